@@ -1,0 +1,86 @@
+#include "plugin_sdk/channel/mailbox.h"
+
+#include <immintrin.h>
+#include <linux/futex.h>
+#include <sched.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <climits>
+#include <cstring>
+
+#include "plugin_sdk/channel/digest.h"
+
+namespace gravitas::channel {
+namespace {
+
+// How long a side spins before it sleeps: about what a sleep and a wake cost.
+constexpr std::uint64_t kSpinNs = 50'000;
+
+void futex_wake(const std::atomic<std::uint32_t>* word) {
+  syscall(SYS_futex, word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
+}
+
+void futex_wait(const std::atomic<std::uint32_t>* word, std::uint32_t expected, std::uint64_t timeout_ns) {
+  const timespec timeout = {static_cast<time_t>(timeout_ns / 1'000'000'000),
+                            static_cast<long>(timeout_ns % 1'000'000'000)};
+  syscall(SYS_futex, word, FUTEX_WAIT, expected, &timeout, nullptr, 0);
+}
+
+}  // namespace
+
+std::uint64_t now_ns() {
+  timespec time;
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return static_cast<std::uint64_t>(time.tv_sec) * 1'000'000'000U + static_cast<std::uint64_t>(time.tv_nsec);
+}
+
+void post(Mailbox* mine, const Mailbox* theirs) {
+  mine->cpu.store(static_cast<std::uint32_t>(sched_getcpu()), std::memory_order_relaxed);
+  mine->signal.fetch_add(1, std::memory_order_seq_cst);
+  if (theirs->sleeping.load(std::memory_order_seq_cst) != 0) futex_wake(&mine->signal);
+}
+
+Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint64_t until) {
+  const auto here = static_cast<std::uint32_t>(sched_getcpu());
+  mine->cpu.store(here, std::memory_order_relaxed);
+  if (theirs->cpu.load(std::memory_order_relaxed) != here) {
+    const std::uint64_t spin_end = now_ns() + kSpinNs;
+    do {
+      for (int i = 0; i < 32; ++i) {
+        if (theirs->signal.load(std::memory_order_acquire) != seen) return Waited::kMessage;
+        _mm_pause();
+      }
+    } while (now_ns() < spin_end);
+  }
+
+  mine->sleeping.store(1, std::memory_order_seq_cst);
+  Waited result = Waited::kMessage;
+  while (theirs->signal.load(std::memory_order_seq_cst) == seen) {
+    const std::uint64_t now = now_ns();
+    if (now >= until) {
+      result = Waited::kTimeout;
+      break;
+    }
+    futex_wait(&theirs->signal, seen, until - now);
+  }
+  mine->sleeping.store(0, std::memory_order_relaxed);
+  return result;
+}
+
+void wake(const Mailbox* mailbox) { futex_wake(&mailbox->signal); }
+
+std::uint64_t frame_digest(const gravitas_frame_header& header, const gravitas_frame_column* columns,
+                           std::span<const stage::ColumnInfo> infos, const void* const* data) {
+  gravitas_frame_header bare = header;
+  bare.digest = 0;
+  Digest digest;
+  digest.add(&bare, sizeof bare);
+  digest.add(columns, infos.size() * sizeof *columns);
+  for (std::size_t i = 0; data != nullptr && i < infos.size(); ++i)
+    digest.add(data[i], static_cast<std::size_t>(columns[i].count) * stage::element_size(infos[i].type));
+  return digest.value();
+}
+
+}  // namespace gravitas::channel

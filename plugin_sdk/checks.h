@@ -1,0 +1,30 @@
+// Checks of answers: what the kernel demands of every reply, and what a plugin's author can test against.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "schemas/frame/column.h"
+
+namespace gravitas {
+
+// Largest deviation of a squared norm from 1 that passes as unit: some roundings of a renormalised quaternion.
+inline constexpr double kUnitTolerance = 1e-9;
+
+inline constexpr std::size_t kNoRow = ~std::size_t{0};
+
+// Index of the first number that is not finite, or kNoRow.
+std::size_t first_not_finite(std::span<const double> numbers);
+
+// First row of `components` numbers whose norm is not 1, or kNoRow.
+std::size_t first_not_unit(std::span<const double> numbers, std::size_t components);
+
+// Number of elements of each column of a message, in order.
+using ColumnCounts = std::span<const std::uint64_t>;
+
+// Structure of a reply: every column a whole number of rows; single values present; columns that name the same
+// rows equally long, and as long as the request's where it has such rows. Empty, or a sentence naming the column.
+std::string check_rows(const stage::MethodInfo& method, ColumnCounts request, ColumnCounts reply);
+
+}  // namespace gravitas

@@ -1,0 +1,58 @@
+#include "plugin_sdk/constraint.h"
+
+#include <string>
+
+namespace gravitas {
+namespace {
+
+void push_vector(const stage::ReplyColumn<double>& column, const Vector3& v) { column.push(v.x(), v.y(), v.z()); }
+
+Pose pose_of(std::span<const double> position, std::span<const double> orientation, std::uint32_t body) {
+  if (body == kNone) return {};
+  if (3 * (std::size_t{body} + 1) > position.size() || 4 * (std::size_t{body} + 1) > orientation.size())
+    throw Refusal("a joint names body " + std::to_string(body) + ", which does not exist");
+  return {vector_at(position, body), quaternion_at(orientation, body)};
+}
+
+}  // namespace
+
+namespace detail {
+
+JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
+                      std::span<const double> orientation, std::size_t joint) {
+  return {pose_of(position, orientation, constraint_body[2 * joint]),
+          pose_of(position, orientation, constraint_body[2 * joint + 1])};
+}
+
+std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row) {
+  if (row + 1 >= begin.size() || begin[row] > begin[row + 1] || begin[row + 1] > numbers.size())
+    throw Refusal("the parameters of joint " + std::to_string(row) + " lie outside their column");
+  return numbers.subspan(begin[row], begin[row + 1] - begin[row]);
+}
+
+void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d) {
+  reply.constraint().push(joint);
+  push_vector(reply.point1(), d.point1);
+  push_vector(reply.point2(), d.point2);
+  push_vector(reply.velocity(), d.velocity);
+  reply.correction().push(d.correction);
+  reply.axes().push(d.axes.w(), d.axes.x(), d.axes.y(), d.axes.z());
+  reply.mode().push(d.modes);
+  push_vector(reply.lower(), d.lower);
+  push_vector(reply.upper(), d.upper);
+  push_vector(reply.compliance(), d.compliance);
+  push_vector(reply.damping(), d.damping);
+  push_vector(reply.maximum_force(), d.maximum_force);
+}
+
+}  // namespace detail
+
+Discrepancy point_discrepancy(const Vector3& anchor1_in_body1, const Vector3& anchor2_in_body2,
+                              const JointBodies& bodies) {
+  Discrepancy d;
+  d.point1 = transform_point(bodies.pose1, anchor1_in_body1);
+  d.point2 = transform_point(bodies.pose2, anchor2_in_body2);
+  return d;
+}
+
+}  // namespace gravitas

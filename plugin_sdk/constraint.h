@@ -1,0 +1,66 @@
+// For authors of joints: the loops over the joints of Constraint.Bind and Constraint.Discrepancies.
+//
+// Bind turns what the scene says in world coordinates at the start into numbers that are fixed in the bodies.
+// Discrepancies turns those numbers and a state into discrepancies (plugin_sdk/discrepancy.h).
+#pragma once
+
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+
+// A joint in a state. The world is a body at the origin, at rest.
+struct JointBodies {
+  Pose pose1, pose2;  // of the centres of mass
+};
+
+// Appends numbers that PropertyCursor reads back.
+class BoundWriter {
+ public:
+  void number(double value) { numbers_.push_back(value); }
+  void vector(const Vector3& v) { numbers_.insert(numbers_.end(), {v.x(), v.y(), v.z()}); }
+  const std::vector<double>& numbers() const { return numbers_; }
+
+ private:
+  std::vector<double> numbers_;
+};
+
+namespace detail {
+JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
+                      std::span<const double> orientation, std::size_t joint);
+void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d);
+std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row);
+}  // namespace detail
+
+// Calls bind(type id, properties of the joint, bodies at the start, writer) for every joint.
+template <typename Bind>
+void bind_each(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Bind&& bind) {
+  reply.bound_begin().push(0);
+  for (std::size_t i = 0; i < request.constraint_type().size(); ++i) {
+    BoundWriter writer;
+    bind(request.constraint_type()[i], PropertyCursor(detail::slice(request.parameter(), request.parameter_begin(), i)),
+         detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i), writer);
+    for (const double number : writer.numbers()) reply.bound().push(number);
+    reply.bound_begin().push(reply.bound().count());
+  }
+}
+
+// Calls describe(type id, bound numbers, bodies, emit) for every joint that holds; emit(discrepancy) adds one.
+template <typename Describe>
+void describe_each(const stage::ConstraintDiscrepanciesRequest& request,
+                   const stage::ConstraintDiscrepanciesReply& reply, Describe&& describe) {
+  for (std::size_t i = 0; i < request.constraint_type().size(); ++i) {
+    if (request.intact()[i] == 0) continue;
+    describe(request.constraint_type()[i], PropertyCursor(detail::slice(request.bound(), request.bound_begin(), i)),
+             detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i),
+             [&](const Discrepancy& d) { detail::push_discrepancy(reply, i, d); });
+  }
+}
+
+// The ball-and-socket discrepancy d_s (2.83): two anchors, fixed in the bodies, coincide.
+Discrepancy point_discrepancy(const Vector3& anchor1_in_body1, const Vector3& anchor2_in_body2, const JointBodies& bodies);
+
+}  // namespace gravitas

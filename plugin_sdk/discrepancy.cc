@@ -1,0 +1,81 @@
+#include "plugin_sdk/discrepancy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+
+JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, const Vector3& com1,
+                         const Vector3& com2) {
+  if (discrepancy.is_angular()) return {Vector3::Zero(), -axis, Vector3::Zero(), axis};
+  const Vector3 middle = 0.5 * (discrepancy.point1 + discrepancy.point2);
+  const Vector3 r1 = middle - com1;
+  const Vector3 r2 = middle - com2;
+  return {-axis, -r1.cross(axis), axis, r2.cross(axis)};
+}
+
+Vector3 carried(const Vector3& point, const Pose& from, const Pose& to) {
+  return to.orientation * (from.orientation.conjugate() * (point - from.position)) + to.position;
+}
+
+Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
+                 const Pose& then2) {
+  const Vector3 error = discrepancy.point2 - discrepancy.point1;
+  if (!discrepancy.is_angular())
+    return carried(discrepancy.point2, now2, then2) - carried(discrepancy.point1, now1, then1);
+  const Vector3 turn1 = log_rotation(then1.orientation * now1.orientation.conjugate());
+  const Vector3 turn2 = log_rotation(then2.orientation * now2.orientation.conjugate());
+  return error + turn2 - turn1;
+}
+
+double joint_error(const Discrepancy& discrepancy, const Vector3& error) {
+  const Matrix3 axes = discrepancy.axes.toRotationMatrix();
+  double sum = 0.0;
+  for (int i = 0; i < 3; ++i) {
+    const double along = axes.col(i).dot(error);
+    double excess = 0.0;
+    switch (axis_mode(discrepancy.modes, i)) {
+      case AxisMode::kLocked: excess = along; break;
+      case AxisMode::kLimited:
+        excess = std::max({0.0, discrepancy.lower[i] - along, along - discrepancy.upper[i]});
+        break;
+      case AxisMode::kUnilateral: excess = std::max(0.0, -along); break;
+      default: break;
+    }
+    sum += excess * excess;
+  }
+  return std::sqrt(sum);
+}
+
+Discrepancy contact_discrepancy(const Vector3& point, const Vector3& normal, double depth) {
+  Discrepancy contact;
+  contact.point1 = point + 0.5 * depth * normal;
+  contact.point2 = point - 0.5 * depth * normal;
+  const auto [tangent1, tangent2] = orthonormal_basis(normal);
+  Matrix3 axes;
+  axes << normal, tangent1, tangent2;
+  contact.axes = to_quaternion(axes);
+  contact.modes = pack_modes(AxisMode::kUnilateral, AxisMode::kFriction, AxisMode::kFriction);
+  return contact;
+}
+
+Discrepancy DiscrepancyColumns::at(std::size_t row) const {
+  Discrepancy d;
+  d.point1 = vector_at(point1, row);
+  d.point2 = vector_at(point2, row);
+  d.velocity = vector_at(velocity, row);
+  d.correction = correction[row];
+  d.axes = quaternion_at(axes, row);
+  d.modes = mode[row];
+  d.lower = vector_at(lower, row);
+  d.upper = vector_at(upper, row);
+  d.compliance = vector_at(compliance, row);
+  d.damping = vector_at(damping, row);
+  d.maximum_force = vector_at(maximum_force, row);
+  return d;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,114 @@
+// The discrepancy: the one form in which joints and contacts are described to every solver (§ 2.7.4, extended).
+//
+// The seed's discrepancy is the quadruple (x1, x2, v_r, beta): a point on either body that should coincide, the
+// velocity x2 should have relative to x1, and the share of the error that a step removes. As printed it is
+// always three bilateral rows, so four contact quadruples weld a box to the floor. Extended here by three
+// orthonormal axes with a mode each, compliance, damping and a bound on the force, and by the angular twin.
+//
+//        body 1 --r1--.                       .--r2-- body 2
+//                  x1 ~~~ m ~~~ x2     error x2 - x1, m the point midway
+//
+// Velocity of a row along the unit axis a (world):  J v = a.(v2 + w2 x r2) - a.(v1 + w1 x r1), r1 and r2 from the
+// centres of mass to m, so J = [-a, -(r1 x a), a, r2 x a]; the angular twin has J = [0, -a, 0, a]. An impulse lambda
+// along a pushes body 2 by +lambda a and body 1 by -lambda a, both at m: pushed at x1 and x2 they would turn by the
+// couple (x2 - x1) x lambda a, out of nothing. J delta is the change of a.(x2 - x1) to first order in the error.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "plugin_sdk/math/pose.h"
+#include "plugin_sdk/math/types.h"
+
+namespace gravitas {
+
+// What holds along one axis of a discrepancy.
+enum class AxisMode : std::uint32_t {
+  kFree = 0,        // nothing
+  kLocked = 1,      // error and velocity difference vanish, multiplier of either sign
+  kLimited = 2,     // error stays within lower … upper
+  kUnilateral = 3,  // error a.(x2 - x1) >= 0, multiplier >= 0
+  kFriction = 4,    // velocity only; the two friction axes share a cone about the unilateral axis
+  kDriven = 5       // velocity only; reaches the desired velocity within maximum_force
+};
+
+// Modes of the three axes, four bits each from the lowest, and a flag for the angular twin.
+inline constexpr std::uint32_t kAngularDiscrepancy = 1U << 12;
+
+constexpr std::uint32_t pack_modes(AxisMode x, AxisMode y, AxisMode z, bool angular = false) {
+  return static_cast<std::uint32_t>(x) | static_cast<std::uint32_t>(y) << 4 | static_cast<std::uint32_t>(z) << 8 |
+         (angular ? kAngularDiscrepancy : 0U);
+}
+
+constexpr AxisMode axis_mode(std::uint32_t modes, int axis) {
+  return static_cast<AxisMode>((modes >> (4 * axis)) & 0xFU);
+}
+
+// True if the value is one that pack_modes() makes.
+constexpr bool is_valid_mode(std::uint32_t modes) {
+  return modes < 2 * kAngularDiscrepancy && (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 &&
+         ((modes >> 8) & 0xFU) <= 5;
+}
+
+// Stands for "no bound" in maximum_force, lower and upper (columns hold finite numbers only).
+inline constexpr double kUnlimited = std::numeric_limits<double>::max();
+
+struct Discrepancy {
+  Vector3 point1 = Vector3::Zero();                     // x1, world, m (angular: rotation vector, rad)
+  Vector3 point2 = Vector3::Zero();                     // x2
+  Vector3 velocity = Vector3::Zero();                   // desired velocity of x2 relative to x1, world, m/s or rad/s
+  double correction = 1.0;                              // beta, 0 … 1
+  Quaternion axes = Quaternion::Identity();             // columns of its matrix are the axes, world
+  std::uint32_t modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked);
+  Vector3 lower = Vector3::Zero();                      // along the axes, m or rad
+  Vector3 upper = Vector3::Zero();
+  Vector3 compliance = Vector3::Zero();                 // m/N or rad/(N m)
+  Vector3 damping = Vector3::Zero();                    // N s/m or N m s/rad
+  Vector3 maximum_force = Vector3::Constant(kUnlimited);  // N or N m
+
+  bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
+};
+
+// One row of the constraint Jacobian, with the arms to the point midway between the discrepancy's two.
+struct JacobianRow {
+  Vector3 linear1, angular1, linear2, angular2;
+
+  // J v for the velocities of the two bodies.
+  double velocity(const Vector3& v1, const Vector3& w1, const Vector3& v2, const Vector3& w2) const {
+    return linear1.dot(v1) + angular1.dot(w1) + linear2.dot(v2) + angular2.dot(w2);
+  }
+};
+
+// Row along `axis` (unit, world) for bodies whose centres of mass are at com1 and com2 (world, m).
+JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, const Vector3& com1,
+                         const Vector3& com2);
+
+// Point of a body given in the world while the body had pose `from` (of its centre of mass), where it is when
+// the body has pose `to`.
+Vector3 carried(const Vector3& point, const Pose& from, const Pose& to);
+
+// Error x2 - x1 (world) when the bodies are at `then` poses, for a discrepancy that was written at `now` poses.
+// Exact for points; an angular error is carried to first order in the rotation between the two.
+Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
+                 const Pose& then2);
+
+// Joint error of a discrepancy with error vector `error` (world): its norm over the axes that are locked, and
+// over the limits where they are exceeded. m, or rad for the angular twin.
+double joint_error(const Discrepancy& discrepancy, const Vector3& error);
+
+// A contact as a discrepancy (§ 2.7.5.1, with x1 and x2 as they must be: x2 - x1 along the normal is minus the
+// depth): first axis the normal (unit, from body 1 to body 2), unilateral; the others friction.
+Discrepancy contact_discrepancy(const Vector3& point, const Vector3& normal, double depth);
+
+// The columns of a message as discrepancies: the same names in ConstraintDiscrepanciesReply and SolverSolveRequest.
+struct DiscrepancyColumns {
+  std::span<const double> point1, point2, velocity, correction, axes;
+  std::span<const std::uint32_t> mode;
+  std::span<const double> lower, upper, compliance, damping, maximum_force;
+
+  std::size_t size() const { return mode.size(); }
+  Discrepancy at(std::size_t row) const;
+};
+
+}  // namespace gravitas

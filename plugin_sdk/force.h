@@ -1,0 +1,42 @@
+// For authors of forces: the loop over the applications of a Force.Wrenches call.
+#pragma once
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+
+// What one force does to one body.
+struct ApplicationAnswer {
+  Wrench wrench = {};       // N and N m about the centre of mass, world
+  Wrench impulse = {};      // N s and N m s, applied once at the start
+  double potential = 0.0;   // J
+  std::uint32_t flags = 0;  // ApplicationFlag bits
+};
+
+// Calls answer(type id, flattened properties of the force, body) for every application in order and writes what it
+// returns. Throws Refusal for an index outside the request.
+template <typename Answer>
+void for_each_application(const stage::ForceWrenchesRequest& request, const stage::ForceWrenchesReply& reply,
+                          Answer&& answer) {
+  const std::span<const std::uint32_t> applications = request.application(), begin = request.force_parameter_begin();
+  for (std::size_t i = 0; i + 1 < applications.size(); i += 2) {
+    const std::uint32_t force = applications[i], body = applications[i + 1];
+    if (force + std::size_t{1} >= begin.size() || body >= request.mass().size() || begin[force] > begin[force + 1] ||
+        begin[force + 1] > request.force_parameter().size())
+      throw Refusal("application " + std::to_string(i / 2) + " names a force or body that does not exist");
+    const ApplicationAnswer a =
+        answer(request.force_type()[force],
+               PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force])), body);
+    const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
+      column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());
+    };
+    push(reply.wrench(), a.wrench);
+    push(reply.impulse(), a.impulse);
+    reply.potential().push(a.potential);
+    reply.flags().push(a.flags);
+  }
+}
+
+}  // namespace gravitas

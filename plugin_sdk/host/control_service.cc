@@ -1,0 +1,104 @@
+#include "plugin_sdk/host/control_service.h"
+
+#include <fcntl.h>
+#include <grpcpp/server_posix.h>
+#include <unistd.h>
+
+#include <utility>
+
+#include "plugin_sdk/floating_point.h"
+
+namespace gravitas::host {
+
+using control::v1::Hello;
+using control::v1::KernelMessage;
+using control::v1::Refusal;
+using control::v1::WorkerMessage;
+
+ControlService::ControlService(std::vector<plugin::v1::Description> plugins, std::uint32_t mxcsr,
+                               std::function<Admission(const Hello&)> admit)
+    : plugins_(std::move(plugins)), mxcsr_(mxcsr), admit_(std::move(admit)) {}
+
+Admission ControlService::judge(const Hello& hello) const {
+  if (hello.magic() != GRAVITAS_MAGIC) return {Refusal::REASON_MAGIC, "the other side is no Gravitas kernel"};
+  if (hello.protocol_minimum() > kProtocolMaximum || hello.protocol_maximum() < kProtocolMinimum) {
+    return {Refusal::REASON_PROTOCOL, "the kernel speaks control protocol " +
+                                          std::to_string(hello.protocol_minimum()) + " to " +
+                                          std::to_string(hello.protocol_maximum()) + ", this worker " +
+                                          std::to_string(kProtocolMinimum) + " to " +
+                                          std::to_string(kProtocolMaximum)};
+  }
+  if (hello.schema_hash() != stage::kSchemaHash)
+    return {Refusal::REASON_SCHEMA, "the kernel was built for another schema of the stage contracts"};
+  if (hello.floating_point().mxcsr() != mxcsr_)
+    return {Refusal::REASON_FLOATING_POINT, "floating-point arithmetic is set differently in kernel and worker"};
+  if (hello.plugins_size() != static_cast<int>(plugins_.size()))
+    return {Refusal::REASON_SETTINGS, "the kernel expects another number of plugins in this worker"};
+  return admit_(hello);
+}
+
+WorkerMessage ControlService::welcome(const Hello& hello) const {
+  WorkerMessage message;
+  control::v1::Welcome* welcome = message.mutable_welcome();
+  welcome->set_magic(GRAVITAS_MAGIC);
+  welcome->set_protocol(kProtocolMaximum);
+  welcome->set_schema_hash(stage::kSchemaHash);
+  welcome->set_epoch(hello.epoch());
+  welcome->set_nonce(hello.nonce());
+  welcome->set_build_id(GRAVITAS_BUILD_ID);
+  welcome->mutable_floating_point()->set_mxcsr(mxcsr_);
+  welcome->mutable_floating_point()->set_c_library(c_library());
+  for (const std::string& feature : cpu_features()) welcome->mutable_floating_point()->add_cpu_features(feature);
+  welcome->set_process_id(getpid());
+  for (const plugin::v1::Description& description : plugins_) *welcome->add_plugins() = description;
+  return message;
+}
+
+grpc::Status ControlService::Session(grpc::ServerContext*,
+                                     grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
+  if (taken_.exchange(true)) return {grpc::StatusCode::ALREADY_EXISTS, "this worker has its kernel"};
+  KernelMessage message;
+  if (!stream->Read(&message) || !message.has_hello())
+    return {grpc::StatusCode::INVALID_ARGUMENT, "the first message must be Hello"};
+
+  const Admission admission = judge(message.hello());
+  if (!admission.text.empty()) {
+    WorkerMessage answer;
+    answer.mutable_refusal()->set_reason(admission.reason);
+    answer.mutable_refusal()->set_text(admission.text);
+    stream->Write(answer);
+    on_end(false);
+    return grpc::Status::OK;
+  }
+  stream->Write(welcome(message.hello()));
+  WorkerMessage ready;
+  ready.mutable_ready();
+  stream->Write(ready);
+
+  while (stream->Read(&message)) {
+    if (message.has_drain()) {
+      on_end(false);
+      return grpc::Status::OK;
+    }
+    if (message.has_ping()) {
+      WorkerMessage answer;
+      answer.mutable_pong()->set_sequence(message.ping().sequence());
+      answer.mutable_pong()->set_calls(calls.load());
+      stream->Write(answer);
+    }
+  }
+  on_end(true);
+  return grpc::Status::OK;
+}
+
+std::unique_ptr<grpc::Server> serve_descriptor(grpc::Service* service, int descriptor) {
+  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+  grpc::ServerBuilder builder;
+  builder.RegisterService(service);
+  builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
+  std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  if (server) grpc::AddInsecureChannelFromFd(server.get(), descriptor);
+  return server;
+}
+
+}  // namespace gravitas::host

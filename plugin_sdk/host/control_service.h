@@ -1,0 +1,54 @@
+// The worker's end of the control stream (schemas/gravitas/control/v1/control.proto): handshake, heartbeat, drain.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "gravitas/control/v1/control.grpc.pb.h"
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas::host {
+
+// Versions of the control protocol that this build speaks.
+inline constexpr std::uint32_t kProtocolMinimum = 1;
+inline constexpr std::uint32_t kProtocolMaximum = 1;
+
+// What the worker does with an accepted Hello: create the plugins. Empty text: ready; else the reason why not.
+struct Admission {
+  control::v1::Refusal::Reason reason = control::v1::Refusal::REASON_UNSPECIFIED;
+  std::string text;
+};
+
+class ControlService final : public control::v1::WorkerControl::Service {
+ public:
+  // `plugins` describes what this worker serves; `mxcsr` is the floating-point control of the thread that will
+  // run them; `admit` is called once, in the stream's thread.
+  ControlService(std::vector<plugin::v1::Description> plugins, std::uint32_t mxcsr,
+                 std::function<Admission(const control::v1::Hello&)> admit);
+
+  // Called (from a thread of gRPC) when the kernel asks the worker to end, or is gone.
+  std::function<void(bool kernel_is_gone)> on_end;
+  std::atomic<std::uint64_t> calls{0};
+
+  grpc::Status Session(grpc::ServerContext* context,
+                       grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream) override;
+
+ private:
+  Admission judge(const control::v1::Hello& hello) const;
+  control::v1::WorkerMessage welcome(const control::v1::Hello& hello) const;
+
+  std::vector<plugin::v1::Description> plugins_;
+  std::uint32_t mxcsr_;
+  std::function<Admission(const control::v1::Hello&)> admit_;
+  std::atomic<bool> taken_{false};
+};
+
+// A server that serves one inherited socket and listens nowhere.
+std::unique_ptr<grpc::Server> serve_descriptor(grpc::Service* service, int descriptor);
+
+}  // namespace gravitas::host

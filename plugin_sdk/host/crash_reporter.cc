@@ -1,0 +1,54 @@
+#include <signal.h>
+#include <time.h>
+
+#include <array>
+#include <atomic>
+#include <cstring>
+
+#include "plugin_sdk/host/worker.h"
+
+namespace gravitas::host {
+namespace {
+
+channel::Mailbox* reporter_mailbox = nullptr;
+const channel::Mailbox* reporter_kernel = nullptr;
+std::uint64_t reporter_epoch = 0;
+alignas(16) std::array<char, 65536> reporter_stack;
+
+// Runs on its own stack (the signal may be a stack overflow) and calls nothing that takes a lock.
+void report_crash(int signal_number) {
+  static std::atomic<bool> reported{false};
+  if (!reported.exchange(true)) {
+    gravitas_frame_header header{};
+    header.magic = GRAVITAS_MAGIC;
+    header.kind = GRAVITAS_FRAME_CRASH;
+    header.epoch = reporter_epoch;
+    header.status = signal_number;
+    std::memcpy(&reporter_mailbox->header, &header, sizeof header);
+    channel::post(reporter_mailbox, reporter_kernel);
+    // let the kernel have this core before the process is torn down
+    const timespec pause = {0, 500'000};
+    nanosleep(&pause, nullptr);
+  }
+  signal(signal_number, SIG_DFL);
+  raise(signal_number);
+}
+
+}  // namespace
+
+void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kernel, std::uint64_t epoch) {
+  reporter_mailbox = mine;
+  reporter_kernel = kernel;
+  reporter_epoch = epoch;
+  stack_t stack{};
+  stack.ss_sp = reporter_stack.data();
+  stack.ss_size = reporter_stack.size();
+  sigaltstack(&stack, nullptr);
+  struct sigaction action {};
+  action.sa_handler = report_crash;
+  action.sa_flags = SA_ONSTACK | SA_NODEFER;
+  sigemptyset(&action.sa_mask);
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) sigaction(number, &action, nullptr);
+}
+
+}  // namespace gravitas::host

@@ -1,0 +1,266 @@
+#include "plugin_sdk/host/worker.h"
+
+#include <sched.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <utility>
+
+#include "plugin_sdk/floating_point.h"
+
+namespace gravitas::host {
+
+using channel::SegmentRole;
+
+struct Worker::CallState {
+  Worker* worker = nullptr;
+  gravitas_frame_header request{};
+  std::size_t reply_columns = 0;
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns{};
+  std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply{};
+  // Offsets of the rooms in the response segment: the reply's, then those for a derivative request.
+  std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> room{};
+};
+
+namespace {
+
+// How long a wait lasts before the loop looks at its flags again.
+constexpr std::uint64_t kIdleNs = 100'000'000;
+// Messages in a row found on the kernel's own core before the worker moves.
+constexpr std::uint32_t kPatience = 4;
+
+std::size_t bytes_of(const stage::ColumnInfo& column, std::uint64_t count) {
+  return static_cast<std::size_t>(count) * stage::element_size(column.type);
+}
+
+bool fits(const channel::Segment& segment, std::uint64_t offset, std::uint64_t bytes) {
+  return offset % GRAVITAS_COLUMN_ALIGNMENT == 0 && bytes <= segment.size() && offset <= segment.size() - bytes;
+}
+
+void mark_progress(void* context) {
+  static_cast<channel::Mailbox*>(context)->progress.fetch_add(1, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+Worker::Worker(std::vector<PluginLibrary> libraries, int descriptor_socket)
+    : libraries_(std::move(libraries)), descriptor_socket_(descriptor_socket) {}
+
+Worker::~Worker() {
+  for (std::size_t i = 0; i < instances_.size(); ++i) libraries_[i].table->destroy(instances_[i]);
+}
+
+std::string Worker::create_instances(const std::vector<std::vector<double>>& settings) {
+  for (std::size_t i = 0; i < libraries_.size(); ++i) {
+    gravitas_error error{};
+    void* instance = nullptr;
+    const gravitas_plugin_table& table = *libraries_[i].table;
+    if (table.create(settings[i].data(), settings[i].size(), &instance, &error) != GRAVITAS_OK)
+      return libraries_[i].declaration.name + ": " + error.text;
+    instances_.push_back(instance);
+  }
+  return {};
+}
+
+bool Worker::receive_segments() {
+  channel::SegmentMessage message{};
+  const int descriptor = channel::receive_segment(descriptor_socket_, &message);
+  if (descriptor < 0) return false;
+  const bool read_only = message.role == SegmentRole::kKernelMailbox || message.role == SegmentRole::kState;
+  channel::Segment segment = channel::Segment::map(
+      descriptor, message.size, read_only ? channel::Access::kReadOnly : channel::Access::kReadWrite);
+  switch (message.role) {
+    case SegmentRole::kKernelMailbox:
+      kernel_segment_ = std::move(segment);
+      kernel_ = reinterpret_cast<const channel::Mailbox*>(kernel_segment_.data());
+      break;
+    case SegmentRole::kWorkerMailbox:
+      worker_segment_ = std::move(segment);
+      mine_ = reinterpret_cast<channel::Mailbox*>(worker_segment_.data());
+      break;
+    case SegmentRole::kState:
+      state_ = std::move(segment);
+      state_generation_ = message.generation;
+      break;
+    case SegmentRole::kResponse:
+      response_ = std::move(segment);
+      response_generation_ = message.generation;
+      break;
+    default: return false;
+  }
+  return true;
+}
+
+bool Worker::map_announced_segments(const gravitas_frame_header& header) {
+  while (state_generation_ != header.state_generation || response_generation_ != header.response_generation)
+    if (!receive_segments()) return false;
+  return true;
+}
+
+int Worker::serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<bool>& stopping,
+                  std::atomic<std::uint64_t>* calls) {
+  epoch_ = epoch;
+  threads_ = std::make_unique<ThreadPool>(threads);
+  while (kernel_ == nullptr || mine_ == nullptr)
+    if (!receive_segments()) return 1;
+  install_crash_reporter(mine_, kernel_, epoch_);
+
+  while (!stopping.load()) {
+    if (channel::wait(mine_, kernel_, seen_, channel::now_ns() + kIdleNs) == channel::Waited::kTimeout) continue;
+    seen_ = kernel_->signal.load(std::memory_order_acquire);
+    gravitas_frame_header header;
+    std::memcpy(&header, &kernel_->header, sizeof header);
+    if (header.kind == GRAVITAS_FRAME_STOP) return 0;
+    if (header.kind != GRAVITAS_FRAME_REQUEST || header.epoch != epoch_) continue;
+    if (!map_announced_segments(header)) return 1;
+    leave_crowded_core();
+    answer(header);
+    calls->fetch_add(1);
+  }
+  return 0;
+}
+
+std::string Worker::read_request(const gravitas_frame_header& request, CallState* call) {
+  call->worker = this;
+  call->request = request;
+  if (request.magic != GRAVITAS_MAGIC || request.schema_hash != stage::kSchemaHash) return "a frame of another schema";
+  if (request.method >= stage::kMethodCount) return "an unknown method";
+  if (request.target >= instances_.size()) return "no such plugin in this worker";
+  const stage::MethodInfo& method = stage::kMethods[request.method];
+  call->reply_columns = method.reply.size();
+  if (request.column_count != method.request.size() || request.reply_count < method.reply.size() ||
+      request.reply_count > GRAVITAS_MAX_COLUMNS)
+    return "a frame with the wrong number of columns";
+  for (std::size_t i = 0; i < method.request.size(); ++i) {
+    const gravitas_frame_column& column = kernel_->columns[i];
+    if (!fits(state_, column.offset, bytes_of(method.request[i], column.count)))
+      return std::string("column ") + method.request[i].name + " lies outside the state segment";
+    call->columns[i] = {state_.data() + column.offset, column.count};
+  }
+  for (std::size_t i = 0; i < request.reply_count; ++i) {
+    const gravitas_frame_column& room = kernel_->reply[i];
+    if (!fits(response_, room.offset, room.capacity * 8)) return "room for a reply outside the response segment";
+    call->room[i] = room.offset;
+    call->reply[i] = {response_.data() + room.offset, room.capacity, 0};
+  }
+  return {};
+}
+
+void Worker::answer(const gravitas_frame_header& request) {
+  CallState call;
+  const std::string problem = read_request(request, &call);
+  if (!problem.empty()) {
+    call.request.method = std::min(request.method, stage::kMethodCount - 1);
+    write_reply(call, GRAVITAS_FAILED, problem.c_str(), 0);
+    return;
+  }
+  struct Services {
+    CallState* call;
+    channel::Mailbox* mine;
+    ThreadPool* threads;
+  } services{&call, mine_, threads_.get()};
+  gravitas_host host{};
+  host.context = &services;
+  host.mark_progress = [](void* context) { mark_progress(static_cast<Services*>(context)->mine); };
+  host.parallel_for = [](void* context, std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t),
+                         void* argument) {
+    static_cast<Services*>(context)->threads->parallel_for(count, body, argument);
+  };
+  if (request.method == static_cast<std::uint32_t>(stage::Method::kIntegratorIntegrate)) {
+    host.derivative = [](void* context, const gravitas_column* columns, gravitas_reply_column* reply) {
+      CallState* current = static_cast<Services*>(context)->call;
+      return current->worker->ask_derivative(current, columns, reply);
+    };
+  }
+
+  const std::uint32_t control = floating_point_control();
+  gravitas_error error{};
+  const std::uint64_t start = channel::now_ns();
+  std::int32_t status = libraries_[request.target].table->call(instances_[request.target], request.method,
+                                                               call.columns.data(), call.reply.data(), &host, &error);
+  const std::uint64_t compute_ns = channel::now_ns() - start;
+  const char* text = error.text;
+  if (floating_point_control() != control) {
+    set_floating_point_control(control);
+    status = GRAVITAS_FAILED;
+    text = "the plugin changed the floating-point environment";
+  }
+  write_reply(call, status, text, compute_ns);
+}
+
+void Worker::write_reply(const CallState& call, std::int32_t status, const char* text, std::uint64_t compute_ns) {
+  gravitas_frame_header header = call.request;
+  header.kind = GRAVITAS_FRAME_REPLY;
+  header.status = status;
+  header.column_count = static_cast<std::uint32_t>(call.reply_columns);
+  header.reply_count = 0;
+  for (std::size_t i = 0; i < call.reply_columns; ++i)
+    mine_->columns[i] = {call.room[i], call.reply[i].count, call.reply[i].capacity};
+  std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
+  for (std::size_t i = 0; i < call.reply_columns; ++i) data[i] = call.reply[i].data;
+  header.digest = channel::frame_digest(header, mine_->columns, stage::kMethods[header.method].reply,
+                                        status == GRAVITAS_OK ? data.data() : nullptr);
+  std::strncpy(mine_->text, text, sizeof mine_->text - 1);
+  mine_->compute_ns = compute_ns;
+  std::memcpy(&mine_->header, &header, sizeof header);
+  channel::post(mine_, kernel_);
+}
+
+// The trial state goes to the rooms behind the reply's; the answer comes in the state segment.
+std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* request, gravitas_reply_column* reply) {
+  const stage::MethodInfo& method =
+      stage::kMethods[static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative)];
+  const std::size_t columns = method.request.size();
+  if (call->request.reply_count < call->reply_columns + columns) return GRAVITAS_CALLBACK_FAILED;
+
+  gravitas_frame_header header = call->request;
+  header.kind = GRAVITAS_FRAME_CALLBACK;
+  header.method = static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative);
+  header.column_count = static_cast<std::uint32_t>(columns);
+  std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
+  for (std::size_t i = 0; i < columns; ++i) {
+    const std::size_t room = call->reply_columns + i;
+    if (request[i].count > call->reply[room].capacity) return GRAVITAS_CALLBACK_FAILED;
+    data[i] = call->reply[room].data;
+    std::memcpy(call->reply[room].data, request[i].data, bytes_of(method.request[i], request[i].count));
+    mine_->columns[i] = {call->room[room], request[i].count, call->reply[room].capacity};
+  }
+  header.digest = channel::frame_digest(header, mine_->columns, method.request, data.data());
+  std::memcpy(&mine_->header, &header, sizeof header);
+  channel::post(mine_, kernel_);
+
+  // the kernel answers, or kills this process
+  while (channel::wait(mine_, kernel_, seen_, channel::now_ns() + kIdleNs) == channel::Waited::kTimeout) {
+  }
+  seen_ = kernel_->signal.load(std::memory_order_acquire);
+  gravitas_frame_header answer;
+  std::memcpy(&answer, &kernel_->header, sizeof answer);
+  const gravitas_frame_column& wrench = kernel_->columns[0];
+  const std::size_t bytes = static_cast<std::size_t>(wrench.count) * sizeof(double);
+  if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || !fits(state_, wrench.offset, bytes))
+    return GRAVITAS_CALLBACK_FAILED;
+  reply[0].count = wrench.count;
+  if (wrench.count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
+  std::memcpy(reply[0].data, state_.data() + wrench.offset, bytes);
+  return GRAVITAS_OK;
+}
+
+// Two sides on one core cannot spin: after a few such meetings the worker lets itself be moved.
+void Worker::leave_crowded_core() {
+  const int here = sched_getcpu();
+  if (here < 0 || kernel_->cpu.load(std::memory_order_relaxed) != static_cast<std::uint32_t>(here)) {
+    collisions_ = 0;
+    return;
+  }
+  if (++collisions_ < kPatience) return;
+  collisions_ = 0;
+  cpu_set_t allowed, others;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0 || CPU_COUNT(&allowed) < 2) return;
+  others = allowed;
+  CPU_CLR(here, &others);
+  if (sched_setaffinity(0, sizeof others, &others) == 0) sched_setaffinity(0, sizeof allowed, &allowed);
+}
+
+}  // namespace gravitas::host

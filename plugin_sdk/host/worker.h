@@ -1,0 +1,63 @@
+// The data loop of a worker process: waits for calls in the kernel's mailbox, runs a plugin, answers.
+//
+//   request frame -> columns (pointers into the state segment, read-only) -> plugin -> reply columns
+//   (in the response segment) -> digest -> reply frame
+//
+// The loop runs in the process's first thread and nothing else does: a mark of progress can then come from the
+// plugin's own code only, and a plugin that hangs is seen to hang.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/segment.h"
+#include "plugin_sdk/library.h"
+#include "plugin_sdk/thread_pool.h"
+
+namespace gravitas::host {
+
+class Worker {
+ public:
+  Worker(std::vector<PluginLibrary> libraries, int descriptor_socket);
+  ~Worker();
+
+  // Creates the instances; `settings` has the numbers of each. Empty, or why a plugin refused.
+  std::string create_instances(const std::vector<std::vector<double>>& settings);
+
+  // Serves calls until a stop frame comes, `stopping` is set, or the kernel is gone. Returns the exit code.
+  int serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<bool>& stopping,
+            std::atomic<std::uint64_t>* calls);
+
+ private:
+  struct CallState;
+
+  bool receive_segments();
+  bool map_announced_segments(const gravitas_frame_header& header);
+  void answer(const gravitas_frame_header& request);
+  std::string read_request(const gravitas_frame_header& request, CallState* call);
+  void write_reply(const CallState& call, std::int32_t status, const char* text, std::uint64_t compute_ns);
+  std::int32_t ask_derivative(CallState* call, const gravitas_column* request, gravitas_reply_column* reply);
+  void leave_crowded_core();
+
+  std::vector<PluginLibrary> libraries_;
+  std::vector<void*> instances_;
+  int descriptor_socket_;
+  std::uint64_t epoch_ = 0;
+  std::unique_ptr<ThreadPool> threads_;
+
+  channel::Segment kernel_segment_, worker_segment_, state_, response_;
+  std::uint64_t state_generation_ = 0, response_generation_ = 0;
+  const channel::Mailbox* kernel_ = nullptr;
+  channel::Mailbox* mine_ = nullptr;
+  std::uint32_t seen_ = 0;
+  std::uint32_t collisions_ = 0;
+};
+
+// Makes fatal signals wake the kernel at once, with the signal's name, before the process dies of them.
+void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kernel, std::uint64_t epoch);
+
+}  // namespace gravitas::host

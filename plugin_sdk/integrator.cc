@@ -1,0 +1,91 @@
+#include "plugin_sdk/integrator.h"
+
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
+
+namespace gravitas {
+namespace {
+
+gravitas_column column_of(std::span<const double> numbers) { return {numbers.data(), numbers.size()}; }
+
+}  // namespace
+
+void TrialColumns::resize(std::size_t bodies) {
+  position.resize(3 * bodies), orientation.resize(4 * bodies);
+  linear_velocity.resize(3 * bodies), angular_velocity.resize(3 * bodies);
+}
+
+BodyState TrialColumns::at(std::size_t body) const {
+  return {{vector_at(position, body), quaternion_at(orientation, body)},
+          {vector_at(linear_velocity, body), vector_at(angular_velocity, body)}};
+}
+
+void TrialColumns::set(std::size_t body, const BodyState& state) {
+  set_vector(position, body, state.pose.position);
+  set_quaternion(orientation, body, state.pose.orientation);
+  set_vector(linear_velocity, body, state.twist.linear);
+  set_vector(angular_velocity, body, state.twist.angular);
+}
+
+Derivatives::Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host)
+    : request_(request), host_(host) {}
+
+std::span<const double> Derivatives::wrenches_at_start() {
+  if (request_.wrench_is_constant() != 0) return request_.wrench();
+  return ask(request_.time(),
+             {request_.position(), request_.orientation(), request_.linear_velocity(), request_.angular_velocity()});
+}
+
+std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial) {
+  if (request_.wrench_is_constant() != 0) return request_.wrench();
+  return ask(time, {trial.position, trial.orientation, trial.linear_velocity, trial.angular_velocity});
+}
+
+std::span<const double> Derivatives::ask(double time, const std::array<std::span<const double>, 4>& state) {
+  answer_.resize(6 * size());
+  const std::array<gravitas_column, 5> question = {column_of({&time, 1}), column_of(state[0]), column_of(state[1]),
+                                                   column_of(state[2]), column_of(state[3])};
+  gravitas_reply_column answer = {answer_.data(), answer_.size(), 0};
+  host_.derivative(question.data(), &answer);
+  if (answer.count != answer_.size()) throw std::runtime_error("the derivative has the wrong size");
+  return answer_;
+}
+
+Acceleration Derivatives::acceleration(std::size_t body, const BodyState& state,
+                                       std::span<const double> wrenches) const {
+  const Vector3 force = vector_at(wrenches, 2 * body), torque = vector_at(wrenches, 2 * body + 1);
+  return {request_.inverse_mass()[body] * force,
+          angular_acceleration(state.pose.orientation, state.twist.angular, vector_at(request_.inertia(), body),
+                               vector_at(request_.inverse_inertia(), body), torque)};
+}
+
+BodyState Derivatives::start(std::size_t body) const { return detail::state_at(request_, body); }
+
+double damping_factor(double damping, double time_step) {
+  return damping == 0.0 ? 1.0 : math::exp(-damping * time_step);
+}
+
+namespace detail {
+
+BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body) {
+  return {{vector_at(request.position(), body), quaternion_at(request.orientation(), body)},
+          {vector_at(request.linear_velocity(), body), vector_at(request.angular_velocity(), body)}};
+}
+
+void push_state(const stage::IntegratorIntegrateReply& reply, const BodyState& state) {
+  const Vector3 &x = state.pose.position, &v = state.twist.linear, &w = state.twist.angular;
+  const Quaternion& q = state.pose.orientation;
+  reply.position().push(x.x(), x.y(), x.z());
+  reply.orientation().push(q.w(), q.x(), q.y(), q.z());
+  reply.linear_velocity().push(v.x(), v.y(), v.z());
+  reply.angular_velocity().push(w.x(), w.y(), w.z());
+}
+
+BodyState keep_moving(const BodyState& state, double time_step) {
+  BodyState moved = state;
+  moved.pose = displaced(state.pose, time_step * state.twist.linear, time_step * state.twist.angular);
+  return moved;
+}
+
+}  // namespace detail
+}  // namespace gravitas

@@ -1,0 +1,85 @@
+// For authors of integrators: the bodies of an Integrator.Integrate call, and derivatives of a trial state.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+
+struct BodyState {
+  Pose pose;    // of the centre of mass
+  Twist twist;  // world
+};
+
+// States of all bodies in the layout of the columns.
+struct TrialColumns {
+  std::vector<double> position, orientation, linear_velocity, angular_velocity;
+
+  void resize(std::size_t bodies);
+  BodyState at(std::size_t body) const;
+  void set(std::size_t body, const BodyState& state);
+};
+
+struct Acceleration {
+  Vector3 linear;   // m/s^2, world
+  Vector3 angular;  // rad/s^2, world; with the gyroscopic term
+};
+
+// Accelerations of free bodies. It asks the host for wrenches unless the request says that they are constant.
+class Derivatives {
+ public:
+  Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host);
+
+  // Wrenches of all bodies (six numbers each) in the initial state of the step, or in a trial state.
+  std::span<const double> wrenches_at_start();
+  std::span<const double> wrenches(double time, const TrialColumns& trial);
+
+  // Acceleration of one body in a state, under its part of `wrenches`.
+  Acceleration acceleration(std::size_t body, const BodyState& state, std::span<const double> wrenches) const;
+
+  BodyState start(std::size_t body) const;
+  std::size_t size() const { return request_.flags().size(); }
+
+ private:
+  std::span<const double> ask(double time, const std::array<std::span<const double>, 4>& state);
+
+  const stage::IntegratorIntegrateRequest& request_;
+  Host& host_;
+  std::vector<double> answer_;
+};
+
+// Calls move(body, state) for every movable body and writes the state it returns as S*; kinematic bodies go on
+// with their velocities (exactly, x + h v and exp(h w) q), immovable ones stay as they are, bit for bit.
+template <typename Move>
+void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
+                   Move&& move);
+
+// Factor by which damping slows a body in time h: exp(-c h) for any c >= 0, never a change of sign.
+double damping_factor(double damping, double time_step);
+
+namespace detail {
+BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body);
+void push_state(const stage::IntegratorIntegrateReply& reply, const BodyState& state);
+BodyState keep_moving(const BodyState& state, double time_step);
+}  // namespace detail
+
+template <typename Move>
+void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
+                   Move&& move) {
+  for (std::size_t body = 0; body < request.flags().size(); ++body) {
+    BodyState state = detail::state_at(request, body);
+    if ((request.flags()[body] & kMovable) != 0) {
+      state = move(body, state);
+    } else if ((request.flags()[body] & kKinematic) != 0) {
+      state = detail::keep_moving(state, request.time_step());
+    }
+    detail::push_state(reply, state);
+  }
+  reply.error_estimate().set(0.0);
+}
+
+}  // namespace gravitas

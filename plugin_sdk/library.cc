@@ -1,0 +1,123 @@
+#include "plugin_sdk/library.h"
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/sendfile.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace gravitas {
+namespace {
+
+// A descriptor of an anonymous copy of the file, or -1 with the reason in errno.
+int private_copy(const std::string& path) {
+  const int source = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (source < 0) return -1;
+  struct stat status;
+  int copy = -1;
+  if (fstat(source, &status) == 0 && S_ISREG(status.st_mode)) {
+    copy = memfd_create("gravitas plugin", MFD_CLOEXEC);
+    off_t offset = 0;
+    while (copy >= 0 && offset < status.st_size) {
+      if (sendfile(copy, source, &offset, static_cast<std::size_t>(status.st_size - offset)) <= 0) {
+        close(copy);
+        copy = -1;
+      }
+    }
+  } else {
+    errno = S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
+  }
+  const int reason = errno;
+  close(source);
+  errno = reason;
+  return copy;
+}
+
+std::vector<Property> read_properties(const gravitas_property* plain, std::uint64_t count) {
+  std::vector<Property> properties;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    const gravitas_property& p = plain[i];
+    Property property;
+    property.name = p.name;
+    property.kind = static_cast<PropertyKind>(p.kind);
+    property.unit = p.unit;
+    property.frame = p.frame;
+    property.meaning = p.meaning;
+    property.minimum = p.minimum;
+    property.maximum = p.maximum;
+    property.exclusive_minimum = p.exclusive_minimum != 0;
+    property.is_required = p.required != 0;
+    property.is_live = p.live != 0;
+    property.columns = p.columns;
+    property.default_numbers.assign(p.default_numbers, p.default_numbers + p.default_count);
+    property.choices.assign(p.choices, p.choices + p.choice_count);
+    properties.push_back(std::move(property));
+  }
+  return properties;
+}
+
+}  // namespace
+
+PluginDeclaration read_declaration(const gravitas_description& plain) {
+  PluginDeclaration declaration;
+  declaration.name = plain.name;
+  declaration.version = plain.version;
+  declaration.meaning = plain.meaning;
+  declaration.slot = static_cast<Slot>(plain.slot);
+  declaration.capabilities.assign(plain.capabilities, plain.capabilities + plain.capability_count);
+  for (std::uint64_t i = 0; i < plain.type_count; ++i) {
+    const gravitas_type& type = plain.types[i];
+    declaration.types.push_back({type.name, type.meaning, read_properties(type.properties, type.property_count)});
+  }
+  declaration.properties = read_properties(plain.properties, plain.property_count);
+  declaration.theta = plain.theta;
+  return declaration;
+}
+
+PluginLibrary load_plugin_library(const std::string& path, std::string* problem) {
+  const int copy = private_copy(path);
+  if (copy < 0) {
+    *problem = "cannot read '" + path + "': " + std::strerror(errno);
+    return {};
+  }
+  // the descriptor stays open: debuggers and sanitizers read symbols through this name
+  const std::string private_path = "/proc/self/fd/" + std::to_string(copy);
+  void* handle = dlopen(private_path.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) {
+    const char* reason = dlerror();
+    *problem = "'" + path + "' is not a shared library that can be loaded: " + (reason != nullptr ? reason : "?");
+    close(copy);
+    return {};
+  }
+  const auto entry = reinterpret_cast<gravitas_plugin_function>(dlsym(handle, "gravitas_plugin"));
+  if (entry == nullptr) {
+    *problem = "'" + path + "' is not a plugin: it has no function gravitas_plugin";
+    return {};
+  }
+  const gravitas_plugin_table* table = entry();
+  if (table == nullptr || table->magic != GRAVITAS_MAGIC) {
+    *problem = "'" + path + "' is not a plugin: gravitas_plugin() returns no table of this interface";
+    return {};
+  }
+  if (table->abi_version != GRAVITAS_ABI_VERSION || table->layout_version != GRAVITAS_LAYOUT_VERSION) {
+    *problem = "'" + path + "' was built for version " + std::to_string(table->abi_version) + "." +
+               std::to_string(table->layout_version) + " of the plugin interface; this is " +
+               std::to_string(GRAVITAS_ABI_VERSION) + "." + std::to_string(GRAVITAS_LAYOUT_VERSION);
+    return {};
+  }
+  if (table->schema_hash != stage::kSchemaHash) {
+    *problem = "'" + path + "' was built for another schema of the stage contracts: rebuild it against this plugin_sdk";
+    return {};
+  }
+  PluginLibrary library;
+  library.table = table;
+  library.declaration = read_declaration(*table->description);
+  return library;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,27 @@
+// Loading a plugin library.
+#pragma once
+
+#include <string>
+
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+
+// A loaded library. It is never unloaded: threads, thread-local storage and static objects of a plugin make
+// that unsafe.
+struct PluginLibrary {
+  const gravitas_plugin_table* table = nullptr;
+  PluginDeclaration declaration;
+};
+
+// Loads the library from a private copy (one path gives one handle in a process, and a file that is replaced
+// under a running program must not change it), checks magic, versions and schema hash, and reads its
+// declaration. Running its constructors may do anything: a kernel does this for direct hosting only.
+// On failure returns a library without table, and `problem` says why: not a readable file, no shared library,
+// no plugin, made for another schema or version of the interface.
+PluginLibrary load_plugin_library(const std::string& path, std::string* problem);
+
+// The plain declaration of a table as C++ values.
+PluginDeclaration read_declaration(const gravitas_description& description);
+
+}  // namespace gravitas

@@ -1,0 +1,39 @@
+// The one rule by which every space decides whether two bodies are a pair, so that all spaces agree.
+#pragma once
+
+#include "plugin_sdk/body.h"
+#include "schemas/stage_frames.h"
+
+namespace gravitas {
+
+// True if bodies a and b both have shapes, one of them can be pushed, their filters allow it, and their closed
+// bounds overlap.
+class PairRule {
+ public:
+  explicit PairRule(const stage::SpacePairsRequest& request)
+      : lower_(request.lower()),
+        upper_(request.upper()),
+        flags_(request.flags()),
+        group_(request.filter_group()),
+        mask_(request.filter_mask()) {}
+
+  bool may_touch(std::uint32_t a, std::uint32_t b) const {
+    return (flags_[a] & flags_[b] & kHasShape) != 0 && ((flags_[a] | flags_[b]) & kMovable) != 0 &&
+           (group_[a] & mask_[b]) != 0 && (group_[b] & mask_[a]) != 0;
+  }
+
+  bool bounds_overlap(std::uint32_t a, std::uint32_t b) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (!(lower_[3 * a + k] <= upper_[3 * b + k] && lower_[3 * b + k] <= upper_[3 * a + k])) return false;
+    return true;
+  }
+
+  bool operator()(std::uint32_t a, std::uint32_t b) const { return may_touch(a, b) && bounds_overlap(a, b); }
+
+ private:
+  std::span<const double> lower_, upper_;
+  std::span<const std::uint32_t> flags_;
+  std::span<const std::uint64_t> group_, mask_;
+};
+
+}  // namespace gravitas

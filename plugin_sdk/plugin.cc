@@ -1,0 +1,145 @@
+#include "plugin_sdk/plugin.h"
+
+#include <cstring>
+#include <deque>
+
+namespace gravitas {
+
+const char* slot_name(Slot slot) {
+  switch (slot) {
+    case Slot::kSpace: return "space";
+    case Slot::kCollision: return "collision";
+    case Slot::kConstraint: return "constraint";
+    case Slot::kForce: return "force";
+    case Slot::kSolver: return "solver";
+    case Slot::kIntegrator: return "integrator";
+  }
+  return "unknown";
+}
+
+bool SpacePlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
+                           Host& host) {
+  if (method != stage::Method::kSpacePairs) return false;
+  pairs(stage::SpacePairsRequest(request), stage::SpacePairsReply(reply), host);
+  return true;
+}
+
+bool CollisionPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
+                               Host& host) {
+  if (method != stage::Method::kCollisionManifolds) return false;
+  manifolds(stage::CollisionManifoldsRequest(request), stage::CollisionManifoldsReply(reply), host);
+  return true;
+}
+
+bool ConstraintPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
+                                Host& host) {
+  if (method == stage::Method::kConstraintBind) {
+    bind(stage::ConstraintBindRequest(request), stage::ConstraintBindReply(reply), host);
+    return true;
+  }
+  if (method != stage::Method::kConstraintDiscrepancies) return false;
+  discrepancies(stage::ConstraintDiscrepanciesRequest(request), stage::ConstraintDiscrepanciesReply(reply), host);
+  return true;
+}
+
+bool ForcePlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
+                           Host& host) {
+  if (method != stage::Method::kForceWrenches) return false;
+  wrenches(stage::ForceWrenchesRequest(request), stage::ForceWrenchesReply(reply), host);
+  return true;
+}
+
+bool SolverPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
+                            Host& host) {
+  if (method != stage::Method::kSolverSolve) return false;
+  solve(stage::SolverSolveRequest(request), stage::SolverSolveReply(reply), host);
+  return true;
+}
+
+bool IntegratorPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
+                                Host& host) {
+  if (method != stage::Method::kIntegratorIntegrate) return false;
+  integrate(stage::IntegratorIntegrateRequest(request), stage::IntegratorIntegrateReply(reply), host);
+  return true;
+}
+
+namespace detail {
+namespace {
+
+// Owns the declaration and the plain structures that point into it.
+struct PlainDescription {
+  PluginDeclaration declaration;
+  std::deque<std::vector<gravitas_property>> properties;
+  std::deque<std::vector<const char*>> texts;
+  std::vector<gravitas_type> types;
+  gravitas_description description{};
+};
+
+const char* const* plain_texts(PlainDescription& owner, const std::vector<std::string>& source) {
+  std::vector<const char*>& texts = owner.texts.emplace_back();
+  for (const std::string& text : source) texts.push_back(text.c_str());
+  return texts.data();
+}
+
+const gravitas_property* plain_properties(PlainDescription& owner, const std::vector<Property>& source) {
+  std::vector<gravitas_property>& properties = owner.properties.emplace_back();
+  for (const Property& p : source) {
+    gravitas_property plain{};
+    plain.name = p.name.c_str();
+    plain.unit = p.unit.c_str();
+    plain.frame = p.frame.c_str();
+    plain.meaning = p.meaning.c_str();
+    plain.default_numbers = p.default_numbers.data();
+    plain.default_count = static_cast<std::uint32_t>(p.default_numbers.size());
+    plain.choices = plain_texts(owner, p.choices);
+    plain.choice_count = static_cast<std::uint32_t>(p.choices.size());
+    plain.minimum = p.minimum;
+    plain.maximum = p.maximum;
+    plain.kind = static_cast<std::uint32_t>(p.kind);
+    plain.columns = p.columns;
+    plain.exclusive_minimum = p.exclusive_minimum ? 1 : 0;
+    plain.required = p.is_required ? 1 : 0;
+    plain.live = p.is_live ? 1 : 0;
+    properties.push_back(plain);
+  }
+  return properties.data();
+}
+
+}  // namespace
+
+const gravitas_description* plain_description(PluginDeclaration declaration) {
+  // never freed: the library is never unloaded
+  auto& owner = *new PlainDescription{std::move(declaration), {}, {}, {}, {}};
+  const PluginDeclaration& source = owner.declaration;
+  for (const TypeDeclaration& type : source.types) {
+    owner.types.push_back({type.name.c_str(), type.meaning.c_str(), plain_properties(owner, type.properties),
+                           type.properties.size()});
+  }
+  owner.description.name = source.name.c_str();
+  owner.description.version = source.version.c_str();
+  owner.description.meaning = source.meaning.c_str();
+  owner.description.capabilities = plain_texts(owner, source.capabilities);
+  owner.description.capability_count = source.capabilities.size();
+  owner.description.types = owner.types.data();
+  owner.description.type_count = owner.types.size();
+  owner.description.properties = plain_properties(owner, source.properties);
+  owner.description.property_count = source.properties.size();
+  owner.description.theta = source.theta;
+  owner.description.slot = static_cast<std::uint32_t>(source.slot);
+  return &owner.description;
+}
+
+void set_error(gravitas_error* error, const char* text) {
+  std::strncpy(error->text, text, sizeof error->text - 1);
+  error->text[sizeof error->text - 1] = '\0';
+}
+
+bool needs_capacity(stage::Method method, const gravitas_reply_column* reply) {
+  const std::size_t columns = stage::kMethods[static_cast<std::uint32_t>(method)].reply.size();
+  for (std::size_t i = 0; i < columns; ++i)
+    if (reply[i].count > reply[i].capacity) return true;
+  return false;
+}
+
+}  // namespace detail
+}  // namespace gravitas

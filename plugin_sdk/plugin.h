@@ -1,0 +1,234 @@
+// What a plugin's author writes: a class derived from the base of its slot, a declaration, one macro.
+//
+//   class Gravity final : public gravitas::ForcePlugin {
+//    public:
+//     static gravitas::PluginDeclaration declaration();
+//     explicit Gravity(gravitas::PropertyCursor settings);
+//     void wrenches(const stage::ForceWrenchesRequest&, const stage::ForceWrenchesReply&, Host&) override;
+//   };
+//   GRAVITAS_PLUGIN(Gravity)
+//
+// The request views have a method per column, named as in schemas/gravitas/stage/v1/; the reply views too,
+// and take rows by push() or as a whole by resize(). The answer must depend on the request and the settings
+// alone: same request, same bytes. To refuse an impossible request throw Refusal with the reason; any other
+// exception is reported as a failure of the plugin. workers/hello is the smallest example.
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/abi.h"
+#include "plugin_sdk/property.h"
+#include "schemas/stage_frames.h"
+
+namespace gravitas {
+
+enum class Slot : std::uint32_t {
+  kSpace = GRAVITAS_SLOT_SPACE,
+  kCollision = GRAVITAS_SLOT_COLLISION,
+  kConstraint = GRAVITAS_SLOT_CONSTRAINT,
+  kForce = GRAVITAS_SLOT_FORCE,
+  kSolver = GRAVITAS_SLOT_SOLVER,
+  kIntegrator = GRAVITAS_SLOT_INTEGRATOR
+};
+
+// "space", "collision", …
+const char* slot_name(Slot slot);
+
+// A name of the scene language that the plugin serves: a force type, a joint type, a shape.
+struct TypeDeclaration {
+  std::string name;
+  std::string meaning;
+  std::vector<Property> properties;
+};
+
+struct PluginDeclaration {
+  std::string name;  // as in `Solver=Sequential`, and as in `gravitas describe`
+  std::string version;
+  Slot slot = Slot::kForce;
+  std::string meaning;
+  std::vector<std::string> capabilities = {};
+  std::vector<TypeDeclaration> types = {};  // empty for a space, solver or integrator: its name is the type
+  std::vector<Property> properties = {};    // settings of the plugin itself
+  // Integrators: share of a velocity-only impulse's effect that moves the pose within the step.
+  // Euler 0, SemiImplicitEuler 1, methods of order two and more 1/2.
+  double theta = 0.5;
+};
+
+// The request is impossible, and why.
+class Refusal : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// What the host offers to a plugin during a call.
+class Host {
+ public:
+  explicit Host(const gravitas_host* host) : host_(host) {}
+
+  // Says that the plugin is alive and getting on with long work.
+  void mark_progress() const { host_->mark_progress(host_->context); }
+
+  // Calls body(begin, end) over a fixed partition of 0 … count, on the host's threads. Bodies must write to
+  // places of their own; the partition is the same for every number of threads.
+  template <typename Body>
+  void parallel_for(std::uint64_t count, Body&& body) const {
+    host_->parallel_for(
+        host_->context, count,
+        [](void* argument, std::uint64_t begin, std::uint64_t end) {
+          (*static_cast<std::remove_reference_t<Body>*>(argument))(begin, end);
+        },
+        &body);
+  }
+
+  // Wrenches of all bodies (six numbers each) in a trial state. `columns` are those of
+  // Integrator.Derivative. Throws std::runtime_error when they cannot be had: let it pass.
+  void derivative(const gravitas_column* request, gravitas_reply_column* reply) const {
+    if (host_->derivative == nullptr || host_->derivative(host_->context, request, reply) != GRAVITAS_OK)
+      throw std::runtime_error("the derivative could not be had");
+  }
+
+ private:
+  const gravitas_host* host_;
+};
+
+// ---- the bases of the slots ------------------------------------------------------------------------------
+
+class SpacePlugin {
+ public:
+  static constexpr Slot kSlot = Slot::kSpace;
+  virtual ~SpacePlugin() = default;
+  virtual void pairs(const stage::SpacePairsRequest& request, const stage::SpacePairsReply& reply, Host& host) = 0;
+  bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
+};
+
+class CollisionPlugin {
+ public:
+  static constexpr Slot kSlot = Slot::kCollision;
+  virtual ~CollisionPlugin() = default;
+  virtual void manifolds(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
+                         Host& host) = 0;
+  bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
+};
+
+class ConstraintPlugin {
+ public:
+  static constexpr Slot kSlot = Slot::kConstraint;
+  virtual ~ConstraintPlugin() = default;
+  virtual void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply,
+                    Host& host) = 0;
+  virtual void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
+                             const stage::ConstraintDiscrepanciesReply& reply, Host& host) = 0;
+  bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
+};
+
+class ForcePlugin {
+ public:
+  static constexpr Slot kSlot = Slot::kForce;
+  virtual ~ForcePlugin() = default;
+  virtual void wrenches(const stage::ForceWrenchesRequest& request, const stage::ForceWrenchesReply& reply,
+                        Host& host) = 0;
+  bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
+};
+
+class SolverPlugin {
+ public:
+  static constexpr Slot kSlot = Slot::kSolver;
+  virtual ~SolverPlugin() = default;
+  virtual void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) = 0;
+  bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
+};
+
+class IntegratorPlugin {
+ public:
+  static constexpr Slot kSlot = Slot::kIntegrator;
+  virtual ~IntegratorPlugin() = default;
+  virtual void integrate(const stage::IntegratorIntegrateRequest& request,
+                         const stage::IntegratorIntegrateReply& reply, Host& host) = 0;
+  bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
+};
+
+// ---- from the class to the C table -----------------------------------------------------------------------
+
+namespace detail {
+
+// The declaration as plain data that lives as long as the library.
+const gravitas_description* plain_description(PluginDeclaration declaration);
+
+// Runs `body`, turning exceptions into a status and a text.
+template <typename Body>
+std::int32_t guarded(gravitas_error* error, Body&& body);
+void set_error(gravitas_error* error, const char* text);
+
+// True if a reply column was asked to hold more than there is room for.
+bool needs_capacity(stage::Method method, const gravitas_reply_column* reply);
+
+template <typename Body>
+std::int32_t guarded(gravitas_error* error, Body&& body) {
+  try {
+    return body();
+  } catch (const Refusal& refusal) {
+    set_error(error, refusal.what());
+    return GRAVITAS_REFUSED;
+  } catch (const std::out_of_range& range) {
+    set_error(error, range.what());
+    return GRAVITAS_REFUSED;
+  } catch (const std::exception& failure) {
+    set_error(error, failure.what());
+    return GRAVITAS_FAILED;
+  } catch (...) {
+    set_error(error, "an exception that is no std::exception");
+    return GRAVITAS_FAILED;
+  }
+}
+
+template <typename P>
+std::int32_t create(const double* settings, std::uint64_t count, void** instance, gravitas_error* error) {
+  return guarded(error, [&]() -> std::int32_t {
+    *instance = new P(PropertyCursor({settings, count}));
+    return GRAVITAS_OK;
+  });
+}
+
+template <typename P>
+void destroy(void* instance) {
+  delete static_cast<P*>(instance);
+}
+
+template <typename P>
+std::int32_t call(void* instance, std::uint32_t method, const gravitas_column* request, gravitas_reply_column* reply,
+                  const gravitas_host* host, gravitas_error* error) {
+  return guarded(error, [&]() -> std::int32_t {
+    Host services(host);
+    const auto which = static_cast<stage::Method>(method);
+    if (!static_cast<P*>(instance)->dispatch(which, request, reply, services)) return GRAVITAS_UNKNOWN_METHOD;
+    return needs_capacity(which, reply) ? GRAVITAS_NEEDS_CAPACITY : GRAVITAS_OK;
+  });
+}
+
+}  // namespace detail
+
+template <typename P>
+const gravitas_plugin_table* plugin_table() {
+  static const gravitas_plugin_table table = {GRAVITAS_MAGIC,
+                                              GRAVITAS_ABI_VERSION,
+                                              GRAVITAS_LAYOUT_VERSION,
+                                              stage::kSchemaHash,
+                                              GRAVITAS_BUILD_ID,
+                                              detail::plain_description(P::declaration()),
+                                              &detail::create<P>,
+                                              &detail::destroy<P>,
+                                              &detail::call<P>};
+  return &table;
+}
+
+#define GRAVITAS_PLUGIN(Class)                                                                    \
+  extern "C" __attribute__((visibility("default"))) const gravitas_plugin_table* gravitas_plugin() { \
+    return gravitas::plugin_table<Class>();                                                       \
+  }
+
+}  // namespace gravitas

@@ -1,0 +1,26 @@
+// Words that all solvers share.
+#pragma once
+
+#include <cstdint>
+
+namespace gravitas {
+
+// Why a solver stopped: `stop_reason` of SolverSolveReply.
+enum class StopReason : std::uint32_t {
+  kNothingToDo = 0,  // no rows
+  kConverged = 1,    // the last sweep changed no velocity by more than rounding's size
+  kIterations = 2    // the allowed number of sweeps was used up
+};
+
+// Columns of `contact_material`.
+enum MaterialColumn : std::uint32_t {
+  kRestitution = 0,
+  kStaticFriction = 1,
+  kDynamicFriction = 2,
+  kRollingFriction = 3,
+  kSpinningFriction = 4,
+  kSurfacePerturbation = 5,
+  kMaterialColumns = 6
+};
+
+}  // namespace gravitas
