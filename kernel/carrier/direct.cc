@@ -1,0 +1,127 @@
+// Direct hosting: the plugins are libraries of this process and columns are pointers into the arena.
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+#include <exception>
+
+#include "kernel/carrier/carrier.h"
+#include "kernel/fault.h"
+#include "plugin_sdk/floating_point.h"
+#include "plugin_sdk/library.h"
+#include "plugin_sdk/thread_pool.h"
+
+namespace gravitas::kernel {
+namespace {
+
+using PluginLibraryList = std::vector<PluginLibrary>;
+
+class DirectCarrier final : public Carrier {
+ public:
+  DirectCarrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads);
+  ~DirectCarrier() override;
+
+  CallResult call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) override;
+  int process_id() const override { return getpid(); }
+  Hosting hosting() const override { return Hosting::kDirect; }
+
+ private:
+  // What the host functions of one call need.
+  struct OpenCall {
+    ThreadPool* threads;
+    Arena* arena;
+    DerivativeSource* derivatives;
+    std::exception_ptr nested_fault;
+  };
+  static std::int32_t derivative(void* context, const gravitas_column* request, gravitas_reply_column* reply);
+
+  PluginLibraryList libraries_;
+  std::vector<void*> instances_;
+  ThreadPool threads_;
+};
+
+DirectCarrier::DirectCarrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads) : threads_(threads) {
+  for (const PluginChoice& plugin : plugins) {
+    std::string problem;
+    PluginLibrary library = load_plugin_library(plugin.library, &problem);
+    if (library.table == nullptr) throw StageFault(FaultKind::kHandshake, "handshake", problem);
+    gravitas_error error{};
+    void* instance = nullptr;
+    if (library.table->create(plugin.settings.data(), plugin.settings.size(), &instance, &error) != GRAVITAS_OK)
+      throw StageFault(FaultKind::kHandshake, "handshake", plugin.declaration.name + ": " + error.text);
+    instances_.push_back(instance);
+    libraries_.push_back(std::move(library));
+  }
+}
+
+DirectCarrier::~DirectCarrier() {
+  for (std::size_t i = 0; i < instances_.size(); ++i) libraries_[i].table->destroy(instances_[i]);
+}
+
+// The plugin's trial state is copied into the arena, where the force slot can see it wherever it is hosted.
+std::int32_t DirectCarrier::derivative(void* context, const gravitas_column* request, gravitas_reply_column* reply) {
+  OpenCall& open = *static_cast<OpenCall*>(context);
+  const std::span<const ColumnId> trial = open.derivatives->trial_columns();
+  for (std::size_t i = 0; i < trial.size(); ++i) {
+    if (request[i].count != open.arena->count(trial[i])) return GRAVITAS_CALLBACK_FAILED;
+    std::memcpy(open.arena->data(trial[i]), request[i].data, request[i].count * sizeof(double));
+  }
+  try {
+    open.derivatives->evaluate();
+  } catch (...) {
+    open.nested_fault = std::current_exception();
+    return GRAVITAS_CALLBACK_FAILED;
+  }
+  const ColumnId wrench = open.derivatives->wrench_column();
+  reply[0].count = open.arena->count(wrench);
+  if (reply[0].count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
+  std::memcpy(reply[0].data, open.arena->data(wrench), reply[0].count * sizeof(double));
+  return GRAVITAS_OK;
+}
+
+CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> request;
+  std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply;
+  for (std::size_t i = 0; i < call.request.size(); ++i)
+    request[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
+  for (std::size_t i = 0; i < call.reply.size(); ++i)
+    reply[i] = {arena->data(call.reply[i]), arena->capacity(call.reply[i]), 0};
+
+  OpenCall open{&threads_, arena, derivatives, nullptr};
+  gravitas_host host{};
+  host.context = &open;
+  host.mark_progress = [](void*) {};
+  host.parallel_for = [](void* context, std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t),
+                         void* argument) {
+    static_cast<OpenCall*>(context)->threads->parallel_for(count, body, argument);
+  };
+  host.derivative = derivatives != nullptr ? &DirectCarrier::derivative : nullptr;
+
+  const std::uint32_t control = floating_point_control();
+  gravitas_error error;
+  error.text[0] = '\0';
+  CallResult result;
+  result.status = libraries_[call.target].table->call(instances_[call.target], static_cast<std::uint32_t>(call.method),
+                                                      request.data(), reply.data(), &host, &error);
+  if (open.nested_fault) std::rethrow_exception(open.nested_fault);
+  if (floating_point_control() != control) {
+    set_floating_point_control(control);
+    result.status = GRAVITAS_FAILED;
+    result.text = "the plugin changed the floating-point environment";
+    return result;
+  }
+  if (result.status != GRAVITAS_OK) result.text = error.text;
+  for (std::size_t i = 0; i < call.reply.size(); ++i) {
+    const bool fits = reply[i].count <= reply[i].capacity;
+    if (fits || result.status == GRAVITAS_NEEDS_CAPACITY) arena->set_count(call.reply[i], reply[i].count);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::unique_ptr<Carrier> make_direct_carrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads) {
+  return std::make_unique<DirectCarrier>(plugins, threads);
+}
+
+}  // namespace gravitas::kernel

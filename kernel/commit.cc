@@ -1,0 +1,209 @@
+// Stage::kCommit: the checked answers become S_{n+1} in the second state, the states are swapped, hashes and
+// events follow. Nothing before the swap can be seen from outside.
+#include <algorithm>
+#include <utility>
+
+#include "kernel/environment.h"
+#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/dynamics.h"
+
+namespace gravitas::kernel {
+namespace {
+
+// A pair touches if a contact of it carries an impulse, or its gap is below this share of the margin.
+constexpr double kTouchingShare = 1e-3;
+
+void copy(const Column<double>& from, const Column<double>& to) {
+  // + 0.0 turns -0 into 0: the sign of a zero must not depend on which stages ran
+  std::ranges::transform(from.span(), to.data(), [](double value) { return value + 0.0; });
+}
+
+}  // namespace
+
+StepOutcome Environment::step() {
+  if (fault_) return StepOutcome::kPaused;
+  const std::uint64_t start = channel::now_ns();
+  try {
+    if (model_.body_count > 0) {
+      run_basic();
+    } else {
+      finish_commit();
+    }
+  } catch (const StageFault& fault) {
+    fault_ = FaultRecord{step_count_ + 1, fault};
+    return StepOutcome::kPaused;
+  }
+  step_profile_.add(channel::now_ns() - start);
+  return StepOutcome::kCommitted;
+}
+
+double Environment::time_of(std::uint32_t step) const {
+  if (step < description_.steps || step == 0) return step * description_.time_step;
+  return (description_.steps - 1) * description_.time_step + description_.last_time_step;
+}
+
+StateView Environment::state() const {
+  return {front().position.span(), front().orientation.span(), front().linear_velocity.span(),
+          front().angular_velocity.span()};
+}
+
+void Environment::commit_trial(const Trusted<TrialState>&) {
+  copy(data_.trial_position, back().position);
+  copy(data_.trial_orientation, back().orientation);
+  copy(data_.trial_linear_velocity, back().linear_velocity);
+  copy(data_.trial_angular_velocity, back().angular_velocity);
+  back().plugin_state.assign(data_.next_plugin_state.span());
+  std::ranges::fill(back().state_changed.span(), 0U);
+  finish_commit();
+}
+
+void Environment::commit_solution(const Trusted<Solution>&) {
+  copy(data_.solved_linear_velocity, back().linear_velocity);
+  copy(data_.solved_angular_velocity, back().angular_velocity);
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    const double* change = &data_.pose_change[6 * i];
+    const Pose pose = displaced(pose_of(data_.trial_position, data_.trial_orientation, i),
+                                Vector3(change[0], change[1], change[2]), Vector3(change[3], change[4], change[5]));
+    set_vector(back().position.span(), i, pose.position);
+    set_quaternion(back().orientation.span(), i, pose.orientation);
+    const bool moved = std::any_of(change, change + 6, [](double number) { return number != 0.0; });
+    const auto differs = [&](const Column<double>& a, const Column<double>& b) {
+      return !std::equal(&a[3 * i], &a[3 * i] + 3, &b[3 * i]);
+    };
+    back().state_changed[i] = moved || differs(data_.solved_linear_velocity, data_.trial_linear_velocity) ||
+                              differs(data_.solved_angular_velocity, data_.trial_angular_velocity);
+  }
+  copy(back().position, back().position);
+  copy(back().orientation, back().orientation);
+  back().plugin_state.assign(data_.next_plugin_state.span());
+  figures_ = {};
+  remember_contacts();
+  remember_joints();
+  finish_commit();
+}
+
+void Environment::finish_commit() {
+  const std::uint64_t start = channel::now_ns();
+  if (model_.constraint_count > 0) update_joints();
+  if (has_contacts()) find_touching();
+  front_ = 1 - front_;
+  ++step_count_;
+  state_hash_ = kernel::state_hash(front());
+  chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
+  if (listener_ != nullptr && has_contacts()) raise_collision_events();
+  if (listener_ != nullptr && model_.constraint_count > 0) raise_break_events();
+  profile_[static_cast<std::size_t>(Stage::kCommit)].add(channel::now_ns() - start);
+}
+
+void Environment::remember_contacts() {
+  back().contact_body.assign(data_.contact_body.span());
+  back().contact_feature.assign(data_.contact_feature.span());
+  back().contact_key.assign(data_.contact_key.span());
+  back().contact_impulse.assign(data_.contact_impulse.span());
+  back().contact_correction.assign(data_.contact_correction.span());
+}
+
+void Environment::remember_joints() {
+  back().discrepancy_constraint.assign(data_.discrepancies.constraint.span());
+  back().discrepancy_impulse.assign(data_.discrepancy_impulse.span());
+  back().discrepancy_correction.assign(data_.discrepancy_correction.span());
+}
+
+// Joint errors at S_{n+1}; joints whose error or load is beyond what they bear end with this commit.
+void Environment::update_joints() {
+  std::ranges::copy(front().intact.span(), back().intact.data());
+  const DiscrepancyAnswer& d = data_.discrepancies;
+  const DiscrepancyColumns columns{d.point1.span(), d.point2.span(), d.velocity.span(),   d.correction.span(),
+                                   d.axes.span(),   d.mode.span(),   d.lower.span(),      d.upper.span(),
+                                   d.compliance.span(), d.damping.span(), d.maximum_force.span()};
+  for (std::size_t row = 0; row < columns.size();) {
+    const std::uint32_t joint = d.constraint[row];
+    const ConstraintDescription& description = model_.constraints[joint];
+    const auto poses = [&](const Column<double>& position, const Column<double>& orientation) {
+      return std::pair{pose_of(position, orientation, description.body1), pose_of(position, orientation, description.body2)};
+    };
+    const auto [trial1, trial2] = poses(data_.trial_position, data_.trial_orientation);
+    const auto [next1, next2] = poses(back().position, back().orientation);
+    double error = 0.0;
+    Vector3 impulse = Vector3::Zero();
+    for (; row < columns.size() && d.constraint[row] == joint; ++row) {
+      const Discrepancy discrepancy = columns.at(row);
+      error = std::max(error, joint_error(discrepancy, error_at(discrepancy, trial1, trial2, next1, next2)));
+      if (!discrepancy.is_angular())
+        impulse += discrepancy.axes * vector_at(data_.discrepancy_impulse.span(), row);
+    }
+    const double force = impulse.norm() / data_.time_step[0];
+    const bool breaks = (description.breaking_threshold > 0.0 && error > description.breaking_threshold) ||
+                        (description.breaking_force > 0.0 && force > description.breaking_force);
+    if (breaks) {
+      back().intact[joint] = 0;
+    } else {
+      figures_.joint_error = std::max(figures_.joint_error, error);
+    }
+  }
+}
+
+// Overlap of every contact at S_{n+1} (its two surface points moved with their bodies), and the pairs that touch.
+void Environment::find_touching() {
+  const State& next = back();
+  next.touching.resize(0);
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
+    const Vector3 point = vector_at(data_.contact_point.span(), i), normal = vector_at(data_.contact_normal.span(), i);
+    const Vector3 half = 0.5 * data_.contact_depth[i] * normal;
+    const auto carry = [&](const Vector3& from, std::uint32_t body) {
+      return carried(from, pose_of(data_.trial_position, data_.trial_orientation, body),
+                     pose_of(next.position, next.orientation, body));
+    };
+    const double gap = normal.dot(carry(point - half, b) - carry(point + half, a));
+    figures_.penetration = std::max(figures_.penetration, -gap);
+    const bool touches = gap <= kTouchingShare * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
+    const std::uint64_t size = next.touching.size();
+    if (!touches || (size > 0 && next.touching[size - 2] == a && next.touching[size - 1] == b)) continue;
+    next.touching.resize(size + 2);
+    next.touching[size] = a;
+    next.touching[size + 1] = b;
+  }
+}
+
+// After the swap: front() is S_{n+1}, back() is S_n.
+void Environment::raise_collision_events() {
+  const std::span<const std::uint32_t> now = front().touching.span(), before = back().touching.span();
+  std::size_t n = 0, b = 0, contact = 0;
+  const auto pair_at = [](std::span<const std::uint32_t> pairs, std::size_t i) {
+    return std::pair{pairs[i], pairs[i + 1]};
+  };
+  while (n < now.size() || b < before.size()) {
+    const bool starts = b >= before.size() || (n < now.size() && pair_at(now, n) < pair_at(before, b));
+    const bool ends = n >= now.size() || (b < before.size() && pair_at(before, b) < pair_at(now, n));
+    if (!starts && !ends) {
+      n += 2, b += 2;
+      continue;
+    }
+    const auto [first, second] = starts ? pair_at(now, n) : pair_at(before, b);
+    Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd, step_count_, time(), first, second,
+                kNone, 0.0, 0.0};
+    for (; starts && contact < data_.contact_key.size(); ++contact) {
+      const std::pair bodies{data_.contact_body[2 * contact], data_.contact_body[2 * contact + 1]};
+      if (bodies > std::pair{first, second}) break;
+      if (bodies != std::pair{first, second}) continue;
+      const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
+      event.relative_speed = std::max(event.relative_speed,
+                                      -normal.dot(vector_at(data_.contact_relative_velocity.span(), contact)));
+      event.impulse += normal.dot(vector_at(data_.contact_impulse.span(), contact));
+    }
+    listener_->on_event(event);
+    (starts ? n : b) += 2;
+  }
+}
+
+void Environment::raise_break_events() {
+  for (std::uint32_t joint = 0; joint < model_.constraint_count; ++joint) {
+    if (front().intact[joint] == back().intact[joint]) continue;
+    const ConstraintDescription& broken = model_.constraints[joint];
+    listener_->on_event({EventKind::kBreak, step_count_, time(), broken.body1, broken.body2, joint, 0.0, 0.0});
+  }
+}
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,51 @@
+// The kernel's end of the control stream to one worker incarnation: handshake, heartbeat, drain.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "gravitas/control/v1/control.grpc.pb.h"
+
+namespace gravitas::kernel {
+
+class ControlSession {
+ public:
+  // Takes over the descriptor (a connected stream socket) and greets the worker in a thread of its own.
+  ControlSession(int descriptor, control::v1::Hello hello);
+  ~ControlSession();
+
+  // Waits for the worker's answer to the greeting. Empty text: it serves; else why it does not.
+  std::string wait_until_ready(std::chrono::milliseconds time);
+
+  const control::v1::Welcome& welcome() const { return welcome_; }
+
+  // Ends the stream, whatever state it is in; called by whoever learns that the worker is gone.
+  void cancel();
+
+ private:
+  void run(control::v1::Hello hello);
+  std::string greet(const control::v1::Hello& hello);
+  std::string judge(const control::v1::Hello& hello) const;
+  void beat();
+
+  std::unique_ptr<control::v1::WorkerControl::Stub> stub_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReaderWriter<control::v1::KernelMessage, control::v1::WorkerMessage>> stream_;
+  control::v1::Welcome welcome_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool greeted_ = false;
+  bool stopping_ = false;
+  std::string problem_;
+  std::thread thread_;
+};
+
+// The kernel's greeting without what is the worker's own (epoch, nonce, plugins).
+control::v1::Hello hello_of_this_kernel();
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,115 @@
+// What a service hands to the kernel to make an environment: everything resolved to numbers and indices, no
+// file format, no formula. services/scene makes it from a scene; tests make it by hand.
+//
+// Poses are those of the centre of mass with principal axes (§ 2.3.2.2); properties of shapes, forces and joints
+// are flattened as plugin_sdk/property.h says.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/pose.h"
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas::kernel {
+
+enum class Hosting : std::uint32_t {
+  kDirect,        // in the kernel's process
+  kSharedMemory,  // in a worker process, data in shared memory
+};
+
+// "direct", "shm".
+const char* hosting_name(Hosting hosting);
+
+struct PluginChoice {
+  PluginDeclaration declaration;
+  std::string library;           // path of the shared library
+  std::vector<double> settings;  // values of the plugin's own properties
+};
+
+struct SlotDescription {
+  Hosting hosting = Hosting::kSharedMemory;
+  double deadline = 2.0;              // s, for one call, counted from the last mark of progress
+  std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
+};
+
+// What the broad phase sees of a body's shape, fixed in the body's frame.
+enum class BoundKind : std::uint32_t { kNone, kSphere, kBox };
+
+struct LocalBound {
+  BoundKind kind = BoundKind::kNone;
+  Vector3 centre = Vector3::Zero();                     // m
+  Quaternion orientation = Quaternion::Identity();      // box to body
+  Vector3 half_extents = Vector3::Zero();               // m; a sphere's radius in x
+};
+
+struct ShapeDescription {
+  std::string id;
+  std::string type;  // "Sphere"
+  std::vector<double> parameters;
+};
+
+struct BodyDescription {
+  std::string id;
+  std::uint32_t flags = kMovable;                     // BodyFlag bits
+  double mass = 1.0;                                  // kg; 0 if immovable
+  Vector3 inertia = Vector3::Ones();                  // principal moments, kg m^2; 0 if immovable
+  double damping = 0.0;                               // 1/s
+  Pose pose;                                          // of the centre of mass, world
+  Twist twist;                                        // world
+  std::uint32_t shape = kNone;                        // row of `shapes`
+  Pose geometry;                                      // of the shape's frame in the body's
+  LocalBound bound;
+  std::uint32_t material = 0;                         // row of `materials`
+  std::uint64_t filter_group = 1, filter_mask = ~0ULL;
+  std::vector<std::uint32_t> forces;                  // rows of `forces`, in the scene's order
+};
+
+struct ForceDescription {
+  std::string id;
+  std::string type;
+  std::vector<double> parameters;
+  std::uint32_t plugin = 0;  // which of the force slot's plugins serves the type
+};
+
+struct ConstraintDescription {
+  std::string id;
+  std::string type;
+  std::vector<double> parameters;
+  std::uint32_t body1 = kNone, body2 = kNone;  // kNone: the world
+  double breaking_threshold = 0.0;             // joint error, m; 0: never
+  double breaking_force = 0.0;                 // N; 0: never
+  std::uint32_t plugin = 0;                    // which of the constraint slot's plugins serves the type
+};
+
+struct EnvironmentDescription {
+  std::string id;
+  double time_step = 1.0 / 60.0;  // s
+  // Number of steps of the whole run and the length of the last one (s), which may be shorter.
+  std::uint32_t steps = 600;
+  double last_time_step = 1.0 / 60.0;
+
+  std::vector<ShapeDescription> shapes;
+  std::uint32_t material_count = 1;
+  // Row a * material_count + b: kMaterialColumns numbers (plugin_sdk/solver.h), symmetric.
+  std::vector<double> material_pairs = std::vector<double>(6, 0.0);
+  std::vector<BodyDescription> bodies;
+  std::vector<ForceDescription> forces;
+  std::vector<ConstraintDescription> constraints;
+
+  SlotDescription space, collision, constraint, force, solver, integrator;
+  std::uint32_t threads = 1;  // of each host's parallel_for
+  bool events = false;        // somebody listens to collision events
+
+  SlotDescription& slot(Slot which);
+  const SlotDescription& slot(Slot which) const;
+
+  // Finds the first thing that is not as this header says (index out of range, non-finite number, quaternion not
+  // unit, negative mass, …) and names it; empty if all is well.
+  std::string validate() const;
+};
+
+}  // namespace gravitas::kernel

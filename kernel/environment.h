@@ -1,0 +1,175 @@
+// An environment: bodies, the plugins that move them, and the truth about their state. Several can live in one
+// process; they share nothing.
+//
+//   Environment world(description);         // starts what the plan needs; throws StageFault, std::invalid_argument
+//   while (world.step() == StepOutcome::kCommitted && world.step_count() < world.total_steps()) …
+//
+// step() is a transaction: it works on scratch columns and the second of two states, and swaps the states at
+// the end. If a stage fails, nothing has happened: the outcome is kPaused, fault() says why, and the state is
+// that of the last commit. An environment is used by one thread at a time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kernel/arena.h"
+#include "kernel/description.h"
+#include "kernel/events.h"
+#include "kernel/fault.h"
+#include "kernel/hash.h"
+#include "kernel/model.h"
+#include "kernel/plan.h"
+#include "kernel/profile.h"
+#include "kernel/slot.h"
+#include "kernel/stage.h"
+#include "kernel/state.h"
+#include "kernel/step_data.h"
+#include "kernel/validate.h"
+
+namespace gravitas::kernel {
+
+enum class StepOutcome { kCommitted, kPaused };
+
+// The committed state, body by body. Spans are valid until the next step.
+struct StateView {
+  std::span<const double> position, orientation, linear_velocity, angular_velocity;
+};
+
+// Largest overlap (m) and joint error (m; rad count as m) of the state that the last step committed.
+struct CommitFigures {
+  double penetration = 0.0;
+  double joint_error = 0.0;
+};
+
+// One failed call, as the report shows it.
+struct FaultRecord {
+  std::uint32_t step;
+  StageFault fault;
+};
+
+class Environment : private DerivativeSource {
+ public:
+  explicit Environment(EnvironmentDescription description);
+  ~Environment() override;
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+  // One step of time, or the reason why not.
+  StepOutcome step();
+
+  const std::string& id() const { return description_.id; }
+  std::uint32_t step_count() const { return step_count_; }
+  std::uint32_t total_steps() const { return description_.steps; }
+  double time_step() const { return description_.time_step; }
+  // Time of the committed state, s: n * time step as a product.
+  double time() const { return time_of(step_count_); }
+
+  StateView state() const;
+  const Model& model() const { return model_; }
+  const CommitFigures& figures() const { return figures_; }
+  // True while the joint holds.
+  bool is_intact(std::uint32_t constraint) const { return front().intact[constraint] != 0; }
+
+  // What the forces report as potential energy in the committed state, J.
+  double potential_energy();
+
+  Hash state_hash() const { return state_hash_; }
+  Hash chain_hash() const { return chain_hash_; }
+
+  const Plan& plan() const { return plan_; }
+  const std::optional<FaultRecord>& fault() const { return fault_; }
+  const DurationHistogram& stage_time(Stage stage) const { return profile_[static_cast<std::size_t>(stage)]; }
+  // Time of the stage that was not spent in the plugin.
+  const DurationHistogram& transport_time(Stage stage) const { return transport_[static_cast<std::size_t>(stage)]; }
+  const DurationHistogram& step_time() const { return step_profile_; }
+
+  // At most one listener; null: no events are made.
+  void set_listener(EventListener* listener) { listener_ = listener; }
+
+ private:
+  // simulators/basic.cc: the order of the stages.
+  void run_basic();
+
+  // stages.cc: a stage each.
+  void begin_step();
+  Trusted<TrialState> integrate();
+  void bound_bodies(const Trusted<TrialState>& trial);
+  Trusted<Pairs> find_pairs();
+  Trusted<Contacts> find_contacts(const Trusted<Pairs>& pairs);
+  void look_up_contacts(const Trusted<Contacts>& contacts);
+  void constrain(const Trusted<TrialState>& trial);
+  void merge_discrepancies();
+  Trusted<Solution> solve();
+
+  // commit.cc
+  void commit_trial(const Trusted<TrialState>& trial);
+  void commit_solution(const Trusted<Solution>& solution);
+  void remember_contacts();
+  void remember_joints();
+  void update_joints();
+  void find_touching();
+  void raise_collision_events();
+  void raise_break_events();
+  void finish_commit();
+
+  // prepare.cc: what is asked once.
+  void start_slots();
+  void bind_joints();
+  void ask_constant_forces();
+
+  // forces.cc
+  std::span<const ColumnId> trial_columns() const override;
+  ColumnId wrench_column() const override { return data_.wrench.id(); }
+  void evaluate() override;
+  void ask_forces(const std::array<ColumnId, 5>& state_columns);
+  void sum_wrenches();
+
+  // Asks a slot and books the time.
+  Untrusted<StageCall> ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives);
+
+  const State& front() const { return states_[front_]; }
+  State& back() { return states_[1 - front_]; }
+  double time_of(std::uint32_t step) const;
+  Pose pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const;
+  bool has_contacts() const { return collision_.is_running(); }
+  bool has_reactions() const { return solver_.is_running(); }
+  // Velocities at the start of the step, with instantaneous impulses where there are any.
+  const Column<double>& start_linear_velocity() const;
+  const Column<double>& start_angular_velocity() const;
+
+  EnvironmentDescription description_;
+  Plan plan_;
+  Arena arena_;
+  Model model_;
+  std::array<State, 2> states_;
+  StepData data_;
+  Validator validator_;
+  int front_ = 0;
+  std::uint32_t step_count_ = 0;
+  double margin_ = 0.0;
+
+  StageSlot space_, collision_, constraint_, force_, solver_, integrator_;
+
+  const std::array<ColumnId, 5> trial_columns_;
+  std::vector<std::vector<ColumnId>> discrepancy_reply_;  // per constraint group
+
+  // Known once the forces have been asked at the start.
+  bool wrench_is_constant_ = true;
+  bool has_impulses_ = false;
+  std::vector<double> initial_potential_;  // per application
+  bool start_wrench_known_ = false;
+  std::vector<std::size_t> next_in_group_;  // scratch of sum_wrenches()
+
+  CommitFigures figures_;
+  Hash state_hash_, chain_hash_;
+  std::optional<FaultRecord> fault_;
+  EventListener* listener_ = nullptr;
+  std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_;
+  DurationHistogram step_profile_;
+};
+
+}  // namespace gravitas::kernel

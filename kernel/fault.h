@@ -1,0 +1,42 @@
+// A stage call that failed: who, how, how it was noticed. Thrown through the step, caught in Environment::step();
+// the committed state is untouched.
+#pragma once
+
+#include <cstdint>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas::kernel {
+
+enum class FaultKind : std::uint32_t {
+  kDeath,         // the worker process ended
+  kDeadline,      // no answer in time
+  kRefusal,       // the plugin says that the request is impossible
+  kFailure,       // the plugin itself failed
+  kBadFrame,      // the answer's frame is wrong: sizes, epoch, digest
+  kBadStructure,  // ids, order, uniqueness, lengths
+  kBadNumbers,    // not finite, not unit, wrong sign
+  kHandshake      // the worker could not be started or refused to serve
+};
+
+// "death", "deadline", …
+const char* fault_kind_name(FaultKind kind);
+
+class StageFault : public std::exception {
+ public:
+  StageFault(FaultKind what_failed, std::string how_noticed, std::string why)
+      : kind(what_failed), detected_by(std::move(how_noticed)), text(std::move(why)) {}
+
+  const char* what() const noexcept override { return text.c_str(); }
+
+  FaultKind kind;
+  std::string detected_by;  // "pidfd", "deadline", "status", "wire", "structure", "numbers", "handshake"
+  std::string text;
+  Slot slot = Slot::kSpace;  // filled where the slot is known
+  std::string plugin;
+};
+
+}  // namespace gravitas::kernel

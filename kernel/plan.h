@@ -1,0 +1,36 @@
+// The planner: which slots a scene needs, and why the others are left out. What is left out starts no process,
+// has no columns and makes no call; the plan is exact, the trajectory's bits are those of the full pipeline.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernel/description.h"
+
+namespace gravitas::kernel {
+
+struct LeftOut {
+  std::string what;  // "solver", "force calls"
+  std::string why;
+};
+
+struct PlannedSlot {
+  Slot slot;
+  std::vector<std::string> plugins;
+  Hosting hosting = Hosting::kSharedMemory;
+  int process_id = 0;
+};
+
+struct Plan {
+  std::vector<PlannedSlot> slots;
+  std::vector<LeftOut> left_out;
+};
+
+// Removes from the description the plugins of slots that it does not need, and says so.
+Plan make_plan(EnvironmentDescription* description);
+
+// Gap up to which contacts are asked for: a hundredth of the smallest bounded shape, so that a contact which
+// the reactions of this step close is known to the solver. m.
+double contact_margin(const EnvironmentDescription& description);
+
+}  // namespace gravitas::kernel

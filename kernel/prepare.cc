@@ -1,0 +1,103 @@
+// What an environment does once, before its first step: start its hosts, bind its joints, ask for the forces.
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+
+#include "kernel/environment.h"
+
+namespace gravitas::kernel {
+namespace {
+
+EnvironmentDescription checked(EnvironmentDescription description) {
+  const std::string problem = description.validate();
+  if (!problem.empty()) throw std::invalid_argument(problem);
+  return description;
+}
+
+}  // namespace
+
+Environment::Environment(EnvironmentDescription description)
+    : description_(checked(std::move(description))),
+      plan_(make_plan(&description_)),
+      model_(&arena_, description_),
+      states_{State(&arena_, description_), State(&arena_, description_)},
+      data_(&arena_, model_, description_),
+      validator_(arena_, model_),
+      margin_(contact_margin(description_)),
+      space_(Slot::kSpace, description_.space),
+      collision_(Slot::kCollision, description_.collision),
+      constraint_(Slot::kConstraint, description_.constraint),
+      force_(Slot::kForce, description_.force),
+      solver_(Slot::kSolver, description_.solver),
+      integrator_(Slot::kIntegrator, description_.integrator),
+      trial_columns_{data_.derivative_time.id(), data_.derivative_position.id(), data_.derivative_orientation.id(),
+                     data_.derivative_linear_velocity.id(), data_.derivative_angular_velocity.id()} {
+  for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
+  arena_.seal();
+  model_.write(description_);
+  states_[0].write(description_);
+  states_[1].write(description_);
+  data_.margin[0] = margin_;
+  data_.theta[0] = integrator_.description().plugins.empty()
+                       ? 0.5
+                       : integrator_.description().plugins[0].declaration.theta;
+  start_slots();
+  bind_joints();
+  ask_constant_forces();
+  state_hash_ = kernel::state_hash(front());
+  chain_hash_ = kernel::chain_hash({}, state_hash_);
+}
+
+Environment::~Environment() {
+  for (StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_}) slot->drain();
+}
+
+void Environment::start_slots() {
+  const std::array<StageSlot*, 6> slots = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};
+  for (StageSlot* slot : slots) slot->start(description_.threads);
+  for (StageSlot* slot : slots) slot->finish_start();
+  for (PlannedSlot& planned : plan_.slots)
+    for (const StageSlot* slot : slots)
+      if (slot->which() == planned.slot) planned.process_id = slot->process_id();
+}
+
+void Environment::bind_joints() {
+  for (const ConstraintGroup& group : model_.constraint_groups) {
+    const std::array<ColumnId, 6> request = {group.type.id(),      group.body.id(),        group.parameter_begin.id(),
+                                             group.parameter.id(), front().position.id(), front().orientation.id()};
+    const std::array<ColumnId, 2> reply = {group.bound_begin.id(), group.bound.id()};
+    const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
+    validator_.bound(ask(Stage::kConstrain, &constraint_, call, nullptr), group);
+  }
+}
+
+// The forces are asked once in the initial state. If all say that this is their answer for ever, they are not
+// asked again and their host is let go.
+void Environment::ask_constant_forces() {
+  if (!force_.is_running()) return;
+  data_.derivative_time[0] = 0.0;
+  ask_forces({data_.derivative_time.id(), front().position.id(), front().orientation.id(),
+              front().linear_velocity.id(), front().angular_velocity.id()});
+  sum_wrenches();
+
+  initial_potential_.assign(model_.application_count, 0.0);
+  std::ranges::fill(data_.impulse.span(), 0.0);
+  for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
+    const ForceGroup& group = model_.force_groups[g];
+    const ForceAnswer& answer = data_.force_answers[g];
+    for (std::size_t i = 0; i < group.row.size(); ++i) {
+      initial_potential_[group.row[i]] = answer.potential[i];
+      wrench_is_constant_ &= (answer.flags[i] & kConstantWrench) != 0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        data_.impulse[6 * group.application[2 * i + 1] + k] += answer.impulse[6 * i + k];
+        has_impulses_ |= answer.impulse[6 * i + k] != 0.0;
+      }
+    }
+  }
+  if (!wrench_is_constant_) return;
+  force_.stop();
+  std::erase_if(plan_.slots, [](const PlannedSlot& planned) { return planned.slot == Slot::kForce; });
+  plan_.left_out.push_back({"force", "all forces are constant: asked once at the start"});
+}
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,263 @@
+// The stages between S_n and the solver's answer: each asks its slot and checks what comes back.
+#include <algorithm>
+#include <limits>
+
+#include "kernel/environment.h"
+#include "plugin_sdk/channel/digest.h"
+#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/solver.h"
+
+namespace gravitas::kernel {
+namespace {
+
+// Identity of a contact's life: who touches, with which features, since which step.
+std::uint64_t new_contact_key(std::uint32_t a, std::uint32_t b, std::uint32_t feature, std::uint32_t step) {
+  const std::array<std::uint32_t, 4> identity = {a, b, feature, step};
+  channel::Digest digest;
+  digest.add(identity.data(), sizeof identity);
+  return digest.value();
+}
+
+}  // namespace
+
+Untrusted<StageCall> Environment::ask(Stage stage, StageSlot* slot, const StageCall& call,
+                                      DerivativeSource* derivatives) {
+  const std::uint64_t start = channel::now_ns();
+  std::uint64_t compute_ns = 0;
+  Untrusted<StageCall> answer = slot->ask(call, &arena_, derivatives, &compute_ns);
+  const std::uint64_t total = channel::now_ns() - start;
+  profile_[static_cast<std::size_t>(stage)].add(total);
+  if (compute_ns > 0) transport_[static_cast<std::size_t>(stage)].add(total - std::min(total, compute_ns));
+  return answer;
+}
+
+Pose Environment::pose_of(const Column<double>& position, const Column<double>& orientation,
+                          std::uint32_t body) const {
+  if (body == kNone) return {};
+  return {vector_at(position.span(), body), quaternion_at(orientation.span(), body)};
+}
+
+const Column<double>& Environment::start_linear_velocity() const {
+  return has_impulses_ && step_count_ == 0 ? data_.start_linear_velocity : front().linear_velocity;
+}
+
+const Column<double>& Environment::start_angular_velocity() const {
+  return has_impulses_ && step_count_ == 0 ? data_.start_angular_velocity : front().angular_velocity;
+}
+
+void Environment::begin_step() {
+  data_.time[0] = time();
+  data_.time_step[0] =
+      step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
+  data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;
+  start_wrench_known_ = false;
+  if (!has_impulses_ || step_count_ != 0) return;
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    const double* impulse = &data_.impulse[6 * i];
+    const Twist twist = after_impulse({vector_at(front().linear_velocity.span(), i), vector_at(front().angular_velocity.span(), i)},
+                                      quaternion_at(front().orientation.span(), i), model_.inverse_mass[i],
+                                      vector_at(model_.inverse_inertia.span(), i),
+                                      Vector3(impulse[0], impulse[1], impulse[2]), Vector3(impulse[3], impulse[4], impulse[5]));
+    set_vector(data_.start_linear_velocity.span(), i, twist.linear);
+    set_vector(data_.start_angular_velocity.span(), i, twist.angular);
+  }
+}
+
+Trusted<TrialState> Environment::integrate() {
+  const std::array<ColumnId, 15> request = {data_.time.id(),
+                                            data_.time_step.id(),
+                                            data_.wrench_is_constant.id(),
+                                            model_.flags.id(),
+                                            model_.inverse_mass.id(),
+                                            model_.inertia.id(),
+                                            model_.inverse_inertia.id(),
+                                            model_.damping.id(),
+                                            data_.wrench.id(),
+                                            front().position.id(),
+                                            front().orientation.id(),
+                                            start_linear_velocity().id(),
+                                            start_angular_velocity().id(),
+                                            front().plugin_state.id(),
+                                            front().state_changed.id()};
+  const std::array<ColumnId, 6> reply = {data_.trial_position.id(),         data_.trial_orientation.id(),
+                                         data_.trial_linear_velocity.id(),  data_.trial_angular_velocity.id(),
+                                         data_.error_estimate.id(),         data_.next_plugin_state.id()};
+  const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
+  DerivativeSource* derivatives = wrench_is_constant_ ? nullptr : this;
+  return validator_.trial_state(ask(Stage::kIntegrate, &integrator_, call, derivatives), data_, front());
+}
+
+// World bounds at S*, widened so that pairs up to the margin apart overlap.
+void Environment::bound_bodies(const Trusted<TrialState>&) {
+  const std::uint64_t start = channel::now_ns();
+  const double widened = 0.5 * margin_;
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    const LocalBound& bound = model_.bound[i];
+    Bounds bounds{Vector3::Constant(-std::numeric_limits<double>::infinity()),
+                  Vector3::Constant(std::numeric_limits<double>::infinity())};
+    const Pose pose = pose_of(data_.trial_position, data_.trial_orientation, i);
+    if (bound.kind == BoundKind::kSphere) bounds = sphere_bounds(pose, bound.centre, bound.half_extents.x());
+    if (bound.kind == BoundKind::kBox) bounds = box_bounds(pose, bound.centre, bound.orientation, bound.half_extents);
+    set_vector(data_.lower.span(), i, bounds.lower - Vector3::Constant(widened));
+    set_vector(data_.upper.span(), i, bounds.upper + Vector3::Constant(widened));
+  }
+  profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
+}
+
+Trusted<Pairs> Environment::find_pairs() {
+  const std::array<ColumnId, 5> request = {data_.lower.id(), data_.upper.id(), model_.flags.id(),
+                                           model_.filter_group.id(), model_.filter_mask.id()};
+  const std::array<ColumnId, 1> reply = {data_.pair.id()};
+  return validator_.pairs(ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr),
+                          data_);
+}
+
+Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {
+  const std::array<ColumnId, 13> request = {data_.margin.id(),
+                                            model_.shape_hash.id(),
+                                            model_.shape_type.id(),
+                                            model_.shape_parameter_begin.id(),
+                                            model_.shape_parameter.id(),
+                                            model_.body_shape.id(),
+                                            model_.geometry_position.id(),
+                                            model_.geometry_orientation.id(),
+                                            data_.trial_position.id(),
+                                            data_.trial_orientation.id(),
+                                            data_.trial_linear_velocity.id(),
+                                            data_.trial_angular_velocity.id(),
+                                            data_.pair.id()};
+  const std::array<ColumnId, 6> reply = {data_.contact_pair.id(),   data_.contact_feature.id(),
+                                         data_.contact_normal.id(), data_.contact_point.id(),
+                                         data_.contact_depth.id(),  data_.contact_relative_velocity.id()};
+  const StageCall call{stage::Method::kCollisionManifolds, 0, request, reply};
+  return validator_.contacts(ask(Stage::kNarrowPhase, &collision_, call, nullptr), data_);
+}
+
+// Bodies, material row, key and warm start of each contact. Both this step's contacts and the remembered ones
+// are in the order (a, b, feature), so one walk matches them.
+void Environment::look_up_contacts(const Trusted<Contacts>&) {
+  const std::size_t count = data_.contact_pair.size();
+  data_.contact_body.resize(2 * count);
+  data_.contact_key.resize(count);
+  data_.contact_material.resize(kMaterialColumns * count);
+  data_.contact_warm_impulse.resize(3 * count);
+  data_.contact_warm_correction.resize(count);
+  const State& old = front();
+  std::size_t o = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t a = data_.pair[2 * data_.contact_pair[i]], b = data_.pair[2 * data_.contact_pair[i] + 1];
+    const std::uint32_t feature = data_.contact_feature[i];
+    data_.contact_body[2 * i] = a;
+    data_.contact_body[2 * i + 1] = b;
+    const double* material =
+        &model_.material_pairs[kMaterialColumns * (model_.material[a] * model_.material_count + model_.material[b])];
+    std::copy_n(material, kMaterialColumns, &data_.contact_material[kMaterialColumns * i]);
+
+    const std::array<std::uint32_t, 3> identity = {a, b, feature};
+    const auto remembered = [&](std::size_t row) {
+      return std::array{old.contact_body[2 * row], old.contact_body[2 * row + 1], old.contact_feature[row]};
+    };
+    while (o < old.contact_key.size() && remembered(o) < identity) ++o;
+    const bool known = o < old.contact_key.size() && remembered(o) == identity;
+    data_.contact_key[i] = known ? old.contact_key[o] : new_contact_key(a, b, feature, step_count_);
+    data_.contact_warm_correction[i] = known ? old.contact_correction[o] : 0.0;
+    set_vector(data_.contact_warm_impulse.span(), i, known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());
+  }
+}
+
+void Environment::constrain(const Trusted<TrialState>&) {
+  for (std::size_t g = 0; g < model_.constraint_groups.size(); ++g) {
+    const ConstraintGroup& group = model_.constraint_groups[g];
+    const Column<std::uint32_t>& intact = data_.group_intact[g];
+    for (std::size_t i = 0; i < group.row.size(); ++i) intact[i] = front().intact[group.row[i]];
+    const std::array<ColumnId, 11> request = {data_.time.id(),
+                                              data_.time_step.id(),
+                                              group.type.id(),
+                                              group.body.id(),
+                                              group.bound_begin.id(),
+                                              group.bound.id(),
+                                              intact.id(),
+                                              data_.trial_position.id(),
+                                              data_.trial_orientation.id(),
+                                              data_.trial_linear_velocity.id(),
+                                              data_.trial_angular_velocity.id()};
+    const std::vector<ColumnId>& reply = discrepancy_reply_[g];
+    const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
+    validator_.discrepancies(ask(Stage::kConstrain, &constraint_, call, nullptr), data_.discrepancy_answers[g],
+                             intact.span());
+  }
+  merge_discrepancies();
+}
+
+// All groups' discrepancies in the order of the scene's joints, with their bodies and warm start.
+void Environment::merge_discrepancies() {
+  const DiscrepancyAnswer& merged = data_.discrepancies;
+  std::size_t count = 0;
+  for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) count += answer.constraint.size();
+  merged.resize(count);
+  data_.discrepancy_body.resize(2 * count);
+  data_.discrepancy_warm_impulse.resize(3 * count);
+  data_.discrepancy_warm_correction.resize(3 * count);
+  std::vector<std::size_t>& next = next_in_group_;
+  next.assign(model_.constraint_groups.size(), 0);
+  const State& old = front();
+  std::size_t row = 0, o = 0;
+  for (std::uint32_t joint = 0; joint < model_.constraint_count; ++joint) {
+    const ConstraintDescription& description = model_.constraints[joint];
+    const std::size_t first = row;
+    for (std::size_t g = 0; g < model_.constraint_groups.size(); ++g) {
+      const DiscrepancyAnswer& answer = data_.discrepancy_answers[g];
+      const ConstraintGroup& group = model_.constraint_groups[g];
+      for (; next[g] < answer.constraint.size() && group.row[answer.constraint[next[g]]] == joint; ++next[g], ++row) {
+        merged.copy_row(row, answer, next[g]);
+        merged.constraint[row] = joint;
+        data_.discrepancy_body[2 * row] = description.body1;
+        data_.discrepancy_body[2 * row + 1] = description.body2;
+      }
+    }
+    // a joint that answers with another number of discrepancies than last time starts cold
+    std::size_t remembered = 0;
+    while (o < old.discrepancy_constraint.size() && old.discrepancy_constraint[o] < joint) ++o;
+    while (o + remembered < old.discrepancy_constraint.size() && old.discrepancy_constraint[o + remembered] == joint)
+      ++remembered;
+    const bool warm = remembered == row - first;
+    for (std::size_t i = first; i < row; ++i) {
+      const std::size_t source = o + (i - first);
+      set_vector(data_.discrepancy_warm_impulse.span(), i,
+                 warm ? vector_at(old.discrepancy_impulse.span(), source) : Vector3::Zero());
+      set_vector(data_.discrepancy_warm_correction.span(), i,
+                 warm ? vector_at(old.discrepancy_correction.span(), source) : Vector3::Zero());
+    }
+  }
+}
+
+Trusted<Solution> Environment::solve() {
+  const DiscrepancyAnswer& joints = data_.discrepancies;
+  const Column<double>& wrench = wrench_is_constant_ ? data_.wrench : data_.start_wrench;
+  const std::array<ColumnId, stage::SolverSolveRequest::kColumnCount> request = {
+      data_.time_step.id(), data_.theta.id(), model_.flags.id(), model_.inverse_mass.id(), model_.inverse_inertia.id(),
+      front().position.id(), front().orientation.id(), start_linear_velocity().id(), start_angular_velocity().id(),
+      data_.trial_position.id(), data_.trial_orientation.id(), data_.trial_linear_velocity.id(),
+      data_.trial_angular_velocity.id(), wrench.id(), data_.discrepancy_body.id(), joints.point1.id(),
+      joints.point2.id(), joints.velocity.id(), joints.correction.id(), joints.axes.id(), joints.mode.id(),
+      joints.lower.id(), joints.upper.id(), joints.compliance.id(), joints.damping.id(), joints.maximum_force.id(),
+      data_.discrepancy_warm_impulse.id(), data_.discrepancy_warm_correction.id(), data_.contact_body.id(),
+      data_.contact_normal.id(), data_.contact_point.id(), data_.contact_depth.id(), data_.contact_key.id(),
+      data_.contact_material.id(), data_.contact_warm_impulse.id(), data_.contact_warm_correction.id()};
+  const std::array<ColumnId, stage::SolverSolveReply::kColumnCount> reply = {
+      data_.solved_linear_velocity.id(), data_.solved_angular_velocity.id(), data_.pose_change.id(),
+      data_.discrepancy_impulse.id(), data_.discrepancy_correction.id(), data_.contact_impulse.id(),
+      data_.contact_correction.id(), data_.contact_direction.id(), data_.iterations.id(), data_.residual.id(),
+      data_.stop_reason.id()};
+  // a solver answers a row per discrepancy and contact: make room, so that it is not asked twice
+  const std::size_t discrepancies = joints.mode.size(), contacts = data_.contact_key.size();
+  for (const Column<double>* column : {&data_.discrepancy_impulse, &data_.discrepancy_correction})
+    column->resize(3 * discrepancies);
+  for (const Column<double>* column : {&data_.contact_impulse, &data_.contact_direction}) column->resize(3 * contacts);
+  data_.contact_correction.resize(contacts);
+  return validator_.solution(ask(Stage::kSolve, &solver_, {stage::Method::kSolverSolve, 0, request, reply}, nullptr),
+                             data_);
+}
+
+}  // namespace gravitas::kernel

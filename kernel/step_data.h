@@ -1,0 +1,84 @@
+// What one step works out on its way: scratch columns, written by the named stage, void after commit.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernel/arena.h"
+#include "kernel/model.h"
+
+namespace gravitas::kernel {
+
+// Answers of Force.Wrenches, a row per application of the group.
+struct ForceAnswer {
+  Column<double> wrench, impulse, potential;
+  Column<std::uint32_t> flags;
+};
+
+// Answers of Constraint.Discrepancies, and the same columns merged over all groups in the scene's order.
+struct DiscrepancyAnswer {
+  DiscrepancyAnswer() = default;
+  DiscrepancyAnswer(Arena* arena, std::uint64_t rows);
+  std::vector<ColumnId> ids() const;
+  void resize(std::uint64_t rows) const;
+  // Copies a row of another answer into a row of this one.
+  void copy_row(std::size_t row, const DiscrepancyAnswer& source, std::size_t source_row) const;
+
+  Column<std::uint32_t> constraint;
+  Column<double> point1, point2, velocity, correction, axes;
+  Column<std::uint32_t> mode;
+  Column<double> lower, upper, compliance, damping, maximum_force;
+};
+
+struct StepData {
+  StepData(Arena* arena, const Model& model, const EnvironmentDescription& description);
+
+  // Scalars of the step: a row each. Written at its start.
+  Column<double> time, time_step, theta, margin;
+  Column<std::uint32_t> wrench_is_constant;
+
+  // Velocities at the start of the step: those of S_n plus instantaneous impulses. Written at its start, and
+  // only in a step that has such impulses.
+  Column<double> start_linear_velocity, start_angular_velocity;
+
+  // Trial state of a derivative request, and its time. Written by the carrier of Stage::kIntegrate.
+  Column<double> derivative_time, derivative_position, derivative_orientation, derivative_linear_velocity,
+      derivative_angular_velocity;
+  // Stage::kForce: answers per group; sum per body (6); impulses per body (6), asked once.
+  std::vector<ForceAnswer> force_answers;
+  Column<double> wrench, impulse;
+  // Wrenches at S_n for the solver, which may differ from the last ones that the integrator asked for.
+  Column<double> start_wrench;
+
+  // Stage::kIntegrate: S*.
+  Column<double> trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity, error_estimate,
+      next_plugin_state;
+
+  // Stage::kBound.
+  Column<double> lower, upper;
+
+  // Stage::kBroadPhase.
+  Column<std::uint32_t> pair;
+
+  // Stage::kNarrowPhase, and what the kernel looks up for each contact.
+  Column<std::uint32_t> contact_pair, contact_feature;
+  Column<double> contact_normal, contact_point, contact_depth, contact_relative_velocity;
+  Column<std::uint32_t> contact_body;
+  Column<std::uint64_t> contact_key;
+  Column<double> contact_material, contact_warm_impulse, contact_warm_correction;
+
+  // Stage::kConstrain.
+  std::vector<Column<std::uint32_t>> group_intact;
+  std::vector<DiscrepancyAnswer> discrepancy_answers;
+  DiscrepancyAnswer discrepancies;
+  Column<std::uint32_t> discrepancy_body;
+  Column<double> discrepancy_warm_impulse, discrepancy_warm_correction;
+
+  // Stage::kSolve.
+  Column<double> solved_linear_velocity, solved_angular_velocity, pose_change;
+  Column<double> discrepancy_impulse, discrepancy_correction, contact_impulse, contact_correction, contact_direction;
+  Column<std::uint32_t> iterations, stop_reason;
+  Column<double> residual;
+};
+
+}  // namespace gravitas::kernel
