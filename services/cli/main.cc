@@ -1,0 +1,42 @@
+// gravitas: one program, sub-commands. Results go to standard output, everything else to standard error.
+#include <CLI/CLI.hpp>
+
+#include <exception>
+#include <iostream>
+
+#include "plugin_sdk/floating_point.h"
+#include "services/cli/commands.h"
+#include "services/run/session.h"
+
+int main(int argc, char** argv) {
+  using namespace gravitas;
+  const std::string missing = missing_cpu_features();
+  if (!missing.empty()) {
+    std::cerr << "gravitas: " << missing << '\n';
+    return cli::kOurFault;
+  }
+
+  CLI::App app{"Gravitas: a rigid-body physics engine whose parts are plugins in worker processes."};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", GRAVITAS_BUILD_ID);
+  cli::Action action;
+  cli::add_run(&app, &action);
+  cli::add_plan(&app, &action);
+  cli::add_plugins(&app, &action);
+  cli::add_describe(&app, &action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error, std::cout, std::cerr);
+    return code == 0 ? cli::kDone : cli::kBadInput;
+  }
+  try {
+    return action();
+  } catch (const BadInput& problem) {
+    std::cerr << problem.what() << '\n';
+    return cli::kBadInput;
+  } catch (const std::exception& problem) {
+    std::cerr << "gravitas: " << problem.what() << '\n';
+    return cli::kOurFault;
+  }
+}

@@ -1,0 +1,145 @@
+// `gravitas plugins` and `gravitas describe`.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <iostream>
+#include <memory>
+
+#include "plugin_sdk/host/description_message.h"
+#include "services/catalog/catalog.h"
+#include "services/cli/commands.h"
+#include "services/recorder/json.h"
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+namespace {
+
+std::string kind_name(PropertyKind kind) {
+  switch (kind) {
+    case PropertyKind::kNumber: return "number";
+    case PropertyKind::kInteger: return "integer";
+    case PropertyKind::kFlag: return "true or false";
+    case PropertyKind::kChoice: return "text";
+    case PropertyKind::kVector: return "{x, y, z}";
+    case PropertyKind::kQuaternion: return "{w, x, y, z}";
+    case PropertyKind::kTable: return "table";
+  }
+  return "?";
+}
+
+std::string range_text(const Property& p) {
+  if (p.kind == PropertyKind::kChoice) return fmt::format("{}", fmt::join(p.choices, " | "));
+  std::string text;
+  if (std::isfinite(p.minimum)) text += fmt::format("{} {:g}", p.exclusive_minimum ? ">" : ">=", p.minimum);
+  if (std::isfinite(p.maximum)) text += fmt::format("{}<= {:g}", text.empty() ? "" : ", ", p.maximum);
+  return text;
+}
+
+std::string default_text(const Property& p) {
+  if (p.is_required) return "required";
+  if (p.default_numbers.empty()) return "absent";
+  if (p.kind == PropertyKind::kFlag) return p.default_numbers[0] != 0.0 ? "true" : "false";
+  if (p.kind == PropertyKind::kChoice) return p.choices[static_cast<std::size_t>(p.default_numbers[0])];
+  return fmt::format("{}", fmt::join(p.default_numbers, ", "));
+}
+
+void print_properties(const std::vector<Property>& properties, const std::string& indent) {
+  for (const Property& p : properties) {
+    std::cout << fmt::format("{}{:<18} {:<14} {:<8} {:<14} {:<12} {:<9} {}\n", indent, p.name, kind_name(p.kind), p.unit,
+                             range_text(p), default_text(p), p.is_live ? "live" : "init-only", p.meaning);
+  }
+}
+
+void print_declaration(const InstalledPlugin& plugin) {
+  const PluginDeclaration& d = plugin.declaration;
+  std::cout << fmt::format("{} {}: slot {}\n  {}\n  library       {}\n  capabilities  {}\n", d.name, d.version,
+                           slot_name(d.slot), d.meaning, plugin.library,
+                           d.capabilities.empty() ? std::string("none") : fmt::format("{}", fmt::join(d.capabilities, ", ")));
+  if (d.slot == Slot::kIntegrator) std::cout << fmt::format("  theta         {:g}\n", d.theta);
+  if (!d.properties.empty()) {
+    std::cout << "  properties (name, type, unit, range, default, when it may change, meaning)\n";
+    print_properties(d.properties, "    ");
+  }
+  for (const TypeDeclaration& type : d.types) {
+    std::cout << fmt::format("  type {}: {}\n", type.name, type.meaning);
+    print_properties(type.properties, "    ");
+  }
+}
+
+Catalog installed_catalog() { return Catalog::installed(installed_worker(), installed_plugins()); }
+
+int list_plugins(bool json) {
+  const Catalog catalog = installed_catalog();
+  if (json) {
+    plugin::v1::Catalog message;
+    for (const InstalledPlugin& plugin : catalog.plugins()) {
+      plugin::v1::Catalog::Entry* entry = message.add_entries();
+      entry->set_library(plugin.library);
+      *entry->mutable_description() = host::to_message(plugin.declaration);
+    }
+    std::cout << to_json(message, JsonForm::kPage);
+  } else {
+    std::cout << fmt::format("{:<12} {:<20} {:<8} {:<34} {}\n", "slot", "plugin", "version", "types", "meaning");
+    for (const InstalledPlugin& plugin : catalog.plugins()) {
+      const PluginDeclaration& d = plugin.declaration;
+      std::string types;
+      for (const TypeDeclaration& type : d.types) types += (types.empty() ? "" : " ") + type.name;
+      std::cout << fmt::format("{:<12} {:<20} {:<8} {:<34} {}\n", slot_name(d.slot), d.name, d.version, types, d.meaning);
+    }
+  }
+  for (const BrokenLibrary& broken : catalog.broken()) std::cerr << broken.problem << '\n';
+  return kDone;
+}
+
+int describe(const std::string& name, bool json) {
+  Catalog catalog = installed_catalog();
+  std::vector<InstalledPlugin> found;
+  std::string problem;
+  if (name.find('/') != std::string::npos || name.ends_with(".so")) {
+    if (const InstalledPlugin* plugin = catalog.add_library(name, &problem)) found.push_back(*plugin);
+  } else {
+    // names are unique inside a slot only; a type's name stands for the plugin that serves it
+    for (const InstalledPlugin& plugin : catalog.plugins())
+      if (plugin.declaration.name == name || find_type(plugin.declaration, name) != nullptr) found.push_back(plugin);
+    if (found.empty()) {
+      problem = "there is no plugin '" + name + "'; installed:";
+      for (const InstalledPlugin& plugin : catalog.plugins()) problem += " " + plugin.declaration.name;
+    }
+  }
+  if (found.empty()) throw BadInput(problem);
+  for (const InstalledPlugin& plugin : found) {
+    if (json) {
+      std::cout << to_json(host::to_message(plugin.declaration), JsonForm::kPage);
+    } else {
+      print_declaration(plugin);
+    }
+  }
+  return kDone;
+}
+
+struct Arguments {
+  std::string name;
+  bool json = false;
+};
+
+}  // namespace
+
+void add_plugins(CLI::App* app, Action* action) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app->add_subcommand("plugins", "List the installed plugins");
+  command->footer("Example: gravitas plugins --json");
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([=] { *action = [=] { return list_plugins(arguments->json); }; });
+}
+
+void add_describe(CLI::App* app, Action* action) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app->add_subcommand("describe", "A plugin's kind, version, capabilities and properties");
+  command->footer("Example: gravitas describe Sequential");
+  command->add_option("PLUGIN", arguments->name, "Name of a plugin or of a type it serves, or path of a library")->required();
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([=] { *action = [=] { return describe(arguments->name, arguments->json); }; });
+}
+
+}  // namespace gravitas::cli

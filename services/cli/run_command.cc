@@ -1,0 +1,153 @@
+// `gravitas run` and `gravitas plan`.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <iostream>
+#include <memory>
+
+#include "services/cli/commands.h"
+#include "services/cli/hosting.h"
+#include "services/recorder/json.h"
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupt_requested = 0;
+
+// The first Ctrl-C ends the run after its step; the second ends the program.
+void request_interrupt(int number) {
+  interrupt_requested = 1;
+  std::signal(number, SIG_DFL);
+}
+
+struct CommandLine {
+  RunOptions options;
+  std::vector<std::string> hosting;
+  bool progress = false, quiet = false, json = false;
+};
+
+void add_scene_options(CLI::App* command, CommandLine* line) {
+  RunOptions& options = line->options;
+  command->add_option("SCENE", options.scenes, "Scene files; several are read as one scene")->required();
+  command->add_option("--duration", options.duration, "Simulated time, s")->check(CLI::NonNegativeNumber);
+  command->add_option("--steps", options.steps, "Number of steps");
+  command->add_option("--dt", options.time_step, "Time step, s")->check(CLI::PositiveNumber);
+  command->add_option("--set", options.overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--hosting", line->hosting, "direct or shm, for all slots or for one: solver=direct")
+      ->take_all()
+      ->allow_extra_args(false);
+  command->add_option("--threads", options.threads, "Threads of each host")->check(CLI::Range(1, 1024));
+}
+
+// One line that is rewritten in place on a terminal, or a line per second elsewhere.
+class ProgressLine {
+ public:
+  ProgressLine(bool wanted, bool quiet) : is_terminal_(isatty(STDERR_FILENO) == 1), wanted_(wanted), quiet_(quiet) {}
+
+  void show(const Progress& progress) {
+    // the clock is looked at now and then only
+    if (quiet_ || (!wanted_ && !is_terminal_) || (++calls_ & 15) != 0) return;
+    const auto now = std::chrono::steady_clock::now();
+    if (!wanted_ && now - start_ < std::chrono::seconds(2)) return;
+    if (now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000))) return;
+    last_ = now;
+    std::cerr << (is_terminal_ ? "\r" : "")
+              << fmt::format("t = {:.2f} of {:.6g} s, step {} of {} ({:.0f} %)", progress.time, progress.duration,
+                             progress.step, progress.steps, 100.0 * progress.step / progress.steps)
+              << (is_terminal_ ? "   " : "\n") << std::flush;
+    shown_ = true;
+  }
+
+  void finish() {
+    if (shown_ && is_terminal_) std::cerr << '\n';
+  }
+
+ private:
+  bool is_terminal_, wanted_, quiet_, shown_ = false;
+  unsigned calls_ = 0;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
+};
+
+void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warnings) {
+  for (const std::string& warning : warnings) std::cerr << warning << '\n';
+}
+
+int run_scene(CommandLine* line) {
+  line->options.hosting = parse_hosting(line->hosting);
+  std::signal(SIGINT, request_interrupt);
+  std::signal(SIGTERM, request_interrupt);
+  ProgressLine progress(line->progress, line->quiet);
+  const RunResult result = run(line->options, [] { return interrupt_requested != 0; },
+                               [&](const Progress& now) { progress.show(now); });
+  progress.finish();
+  if (!line->quiet) print_warnings(result.report.warnings());
+  if (line->json) {
+    std::cout << to_json(result.report, JsonForm::kPage);
+  } else if (!line->quiet) {
+    std::cout << result.summary;
+  }
+  if (result.outcome == RunOutcome::kPaused) {
+    std::cerr << "gravitas: " << result.fault << "\n";
+    return kPaused;
+  }
+  if (result.outcome == RunOutcome::kInterrupted) {
+    std::cerr << fmt::format("gravitas: interrupted after step {}; what was computed is kept\n", result.report.steps());
+    return kInterrupted;
+  }
+  return kDone;
+}
+
+int plan_scene(CommandLine* line) {
+  line->options.hosting = parse_hosting(line->hosting);
+  std::vector<std::string> warnings;
+  const kernel::EnvironmentDescription description = load(line->options, &warnings);
+  for (const std::string& warning : warnings) std::cerr << warning << '\n';
+  report::v1::Plan plan = plan_message(*start(description));
+  // the workers that were started to find out are gone again
+  for (report::v1::PlannedSlot& slot : *plan.mutable_slots()) slot.set_pid(0);
+  if (line->json) {
+    std::cout << to_json(plan, JsonForm::kPage);
+    return kDone;
+  }
+  std::cout << fmt::format("{:<12} {:<20} {}\n", "slot", "plugin", "hosting");
+  for (const report::v1::PlannedSlot& slot : plan.slots())
+    std::cout << fmt::format("{:<12} {:<20} {}\n", slot.slot(), slot.plugin(), slot.hosting());
+  for (const report::v1::LeftOut& out : plan.left_out())
+    std::cout << fmt::format("{:<12} left out: {}\n", out.what(), out.why());
+  return kDone;
+}
+
+}  // namespace
+
+void add_run(CLI::App* app, Action* action) {
+  const auto line = std::make_shared<CommandLine>();
+  CLI::App* command = app->add_subcommand("run", "Simulate a scene");
+  command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json");
+  add_scene_options(command, line.get());
+  RunOptions& options = line->options;
+  command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
+  command->add_option("--sample-every", options.sample_every, "Interval of the trajectory's samples, s; every step if absent")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--report", options.report, "Write the report to this file (JSON)");
+  command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
+  command->add_flag("--json", line->json, "Print the report instead of the summary");
+  command->add_flag("--progress", line->progress, "Show progress from the start");
+  command->add_flag("--quiet", line->quiet, "Print nothing but errors");
+  command->callback([=] { *action = [=] { return run_scene(line.get()); }; });
+}
+
+void add_plan(CLI::App* app, Action* action) {
+  const auto line = std::make_shared<CommandLine>();
+  CLI::App* command = app->add_subcommand("plan", "Print the pipeline that a scene needs, and what is left out and why");
+  command->footer("Example: gravitas plan deploy/scenes/two_spheres_motor.gravitas");
+  add_scene_options(command, line.get());
+  command->add_flag("--json", line->json, "Print JSON");
+  command->callback([=] { *action = [=] { return plan_scene(line.get()); }; });
+}
+
+}  // namespace gravitas::cli

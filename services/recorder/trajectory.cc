@@ -1,0 +1,77 @@
+#include "services/recorder/trajectory.h"
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace gravitas {
+namespace {
+
+// A boundary counts as "at k * interval" within this share of a time step.
+constexpr double kTimeTolerance = 1e-9;
+
+[[noreturn]] void fail(const std::string& path) {
+  throw std::system_error(errno, std::generic_category(), "trajectory '" + path + "'");
+}
+
+// Ids are written as they are unless CSV would misread them.
+std::string quoted(const std::string& id) {
+  if (id.find_first_of(",\"\n\r") == std::string::npos) return id;
+  std::string out = "\"";
+  for (const char c : id) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + "\"";
+}
+
+}  // namespace
+
+TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description,
+                                   double interval)
+    : path_(path), file_(std::fopen(path.c_str(), "we")), interval_(interval) {
+  if (file_ == nullptr) fail(path);
+  for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
+    const kernel::BodyDescription& body = description.bodies[i];
+    if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
+  }
+  if (std::fputs("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", file_) < 0) fail(path);
+}
+
+TrajectoryWriter::~TrajectoryWriter() {
+  if (file_ != nullptr) std::fclose(file_);
+}
+
+void TrajectoryWriter::offer(const kernel::Environment& environment, bool last) {
+  const double time = environment.time();
+  const double tolerance = kTimeTolerance * environment.time_step();
+  const bool due = interval_ <= 0.0 || time >= static_cast<double>(next_sample_) * interval_ - tolerance;
+  if (!due && !last) return;
+  if (last_written_ == environment.step_count()) return;
+  while (interval_ > 0.0 && static_cast<double>(next_sample_) * interval_ - tolerance <= time) ++next_sample_;
+  write_sample(environment);
+  last_written_ = environment.step_count();
+}
+
+void TrajectoryWriter::write_sample(const kernel::Environment& environment) {
+  const kernel::StateView state = environment.state();
+  fmt::memory_buffer text;
+  for (const Row& row : rows_) {
+    const Pose body{vector_at(state.position, row.body), quaternion_at(state.orientation, row.body)};
+    const Pose pose = compose(body, row.geometry);
+    const Vector3 v = vector_at(state.linear_velocity, row.body), w = vector_at(state.angular_velocity, row.body);
+    fmt::format_to(std::back_inserter(text),
+                   "{:.17g},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},"
+                   "{:.17g},{:.17g}\n",
+                   environment.time(), row.id, pose.position.x(), pose.position.y(), pose.position.z(),
+                   pose.orientation.w(), pose.orientation.x(), pose.orientation.y(), pose.orientation.z(), v.x(), v.y(),
+                   v.z(), w.x(), w.y(), w.z());
+  }
+  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail(path_);
+}
+
+void TrajectoryWriter::close() {
+  std::FILE* file = std::exchange(file_, nullptr);
+  if (file != nullptr && std::fclose(file) != 0) fail(path_);
+}
+
+}  // namespace gravitas

@@ -1,0 +1,50 @@
+// The trajectory file: CSV, a row per body and sample, 17 significant digits so that every double can be read
+// back bit for bit.
+//
+//   time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz
+//
+// SI units, world frame. Position and orientation are those of the geometry's frame (of the centre of mass where
+// there is no geometry), vx vy vz is the velocity of the centre of mass. Immovable bodies have no rows. Samples:
+// the initial state, then the first step boundary at or after k * interval, and the last state.
+#pragma once
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "kernel/environment.h"
+
+namespace gravitas {
+
+class TrajectoryWriter {
+ public:
+  // `interval` 0: every step. Throws std::system_error if the file cannot be made.
+  TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
+  ~TrajectoryWriter();
+  TrajectoryWriter(const TrajectoryWriter&) = delete;
+  TrajectoryWriter& operator=(const TrajectoryWriter&) = delete;
+
+  // Called for the initial state and after every commit; `last` forces a sample.
+  void offer(const kernel::Environment& environment, bool last);
+
+  // Writes out everything; throws std::system_error if that fails (a full disk).
+  void close();
+
+ private:
+  void write_sample(const kernel::Environment& environment);
+
+  struct Row {
+    std::uint32_t body;
+    std::string id;
+    Pose geometry;  // of the geometry's frame in the body's
+  };
+
+  std::string path_;
+  std::FILE* file_;
+  std::vector<Row> rows_;
+  double interval_;
+  std::uint64_t next_sample_ = 0;
+  std::int64_t last_written_ = -1;
+};
+
+}  // namespace gravitas

@@ -1,0 +1,113 @@
+#include "services/run/figures.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/dynamics.h"
+
+namespace gravitas {
+namespace {
+
+void write_change(const Vector3& initial, const Vector3& final_value, report::v1::VectorChange* change) {
+  for (int k = 0; k < 3; ++k) {
+    change->add_initial(initial[k]);
+    change->add_final(final_value[k]);
+  }
+}
+
+// Numbers of a property among the flattened ones, or nothing if the type has no such property.
+std::optional<std::vector<double>> property_of(const TypeDeclaration& type, const std::vector<double>& numbers,
+                                               const std::string& name) {
+  std::size_t next = 0;
+  for (const Property& property : type.properties) {
+    std::size_t size = property.flat_size();
+    if (property.kind == PropertyKind::kTable && next < numbers.size())
+      size += static_cast<std::size_t>(numbers[next]) * property.columns;
+    if (next + size > numbers.size()) return std::nullopt;
+    if (property.name == name)
+      return std::vector<double>(numbers.begin() + static_cast<std::ptrdiff_t>(next),
+                                 numbers.begin() + static_cast<std::ptrdiff_t>(next + size));
+    next += size;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Figures::Figures(const kernel::EnvironmentDescription& description) : description_(description) { find_drives(); }
+
+// A drive is a joint whose type has an axis of two points and an angular speed, as AngularMotor does.
+void Figures::find_drives() {
+  for (std::uint32_t i = 0; i < description_.constraints.size(); ++i) {
+    const kernel::ConstraintDescription& joint = description_.constraints[i];
+    for (const TypeDeclaration& type : description_.constraint.plugins[joint.plugin].declaration.types) {
+      if (type.name != joint.type) continue;
+      const auto point1 = property_of(type, joint.parameters, "BindAxisPoint1");
+      const auto point2 = property_of(type, joint.parameters, "BindAxisPoint2");
+      const auto speed = property_of(type, joint.parameters, "AngularSpeed");
+      if (!point1 || !point2 || !speed) continue;
+      const Vector3 axis = vector_at(*point2, 0) - vector_at(*point1, 0);
+      const Quaternion q = joint.body1 == kNone ? Quaternion::Identity() : description_.bodies[joint.body1].pose.orientation;
+      drives_.push_back({i, q.conjugate() * axis.normalized(), (*speed)[0]});
+    }
+  }
+}
+
+double Figures::drive_speed(const Drive& drive, const kernel::StateView& state) const {
+  const kernel::ConstraintDescription& joint = description_.constraints[drive.constraint];
+  Vector3 axis = drive.axis_in_body1;
+  Vector3 relative = Vector3::Zero();
+  if (joint.body1 != kNone) {
+    axis = quaternion_at(state.orientation, joint.body1) * axis;
+    relative -= vector_at(state.angular_velocity, joint.body1);
+  }
+  if (joint.body2 != kNone) relative += vector_at(state.angular_velocity, joint.body2);
+  return axis.dot(relative);
+}
+
+Figures::Totals Figures::totals(kernel::Environment* environment) const {
+  Totals sum;
+  const kernel::StateView state = environment->state();
+  const kernel::Model& model = environment->model();
+  for (std::uint32_t i = 0; i < model.body_count; ++i) {
+    if ((model.flags[i] & kMovable) == 0) continue;
+    const Pose pose{vector_at(state.position, i), quaternion_at(state.orientation, i)};
+    const Twist twist{vector_at(state.linear_velocity, i), vector_at(state.angular_velocity, i)};
+    const Vector3 inertia = vector_at(model.inertia.span(), i);
+    sum.kinetic += kinetic_energy(model.mass[i], inertia, pose.orientation, twist);
+    sum.linear += model.mass[i] * twist.linear;
+    sum.angular += angular_momentum(model.mass[i], inertia, pose, twist);
+  }
+  sum.potential = environment->potential_energy();
+  return sum;
+}
+
+void Figures::follow(kernel::Environment* environment) {
+  last_ = totals(environment);
+  if (!initial_) initial_ = last_;
+  largest_kinetic_ = std::max(largest_kinetic_, last_.kinetic);
+  largest_deviation_ = std::max(largest_deviation_, std::fabs(last_.energy() - initial_->energy()));
+  penetration_ = std::max(penetration_, environment->figures().penetration);
+  joint_error_ = std::max(joint_error_, environment->figures().joint_error);
+  for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
+}
+
+void Figures::write(report::v1::Report* report) const {
+  const Totals initial = initial_.value_or(Totals{});
+  const double scale = std::max(std::fabs(initial.energy()), largest_kinetic_);
+  report->mutable_energy()->set_initial(initial.energy());
+  report->mutable_energy()->set_final(last_.energy());
+  report->mutable_energy()->set_max_relative_drift(scale > 0.0 ? largest_deviation_ / scale : 0.0);
+  write_change(initial.linear, last_.linear, report->mutable_linear_momentum());
+  write_change(initial.angular, last_.angular, report->mutable_angular_momentum());
+  report->set_max_penetration(penetration_);
+  report->set_max_joint_error(joint_error_);
+  for (const Drive& drive : drives_) {
+    report::v1::Drive* message = report->add_drives();
+    message->set_constraint(description_.constraints[drive.constraint].id);
+    message->set_target(drive.target);
+    message->set_speed(drive.speed);
+  }
+}
+
+}  // namespace gravitas

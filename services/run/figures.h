@@ -1,0 +1,50 @@
+// Conserved quantities and errors of a run, followed from commit to commit for the report.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "gravitas/report/v1/report.pb.h"
+#include "kernel/environment.h"
+
+namespace gravitas {
+
+class Figures {
+ public:
+  explicit Figures(const kernel::EnvironmentDescription& description);
+
+  // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential).
+  void follow(kernel::Environment* environment);
+
+  // Energy, momenta, penetration, joint error, drives.
+  void write(report::v1::Report* report) const;
+
+ private:
+  struct Totals {
+    double kinetic = 0.0, potential = 0.0;             // J
+    Vector3 linear = Vector3::Zero();                  // kg m/s
+    Vector3 angular = Vector3::Zero();                 // kg m^2/s, about the origin
+    double energy() const { return kinetic + potential; }
+  };
+  // A joint that drives its second body about an axis.
+  struct Drive {
+    std::uint32_t constraint;
+    Vector3 axis_in_body1;  // unit
+    double target;          // rad/s
+    double speed = 0.0;     // rad/s, in the last state
+  };
+
+  Totals totals(kernel::Environment* environment) const;
+  void find_drives();
+  double drive_speed(const Drive& drive, const kernel::StateView& state) const;
+
+  const kernel::EnvironmentDescription& description_;
+  std::vector<Drive> drives_;
+  std::optional<Totals> initial_;
+  Totals last_;
+  double largest_kinetic_ = 0.0, largest_deviation_ = 0.0;
+  double penetration_ = 0.0, joint_error_ = 0.0;
+};
+
+}  // namespace gravitas

@@ -1,0 +1,55 @@
+#include "services/run/summary.h"
+
+#include <fmt/format.h>
+
+#include <set>
+
+namespace gravitas {
+namespace {
+
+// Bodies and joints that are named one by one.
+constexpr std::size_t kMostNamed = 4;
+
+std::string story(const report::v1::Report& report, const std::vector<EventLog::Meeting>& meetings) {
+  std::string text;
+  for (std::size_t i = 0; i < meetings.size() && i < kMostNamed; ++i) {
+    text += fmt::format("{}{} met {} at {:.3f} s ({:.2f} m/s)", i == 0 ? "" : ", ", meetings[i].body, meetings[i].with,
+                        meetings[i].time, meetings[i].speed);
+  }
+  if (meetings.size() > kMostNamed) text += fmt::format(" and {} more", meetings.size() - kMostNamed);
+  for (int i = 0; i < report.drives_size() && i < static_cast<int>(kMostNamed); ++i) {
+    const report::v1::Drive& drive = report.drives(i);
+    text += fmt::format("{}{} turns at {:.6g} rad/s (set: {:.6g})", text.empty() ? "" : "; ", drive.constraint(),
+                        drive.speed(), drive.target());
+  }
+  if (report.events().break_() > 0) text += fmt::format("{}{} joints broke", text.empty() ? "" : "; ", report.events().break_());
+  return text;
+}
+
+std::string hosts(const report::v1::Plan& plan) {
+  std::set<int> processes;
+  std::string names;
+  for (const report::v1::PlannedSlot& slot : plan.slots()) {
+    names += fmt::format("{}{}={}", names.empty() ? "" : ", ", slot.slot(), slot.plugin());
+    if (slot.hosting() != "direct") processes.insert(slot.pid());
+  }
+  return processes.empty() ? fmt::format("in this process: {}", names)
+                           : fmt::format("{} worker processes: {}", processes.size(), names);
+}
+
+}  // namespace
+
+std::string summarize(const report::v1::Report& report, const std::vector<EventLog::Meeting>& meetings) {
+  std::string text = fmt::format("{}: {:.6g} s in {} steps, {} bodies, {:.3f} s of wall time ({:.1f} us a step)\n",
+                                 report.scene(), report.simulated_seconds(), report.steps(), report.bodies(),
+                                 report.wall_seconds(), report.microseconds_per_step().median());
+  const std::string happened = story(report, meetings);
+  if (!happened.empty()) text += "  " + happened + "\n";
+  text += fmt::format("  energy {:.6g} -> {:.6g} J, penetration <= {:.2g} m, joint error <= {:.2g} m\n",
+                      report.energy().initial(), report.energy().final(), report.max_penetration(),
+                      report.max_joint_error());
+  text += fmt::format("  {}\n  chain hash {}\n", hosts(report.plan()), report.chain_hash());
+  return text;
+}
+
+}  // namespace gravitas
