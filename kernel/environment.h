@@ -131,6 +131,17 @@ class Environment : private DerivativeSource {
   // Asks a slot and books the time.
   Untrusted<StageCall> ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives);
 
+  // Asks a slot and checks the answer; what the check finds is the fault of the plugin that was asked.
+  template <typename Check>
+  auto ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives, Check&& check) {
+    const Untrusted<StageCall> answer = ask(stage, slot, call, derivatives);
+    try {
+      return check(answer);
+    } catch (StageFault& fault) {
+      slot->fail(std::move(fault), call.target);
+    }
+  }
+
   const State& front() const { return states_[front_]; }
   State& back() { return states_[1 - front_]; }
   double time_of(std::uint32_t step) const;

@@ -28,7 +28,7 @@ void Environment::ask_forces(const std::array<ColumnId, 5>& state) {
     const std::array<ColumnId, 4> reply = {answer.wrench.id(), answer.impulse.id(), answer.potential.id(),
                                            answer.flags.id()};
     const StageCall call{stage::Method::kForceWrenches, group.target, request, reply};
-    validator_.wrenches(ask(Stage::kForce, &force_, call, nullptr), answer);
+    ask(Stage::kForce, &force_, call, nullptr, [&](const auto& got) { return validator_.wrenches(got, answer); });
   }
 }
 

@@ -67,7 +67,7 @@ void Environment::bind_joints() {
                                              group.parameter.id(), front().position.id(), front().orientation.id()};
     const std::array<ColumnId, 2> reply = {group.bound_begin.id(), group.bound.id()};
     const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
-    validator_.bound(ask(Stage::kConstrain, &constraint_, call, nullptr), group);
+    ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) { return validator_.bound(answer, group); });
   }
 }
 

@@ -31,9 +31,10 @@ class StageSlot {
   Untrusted<StageCall> ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
                            std::uint64_t* compute_ns);
 
- private:
+  // Throws the fault with this slot and the plugin that was asked written into it.
   [[noreturn]] void fail(StageFault fault, std::uint32_t target) const;
 
+ private:
   Slot which_;
   SlotDescription description_;
   std::unique_ptr<PendingCarrier> pending_;

@@ -85,7 +85,8 @@ Trusted<TrialState> Environment::integrate() {
                                          data_.error_estimate.id(),         data_.next_plugin_state.id()};
   const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
   DerivativeSource* derivatives = wrench_is_constant_ ? nullptr : this;
-  return validator_.trial_state(ask(Stage::kIntegrate, &integrator_, call, derivatives), data_, front());
+  return ask(Stage::kIntegrate, &integrator_, call, derivatives,
+             [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });
 }
 
 // World bounds at S*, widened so that pairs up to the margin apart overlap.
@@ -109,8 +110,8 @@ Trusted<Pairs> Environment::find_pairs() {
   const std::array<ColumnId, 5> request = {data_.lower.id(), data_.upper.id(), model_.flags.id(),
                                            model_.filter_group.id(), model_.filter_mask.id()};
   const std::array<ColumnId, 1> reply = {data_.pair.id()};
-  return validator_.pairs(ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr),
-                          data_);
+  return ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr,
+             [&](const auto& answer) { return validator_.pairs(answer, data_); });
 }
 
 Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {
@@ -131,7 +132,8 @@ Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {
                                          data_.contact_normal.id(), data_.contact_point.id(),
                                          data_.contact_depth.id(),  data_.contact_relative_velocity.id()};
   const StageCall call{stage::Method::kCollisionManifolds, 0, request, reply};
-  return validator_.contacts(ask(Stage::kNarrowPhase, &collision_, call, nullptr), data_);
+  return ask(Stage::kNarrowPhase, &collision_, call, nullptr,
+             [&](const auto& answer) { return validator_.contacts(answer, data_); });
 }
 
 // Bodies, material row, key and warm start of each contact. Both this step's contacts and the remembered ones
@@ -184,8 +186,9 @@ void Environment::constrain(const Trusted<TrialState>&) {
                                               data_.trial_angular_velocity.id()};
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
     const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
-    validator_.discrepancies(ask(Stage::kConstrain, &constraint_, call, nullptr), data_.discrepancy_answers[g],
-                             intact.span());
+    ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) {
+      return validator_.discrepancies(answer, data_.discrepancy_answers[g], intact.span());
+    });
   }
   merge_discrepancies();
 }
@@ -256,8 +259,8 @@ Trusted<Solution> Environment::solve() {
     column->resize(3 * discrepancies);
   for (const Column<double>* column : {&data_.contact_impulse, &data_.contact_direction}) column->resize(3 * contacts);
   data_.contact_correction.resize(contacts);
-  return validator_.solution(ask(Stage::kSolve, &solver_, {stage::Method::kSolverSolve, 0, request, reply}, nullptr),
-                             data_);
+  return ask(Stage::kSolve, &solver_, {stage::Method::kSolverSolve, 0, request, reply}, nullptr,
+             [&](const auto& answer) { return validator_.solution(answer, data_); });
 }
 
 }  // namespace gravitas::kernel

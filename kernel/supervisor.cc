@@ -182,7 +182,10 @@ void Supervisor::reap(int pidfd) {
   }
   process->ending_ = describe_ending(info);
   process->ended_.store(true, std::memory_order_release);
-  if (process->on_end_) process->on_end_();
+  // called once; what it holds may hold the process
+  const std::function<void()> on_end = std::move(process->on_end_);
+  process->on_end_ = nullptr;
+  if (on_end) on_end();
 }
 
 }  // namespace gravitas::kernel

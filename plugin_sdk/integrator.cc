@@ -27,8 +27,8 @@ void TrialColumns::set(std::size_t body, const BodyState& state) {
   set_vector(angular_velocity, body, state.twist.angular);
 }
 
-Derivatives::Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host)
-    : request_(request), host_(host) {}
+Derivatives::Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host, std::vector<double>* room)
+    : request_(request), host_(host), answer_(*room) {}
 
 std::span<const double> Derivatives::wrenches_at_start() {
   if (request_.wrench_is_constant() != 0) return request_.wrench();

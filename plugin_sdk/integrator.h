@@ -32,7 +32,8 @@ struct Acceleration {
 // Accelerations of free bodies. It asks the host for wrenches unless the request says that they are constant.
 class Derivatives {
  public:
-  Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host);
+  // `room` is kept by the plugin from call to call, so that a step allocates nothing.
+  Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host, std::vector<double>* room);
 
   // Wrenches of all bodies (six numbers each) in the initial state of the step, or in a trial state.
   std::span<const double> wrenches_at_start();
@@ -49,7 +50,7 @@ class Derivatives {
 
   const stage::IntegratorIntegrateRequest& request_;
   Host& host_;
-  std::vector<double> answer_;
+  std::vector<double>& answer_;
 };
 
 // Calls move(body, state) for every movable body and writes the state it returns as S*; kinematic bodies go on

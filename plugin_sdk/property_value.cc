@@ -16,6 +16,8 @@ constexpr double kNormTolerance = 1e-3;
 constexpr double kRoundingOfSquaredNorm = 1e-15;
 constexpr double kLargestInteger = 9.0e15;
 constexpr std::size_t kShownCharacters = 60;
+// Unknown names beyond this number tell nothing new.
+constexpr std::size_t kMostProblems = 20;
 
 using Kind = PropertyValue::Kind;
 
@@ -189,6 +191,7 @@ bool match_names(const std::vector<Property>& declared, const std::vector<NamedV
   bool good = true;
   found->assign(declared.size(), nullptr);
   for (const NamedValue& value : given) {
+    if (problems->size() >= kMostProblems) return false;
     std::size_t i = 0;
     while (i < declared.size() && declared[i].name != value.name) ++i;
     if (i == declared.size()) {

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "gravitas/options/v1/options.pb.h"
+#include "schemas/frame/layout.h"
 
 namespace {
 
@@ -123,7 +124,10 @@ bool read_columns(const pb::Descriptor& message, RowNumbers* rows, std::vector<C
     }
     columns->push_back(column);
   }
-  return columns->size() <= 48;
+  if (columns->size() <= GRAVITAS_MAX_COLUMNS) return true;
+  std::cerr << message.full_name() << ": " << columns->size() << " columns, a frame has room for "
+            << GRAVITAS_MAX_COLUMNS << '\n';
+  return false;
 }
 
 void write_info(std::ostream& out, const std::string& array, const std::vector<Column>& columns) {

@@ -53,6 +53,8 @@ bool read_all(int descriptor, void* data, std::size_t size, std::uint64_t until)
 // The child: describes libraries from `first` on, one message each, behind its length.
 [[noreturn]] void describe_in_child(const std::vector<std::string>& libraries, std::size_t first, int out) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // what a library prints while it loads must not mix with the catalogue
+  dup2(STDERR_FILENO, STDOUT_FILENO);
   for (std::size_t i = first; i < libraries.size(); ++i) {
     Entry entry;
     entry.set_library(libraries[i]);

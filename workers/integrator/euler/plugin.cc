@@ -26,7 +26,7 @@ class Euler final : public IntegratorPlugin {
   void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                  Host& host) override {
     const double h = request.time_step();
-    Derivatives derivatives(request, host);
+    Derivatives derivatives(request, host, &room_);
     const std::span<const double> wrenches = derivatives.wrenches_at_start();
     for_each_body(request, reply, [&](std::size_t body, const BodyState& s) {
       const Acceleration a = derivatives.acceleration(body, s, wrenches);
@@ -35,6 +35,9 @@ class Euler final : public IntegratorPlugin {
                        {slowed * (s.twist.linear + h * a.linear), slowed * (s.twist.angular + h * a.angular)}};
     });
   }
+
+ private:
+  std::vector<double> room_;  // scratch
 };
 
 }  // namespace

@@ -27,7 +27,7 @@ class SemiImplicitEuler final : public IntegratorPlugin {
   void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                  Host& host) override {
     const double h = request.time_step();
-    Derivatives derivatives(request, host);
+    Derivatives derivatives(request, host, &room_);
     const std::span<const double> wrenches = derivatives.wrenches_at_start();
     for_each_body(request, reply, [&](std::size_t body, const BodyState& s) {
       const Acceleration a = derivatives.acceleration(body, s, wrenches);
@@ -36,6 +36,9 @@ class SemiImplicitEuler final : public IntegratorPlugin {
       return BodyState{displaced(s.pose, h * next.linear, h * next.angular), next};
     });
   }
+
+ private:
+  std::vector<double> room_;  // scratch
 };
 
 }  // namespace

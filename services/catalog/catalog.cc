@@ -1,0 +1,154 @@
+#include "services/catalog/catalog.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <set>
+#include <system_error>
+#include <utility>
+
+#include "plugin_sdk/host/description_message.h"
+#include "services/catalog/describe_process.h"
+
+namespace gravitas {
+namespace {
+
+namespace files = std::filesystem;
+
+// The worker gives up on a library by itself after five seconds.
+constexpr std::chrono::milliseconds kTimeout{10000}, kTimeoutPerLibrary{6000};
+constexpr std::size_t kShownBroken = 3;
+
+// *.so of the folder by name. False with the reason if it cannot be read.
+bool list_libraries(const std::string& folder, std::vector<std::string>* libraries,
+                    std::string* problem) {
+  std::error_code error;
+  for (files::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error))
+    if (entry->path().extension() == ".so")
+      libraries->push_back(files::absolute(entry->path()).string());
+  std::sort(libraries->begin(), libraries->end());
+  if (error) *problem = "the folder cannot be read: " + error.message();
+  return !error;
+}
+
+// Why a described plugin cannot be used, or empty.
+std::string usability(const plugin::v1::Catalog::Entry& entry,
+                      const PluginDeclaration& declaration) {
+  if (!entry.problem().empty()) return entry.problem();
+  const bool has_slot = declaration.slot >= Slot::kSpace && declaration.slot <= Slot::kIntegrator;
+  if (!has_slot) return "it declares a slot that this version does not have";
+  if (declaration.name.empty()) return "it declares no name";
+  return "";
+}
+
+}  // namespace
+
+Catalog::Catalog(std::vector<InstalledPlugin> plugins)
+    : plugins_(std::make_move_iterator(plugins.begin()), std::make_move_iterator(plugins.end())) {}
+
+Catalog Catalog::installed(const std::string& worker_path, const std::string& plugin_dir) {
+  Catalog catalog;
+  catalog.worker_path_ = worker_path;
+  std::vector<std::string> libraries;
+  std::string problem;
+  if (!list_libraries(plugin_dir, &libraries, &problem)) {
+    catalog.broken_.push_back({plugin_dir, problem});
+    return catalog;
+  }
+  if (libraries.empty()) return catalog;
+  plugin::v1::Catalog answer;
+  if (!describe_libraries(worker_path, libraries, kTimeout + libraries.size() * kTimeoutPerLibrary,
+                          &answer, &problem)) {
+    catalog.broken_.push_back({plugin_dir, problem});
+    return catalog;
+  }
+  for (std::size_t i = 0; i < libraries.size(); ++i) {
+    const plugin::v1::Catalog::Entry& entry = answer.entries(static_cast<int>(i));
+    PluginDeclaration declaration = host::from_message(entry.description());
+    const std::string why = usability(entry, declaration);
+    catalog.add(libraries[i], why, std::move(declaration));
+  }
+  return catalog;
+}
+
+void Catalog::add(const std::string& library, const std::string& problem,
+                  PluginDeclaration declaration) {
+  if (problem.empty()) {
+    plugins_.push_back({library, std::move(declaration)});
+  } else {
+    broken_.push_back({library, problem});
+  }
+}
+
+const InstalledPlugin* Catalog::add_library(const std::string& path, std::string* problem) {
+  if (worker_path_.empty()) {
+    *problem = "there is no worker program to ask about it";
+    return nullptr;
+  }
+  const std::string library = files::absolute(path).lexically_normal().string();
+  std::error_code error;
+  if (!files::is_regular_file(library, error)) {
+    *problem = error ? "it cannot be read: " + error.message() : "it is no file";
+    return nullptr;
+  }
+  plugin::v1::Catalog answer;
+  if (!describe_libraries(worker_path_, {library}, kTimeout + kTimeoutPerLibrary, &answer, problem))
+    return nullptr;
+  PluginDeclaration declaration = host::from_message(answer.entries(0).description());
+  *problem = usability(answer.entries(0), declaration);
+  if (!problem->empty()) return nullptr;
+  add(library, "", std::move(declaration));
+  return &plugins_.back();
+}
+
+const InstalledPlugin* Catalog::find_plugin(Slot slot, const std::string& name) const {
+  for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
+    if (plugin->declaration.slot == slot && plugin->declaration.name == name) return &*plugin;
+  return nullptr;
+}
+
+const InstalledPlugin* Catalog::find_type(Slot slot, const std::string& type) const {
+  for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
+    if (plugin->declaration.slot == slot &&
+        gravitas::find_type(plugin->declaration, type) != nullptr)
+      return &*plugin;
+  return nullptr;
+}
+
+const InstalledPlugin* Catalog::find(const std::string& name) const {
+  for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
+    if (plugin->declaration.name == name) return &*plugin;
+  return nullptr;
+}
+
+std::vector<std::string> Catalog::plugin_names(Slot slot) const {
+  std::set<std::string> names;
+  for (const InstalledPlugin& plugin : plugins_)
+    if (plugin.declaration.slot == slot) names.insert(plugin.declaration.name);
+  return {names.begin(), names.end()};
+}
+
+std::vector<std::string> Catalog::type_names(Slot slot) const {
+  std::set<std::string> names;
+  for (const InstalledPlugin& plugin : plugins_)
+    if (plugin.declaration.slot == slot)
+      for (const TypeDeclaration& type : plugin.declaration.types) names.insert(type.name);
+  return {names.begin(), names.end()};
+}
+
+std::string Catalog::broken_text() const {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(broken_.size(), kShownBroken); ++i)
+    text += (i == 0 ? "" : ", ") + broken_[i].library + " (" + broken_[i].problem + ')';
+  if (broken_.size() > kShownBroken) text += ", … (" + std::to_string(broken_.size()) + " in all)";
+  return text.empty() ? "" : "; not usable: " + text;
+}
+
+const TypeDeclaration* find_type(const PluginDeclaration& declaration, const std::string& type) {
+  for (const TypeDeclaration& candidate : declaration.types)
+    if (candidate.name == type) return &candidate;
+  return nullptr;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,167 @@
+#include "services/catalog/describe_process.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+extern char** environ;
+
+namespace gravitas {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// An answer of this size would be wrong anyway.
+constexpr std::size_t kLargestAnswer = std::size_t{64} << 20;
+constexpr std::size_t kShownCharacters = 300;
+
+struct Pipe {
+  int read = -1;
+  int write = -1;
+
+  Pipe() {
+    std::array<int, 2> ends = {-1, -1};
+    if (::pipe2(ends.data(), O_CLOEXEC) == 0) read = ends[0], write = ends[1];
+  }
+  ~Pipe() {
+    close_end(&read);
+    close_end(&write);
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+
+  static void close_end(int* end) {
+    if (*end >= 0) ::close(*end);
+    *end = -1;
+  }
+};
+
+// Starts the worker in a process group of its own, so that a timeout also reaches what it started.
+int spawn(const std::string& worker_path, const std::vector<std::string>& libraries,
+          const Pipe& out, const Pipe& err, pid_t* pid) {
+  std::vector<std::string> words = {worker_path, "--describe"};
+  words.insert(words.end(), libraries.begin(), libraries.end());
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawnattr_init(&attributes);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, out.write, STDOUT_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, err.write, STDERR_FILENO);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  const int result =
+      ::posix_spawn(pid, worker_path.c_str(), &actions, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return result;
+}
+
+// Reads once from a pipe that is ready; closes it at its end.
+void drain(int* end, std::string* text) {
+  std::array<char, 65536> buffer;
+  const ssize_t got = ::read(*end, buffer.data(), buffer.size());
+  if (got > 0 && text->size() < kLargestAnswer) {
+    text->append(buffer.data(), static_cast<std::size_t>(got));
+  } else if (got >= 0 || errno != EINTR) {
+    Pipe::close_end(end);
+  }
+}
+
+// Reads both pipes to their ends. False if time ran out before.
+bool read_all(Pipe* out, Pipe* err, Clock::time_point until, std::string* answer,
+              std::string* messages) {
+  while (out->read >= 0 || err->read >= 0) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    if (left <= 0) return false;
+    std::array<pollfd, 2> ends = {pollfd{out->read, POLLIN, 0}, pollfd{err->read, POLLIN, 0}};
+    if (::poll(ends.data(), ends.size(), static_cast<int>(left)) < 0 && errno != EINTR)
+      return false;
+    if (out->read >= 0 && ends[0].revents != 0) drain(&out->read, answer);
+    if (err->read >= 0 && ends[1].revents != 0) drain(&err->read, messages);
+  }
+  return true;
+}
+
+// The status of a process that has ended or is about to; it is killed if time runs out.
+int wait_for(pid_t pid, Clock::time_point until, bool* is_in_time) {
+  const int handle = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));
+  while (*is_in_time && handle >= 0) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    pollfd end = {handle, POLLIN, 0};
+    const int ready = left > 0 ? ::poll(&end, 1, static_cast<int>(left)) : 0;
+    if (ready > 0) break;
+    *is_in_time = ready < 0 && errno == EINTR;
+  }
+  if (handle >= 0) ::close(handle);
+  if (!*is_in_time) ::kill(-pid, SIGKILL);
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  return status;
+}
+
+std::string first_line(const std::string& messages) {
+  const std::string line = messages.substr(0, std::min(messages.find('\n'), kShownCharacters));
+  return line.empty() ? "" : ": " + line;
+}
+
+}  // namespace
+
+bool describe_libraries(const std::string& worker_path, const std::vector<std::string>& libraries,
+                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer,
+                        std::string* problem) {
+  Pipe out, err;
+  if (out.read < 0 || err.read < 0) {
+    *problem = std::string("no pipe could be made: ") + std::strerror(errno);
+    return false;
+  }
+  pid_t pid = -1;
+  const int failure = spawn(worker_path, libraries, out, err, &pid);
+  if (failure != 0) {
+    *problem = worker_path + " could not be started: " + std::strerror(failure);
+    return false;
+  }
+  Pipe::close_end(&out.write);
+  Pipe::close_end(&err.write);
+
+  std::string bytes, messages;
+  const Clock::time_point until = Clock::now() + timeout;
+  bool is_complete = read_all(&out, &err, until, &bytes, &messages);
+  const int status = wait_for(pid, until, &is_complete);
+  if (!is_complete) {
+    *problem = worker_path + " --describe did not end within " + std::to_string(timeout.count()) +
+               " ms" + first_line(messages);
+  } else if (WIFSIGNALED(status)) {
+    *problem = worker_path + " --describe was ended by signal " + std::to_string(WTERMSIG(status)) +
+               first_line(messages);
+  } else if (WEXITSTATUS(status) != 0) {
+    *problem = worker_path + " --describe ended with status " +
+               std::to_string(WEXITSTATUS(status)) + first_line(messages);
+  } else if (!answer->ParseFromString(bytes) ||
+             answer->entries_size() != static_cast<int>(libraries.size())) {
+    *problem = worker_path + " --describe wrote no catalogue of " +
+               std::to_string(libraries.size()) + " libraries";
+  } else {
+    return true;
+  }
+  return false;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,205 @@
+#include "services/scene/build.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "services/scene/build_bodies.h"
+#include "services/scene/build_context.h"
+#include "services/scene/build_materials.h"
+#include "services/scene/build_plugins.h"
+#include "services/scene/build_shapes.h"
+
+namespace gravitas::scene {
+namespace {
+
+using v1::Constraint;
+using v1::Simulator;
+using v1::SimulatorProperties;
+
+constexpr double kStepTolerance = 1e-9;
+
+const v1::Environment* find_environment(const v1::Scene& scene, Diagnostics* diagnostics) {
+  if (scene.environment_size() == 0) {
+    diagnostics->error(place_of(scene.location()),
+                       "the scene has no Environment { … }; required: one");
+    return nullptr;
+  }
+  const v1::Environment& first = scene.environment(0);
+  if (scene.environment_size() == 1) return &first;
+  const v1::Environment& second = scene.environment(1);
+  diagnostics->error(place_of(second.location()),
+                     "a second Environment \"" + second.id() + "\"; the first is \"" + first.id() +
+                         "\" at " + diagnostics->place_text(place_of(first.location())) +
+                         "; allowed: one");
+  return nullptr;
+}
+
+// Number of steps and length of the last one.
+void build_steps(const SimulatorProperties& properties, BuildContext* context) {
+  const double time_step = properties.time_step(), duration = properties.duration();
+  const double ratio = duration / time_step, whole = std::round(ratio);
+  // a quotient of two rounded numbers is off by a rounding or two of its own size
+  const double tolerance =
+      std::max(kStepTolerance, 4.0 * std::numeric_limits<double>::epsilon() * ratio);
+  const bool is_whole = std::fabs(ratio - whole) <= tolerance;
+  const double steps = is_whole ? whole : std::ceil(ratio);
+  if (!(steps <= static_cast<double>(std::numeric_limits<std::uint32_t>::max()))) {
+    context->diagnostics->error(
+        place_of(properties, SimulatorProperties::kTimeStepFieldNumber),
+        "Duration/TimeStep is " + number_text(ratio) + "; allowed: up to 4294967295 steps");
+    return;
+  }
+  context->description.time_step = time_step;
+  context->description.steps = static_cast<std::uint32_t>(steps);
+  context->description.last_time_step = is_whole ? time_step : duration - (steps - 1.0) * time_step;
+}
+
+void build_simulator(const Simulator& simulator, BuildContext* context) {
+  if (simulator.type() != "Basic") {
+    context->diagnostics->error(place_of(simulator, Simulator::kTypeFieldNumber),
+                                "the simulator \"" + simulator.type() +
+                                    "\" is not supported by this version; allowed: \"Basic\"");
+  }
+  const SimulatorProperties& properties = simulator.custom_properties();
+  if (properties.substeps() != 1) {
+    context->diagnostics->error(place_of(properties, SimulatorProperties::kSubstepsFieldNumber),
+                                "Substeps is " + std::to_string(properties.substeps()) +
+                                    ", which is not supported by this version; allowed: 1");
+  }
+  build_steps(properties, context);
+}
+
+void check_filter(const v1::Environment& environment, Diagnostics* diagnostics) {
+  const v1::CollisionFilter& filter = environment.collision_filter();
+  if (!environment.has_collision_filter() || filter.default_allow()) return;
+  diagnostics->error(place_of(filter, v1::CollisionFilter::kDefaultAllowFieldNumber),
+                     "DefaultAllow = false is not supported by this version; allowed: true");
+}
+
+void build_forces(PluginSelection* plugins, BuildContext* context) {
+  for (const v1::Force& force : context->scene.forces().force()) {
+    kernel::ForceDescription& description = context->description.forces.emplace_back();
+    description.id = force.id();
+    description.type = force.type();
+    const TypeDeclaration* type = nullptr;
+    const TextPosition place = place_of(force, v1::Force::kTypeFieldNumber);
+    description.plugin = plugins->serve(Slot::kForce, force.type(), place, &type);
+    if (type == nullptr) continue;
+    context->flatten_properties(type->properties, force.custom_properties(),
+                                place_of(force.location()), force.type() + " \"" + force.id() + '"',
+                                &description.parameters);
+  }
+}
+
+// ---- joints
+// ------------------------------------------------------------------------------------------------------
+
+// The row of the body that a joint names, or kNone for the world. False after an error.
+bool find_body(const Constraint& joint, int field, const IdIndex& bodies, BuildContext* context,
+               std::uint32_t* row) {
+  const bool is_first = field == Constraint::kBody1FieldNumber;
+  const std::string& id = is_first ? joint.body1() : joint.body2();
+  *row = kNone;
+  if (id.empty()) return true;
+  *row =
+      bodies.find(id, is_first ? "Body1" : "Body2", place_of(joint, field), context->diagnostics);
+  return *row != kNone;
+}
+
+void check_bodies(const Constraint& joint, const kernel::ConstraintDescription& description,
+                  BuildContext* context) {
+  const auto is_movable = [&](std::uint32_t row) {
+    return row != kNone && (context->description.bodies[row].flags & kMovable) != 0;
+  };
+  std::string wrong;
+  if (description.body1 == kNone && description.body2 == kNone) {
+    wrong = "joins the world to the world; required: Body1 or Body2";
+  } else if (description.body1 == description.body2) {
+    wrong = "joins \"" + joint.body1() + "\" to itself; allowed: two bodies, or one and the world";
+  } else if (!is_movable(description.body1) && !is_movable(description.body2)) {
+    wrong =
+        "joins nothing that can be pushed; required: a body that is neither immovable nor "
+        "kinematic";
+  } else {
+    return;
+  }
+  const bool has_second = is_written(joint, Constraint::kBody2FieldNumber);
+  context->diagnostics->error(
+      place_of(joint, has_second ? Constraint::kBody2FieldNumber : Constraint::kBody1FieldNumber),
+      "Constraint \"" + joint.id() + "\" " + wrong);
+}
+
+void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
+  for (const Constraint& joint : context->environment.constraints().constraint()) {
+    if (context->diagnostics->full()) return;
+    kernel::ConstraintDescription description;
+    description.id = joint.id();
+    description.type = joint.type();
+    description.breaking_threshold = joint.breaking_threshold();
+    description.breaking_force = joint.breaking_force();
+    const TypeDeclaration* type = nullptr;
+    description.plugin = plugins->serve(Slot::kConstraint, joint.type(),
+                                        place_of(joint, Constraint::kTypeFieldNumber), &type);
+    const bool has_first =
+        find_body(joint, Constraint::kBody1FieldNumber, bodies, context, &description.body1);
+    const bool has_second =
+        find_body(joint, Constraint::kBody2FieldNumber, bodies, context, &description.body2);
+    if (has_first && has_second) check_bodies(joint, description, context);
+    if (type != nullptr) {
+      context->flatten_properties(type->properties, joint.custom_properties(),
+                                  place_of(joint.location()),
+                                  joint.type() + " \"" + joint.id() + '"', &description.parameters);
+    }
+    context->description.constraints.push_back(std::move(description));
+  }
+}
+
+// ---- all of it
+// ---------------------------------------------------------------------------------------------------
+
+void build_world(BuildContext* context) {
+  const v1::Environment& environment = context->environment;
+  Diagnostics* diagnostics = context->diagnostics;
+  const bool has_shapes = context->scene.geometries().geometry_size() > 0;
+  const bool has_joints = environment.constraints().constraint_size() > 0;
+  const bool has_bodies = environment.space().bodies().body_size() > 0;
+
+  const IdIndex geometries("Geometry", context->scene.geometries().geometry(), diagnostics);
+  const IdIndex materials("Material", context->scene.materials().material(), diagnostics);
+  const IdIndex forces("Force", context->scene.forces().force(), diagnostics);
+  const IdIndex bodies("Body", environment.space().bodies().body(), diagnostics);
+  const IdIndex joints("Constraint", environment.constraints().constraint(), diagnostics);
+
+  PluginSelection plugins(context);
+  plugins.choose(Slot::kSpace, environment.space(), has_shapes);
+  const std::vector<Solid> solids = build_shapes(plugins.choose_collision(has_shapes), context);
+  build_forces(&plugins, context);
+  build_bodies({geometries, materials, forces, solids}, context);
+  // rows of bodies are complete unless there were too many errors to go on
+  if (!diagnostics->full()) build_constraints(bodies, &plugins, context);
+  plugins.choose(Slot::kSolver, environment.constraint_solver(), has_shapes || has_joints);
+  plugins.choose(Slot::kIntegrator, environment.kinetic_integrator(), has_bodies);
+  plugins.report_unused();
+  if (diagnostics->ok()) build_materials(context);
+}
+
+}  // namespace
+
+std::optional<kernel::EnvironmentDescription> build(const v1::Scene& scene, Catalog* catalog,
+                                                    Problems* problems) {
+  Diagnostics diagnostics(scene, problems);
+  const v1::Environment* environment = find_environment(scene, &diagnostics);
+  if (environment == nullptr) return std::nullopt;
+  BuildContext context{scene, *environment, catalog, &diagnostics, {}};
+  context.description.id = environment->id();
+  build_simulator(scene.simulator(), &context);
+  check_filter(*environment, &diagnostics);
+  build_world(&context);
+  if (!diagnostics.ok()) return std::nullopt;
+  return std::move(context.description);
+}
+
+}  // namespace gravitas::scene

@@ -1,0 +1,275 @@
+#include "services/scene/build_bodies.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "plugin_sdk/geometry/mass_properties.h"
+
+namespace gravitas::scene {
+namespace {
+
+using v1::Body;
+using v1::KineticProperties;
+
+constexpr double kUnspecifiedDensity = 1000.0;  // kg/m^3
+
+Vector3 vector_of(const google::protobuf::RepeatedField<double>& numbers) {
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+Quaternion quaternion_of(const google::protobuf::RepeatedField<double>& numbers) {
+  return {numbers[0], numbers[1], numbers[2], numbers[3]};
+}
+
+bool is_identity(const Pose& pose) {
+  return pose.position == Vector3::Zero() &&
+         pose.orientation.coeffs() == Quaternion::Identity().coeffs();
+}
+
+// Mass, moments and the pose X_GB of the centre of mass with principal axes in the geometry's
+// frame.
+struct Inertia {
+  double mass = 0.0;
+  Vector3 moments = Vector3::Zero();
+  Pose X_GB;
+};
+
+class BodyBuilder {
+ public:
+  BodyBuilder(const Body& body, const BodyReferences& references, BuildContext* context)
+      : body_(body),
+        references_(references),
+        context_(*context),
+        diagnostics_(*context->diagnostics) {}
+
+  void build(kernel::BodyDescription* description) {
+    description->id = body_.id();
+    if (!find_geometry(description) || !find_kind(description)) return;
+    const std::optional<Inertia> inertia = is_movable_ ? movable_inertia() : frame_alone();
+    if (!inertia.has_value()) return;
+    description->mass = inertia->mass;
+    description->inertia = inertia->moments;
+    set_pose(inertia->X_GB, description);
+    set_bound(description);
+    set_material(description);
+    set_forces(description);
+  }
+
+ private:
+  std::string what() const { return "Body \"" + body_.id() + '"'; }
+  TextPosition place(int field) const { return place_of(body_, field); }
+  bool written(int field) const { return is_written(body_, field); }
+
+  bool find_geometry(kernel::BodyDescription* description) {
+    if (body_.geometry_id().empty()) return true;
+    description->shape = references_.geometries.find(
+        body_.geometry_id(), "GeometryId", place(Body::kGeometryIdFieldNumber), &diagnostics_);
+    if (description->shape == kNone) return false;
+    solid_ = &references_.solids[description->shape];
+    description->flags |= kHasShape;
+    // a geometry with errors was reported where it stands
+    return solid_->is_good;
+  }
+
+  // Movable, kinematic or immovable, and what contradicts itself.
+  bool find_kind(kernel::BodyDescription* description) {
+    const bool is_unbounded = solid_ != nullptr && solid_->is_unbounded();
+    const bool is_immovable =
+        body_.has_immovable() ? body_.immovable() : is_unbounded && !body_.kinematic();
+    if (is_immovable && body_.kinematic()) {
+      diagnostics_.error(place(Body::kImmovableFieldNumber),
+                         what() + " is Immovable and Kinematic; allowed: one of them");
+      return false;
+    }
+    is_movable_ = !is_immovable && !body_.kinematic();
+    if (is_movable_ && is_unbounded) {
+      diagnostics_.error(place(Body::kImmovableFieldNumber),
+                         what() +
+                             " has an unbounded geometry and is movable; allowed: Immovable = "
+                             "true, or Kinematic = true");
+      return false;
+    }
+    description->flags &= ~static_cast<std::uint32_t>(kMovable);
+    if (is_movable_) description->flags |= kMovable;
+    if (body_.kinematic()) description->flags |= kKinematic;
+    if (is_unbounded) description->flags |= kUnbounded;
+    if (is_movable_ && body_.kinetic_properties().can_sleep()) description->flags |= kCanSleep;
+    return true;
+  }
+
+  // ---- mass
+  // --------------------------------------------------------------------------------------------------
+
+  std::nullopt_t refuse(int field, const std::string& text) {
+    diagnostics_.error(place(field), what() + ' ' + text);
+    return std::nullopt;
+  }
+
+  std::optional<Inertia> movable_inertia() {
+    const bool has_moments = body_.principal_moments_size() > 0;
+    if (body_.has_mass() && body_.mass_density() > 0.0)
+      return refuse(Body::kMassFieldNumber, "has Mass and MassDensity; allowed: one of them");
+    if (body_.has_mass() && body_.mass() == 0.0)
+      return refuse(Body::kMassFieldNumber,
+                    "is movable and has Mass 0; allowed: a number > 0, or Immovable = true");
+    if (has_moments && !body_.has_mass())
+      return refuse(Body::kPrincipalMomentsFieldNumber,
+                    "has PrincipalMoments without Mass; allowed: both together");
+    for (const int field : {Body::kCentreOfMassFieldNumber, Body::kPrincipalAxesFieldNumber})
+      if (written(field) && !has_moments)
+        return refuse(
+            field,
+            "has CentreOfMass or PrincipalAxes without PrincipalMoments; allowed: with Mass and "
+            "PrincipalMoments");
+    if (has_moments) return declared_inertia();
+    if (solid_ == nullptr)
+      return refuse(
+          body_.has_mass() ? Body::kMassFieldNumber : Body::kIdFieldNumber,
+          "has no geometry to take its moments from; required: Mass and PrincipalMoments");
+    if (!solid_->has_mass())
+      return refuse(
+          body_.has_mass() ? Body::kMassFieldNumber : Body::kGeometryIdFieldNumber,
+          "has a geometry whose mass is not known here; required: Mass and PrincipalMoments");
+    return inertia_of_solid();
+  }
+
+  std::optional<Inertia> inertia_of_solid() {
+    double density = body_.mass_density();
+    if (!body_.has_mass() && density == 0.0) {
+      density = kUnspecifiedDensity;
+      diagnostics_.warning(
+          place(Body::kMassDensityFieldNumber),
+          what() +
+              (body_.has_mass_density() ? " has MassDensity 0, which means unspecified"
+                                        : " has neither MassDensity nor Mass") +
+              ": it gets 1000 kg/m^3");
+    }
+    MassProperties properties =
+        mass_properties(*solid_, body_.has_mass() ? kUnspecifiedDensity : density);
+    if (body_.has_mass()) properties = scaled_to_mass(properties, body_.mass());
+    return checked(properties, principal_axes(properties), Body::kMassDensityFieldNumber);
+  }
+
+  // Mass and PrincipalMoments as written.
+  std::optional<Inertia> declared_inertia() {
+    if (solid_ == nullptr && written(Body::kCentreOfMassFieldNumber) &&
+        vector_of(body_.centre_of_mass()) != Vector3::Zero())
+      return refuse(Body::kCentreOfMassFieldNumber,
+                    "has no geometry, so its Position is the centre of mass; allowed: leave "
+                    "CentreOfMass out");
+    MassProperties properties;
+    properties.mass = body_.mass();
+    properties.centre_of_mass = centre_of_mass();
+    properties.inertia = vector_of(body_.principal_moments()).asDiagonal();
+    PrincipalAxes axes;
+    axes.moments = vector_of(body_.principal_moments());
+    if (body_.principal_axes_size() > 0) axes.orientation = quaternion_of(body_.principal_axes());
+    return checked(properties, axes, Body::kPrincipalMomentsFieldNumber);
+  }
+
+  std::optional<Inertia> checked(const MassProperties& properties, const PrincipalAxes& axes,
+                                 int field) {
+    std::string why;
+    if (!validate(properties, &why))
+      return refuse(field, "has a mass that no solid can have: " + why);
+    return Inertia{properties.mass, axes.moments, {properties.centre_of_mass, axes.orientation}};
+  }
+
+  // The one written, else that of the shape.
+  Vector3 centre_of_mass() const {
+    if (body_.centre_of_mass_size() > 0) return vector_of(body_.centre_of_mass());
+    const bool is_known = solid_ != nullptr && solid_->has_mass();
+    return is_known ? mass_properties(*solid_, kUnspecifiedDensity).centre_of_mass
+                    : Vector3::Zero();
+  }
+
+  // Of a body that nothing pushes: the frame counts, the mass does not.
+  std::optional<Inertia> frame_alone() const {
+    Inertia inertia;
+    if (solid_ != nullptr) inertia.X_GB.position = centre_of_mass();
+    return inertia;
+  }
+
+  // ---- the rest
+  // ----------------------------------------------------------------------------------------------
+
+  void set_pose(const Pose& X_GB, kernel::BodyDescription* description) {
+    const KineticProperties& kinetic = body_.kinetic_properties();
+    const Pose X_WG{vector_of(kinetic.position()), quaternion_of(kinetic.orientation())};
+    // a body whose frames coincide keeps the numbers of the scene
+    const bool coincide = is_identity(X_GB);
+    description->pose = coincide ? X_WG : compose(X_WG, X_GB);
+    description->geometry = coincide ? Pose{} : inverse(X_GB);
+    description->twist = {vector_of(kinetic.linear_velocity()),
+                          vector_of(kinetic.angular_velocity())};
+    if (is_movable_) description->damping = kinetic.damping_coefficient();
+    const bool moves = description->twist.linear != Vector3::Zero() ||
+                       description->twist.angular != Vector3::Zero();
+    if (is_movable_ || body_.kinematic() || !moves) return;
+    description->twist = {};
+    const bool is_linear = is_written(kinetic, KineticProperties::kLinearVelocityFieldNumber);
+    diagnostics_.warning(
+        place_of(kinetic, is_linear ? KineticProperties::kLinearVelocityFieldNumber
+                                    : KineticProperties::kAngularVelocityFieldNumber),
+        what() + " is immovable: its velocities are dropped (a body that keeps them is Kinematic)");
+  }
+
+  void set_bound(kernel::BodyDescription* description) {
+    if (solid_ == nullptr) return;
+    const std::string& type = body_.bounding_volume_type();
+    description->bound = local_bound(*solid_, type, description->geometry);
+    if (!solid_->is_unbounded() || type.empty() || type == "None") return;
+    diagnostics_.warning(place(Body::kBoundingVolumeTypeFieldNumber),
+                         what() + " has an unbounded geometry: BoundingVolumeType \"" + type +
+                             "\" is taken as \"None\"");
+  }
+
+  void set_material(kernel::BodyDescription* description) {
+    description->material = kNone;
+    if (body_.material().empty()) return;
+    description->material = references_.materials.find(
+        body_.material(), "Material", place(Body::kMaterialFieldNumber), &diagnostics_);
+  }
+
+  void set_forces(kernel::BodyDescription* description) {
+    const TextPosition position = place(Body::kForcesFieldNumber);
+    std::vector<std::uint32_t>& rows = description->forces;
+    for (const std::string& id : body_.forces()) {
+      rows.push_back(references_.forces.find(id, "Forces", position, &diagnostics_));
+      if (rows.back() == kNone) return;
+    }
+    std::vector<std::uint32_t> sorted = rows;
+    std::sort(sorted.begin(), sorted.end());
+    const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+    if (twice != sorted.end()) {
+      const std::string& id = context_.scene.forces().force(static_cast<int>(*twice)).id();
+      diagnostics_.error(position, "Forces names \"" + id + "\" twice; allowed: each force once");
+      return;
+    }
+    if (is_movable_ || description->forces.empty()) return;
+    description->forces.clear();
+    diagnostics_.warning(position, what() + " is " +
+                                       (body_.kinematic() ? "kinematic" : "immovable") +
+                                       ": its Forces do nothing and are dropped");
+  }
+
+  const Body& body_;
+  const BodyReferences& references_;
+  BuildContext& context_;
+  Diagnostics& diagnostics_;
+  const Solid* solid_ = nullptr;
+  bool is_movable_ = true;
+};
+
+}  // namespace
+
+void build_bodies(const BodyReferences& references, BuildContext* context) {
+  const auto& bodies = context->environment.space().bodies().body();
+  context->description.bodies.resize(static_cast<std::size_t>(bodies.size()));
+  for (int i = 0; i < bodies.size() && !context->diagnostics->full(); ++i)
+    BodyBuilder(bodies[i], references, context)
+        .build(&context->description.bodies[static_cast<std::size_t>(i)]);
+}
+
+}  // namespace gravitas::scene

@@ -1,0 +1,14 @@
+// Kills its own process in the third call.
+#include <csignal>
+
+#include "tests/faulty/faulty_integrator.h"
+
+namespace {
+
+void misbehave(const gravitas::faulty::Request&, const gravitas::faulty::Reply&, gravitas::Host&) {
+  raise(SIGKILL);
+}
+
+}  // namespace
+
+GRAVITAS_PLUGIN(gravitas::faulty::FaultyIntegrator<misbehave>)

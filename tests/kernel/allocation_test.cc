@@ -1,0 +1,71 @@
+// No step allocates after warm-up: every allocation of this program, the plugins' included, is counted.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace {
+
+std::atomic<std::uint64_t> allocations{0};
+
+void* counted(std::size_t size, std::size_t alignment) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  const std::size_t rounded = (size + alignment - 1) / alignment * alignment;
+  void* memory = alignment <= alignof(std::max_align_t) ? std::malloc(size) : std::aligned_alloc(alignment, rounded);
+  if (memory == nullptr) throw std::bad_alloc();
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size, 1); }
+void* operator new[](std::size_t size) { return counted(size, 1); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return counted(size, static_cast<std::size_t>(alignment));
+}
+void* operator new[](std::size_t size, std::align_val_t alignment) {
+  return counted(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::StepOutcome;
+
+TEST(Allocation, TheCounterCounts) {
+  const std::uint64_t before = allocations;
+  const std::vector<double> some(100);
+  EXPECT_GT(allocations, before) << some.size();
+}
+
+TEST(Allocation, AStepAllocatesNothingAfterWarmUp) {
+  testing::WorldBuilder builder(kernel::Hosting::kDirect);
+  builder.steps(1000, 1.0 / 60.0).ground();
+  builder.box(Vector3(0.5, 0.5, 0.5), 1.0, Vector3(0, 0.5, 0)).sphere(0.5, 1.0, Vector3(3, 2, 0)).sphere(0.5, 1.0, Vector3(4.5, 2, 0));
+  builder.gravity(Vector3(0, -9.81, 0));
+  // a force that is asked in every step, and a joint
+  builder.force("Basic", "force_basic", {0.1, 0, 0, 0, 0.1, 0, 0, 0, 0, 1, 0, 0});
+  builder.joint("Spherical", "constraint_spherical", 2, 3, {3.75, 2, 0});
+  Environment world(builder.description());
+  for (int i = 0; i < 200; ++i) ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.what();
+  const std::uint64_t before = allocations;
+  for (int i = 0; i < 100; ++i) world.step();
+  EXPECT_EQ(allocations - before, 0U);
+  EXPECT_EQ(world.step_count(), 300U);
+}
+
+}  // namespace
+}  // namespace gravitas

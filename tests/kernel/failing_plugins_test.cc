@@ -1,0 +1,185 @@
+// What a step does when a plugin fails: nothing. The environment pauses at its last commit and says which slot,
+// which plugin, what happened and how it was noticed.
+#include <gtest/gtest.h>
+
+#include <dirent.h>
+#include <sys/wait.h>
+
+#include <cstring>
+#include <string>
+
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::FaultKind;
+using kernel::Hosting;
+using kernel::StepOutcome;
+using testing::faulty_plugin_path;
+using testing::WorldBuilder;
+
+struct Expected {
+  const char* library;
+  FaultKind kind;
+  const char* detected_by;
+  const char* text;  // part of it
+};
+
+void PrintTo(const Expected& expected, std::ostream* out) { *out << expected.library; }
+
+WorldBuilder ball_on_ground(Hosting hosting) {
+  WorldBuilder builder(hosting);
+  builder.steps(10, 0.01).ground().sphere(0.5, 1.0, Vector3(0, 0.5, 0)).gravity(Vector3(0, -10, 0));
+  return builder;
+}
+
+// Runs a world whose integrator misbehaves in its third call and checks that it stopped after two steps.
+void expect_pause_at_third_step(const WorldBuilder& builder, const Expected& expected) {
+  Environment world(builder.description());
+  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  const kernel::Hash state = world.state_hash(), chain = world.chain_hash();
+  ASSERT_EQ(world.step(), StepOutcome::kPaused);
+  ASSERT_TRUE(world.fault().has_value());
+  const kernel::StageFault& fault = world.fault()->fault;
+  EXPECT_EQ(world.fault()->step, 3U);
+  EXPECT_EQ(fault.kind, expected.kind) << fault.text;
+  EXPECT_EQ(fault.detected_by, expected.detected_by);
+  EXPECT_EQ(fault.slot, Slot::kIntegrator);
+  EXPECT_EQ(fault.plugin, "Faulty");
+  EXPECT_NE(fault.text.find(expected.text), std::string::npos) << fault.text;
+  // the committed state is untouched, and stays so
+  EXPECT_EQ(world.step(), StepOutcome::kPaused);
+  EXPECT_EQ(world.step_count(), 2U);
+  EXPECT_EQ(world.state_hash(), state);
+  EXPECT_EQ(world.chain_hash(), chain);
+}
+
+class InWorker : public ::testing::TestWithParam<Expected> {};
+
+TEST_P(InWorker, PausesAtTheLastCommit) {
+  WorldBuilder builder = ball_on_ground(Hosting::kSharedMemory);
+  builder.plugin(Slot::kIntegrator, faulty_plugin_path(GetParam().library));
+  builder.description().integrator.deadline = 0.1;
+  expect_pause_at_third_step(builder, GetParam());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    EveryWay, InWorker,
+    ::testing::Values(Expected{"integrator_killed", FaultKind::kDeath, "pidfd", "killed by signal 9"},
+                      Expected{"integrator_segv", FaultKind::kDeath, "pidfd", "killed by signal 11"},
+                      Expected{"integrator_exits", FaultKind::kDeath, "pidfd", "exit code 0"},
+                      Expected{"integrator_hangs", FaultKind::kDeadline, "deadline", "within its deadline"},
+                      Expected{"integrator_marks_forever", FaultKind::kDeadline, "deadline", "ten times"},
+                      Expected{"integrator_throws", FaultKind::kFailure, "status", "out of ideas"},
+                      Expected{"integrator_flush_to_zero", FaultKind::kFailure, "status", "floating-point"},
+                      Expected{"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
+                      Expected{"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
+                      Expected{"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
+                      Expected{"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
+                      Expected{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}),
+    [](const auto& one) { return std::string(one.param.library); });
+
+class InProcess : public ::testing::TestWithParam<Expected> {};
+
+TEST_P(InProcess, PausesAtTheLastCommit) {
+  WorldBuilder builder = ball_on_ground(Hosting::kDirect);
+  builder.plugin(Slot::kIntegrator, faulty_plugin_path(GetParam().library));
+  expect_pause_at_third_step(builder, GetParam());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    EveryWayThatCanBeSurvived, InProcess,
+    ::testing::Values(Expected{"integrator_throws", FaultKind::kFailure, "status", "out of ideas"},
+                      Expected{"integrator_flush_to_zero", FaultKind::kFailure, "status", "floating-point"},
+                      Expected{"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
+                      Expected{"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
+                      Expected{"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
+                      Expected{"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
+                      Expected{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}),
+    [](const auto& one) { return std::string(one.param.library); });
+
+TEST(FailingPlugins, PairsOutOfOrderAreRefused) {
+  WorldBuilder builder = ball_on_ground(Hosting::kDirect);
+  builder.sphere(0.5, 1.0, Vector3(0, 1.4, 0)).plugin(Slot::kSpace, faulty_plugin_path("space_unsorted"));
+  Environment world(builder.description());
+  ASSERT_EQ(world.step(), StepOutcome::kPaused);
+  EXPECT_EQ(world.fault()->fault.kind, FaultKind::kBadStructure);
+  EXPECT_EQ(world.fault()->fault.slot, Slot::kSpace);
+}
+
+TEST(FailingPlugins, ContactsThatPullAreRefused) {
+  WorldBuilder builder = ball_on_ground(Hosting::kDirect);
+  builder.plugin(Slot::kSolver, faulty_plugin_path("solver_sticky"));
+  Environment world(builder.description());
+  ASSERT_EQ(world.step(), StepOutcome::kPaused);
+  EXPECT_EQ(world.fault()->fault.kind, FaultKind::kBadNumbers);
+  EXPECT_NE(world.fault()->fault.text.find("pulls"), std::string::npos) << world.fault()->fault.text;
+}
+
+TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
+  for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory}) {
+    WorldBuilder builder = ball_on_ground(hosting);
+    builder.description().solver.plugins[0].library = GRAVITAS_SOURCE_DIR "/README.md";
+    try {
+      Environment world(builder.description());
+      FAIL() << "it started";
+    } catch (const kernel::StageFault& fault) {
+      EXPECT_EQ(fault.kind, FaultKind::kHandshake);
+      EXPECT_EQ(fault.slot, Slot::kSolver);
+      EXPECT_NE(fault.text.find("README.md"), std::string::npos) << fault.text;
+    }
+  }
+}
+
+TEST(FailingPlugins, AFailureInOneEnvironmentLeavesAnotherAlone) {
+  WorldBuilder quiet = ball_on_ground(Hosting::kSharedMemory);
+  Environment alone(quiet.description());
+  while (alone.step_count() < 10) ASSERT_EQ(alone.step(), StepOutcome::kCommitted);
+
+  WorldBuilder bad = ball_on_ground(Hosting::kSharedMemory);
+  bad.plugin(Slot::kIntegrator, faulty_plugin_path("integrator_killed"));
+  Environment failing(bad.description());
+  Environment other(quiet.description());
+  while (other.step_count() < 10) {
+    failing.step();
+    ASSERT_EQ(other.step(), StepOutcome::kCommitted);
+  }
+  EXPECT_TRUE(failing.fault().has_value());
+  EXPECT_EQ(other.chain_hash(), alone.chain_hash());
+}
+
+int open_descriptors() {
+  int count = 0;
+  DIR* folder = opendir("/proc/self/fd");
+  while (readdir(folder) != nullptr) ++count;
+  closedir(folder);
+  return count;
+}
+
+TEST(FailingPlugins, NothingIsLeftBehind) {
+  const auto live_and_die = [](const char* library) {
+    WorldBuilder builder = ball_on_ground(Hosting::kSharedMemory);
+    if (library != nullptr) builder.plugin(Slot::kIntegrator, faulty_plugin_path(library));
+    builder.description().integrator.deadline = 0.1;
+    Environment world(builder.description());
+    while (world.step_count() < 10 && world.step() == StepOutcome::kCommitted) {
+    }
+  };
+  // what is made once per process (the supervisor, gRPC, the declarations of libraries) is made by the first round
+  const char* const libraries[] = {nullptr, "integrator_killed", "integrator_hangs"};
+  for (const char* library : libraries) live_and_die(library);
+  const int before = open_descriptors();
+  for (const char* library : libraries) {
+    live_and_die(library);
+    // all children are reaped: there is none to wait for
+    EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
+  }
+  EXPECT_EQ(open_descriptors(), before);
+}
+
+}  // namespace
+}  // namespace gravitas

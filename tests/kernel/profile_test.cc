@@ -1,0 +1,28 @@
+#include "kernel/profile.h"
+
+#include <gtest/gtest.h>
+
+namespace gravitas::kernel {
+namespace {
+
+TEST(DurationHistogram, KnowsQuantilesToFourPerCent) {
+  DurationHistogram histogram;
+  for (std::uint64_t ns = 1; ns <= 100'000; ++ns) histogram.add(ns);
+  EXPECT_EQ(histogram.count(), 100'000U);
+  EXPECT_NEAR(histogram.quantile_us(0.5), 50.0, 0.04 * 50.0);
+  EXPECT_NEAR(histogram.quantile_us(0.99), 99.0, 0.04 * 99.0);
+  EXPECT_DOUBLE_EQ(histogram.max_us(), 100.0);
+  EXPECT_NEAR(histogram.mean_us(), 50.0005, 1e-9);
+}
+
+TEST(DurationHistogram, IsExactForSmallAndKeepsLargeDurations) {
+  DurationHistogram small, large;
+  small.add(7);
+  EXPECT_DOUBLE_EQ(small.quantile_us(0.5), 0.007);
+  large.add(3'600'000'000'000);
+  EXPECT_NEAR(large.quantile_us(0.5), 3.6e9, 0.04 * 3.6e9);
+  EXPECT_EQ(DurationHistogram().quantile_us(0.5), 0.0);
+}
+
+}  // namespace
+}  // namespace gravitas::kernel
