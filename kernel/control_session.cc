@@ -104,18 +104,45 @@ std::string ControlSession::judge(const Hello& hello) const {
   return {};
 }
 
-// A ping every half second, the next only after the answer, so that a hanging worker piles up nothing.
+// A ping every half second, the next only after the answer, so that a hanging worker piles up nothing. The worker's
+// complaints come before its answer.
 void ControlSession::beat() {
   std::unique_lock lock(mutex_);
-  for (std::uint64_t sequence = 1; !changed_.wait_for(lock, kHeartbeat, [&] { return stopping_; }); ++sequence) {
+  for (std::uint64_t sequence = 1; !changed_.wait_for(lock, kHeartbeat, [&] { return stopping_ || draining_; });
+       ++sequence) {
     lock.unlock();
     KernelMessage ping;
     ping.mutable_ping()->set_sequence(sequence);
+    bool alive = stream_->Write(ping);
     WorkerMessage answer;
-    const bool alive = stream_->Write(ping) && stream_->Read(&answer);
+    while (alive && !answer.has_pong()) {
+      alive = stream_->Read(&answer);
+      if (alive && answer.has_fault()) {
+        const std::lock_guard faults_lock(mutex_);
+        faults_.push_back(answer.fault().text());
+      }
+    }
     lock.lock();
     if (!alive) return;
   }
+  if (stopping_) return;
+  lock.unlock();
+  KernelMessage drain;
+  drain.mutable_drain();
+  stream_->Write(drain);
+}
+
+void ControlSession::drain() {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  changed_.notify_all();
+}
+
+std::vector<std::string> ControlSession::take_faults() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(faults_, {});
 }
 
 }  // namespace gravitas::kernel

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "gravitas/control/v1/control.grpc.pb.h"
 
@@ -23,14 +24,18 @@ class ControlSession {
 
   const control::v1::Welcome& welcome() const { return welcome_; }
 
-  // Ends the stream, whatever state it is in; called by whoever learns that the worker is gone.
-  void cancel();
+  // Asks the worker to finish and exit.
+  void drain();
+
+  // What the worker said went wrong, in its words; taken out.
+  std::vector<std::string> take_faults();
 
  private:
   void run(control::v1::Hello hello);
   std::string greet(const control::v1::Hello& hello);
   std::string judge(const control::v1::Hello& hello) const;
   void beat();
+  void cancel();
 
   std::unique_ptr<control::v1::WorkerControl::Stub> stub_;
   grpc::ClientContext context_;
@@ -40,7 +45,9 @@ class ControlSession {
   std::mutex mutex_;
   std::condition_variable changed_;
   bool greeted_ = false;
+  bool draining_ = false;
   bool stopping_ = false;
+  std::vector<std::string> faults_;
   std::string problem_;
   std::thread thread_;
 };

@@ -82,6 +82,8 @@ class Environment : private DerivativeSource {
 
   const Plan& plan() const { return plan_; }
   const std::optional<FaultRecord>& fault() const { return fault_; }
+  // What is worth a line in the report and no fault: complaints of workers, direct calls beyond their deadline.
+  std::vector<std::string> warnings();
   const DurationHistogram& stage_time(Stage stage) const { return profile_[static_cast<std::size_t>(stage)]; }
   // Time of the stage that was not spent in the plugin.
   const DurationHistogram& transport_time(Stage stage) const { return transport_[static_cast<std::size_t>(stage)]; }
@@ -179,6 +181,8 @@ class Environment : private DerivativeSource {
   Hash state_hash_, chain_hash_;
   std::optional<FaultRecord> fault_;
   EventListener* listener_ = nullptr;
+  // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.
+  std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};
   std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_;
   DurationHistogram step_profile_;
 };

@@ -28,8 +28,26 @@ Untrusted<StageCall> Environment::ask(Stage stage, StageSlot* slot, const StageC
   Untrusted<StageCall> answer = slot->ask(call, &arena_, derivatives, &compute_ns);
   const std::uint64_t total = channel::now_ns() - start;
   profile_[static_cast<std::size_t>(stage)].add(total);
+  if (slot->description().hosting == Hosting::kDirect &&
+      static_cast<double>(total) > 1e9 * slot->description().deadline) {
+    std::uint64_t& longest = overrun_ns_[static_cast<std::size_t>(stage)];
+    longest = std::max(longest, total);
+  }
   if (compute_ns > 0) transport_[static_cast<std::size_t>(stage)].add(total - std::min(total, compute_ns));
   return answer;
+}
+
+std::vector<std::string> Environment::warnings() {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < overrun_ns_.size(); ++i) {
+    if (overrun_ns_[i] == 0) continue;
+    lines.push_back(std::string("stage ") + kStageNames[i] + " took " + std::to_string(overrun_ns_[i] / 1'000'000) +
+                    " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
+  }
+  for (StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
+    for (const std::string& complaint : slot->take_complaints())
+      lines.push_back(std::string("worker of slot ") + slot_name(slot->which()) + ": " + complaint);
+  return lines;
 }
 
 Pose Environment::pose_of(const Column<double>& position, const Column<double>& orientation,

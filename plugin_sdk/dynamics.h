@@ -29,8 +29,8 @@ struct Twist {
 Vector3 angular_acceleration(const Quaternion& q, const Vector3& w, const Vector3& inertia,
                              const Vector3& inverse_inertia, const Vector3& torque);
 
-// Pose after a translation and a rotation vector (world): (x + d, exp(r) q). The pose is returned as it is,
-// bit for bit, if both are zero; else the orientation is renormalised.
+// Pose after a translation and a rotation vector (world): (x + d, exp(r) q), the orientation renormalised. What is
+// moved by exactly zero, position or orientation, is returned as it is, bit for bit.
 Pose displaced(const Pose& pose, const Vector3& translation, const Vector3& rotation);
 
 // Momentum change of a wrench's impulse: velocities after an impulse (N s) and angular impulse (N m s).

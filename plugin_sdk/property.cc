@@ -103,9 +103,18 @@ std::int64_t PropertyCursor::integer() {
   return static_cast<std::int64_t>(value);
 }
 
-bool PropertyCursor::flag() { return number() != 0.0; }
+bool PropertyCursor::flag() {
+  const double value = number();
+  if (value != 0.0 && value != 1.0) throw std::out_of_range("neither true nor false");
+  return value != 0.0;
+}
 
-std::uint32_t PropertyCursor::choice() { return static_cast<std::uint32_t>(integer()); }
+std::uint32_t PropertyCursor::choice() {
+  const std::int64_t position = integer();
+  if (position < 0 || position > std::numeric_limits<std::uint32_t>::max())
+    throw std::out_of_range("not the position of a choice");
+  return static_cast<std::uint32_t>(position);
+}
 
 Vector3 PropertyCursor::vector() {
   const std::span<const double> v = take(3);

@@ -66,8 +66,9 @@ struct Property {
   std::size_t flat_size() const;
 };
 
-// Reads flattened values in the order of declaration. Reading past the end throws std::out_of_range: the
-// host turns it into a refusal.
+// Reads flattened values in the order of declaration. Reading past the end, or a number that is none of the
+// kind (also the NaN of an absent value, unless read as a number, vector or quaternion), throws
+// std::out_of_range: the host turns it into a refusal.
 class PropertyCursor {
  public:
   explicit PropertyCursor(std::span<const double> numbers) : numbers_(numbers) {}

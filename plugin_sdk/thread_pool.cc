@@ -22,7 +22,9 @@ struct ThreadPool::Crew {
   void* argument = nullptr;
   std::uint64_t count = 0;
   std::atomic<std::uint64_t> next{0};
+  // Of the first chunk that threw.
   std::exception_ptr failure;
+  std::uint64_t failure_begin = 0;
 
   // Takes chunks until none is left.
   void work() {
@@ -33,7 +35,7 @@ struct ThreadPool::Crew {
         body(argument, begin, std::min(begin + kChunk, count));
       } catch (...) {
         const std::lock_guard lock(mutex);
-        if (!failure) failure = std::current_exception();
+        if (!failure || begin < failure_begin) failure = std::current_exception(), failure_begin = begin;
       }
     }
   }
@@ -68,7 +70,15 @@ ThreadPool::~ThreadPool() {
 void ThreadPool::parallel_for(std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t),
                               void* argument) {
   if (threads_ == 1 || count <= kChunk) {
-    for (std::uint64_t begin = 0; begin < count; begin += kChunk) body(argument, begin, std::min(begin + kChunk, count));
+    std::exception_ptr failure;
+    for (std::uint64_t begin = 0; begin < count; begin += kChunk) {
+      try {
+        body(argument, begin, std::min(begin + kChunk, count));
+      } catch (...) {
+        if (!failure) failure = std::current_exception();
+      }
+    }
+    if (failure) std::rethrow_exception(failure);
     return;
   }
   if (!crew_) {

@@ -18,8 +18,8 @@ class ThreadPool {
   explicit ThreadPool(std::uint32_t threads);
   ~ThreadPool();
 
-  // Calls body(argument, begin, end) for every chunk of 0 … count; returns when all are done. An exception of a
-  // body is thrown here once all others are done.
+  // Calls body(argument, begin, end) for every chunk of 0 … count; returns when all are done. Of the
+  // exceptions of bodies that of the first chunk is thrown here once all are done.
   void parallel_for(std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t), void* argument);
 
  private:

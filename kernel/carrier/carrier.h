@@ -56,6 +56,9 @@ class Carrier {
   // Process that hosts the plugins.
   virtual int process_id() const = 0;
   virtual Hosting hosting() const = 0;
+
+  // What the host said went wrong besides its answers; taken out.
+  virtual std::vector<std::string> take_complaints() { return {}; }
 };
 
 // Loads the plugins into this process.

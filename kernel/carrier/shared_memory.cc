@@ -63,6 +63,7 @@ class SharedMemoryCarrier final : public Carrier {
   void drain() override;
   int process_id() const override { return connection_->process->process_id(); }
   Hosting hosting() const override { return Hosting::kSharedMemory; }
+  std::vector<std::string> take_complaints() override { return connection_->control->take_faults(); }
 
  private:
   // What outlives this object until the process has been reaped: the mailbox that the watcher wakes.
@@ -158,7 +159,9 @@ void SharedMemoryCarrier::finish() {
     report_death();
 }
 
+// Said on both ways: the data loop sleeps on its mailbox, not on the stream.
 void SharedMemoryCarrier::drain() {
+  connection_->control->drain();
   gravitas_frame_header stop{};
   stop.kind = GRAVITAS_FRAME_STOP;
   stop.epoch = epoch_;

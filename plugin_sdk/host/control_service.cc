@@ -15,6 +15,13 @@ using control::v1::KernelMessage;
 using control::v1::Refusal;
 using control::v1::WorkerMessage;
 
+namespace {
+
+// Complaints between two heartbeats beyond this number are dropped.
+constexpr std::size_t kMostComplaints = 16;
+
+}  // namespace
+
 ControlService::ControlService(std::vector<plugin::v1::Description> plugins, std::uint32_t mxcsr,
                                std::function<Admission(const Hello&)> admit)
     : plugins_(std::move(plugins)), mxcsr_(mxcsr), admit_(std::move(admit)) {}
@@ -54,6 +61,16 @@ WorkerMessage ControlService::welcome(const Hello& hello) const {
   return message;
 }
 
+void ControlService::complain(std::string text) {
+  const std::lock_guard lock(mutex_);
+  if (complaints_.size() < kMostComplaints) complaints_.push_back(std::move(text));
+}
+
+std::vector<std::string> ControlService::take_complaints() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(complaints_, {});
+}
+
 grpc::Status ControlService::Session(grpc::ServerContext*,
                                      grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
   if (taken_.exchange(true)) return {grpc::StatusCode::ALREADY_EXISTS, "this worker has its kernel"};
@@ -82,6 +99,10 @@ grpc::Status ControlService::Session(grpc::ServerContext*,
     }
     if (message.has_ping()) {
       WorkerMessage answer;
+      for (std::string& text : take_complaints()) {
+        answer.mutable_fault()->set_text(std::move(text));
+        stream->Write(answer);
+      }
       answer.mutable_pong()->set_sequence(message.ping().sequence());
       answer.mutable_pong()->set_calls(calls.load());
       stream->Write(answer);

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -35,17 +36,23 @@ class ControlService final : public control::v1::WorkerControl::Service {
   std::function<void(bool kernel_is_gone)> on_end;
   std::atomic<std::uint64_t> calls{0};
 
+  // Something the kernel should hear of besides the answers of calls; goes out with the next heartbeat.
+  void complain(std::string text);
+
   grpc::Status Session(grpc::ServerContext* context,
                        grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream) override;
 
  private:
   Admission judge(const control::v1::Hello& hello) const;
+  std::vector<std::string> take_complaints();
   control::v1::WorkerMessage welcome(const control::v1::Hello& hello) const;
 
   std::vector<plugin::v1::Description> plugins_;
   std::uint32_t mxcsr_;
   std::function<Admission(const control::v1::Hello&)> admit_;
   std::atomic<bool> taken_{false};
+  std::mutex mutex_;
+  std::vector<std::string> complaints_;
 };
 
 // A server that serves one inherited socket and listens nowhere.

@@ -122,7 +122,8 @@ int serve(const Arguments& arguments) {
       handshake.changed.notify_all();
     }
   }
-  const int code = worker.serve(epoch, threads, stopping, &service.calls);
+  const int code = worker.serve(epoch, threads, stopping, &service.calls,
+                                [&](std::string text) { service.complain(std::move(text)); });
   // instances are gone with the process: a hanging destructor must not keep it
   std::_Exit(code);
 }

@@ -100,7 +100,7 @@ bool Worker::map_announced_segments(const gravitas_frame_header& header) {
 }
 
 int Worker::serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<bool>& stopping,
-                  std::atomic<std::uint64_t>* calls) {
+                  std::atomic<std::uint64_t>* calls, const std::function<void(std::string)>& complain) {
   epoch_ = epoch;
   threads_ = std::make_unique<ThreadPool>(threads);
   while (kernel_ == nullptr || mine_ == nullptr)
@@ -113,7 +113,10 @@ int Worker::serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<
     gravitas_frame_header header;
     std::memcpy(&header, &kernel_->header, sizeof header);
     if (header.kind == GRAVITAS_FRAME_STOP) return 0;
-    if (header.kind != GRAVITAS_FRAME_REQUEST || header.epoch != epoch_) continue;
+    if (header.kind != GRAVITAS_FRAME_REQUEST || header.epoch != epoch_) {
+      complain("dropped a frame of kind " + std::to_string(header.kind) + " and epoch " + std::to_string(header.epoch));
+      continue;
+    }
     if (!map_announced_segments(header)) return 1;
     leave_crowded_core();
     answer(header);

@@ -9,6 +9,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -29,8 +30,9 @@ class Worker {
   std::string create_instances(const std::vector<std::vector<double>>& settings);
 
   // Serves calls until a stop frame comes, `stopping` is set, or the kernel is gone. Returns the exit code.
+  // `complain` takes what the kernel should hear of besides the answers.
   int serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<bool>& stopping,
-            std::atomic<std::uint64_t>* calls);
+            std::atomic<std::uint64_t>* calls, const std::function<void(std::string)>& complain);
 
  private:
   struct CallState;

@@ -207,6 +207,7 @@ RunResult run(const RunOptions& options, const std::function<bool()>& interrupte
   *report.mutable_plan() = plan_message(*environment);
   *report.mutable_events() = events->counts();
   for (std::string& warning : warnings) report.add_warnings(std::move(warning));
+  for (std::string& warning : environment->warnings()) report.add_warnings(std::move(warning));
   figures.write(&report);
   write_stages(*environment, &report);
   if (trajectory) trajectory->close();
