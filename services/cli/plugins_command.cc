@@ -11,6 +11,7 @@
 #include "services/cli/commands.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
+#include "services/scene/reference.h"
 
 namespace gravitas::cli {
 namespace {
@@ -121,6 +122,7 @@ int describe(const std::string& name, bool json) {
 struct Arguments {
   std::string name;
   bool json = false;
+  bool reference = false;
 };
 
 }  // namespace
@@ -137,9 +139,19 @@ void add_describe(CLI::App* app, Action* action) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app->add_subcommand("describe", "A plugin's kind, version, capabilities and properties");
   command->footer("Example: gravitas describe Sequential");
-  command->add_option("PLUGIN", arguments->name, "Name of a plugin or of a type it serves, or path of a library")->required();
+  CLI::Option* reference = command->add_flag("--reference", arguments->reference,
+                                             "Print the reference page of the scene language instead (Markdown)");
+  command->add_option("PLUGIN", arguments->name, "Name of a plugin or of a type it serves, or path of a library")
+      ->excludes(reference);
   command->add_flag("--json", arguments->json, "Print JSON");
-  command->callback([=] { *action = [=] { return describe(arguments->name, arguments->json); }; });
+  command->callback([=] {
+    if (arguments->name.empty() && !arguments->reference) throw CLI::RequiredError("PLUGIN or --reference");
+    *action = [=] {
+      if (!arguments->reference) return describe(arguments->name, arguments->json);
+      std::cout << scene::reference_page(installed_catalog());
+      return static_cast<int>(kDone);
+    };
+  });
 }
 
 }  // namespace gravitas::cli

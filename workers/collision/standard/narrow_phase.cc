@@ -1,0 +1,87 @@
+// Dispatch by the pair of types, and the canonical order that makes the mirror law exact: a pair is
+// always computed in one order, and the other order is its answer with the normals turned round.
+#include "workers/collision/standard/narrow_phase.h"
+
+#include <utility>
+
+#include "workers/collision/standard/pair_functions.h"
+
+namespace gravitas::collision {
+namespace {
+
+void collide_nothing(const Shape&, const Shape&, const Placement&, double, Manifold* out) { out->count = 0; }
+
+// row: type of a, column: type of b; below the diagonal the order is swapped before the look-up
+constexpr PairFunction kPairFunctions[kShapeTypeCount][kShapeTypeCount] = {
+    {collide_sphere_sphere, collide_sphere_box, collide_sphere_cylinder, collide_sphere_halfspace},
+    {nullptr, collide_convex, collide_convex, collide_box_halfspace},
+    {nullptr, nullptr, collide_convex, collide_cylinder_halfspace},
+    {nullptr, nullptr, nullptr, collide_nothing},
+};
+
+// -1, 0 or 1 as the first difference of x from y is positive, absent or negative: larger goes first
+template <typename Vector>
+int larger_first(const Vector& x, const Vector& y) {
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    if (x[i] != y[i]) return x[i] > y[i] ? -1 : 1;
+  }
+  return 0;
+}
+
+// Whether the pair is computed as (b, a). Between bodies of one type the larger goes first: the
+// order decides ties between reference faces and enters the feature ids, so it must not change
+// while the bodies move. Equal sizes leave only the poses. Then the order follows a direction that
+// is unlikely to be perpendicular to the line of centres of bodies that stand or lie side by side.
+bool computed_swapped(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB) {
+  if (a.type != b.type) return a.type > b.type;
+  if (const int order = larger_first(a.size, b.size); order != 0) return order > 0;
+  const Vector3 offset = X_WB.position - X_WA.position;
+  const double along = offset.dot(Vector3(0.2746, 0.8537, 0.4425));
+  if (along != 0.0) return along < 0.0;
+  if (const int order = larger_first(offset, Vector3(-offset)); order != 0) return order > 0;
+  return larger_first(X_WA.orientation.coeffs(), X_WB.orientation.coeffs()) > 0;
+}
+
+// Bounding spheres apart by more than the margin. False comparisons make NaN and infinity "apart".
+bool surely_apart(const Shape& a, const Shape& b, const Vector3& offset, double margin) {
+  const double reach = (bounding_radius(a) + bounding_radius(b)) * (1.0 + 1e-12) + margin;
+  if (reach == std::numeric_limits<double>::infinity()) return !offset.allFinite();
+  if (!(offset.cwiseAbs().maxCoeff() <= reach)) return true;
+  return !(offset.squaredNorm() <= reach * reach);
+}
+
+void collide_in_order(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin,
+                      Manifold* out) {
+  const Placement placement{X_WA.orientation.toRotationMatrix(), X_WB.orientation.toRotationMatrix(),
+                            X_WB.position - X_WA.position};
+  out->count = 0;
+  if (surely_apart(a, b, placement.p_AB_W, margin)) return;
+  const auto row = static_cast<std::size_t>(a.type);
+  const auto column = static_cast<std::size_t>(b.type);
+  kPairFunctions[row][column](a, b, placement, margin, out);
+  for (int i = 0; i < out->count; ++i) {
+    out->contacts[static_cast<std::size_t>(i)].point += X_WA.position;
+  }
+}
+
+}  // namespace
+
+void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, Manifold* out) {
+  if (!computed_swapped(a, X_WA, b, X_WB)) {
+    collide_in_order(a, X_WA, b, X_WB, margin, out);
+    return;
+  }
+  collide_in_order(b, X_WB, a, X_WA, margin, out);
+  for (int i = 0; i < out->count; ++i) {
+    Vector3& normal = out->contacts[static_cast<std::size_t>(i)].normal;
+    normal = -normal;
+  }
+}
+
+bool intersects(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB) {
+  Manifold manifold;
+  collide(a, X_WA, b, X_WB, 0.0, &manifold);
+  return manifold.count > 0;
+}
+
+}  // namespace gravitas::collision

@@ -1,0 +1,37 @@
+// The functions behind the table of narrow_phase.cc: one per unordered pair of shape types, the
+// type with the lower value first.
+#pragma once
+
+#include "plugin_sdk/math/types.h"
+#include "workers/collision/standard/manifold.h"
+#include "workers/collision/standard/shapes.h"
+
+namespace gravitas::collision {
+
+// How a pair lies in the world: both rotations and the position of b relative to a (m, world axes).
+// The origin is a's, so that nothing below sees how far the pair is from the origin of W.
+struct Placement {
+  Matrix3 R_WA;
+  Matrix3 R_WB;
+  Vector3 p_AB_W;
+};
+
+// Each writes the manifold with world axes, points relative to the origin of a. For pairs of one
+// type the caller fixes which body is a (see canonical order in narrow_phase.cc).
+using PairFunction = void (*)(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+
+// sphere_pairs.cc
+void collide_sphere_sphere(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+void collide_sphere_box(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+void collide_sphere_cylinder(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+void collide_sphere_halfspace(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+
+// halfspace_pairs.cc
+void collide_box_halfspace(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+void collide_cylinder_halfspace(const Shape& a, const Shape& b, const Placement& placement, double margin,
+                                Manifold* out);
+
+// convex_pairs.cc: box - box, box - cylinder, cylinder - cylinder
+void collide_convex(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+
+}  // namespace gravitas::collision
