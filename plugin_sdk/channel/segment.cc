@@ -91,14 +91,16 @@ int receive_segment(int socket, SegmentMessage* message) {
     received = recvmsg(socket, &packet, MSG_CMSG_CLOEXEC);
   } while (received < 0 && errno == EINTR);
   const cmsghdr* rights = received > 0 ? CMSG_FIRSTHDR(&packet) : nullptr;
-  if (rights == nullptr || rights->cmsg_type != SCM_RIGHTS || rights->cmsg_len != CMSG_LEN(sizeof(int))) return -1;
-  int descriptor = -1;
-  std::memcpy(&descriptor, CMSG_DATA(rights), sizeof descriptor);
-  if (received != static_cast<ssize_t>(sizeof *message)) {
-    close(descriptor);
-    return -1;
-  }
-  return descriptor;
+  if (rights == nullptr || rights->cmsg_level != SOL_SOCKET || rights->cmsg_type != SCM_RIGHTS) return -1;
+
+  // the room for one descriptor is padded, so that two may have come
+  int descriptors[CMSG_SPACE(sizeof(int)) / sizeof(int)] = {};
+  const std::size_t bytes = rights->cmsg_len - CMSG_LEN(0), count = bytes / sizeof(int);
+  std::memcpy(descriptors, CMSG_DATA(rights), bytes);
+  const bool whole = (packet.msg_flags & (MSG_TRUNC | MSG_CTRUNC)) == 0;
+  if (whole && count == 1 && received == static_cast<ssize_t>(sizeof *message)) return descriptors[0];
+  for (std::size_t i = 0; i < count; ++i) close(descriptors[i]);
+  return -1;
 }
 
 }  // namespace gravitas::channel

@@ -1,0 +1,23 @@
+// How fast two surfaces arrive at each other within a step, and the restitution that follows.
+#pragma once
+
+#include "workers/solver/sequential/relaxation_bodies.h"
+
+namespace gravitas {
+
+// s of the law n.v_{n+1} >= e s, m/s, zero where nothing arrives:
+//   s^2 = max(0, u^2 - 2 a max(0, gap_n)),  u = n.(relative velocity at S_n),  a = (u* - u)/h,
+// u* the same at S*: the speed after the way gap_n at constant acceleration, so that a fall from
+// rest bounces back to its own height whatever the step. s = 0 if u* >= 0, and below the rest speed
+// 2 |a| h, that what a body at rest gains by its load in two steps: such a contact rests.
+double arrival_speed(double start_velocity, double trial_velocity, double gap_at_start,
+                     double time_step);
+
+// Gap along `direction` at S_n of two surfaces with `gap` at S*: gap* - J (S* - S_n), both bodies
+// displaced as rigid bodies with the arms they have at S*. Turning round the normal or about a
+// sphere's own centre changes no gap; the surface points themselves carried back would open one of
+// r(1 - cos w h), and a ball that rolls fast would bounce on the flat.
+double gap_before(double gap, const RelaxationDirection& direction, const RelaxationBody& body1,
+                  const RelaxationBody& body2);
+
+}  // namespace gravitas

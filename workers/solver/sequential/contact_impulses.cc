@@ -1,0 +1,355 @@
+// Rows and sweeps of the velocities at contacts, one contact at a time; whole patches are in
+// contact_impulses_patch.cc.
+#include "workers/solver/sequential/contact_impulses.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver.h"
+#include "workers/solver/sequential/arrival.h"
+#include "workers/solver/sequential/coulomb_contact.h"
+#include "workers/solver/sequential/surface_perturbation.h"
+
+namespace gravitas {
+namespace {
+
+double material(const stage::SolverSolveRequest& request, std::size_t contact,
+                MaterialColumn column) {
+  return request.contact_material()[kMaterialColumns * contact + column];
+}
+
+Matrix3 frame_of(const Vector3& normal) {
+  const auto [first, second] = orthonormal_basis(normal);
+  Matrix3 frame;
+  frame << normal, first, second;
+  return frame;
+}
+
+}  // namespace
+
+// ---- rows
+
+void ContactImpulses::build(const RelaxationBodies& bodies,
+                            const stage::SolverSolveRequest& request,
+                            const std::vector<std::uint8_t>& closed,
+                            const std::vector<double>& warm) {
+  rows_.clear();
+  rolling_.clear();
+  for (std::size_t i = 0; i < closed.size(); ++i) {
+    if (closed[i] == 0) continue;
+    Row& row = rows_.emplace_back();
+    row.contact = static_cast<std::uint32_t>(i);
+    row.body1 = request.contact_body()[2 * i];
+    row.body2 = request.contact_body()[2 * i + 1];
+    const Vector3 point = vector_at(request.contact_point(), i);
+    row.arm1 = point - bodies[row.body1].trial.position;
+    row.arm2 = point - bodies[row.body2].trial.position;
+    row.dynamic_friction = material(request, i, kDynamicFriction);
+    row.static_friction = std::max(row.dynamic_friction, material(request, i, kStaticFriction));
+    row.has_friction = row.static_friction > 0.0;
+    set_law(row, bodies, request);
+    set_response(row, bodies);
+    set_rolling(row, bodies, material(request, i, kRollingFriction),
+                material(request, i, kSpinningFriction));
+
+    row.impulse = row.frame.transpose() * vector_at(warm, i);
+    row.impulse.x() = std::max(0.0, row.impulse.x());
+    const double tangent = row.impulse.tail<2>().norm();
+    const double allowed = row.static_friction * row.impulse.x();
+    if (tangent > allowed) row.impulse.tail<2>() *= allowed / tangent;
+  }
+  set_patches(bodies);
+}
+
+// The direction of the normal law and its target e s.
+void ContactImpulses::set_law(Row& row, const RelaxationBodies& bodies,
+                              const stage::SolverSolveRequest& request) {
+  const std::size_t i = row.contact;
+  const RelaxationBody& one = bodies[row.body1];
+  const RelaxationBody& two = bodies[row.body2];
+  const Vector3 normal = vector_at(request.contact_normal(), i);
+  const Vector3 point = vector_at(request.contact_point(), i);
+  const auto through = RelaxationDirection::through(point, normal, one, two);
+  const double gap = gap_before(-request.contact_depth()[i], through, one, two);
+  const double start = through.along(one.start_velocity, two.start_velocity);
+  const double trial = through.along(one.trial_velocity, two.trial_velocity);
+  const double speed = arrival_speed(start, trial, gap, request.time_step());
+  const double restitution = material(request, i, kRestitution);
+  row.frame = frame_of(normal);
+  row.target = restitution * speed;
+
+  const double epsilon = material(request, i, kSurfacePerturbation);
+  if (!(speed > 0.0) || !(epsilon > 0.0)) return;
+  const Vector3 tilted = perturbed_normal(normal, epsilon, request.contact_key()[i]);
+  const auto across = RelaxationDirection::through(point, tilted, one, two);
+  const double tilted_start = across.along(one.start_velocity, two.start_velocity);
+  const double tilted_trial = across.along(one.trial_velocity, two.trial_velocity);
+  const double tilted_speed = arrival_speed(tilted_start, tilted_trial, gap, request.time_step());
+  const bool keeps_signs = tilted_trial < 0.0 && (tilted_start < 0.0) == (start < 0.0);
+  if (!keeps_signs || !(tilted_speed > 0.0) || !(tilted.dot(normal) > 0.0)) return;
+  row.frame = frame_of(tilted);
+  row.target = restitution * tilted_speed;
+}
+
+void ContactImpulses::set_response(Row& row, const RelaxationBodies& bodies) {
+  const Matrix3 world = point_response(bodies[row.body1], row.arm1, row.arm1) +
+                        point_response(bodies[row.body2], row.arm2, row.arm2);
+  const Matrix3 response = row.frame.transpose() * world * row.frame;
+  row.response = 0.5 * (response + response.transpose());
+  row.disc = FrictionDisc::of(row.response.bottomRightCorner<2, 2>());
+  const double determinant = row.response.determinant();
+  const double size = row.response.trace();
+  row.has_inverse = row.has_friction && determinant > 1e-12 * size * size * size;
+  if (row.has_inverse) row.inverse = row.response.inverse();
+}
+
+void ContactImpulses::set_rolling(Row& row, const RelaxationBodies& bodies, double rolling_friction,
+                                  double spinning_friction) {
+  if (!(rolling_friction > 0.0) && !(spinning_friction > 0.0)) return;
+  const RelaxationBody& one = bodies[row.body1];
+  const RelaxationBody& two = bodies[row.body2];
+  const Matrix3 world = one.inverse_inertia + two.inverse_inertia;
+  const Matrix3 response = row.frame.transpose() * world * row.frame;
+  Rolling rolling;
+  rolling.normal_response = response(0, 0);
+  rolling.disc = FrictionDisc::of(response.bottomRightCorner<2, 2>());
+  rolling.rolling_friction = rolling_friction;
+  rolling.spinning_friction = spinning_friction;
+  rolling.length = std::max(one.gyration(), two.gyration());
+  row.rolling = static_cast<std::int32_t>(rolling_.size());
+  rolling_.push_back(rolling);
+}
+
+// ---- velocities and impulses
+
+// Relative velocity of the contact's points, in its frame.
+Vector3 ContactImpulses::velocity_of(const Row& row, const RelaxationMotion& x) const {
+  const Twist& one = x[row.body1];
+  const Twist& two = x[row.body2];
+  return row.frame.transpose() *
+         (two.linear + two.angular.cross(row.arm2) - one.linear - one.angular.cross(row.arm1));
+}
+
+Vector3 ContactImpulses::turning_of(const Row& row, const RelaxationMotion& x) const {
+  return row.frame.transpose() * (x[row.body2].angular - x[row.body1].angular);
+}
+
+void ContactImpulses::push(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
+                           RelaxationMotion& x) const {
+  const Vector3 world = row.frame * impulse;
+  const RelaxationBody& one = bodies[row.body1];
+  const RelaxationBody& two = bodies[row.body2];
+  x[row.body1].linear -= one.inverse_mass * world;
+  x[row.body1].angular -= one.inverse_inertia * row.arm1.cross(world);
+  x[row.body2].linear += two.inverse_mass * world;
+  x[row.body2].angular += two.inverse_inertia * row.arm2.cross(world);
+}
+
+void ContactImpulses::push_turning(const Row& row, const Vector3& impulse,
+                                   const RelaxationBodies& bodies, RelaxationMotion& x) const {
+  const Vector3 world = row.frame * impulse;
+  x[row.body1].angular -= bodies[row.body1].inverse_inertia * world;
+  x[row.body2].angular += bodies[row.body2].inverse_inertia * world;
+}
+
+void ContactImpulses::push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const {
+  for (const Row& row : rows_) {
+    if (!row.impulse.isZero(0.0)) push(row, row.impulse, bodies, x);
+    if (row.rolling < 0) continue;
+    const Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
+    if (!rolling.impulse.isZero(0.0)) push_turning(row, rolling.impulse, bodies, x);
+  }
+}
+
+void ContactImpulses::push_friction(const RelaxationBodies& bodies, double factor,
+                                    RelaxationMotion& x) const {
+  for (const Row& row : rows_) {
+    const Vector3 tangent(0.0, factor * row.impulse.y(), factor * row.impulse.z());
+    if (!tangent.isZero(0.0)) push(row, tangent, bodies, x);
+    if (row.rolling < 0) continue;
+    const Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
+    if (!rolling.impulse.isZero(0.0)) push_turning(row, factor * rolling.impulse, bodies, x);
+  }
+}
+
+bool ContactImpulses::has_friction_impulse() const {
+  return std::any_of(
+             rows_.begin(), rows_.end(),
+             [](const Row& row) { return row.impulse.y() != 0.0 || row.impulse.z() != 0.0; }) ||
+         std::any_of(rolling_.begin(), rolling_.end(),
+                     [](const Rolling& rolling) { return !rolling.impulse.isZero(0.0); });
+}
+
+double ContactImpulses::largest_violation(const RelaxationMotion& x) const {
+  double largest = 0.0;
+  for (const Row& row : rows_) largest = std::max(largest, row.target - velocity_of(row, x).x());
+  return largest;
+}
+
+double ContactImpulses::largest_motion(const RelaxationMotion& x) const {
+  double largest = 0.0;
+  for (const Row& row : rows_) {
+    const Twist& one = x[row.body1];
+    const Twist& two = x[row.body2];
+    largest = std::max(largest, one.linear.norm() + one.angular.norm() * row.arm1.norm() +
+                                    two.linear.norm() + two.angular.norm() * row.arm2.norm());
+  }
+  return largest;
+}
+
+void ContactImpulses::clear_multipliers() {
+  for (Row& row : rows_) row.impulse.setZero();
+  for (Rolling& rolling : rolling_) rolling.impulse.setZero();
+}
+
+// ---- relaxation
+
+double ContactImpulses::sweep(const RelaxationBodies& bodies, RelaxationMotion& x) {
+  double change = 0.0;
+  for (const Patch& patch : patches_) {
+    const bool solved = sweep_whole(patch, bodies, x, &change);
+    for (std::size_t i = patch.first; i < patch.end; ++i) {
+      if (!solved) change = std::max(change, sweep_row(rows_[i], bodies, x));
+      if (rows_[i].rolling >= 0) change = std::max(change, sweep_rolling(rows_[i], bodies, x));
+    }
+  }
+  return change;
+}
+
+double ContactImpulses::sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x) {
+  const Vector3 velocity = velocity_of(row, x);
+  // open and leaving: the commonest case costs no more than this
+  if (velocity.x() >= row.target && row.impulse.isZero(0.0)) return 0.0;
+  const Vector3 impulse = relaxed(row, velocity);
+  const Vector3 amount = impulse - row.impulse;
+  if (amount.isZero(0.0)) return 0.0;
+  row.impulse = impulse;
+  push(row, amount, bodies, x);
+  return (row.response * amount).cwiseAbs().maxCoeff();
+}
+
+// The impulse that makes this contact right, all others as they are.
+Vector3 ContactImpulses::relaxed(const Row& row, const Vector3& velocity) const {
+  Vector3 impulse = row.impulse;
+  const double mu = row.slides ? row.dynamic_friction : row.static_friction;
+  if (row.has_inverse) {
+    const Vector3 free_velocity = velocity - row.response * row.impulse;
+    if (solve_coulomb_contact(row.response, row.inverse, free_velocity, row.target, mu, &impulse))
+      return impulse;
+  }
+  // without friction, or with bodies that cannot move every way: normal row, then friction
+  const double missing = row.target - velocity.x();
+  impulse.x() = std::max(0.0, impulse.x() + missing / row.response(0, 0));
+  if (!row.has_friction) return impulse;
+  const Vector3 now = velocity + row.response.col(0) * (impulse.x() - row.impulse.x());
+  impulse.tail<2>() = row.disc.updated(impulse.tail<2>(), now.tail<2>(), mu * impulse.x());
+  return impulse;
+}
+
+double ContactImpulses::sweep_rolling(const Row& row, const RelaxationBodies& bodies,
+                                      RelaxationMotion& x) {
+  Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
+  const Vector3 turning = turning_of(row, x);
+  Vector3 impulse = rolling.impulse;
+  if (rolling.normal_response > 0.0) {
+    const double bound = rolling.spinning_friction * row.impulse.x();
+    impulse.x() = std::clamp(impulse.x() - turning.x() / rolling.normal_response, -bound, bound);
+  }
+  impulse.tail<2>() = rolling.disc.updated(impulse.tail<2>(), turning.tail<2>(),
+                                           rolling.rolling_friction * row.impulse.x());
+  const Vector3 amount = impulse - rolling.impulse;
+  if (amount.isZero(0.0)) return 0.0;
+  rolling.impulse = impulse;
+  push_turning(row, amount, bodies, x);
+  const double response = std::max(rolling.normal_response, rolling.disc.largest);
+  return response * amount.norm() * rolling.length;
+}
+
+bool ContactImpulses::let_slide(const RelaxationMotion& x, double slip) {
+  bool any = false;
+  for (Row& row : rows_) {
+    if (row.slides || !(row.dynamic_friction < row.static_friction)) continue;
+    if (row.impulse.x() == 0.0 || velocity_of(row, x).tail<2>().norm() <= slip) continue;
+    row.slides = true;
+    any = true;
+  }
+  return any;
+}
+
+void ContactImpulses::let_stick() {
+  for (Row& row : rows_) row.slides = false;
+}
+
+void ContactImpulses::store(std::vector<double>& impulses, std::vector<double>& directions) const {
+  for (const Row& row : rows_) {
+    set_vector(impulses, row.contact, row.frame * row.impulse);
+    set_vector(directions, row.contact, row.frame.col(0));
+  }
+}
+
+// ---- energy
+
+// Work of a contact's impulse and, in `size`, what it is large or small against.
+double ContactImpulses::work_of(const Row& row, const RelaxationMotion& before,
+                                const RelaxationMotion& after, double* size) const {
+  const Vector3 start = velocity_of(row, before);
+  const Vector3 end = velocity_of(row, after);
+  double work = 0.5 * row.impulse.dot(start + end);
+  *size = 0.5 * row.impulse.norm() * (start.norm() + end.norm());
+  if (row.rolling >= 0) {
+    const Vector3& turning = rolling_[static_cast<std::size_t>(row.rolling)].impulse;
+    work += 0.5 * turning.dot(turning_of(row, before) + turning_of(row, after));
+  }
+  return work;
+}
+
+void ContactImpulses::add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
+                               const RelaxationMotion& after, std::vector<double>& work) const {
+  double size = 0.0;
+  for (const Row& row : rows_) {
+    work[owner_of(row, bodies)] += work_of(row, before, after, &size);
+  }
+}
+
+std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before,
+                                                 const RelaxationMotion& after) {
+  std::uint32_t count = 0;
+  for (Row& row : rows_) {
+    if (!(row.target > 0.0)) continue;
+    double size = 0.0;
+    const double work = work_of(row, before, after, &size);
+    if (!(work > 1e-10 * size)) continue;
+    row.target = ++row.lowered < 3 ? 0.5 * row.target : 0.0;
+    ++count;
+  }
+  return count;
+}
+
+std::uint32_t ContactImpulses::drop_restitution(const RelaxationBodies& bodies,
+                                                const std::vector<std::uint32_t>& group,
+                                                const std::vector<double>& gained,
+                                                double tolerance) {
+  std::uint32_t count = 0;
+  for (Row& row : rows_) {
+    if (!(row.target > 0.0) || !(gained[group[owner_of(row, bodies)]] > tolerance)) continue;
+    row.target = 0.0;
+    ++count;
+  }
+  return count;
+}
+
+void ContactImpulses::scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+                            const std::vector<double>& factor) {
+  for (Row& row : rows_) {
+    const double share = factor[group[owner_of(row, bodies)]];
+    row.impulse *= share;
+    if (row.rolling >= 0) rolling_[static_cast<std::size_t>(row.rolling)].impulse *= share;
+  }
+}
+
+bool ContactImpulses::has_restitution() const {
+  return std::any_of(rows_.begin(), rows_.end(), [](const Row& row) { return row.target > 0.0; });
+}
+
+}  // namespace gravitas

@@ -1,0 +1,159 @@
+// The contacts' side of the velocity: restitution, friction in its cone, rolling and spinning
+// friction, for the contacts that are closed at the end of the step.
+//
+//   0 <= lambda_N  _|_  n.v_{n+1} - e s >= 0
+//   |lambda_T| <= mu lambda_N, against the slip; mu_s while it sticks, mu_d once it slides
+//   |tau_T| <= mu_r lambda_N, against rolling (relative turning across n);  |tau_N| <= mu_sp
+//   lambda_N, about n
+//
+// s is the arrival speed (arrival.h), mu_r and mu_sp are lengths (m). Both bodies are pushed at the
+// contact's own point, so momentum is conserved to rounding. Where the surface is perturbed and s >
+// 0, n is the perturbed normal (surface_perturbation.h) if it keeps the signs of n.v at S_n and at
+// S* and finds an arrival along it too, and friction acts across it. A resting contact uses the
+// true normal: a tilt that persists would roll a resting ball away for ever.
+//
+// A visit to a pair of bodies first tries all their contacts at once, as sticking with n.v = e s
+// (contact_patch.h); that is taken if every impulse lies in its cone, of a flat patch also with its
+// friction spread like its normal impulses. Else each contact is solved exactly, normal and tangent
+// together, with the others as they are (coulomb_contact.h). Solving the normal law and then
+// friction, as § 2.6.2 does, breaks the normal law, because friction moves n.v.
+//
+// Static and dynamic friction. All contacts first stick within mu_s. Those that slip when the
+// sweeps have converged (or half or three quarters of them are spent), by much more than the last
+// sweep still changed, slide with mu_d from then on; nothing returns to mu_s within a solution, so
+// it cannot chatter. A static coefficient below the dynamic is taken as equal to it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "workers/solver/sequential/contact_patch.h"
+#include "workers/solver/sequential/friction_disc.h"
+#include "workers/solver/sequential/relaxation_bodies.h"
+
+namespace gravitas {
+
+class ContactImpulses {
+ public:
+  // Rows of the contacts with closed[i] != 0, starting from the impulses `warm` (world, on the
+  // second body; three numbers per contact).
+  void build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request,
+             const std::vector<std::uint8_t>& closed, const std::vector<double>& warm);
+
+  bool is_empty() const { return rows_.empty(); }
+  void push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const;
+  // The same for friction (all three kinds) alone, times `factor`.
+  void push_friction(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const;
+  bool has_friction_impulse() const;
+
+  // Largest violation of a normal law by velocities x, and largest sum of the speeds that meet at a
+  // contact: what rounding goes by. m/s.
+  double largest_violation(const RelaxationMotion& x) const;
+  double largest_motion(const RelaxationMotion& x) const;
+  void clear_multipliers();
+
+  // One sweep. Returns the largest change of a contact's velocity, m/s.
+  double sweep(const RelaxationBodies& bodies, RelaxationMotion& x);
+
+  // Makes contacts that slip faster than `slip` (m/s) slide with mu_d in the following sweeps;
+  // returns whether any changed.
+  bool let_slide(const RelaxationMotion& x, double slip);
+  // All stick again, for a solution anew.
+  void let_stick();
+
+  // Writes impulses (world, on the second body) and directions of the rows that are there; leaves
+  // the others.
+  void store(std::vector<double>& impulses, std::vector<double>& directions) const;
+
+  // ---- the bound on energy (sequential.h) ----
+
+  // Work of each contact's impulse, added to that of its second body, or of the first where the
+  // second is not pushed.
+  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
+                const RelaxationMotion& after, std::vector<double>& work) const;
+  // Lowers e s of the contacts that arrive and whose impulse does positive work: to a half, a
+  // quarter, then to zero. Returns how many were lowered.
+  std::uint32_t lower_restitution(const RelaxationMotion& before, const RelaxationMotion& after);
+  // Sets e s to zero for contacts of bodies in a group (by the number of its first body) that
+  // gained more than `tolerance` J. Returns how many changed.
+  std::uint32_t drop_restitution(const RelaxationBodies& bodies,
+                                 const std::vector<std::uint32_t>& group,
+                                 const std::vector<double>& gained, double tolerance);
+  // Multiplies all impulses by the factor of their bodies' group.
+  void scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+             const std::vector<double>& factor);
+  bool has_restitution() const;
+
+  // Pairs of the rows, for grouping bodies.
+  template <typename Visit>
+  void each_pair(Visit visit) const {
+    for (const Row& row : rows_) visit(row.body1, row.body2);
+  }
+
+ private:
+  struct Row {
+    std::uint32_t body1 = 0, body2 = 0, contact = 0;
+    std::int32_t rolling = -1;  // its place in rolling_
+    bool has_inverse = false;   // `inverse` is there
+    bool slides = false;
+    bool has_friction = false;
+    std::uint32_t lowered = 0;
+    Vector3 arm1, arm2;  // from the centres of mass to the contact, m
+    Matrix3 frame;       // columns: direction of the normal law and two tangents, world
+    Matrix3 response;    // W, in the frame
+    Matrix3 inverse;     // W^-1
+    FrictionDisc disc;
+    double target = 0.0;  // e s, m/s
+    double static_friction = 0.0, dynamic_friction = 0.0;
+    Vector3 impulse = Vector3::Zero();  // in the frame
+  };
+  struct Rolling {
+    double normal_response = 0.0;
+    FrictionDisc disc;
+    double rolling_friction = 0.0, spinning_friction = 0.0, length = 0.0;  // m
+    Vector3 impulse =
+        Vector3::Zero();  // torque impulses in the frame: about the normal, and two tangents
+  };
+
+  // Consecutive rows of one pair of bodies.
+  struct Patch {
+    std::uint32_t first = 0, end = 0;
+    bool has_whole = false;
+    bool is_flat = false;  // one normal, points in a plane across it
+    ContactPatch whole;
+  };
+  using PatchImpulses = std::array<Vector3, ContactPatch::kRows>;
+
+  static std::uint32_t owner_of(const Row& row, const RelaxationBodies& bodies) {
+    return bodies[row.body2].is_pushed() ? row.body2 : row.body1;
+  }
+  Vector3 velocity_of(const Row& row, const RelaxationMotion& x) const;
+  Vector3 turning_of(const Row& row, const RelaxationMotion& x) const;
+  void push(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
+            RelaxationMotion& x) const;
+  void push_turning(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
+                    RelaxationMotion& x) const;
+  void set_law(Row& row, const RelaxationBodies& bodies, const stage::SolverSolveRequest& request);
+  void set_response(Row& row, const RelaxationBodies& bodies);
+  void set_rolling(Row& row, const RelaxationBodies& bodies, double rolling_friction,
+                   double spinning_friction);
+  void set_patches(const RelaxationBodies& bodies);
+  ContactPatch whole_of(const Patch& patch, const RelaxationBodies& bodies) const;
+  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x,
+                   double* change);
+  bool is_flat(const Patch& patch) const;
+  bool is_in_cones(const Patch& patch, const PatchImpulses& impulses) const;
+  bool spread_friction(const Patch& patch, PatchImpulses* impulses) const;
+  double sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
+  double sweep_rolling(const Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
+  Vector3 relaxed(const Row& row, const Vector3& velocity) const;
+  double work_of(const Row& row, const RelaxationMotion& before, const RelaxationMotion& after,
+                 double* size) const;
+
+  std::vector<Row> rows_;
+  std::vector<Rolling> rolling_;
+  std::vector<Patch> patches_;
+};
+
+}  // namespace gravitas

@@ -1,0 +1,90 @@
+// What one axis of a discrepancy asks of a relaxation: the right-hand side of its row, for the pose
+// change and for the velocity.
+//
+// Every law is one form, with J x the displacement or velocity along the axis, lambda the
+// multiplier and y = J x + gamma lambda:
+//
+//   y >= lower_target, lambda > 0 only where it is equal
+//   y <= upper_target, lambda < 0 only where it is equal
+//   |lambda| <= bound, which comes first
+//
+// An equality has both sides with the same target, a one-sided row has one.
+//
+// h is the time step, e* the error x2 - x1 along the axis at S*, e_n that of the same points
+// carried back to S_n, beta = CorrectionFactor * correction, F = maximum_force, d the damping, c
+// the compliance, v_d the desired velocity along the axis.
+//
+//   Pose change, bound F h^2:
+//     locked            e* + J delta = (1 - beta) e_n
+//     limited           e* + J delta >= lower + min(0, (1 - beta)(e_n - lower)), and so for upper
+//     unilateral        as limited, from below at 0
+//     others            none, nor for a compliance
+//   Velocity, bound F h:
+//     locked            J v = v_d
+//     limited           J v >= v_d where closed below, J v <= v_d where closed above
+//     unilateral        J v >= v_d where closed
+//     driven, friction  J v + gamma lambda = v_d,  gamma = 1/(h d) for d > 0, else 0
+//     with compliance   J v + gamma lambda = v_d - e/(c d + h),  gamma = c/(h (c d + h)),
+//                       for locked, limited and unilateral axes
+//
+// A limit with lower = upper holds like a lock at that error (rods, coupler lengths).
+//
+// A limit is closed where its error after the pose change is within the slop. The soft row is the
+// spring and damper
+//   lambda/h = -(e_{n+1}/c + d (J v - v_d)),  e_{n+1} = e_n + h (J v - v_d),
+// at the end of the step (implicit Euler, order one, stable for every stiffness), e being e_n less
+// the limit. A soft limit pushes only while its error is outside it at S_n or S*.
+//
+// A contact's friction cone comes with its material row; a joint's discrepancy has no coefficient,
+// so its friction axes are bounded by maximum_force, each by itself. Compliance of free, driven and
+// friction axes has no meaning and is not read.
+#pragma once
+
+#include <limits>
+
+#include "plugin_sdk/discrepancy.h"
+
+namespace gravitas {
+
+struct JointLaw {
+  bool has_lower = false;
+  bool has_upper = false;
+  double lower_target = 0.0;  // of J x: m, m/s, rad or rad/s
+  double upper_target = 0.0;
+  double gamma = 0.0;
+  double bound = std::numeric_limits<double>::infinity();  // of |lambda|
+  // The impulse acts on the velocity alone: theta h of it moves the pose.
+  bool is_velocity_only = false;
+
+  bool is_active() const { return has_lower || has_upper; }
+  bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }
+  // An equality that nothing softens or bounds.
+  bool is_rigid() const {
+    return is_equality() && gamma == 0.0 && bound == std::numeric_limits<double>::infinity();
+  }
+};
+
+// What the laws of one axis are made from.
+struct JointAxisState {
+  AxisMode mode = AxisMode::kFree;
+  double lower = 0.0, upper = 0.0, compliance = 0.0, damping = 0.0, maximum_force = kUnlimited;
+  double desired_velocity = 0.0;
+  double error_at_start = 0.0;  // e_n
+  double error_at_trial = 0.0;  // e*
+};
+
+// All the axes of a discrepancy with error vector `start_error` (world) at S_n.
+JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
+                                const Vector3& start_error);
+
+JointLaw pose_law(const JointAxisState& axis, double beta, double time_step);
+
+// `error_after` is e* + J delta, `slop` how far from a limit it still counts as closed.
+JointLaw velocity_law(const JointAxisState& axis, double error_after, double slop,
+                      double time_step);
+
+// The multiplier that makes a row right when its value is now J x + gamma lambda = value, and a
+// unit of multiplier changes that by `response` > 0.
+double relaxed_multiplier(const JointLaw& law, double multiplier, double value, double response);
+
+}  // namespace gravitas

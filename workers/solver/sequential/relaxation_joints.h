@@ -1,0 +1,134 @@
+// The joints' side of a relaxation: rows of discrepancies, block by block, for one of the two
+// problems (pose change or velocity).
+//
+// Consecutive discrepancies between the same two bodies are one block, because they act through the
+// six components of one relative motion: swept one by one, two points of a hinge that lie close
+// together, or a drive beside the lock of its own axis, would converge at the pace of their overlap
+// (0.9 a sweep and worse).
+//
+// First, the rigid rows of a block (equalities that nothing softens or bounds) are scaled to
+// J M^-1 J^T = 1 on the diagonal and taken in the order of a diagonally pivoted Cholesky
+// factorisation, until a pivot falls below 1e-10: at most six, the rest depend on them. So
+// redundancy costs nothing (a hinge of two points has 6 rows of rank 5, a rigid joint of three
+// points 9 of rank 6, the seed's motor 18 of rank 6): rows left out hold by themselves, or are
+// inconsistent, and their multipliers are zero. A sweep solves the kept ones together.
+//
+// Then every other row (limits, drives, springs) is made M-orthogonal to the kept ones,
+//   J' = J - K_rB K_BB^-1 J_B,
+// so that its multiplier changes none of them. A row whose J' M^-1 J'^T is below 1e-10 of
+// J M^-1 J^T is held by the lock already and left out.
+//
+// Arms. Both bodies are pushed at the midpoint of x1 and x2. At their own points, as the seed has
+// it, the pair of impulses is a couple (x2 - x1) x lambda: a joint with an error, or a slider away
+// from its origin, would turn its two bodies out of nothing, and the redundant rows of a hinge
+// would contradict each other by the error. With one point the total linear and angular momentum
+// are conserved to rounding; the linearised error differs by (turn x error)/2, which is of second
+// order like the linearisation itself.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "workers/solver/sequential/joint_laws.h"
+#include "workers/solver/sequential/relaxation_bodies.h"
+
+namespace gravitas {
+
+// A discrepancy with all that the two problems need of it. The poses are those at S*.
+struct RelaxationDiscrepancy {
+  std::uint32_t body1 = 0, body2 = 0;  // rows of RelaxationBodies
+  double beta = 1.0;                   // of the pose change
+  double slop = 0.0;                   // of a limit, m or rad
+  double length = 1.0;                 // of a unit of the error, m: 1 for points, an arm for angles
+  std::array<RelaxationDirection, 3> directions;
+  std::array<JointAxisState, 3> axes;
+};
+
+// Reads row `row` of the request. `correction_factor` multiplies the discrepancy's own.
+RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1,
+                                             std::uint32_t body2, const RelaxationBodies& bodies,
+                                             double correction_factor);
+
+class RelaxationJoints {
+ public:
+  // Multipliers along the axes of every discrepancy; 3 per row.
+  using Multipliers = std::vector<double>;
+  using Laws = std::vector<JointLaw>;
+
+  // Rows of all active laws (3 per discrepancy), starting from `warm`.
+  void build(const RelaxationBodies& bodies,
+             const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
+             const Multipliers& warm);
+
+  bool is_empty() const { return rows_.empty(); }
+
+  // x += M^-1 J^T lambda of all rows, or of the velocity-only ones times `factor`.
+  void push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const;
+  void push_velocity_only(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const;
+  bool has_velocity_only_impulse() const;
+
+  // Largest violation of a row by x, and largest sum of the magnitudes that J x is made of: what
+  // rounding goes by. m or m/s, angles times their length.
+  double largest_violation(const RelaxationMotion& x) const;
+  double largest_motion(const RelaxationMotion& x) const;
+  void clear_multipliers();
+
+  // One sweep over the blocks. Returns the largest change of J x in m or m/s.
+  double sweep(const RelaxationBodies& bodies, RelaxationMotion& x);
+
+  // Overwrites the multipliers of all discrepancies; those of rows that are not there with zero.
+  void store(Multipliers& multipliers) const;
+
+  // ---- the bound on energy (sequential.h) ----
+
+  // Work of the rows that neither drive nor soften, lambda (J before + J after)/2, J, added to that
+  // of body2, or of body1 where body2 is not pushed.
+  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
+                const RelaxationMotion& after, std::vector<double>& work) const;
+  // Sets factor to 1 for the groups of bodies (by the number of their first) that a drive or a
+  // spring acts on.
+  void exempt_driven(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+                     std::vector<double>& factor) const;
+  // Multiplies all multipliers by the factor of their bodies' group.
+  void scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+             const std::vector<double>& factor);
+
+ private:
+  static constexpr int kBlock = 6;
+
+  struct Row {
+    RelaxationDirection own;     // J
+    RelaxationDirection solved;  // J', for rows outside the block
+    JointLaw law;
+    double response = 0.0;  // J' M^-1 J'^T + gamma
+    double length = 1.0;
+    double multiplier = 0.0;
+    std::uint32_t place = 0;             // 3 * discrepancy + axis
+    std::array<double, kBlock> share{};  // K_BB^-1 K_Br
+  };
+  struct Block {
+    std::uint32_t body1 = 0, body2 = 0;
+    std::uint32_t first = 0, end = 0;  // rows
+    int rigid = 0;                     // how many of them, from the first, are solved together
+    Eigen::Matrix<double, kBlock, kBlock> inverse;
+  };
+
+  static std::uint32_t owner_of(const Block& block, const RelaxationBodies& bodies) {
+    return bodies[block.body2].is_pushed() ? block.body2 : block.body1;
+  }
+  void collect(const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
+               std::size_t first, std::size_t end, const Multipliers& warm);
+  void factorise(Block& block, double inverse_masses);
+  void orthogonalise(Block& block, double inverse_masses);
+  double sweep_rigid(const Block& block, double w1, double w2, Twist& x1, Twist& x2);
+  double sweep_others(const Block& block, double w1, double w2, Twist& x1, Twist& x2);
+
+  std::vector<Row> rows_;
+  std::vector<Block> blocks_;
+  std::vector<Row> rigid_, others_;                 // of the block that is being built
+  std::vector<std::array<double, kBlock>> factor_;  // of its rigid rows
+  std::vector<double> pivot_;
+};
+
+}  // namespace gravitas

@@ -1,0 +1,135 @@
+// The Sequential solver: joints and contacts by relaxation, after § 2.6.7.1 and § 2.7.6 with what
+// they get wrong put right. A pure function of the request and the settings.
+//
+//   S_n, S*, discrepancies, contacts
+//     -> pose change      delta  = M^-1 J^T mu      joint_laws.h, contact_gaps.h
+//     -> closed contacts  gaps and limits that S* (+) delta leaves at zero
+//     -> velocity         v_{n+1} = v* + M^-1 J^T lambda      joint_laws.h, contact_impulses.h
+//     -> pose change again, if friction, drives or springs act on the velocity alone
+//
+// Notation: h time step, * what the integrator made without joints and contacts, J Jacobian rows
+// with arms and world inertia at S*, M masses, lambda impulses (N s), mu position multipliers (kg
+// m), (+) composition of a pose with a translation and a rotation vector (world). delta is not h
+// (v_{n+1} - v*): the multipliers are its own.
+//
+// Method (§ 2.7.6, corrected). Projected block Gauss-Seidel: joints, then contacts, each block
+// solved for what is missing of it now, with accumulated multipliers that are clamped as a whole,
+// until a sweep changes no row by more than 128 units of rounding of the velocities that meet (pose
+// change: of the displacements, or a quarter unit of rounding of the coordinates), or `Iterations`
+// sweeps are done. The seed solves 1/k of each error in each of k sweeps, which leaves e^-beta of
+// it (35 % at beta = 1), finds impulses once from the velocities before, and clamps nothing. Sweeps
+// start from last step's multipliers; where nothing is missing without any, the multipliers are
+// zero and no sweep is done. Velocities are summed up anew from the final multipliers, so that a
+// body without an impulse keeps v* and delta = 0 bit for bit.
+//
+// Rows on velocity alone (friction, rolling, drives, springs): mu = theta h lambda. Scheme: pose
+// change without them, closed set, velocities; then pose change again on top of theta h M^-1 J^T
+// lambda. If that closes a contact or a limit more, velocities are solved for the larger set and
+// the pose change once more, and the set is not looked at again. A contact that this opens stays in
+// the set: it did close within the step, and let go it would be closed again without its impulse.
+//
+// Impacts (§ 2.6.2, corrected). Normal law and friction of a contact are solved together
+// (contact_impulses.h); with (2.64) and (2.69) in turn friction breaks the normal law in every
+// oblique impact. Restitution with friction in coupled impacts can create energy all the same
+// (Kane's paradox). Bound: the work of a contact's impulse is lambda.(u_before + u_after)/2; where
+// it is positive for a contact that arrives, e s of that contact is lowered, to a half, a quarter,
+// zero, with a solution after each. These works (with those of the locks and limits) sum to the
+// change of kinetic energy from v* to v_{n+1}; should it still be positive for a connected set of
+// bodies, e s is zero for all contacts of it. With that no solution gains; sweeps that ran out can,
+// and then all impulses of the set are scaled back to the largest share that does not.
+// SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
+// they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
+//
+// Order: S_{n+1} is of first order in h at joints and contacts (arms at S*), exact for constant
+// loads on resting, sticking and bouncing bodies. Joint error after the step is of second order in
+// the step's turn.
+//
+// Convergence is linear: one joint, one contact, or one patch of contacts that rests or sticks is
+// exact in one sweep; n bodies in a row take of the order of n^2 sweeps, times the mass ratio where
+// the heavy end hangs or lies on the light one; a box that slides or tips takes some tens.
+// Known failures: a chain of 20 links under 1000 times its mass and a stack of ten under a load of
+// 1000 stretch and sink for thousands of sweeps, tall stacks under the default 200 until the warm
+// start has caught up. Much friction at long arms (Painlevé; mu > 4/3 at a slender rod, less where
+// several contacts drive each other) may have no solution or several, and then the sweeps run round
+// in circles. `stop_reason` and `residual` say so; a small residual in a slow case is a small
+// change, not a small error. Newton and Direct exist for these scenes.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "workers/solver/sequential/contact_gaps.h"
+#include "workers/solver/sequential/contact_impulses.h"
+#include "workers/solver/sequential/relaxation_joints.h"
+
+namespace gravitas {
+
+struct SequentialSettings {
+  std::uint32_t iterations = 200;  // largest number of sweeps of one relaxation, 1 ... 100000
+  double correction_factor = 1.0;  // share of an old error that a step removes, 0 ... 1
+};
+
+// What a solution took. The reply carries the first three.
+struct SequentialSummary {
+  std::uint32_t sweeps = 0;       // of all relaxations of the call
+  double residual = 0.0;          // largest change of a velocity in the last one's last sweep, m/s
+  std::uint32_t stop_reason = 0;  // StopReason
+  std::uint32_t velocity_solutions = 0;    // relaxations of the velocities
+  std::uint32_t restitutions_lowered = 0;  // times an e s was lowered for doing positive work
+  std::uint32_t restitutions_dropped = 0;  // contacts set to e s = 0 for the energy of their bodies
+  std::uint32_t groups_scaled_back = 0;    // sets of bodies whose unfinished solution gained energy
+};
+
+class SequentialSolver {
+ public:
+  explicit SequentialSolver(const SequentialSettings& settings) : settings_(settings) {}
+
+  // Answers the request. Throws Refusal for an impossible one (solver_request_check.h), and where
+  // the answer is not finite because the numbers overflow. What is kept between calls is room for
+  // rows, nothing else.
+  SequentialSummary solve(const stage::SolverSolveRequest& request,
+                          const stage::SolverSolveReply& reply);
+
+ private:
+  void load(const stage::SolverSolveRequest& request);
+  void solve_pose();
+  bool find_closed();
+  void build_velocity(const stage::SolverSolveRequest& request);
+  void solve_velocity();
+  void relax_velocity();
+  bool sweep_velocity(double tolerance);
+  void bound_energy();
+  void group_bodies();
+  double add_up_gains(const RelaxationMotion& after);
+  void scale_back();
+  void sum_velocity();
+  bool acts_on_velocity_alone() const;
+  void set_offset(double factor);
+  void write(const stage::SolverSolveReply& reply);
+
+  SequentialSettings settings_;
+  SequentialSummary summary_;
+  bool velocity_converged_ = true;
+  bool used_up_ = false;  // some relaxation ran out of sweeps
+  double time_step_ = 0.0;
+  double coordinates_ = 0.0;
+
+  RelaxationBodies bodies_;
+  std::vector<RelaxationDiscrepancy> discrepancies_;
+  RelaxationJoints::Laws pose_laws_, velocity_laws_;
+  RelaxationJoints pose_joints_, velocity_joints_;
+  ContactGaps gaps_;
+  ContactImpulses impulses_;
+
+  RelaxationMotion trial_velocity_, velocity_;  // v*, v_{n+1}
+  RelaxationMotion offset_;                     // theta h M^-1 J^T lambda of rows on velocity alone
+  RelaxationMotion displacement_;               // delta
+  std::vector<std::uint8_t> closed_, closed_now_;
+
+  std::vector<double> joint_correction_, joint_impulse_;
+  std::vector<double> contact_correction_, contact_impulse_, contact_direction_;
+  std::vector<std::uint32_t> group_;
+  std::vector<double> work_, gained_, factor_;
+};
+
+}  // namespace gravitas
