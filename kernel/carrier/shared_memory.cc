@@ -303,11 +303,10 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
       until = std::min(now + deadline_ns_, cap);
     } else if (now >= until) {
       connection_->process->kill();
-      const double seconds = static_cast<double>(deadline_ns_) / 1e9;
       throw StageFault(FaultKind::kDeadline, "deadline",
                        now >= cap ? "the call took longer than ten times its deadline"
                                   : "no answer and no mark of progress within its deadline of " +
-                                        std::to_string(seconds) + " s");
+                                        std::to_string(deadline_ns_ / 1'000'000) + " ms");
     }
   }
 }

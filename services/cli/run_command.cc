@@ -32,9 +32,9 @@ struct CommandLine {
 void add_scene_options(CLI::App* command, CommandLine* line) {
   RunOptions& options = line->options;
   command->add_option("SCENE", options.scenes, "Scene files; several are read as one scene")->required();
-  command->add_option("--duration", options.duration, "Simulated time, s")->check(CLI::NonNegativeNumber);
+  command->add_option("--duration", options.duration, "Simulated time, s");
   command->add_option("--steps", options.steps, "Number of steps");
-  command->add_option("--dt", options.time_step, "Time step, s")->check(CLI::PositiveNumber);
+  command->add_option("--dt", options.time_step, "Time step, s");
   command->add_option("--set", options.overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50")
       ->take_all()
       ->allow_extra_args(false);
@@ -131,8 +131,7 @@ void add_run(CLI::App* app, Action* action) {
   add_scene_options(command, line.get());
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
-  command->add_option("--sample-every", options.sample_every, "Interval of the trajectory's samples, s; every step if absent")
-      ->check(CLI::PositiveNumber);
+  command->add_option("--sample-every", options.sample_every, "Interval of the trajectory's samples, s; every step if absent");
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
   command->add_flag("--json", line->json, "Print the report instead of the summary");

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
@@ -93,6 +94,14 @@ std::string installed_plugins() {
 }
 
 kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings) {
+  const auto require_positive = [](const char* option, double value) {
+    if (!std::isfinite(value) || value <= 0.0)
+      throw BadInput(fmt::format("{} {:g}: it must be a finite number of seconds > 0", option, value));
+  };
+  if (options.time_step) require_positive("--dt", *options.time_step);
+  if (options.sample_every) require_positive("--sample-every", *options.sample_every);
+  if (options.duration && !(std::isfinite(*options.duration) && *options.duration >= 0.0))
+    throw BadInput(fmt::format("--duration {:g}: it must be a finite number of seconds >= 0", *options.duration));
   scene::Problems problems;
   scene::SceneDocument document;
   scene::read_files(options.scenes, &document, &problems);
@@ -154,7 +163,7 @@ RunResult run(const RunOptions& options, const std::function<bool()>& interrupte
   std::unique_ptr<EventLog> events;
   try {
     if (!options.trajectory.empty())
-      trajectory = std::make_unique<TrajectoryWriter>(options.trajectory, description, options.sample_every);
+      trajectory = std::make_unique<TrajectoryWriter>(options.trajectory, description, options.sample_every.value_or(0.0));
     events = std::make_unique<EventLog>(options.events, description);
   } catch (const std::system_error& error) {
     throw BadInput(error.what());

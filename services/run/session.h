@@ -26,7 +26,7 @@ struct RunOptions {
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events;
-  double sample_every = 0.0;  // s
+  std::optional<double> sample_every;  // s; every step if absent
   std::uint32_t threads = 1;
 };
 
