@@ -67,21 +67,30 @@ TEST_P(InWorker, PausesAtTheLastCommit) {
   expect_pause_at_third_step(builder, GetParam());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    EveryWay, InWorker,
-    ::testing::Values(Expected{"integrator_killed", FaultKind::kDeath, "pidfd", "killed by signal 9"},
-                      Expected{"integrator_segv", FaultKind::kDeath, "pidfd", "killed by signal 11"},
-                      Expected{"integrator_exits", FaultKind::kDeath, "pidfd", "exit code 0"},
-                      Expected{"integrator_hangs", FaultKind::kDeadline, "deadline", "within its deadline"},
-                      Expected{"integrator_marks_forever", FaultKind::kDeadline, "deadline", "ten times"},
-                      Expected{"integrator_throws", FaultKind::kFailure, "status", "out of ideas"},
-                      Expected{"integrator_flush_to_zero", FaultKind::kFailure, "status", "floating-point"},
-                      Expected{"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
-                      Expected{"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
-                      Expected{"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
-                      Expected{"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
-                      Expected{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}),
-    [](const auto& one) { return std::string(one.param.library); });
+// Ends the process, or never answers: only a worker's failure can be survived.
+const Expected kFatal[] = {
+    {"integrator_killed", FaultKind::kDeath, "pidfd", "killed by signal 9"},
+    {"integrator_segv", FaultKind::kDeath, "pidfd", "killed by signal 11"},
+    {"integrator_exits", FaultKind::kDeath, "pidfd", "exit code 0"},
+    {"integrator_hangs", FaultKind::kDeadline, "deadline", "within its deadline"},
+    {"integrator_marks_forever", FaultKind::kDeadline, "deadline", "ten times"},
+};
+
+// Answers wrongly, which is noticed on any hosting.
+const Expected kWrong[] = {
+    {"integrator_throws", FaultKind::kFailure, "status", "out of ideas"},
+    {"integrator_flush_to_zero", FaultKind::kFailure, "status", "floating-point"},
+    {"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
+    {"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
+    {"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
+    {"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
+    {"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"},
+};
+
+std::string name_of(const ::testing::TestParamInfo<Expected>& one) { return one.param.library; }
+
+INSTANTIATE_TEST_SUITE_P(Fatal, InWorker, ::testing::ValuesIn(kFatal), name_of);
+INSTANTIATE_TEST_SUITE_P(Wrong, InWorker, ::testing::ValuesIn(kWrong), name_of);
 
 class InProcess : public ::testing::TestWithParam<Expected> {};
 
@@ -91,16 +100,7 @@ TEST_P(InProcess, PausesAtTheLastCommit) {
   expect_pause_at_third_step(builder, GetParam());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    EveryWayThatCanBeSurvived, InProcess,
-    ::testing::Values(Expected{"integrator_throws", FaultKind::kFailure, "status", "out of ideas"},
-                      Expected{"integrator_flush_to_zero", FaultKind::kFailure, "status", "floating-point"},
-                      Expected{"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
-                      Expected{"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
-                      Expected{"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
-                      Expected{"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
-                      Expected{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}),
-    [](const auto& one) { return std::string(one.param.library); });
+INSTANTIATE_TEST_SUITE_P(Wrong, InProcess, ::testing::ValuesIn(kWrong), name_of);
 
 TEST(FailingPlugins, PairsOutOfOrderAreRefused) {
   WorldBuilder builder = ball_on_ground(Hosting::kDirect);
