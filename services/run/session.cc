@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
@@ -89,8 +90,8 @@ void write_report_file(const std::string& path, const report::v1::Report& report
 std::string installed_worker() { return kernel::worker_program(); }
 
 std::string installed_plugins() {
-  const std::string worker = kernel::worker_program();
-  return worker.substr(0, worker.rfind('/')) + "/../lib/gravitas";
+  const std::filesystem::path bin = std::filesystem::path(kernel::worker_program()).parent_path();
+  return (bin.parent_path() / "lib" / "gravitas").string();
 }
 
 kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings) {

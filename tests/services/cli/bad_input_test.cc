@@ -1,0 +1,166 @@
+// Bad input from outside: exit code 2, the place, what is wrong, what is allowed; in a second or two.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using testing::ProgramResult;
+using testing::run_program;
+using testing::ScratchFolder;
+using testing::shipped_scene;
+using ::testing::HasSubstr;
+
+const std::string kSample = shipped_scene("two_spheres_motor");
+
+struct BadScene {
+  const char* name;
+  std::string text;
+  std::string place;     // line:column
+  std::string expected;  // part of the message
+};
+
+void PrintTo(const BadScene& scene, std::ostream* out) { *out << scene.name; }
+
+// A whole scene with one body that `body` describes, on line 4.
+std::string with_body(const std::string& body) {
+  return "Geometries { Geometry { Type = \"Sphere\" Id = \"S\" CustomProperties { Radius = 0.5 } } }\n"
+         "Simulator { Type = \"Basic\" Id = \"M\" CustomProperties { Duration = 0.1 } }\n"
+         "Environment { Id = \"W\" Space { Type = \"Basic\" Id = \"B\" Bodies {\n" +
+         body + "\n} } }\n";
+}
+
+std::string with_geometry(const std::string& properties) {
+  return "Geometries {\nGeometry { Type = \"Sphere\" Id = \"S\" CustomProperties { " + properties + " } } }\n" +
+         "Environment { Id = \"W\" Space { Type = \"Basic\" Id = \"B\" Bodies {\n" +
+         "Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" } } } }\n";
+}
+
+const BadScene kBadScenes[] = {
+    {"unknown_block", "Enviroment { }\n", "1:1", "Environment"},
+    {"unknown_property", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Masss = 1 }"), "4:49", "Mass"},
+    {"wrong_type", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Mass = \"heavy\" }"), "4:56", "number"},
+    {"missing_id", with_body("Body { Type = \"Rigid\" GeometryId = \"S\" }"), "4:1", "Id"},
+    {"duplicate_id",
+     with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" }\nBody { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" }"),
+     "5:28", "\"A\""},
+    {"dangling_id", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"T\" }"), "4:45", "\"S\""},
+    {"non_finite", with_geometry("Radius = 1e999"), "2:65", "1e999"},
+    {"zero_size", with_geometry("Radius = 0"), "2:65", "> 0"},
+    {"negative_size", with_geometry("Radius = -1"), "2:65", "> 0"},
+    {"far_from_unit",
+     with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" KineticProperties { Orientation = {1,1,0,0} } }"), "4:83",
+     "norm 1"},
+    {"unbalanced", "Environment {\n", "2:1", "}"},
+    {"deep", std::string(100'000, '{'), "1:", ""},
+};
+
+class Refused : public ::testing::TestWithParam<BadScene> {};
+
+TEST_P(Refused, WithItsPlaceAndWhatIsAllowed) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write("scene.gravitas", GetParam().text);
+  const ProgramResult result = run_program({"run", scene}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.out, "");
+  EXPECT_THAT(result.err, HasSubstr(scene + ":" + GetParam().place));
+  EXPECT_THAT(result.err, HasSubstr(GetParam().expected));
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, Refused, ::testing::ValuesIn(kBadScenes),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+TEST(BadInput, AQuaternionThatIsNearlyUnitIsRepairedWithAWarning) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "scene.gravitas",
+      with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" KineticProperties { Orientation = {1.0005,0,0,0} } }"));
+  const ProgramResult result = run_program({"run", scene}, folder);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr(scene + ":4:83: warning"));
+}
+
+TEST(BadInput, FilesThatCannotBeRead) {
+  const ScratchFolder folder;
+  for (const std::string& path : {folder.path("missing.gravitas"), folder.path("")}) {
+    const ProgramResult result = run_program({"run", path}, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(path + ":1:1: error"));
+  }
+}
+
+TEST(BadInput, AFileThatIsNoSceneAtAll) {
+  const ScratchFolder folder;
+  const std::string path = folder.write("noise", std::string("\x7f" "ELF\0\1\2\3", 8));
+  EXPECT_EQ(run_program({"run", path}, folder).exit_code, 2);
+}
+
+TEST(BadInput, AMillionLinesAreReadAndTheMistakeInTheLastIsFound) {
+  const ScratchFolder folder;
+  std::string text;
+  for (int i = 0; i < 1'000'000; ++i) text += "// line\n";
+  const std::string path = folder.write("long.gravitas", text + "Environmnt { }\n");
+  const ProgramResult result = run_program({"run", path}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr(path + ":1000001:1: error"));
+}
+
+// The sample with a library of the user's for the solver.
+ProgramResult run_with_solver_library(const std::string& library, const ScratchFolder& folder) {
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Library = \"" + library + "\" } }");
+  return run_program({"run", kSample, plugins}, folder);
+}
+
+TEST(BadInput, LibrariesThatAreNoPluginsOrOfAnotherSchema) {
+  const ScratchFolder folder;
+  const std::string faulty = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/";
+  for (const auto& [library, expected] : std::vector<std::pair<std::string, std::string>>{
+           {folder.path("missing.so"), "No such file"},
+           {folder.write("text.so", "not a library"), "shared library"},
+           {faulty + "wrong_schema_hash.so", "schema"},
+           {faulty + "crash_on_load.so", "signal"}}) {
+    const ProgramResult result = run_with_solver_library(library, folder);
+    EXPECT_EQ(result.exit_code, 2) << library;
+    EXPECT_THAT(result.err, HasSubstr("plugins.gravitas:1:"));
+    EXPECT_THAT(result.err, HasSubstr(expected));
+  }
+}
+
+TEST(BadInput, OptionsOfTheCommandLine) {
+  const ScratchFolder folder;
+  for (const auto& [option, expected] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--frobnicate"}, "--frobnicate"},
+           {{"--hosting", "cloud"}, "allowed: direct, shm"},
+           {{"--hosting", "grpc"}, "not supported by this version"},
+           {{"--hosting", "sovler=shm"}, "allowed: space, collision"},
+           {{"--dt", "0"}, "--dt 0: it must be"},
+           {{"--duration", "-1"}, "--duration -1: it must be"},
+           {{"--steps", "many"}, "--steps"},
+           {{"--threads", "0"}, "--threads"},
+           {{"--set", "Solver.Iteration=5"}, "Iterations"},
+           {{"--set", "Solver.Iterations=none"}, "--set Solver.Iterations=none"},
+           {{"--set", "Integrator=RK9"}, "Euler"},
+           {{"--set", "Body.Ball1.LinearVelocity={1,0,0}"}, "Ball01"},
+           {{"--set", "nonsense"}, "--set nonsense"},
+           {{"--trajectory", "/nonexistent/motion.csv"}, "/nonexistent/motion.csv"}}) {
+    std::vector<std::string> arguments = {"run", kSample};
+    arguments.insert(arguments.end(), option.begin(), option.end());
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2) << option[0];
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, HasSubstr(expected));
+  }
+}
+
+TEST(BadInput, NoOrUnknownSubcommand) {
+  const ScratchFolder folder;
+  EXPECT_EQ(run_program({}, folder).exit_code, 2);
+  EXPECT_EQ(run_program({"fly"}, folder).exit_code, 2);
+  EXPECT_EQ(run_program({"run"}, folder).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace gravitas

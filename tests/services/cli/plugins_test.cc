@@ -1,0 +1,81 @@
+// `gravitas plan`, `plugins`, `describe` and the help of all.
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include "gravitas/plugin/v1/description.pb.h"
+#include "gravitas/report/v1/report.pb.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using google::protobuf::util::JsonStringToMessage;
+using testing::ProgramResult;
+using testing::run_program;
+using testing::ScratchFolder;
+using testing::shipped_scene;
+using ::testing::HasSubstr;
+
+TEST(Plan, NamesWhatIsNeededAndWhyTheRestIsNot) {
+  const ScratchFolder folder;
+  const ProgramResult table = run_program({"plan", shipped_scene("two_spheres_motor")}, folder);
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_THAT(table.out, HasSubstr("AngularMotor"));
+  EXPECT_THAT(table.out, HasSubstr("force        left out: all forces are constant"));
+  const ProgramResult json = run_program({"plan", shipped_scene("two_spheres_motor"), "--json"}, folder);
+  report::v1::Plan plan;
+  ASSERT_TRUE(JsonStringToMessage(json.out, &plan).ok());
+  EXPECT_EQ(plan.slots_size(), 5);
+  for (const report::v1::PlannedSlot& slot : plan.slots()) EXPECT_EQ(slot.pid(), 0);
+}
+
+TEST(Plugins, ListsThemAsTableAndJson) {
+  const ScratchFolder folder;
+  const ProgramResult table = run_program({"plugins"}, folder);
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_EQ(table.err, "");
+  plugin::v1::Catalog catalog;
+  ASSERT_TRUE(JsonStringToMessage(run_program({"plugins", "--json"}, folder).out, &catalog).ok());
+  EXPECT_GE(catalog.entries_size(), 11);
+  for (const plugin::v1::Catalog::Entry& entry : catalog.entries())
+    EXPECT_THAT(table.out, HasSubstr(entry.description().name()));
+}
+
+TEST(Describe, ShowsPropertiesWithUnitRangeDefaultAndMeaning) {
+  const ScratchFolder folder;
+  const ProgramResult solver = run_program({"describe", "Sequential"}, folder);
+  EXPECT_EQ(solver.exit_code, 0);
+  EXPECT_THAT(solver.out, HasSubstr("slot solver"));
+  EXPECT_THAT(solver.out, HasSubstr("Iterations"));
+  EXPECT_THAT(solver.out, HasSubstr("live"));
+  // a type's name stands for the plugin that serves it, a path for the library
+  EXPECT_THAT(run_program({"describe", "Sphere"}, folder).out, HasSubstr("Radius"));
+  const ProgramResult library = run_program({"describe", GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so", "--json"}, folder);
+  plugin::v1::Description description;
+  ASSERT_TRUE(JsonStringToMessage(library.out, &description).ok());
+  EXPECT_EQ(description.name(), "Hello");
+  EXPECT_EQ(description.types(0).properties(0).unit(), "N");
+}
+
+TEST(Describe, WhatIsNotInstalledIsAnErrorThatListsWhatIs) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program({"describe", "Nope"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("installed: "));
+  EXPECT_EQ(run_program({"describe", "/etc/passwd.so"}, folder).exit_code, 2);
+  EXPECT_EQ(run_program({"describe"}, folder).exit_code, 2);
+}
+
+TEST(Help, OfEverySubcommandHasAnExample) {
+  const ScratchFolder folder;
+  EXPECT_EQ(run_program({"--help"}, folder).exit_code, 0);
+  for (const char* command : {"run", "plan", "plugins", "describe"}) {
+    const ProgramResult result = run_program({command, "--help"}, folder);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ") + command));
+  }
+}
+
+}  // namespace
+}  // namespace gravitas

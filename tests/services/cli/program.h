@@ -1,0 +1,44 @@
+// Runs the real `gravitas` program and keeps what it said.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+#include <vector>
+
+namespace gravitas::testing {
+
+struct ProgramResult {
+  int exit_code = -1;  // 128 + signal if it was killed
+  std::string out, err;
+};
+
+// A folder of its own for a test's files, removed with everything in it at the end.
+class ScratchFolder {
+ public:
+  ScratchFolder();
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  // Writes a file and returns its path.
+  std::string write(const std::string& name, const std::string& text) const;
+
+ private:
+  std::string folder_;
+};
+
+std::string read_file(const std::string& path);
+
+// Starts `gravitas` with its standard streams in files of `folder`; returns its process id.
+pid_t start_program(const std::vector<std::string>& arguments, const ScratchFolder& folder);
+// Waits for it to end; killed after a minute.
+ProgramResult finish_program(pid_t process, const ScratchFolder& folder);
+
+ProgramResult run_program(const std::vector<std::string>& arguments, const ScratchFolder& folder);
+
+// A shipped scene.
+std::string shipped_scene(const std::string& name);
+
+}  // namespace gravitas::testing

@@ -1,0 +1,225 @@
+// `gravitas run` from outside: what it prints, what it writes, how it ends.
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "gravitas/report/v1/report.pb.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using testing::ProgramResult;
+using testing::read_file;
+using testing::run_program;
+using testing::ScratchFolder;
+using testing::shipped_scene;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+const std::string kSample = shipped_scene("two_spheres_motor");
+
+report::v1::Report read_report(const std::string& text) {
+  report::v1::Report report;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(text, &report).ok()) << text;
+  return report;
+}
+
+std::vector<std::vector<std::string>> read_csv(const std::string& path) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream text(read_file(path));
+  for (std::string line; std::getline(text, line);) {
+    std::vector<std::string>& row = rows.emplace_back();
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) row.push_back(cell);
+  }
+  return rows;
+}
+
+TEST(Run, TheSampleTellsItsStoryWithEverySlotInAProcessOfItsOwn) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program({"run", kSample, "--report", folder.path("report.json")}, folder);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("Ball01 met Ground"));
+  EXPECT_THAT(result.out, HasSubstr("Ball02 met Ground"));
+  EXPECT_THAT(result.out, HasSubstr("MyAngularMotor turns at 3.1412 rad/s"));
+  EXPECT_THAT(result.err, HasSubstr("MassDensity 0"));
+
+  const report::v1::Report report = read_report(read_file(folder.path("report.json")));
+  EXPECT_EQ(report.steps(), 600U);
+  EXPECT_EQ(report.bodies(), 3U);
+  EXPECT_EQ(report.outcome(), "completed");
+  EXPECT_EQ(report.warnings_size(), 2);
+  ASSERT_EQ(report.plan().slots_size(), 5);
+  std::set<int> processes;
+  for (const report::v1::PlannedSlot& slot : report.plan().slots()) {
+    EXPECT_EQ(slot.hosting(), "shm");
+    processes.insert(slot.pid());
+  }
+  EXPECT_EQ(processes.size(), 5U);
+  EXPECT_NEAR(report.drives(0).speed(), 3.1412, 1e-6);
+  EXPECT_GE(report.events().collision_start(), 2U);
+  EXPECT_EQ(report.events().break_(), 0U);
+}
+
+TEST(Run, TheReportHasTheKeysThatScriptsReadAndNoOthersAreMissing) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program({"run", kSample, "--steps", "3", "--hosting", "direct", "--json"}, folder);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* key :
+       {"scene", "simulated_seconds", "steps", "bodies", "wall_seconds", "microseconds_per_step", "mean", "median", "p99",
+        "max", "energy", "initial", "final", "max_relative_drift", "linear_momentum", "angular_momentum",
+        "max_penetration", "max_joint_error", "state_hash", "chain_hash", "plan", "slots", "slot", "plugin", "hosting",
+        "pid", "left_out", "what", "why", "stages", "stage", "calls", "median_us", "p99_us", "transport_median_us",
+        "faults", "swaps", "events", "collision_start", "collision_end", "sleep", "wake", "break", "warnings"})
+    EXPECT_THAT(result.out, HasSubstr("\"" + std::string(key) + "\":")) << key;
+}
+
+TEST(Run, HostingAndThreadsChangeNoBit) {
+  const ScratchFolder folder;
+  const auto hash = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"run", kSample, "--steps", "120", "--json"});
+    return read_report(run_program(options, folder).out).chain_hash();
+  };
+  const std::string reference = hash({"--hosting", "direct"});
+  EXPECT_EQ(reference.size(), 32U);
+  EXPECT_EQ(reference, hash({}));
+  EXPECT_EQ(reference, hash({"--hosting", "direct", "--hosting", "solver=shm", "--threads", "2"}));
+}
+
+TEST(Run, TheTrajectoryHasARowPerMovingBodyAndSampleAndReadsBackExactly) {
+  const ScratchFolder folder;
+  const std::string file = folder.path("motion.csv");
+  ASSERT_EQ(run_program({"run", kSample, "--steps", "10", "--hosting", "direct", "--trajectory", file}, folder).exit_code, 0);
+  const auto rows = read_csv(file);
+  ASSERT_EQ(rows.size(), 1U + 2 * 11);
+  EXPECT_THAT(read_file(file), StartsWith("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n0,Ball01,0,1,0,1,0,0,0,0,0,0,0,0,0\n"));
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    ASSERT_EQ(rows[i].size(), 15U);
+    EXPECT_NE(rows[i][1], "Ground");
+  }
+  // free fall with Euler: v = -g n h and y = 1 - g h^2 n (n - 1) / 2, summed as the integrator sums
+  double v = 0.0, y = 1.0;
+  for (int n = 0; n < 10; ++n) {
+    y += v * (1.0 / 60.0);
+    v = std::exp(-0.1 / 60.0) * (v - 5.0 / 60.0);
+  }
+  EXPECT_NEAR(std::stod(rows[21][3]), y, 1e-14);
+  EXPECT_NEAR(std::stod(rows[21][10]), v, 1e-14);
+}
+
+TEST(Run, SamplesAreTheFirstBoundariesAtOrAfterTheIntervalAndTheLast) {
+  const ScratchFolder folder;
+  const std::string file = folder.path("motion.csv");
+  ASSERT_EQ(run_program({"run", kSample, "--steps", "10", "--dt", "0.1", "--hosting", "direct", "--trajectory", file,
+                         "--sample-every", "0.25"},
+                        folder)
+                .exit_code,
+            0);
+  std::vector<double> times;
+  for (const auto& row : read_csv(file))
+    if (row[1] == "Ball01") times.push_back(std::stod(row[0]));
+  const std::vector<double> expected = {0.0, 0.3, 0.5, 0.8, 1.0};
+  ASSERT_EQ(times.size(), expected.size());
+  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_NEAR(times[i], expected[i], 1e-12);
+}
+
+TEST(Run, DurationStepsAndTimeStepOverrideTheScene) {
+  const ScratchFolder folder;
+  const auto run = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {"run", kSample, "--hosting", "direct", "--json"});
+    return read_report(run_program(options, folder).out);
+  };
+  EXPECT_EQ(run({"--duration", "0.5"}).steps(), 30U);
+  EXPECT_EQ(run({"--duration", "1", "--dt", "0.3"}).steps(), 4U);
+  EXPECT_DOUBLE_EQ(run({"--duration", "1", "--dt", "0.3"}).simulated_seconds(), 1.0);
+  EXPECT_EQ(run({"--steps", "7"}).steps(), 7U);
+  EXPECT_EQ(run({"--duration", "0"}).steps(), 0U);
+}
+
+TEST(Run, EventsAreJsonLinesInOrder) {
+  const ScratchFolder folder;
+  const std::string file = folder.path("events.jsonl");
+  ASSERT_EQ(run_program({"run", kSample, "--hosting", "direct", "--duration", "1", "--events", file}, folder).exit_code, 0);
+  std::istringstream lines(read_file(file));
+  std::string first;
+  ASSERT_TRUE(std::getline(lines, first));
+  EXPECT_THAT(first, HasSubstr("\"kind\":\"collision_start\",\"bodies\":[\"Ground\",\"Ball01\"]"));
+  EXPECT_THAT(first, HasSubstr("\"step\":28"));
+}
+
+TEST(Run, QuietPrintsNothing) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program({"run", kSample, "--steps", "1", "--quiet"}, folder);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out + result.err, "");
+}
+
+TEST(Run, AnInterruptKeepsWhatWasComputed) {
+  const ScratchFolder folder;
+  const std::string pipe = folder.path("motion.csv");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const pid_t process = testing::start_program(
+      {"run", kSample, "--hosting", "direct", "--duration", "1e6", "--trajectory", pipe, "--report", folder.path("report.json")},
+      folder);
+  // rows come out: the run is under way
+  std::ifstream rows(pipe);
+  std::string line;
+  for (int i = 0; i < 1000; ++i) ASSERT_TRUE(std::getline(rows, line));
+  kill(process, SIGINT);
+  std::string last;
+  while (std::getline(rows, line)) last = line;
+  const ProgramResult result = testing::finish_program(process, folder);
+  EXPECT_EQ(result.exit_code, 130);
+  const report::v1::Report report = read_report(read_file(folder.path("report.json")));
+  EXPECT_EQ(report.outcome(), "interrupted");
+  EXPECT_GE(report.steps(), 400U);
+  // the trajectory ends with the state that the report is about
+  EXPECT_NEAR(std::stod(last), report.simulated_seconds(), 1e-9);
+}
+
+// A scene whose integrator is one of the deliberately bad plugins.
+ProgramResult run_with_bad_integrator(const std::string& library, const ScratchFolder& folder) {
+  const std::string plugins = folder.write(
+      "plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Deadline = 0.2 Library = \"" GRAVITAS_BINARY_DIR
+                          "/lib/gravitas-faulty/" + library + ".so\" } }");
+  return run_program({"run", kSample, plugins, "--set", "Integrator=Faulty", "--report", folder.path("report.json"),
+                      "--trajectory", folder.path("motion.csv")},
+                     folder);
+}
+
+TEST(Run, AWorkerThatDiesEndsTheRunWithSlotCauseAndStep) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_with_bad_integrator("integrator_killed", folder);
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("paused at step 3: slot integrator, plugin Faulty"));
+  EXPECT_THAT(result.err, HasSubstr("killed by signal 9"));
+  const report::v1::Report report = read_report(read_file(folder.path("report.json")));
+  EXPECT_EQ(report.outcome(), "paused");
+  EXPECT_EQ(report.steps(), 2U);
+  ASSERT_EQ(report.faults_size(), 1);
+  EXPECT_EQ(report.faults(0).step(), 3U);
+  EXPECT_EQ(report.faults(0).slot(), "integrator");
+  EXPECT_EQ(report.faults(0).kind(), "death");
+  // initial state and two steps of two bodies are kept
+  EXPECT_EQ(read_csv(folder.path("motion.csv")).size(), 1U + 3 * 2);
+}
+
+TEST(Run, AWorkerThatHangsEndsTheRunAtItsDeadline) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_with_bad_integrator("integrator_hangs", folder);
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, HasSubstr("paused at step 3: slot integrator"));
+  EXPECT_THAT(result.err, HasSubstr("within its deadline of 200 ms"));
+}
+
+}  // namespace
+}  // namespace gravitas
