@@ -17,9 +17,7 @@ ColumnId Arena::add(stage::ElementType type, std::uint64_t count, std::uint64_t 
   return static_cast<ColumnId>(columns_.size() - 1);
 }
 
-void Arena::seal() {
-  move_to_new_segment(columns_);
-}
+void Arena::seal() { move_to_new_segment(columns_); }
 
 void Arena::grow(ColumnId column, std::uint64_t capacity) {
   if (capacity <= columns_[column].capacity) return;
@@ -34,8 +32,8 @@ void Arena::move_to_new_segment(std::vector<Entry> layout) {
     entry.offset = size;
     size += round_up(entry.capacity * stage::element_size(entry.type), GRAVITAS_COLUMN_ALIGNMENT);
   }
-  channel::Segment segment = channel::Segment::create("gravitas state", round_up(std::max<std::uint64_t>(size, 1), kPage),
-                                                      channel::Sharing::kReadersOnly);
+  channel::Segment segment = channel::Segment::create(
+      "gravitas state", round_up(std::max<std::uint64_t>(size, 1), kPage), channel::Sharing::kReadersOnly);
   for (std::size_t i = 0; base_ != nullptr && i < columns_.size(); ++i) {
     const Entry& old = columns_[i];
     std::memcpy(segment.data() + layout[i].offset, base_ + old.offset, old.count * stage::element_size(old.type));

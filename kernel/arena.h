@@ -6,8 +6,8 @@
 // larger segment, with a new generation: pointers and spans are valid until the next grow() or seal().
 #pragma once
 
-#include <cstdint>
 #include <algorithm>
+#include <cstdint>
 #include <span>
 #include <type_traits>
 #include <vector>

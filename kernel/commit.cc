@@ -114,14 +114,15 @@ void Environment::remember_joints() {
 void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   const DiscrepancyAnswer& d = data_.discrepancies;
-  const DiscrepancyColumns columns{d.point1.span(), d.point2.span(), d.velocity.span(),   d.correction.span(),
-                                   d.axes.span(),   d.mode.span(),   d.lower.span(),      d.upper.span(),
+  const DiscrepancyColumns columns{d.point1.span(),     d.point2.span(),  d.velocity.span(),     d.correction.span(),
+                                   d.axes.span(),       d.mode.span(),    d.lower.span(),        d.upper.span(),
                                    d.compliance.span(), d.damping.span(), d.maximum_force.span()};
   for (std::size_t row = 0; row < columns.size();) {
     const std::uint32_t joint = d.constraint[row];
     const ConstraintDescription& description = model_.constraints[joint];
     const auto poses = [&](const Column<double>& position, const Column<double>& orientation) {
-      return std::pair{pose_of(position, orientation, description.body1), pose_of(position, orientation, description.body2)};
+      return std::pair{pose_of(position, orientation, description.body1),
+                       pose_of(position, orientation, description.body2)};
     };
     const auto [trial1, trial2] = poses(data_.trial_position, data_.trial_orientation);
     const auto [next1, next2] = poses(back().position, back().orientation);
@@ -130,8 +131,7 @@ void Environment::update_joints() {
     for (; row < columns.size() && d.constraint[row] == joint; ++row) {
       const Discrepancy discrepancy = columns.at(row);
       error = std::max(error, joint_error(discrepancy, error_at(discrepancy, trial1, trial2, next1, next2)));
-      if (!discrepancy.is_angular())
-        impulse += discrepancy.axes * vector_at(data_.discrepancy_impulse.span(), row);
+      if (!discrepancy.is_angular()) impulse += discrepancy.axes * vector_at(data_.discrepancy_impulse.span(), row);
     }
     const double force = impulse.norm() / data_.time_step[0];
     const bool breaks = (description.breaking_threshold > 0.0 && error > description.breaking_threshold) ||
@@ -182,15 +182,21 @@ void Environment::raise_collision_events() {
       continue;
     }
     const auto [first, second] = starts ? pair_at(now, n) : pair_at(before, b);
-    Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd, step_count_, time(), first, second,
-                kNone, 0.0, 0.0};
+    Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd,
+                step_count_,
+                time(),
+                first,
+                second,
+                kNone,
+                0.0,
+                0.0};
     for (; starts && contact < data_.contact_key.size(); ++contact) {
       const std::pair bodies{data_.contact_body[2 * contact], data_.contact_body[2 * contact + 1]};
       if (bodies > std::pair{first, second}) break;
       if (bodies != std::pair{first, second}) continue;
       const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
-      event.relative_speed = std::max(event.relative_speed,
-                                      -normal.dot(vector_at(data_.contact_relative_velocity.span(), contact)));
+      event.relative_speed =
+          std::max(event.relative_speed, -normal.dot(vector_at(data_.contact_relative_velocity.span(), contact)));
       event.impulse += normal.dot(vector_at(data_.contact_impulse.span(), contact));
     }
     listener_->on_event(event);

@@ -13,9 +13,10 @@ bool is_unit(const Quaternion& q) { return std::fabs(q.squaredNorm() - 1.0) <= k
 
 std::string validate_body(const EnvironmentDescription& d, const BodyDescription& body) {
   const std::string who = "body '" + body.id + "': ";
-  const bool finite = body.pose.position.allFinite() && body.twist.linear.allFinite() && body.twist.angular.allFinite() &&
-                      body.geometry.position.allFinite() && std::isfinite(body.mass) && body.inertia.allFinite() &&
-                      std::isfinite(body.damping) && body.bound.centre.allFinite() && body.bound.half_extents.allFinite();
+  const bool finite = body.pose.position.allFinite() && body.twist.linear.allFinite() &&
+                      body.twist.angular.allFinite() && body.geometry.position.allFinite() &&
+                      std::isfinite(body.mass) && body.inertia.allFinite() && std::isfinite(body.damping) &&
+                      body.bound.centre.allFinite() && body.bound.half_extents.allFinite();
   if (!finite) return who + "a number is not finite";
   if (!is_unit(body.pose.orientation) || !is_unit(body.geometry.orientation) || !is_unit(body.bound.orientation))
     return who + "an orientation is not a unit quaternion";
@@ -47,12 +48,18 @@ const char* hosting_name(Hosting hosting) { return hosting == Hosting::kDirect ?
 
 SlotDescription& EnvironmentDescription::slot(Slot which) {
   switch (which) {
-    case Slot::kSpace: return space;
-    case Slot::kCollision: return collision;
-    case Slot::kConstraint: return constraint;
-    case Slot::kForce: return force;
-    case Slot::kSolver: return solver;
-    case Slot::kIntegrator: break;
+    case Slot::kSpace:
+      return space;
+    case Slot::kCollision:
+      return collision;
+    case Slot::kConstraint:
+      return constraint;
+    case Slot::kForce:
+      return force;
+    case Slot::kSolver:
+      return solver;
+    case Slot::kIntegrator:
+      break;
   }
   return integrator;
 }
@@ -64,8 +71,7 @@ const SlotDescription& EnvironmentDescription::slot(Slot which) const {
 std::string EnvironmentDescription::validate() const {
   if (!(time_step > 0.0) || !std::isfinite(time_step)) return "the time step must be positive";
   if (!(last_time_step > 0.0) || !(last_time_step <= time_step * (1.0 + 1e-9))) return "the last time step is longer";
-  if (material_count == 0 ||
-      material_pairs.size() != std::size_t{material_count} * material_count * kMaterialColumns)
+  if (material_count == 0 || material_pairs.size() != std::size_t{material_count} * material_count * kMaterialColumns)
     return "the table of material pairs has the wrong size";
   for (const double number : material_pairs)
     if (!std::isfinite(number) || number < 0.0) return "the table of material pairs has an impossible number";
@@ -75,8 +81,10 @@ std::string EnvironmentDescription::validate() const {
     if (std::string problem = validate_body(*this, body); !problem.empty()) return problem;
   for (const ConstraintDescription& joint : constraints)
     if (std::string problem = validate_joint(*this, joint); !problem.empty()) return problem;
-  for (const Slot which : {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
-    if (!(slot(which).deadline > 0.0)) return std::string("the deadline of slot ") + slot_name(which) + " must be positive";
+  for (const Slot which :
+       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+    if (!(slot(which).deadline > 0.0))
+      return std::string("the deadline of slot ") + slot_name(which) + " must be positive";
   return {};
 }
 

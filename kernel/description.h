@@ -41,9 +41,9 @@ enum class BoundKind : std::uint32_t { kNone, kSphere, kBox };
 
 struct LocalBound {
   BoundKind kind = BoundKind::kNone;
-  Vector3 centre = Vector3::Zero();                     // m
-  Quaternion orientation = Quaternion::Identity();      // box to body
-  Vector3 half_extents = Vector3::Zero();               // m; a sphere's radius in x
+  Vector3 centre = Vector3::Zero();                 // m
+  Quaternion orientation = Quaternion::Identity();  // box to body
+  Vector3 half_extents = Vector3::Zero();           // m; a sphere's radius in x
 };
 
 struct ShapeDescription {
@@ -54,18 +54,18 @@ struct ShapeDescription {
 
 struct BodyDescription {
   std::string id;
-  std::uint32_t flags = kMovable;                     // BodyFlag bits
-  double mass = 1.0;                                  // kg; 0 if immovable
-  Vector3 inertia = Vector3::Ones();                  // principal moments, kg m^2; 0 if immovable
-  double damping = 0.0;                               // 1/s
-  Pose pose;                                          // of the centre of mass, world
-  Twist twist;                                        // world
-  std::uint32_t shape = kNone;                        // row of `shapes`
-  Pose geometry;                                      // of the shape's frame in the body's
+  std::uint32_t flags = kMovable;     // BodyFlag bits
+  double mass = 1.0;                  // kg; 0 if immovable
+  Vector3 inertia = Vector3::Ones();  // principal moments, kg m^2; 0 if immovable
+  double damping = 0.0;               // 1/s
+  Pose pose;                          // of the centre of mass, world
+  Twist twist;                        // world
+  std::uint32_t shape = kNone;        // row of `shapes`
+  Pose geometry;                      // of the shape's frame in the body's
   LocalBound bound;
-  std::uint32_t material = 0;                         // row of `materials`
+  std::uint32_t material = 0;  // row of `materials`
   std::uint64_t filter_group = 1, filter_mask = ~0ULL;
-  std::vector<std::uint32_t> forces;                  // rows of `forces`, in the scene's order
+  std::vector<std::uint32_t> forces;  // rows of `forces`, in the scene's order
 };
 
 struct ForceDescription {

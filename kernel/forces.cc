@@ -5,9 +5,7 @@
 
 namespace gravitas::kernel {
 
-std::span<const ColumnId> Environment::trial_columns() const {
-  return trial_columns_;
-}
+std::span<const ColumnId> Environment::trial_columns() const { return trial_columns_; }
 
 void Environment::ask_forces(const std::array<ColumnId, 5>& state) {
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {

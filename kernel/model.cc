@@ -64,7 +64,8 @@ Model::Model(Arena* arena, const EnvironmentDescription& d)
   const std::uint64_t n = body_count;
   const auto numbers = [&](std::uint64_t components) { return Column<double>(arena, n * components, 0); };
   flags = Column<std::uint32_t>(arena, n, 0);
-  mass = numbers(1), inverse_mass = numbers(1), inertia = numbers(3), inverse_inertia = numbers(3), damping = numbers(1);
+  mass = numbers(1), inverse_mass = numbers(1), inertia = numbers(3), inverse_inertia = numbers(3),
+  damping = numbers(1);
   body_shape = Column<std::uint32_t>(arena, n, 0);
   geometry_position = numbers(3), geometry_orientation = numbers(4);
   filter_group = Column<std::uint64_t>(arena, n, 0), filter_mask = Column<std::uint64_t>(arena, n, 0);
@@ -83,8 +84,10 @@ Model::Model(Arena* arena, const EnvironmentDescription& d)
     const auto served = served_by(d.forces, plugin);
     std::uint64_t applications = 0;
     for (const BodyDescription& body : d.bodies)
-      applications += static_cast<std::uint64_t>(std::count_if(
-          body.forces.begin(), body.forces.end(), [&](std::uint32_t force) { return d.forces[force].plugin == plugin; }));
+      applications +=
+          static_cast<std::uint64_t>(std::count_if(body.forces.begin(), body.forces.end(), [&](std::uint32_t force) {
+            return d.forces[force].plugin == plugin;
+          }));
     if (applications == 0) continue;
     ForceGroup& group = force_groups.emplace_back();
     group.target = plugin;

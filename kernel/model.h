@@ -43,9 +43,9 @@ struct Model {
 
   // Bodies: a row each.
   Column<std::uint32_t> flags;
-  Column<double> mass, inverse_mass;         // kg, 1/kg; inverse 0 where nothing can push the body
-  Column<double> inertia, inverse_inertia;   // principal, 3 per body
-  Column<double> damping;                    // 1/s
+  Column<double> mass, inverse_mass;        // kg, 1/kg; inverse 0 where nothing can push the body
+  Column<double> inertia, inverse_inertia;  // principal, 3 per body
+  Column<double> damping;                   // 1/s
   Column<std::uint32_t> body_shape;
   Column<double> geometry_position, geometry_orientation;  // of the shape's frame in the body's
   Column<std::uint64_t> filter_group, filter_mask;

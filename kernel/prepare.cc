@@ -38,9 +38,8 @@ Environment::Environment(EnvironmentDescription description)
   states_[0].write(description_);
   states_[1].write(description_);
   data_.margin[0] = margin_;
-  data_.theta[0] = integrator_.description().plugins.empty()
-                       ? 0.5
-                       : integrator_.description().plugins[0].declaration.theta;
+  data_.theta[0] =
+      integrator_.description().plugins.empty() ? 0.5 : integrator_.description().plugins[0].declaration.theta;
   start_slots();
   bind_joints();
   ask_constant_forces();
@@ -63,11 +62,12 @@ void Environment::start_slots() {
 
 void Environment::bind_joints() {
   for (const ConstraintGroup& group : model_.constraint_groups) {
-    const std::array<ColumnId, 6> request = {group.type.id(),      group.body.id(),        group.parameter_begin.id(),
+    const std::array<ColumnId, 6> request = {group.type.id(),      group.body.id(),       group.parameter_begin.id(),
                                              group.parameter.id(), front().position.id(), front().orientation.id()};
     const std::array<ColumnId, 2> reply = {group.bound_begin.id(), group.bound.id()};
     const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
-    ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) { return validator_.bound(answer, group); });
+    ask(Stage::kConstrain, &constraint_, call, nullptr,
+        [&](const auto& answer) { return validator_.bound(answer, group); });
   }
 }
 
@@ -76,8 +76,8 @@ void Environment::bind_joints() {
 void Environment::ask_constant_forces() {
   if (!force_.is_running()) return;
   data_.derivative_time[0] = 0.0;
-  ask_forces({data_.derivative_time.id(), front().position.id(), front().orientation.id(),
-              front().linear_velocity.id(), front().angular_velocity.id()});
+  ask_forces({data_.derivative_time.id(), front().position.id(), front().orientation.id(), front().linear_velocity.id(),
+              front().angular_velocity.id()});
   sum_wrenches();
 
   initial_potential_.assign(model_.application_count, 0.0);

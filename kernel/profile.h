@@ -18,7 +18,9 @@ class DurationHistogram {
   }
 
   std::uint64_t count() const { return count_; }
-  double mean_us() const { return count_ == 0 ? 0.0 : static_cast<double>(sum_ns_) / static_cast<double>(count_) * 1e-3; }
+  double mean_us() const {
+    return count_ == 0 ? 0.0 : static_cast<double>(sum_ns_) / static_cast<double>(count_) * 1e-3;
+  }
   double max_us() const { return static_cast<double>(max_ns_) * 1e-3; }
 
   // Duration below which the share `quantile` (0 … 1) of all lie, in microseconds.

@@ -48,15 +48,16 @@ Untrusted<StageCall> StageSlot::ask(const StageCall& call, Arena* arena, Derivat
       const CallResult result = carrier_->call(call, arena, derivatives);
       *compute_ns += result.compute_ns;
       if (result.status == GRAVITAS_OK) return Untrusted<StageCall>(call);
-      if (result.status == GRAVITAS_REFUSED) throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
+      if (result.status == GRAVITAS_REFUSED)
+        throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
       if (result.status != GRAVITAS_NEEDS_CAPACITY)
         throw StageFault(FaultKind::kFailure, "status", "it failed: " + result.text);
       for (const ColumnId column : call.reply) {
         const std::uint64_t wanted = arena->count(column);
         if (wanted <= arena->capacity(column)) continue;
         if (wanted > kLargestColumn)
-          throw StageFault(FaultKind::kBadStructure, "structure", "it asks for room for " + std::to_string(wanted) +
-                                                                      " numbers in one column");
+          throw StageFault(FaultKind::kBadStructure, "structure",
+                           "it asks for room for " + std::to_string(wanted) + " numbers in one column");
         arena->set_count(column, 0);
         arena->grow(column, wanted);
       }

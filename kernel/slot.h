@@ -24,7 +24,9 @@ class StageSlot {
   bool is_running() const { return carrier_ != nullptr; }
   Slot which() const { return which_; }
   const SlotDescription& description() const { return description_; }
-  std::vector<std::string> take_complaints() { return carrier_ ? carrier_->take_complaints() : std::vector<std::string>(); }
+  std::vector<std::string> take_complaints() {
+    return carrier_ ? carrier_->take_complaints() : std::vector<std::string>();
+  }
   int process_id() const { return carrier_ ? carrier_->process_id() : 0; }
 
   // Asks; the answer lies in the call's reply columns but is not to be used before validation.

@@ -50,8 +50,7 @@ std::vector<std::string> Environment::warnings() {
   return lines;
 }
 
-Pose Environment::pose_of(const Column<double>& position, const Column<double>& orientation,
-                          std::uint32_t body) const {
+Pose Environment::pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const {
   if (body == kNone) return {};
   return {vector_at(position.span(), body), quaternion_at(orientation.span(), body)};
 }
@@ -66,17 +65,17 @@ const Column<double>& Environment::start_angular_velocity() const {
 
 void Environment::begin_step() {
   data_.time[0] = time();
-  data_.time_step[0] =
-      step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
+  data_.time_step[0] = step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
   data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;
   start_wrench_known_ = false;
   if (!has_impulses_ || step_count_ != 0) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* impulse = &data_.impulse[6 * i];
-    const Twist twist = after_impulse({vector_at(front().linear_velocity.span(), i), vector_at(front().angular_velocity.span(), i)},
-                                      quaternion_at(front().orientation.span(), i), model_.inverse_mass[i],
-                                      vector_at(model_.inverse_inertia.span(), i),
-                                      Vector3(impulse[0], impulse[1], impulse[2]), Vector3(impulse[3], impulse[4], impulse[5]));
+    const Twist twist =
+        after_impulse({vector_at(front().linear_velocity.span(), i), vector_at(front().angular_velocity.span(), i)},
+                      quaternion_at(front().orientation.span(), i), model_.inverse_mass[i],
+                      vector_at(model_.inverse_inertia.span(), i), Vector3(impulse[0], impulse[1], impulse[2]),
+                      Vector3(impulse[3], impulse[4], impulse[5]));
     set_vector(data_.start_linear_velocity.span(), i, twist.linear);
     set_vector(data_.start_angular_velocity.span(), i, twist.angular);
   }
@@ -98,9 +97,9 @@ Trusted<TrialState> Environment::integrate() {
                                             start_angular_velocity().id(),
                                             front().plugin_state.id(),
                                             front().state_changed.id()};
-  const std::array<ColumnId, 6> reply = {data_.trial_position.id(),         data_.trial_orientation.id(),
-                                         data_.trial_linear_velocity.id(),  data_.trial_angular_velocity.id(),
-                                         data_.error_estimate.id(),         data_.next_plugin_state.id()};
+  const std::array<ColumnId, 6> reply = {data_.trial_position.id(),        data_.trial_orientation.id(),
+                                         data_.trial_linear_velocity.id(), data_.trial_angular_velocity.id(),
+                                         data_.error_estimate.id(),        data_.next_plugin_state.id()};
   const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
   DerivativeSource* derivatives = wrench_is_constant_ ? nullptr : this;
   return ask(Stage::kIntegrate, &integrator_, call, derivatives,
@@ -182,7 +181,8 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
     const bool known = o < old.contact_key.size() && remembered(o) == identity;
     data_.contact_key[i] = known ? old.contact_key[o] : new_contact_key(a, b, feature, step_count_);
     data_.contact_warm_correction[i] = known ? old.contact_correction[o] : 0.0;
-    set_vector(data_.contact_warm_impulse.span(), i, known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());
+    set_vector(data_.contact_warm_impulse.span(), i,
+               known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());
   }
 }
 
@@ -256,21 +256,53 @@ void Environment::merge_discrepancies() {
 Trusted<Solution> Environment::solve() {
   const DiscrepancyAnswer& joints = data_.discrepancies;
   const Column<double>& wrench = wrench_is_constant_ ? data_.wrench : data_.start_wrench;
-  const std::array<ColumnId, stage::SolverSolveRequest::kColumnCount> request = {
-      data_.time_step.id(), data_.theta.id(), model_.flags.id(), model_.inverse_mass.id(), model_.inverse_inertia.id(),
-      front().position.id(), front().orientation.id(), start_linear_velocity().id(), start_angular_velocity().id(),
-      data_.trial_position.id(), data_.trial_orientation.id(), data_.trial_linear_velocity.id(),
-      data_.trial_angular_velocity.id(), wrench.id(), data_.discrepancy_body.id(), joints.point1.id(),
-      joints.point2.id(), joints.velocity.id(), joints.correction.id(), joints.axes.id(), joints.mode.id(),
-      joints.lower.id(), joints.upper.id(), joints.compliance.id(), joints.damping.id(), joints.maximum_force.id(),
-      data_.discrepancy_warm_impulse.id(), data_.discrepancy_warm_correction.id(), data_.contact_body.id(),
-      data_.contact_normal.id(), data_.contact_point.id(), data_.contact_depth.id(), data_.contact_key.id(),
-      data_.contact_material.id(), data_.contact_warm_impulse.id(), data_.contact_warm_correction.id()};
-  const std::array<ColumnId, stage::SolverSolveReply::kColumnCount> reply = {
-      data_.solved_linear_velocity.id(), data_.solved_angular_velocity.id(), data_.pose_change.id(),
-      data_.discrepancy_impulse.id(), data_.discrepancy_correction.id(), data_.contact_impulse.id(),
-      data_.contact_correction.id(), data_.contact_direction.id(), data_.iterations.id(), data_.residual.id(),
-      data_.stop_reason.id()};
+  const std::array<ColumnId, stage::SolverSolveRequest::kColumnCount> request = {data_.time_step.id(),
+                                                                                 data_.theta.id(),
+                                                                                 model_.flags.id(),
+                                                                                 model_.inverse_mass.id(),
+                                                                                 model_.inverse_inertia.id(),
+                                                                                 front().position.id(),
+                                                                                 front().orientation.id(),
+                                                                                 start_linear_velocity().id(),
+                                                                                 start_angular_velocity().id(),
+                                                                                 data_.trial_position.id(),
+                                                                                 data_.trial_orientation.id(),
+                                                                                 data_.trial_linear_velocity.id(),
+                                                                                 data_.trial_angular_velocity.id(),
+                                                                                 wrench.id(),
+                                                                                 data_.discrepancy_body.id(),
+                                                                                 joints.point1.id(),
+                                                                                 joints.point2.id(),
+                                                                                 joints.velocity.id(),
+                                                                                 joints.correction.id(),
+                                                                                 joints.axes.id(),
+                                                                                 joints.mode.id(),
+                                                                                 joints.lower.id(),
+                                                                                 joints.upper.id(),
+                                                                                 joints.compliance.id(),
+                                                                                 joints.damping.id(),
+                                                                                 joints.maximum_force.id(),
+                                                                                 data_.discrepancy_warm_impulse.id(),
+                                                                                 data_.discrepancy_warm_correction.id(),
+                                                                                 data_.contact_body.id(),
+                                                                                 data_.contact_normal.id(),
+                                                                                 data_.contact_point.id(),
+                                                                                 data_.contact_depth.id(),
+                                                                                 data_.contact_key.id(),
+                                                                                 data_.contact_material.id(),
+                                                                                 data_.contact_warm_impulse.id(),
+                                                                                 data_.contact_warm_correction.id()};
+  const std::array<ColumnId, stage::SolverSolveReply::kColumnCount> reply = {data_.solved_linear_velocity.id(),
+                                                                             data_.solved_angular_velocity.id(),
+                                                                             data_.pose_change.id(),
+                                                                             data_.discrepancy_impulse.id(),
+                                                                             data_.discrepancy_correction.id(),
+                                                                             data_.contact_impulse.id(),
+                                                                             data_.contact_correction.id(),
+                                                                             data_.contact_direction.id(),
+                                                                             data_.iterations.id(),
+                                                                             data_.residual.id(),
+                                                                             data_.stop_reason.id()};
   // a solver answers a row per discrepancy and contact: make room, so that it is not asked twice
   const std::size_t discrepancies = joints.mode.size(), contacts = data_.contact_key.size();
   for (const Column<double>* column : {&data_.discrepancy_impulse, &data_.discrepancy_correction})

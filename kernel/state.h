@@ -27,19 +27,19 @@ struct State {
 
   // Memory of contacts, in their order (pair, feature): bodies, feature, key of the contact's life, multipliers.
   // Written by Stage::kCommit; matched with the next step's contacts.
-  Column<std::uint32_t> contact_body;      // 2
+  Column<std::uint32_t> contact_body;  // 2
   Column<std::uint32_t> contact_feature;
   Column<std::uint64_t> contact_key;
-  Column<double> contact_impulse;          // 3, N s, world
-  Column<double> contact_correction;       // kg m
+  Column<double> contact_impulse;     // 3, N s, world
+  Column<double> contact_correction;  // kg m
 
   // Memory of joints: multipliers of each discrepancy, matched by joint and position in it.
   Column<std::uint32_t> discrepancy_constraint;
-  Column<double> discrepancy_impulse;      // 3, N s, along the axes
-  Column<double> discrepancy_correction;   // 3, kg m
+  Column<double> discrepancy_impulse;     // 3, N s, along the axes
+  Column<double> discrepancy_correction;  // 3, kg m
 
   // Pairs of bodies that touch, ascending.
-  Column<std::uint32_t> touching;          // 2
+  Column<std::uint32_t> touching;  // 2
 };
 
 }  // namespace gravitas::kernel

@@ -15,13 +15,14 @@ DiscrepancyAnswer::DiscrepancyAnswer(Arena* arena, std::uint64_t rows) {
 }
 
 std::vector<ColumnId> DiscrepancyAnswer::ids() const {
-  return {constraint.id(), point1.id(), point2.id(),     velocity.id(), correction.id(),   axes.id(), mode.id(),
-          lower.id(),      upper.id(),  compliance.id(), damping.id(),  maximum_force.id()};
+  return {constraint.id(), point1.id(), point2.id(), velocity.id(),   correction.id(), axes.id(),
+          mode.id(),       lower.id(),  upper.id(),  compliance.id(), damping.id(),    maximum_force.id()};
 }
 
 void DiscrepancyAnswer::resize(std::uint64_t rows) const {
   constraint.resize(rows), mode.resize(rows), correction.resize(rows), axes.resize(4 * rows);
-  for (const Column<double>* column : {&point1, &point2, &velocity, &lower, &upper, &compliance, &damping, &maximum_force})
+  for (const Column<double>* column :
+       {&point1, &point2, &velocity, &lower, &upper, &compliance, &damping, &maximum_force})
     column->resize(3 * rows);
 }
 
@@ -48,7 +49,9 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
     return Column<double>(arena, needed ? n * components : 0, 0);
   };
   const std::uint64_t contacts = has_shapes ? std::max<std::uint64_t>(16, 8 * n) : 0;
-  const auto contact_numbers = [&](std::uint64_t components) { return Column<double>(arena, 0, contacts * components); };
+  const auto contact_numbers = [&](std::uint64_t components) {
+    return Column<double>(arena, 0, contacts * components);
+  };
 
   time = Column<double>(arena, 1, 0), time_step = Column<double>(arena, 1, 0), theta = Column<double>(arena, 1, 0);
   margin = Column<double>(arena, 1, 0);

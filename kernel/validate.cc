@@ -40,13 +40,14 @@ void Validator::check_structure_and_finiteness(const StageCall& call) const {
   for (std::size_t i = 0; i < call.request.size(); ++i) request[i] = arena_.count(call.request[i]);
   for (std::size_t i = 0; i < call.reply.size(); ++i) reply[i] = arena_.count(call.reply[i]);
   const stage::MethodInfo& method = call.info();
-  const std::string problem = check_rows(method, {request.data(), call.request.size()}, {reply.data(), call.reply.size()});
+  const std::string problem =
+      check_rows(method, {request.data(), call.request.size()}, {reply.data(), call.reply.size()});
   if (!problem.empty()) bad_structure(problem);
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     if (method.reply[i].type != stage::ElementType::kF64) continue;
-    const std::size_t index =
-        first_not_finite({reinterpret_cast<const double*>(arena_.data(call.reply[i])), reply[i]});
-    if (index != kNoRow) bad_numbers(at_row(method.reply[i].name, index / method.reply[i].components) + " is not finite");
+    const std::size_t index = first_not_finite({reinterpret_cast<const double*>(arena_.data(call.reply[i])), reply[i]});
+    if (index != kNoRow)
+      bad_numbers(at_row(method.reply[i].name, index / method.reply[i].components) + " is not finite");
   }
 }
 
@@ -119,7 +120,8 @@ Trusted<Discrepancies> Validator::discrepancies(const Untrusted<StageCall>& answ
   check_structure_and_finiteness(answer.value_);
   for (std::size_t i = 0; i < columns.constraint.size(); ++i) {
     const std::uint32_t joint = columns.constraint[i];
-    if (joint >= intact.size() || intact[joint] == 0) bad_structure(at_row("constraint", i) + " is no joint that holds");
+    if (joint >= intact.size() || intact[joint] == 0)
+      bad_structure(at_row("constraint", i) + " is no joint that holds");
     if (i > 0 && columns.constraint[i - 1] > joint) bad_structure(at_row("constraint", i) + " is out of order");
     if (!is_valid_mode(columns.mode[i])) bad_structure(at_row("mode", i) + " is unknown");
     if (!(columns.correction[i] >= 0.0 && columns.correction[i] <= 1.0))

@@ -61,6 +61,7 @@ void describe_each(const stage::ConstraintDiscrepanciesRequest& request,
 }
 
 // The ball-and-socket discrepancy d_s (2.83): two anchors, fixed in the bodies, coincide.
-Discrepancy point_discrepancy(const Vector3& anchor1_in_body1, const Vector3& anchor2_in_body2, const JointBodies& bodies);
+Discrepancy point_discrepancy(const Vector3& anchor1_in_body1, const Vector3& anchor2_in_body2,
+                              const JointBodies& bodies);
 
 }  // namespace gravitas

@@ -38,12 +38,17 @@ double joint_error(const Discrepancy& discrepancy, const Vector3& error) {
     const double along = axes.col(i).dot(error);
     double excess = 0.0;
     switch (axis_mode(discrepancy.modes, i)) {
-      case AxisMode::kLocked: excess = along; break;
+      case AxisMode::kLocked:
+        excess = along;
+        break;
       case AxisMode::kLimited:
         excess = std::max({0.0, discrepancy.lower[i] - along, along - discrepancy.upper[i]});
         break;
-      case AxisMode::kUnilateral: excess = std::max(0.0, -along); break;
-      default: break;
+      case AxisMode::kUnilateral:
+        excess = std::max(0.0, -along);
+        break;
+      default:
+        break;
     }
     sum += excess * excess;
   }

@@ -55,16 +55,16 @@ constexpr bool is_valid_mode(std::uint32_t modes) {
 inline constexpr double kUnlimited = std::numeric_limits<double>::max();
 
 struct Discrepancy {
-  Vector3 point1 = Vector3::Zero();                     // x1, world, m (angular: rotation vector, rad)
-  Vector3 point2 = Vector3::Zero();                     // x2
-  Vector3 velocity = Vector3::Zero();                   // desired velocity of x2 relative to x1, world, m/s or rad/s
-  double correction = 1.0;                              // beta, 0 … 1
-  Quaternion axes = Quaternion::Identity();             // columns of its matrix are the axes, world
+  Vector3 point1 = Vector3::Zero();          // x1, world, m (angular: rotation vector, rad)
+  Vector3 point2 = Vector3::Zero();          // x2
+  Vector3 velocity = Vector3::Zero();        // desired velocity of x2 relative to x1, world, m/s or rad/s
+  double correction = 1.0;                   // beta, 0 … 1
+  Quaternion axes = Quaternion::Identity();  // columns of its matrix are the axes, world
   std::uint32_t modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked);
-  Vector3 lower = Vector3::Zero();                      // along the axes, m or rad
+  Vector3 lower = Vector3::Zero();  // along the axes, m or rad
   Vector3 upper = Vector3::Zero();
-  Vector3 compliance = Vector3::Zero();                 // m/N or rad/(N m)
-  Vector3 damping = Vector3::Zero();                    // N s/m or N m s/rad
+  Vector3 compliance = Vector3::Zero();                   // m/N or rad/(N m)
+  Vector3 damping = Vector3::Zero();                      // N s/m or N m s/rad
   Vector3 maximum_force = Vector3::Constant(kUnlimited);  // N or N m
 
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
@@ -81,8 +81,7 @@ struct JacobianRow {
 };
 
 // Row along `axis` (unit, world) for bodies whose centres of mass are at com1 and com2 (world, m).
-JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, const Vector3& com1,
-                         const Vector3& com2);
+JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, const Vector3& com1, const Vector3& com2);
 
 // Point of a body given in the world while the body had pose `from` (of its centre of mass), where it is when
 // the body has pose `to`.

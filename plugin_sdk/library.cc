@@ -114,6 +114,11 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     *problem = "'" + path + "' was built for another schema of the stage contracts: rebuild it against this plugin_sdk";
     return {};
   }
+  if (table->description == nullptr || table->create == nullptr || table->destroy == nullptr ||
+      table->call == nullptr) {
+    *problem = "'" + path + "' is not a whole plugin: its table lacks a description or a function";
+    return {};
+  }
   PluginLibrary library;
   library.table = table;
   library.declaration = read_declaration(*table->description);

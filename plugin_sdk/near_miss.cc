@@ -22,8 +22,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
     for (std::size_t j = 1; j <= b.size(); ++j) {
       const bool equal = lower(a[i - 1]) == lower(b[j - 1]);
       row[j] = std::min({above[j] + 1, row[j - 1] + 1, above[j - 1] + (equal ? 0 : 1)});
-      const bool exchanged = i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
-                             lower(a[i - 2]) == lower(b[j - 1]);
+      const bool exchanged = i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) && lower(a[i - 2]) == lower(b[j - 1]);
       if (exchanged) row[j] = std::min(row[j], before[j - 2] + 1);
     }
     before.swap(above);
@@ -40,10 +39,9 @@ std::string nearest_name(std::string_view given, std::span<const std::string> ca
   if (given.empty() || given.size() > kLongestName) return "";
   for (const std::string& candidate : candidates) {
     if (candidate.empty() || candidate.size() > kLongestName) continue;
-    const std::size_t bound =
-        std::max<std::size_t>(1, std::max(given.size(), candidate.size()) / 3);
-    const std::size_t gap = given.size() > candidate.size() ? given.size() - candidate.size()
-                                                            : candidate.size() - given.size();
+    const std::size_t bound = std::max<std::size_t>(1, std::max(given.size(), candidate.size()) / 3);
+    const std::size_t gap =
+        given.size() > candidate.size() ? given.size() - candidate.size() : candidate.size() - given.size();
     if (gap > bound || gap >= least) continue;
     const std::size_t slips = distance(given, candidate);
     if (slips > bound || slips >= least) continue;
@@ -68,8 +66,7 @@ std::string quoted_names(std::span<const std::string> names) {
 std::string allowed_names(std::string_view given, std::span<const std::string> candidates) {
   if (candidates.empty()) return "none is allowed here";
   const std::string nearest = nearest_name(given, candidates);
-  const std::string question =
-      nearest.empty() ? "allowed: " : "did you mean \"" + nearest + "\"? Allowed: ";
+  const std::string question = nearest.empty() ? "allowed: " : "did you mean \"" + nearest + "\"? Allowed: ";
   return question + quoted_names(candidates);
 }
 

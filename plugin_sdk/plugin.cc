@@ -7,12 +7,18 @@ namespace gravitas {
 
 const char* slot_name(Slot slot) {
   switch (slot) {
-    case Slot::kSpace: return "space";
-    case Slot::kCollision: return "collision";
-    case Slot::kConstraint: return "constraint";
-    case Slot::kForce: return "force";
-    case Slot::kSolver: return "solver";
-    case Slot::kIntegrator: return "integrator";
+    case Slot::kSpace:
+      return "space";
+    case Slot::kCollision:
+      return "collision";
+    case Slot::kConstraint:
+      return "constraint";
+    case Slot::kForce:
+      return "force";
+    case Slot::kSolver:
+      return "solver";
+    case Slot::kIntegrator:
+      return "integrator";
   }
   return "unknown";
 }
@@ -112,8 +118,8 @@ const gravitas_description* plain_description(PluginDeclaration declaration) {
   auto& owner = *new PlainDescription{std::move(declaration), {}, {}, {}, {}};
   const PluginDeclaration& source = owner.declaration;
   for (const TypeDeclaration& type : source.types) {
-    owner.types.push_back({type.name.c_str(), type.meaning.c_str(), plain_properties(owner, type.properties),
-                           type.properties.size()});
+    owner.types.push_back(
+        {type.name.c_str(), type.meaning.c_str(), plain_properties(owner, type.properties), type.properties.size()});
   }
   owner.description.name = source.name.c_str();
   owner.description.version = source.version.c_str();

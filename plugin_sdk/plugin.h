@@ -14,11 +14,13 @@
 // exception is reported as a failure of the plugin. workers/hello is the smallest example.
 #pragma once
 
-#include <concepts>
+#include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <mutex>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "plugin_sdk/abi.h"
@@ -75,14 +77,30 @@ class Host {
 
   // Calls body(begin, end) over a fixed partition of 0 … count, on the host's threads. Bodies must write to
   // places of their own; the partition is the same for every number of threads.
+  // An exception of a body is thrown here once all are done: of several, that of the first part.
   template <typename Body>
   void parallel_for(std::uint64_t count, Body&& body) const {
+    // no exception crosses the C interface: it waits here
+    struct Parts {
+      std::remove_reference_t<Body>* body;
+      std::mutex mutex;
+      std::uint64_t failed_part = ~std::uint64_t{0};
+      std::exception_ptr failure;
+    } parts{&body, {}, ~std::uint64_t{0}, nullptr};
     host_->parallel_for(
         host_->context, count,
         [](void* argument, std::uint64_t begin, std::uint64_t end) {
-          (*static_cast<std::remove_reference_t<Body>*>(argument))(begin, end);
+          Parts& shared = *static_cast<Parts*>(argument);
+          try {
+            (*shared.body)(begin, end);
+          } catch (...) {
+            const std::lock_guard lock(shared.mutex);
+            if (begin < shared.failed_part) shared.failure = std::current_exception();
+            shared.failed_part = std::min(shared.failed_part, begin);
+          }
         },
-        &body);
+        &parts);
+    if (parts.failure) std::rethrow_exception(parts.failure);
   }
 
   // Wrenches of all bodies (six numbers each) in a trial state. `columns` are those of
@@ -147,8 +165,8 @@ class IntegratorPlugin {
  public:
   static constexpr Slot kSlot = Slot::kIntegrator;
   virtual ~IntegratorPlugin() = default;
-  virtual void integrate(const stage::IntegratorIntegrateRequest& request,
-                         const stage::IntegratorIntegrateReply& reply, Host& host) = 0;
+  virtual void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
+                         Host& host) = 0;
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 
@@ -214,21 +232,16 @@ std::int32_t call(void* instance, std::uint32_t method, const gravitas_column* r
 
 template <typename P>
 const gravitas_plugin_table* plugin_table() {
-  static const gravitas_plugin_table table = {GRAVITAS_MAGIC,
-                                              GRAVITAS_ABI_VERSION,
-                                              GRAVITAS_LAYOUT_VERSION,
-                                              stage::kSchemaHash,
-                                              GRAVITAS_BUILD_ID,
-                                              detail::plain_description(P::declaration()),
-                                              &detail::create<P>,
-                                              &detail::destroy<P>,
-                                              &detail::call<P>};
+  static const gravitas_plugin_table table = {
+      GRAVITAS_MAGIC,     GRAVITAS_ABI_VERSION, GRAVITAS_LAYOUT_VERSION,
+      stage::kSchemaHash, GRAVITAS_BUILD_ID,    detail::plain_description(P::declaration()),
+      &detail::create<P>, &detail::destroy<P>,  &detail::call<P>};
   return &table;
 }
 
-#define GRAVITAS_PLUGIN(Class)                                                                    \
+#define GRAVITAS_PLUGIN(Class)                                                                       \
   extern "C" __attribute__((visibility("default"))) const gravitas_plugin_table* gravitas_plugin() { \
-    return gravitas::plugin_table<Class>();                                                       \
+    return gravitas::plugin_table<Class>();                                                          \
   }
 
 }  // namespace gravitas

@@ -26,18 +26,14 @@ bool wrong(const PropertyValue& value, std::string text, std::vector<PropertyPro
   return false;
 }
 
-bool refuse(const Property& declared, const PropertyValue& value,
-            std::vector<PropertyProblem>* problems) {
-  return wrong(value,
-               declared.name + " is " + shown(value) + "; allowed: " + allowed_values(declared),
-               problems);
+bool refuse(const Property& declared, const PropertyValue& value, std::vector<PropertyProblem>* problems) {
+  return wrong(value, declared.name + " is " + shown(value) + "; allowed: " + allowed_values(declared), problems);
 }
 
 std::string bounds_text(const Property& declared) {
   const bool below = std::isfinite(declared.minimum), above = std::isfinite(declared.maximum);
   if (!below && !above) return "";
-  const std::string minimum = number_text(declared.minimum),
-                    maximum = number_text(declared.maximum);
+  const std::string minimum = number_text(declared.minimum), maximum = number_text(declared.maximum);
   if (!above) return (declared.exclusive_minimum ? " > " : " >= ") + minimum;
   if (!below) return " <= " + maximum;
   return (declared.exclusive_minimum ? " in (" : " in [") + minimum + ", " + maximum + "]";
@@ -45,8 +41,7 @@ std::string bounds_text(const Property& declared) {
 
 bool in_bounds(const Property& declared, double number) {
   if (!std::isfinite(number)) return false;
-  const bool above =
-      declared.exclusive_minimum ? number > declared.minimum : number >= declared.minimum;
+  const bool above = declared.exclusive_minimum ? number > declared.minimum : number >= declared.minimum;
   return above && number <= declared.maximum;
 }
 
@@ -55,18 +50,16 @@ bool take_number(const Property& declared, const PropertyValue& element, std::ve
                  std::vector<PropertyProblem>* problems) {
   if (element.kind != Kind::kNumber || !in_bounds(declared, element.number)) {
     return wrong(element,
-                 "an element of " + declared.name + " is " + shown(element) +
-                     "; allowed: " + allowed_values(declared),
+                 "an element of " + declared.name + " is " + shown(element) + "; allowed: " + allowed_values(declared),
                  problems);
   }
   out->push_back(element.number);
   return true;
 }
 
-bool take_list(const Property& declared, std::size_t length, const PropertyValue& given,
-               std::vector<double>* out, std::vector<PropertyProblem>* problems) {
-  if (given.kind != Kind::kList || given.list.size() != length)
-    return refuse(declared, given, problems);
+bool take_list(const Property& declared, std::size_t length, const PropertyValue& given, std::vector<double>* out,
+               std::vector<PropertyProblem>* problems) {
+  if (given.kind != Kind::kList || given.list.size() != length) return refuse(declared, given, problems);
   for (const PropertyValue& element : given.list)
     if (!take_number(declared, element, out, problems)) return false;
   return true;
@@ -82,8 +75,8 @@ bool take_quaternion(const Property& declared, const PropertyValue& given, std::
   const double norm = std::sqrt(squared);
   if (!(std::fabs(norm - 1.0) <= kNormTolerance)) {
     return wrong(given,
-                 declared.name + " has the norm " + number_text(norm) +
-                     "; allowed: " + allowed_values(declared) + " with norm 1 (within 1e-3)",
+                 declared.name + " has the norm " + number_text(norm) + "; allowed: " + allowed_values(declared) +
+                     " with norm 1 (within 1e-3)",
                  problems);
   }
   const Quaternion unit = normalized(Quaternion(q[0], q[1], q[2], q[3]));
@@ -91,8 +84,7 @@ bool take_quaternion(const Property& declared, const PropertyValue& given, std::
   // numbers written with nine digits or more are meant to be unit
   if (std::fabs(norm - 1.0) > 1e-9) {
     problems->push_back(
-        {given.position,
-         declared.name + " has the norm " + number_text(norm) + " and was normalised", true});
+        {given.position, declared.name + " has the norm " + number_text(norm) + " and was normalised", true});
   }
   return true;
 }
@@ -131,18 +123,15 @@ bool take_choice(const Property& declared, const PropertyValue& given, std::vect
     out->push_back(static_cast<double>(i));
     return true;
   }
-  return wrong(
-      given,
-      declared.name + " is " + shown(given) + "; " + allowed_names(given.text, declared.choices),
-      problems);
+  return wrong(given, declared.name + " is " + shown(given) + "; " + allowed_names(given.text, declared.choices),
+               problems);
 }
 
 bool take(const Property& declared, const PropertyValue& given, std::vector<double>* out,
           std::vector<PropertyProblem>* problems) {
   switch (declared.kind) {
     case PropertyKind::kNumber:
-      if (given.kind != Kind::kNumber || !in_bounds(declared, given.number))
-        return refuse(declared, given, problems);
+      if (given.kind != Kind::kNumber || !in_bounds(declared, given.number)) return refuse(declared, given, problems);
       out->push_back(given.number);
       return true;
     case PropertyKind::kInteger:
@@ -164,9 +153,7 @@ bool take(const Property& declared, const PropertyValue& given, std::vector<doub
     case PropertyKind::kTable:
       return take_table(declared, given, out, problems);
   }
-  return wrong(given,
-               declared.name + " has a kind that this version does not know; it cannot be given",
-               problems);
+  return wrong(given, declared.name + " has a kind that this version does not know; it cannot be given", problems);
 }
 
 void append_absent(const Property& property, std::vector<double>* out) {
@@ -196,8 +183,7 @@ bool match_names(const std::vector<Property>& declared, const std::vector<NamedV
     while (i < declared.size() && declared[i].name != value.name) ++i;
     if (i == declared.size()) {
       problems->push_back({value.position,
-                           "unknown property \"" + value.name + "\"; " +
-                               allowed_names(value.name, names_of(declared)),
+                           "unknown property \"" + value.name + "\"; " + allowed_names(value.name, names_of(declared)),
                            false});
       good = false;
     } else if ((*found)[i] != nullptr) {
@@ -255,8 +241,8 @@ bool flatten_value(const Property& declared, const PropertyValue& given, std::ve
   return false;
 }
 
-bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue>& given,
-             std::vector<double>* out, std::vector<PropertyProblem>* problems) {
+bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue>& given, std::vector<double>* out,
+             std::vector<PropertyProblem>* problems) {
   std::vector<const NamedValue*> found;
   bool good = match_names(declared, given, &found, problems);
   for (std::size_t i = 0; i < declared.size(); ++i) {
@@ -264,8 +250,7 @@ bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue
     if (found[i] != nullptr) {
       good = flatten_value(property, found[i]->value, out, problems) && good;
     } else if (property.is_required) {
-      problems->push_back(
-          {{}, property.name + " is missing; required: " + allowed_values(property), false});
+      problems->push_back({{}, property.name + " is missing; required: " + allowed_values(property), false});
       good = false;
     } else {
       append_absent(property, out);
@@ -316,8 +301,7 @@ std::string shown(const PropertyValue& value) {
 
 std::string number_text(double number) {
   std::array<char, 32> buffer;
-  const std::to_chars_result end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), number);
+  const std::to_chars_result end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), number);
   return {buffer.data(), end.ptr};
 }
 

@@ -73,8 +73,8 @@ bool flatten_value(const Property& declared, const PropertyValue& given, std::ve
 // suggestion), names given twice, required properties that are missing. Absent properties take
 // their default, else NaN (a table: no rows). Returns false if there was an error; then *out must
 // not be used.
-bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue>& given,
-             std::vector<double>* out, std::vector<PropertyProblem>* problems);
+bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue>& given, std::vector<double>* out,
+             std::vector<PropertyProblem>* problems);
 
 // What a property takes: "a number > 0", "a list of 3 numbers", "one of "World", "Body"".
 std::string allowed_values(const Property& declared);

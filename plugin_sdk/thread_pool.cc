@@ -67,8 +67,7 @@ ThreadPool::~ThreadPool() {
   for (std::thread& thread : crew_->threads) thread.join();
 }
 
-void ThreadPool::parallel_for(std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t),
-                              void* argument) {
+void ThreadPool::parallel_for(std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t), void* argument) {
   if (threads_ == 1 || count <= kChunk) {
     std::exception_ptr failure;
     for (std::uint64_t begin = 0; begin < count; begin += kChunk) {

@@ -73,10 +73,14 @@ struct Column {
 
 std::string element_type(const pb::FieldDescriptor& field) {
   switch (field.type()) {
-    case pb::FieldDescriptor::TYPE_DOUBLE: return "double";
-    case pb::FieldDescriptor::TYPE_UINT32: return "std::uint32_t";
-    case pb::FieldDescriptor::TYPE_UINT64: return "std::uint64_t";
-    default: return "";
+    case pb::FieldDescriptor::TYPE_DOUBLE:
+      return "double";
+    case pb::FieldDescriptor::TYPE_UINT32:
+      return "std::uint32_t";
+    case pb::FieldDescriptor::TYPE_UINT64:
+      return "std::uint64_t";
+    default:
+      return "";
   }
 }
 
@@ -206,8 +210,10 @@ int generate(const std::vector<const pb::FileDescriptor*>& files, const std::str
     }
   }
   std::ofstream out(out_path);
-  out << "// Written by schemas/frame_compiler.cc from schemas/gravitas/stage/v1/*.proto. Do not edit.\n#pragma once\n\n"
-      << "#include <cstdint>\n#include <span>\n\n#include \"schemas/frame/column.h\"\n#include \"schemas/frame/layout.h\"\n\n"
+  out << "// Written by schemas/frame_compiler.cc from schemas/gravitas/stage/v1/*.proto. Do not edit.\n#pragma "
+         "once\n\n"
+      << "#include <cstdint>\n#include <span>\n\n#include \"schemas/frame/column.h\"\n#include "
+         "\"schemas/frame/layout.h\"\n\n"
       << "namespace gravitas::stage {\n\n"
       << "// Hash of the stage schemas: two sides with different hashes do not talk.\n"
       << "inline constexpr std::uint64_t kSchemaHash = 0x" << std::hex << hash << std::dec << "ULL;\n\n"
@@ -241,9 +247,10 @@ int main(int argc, char** argv) {
     std::cerr << "usage: frame_compiler --proto-root DIR (--out FILE | --lint PROTO...)\n";
     return 2;
   }
-  if (!lint) names = {"gravitas/stage/v1/space.proto",      "gravitas/stage/v1/collision.proto",
-                      "gravitas/stage/v1/constraint.proto", "gravitas/stage/v1/force.proto",
-                      "gravitas/stage/v1/integrator.proto", "gravitas/stage/v1/solver.proto"};
+  if (!lint)
+    names = {"gravitas/stage/v1/space.proto",      "gravitas/stage/v1/collision.proto",
+             "gravitas/stage/v1/constraint.proto", "gravitas/stage/v1/force.proto",
+             "gravitas/stage/v1/integrator.proto", "gravitas/stage/v1/solver.proto"};
 
   pb::compiler::DiskSourceTree tree;
   tree.MapPath("", root);

@@ -26,9 +26,9 @@ struct StageCall {
 };
 
 struct CallResult {
-  std::int32_t status = GRAVITAS_OK;   // GRAVITAS_OK, _NEEDS_CAPACITY (counts say how much), _REFUSED, _FAILED …
-  std::string text;                    // why it was refused or failed
-  std::uint64_t compute_ns = 0;        // time the plugin worked, if the carrier knows it apart
+  std::int32_t status = GRAVITAS_OK;  // GRAVITAS_OK, _NEEDS_CAPACITY (counts say how much), _REFUSED, _FAILED …
+  std::string text;                   // why it was refused or failed
+  std::uint64_t compute_ns = 0;       // time the plugin worked, if the carrier knows it apart
 };
 
 // Answers Integrator.Derivative while an Integrate call is open. `request` names arena columns that hold the

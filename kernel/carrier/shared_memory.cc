@@ -139,7 +139,8 @@ SharedMemoryCarrier::SharedMemoryCarrier(const std::vector<PluginChoice>& plugin
     });
   } catch (const std::system_error& error) {
     for (const int descriptor : {control[0], control[1], descriptors[1]}) close(descriptor);
-    throw StageFault(FaultKind::kHandshake, "handshake", std::string("cannot start '") + program + "': " + error.what());
+    throw StageFault(FaultKind::kHandshake, "handshake",
+                     std::string("cannot start '") + program + "': " + error.what());
   }
   close(control[1]);
   close(descriptors[1]);
@@ -201,15 +202,15 @@ void SharedMemoryCarrier::make_rooms(const StageCall& call, const Arena& arena, 
 void SharedMemoryCarrier::send_new_segments(const Arena& arena) {
   bool sent = true;
   if (sent_response_ != response_generation_) {
-    sent = channel::send_segment(descriptor_socket_,
-                                 {SegmentRole::kResponse, 0, response_generation_, response_.size()},
-                                 response_.descriptor());
+    sent =
+        channel::send_segment(descriptor_socket_, {SegmentRole::kResponse, 0, response_generation_, response_.size()},
+                              response_.descriptor());
     sent_response_ = response_generation_;
   }
   if (sent && sent_state_ != arena.generation()) {
-    sent = channel::send_segment(descriptor_socket_,
-                                 {SegmentRole::kState, 0, arena.generation(), arena.segment().size()},
-                                 arena.segment().descriptor());
+    sent =
+        channel::send_segment(descriptor_socket_, {SegmentRole::kState, 0, arena.generation(), arena.segment().size()},
+                              arena.segment().descriptor());
     sent_state_ = arena.generation();
   }
   if (!sent) report_death();
@@ -244,8 +245,7 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
   request.target = call.target;
   request.reply_count = static_cast<std::uint32_t>(rooms_);
   request.deadline_ns = channel::now_ns() + deadline_ns_;
-  for (std::size_t i = 0; i < rooms_; ++i)
-    connection_->mine->reply[i] = {room_offset_[i], 0, room_capacity_[i]};
+  for (std::size_t i = 0; i < rooms_; ++i) connection_->mine->reply[i] = {room_offset_[i], 0, room_capacity_[i]};
   post_frame(request, call.request, *arena);
 
   std::uint64_t spent_ns = 0;

@@ -77,7 +77,7 @@ std::uint64_t frame_digest(const gravitas_frame_header& header, const gravitas_f
   bare.digest = 0;
   Digest digest;
   digest.add(&bare, sizeof bare);
-  digest.add(columns, infos.size() * sizeof *columns);
+  digest.add(columns, header.column_count * sizeof *columns);
   for (std::size_t i = 0; data != nullptr && i < infos.size(); ++i)
     digest.add(data[i], static_cast<std::size_t>(columns[i].count) * stage::element_size(infos[i].type));
   return digest.value();

@@ -12,7 +12,7 @@ enum class Access { kReadOnly, kReadWrite };
 
 // Who may write the segment besides its creator.
 enum class Sharing {
-  kReadersOnly,   // sealed against new writable mappings: workers can only read
+  kReadersOnly,  // sealed against new writable mappings: workers can only read
   kWriters
 };
 

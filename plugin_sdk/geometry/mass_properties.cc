@@ -74,8 +74,7 @@ MassProperties box_mass_properties(const Vector3& half_extents, double density) 
   MassProperties result;
   result.mass = 8.0 * half_extents.x() * half_extents.y() * half_extents.z() * density;
   result.inertia.diagonal() =
-      result.mass / 3.0 *
-      Vector3(square.y() + square.z(), square.x() + square.z(), square.x() + square.y());
+      result.mass / 3.0 * Vector3(square.y() + square.z(), square.x() + square.z(), square.x() + square.y());
   return result;
 }
 
@@ -126,8 +125,7 @@ MassProperties combined(std::span<const MassProperties> parts) {
   if (result.mass == 0.0) return MassProperties{};
   result.centre_of_mass = moment / result.mass;
   for (const MassProperties& part : parts) {
-    result.inertia +=
-        translated_inertia(part.inertia, part.mass, part.centre_of_mass - result.centre_of_mass);
+    result.inertia += translated_inertia(part.inertia, part.mass, part.centre_of_mass - result.centre_of_mass);
   }
   return result;
 }
@@ -173,14 +171,13 @@ bool validate(const MassProperties& properties, std::string* why) {
   }
   const Vector3 moments = principal_axes(properties).moments;
   if (!(moments.minCoeff() > 0.0)) {
-    return refuse(why, "principal moments must be positive, the least is ", moments.minCoeff(),
-                  " kg m^2");
+    return refuse(why, "principal moments must be positive, the least is ", moments.minCoeff(), " kg m^2");
   }
   const double largest = moments.maxCoeff();
   const double others = moments.sum() - largest;
   if (!(largest <= others + kWrittenPrecision * largest)) {
-    return refuse(why, "a principal moment of ", largest,
-                  " kg m^2 exceeds the sum of the other two, ", others, " kg m^2");
+    return refuse(why, "a principal moment of ", largest, " kg m^2 exceeds the sum of the other two, ", others,
+                  " kg m^2");
   }
   return true;
 }

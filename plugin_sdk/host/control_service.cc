@@ -29,11 +29,9 @@ ControlService::ControlService(std::vector<plugin::v1::Description> plugins, std
 Admission ControlService::judge(const Hello& hello) const {
   if (hello.magic() != GRAVITAS_MAGIC) return {Refusal::REASON_MAGIC, "the other side is no Gravitas kernel"};
   if (hello.protocol_minimum() > kProtocolMaximum || hello.protocol_maximum() < kProtocolMinimum) {
-    return {Refusal::REASON_PROTOCOL, "the kernel speaks control protocol " +
-                                          std::to_string(hello.protocol_minimum()) + " to " +
-                                          std::to_string(hello.protocol_maximum()) + ", this worker " +
-                                          std::to_string(kProtocolMinimum) + " to " +
-                                          std::to_string(kProtocolMaximum)};
+    return {Refusal::REASON_PROTOCOL, "the kernel speaks control protocol " + std::to_string(hello.protocol_minimum()) +
+                                          " to " + std::to_string(hello.protocol_maximum()) + ", this worker " +
+                                          std::to_string(kProtocolMinimum) + " to " + std::to_string(kProtocolMaximum)};
   }
   if (hello.schema_hash() != stage::kSchemaHash)
     return {Refusal::REASON_SCHEMA, "the kernel was built for another schema of the stage contracts"};

@@ -39,8 +39,9 @@ class ControlService final : public control::v1::WorkerControl::Service {
   // Something the kernel should hear of besides the answers of calls; goes out with the next heartbeat.
   void complain(std::string text);
 
-  grpc::Status Session(grpc::ServerContext* context,
-                       grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream) override;
+  grpc::Status Session(
+      grpc::ServerContext* context,
+      grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream) override;
 
  private:
   Admission judge(const control::v1::Hello& hello) const;

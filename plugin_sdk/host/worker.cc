@@ -88,7 +88,8 @@ bool Worker::receive_segments() {
       response_ = std::move(segment);
       response_generation_ = message.generation;
       break;
-    default: return false;
+    default:
+      return false;
   }
   return true;
 }
@@ -136,6 +137,8 @@ std::string Worker::read_request(const gravitas_frame_header& request, CallState
   if (request.column_count != method.request.size() || request.reply_count < method.reply.size() ||
       request.reply_count > GRAVITAS_MAX_COLUMNS)
     return "a frame with the wrong number of columns";
+  if (channel::frame_digest(request, kernel_->columns, {}, nullptr) != request.digest)
+    return "a frame whose digest does not fit";
   for (std::size_t i = 0; i < method.request.size(); ++i) {
     const gravitas_frame_column& column = kernel_->columns[i];
     if (!fits(state_, column.offset, bytes_of(method.request[i], column.count)))
@@ -213,8 +216,7 @@ void Worker::write_reply(const CallState& call, std::int32_t status, const char*
 
 // The trial state goes to the rooms behind the reply's; the answer comes in the state segment.
 std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* request, gravitas_reply_column* reply) {
-  const stage::MethodInfo& method =
-      stage::kMethods[static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative)];
+  const stage::MethodInfo& method = stage::kMethods[static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative)];
   const std::size_t columns = method.request.size();
   if (call->request.reply_count < call->reply_columns + columns) return GRAVITAS_CALLBACK_FAILED;
 
@@ -242,7 +244,9 @@ std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* requ
   std::memcpy(&answer, &kernel_->header, sizeof answer);
   const gravitas_frame_column& wrench = kernel_->columns[0];
   const std::size_t bytes = static_cast<std::size_t>(wrench.count) * sizeof(double);
-  if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || !fits(state_, wrench.offset, bytes))
+  if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || answer.column_count != 1 ||
+      channel::frame_digest(answer, kernel_->columns, {}, nullptr) != answer.digest ||
+      !fits(state_, wrench.offset, bytes))
     return GRAVITAS_CALLBACK_FAILED;
   reply[0].count = wrench.count;
   if (wrench.count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;

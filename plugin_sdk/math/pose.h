@@ -23,8 +23,7 @@ struct Pose {
 // error per product, so a caller that composes along an unbounded chain applies normalized() from
 // plugin_sdk/math/rotation.h.
 inline Pose compose(const Pose& X_AB, const Pose& X_BC) {
-  return Pose{X_AB.orientation * X_BC.position + X_AB.position,
-              X_AB.orientation * X_BC.orientation};
+  return Pose{X_AB.orientation * X_BC.position + X_AB.position, X_AB.orientation * X_BC.orientation};
 }
 
 // X_BA from X_AB. Precondition: unit orientation (the conjugate is taken for the inverse).
@@ -34,9 +33,7 @@ inline Pose inverse(const Pose& X_AB) {
 }
 
 // p_A from p_B (m).
-inline Vector3 transform_point(const Pose& X_AB, const Vector3& p_B) {
-  return X_AB.orientation * p_B + X_AB.position;
-}
+inline Vector3 transform_point(const Pose& X_AB, const Vector3& p_B) { return X_AB.orientation * p_B + X_AB.position; }
 
 // p_B from p_A (m). Precondition: unit orientation.
 inline Vector3 inverse_transform_point(const Pose& X_AB, const Vector3& p_A) {
@@ -47,8 +44,7 @@ inline Vector3 inverse_transform_point(const Pose& X_AB, const Vector3& p_A) {
 // positions is taken before the rotation, so two frames close together far from the origin keep
 // their accuracy.
 inline Pose relative(const Pose& X_WA, const Pose& X_WB) {
-  return Pose{inverse_transform_point(X_WA, X_WB.position),
-              X_WA.orientation.conjugate() * X_WB.orientation};
+  return Pose{inverse_transform_point(X_WA, X_WB.position), X_WA.orientation.conjugate() * X_WB.orientation};
 }
 
 // The homogeneous matrix [R p; 0 0 0 1] with p_A = R p_B + p. Precondition: unit orientation.

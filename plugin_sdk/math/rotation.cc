@@ -28,8 +28,7 @@ double range_scale(double magnitude) {
 double length(const Vector3& v) {
   const double scale = range_scale(v.cwiseAbs().maxCoeff());
   const Vector3 in_range = v * scale;
-  const double square =
-      in_range.x() * in_range.x() + in_range.y() * in_range.y() + in_range.z() * in_range.z();
+  const double square = in_range.x() * in_range.x() + in_range.y() * in_range.y() + in_range.z() * in_range.z();
   return std::sqrt(square) / scale;
 }
 
@@ -50,8 +49,8 @@ Quaternion normalized(const Quaternion& q) {
 Quaternion shorter_arc(const Quaternion& q) { return q.w() < 0.0 ? negated(q) : q; }
 
 Quaternion shorter_arc(const Quaternion& q, const Quaternion& reference) {
-  const double cosine = (q.w() * reference.w() + q.x() * reference.x()) +
-                        (q.y() * reference.y() + q.z() * reference.z());
+  const double cosine =
+      (q.w() * reference.w() + q.x() * reference.x()) + (q.y() * reference.y() + q.z() * reference.z());
   return cosine < 0.0 ? negated(q) : q;
 }
 
@@ -61,9 +60,9 @@ Matrix3 to_rotation_matrix(const Quaternion& q) {
   const double y = q.y();
   const double z = q.z();
   Matrix3 R;
-  R << 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w),
-      2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w),
-      2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y);
+  R << 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w), 2.0 * (x * y + z * w),
+      1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w), 2.0 * (x * z - y * w), 2.0 * (y * z + x * w),
+      1.0 - 2.0 * (x * x + y * y);
   return R;
 }
 
@@ -77,8 +76,7 @@ Quaternion to_quaternion(const Matrix3& rotation) {
 
   // each branch is the quaternion times four times its largest component
   if (trace >= R(largest, largest)) {
-    return normalized(
-        Quaternion(1.0 + trace, R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1)));
+    return normalized(Quaternion(1.0 + trace, R(2, 1) - R(1, 2), R(0, 2) - R(2, 0), R(1, 0) - R(0, 1)));
   }
   const int i = largest;
   const int j = (i + 1) % 3;
@@ -99,8 +97,7 @@ Quaternion exp_rotation(const Vector3& rotation_vector) {
     return Quaternion(math::cos(0.5 * angle), factor * v.x(), factor * v.y(), factor * v.z());
   }
   const math::SinCos half = math::sincos(0.5 * angle);
-  return Quaternion(half.cos, v.x() / angle * half.sin, v.y() / angle * half.sin,
-                    v.z() / angle * half.sin);
+  return Quaternion(half.cos, v.x() / angle * half.sin, v.y() / angle * half.sin, v.z() / angle * half.sin);
 }
 
 Vector3 log_rotation(const Quaternion& q) {
@@ -174,8 +171,7 @@ Matrix3 world_inertia(const Quaternion& orientation, const Vector3& principal_mo
   return result;
 }
 
-Matrix3 world_inverse_inertia(const Quaternion& orientation,
-                              const Vector3& inverse_principal_moments) {
+Matrix3 world_inverse_inertia(const Quaternion& orientation, const Vector3& inverse_principal_moments) {
   return world_inertia(orientation, inverse_principal_moments);
 }
 

@@ -87,7 +87,6 @@ Matrix3 world_inertia(const Quaternion& orientation, const Vector3& principal_mo
 
 // The inverse of world_inertia from the inverse principal moments (1/(kg m^2)); a zero entry is a
 // body that cannot be turned about that axis. Exactly symmetric.
-Matrix3 world_inverse_inertia(const Quaternion& orientation,
-                              const Vector3& inverse_principal_moments);
+Matrix3 world_inverse_inertia(const Quaternion& orientation, const Vector3& inverse_principal_moments);
 
 }  // namespace gravitas

@@ -38,9 +38,7 @@ double polynomial(double z, const double (&c)[kCount]) {
 }
 
 // 2^k for -1022 <= k <= 1023.
-double power_of_two(int k) {
-  return std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
-}
+double power_of_two(int k) { return std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52); }
 
 // v * 2^k with one rounding, for |v| between 1/4 and 4 and -1100 <= k <= 1100.
 double scaled(double v, int k) {
@@ -94,8 +92,7 @@ QuarterTurns reduce_large(double x) {
     return shift == 0 ? left : left | (kTwoOverPiBits[word + i + 1] >> (64 - shift));
   };
   const Uint128 low = static_cast<Uint128>(m) * window(2);
-  const Uint128 middle =
-      static_cast<Uint128>(m) * window(1) + static_cast<std::uint64_t>(low >> 64);
+  const Uint128 middle = static_cast<Uint128>(m) * window(1) + static_cast<std::uint64_t>(low >> 64);
   const std::uint64_t high = m * window(0) + static_cast<std::uint64_t>(middle >> 64);
   const auto p1 = static_cast<std::uint64_t>(middle);
   const auto p0 = static_cast<std::uint64_t>(low);
@@ -155,9 +152,8 @@ double leading_17_bits(double v) {
 // u^3 + (r - u)(r^2 + r u + u^2) with u the leading bits of r, since its roundings would otherwise
 // be a quarter ulp of the result.
 DoubleDouble sin_reduced(double r, double r_lo) {
-  static constexpr double kS[] = {0x1.111111111110fp-7,  -0x1.a01a01a01937ep-13,
-                                  0x1.71de3a53cf74dp-19, -0x1.ae64534170f39p-26,
-                                  0x1.6120f20178330p-33, -0x1.aacfb79055a65p-41};
+  static constexpr double kS[] = {0x1.111111111110fp-7,   -0x1.a01a01a01937ep-13, 0x1.71de3a53cf74dp-19,
+                                  -0x1.ae64534170f39p-26, 0x1.6120f20178330p-33,  -0x1.aacfb79055a65p-41};
   constexpr double kSixthHi = 0x1.5555555555555p-3;
   constexpr double kSixthLo = 0x1.5555555555555p-57;
   const double z = r * r;
@@ -173,9 +169,8 @@ DoubleDouble sin_reduced(double r, double r_lo) {
 // cos(r + r_lo) = 1 - r^2/2 + r^4 C(r^2) - r r_lo, |r| <= 0.786: 2^-64.2. The square is taken from
 // the upper half of r exactly, since half an ulp of r^2/2 would be a quarter ulp of the result.
 DoubleDouble cos_reduced(double r, double r_lo) {
-  static constexpr double kC[] = {0x1.555555555554cp-5,  -0x1.6c16c16c15150p-10,
-                                  0x1.a01a019cad178p-16, -0x1.27e4f8066f94ep-22,
-                                  0x1.1ee9e96f9c565p-29, -0x1.8fad48c060467p-37};
+  static constexpr double kC[] = {0x1.555555555554cp-5,   -0x1.6c16c16c15150p-10, 0x1.a01a019cad178p-16,
+                                  -0x1.27e4f8066f94ep-22, 0x1.1ee9e96f9c565p-29,  -0x1.8fad48c060467p-37};
   const double z = r * r;
   const double upper = leading_26_bits(r);
   const double half_square = 0.5 * (upper * upper);
@@ -192,9 +187,8 @@ double rounded(DoubleDouble v) { return v.hi + v.lo; }
 // atan(n/d) = atan(c) + atan(t), t = (n - c d)/(d + c n), |t| <= 1/16,
 // atan(t) = t + t^3 A(t^2), |t| <= 0.0628: 2^-72.7
 DoubleDouble atan_of_ratio(DoubleDouble n, DoubleDouble d) {
-  static constexpr double kA[] = {-0x1.5555555555555p-2, 0x1.999999999982dp-3,
-                                  -0x1.2492492400273p-3, 0x1.c71c6e68db184p-4,
-                                  -0x1.7458109549493p-4, 0x1.37620fccb6a9ep-4};
+  static constexpr double kA[] = {-0x1.5555555555555p-2, 0x1.999999999982dp-3,  -0x1.2492492400273p-3,
+                                  0x1.c71c6e68db184p-4,  -0x1.7458109549493p-4, 0x1.37620fccb6a9ep-4};
   const auto k = static_cast<int>(std::floor(8.0 * (n.hi / d.hi) + 0.5));
   const double c = 0.125 * k;
   const DoubleDouble cd = two_product(c, d.hi);
@@ -263,10 +257,10 @@ FoldedAngle fold_angle(double y, double x) {
 
 // exp(r + r_lo) - 1 = r + r^2/2 + r^3 Q(r) + ..., |r| <= 0.3467: 2^-67.8
 DoubleDouble expm1_reduced(double r, double r_lo) {
-  static constexpr double kQ[] = {
-      0x1.5555555555555p-3,  0x1.5555555555557p-5,  0x1.1111111111113p-7,  0x1.6c16c16c156b3p-10,
-      0x1.a01a01a0182e5p-13, 0x1.a01a01ab5520cp-16, 0x1.71de3a603ded9p-19, 0x1.27e4d0b6f822fp-22,
-      0x1.ae641619e3ffap-26, 0x1.1f84bbf627d6bp-29, 0x1.61e0a612cadbap-33};
+  static constexpr double kQ[] = {0x1.5555555555555p-3,  0x1.5555555555557p-5,  0x1.1111111111113p-7,
+                                  0x1.6c16c16c156b3p-10, 0x1.a01a01a0182e5p-13, 0x1.a01a01ab5520cp-16,
+                                  0x1.71de3a603ded9p-19, 0x1.27e4d0b6f822fp-22, 0x1.ae641619e3ffap-26,
+                                  0x1.1f84bbf627d6bp-29, 0x1.61e0a612cadbap-33};
   const DoubleDouble square = two_product(r, r);
   const DoubleDouble head = fast_two_sum(r, 0.5 * square.hi);
   const double cubic = r * square.hi * polynomial(r, kQ);
@@ -299,9 +293,9 @@ constexpr double kExpUnderflow = -0x1.74910d52d3051p+9;  // the last that does n
 // log(1 + z) = z - z^2/2 + z^3 P(z), |z| <= 0.00785: 2^-73.7. Row 0 and the last have c = 1
 // exactly, so that nothing cancels near x = 1.
 DoubleDouble log_of_pair(double x, double x_lo) {
-  static constexpr double kP[] = {
-      0x1.5555555555555p-2, -0x1.000000000006ap-2, 0x1.9999999999c08p-3, -0x1.5555554449c48p-3,
-      0x1.24924908fa2f1p-3, -0x1.00069fa2ce421p-3, 0x1.c72bb473e347ep-4};
+  static constexpr double kP[] = {0x1.5555555555555p-2,  -0x1.000000000006ap-2, 0x1.9999999999c08p-3,
+                                  -0x1.5555554449c48p-3, 0x1.24924908fa2f1p-3,  -0x1.00069fa2ce421p-3,
+                                  0x1.c72bb473e347ep-4};
   const auto bits = std::bit_cast<std::uint64_t>(x);
   int k = static_cast<int>(bits >> 52) - 1023;
   double m = std::bit_cast<double>((bits & 0xfffffffffffffULL) | 0x3ff0000000000000ULL);
@@ -319,8 +313,8 @@ DoubleDouble log_of_pair(double x, double x_lo) {
   const DoubleDouble z = two_sum(main.hi, main.lo + m_lo * c.reciprocal);
 
   const DoubleDouble square = two_product(z.hi, z.hi);
-  const double tail = z.hi * square.hi * polynomial(z.hi, kP) - (0.5 * square.lo + z.hi * z.lo) +
-                      (k * kLn2Lo + c.log_lo) + z.lo;
+  const double tail =
+      z.hi * square.hi * polynomial(z.hi, kP) - (0.5 * square.lo + z.hi * z.lo) + (k * kLn2Lo + c.log_lo) + z.lo;
   const DoubleDouble first = two_sum(k * kLn2Hi + c.log_hi, z.hi);
   const DoubleDouble second = two_sum(first.hi, -0.5 * square.hi);
   return fast_two_sum(second.hi, (first.lo + second.lo) + tail);

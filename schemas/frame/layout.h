@@ -59,41 +59,41 @@ typedef struct gravitas_frame_column {
 
 enum gravitas_frame_kind {
   GRAVITAS_FRAME_NONE = 0,
-  GRAVITAS_FRAME_REQUEST = 1,     // kernel -> worker: a stage call
-  GRAVITAS_FRAME_REPLY = 2,       // worker -> kernel: its answer
-  GRAVITAS_FRAME_CALLBACK = 3,    // worker -> kernel: a derivative is asked for
-  GRAVITAS_FRAME_ANSWER = 4,      // kernel -> worker: the derivative
-  GRAVITAS_FRAME_CRASH = 5,       // worker -> kernel: a fatal signal was caught
-  GRAVITAS_FRAME_STOP = 6         // kernel -> worker: leave the loop
+  GRAVITAS_FRAME_REQUEST = 1,   // kernel -> worker: a stage call
+  GRAVITAS_FRAME_REPLY = 2,     // worker -> kernel: its answer
+  GRAVITAS_FRAME_CALLBACK = 3,  // worker -> kernel: a derivative is asked for
+  GRAVITAS_FRAME_ANSWER = 4,    // kernel -> worker: the derivative
+  GRAVITAS_FRAME_CRASH = 5,     // worker -> kernel: a fatal signal was caught
+  GRAVITAS_FRAME_STOP = 6       // kernel -> worker: leave the loop
 };
 
 typedef struct gravitas_frame_header {
   uint64_t magic;
   uint64_t schema_hash;
-  uint64_t epoch;                 // incarnation of the worker
-  uint64_t sequence;              // of the call, counted up by the kernel
-  uint32_t attempt;               // 0 for the first
-  uint32_t kind;                  // gravitas_frame_kind
-  uint32_t method;                // stage::Method
-  uint32_t target;                // which of the worker's plugins
-  int32_t status;                 // gravitas_status, in a reply
+  uint64_t epoch;     // incarnation of the worker
+  uint64_t sequence;  // of the call, counted up by the kernel
+  uint32_t attempt;   // 0 for the first
+  uint32_t kind;      // gravitas_frame_kind
+  uint32_t method;    // stage::Method
+  uint32_t target;    // which of the worker's plugins
+  int32_t status;     // gravitas_status, in a reply
   uint32_t column_count;
-  uint32_t reply_count;           // columns of the reply that room is described for
+  uint32_t reply_count;  // columns of the reply that room is described for
   uint32_t reserved;
-  uint64_t state_generation;      // which state segment the offsets mean
-  uint64_t response_generation;   // which response segment
-  uint64_t deadline_ns;           // CLOCK_MONOTONIC
-  uint64_t digest;                // of all that follows in the header's columns and, in a reply, of the data
+  uint64_t state_generation;     // which state segment the offsets mean
+  uint64_t response_generation;  // which response segment
+  uint64_t deadline_ns;          // CLOCK_MONOTONIC
+  uint64_t digest;               // of all that follows in the header's columns and, in a reply, of the data
 } gravitas_frame_header;
 
 // Answers of a plugin's functions.
 enum gravitas_status {
   GRAVITAS_OK = 0,
-  GRAVITAS_NEEDS_CAPACITY = 1,    // a reply column was too short; its count says what it takes
-  GRAVITAS_REFUSED = 2,           // the request is impossible, the text says why
-  GRAVITAS_FAILED = 3,            // the plugin itself failed (an exception)
+  GRAVITAS_NEEDS_CAPACITY = 1,  // a reply column was too short; its count says what it takes
+  GRAVITAS_REFUSED = 2,         // the request is impossible, the text says why
+  GRAVITAS_FAILED = 3,          // the plugin itself failed (an exception)
   GRAVITAS_UNKNOWN_METHOD = 4,
-  GRAVITAS_CALLBACK_FAILED = 5    // a derivative could not be had; the call is void
+  GRAVITAS_CALLBACK_FAILED = 5  // a derivative could not be had; the call is void
 };
 
 #ifdef __cplusplus

@@ -20,21 +20,17 @@ constexpr std::chrono::milliseconds kTimeout{10000}, kTimeoutPerLibrary{6000};
 constexpr std::size_t kShownBroken = 3;
 
 // *.so of the folder by name. False with the reason if it cannot be read.
-bool list_libraries(const std::string& folder, std::vector<std::string>* libraries,
-                    std::string* problem) {
+bool list_libraries(const std::string& folder, std::vector<std::string>* libraries, std::string* problem) {
   std::error_code error;
-  for (files::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error))
-    if (entry->path().extension() == ".so")
-      libraries->push_back(files::absolute(entry->path()).string());
+  for (files::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (entry->path().extension() == ".so") libraries->push_back(files::absolute(entry->path()).string());
   std::sort(libraries->begin(), libraries->end());
   if (error) *problem = "the folder cannot be read: " + error.message();
   return !error;
 }
 
 // Why a described plugin cannot be used, or empty.
-std::string usability(const plugin::v1::Catalog::Entry& entry,
-                      const PluginDeclaration& declaration) {
+std::string usability(const plugin::v1::Catalog::Entry& entry, const PluginDeclaration& declaration) {
   if (!entry.problem().empty()) return entry.problem();
   const bool has_slot = declaration.slot >= Slot::kSpace && declaration.slot <= Slot::kIntegrator;
   if (!has_slot) return "it declares a slot that this version does not have";
@@ -58,8 +54,8 @@ Catalog Catalog::installed(const std::string& worker_path, const std::string& pl
   }
   if (libraries.empty()) return catalog;
   plugin::v1::Catalog answer;
-  if (!describe_libraries(worker_path, libraries, kTimeout + libraries.size() * kTimeoutPerLibrary,
-                          &answer, &problem)) {
+  if (!describe_libraries(worker_path, libraries, kTimeout + libraries.size() * kTimeoutPerLibrary, &answer,
+                          &problem)) {
     catalog.broken_.push_back({plugin_dir, problem});
     return catalog;
   }
@@ -72,8 +68,7 @@ Catalog Catalog::installed(const std::string& worker_path, const std::string& pl
   return catalog;
 }
 
-void Catalog::add(const std::string& library, const std::string& problem,
-                  PluginDeclaration declaration) {
+void Catalog::add(const std::string& library, const std::string& problem, PluginDeclaration declaration) {
   if (problem.empty()) {
     plugins_.push_back({library, std::move(declaration)});
   } else {
@@ -93,8 +88,7 @@ const InstalledPlugin* Catalog::add_library(const std::string& path, std::string
     return nullptr;
   }
   plugin::v1::Catalog answer;
-  if (!describe_libraries(worker_path_, {library}, kTimeout + kTimeoutPerLibrary, &answer, problem))
-    return nullptr;
+  if (!describe_libraries(worker_path_, {library}, kTimeout + kTimeoutPerLibrary, &answer, problem)) return nullptr;
   PluginDeclaration declaration = host::from_message(answer.entries(0).description());
   *problem = usability(answer.entries(0), declaration);
   if (!problem->empty()) return nullptr;
@@ -110,9 +104,7 @@ const InstalledPlugin* Catalog::find_plugin(Slot slot, const std::string& name) 
 
 const InstalledPlugin* Catalog::find_type(Slot slot, const std::string& type) const {
   for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
-    if (plugin->declaration.slot == slot &&
-        gravitas::find_type(plugin->declaration, type) != nullptr)
-      return &*plugin;
+    if (plugin->declaration.slot == slot && gravitas::find_type(plugin->declaration, type) != nullptr) return &*plugin;
   return nullptr;
 }
 

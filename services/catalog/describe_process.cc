@@ -47,8 +47,8 @@ struct Pipe {
 };
 
 // Starts the worker in a process group of its own, so that a timeout also reaches what it started.
-int spawn(const std::string& worker_path, const std::vector<std::string>& libraries,
-          const Pipe& out, const Pipe& err, pid_t* pid) {
+int spawn(const std::string& worker_path, const std::vector<std::string>& libraries, const Pipe& out, const Pipe& err,
+          pid_t* pid) {
   std::vector<std::string> words = {worker_path, "--describe"};
   words.insert(words.end(), libraries.begin(), libraries.end());
   std::vector<char*> arguments;
@@ -64,8 +64,7 @@ int spawn(const std::string& worker_path, const std::vector<std::string>& librar
   posix_spawn_file_actions_adddup2(&actions, err.write, STDERR_FILENO);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   posix_spawnattr_setpgroup(&attributes, 0);
-  const int result =
-      ::posix_spawn(pid, worker_path.c_str(), &actions, &attributes, arguments.data(), environ);
+  const int result = ::posix_spawn(pid, worker_path.c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   return result;
@@ -83,15 +82,12 @@ void drain(int* end, std::string* text) {
 }
 
 // Reads both pipes to their ends. False if time ran out before.
-bool read_all(Pipe* out, Pipe* err, Clock::time_point until, std::string* answer,
-              std::string* messages) {
+bool read_all(Pipe* out, Pipe* err, Clock::time_point until, std::string* answer, std::string* messages) {
   while (out->read >= 0 || err->read >= 0) {
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
     if (left <= 0) return false;
     std::array<pollfd, 2> ends = {pollfd{out->read, POLLIN, 0}, pollfd{err->read, POLLIN, 0}};
-    if (::poll(ends.data(), ends.size(), static_cast<int>(left)) < 0 && errno != EINTR)
-      return false;
+    if (::poll(ends.data(), ends.size(), static_cast<int>(left)) < 0 && errno != EINTR) return false;
     if (out->read >= 0 && ends[0].revents != 0) drain(&out->read, answer);
     if (err->read >= 0 && ends[1].revents != 0) drain(&err->read, messages);
   }
@@ -102,8 +98,7 @@ bool read_all(Pipe* out, Pipe* err, Clock::time_point until, std::string* answer
 int wait_for(pid_t pid, Clock::time_point until, bool* is_in_time) {
   const int handle = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));
   while (*is_in_time && handle >= 0) {
-    const auto left =
-        std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
     pollfd end = {handle, POLLIN, 0};
     const int ready = left > 0 ? ::poll(&end, 1, static_cast<int>(left)) : 0;
     if (ready > 0) break;
@@ -125,8 +120,7 @@ std::string first_line(const std::string& messages) {
 }  // namespace
 
 bool describe_libraries(const std::string& worker_path, const std::vector<std::string>& libraries,
-                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer,
-                        std::string* problem) {
+                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem) {
   Pipe out, err;
   if (out.read < 0 || err.read < 0) {
     *problem = std::string("no pipe could be made: ") + std::strerror(errno);
@@ -146,18 +140,16 @@ bool describe_libraries(const std::string& worker_path, const std::vector<std::s
   bool is_complete = read_all(&out, &err, until, &bytes, &messages);
   const int status = wait_for(pid, until, &is_complete);
   if (!is_complete) {
-    *problem = worker_path + " --describe did not end within " + std::to_string(timeout.count()) +
-               " ms" + first_line(messages);
-  } else if (WIFSIGNALED(status)) {
-    *problem = worker_path + " --describe was ended by signal " + std::to_string(WTERMSIG(status)) +
+    *problem = worker_path + " --describe did not end within " + std::to_string(timeout.count()) + " ms" +
                first_line(messages);
+  } else if (WIFSIGNALED(status)) {
+    *problem =
+        worker_path + " --describe was ended by signal " + std::to_string(WTERMSIG(status)) + first_line(messages);
   } else if (WEXITSTATUS(status) != 0) {
-    *problem = worker_path + " --describe ended with status " +
-               std::to_string(WEXITSTATUS(status)) + first_line(messages);
-  } else if (!answer->ParseFromString(bytes) ||
-             answer->entries_size() != static_cast<int>(libraries.size())) {
-    *problem = worker_path + " --describe wrote no catalogue of " +
-               std::to_string(libraries.size()) + " libraries";
+    *problem =
+        worker_path + " --describe ended with status " + std::to_string(WEXITSTATUS(status)) + first_line(messages);
+  } else if (!answer->ParseFromString(bytes) || answer->entries_size() != static_cast<int>(libraries.size())) {
+    *problem = worker_path + " --describe wrote no catalogue of " + std::to_string(libraries.size()) + " libraries";
   } else {
     return true;
   }

@@ -15,7 +15,6 @@ namespace gravitas {
 // does not end within the timeout (it is killed then), ends with an error, or writes something
 // else.
 bool describe_libraries(const std::string& worker_path, const std::vector<std::string>& libraries,
-                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer,
-                        std::string* problem);
+                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem);
 
 }  // namespace gravitas

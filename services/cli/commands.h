@@ -2,20 +2,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-
 #include <functional>
 
 namespace gravitas::cli {
 
 // Exit codes (the same for every sub-command).
-enum ExitCode : int {
-  kDone = 0,
-  kOurFault = 1,
-  kBadInput = 2,
-  kPaused = 3,
-  kExaminedFailed = 4,
-  kInterrupted = 130
-};
+enum ExitCode : int { kDone = 0, kOurFault = 1, kBadInput = 2, kPaused = 3, kExaminedFailed = 4, kInterrupted = 130 };
 
 // What the chosen sub-command does.
 using Action = std::function<int()>;

@@ -5,7 +5,8 @@
 namespace gravitas::cli {
 namespace {
 
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator};
+constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
+                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
 kernel::Hosting parse_mode(const std::string& word, const std::string& mode) {
   if (mode == "direct") return kernel::Hosting::kDirect;
@@ -30,8 +31,10 @@ std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words) 
     for (const Slot slot : kSlots)
       if (name == slot_name(slot)) found = slot;
     if (!found)
-      throw BadInput(fmt::format("--hosting {}: unknown slot '{}'; allowed: space, collision, constraint, force, solver, "
-                                 "integrator", word, name));
+      throw BadInput(
+          fmt::format("--hosting {}: unknown slot '{}'; allowed: space, collision, constraint, force, solver, "
+                      "integrator",
+                      word, name));
     choices.push_back({found, parse_mode(word, word.substr(equals + 1))});
   }
   return choices;

@@ -1,6 +1,5 @@
 // gravitas: one program, sub-commands. Results go to standard output, everything else to standard error.
 #include <CLI/CLI.hpp>
-
 #include <exception>
 #include <iostream>
 

@@ -18,13 +18,20 @@ namespace {
 
 std::string kind_name(PropertyKind kind) {
   switch (kind) {
-    case PropertyKind::kNumber: return "number";
-    case PropertyKind::kInteger: return "integer";
-    case PropertyKind::kFlag: return "true or false";
-    case PropertyKind::kChoice: return "text";
-    case PropertyKind::kVector: return "{x, y, z}";
-    case PropertyKind::kQuaternion: return "{w, x, y, z}";
-    case PropertyKind::kTable: return "table";
+    case PropertyKind::kNumber:
+      return "number";
+    case PropertyKind::kInteger:
+      return "integer";
+    case PropertyKind::kFlag:
+      return "true or false";
+    case PropertyKind::kChoice:
+      return "text";
+    case PropertyKind::kVector:
+      return "{x, y, z}";
+    case PropertyKind::kQuaternion:
+      return "{w, x, y, z}";
+    case PropertyKind::kTable:
+      return "table";
   }
   return "?";
 }
@@ -47,16 +54,17 @@ std::string default_text(const Property& p) {
 
 void print_properties(const std::vector<Property>& properties, const std::string& indent) {
   for (const Property& p : properties) {
-    std::cout << fmt::format("{}{:<18} {:<14} {:<8} {:<14} {:<12} {:<9} {}\n", indent, p.name, kind_name(p.kind), p.unit,
-                             range_text(p), default_text(p), p.is_live ? "live" : "init-only", p.meaning);
+    std::cout << fmt::format("{}{:<18} {:<14} {:<8} {:<14} {:<12} {:<9} {}\n", indent, p.name, kind_name(p.kind),
+                             p.unit, range_text(p), default_text(p), p.is_live ? "live" : "init-only", p.meaning);
   }
 }
 
 void print_declaration(const InstalledPlugin& plugin) {
   const PluginDeclaration& d = plugin.declaration;
-  std::cout << fmt::format("{} {}: slot {}\n  {}\n  library       {}\n  capabilities  {}\n", d.name, d.version,
-                           slot_name(d.slot), d.meaning, plugin.library,
-                           d.capabilities.empty() ? std::string("none") : fmt::format("{}", fmt::join(d.capabilities, ", ")));
+  std::cout << fmt::format(
+      "{} {}: slot {}\n  {}\n  library       {}\n  capabilities  {}\n", d.name, d.version, slot_name(d.slot), d.meaning,
+      plugin.library,
+      d.capabilities.empty() ? std::string("none") : fmt::format("{}", fmt::join(d.capabilities, ", ")));
   if (d.slot == Slot::kIntegrator) std::cout << fmt::format("  theta         {:g}\n", d.theta);
   if (!d.properties.empty()) {
     std::cout << "  properties (name, type, unit, range, default, when it may change, meaning)\n";
@@ -86,7 +94,8 @@ int list_plugins(bool json) {
       const PluginDeclaration& d = plugin.declaration;
       std::string types;
       for (const TypeDeclaration& type : d.types) types += (types.empty() ? "" : " ") + type.name;
-      std::cout << fmt::format("{:<12} {:<20} {:<8} {:<34} {}\n", slot_name(d.slot), d.name, d.version, types, d.meaning);
+      std::cout << fmt::format("{:<12} {:<20} {:<8} {:<34} {}\n", slot_name(d.slot), d.name, d.version, types,
+                               d.meaning);
     }
   }
   for (const BrokenLibrary& broken : catalog.broken()) std::cerr << broken.problem << '\n';

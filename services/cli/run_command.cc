@@ -82,8 +82,8 @@ int run_scene(CommandLine* line) {
   std::signal(SIGINT, request_interrupt);
   std::signal(SIGTERM, request_interrupt);
   ProgressLine progress(line->progress, line->quiet);
-  const RunResult result = run(line->options, [] { return interrupt_requested != 0; },
-                               [&](const Progress& now) { progress.show(now); });
+  const RunResult result = run(
+      line->options, [] { return interrupt_requested != 0; }, [&](const Progress& now) { progress.show(now); });
   progress.finish();
   if (!line->quiet) print_warnings(result.report.warnings());
   if (line->json) {
@@ -131,7 +131,8 @@ void add_run(CLI::App* app, Action* action) {
   add_scene_options(command, line.get());
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
-  command->add_option("--sample-every", options.sample_every, "Interval of the trajectory's samples, s; every step if absent");
+  command->add_option("--sample-every", options.sample_every,
+                      "Interval of the trajectory's samples, s; every step if absent");
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
   command->add_flag("--json", line->json, "Print the report instead of the summary");
@@ -142,7 +143,8 @@ void add_run(CLI::App* app, Action* action) {
 
 void add_plan(CLI::App* app, Action* action) {
   const auto line = std::make_shared<CommandLine>();
-  CLI::App* command = app->add_subcommand("plan", "Print the pipeline that a scene needs, and what is left out and why");
+  CLI::App* command =
+      app->add_subcommand("plan", "Print the pipeline that a scene needs, and what is left out and why");
   command->footer("Example: gravitas plan deploy/scenes/two_spheres_motor.gravitas");
   add_scene_options(command, line.get());
   command->add_flag("--json", line->json, "Print JSON");

@@ -15,9 +15,12 @@ constexpr std::size_t kMostMeetings = 16;
 
 const char* kind_name(kernel::EventKind kind) {
   switch (kind) {
-    case kernel::EventKind::kCollisionStart: return "collision_start";
-    case kernel::EventKind::kCollisionEnd: return "collision_end";
-    case kernel::EventKind::kBreak: return "break";
+    case kernel::EventKind::kCollisionStart:
+      return "collision_start";
+    case kernel::EventKind::kCollisionEnd:
+      return "collision_end";
+    case kernel::EventKind::kBreak:
+      return "break";
   }
   return "unknown";
 }
@@ -45,14 +48,20 @@ void EventLog::on_event(const kernel::Event& event) {
       counts_.set_collision_start(counts_.collision_start() + 1);
       remember_meeting(event);
       break;
-    case kernel::EventKind::kCollisionEnd: counts_.set_collision_end(counts_.collision_end() + 1); break;
-    case kernel::EventKind::kBreak: counts_.set_break_(counts_.break_() + 1); break;
+    case kernel::EventKind::kCollisionEnd:
+      counts_.set_collision_end(counts_.collision_end() + 1);
+      break;
+    case kernel::EventKind::kBreak:
+      counts_.set_break_(counts_.break_() + 1);
+      break;
   }
   if (file_ != nullptr) write(event, kind_name(event.kind));
 }
 
 void EventLog::remember_meeting(const kernel::Event& event) {
-  const auto is_fixed = [&](std::uint32_t body) { return (description_.bodies[body].flags & (kMovable | kKinematic)) == 0; };
+  const auto is_fixed = [&](std::uint32_t body) {
+    return (description_.bodies[body].flags & (kMovable | kKinematic)) == 0;
+  };
   if (is_fixed(event.a) == is_fixed(event.b) || meetings_.size() >= kMostMeetings) return;
   const std::uint32_t mover = is_fixed(event.a) ? event.b : event.a, other = is_fixed(event.a) ? event.a : event.b;
   if (has_met_[mover]) return;

@@ -1,10 +1,10 @@
 #include "services/recorder/trajectory.h"
 
+#include <fmt/format.h>
+
 #include <cerrno>
 #include <system_error>
 #include <utility>
-
-#include <fmt/format.h>
 
 namespace gravitas {
 namespace {

@@ -47,7 +47,8 @@ void Figures::find_drives() {
       const auto speed = property_of(type, joint.parameters, "AngularSpeed");
       if (!point1 || !point2 || !speed) continue;
       const Vector3 axis = vector_at(*point2, 0) - vector_at(*point1, 0);
-      const Quaternion q = joint.body1 == kNone ? Quaternion::Identity() : description_.bodies[joint.body1].pose.orientation;
+      const Quaternion q =
+          joint.body1 == kNone ? Quaternion::Identity() : description_.bodies[joint.body1].pose.orientation;
       drives_.push_back({i, q.conjugate() * axis.normalized(), (*speed)[0]});
     }
   }

@@ -22,9 +22,9 @@ class Figures {
 
  private:
   struct Totals {
-    double kinetic = 0.0, potential = 0.0;             // J
-    Vector3 linear = Vector3::Zero();                  // kg m/s
-    Vector3 angular = Vector3::Zero();                 // kg m^2/s, about the origin
+    double kinetic = 0.0, potential = 0.0;  // J
+    Vector3 linear = Vector3::Zero();       // kg m/s
+    Vector3 angular = Vector3::Zero();      // kg m^2/s, about the origin
     double energy() const { return kinetic + potential; }
   };
   // A joint that drives its second body about an axis.

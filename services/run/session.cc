@@ -37,7 +37,8 @@ void require(const scene::Problems& problems) {
 
 void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description) {
   for (const HostingChoice& choice : choices) {
-    for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+    for (const Slot slot :
+         {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
       if (!choice.slot || *choice.slot == slot) description->slot(slot).hosting = choice.hosting;
   }
 }
@@ -164,7 +165,8 @@ RunResult run(const RunOptions& options, const std::function<bool()>& interrupte
   std::unique_ptr<EventLog> events;
   try {
     if (!options.trajectory.empty())
-      trajectory = std::make_unique<TrajectoryWriter>(options.trajectory, description, options.sample_every.value_or(0.0));
+      trajectory =
+          std::make_unique<TrajectoryWriter>(options.trajectory, description, options.sample_every.value_or(0.0));
     events = std::make_unique<EventLog>(options.events, description);
   } catch (const std::system_error& error) {
     throw BadInput(error.what());
@@ -203,7 +205,8 @@ RunResult run(const RunOptions& options, const std::function<bool()>& interrupte
   if (trajectory) trajectory->offer(*environment, true);
 
   report::v1::Report& report = result.report;
-  for (const std::string& path : options.scenes) report.set_scene(report.scene() + (report.scene().empty() ? "" : " ") + path);
+  for (const std::string& path : options.scenes)
+    report.set_scene(report.scene() + (report.scene().empty() ? "" : " ") + path);
   report.set_simulated_seconds(environment->time());
   report.set_steps(environment->step_count());
   report.set_time_step(environment->time_step());

@@ -20,9 +20,9 @@ struct HostingChoice {
 
 struct RunOptions {
   std::vector<std::string> scenes;
-  std::optional<double> duration;    // s
+  std::optional<double> duration;  // s
   std::optional<std::uint32_t> steps;
-  std::optional<double> time_step;   // s
+  std::optional<double> time_step;     // s
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events;
@@ -41,8 +41,8 @@ enum class RunOutcome { kCompleted, kInterrupted, kPaused };
 struct RunResult {
   RunOutcome outcome = RunOutcome::kCompleted;
   report::v1::Report report;
-  std::string summary;      // what happened, for a person
-  std::string fault;        // why the run paused: slot, plugin, cause, step
+  std::string summary;  // what happened, for a person
+  std::string fault;    // why the run paused: slot, plugin, cause, step
 };
 
 // The scene as the kernel's description. Throws BadInput. `warnings` gets the reader's warnings.

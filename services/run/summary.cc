@@ -22,7 +22,8 @@ std::string story(const report::v1::Report& report, const std::vector<EventLog::
     text += fmt::format("{}{} turns at {:.6g} rad/s (set: {:.6g})", text.empty() ? "" : "; ", drive.constraint(),
                         drive.speed(), drive.target());
   }
-  if (report.events().break_() > 0) text += fmt::format("{}{} joints broke", text.empty() ? "" : "; ", report.events().break_());
+  if (report.events().break_() > 0)
+    text += fmt::format("{}{} joints broke", text.empty() ? "" : "; ", report.events().break_());
   return text;
 }
 

@@ -13,15 +13,13 @@ using Kind = PropertyValue::Kind;
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-void trim(const Entry& entry, const TextPosition& position, std::string* text,
-          Diagnostics* diagnostics) {
+void trim(const Entry& entry, const TextPosition& position, std::string* text, Diagnostics* diagnostics) {
   const auto first = std::find_if_not(text->begin(), text->end(), is_blank);
-  const auto last =
-      std::find_if_not(text->rbegin(), std::make_reverse_iterator(first), is_blank).base();
+  const auto last = std::find_if_not(text->rbegin(), std::make_reverse_iterator(first), is_blank).base();
   if (first == text->begin() && last == text->end()) return;
   std::string trimmed(first, last);
-  diagnostics->warning(position, entry.name + " is \"" + *text + "\"; the blanks around \"" +
-                                     trimmed + "\" are dropped");
+  diagnostics->warning(position,
+                       entry.name + " is \"" + *text + "\"; the blanks around \"" + trimmed + "\" are dropped");
   *text = std::move(trimmed);
 }
 
@@ -29,50 +27,42 @@ void trim(const Entry& entry, const TextPosition& position, std::string* text,
 bool check_text(const Entry& entry, PropertyValue* value, Diagnostics* diagnostics) {
   const bool is_list = entry.form == Form::kTexts;
   if (value->kind != Kind::kText) {
-    diagnostics->error(value->position,
-                       (is_list ? "an element of " : "") + entry.name + " is " + shown(*value) +
-                           "; allowed: " + (is_list ? "texts" : "a text") + " in double quotes");
+    diagnostics->error(value->position, (is_list ? "an element of " : "") + entry.name + " is " + shown(*value) +
+                                            "; allowed: " + (is_list ? "texts" : "a text") + " in double quotes");
     return false;
   }
   if (entry.is_identifier) {
     trim(entry, value->position, &value->text, diagnostics);
-    const bool has_control = std::any_of(value->text.begin(), value->text.end(), [](char c) {
-      return static_cast<unsigned char>(c) < 0x20U || c == 0x7F;
-    });
+    const bool has_control = std::any_of(value->text.begin(), value->text.end(),
+                                         [](char c) { return static_cast<unsigned char>(c) < 0x20U || c == 0x7F; });
     if (has_control) {
-      diagnostics->error(value->position,
-                         entry.name +
-                             " holds a tab, a line end or the like; allowed: visible "
-                             "characters and blanks inside");
+      diagnostics->error(value->position, entry.name +
+                                              " holds a tab, a line end or the like; allowed: visible "
+                                              "characters and blanks inside");
       return false;
     }
   }
   if (entry.is_required && value->text.empty()) {
-    diagnostics->error(value->position,
-                       entry.name + " is empty; required: a text of at least one character");
+    diagnostics->error(value->position, entry.name + " is empty; required: a text of at least one character");
     return false;
   }
   if (entry.choices.empty()) return true;
-  if (std::find(entry.choices.begin(), entry.choices.end(), value->text) != entry.choices.end())
-    return true;
-  diagnostics->error(value->position, entry.name + " is " + shown(*value) + "; " +
-                                          allowed_names(value->text, entry.choices));
+  if (std::find(entry.choices.begin(), entry.choices.end(), value->text) != entry.choices.end()) return true;
+  diagnostics->error(value->position,
+                     entry.name + " is " + shown(*value) + "; " + allowed_names(value->text, entry.choices));
   return false;
 }
 
-bool set_texts(const Entry& entry, PropertyValue* value, pb::Message* block,
-               Diagnostics* diagnostics) {
+bool set_texts(const Entry& entry, PropertyValue* value, pb::Message* block, Diagnostics* diagnostics) {
   if (value->kind != Kind::kList) {
-    diagnostics->error(value->position, entry.name + " is " + shown(*value) +
-                                            "; allowed: a list of texts, { \"…\" }");
+    diagnostics->error(value->position, entry.name + " is " + shown(*value) + "; allowed: a list of texts, { \"…\" }");
     return false;
   }
   for (PropertyValue& element : value->list)
     if (!check_text(entry, &element, diagnostics)) return false;
   const pb::Reflection& reflection = *block->GetReflection();
   reflection.ClearField(block, entry.field);
-  for (PropertyValue& element : value->list)
-    reflection.AddString(block, entry.field, std::move(element.text));
+  for (PropertyValue& element : value->list) reflection.AddString(block, entry.field, std::move(element.text));
   return true;
 }
 
@@ -112,8 +102,7 @@ bool set(const Entry& entry, PropertyValue value, pb::Message* block, Diagnostic
     case Form::kTexts:
       return set_texts(entry, &value, block, diagnostics);
     case Form::kValue:
-      to_message(std::move(value),
-                 static_cast<v1::Value*>(reflection.MutableMessage(block, entry.field)));
+      to_message(std::move(value), static_cast<v1::Value*>(reflection.MutableMessage(block, entry.field)));
       return true;
     case Form::kBlock:
     case Form::kProperties:
@@ -130,8 +119,8 @@ void assign(const BlockRule& rule, const Entry& entry, PropertyValue value, pb::
   if (!set(entry, std::move(value), block, diagnostics) || rule.places == nullptr) return;
   if (!position.known()) return;
   const pb::Reflection& reflection = *block->GetReflection();
-  for (const std::uint32_t number : {static_cast<std::uint32_t>(entry.field->number()),
-                                     position.file, position.line, position.column})
+  for (const std::uint32_t number :
+       {static_cast<std::uint32_t>(entry.field->number()), position.file, position.line, position.column})
     reflection.AddUInt32(block, rule.places, number);
 }
 
@@ -146,8 +135,7 @@ void assign_property(std::string_view name, const TextPosition& name_position, P
   to_message(std::move(value), property->mutable_value());
 }
 
-void fill_defaults(const BlockRule& rule, std::uint64_t present, pb::Message* block,
-                   Diagnostics* diagnostics) {
+void fill_defaults(const BlockRule& rule, std::uint64_t present, pb::Message* block, Diagnostics* diagnostics) {
   const pb::Reflection& reflection = *block->GetReflection();
   for (const Entry& entry : rule.entries) {
     if ((present >> entry.index & 1U) != 0) continue;
@@ -188,8 +176,7 @@ void to_message(PropertyValue value, v1::Value* message) {
     case Kind::kList:
       message->mutable_list()->clear_value();
       message->mutable_list()->mutable_value()->Reserve(static_cast<int>(value.list.size()));
-      for (PropertyValue& element : value.list)
-        to_message(std::move(element), message->mutable_list()->add_value());
+      for (PropertyValue& element : value.list) to_message(std::move(element), message->mutable_list()->add_value());
       break;
   }
 }
@@ -206,8 +193,7 @@ PropertyValue from_message(const v1::Value& message) {
     case v1::Value::kList:
       value.kind = Kind::kList;
       value.list.reserve(static_cast<std::size_t>(message.list().value_size()));
-      for (const v1::Value& element : message.list().value())
-        value.list.push_back(from_message(element));
+      for (const v1::Value& element : message.list().value()) value.list.push_back(from_message(element));
       break;
     case v1::Value::kNumber:
     case v1::Value::KIND_NOT_SET:
@@ -222,8 +208,7 @@ std::vector<NamedValue> named_values(const v1::Properties& properties) {
   std::vector<NamedValue> values;
   values.reserve(static_cast<std::size_t>(properties.property_size()));
   for (const v1::Property& property : properties.property())
-    values.push_back(
-        {property.name(), from_message(property.value()), place_of(property.location())});
+    values.push_back({property.name(), from_message(property.value()), place_of(property.location())});
   return values;
 }
 

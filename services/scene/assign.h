@@ -12,8 +12,8 @@ namespace gravitas::scene {
 // Checks the value of a property (no block) and sets the field of `block`, together with its place.
 // Blanks around ids are trimmed with a warning. A value that breaks a rule is reported and sets
 // nothing.
-void assign(const BlockRule& rule, const Entry& entry, PropertyValue value,
-            google::protobuf::Message* block, Diagnostics* diagnostics);
+void assign(const BlockRule& rule, const Entry& entry, PropertyValue value, google::protobuf::Message* block,
+            Diagnostics* diagnostics);
 
 // Sets `Name = value` among properties that a plugin declares; one of that name is replaced.
 void assign_property(std::string_view name, const TextPosition& name_position, PropertyValue value,

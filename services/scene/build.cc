@@ -23,17 +23,15 @@ constexpr double kStepTolerance = 1e-9;
 
 const v1::Environment* find_environment(const v1::Scene& scene, Diagnostics* diagnostics) {
   if (scene.environment_size() == 0) {
-    diagnostics->error(place_of(scene.location()),
-                       "the scene has no Environment { … }; required: one");
+    diagnostics->error(place_of(scene.location()), "the scene has no Environment { … }; required: one");
     return nullptr;
   }
   const v1::Environment& first = scene.environment(0);
   if (scene.environment_size() == 1) return &first;
   const v1::Environment& second = scene.environment(1);
   diagnostics->error(place_of(second.location()),
-                     "a second Environment \"" + second.id() + "\"; the first is \"" + first.id() +
-                         "\" at " + diagnostics->place_text(place_of(first.location())) +
-                         "; allowed: one");
+                     "a second Environment \"" + second.id() + "\"; the first is \"" + first.id() + "\" at " +
+                         diagnostics->place_text(place_of(first.location())) + "; allowed: one");
   return nullptr;
 }
 
@@ -42,14 +40,12 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
   const double time_step = properties.time_step(), duration = properties.duration();
   const double ratio = duration / time_step, whole = std::round(ratio);
   // a quotient of two rounded numbers is off by a rounding or two of its own size
-  const double tolerance =
-      std::max(kStepTolerance, 4.0 * std::numeric_limits<double>::epsilon() * ratio);
+  const double tolerance = std::max(kStepTolerance, 4.0 * std::numeric_limits<double>::epsilon() * ratio);
   const bool is_whole = std::fabs(ratio - whole) <= tolerance;
   const double steps = is_whole ? whole : std::ceil(ratio);
   if (!(steps <= static_cast<double>(std::numeric_limits<std::uint32_t>::max()))) {
-    context->diagnostics->error(
-        place_of(properties, SimulatorProperties::kTimeStepFieldNumber),
-        "Duration/TimeStep is " + number_text(ratio) + "; allowed: up to 4294967295 steps");
+    context->diagnostics->error(place_of(properties, SimulatorProperties::kTimeStepFieldNumber),
+                                "Duration/TimeStep is " + number_text(ratio) + "; allowed: up to 4294967295 steps");
     return;
   }
   context->description.time_step = time_step;
@@ -59,9 +55,9 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
 
 void build_simulator(const Simulator& simulator, BuildContext* context) {
   if (simulator.type() != "Basic") {
-    context->diagnostics->error(place_of(simulator, Simulator::kTypeFieldNumber),
-                                "the simulator \"" + simulator.type() +
-                                    "\" is not supported by this version; allowed: \"Basic\"");
+    context->diagnostics->error(
+        place_of(simulator, Simulator::kTypeFieldNumber),
+        "the simulator \"" + simulator.type() + "\" is not supported by this version; allowed: \"Basic\"");
   }
   const SimulatorProperties& properties = simulator.custom_properties();
   if (properties.substeps() != 1) {
@@ -88,9 +84,8 @@ void build_forces(PluginSelection* plugins, BuildContext* context) {
     const TextPosition place = place_of(force, v1::Force::kTypeFieldNumber);
     description.plugin = plugins->serve(Slot::kForce, force.type(), place, &type);
     if (type == nullptr) continue;
-    context->flatten_properties(type->properties, force.custom_properties(),
-                                place_of(force.location()), force.type() + " \"" + force.id() + '"',
-                                &description.parameters);
+    context->flatten_properties(type->properties, force.custom_properties(), place_of(force.location()),
+                                force.type() + " \"" + force.id() + '"', &description.parameters);
   }
 }
 
@@ -98,19 +93,16 @@ void build_forces(PluginSelection* plugins, BuildContext* context) {
 // ------------------------------------------------------------------------------------------------------
 
 // The row of the body that a joint names, or kNone for the world. False after an error.
-bool find_body(const Constraint& joint, int field, const IdIndex& bodies, BuildContext* context,
-               std::uint32_t* row) {
+bool find_body(const Constraint& joint, int field, const IdIndex& bodies, BuildContext* context, std::uint32_t* row) {
   const bool is_first = field == Constraint::kBody1FieldNumber;
   const std::string& id = is_first ? joint.body1() : joint.body2();
   *row = kNone;
   if (id.empty()) return true;
-  *row =
-      bodies.find(id, is_first ? "Body1" : "Body2", place_of(joint, field), context->diagnostics);
+  *row = bodies.find(id, is_first ? "Body1" : "Body2", place_of(joint, field), context->diagnostics);
   return *row != kNone;
 }
 
-void check_bodies(const Constraint& joint, const kernel::ConstraintDescription& description,
-                  BuildContext* context) {
+void check_bodies(const Constraint& joint, const kernel::ConstraintDescription& description, BuildContext* context) {
   const auto is_movable = [&](std::uint32_t row) {
     return row != kNone && (context->description.bodies[row].flags & kMovable) != 0;
   };
@@ -141,16 +133,13 @@ void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildCon
     description.breaking_threshold = joint.breaking_threshold();
     description.breaking_force = joint.breaking_force();
     const TypeDeclaration* type = nullptr;
-    description.plugin = plugins->serve(Slot::kConstraint, joint.type(),
-                                        place_of(joint, Constraint::kTypeFieldNumber), &type);
-    const bool has_first =
-        find_body(joint, Constraint::kBody1FieldNumber, bodies, context, &description.body1);
-    const bool has_second =
-        find_body(joint, Constraint::kBody2FieldNumber, bodies, context, &description.body2);
+    description.plugin =
+        plugins->serve(Slot::kConstraint, joint.type(), place_of(joint, Constraint::kTypeFieldNumber), &type);
+    const bool has_first = find_body(joint, Constraint::kBody1FieldNumber, bodies, context, &description.body1);
+    const bool has_second = find_body(joint, Constraint::kBody2FieldNumber, bodies, context, &description.body2);
     if (has_first && has_second) check_bodies(joint, description, context);
     if (type != nullptr) {
-      context->flatten_properties(type->properties, joint.custom_properties(),
-                                  place_of(joint.location()),
+      context->flatten_properties(type->properties, joint.custom_properties(), place_of(joint.location()),
                                   joint.type() + " \"" + joint.id() + '"', &description.parameters);
     }
     context->description.constraints.push_back(std::move(description));
@@ -188,8 +177,7 @@ void build_world(BuildContext* context) {
 
 }  // namespace
 
-std::optional<kernel::EnvironmentDescription> build(const v1::Scene& scene, Catalog* catalog,
-                                                    Problems* problems) {
+std::optional<kernel::EnvironmentDescription> build(const v1::Scene& scene, Catalog* catalog, Problems* problems) {
   Diagnostics diagnostics(scene, problems);
   const v1::Environment* environment = find_environment(scene, &diagnostics);
   if (environment == nullptr) return std::nullopt;

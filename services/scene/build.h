@@ -45,7 +45,6 @@ namespace gravitas::scene {
 // Builds the environment of a scene that was read (and overridden) without errors. Libraries that
 // the scene names are added to the catalogue. Returns nothing if there was an error. `threads` and
 // `events` of the description are the caller's to set.
-std::optional<kernel::EnvironmentDescription> build(const v1::Scene& scene, Catalog* catalog,
-                                                    Problems* problems);
+std::optional<kernel::EnvironmentDescription> build(const v1::Scene& scene, Catalog* catalog, Problems* problems);
 
 }  // namespace gravitas::scene

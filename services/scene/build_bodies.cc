@@ -23,8 +23,7 @@ Quaternion quaternion_of(const google::protobuf::RepeatedField<double>& numbers)
 }
 
 bool is_identity(const Pose& pose) {
-  return pose.position == Vector3::Zero() &&
-         pose.orientation.coeffs() == Quaternion::Identity().coeffs();
+  return pose.position == Vector3::Zero() && pose.orientation.coeffs() == Quaternion::Identity().coeffs();
 }
 
 // Mass, moments and the pose X_GB of the centre of mass with principal axes in the geometry's
@@ -38,10 +37,7 @@ struct Inertia {
 class BodyBuilder {
  public:
   BodyBuilder(const Body& body, const BodyReferences& references, BuildContext* context)
-      : body_(body),
-        references_(references),
-        context_(*context),
-        diagnostics_(*context->diagnostics) {}
+      : body_(body), references_(references), context_(*context), diagnostics_(*context->diagnostics) {}
 
   void build(kernel::BodyDescription* description) {
     description->id = body_.id();
@@ -63,8 +59,8 @@ class BodyBuilder {
 
   bool find_geometry(kernel::BodyDescription* description) {
     if (body_.geometry_id().empty()) return true;
-    description->shape = references_.geometries.find(
-        body_.geometry_id(), "GeometryId", place(Body::kGeometryIdFieldNumber), &diagnostics_);
+    description->shape = references_.geometries.find(body_.geometry_id(), "GeometryId",
+                                                     place(Body::kGeometryIdFieldNumber), &diagnostics_);
     if (description->shape == kNone) return false;
     solid_ = &references_.solids[description->shape];
     description->flags |= kHasShape;
@@ -75,8 +71,7 @@ class BodyBuilder {
   // Movable, kinematic or immovable, and what contradicts itself.
   bool find_kind(kernel::BodyDescription* description) {
     const bool is_unbounded = solid_ != nullptr && solid_->is_unbounded();
-    const bool is_immovable =
-        body_.has_immovable() ? body_.immovable() : is_unbounded && !body_.kinematic();
+    const bool is_immovable = body_.has_immovable() ? body_.immovable() : is_unbounded && !body_.kinematic();
     if (is_immovable && body_.kinematic()) {
       diagnostics_.error(place(Body::kImmovableFieldNumber),
                          what() + " is Immovable and Kinematic; allowed: one of them");
@@ -111,26 +106,21 @@ class BodyBuilder {
     if (body_.has_mass() && body_.mass_density() > 0.0)
       return refuse(Body::kMassFieldNumber, "has Mass and MassDensity; allowed: one of them");
     if (body_.has_mass() && body_.mass() == 0.0)
-      return refuse(Body::kMassFieldNumber,
-                    "is movable and has Mass 0; allowed: a number > 0, or Immovable = true");
+      return refuse(Body::kMassFieldNumber, "is movable and has Mass 0; allowed: a number > 0, or Immovable = true");
     if (has_moments && !body_.has_mass())
-      return refuse(Body::kPrincipalMomentsFieldNumber,
-                    "has PrincipalMoments without Mass; allowed: both together");
+      return refuse(Body::kPrincipalMomentsFieldNumber, "has PrincipalMoments without Mass; allowed: both together");
     for (const int field : {Body::kCentreOfMassFieldNumber, Body::kPrincipalAxesFieldNumber})
       if (written(field) && !has_moments)
-        return refuse(
-            field,
-            "has CentreOfMass or PrincipalAxes without PrincipalMoments; allowed: with Mass and "
-            "PrincipalMoments");
+        return refuse(field,
+                      "has CentreOfMass or PrincipalAxes without PrincipalMoments; allowed: with Mass and "
+                      "PrincipalMoments");
     if (has_moments) return declared_inertia();
     if (solid_ == nullptr)
-      return refuse(
-          body_.has_mass() ? Body::kMassFieldNumber : Body::kIdFieldNumber,
-          "has no geometry to take its moments from; required: Mass and PrincipalMoments");
+      return refuse(body_.has_mass() ? Body::kMassFieldNumber : Body::kIdFieldNumber,
+                    "has no geometry to take its moments from; required: Mass and PrincipalMoments");
     if (!solid_->has_mass())
-      return refuse(
-          body_.has_mass() ? Body::kMassFieldNumber : Body::kGeometryIdFieldNumber,
-          "has a geometry whose mass is not known here; required: Mass and PrincipalMoments");
+      return refuse(body_.has_mass() ? Body::kMassFieldNumber : Body::kGeometryIdFieldNumber,
+                    "has a geometry whose mass is not known here; required: Mass and PrincipalMoments");
     return inertia_of_solid();
   }
 
@@ -138,15 +128,13 @@ class BodyBuilder {
     double density = body_.mass_density();
     if (!body_.has_mass() && density == 0.0) {
       density = kUnspecifiedDensity;
-      diagnostics_.warning(
-          place(Body::kMassDensityFieldNumber),
-          what() +
-              (body_.has_mass_density() ? " has MassDensity 0, which means unspecified"
-                                        : " has neither MassDensity nor Mass") +
-              ": it gets 1000 kg/m^3");
+      diagnostics_.warning(place(Body::kMassDensityFieldNumber),
+                           what() +
+                               (body_.has_mass_density() ? " has MassDensity 0, which means unspecified"
+                                                         : " has neither MassDensity nor Mass") +
+                               ": it gets 1000 kg/m^3");
     }
-    MassProperties properties =
-        mass_properties(*solid_, body_.has_mass() ? kUnspecifiedDensity : density);
+    MassProperties properties = mass_properties(*solid_, body_.has_mass() ? kUnspecifiedDensity : density);
     if (body_.has_mass()) properties = scaled_to_mass(properties, body_.mass());
     return checked(properties, principal_axes(properties), Body::kMassDensityFieldNumber);
   }
@@ -168,11 +156,9 @@ class BodyBuilder {
     return checked(properties, axes, Body::kPrincipalMomentsFieldNumber);
   }
 
-  std::optional<Inertia> checked(const MassProperties& properties, const PrincipalAxes& axes,
-                                 int field) {
+  std::optional<Inertia> checked(const MassProperties& properties, const PrincipalAxes& axes, int field) {
     std::string why;
-    if (!validate(properties, &why))
-      return refuse(field, "has a mass that no solid can have: " + why);
+    if (!validate(properties, &why)) return refuse(field, "has a mass that no solid can have: " + why);
     return Inertia{properties.mass, axes.moments, {properties.centre_of_mass, axes.orientation}};
   }
 
@@ -180,8 +166,7 @@ class BodyBuilder {
   Vector3 centre_of_mass() const {
     if (body_.centre_of_mass_size() > 0) return vector_of(body_.centre_of_mass());
     const bool is_known = solid_ != nullptr && solid_->has_mass();
-    return is_known ? mass_properties(*solid_, kUnspecifiedDensity).centre_of_mass
-                    : Vector3::Zero();
+    return is_known ? mass_properties(*solid_, kUnspecifiedDensity).centre_of_mass : Vector3::Zero();
   }
 
   // Of a body that nothing pushes: the frame counts, the mass does not.
@@ -201,18 +186,15 @@ class BodyBuilder {
     const bool coincide = is_identity(X_GB);
     description->pose = coincide ? X_WG : compose(X_WG, X_GB);
     description->geometry = coincide ? Pose{} : inverse(X_GB);
-    description->twist = {vector_of(kinetic.linear_velocity()),
-                          vector_of(kinetic.angular_velocity())};
+    description->twist = {vector_of(kinetic.linear_velocity()), vector_of(kinetic.angular_velocity())};
     if (is_movable_) description->damping = kinetic.damping_coefficient();
-    const bool moves = description->twist.linear != Vector3::Zero() ||
-                       description->twist.angular != Vector3::Zero();
+    const bool moves = description->twist.linear != Vector3::Zero() || description->twist.angular != Vector3::Zero();
     if (is_movable_ || body_.kinematic() || !moves) return;
     description->twist = {};
     const bool is_linear = is_written(kinetic, KineticProperties::kLinearVelocityFieldNumber);
-    diagnostics_.warning(
-        place_of(kinetic, is_linear ? KineticProperties::kLinearVelocityFieldNumber
-                                    : KineticProperties::kAngularVelocityFieldNumber),
-        what() + " is immovable: its velocities are dropped (a body that keeps them is Kinematic)");
+    diagnostics_.warning(place_of(kinetic, is_linear ? KineticProperties::kLinearVelocityFieldNumber
+                                                     : KineticProperties::kAngularVelocityFieldNumber),
+                         what() + " is immovable: its velocities are dropped (a body that keeps them is Kinematic)");
   }
 
   void set_bound(kernel::BodyDescription* description) {
@@ -220,16 +202,16 @@ class BodyBuilder {
     const std::string& type = body_.bounding_volume_type();
     description->bound = local_bound(*solid_, type, description->geometry);
     if (!solid_->is_unbounded() || type.empty() || type == "None") return;
-    diagnostics_.warning(place(Body::kBoundingVolumeTypeFieldNumber),
-                         what() + " has an unbounded geometry: BoundingVolumeType \"" + type +
-                             "\" is taken as \"None\"");
+    diagnostics_.warning(
+        place(Body::kBoundingVolumeTypeFieldNumber),
+        what() + " has an unbounded geometry: BoundingVolumeType \"" + type + "\" is taken as \"None\"");
   }
 
   void set_material(kernel::BodyDescription* description) {
     description->material = kNone;
     if (body_.material().empty()) return;
-    description->material = references_.materials.find(
-        body_.material(), "Material", place(Body::kMaterialFieldNumber), &diagnostics_);
+    description->material =
+        references_.materials.find(body_.material(), "Material", place(Body::kMaterialFieldNumber), &diagnostics_);
   }
 
   void set_forces(kernel::BodyDescription* description) {
@@ -249,8 +231,7 @@ class BodyBuilder {
     }
     if (is_movable_ || description->forces.empty()) return;
     description->forces.clear();
-    diagnostics_.warning(position, what() + " is " +
-                                       (body_.kinematic() ? "kinematic" : "immovable") +
+    diagnostics_.warning(position, what() + " is " + (body_.kinematic() ? "kinematic" : "immovable") +
                                        ": its Forces do nothing and are dropped");
   }
 
@@ -268,8 +249,7 @@ void build_bodies(const BodyReferences& references, BuildContext* context) {
   const auto& bodies = context->environment.space().bodies().body();
   context->description.bodies.resize(static_cast<std::size_t>(bodies.size()));
   for (int i = 0; i < bodies.size() && !context->diagnostics->full(); ++i)
-    BodyBuilder(bodies[i], references, context)
-        .build(&context->description.bodies[static_cast<std::size_t>(i)]);
+    BodyBuilder(bodies[i], references, context).build(&context->description.bodies[static_cast<std::size_t>(i)]);
 }
 
 }  // namespace gravitas::scene

@@ -25,12 +25,10 @@ class IdIndex {
  public:
   // Reports ids that stand twice.
   template <typename Block>
-  IdIndex(std::string kind, const google::protobuf::RepeatedPtrField<Block>& blocks,
-          Diagnostics* diagnostics)
+  IdIndex(std::string kind, const google::protobuf::RepeatedPtrField<Block>& blocks, Diagnostics* diagnostics)
       : kind_(std::move(kind)) {
     rows_.reserve(static_cast<std::size_t>(blocks.size()));
-    for (int i = 0; i < blocks.size(); ++i)
-      rows_.emplace_back(blocks[i].id(), static_cast<std::uint32_t>(i));
+    for (int i = 0; i < blocks.size(); ++i) rows_.emplace_back(blocks[i].id(), static_cast<std::uint32_t>(i));
     std::sort(rows_.begin(), rows_.end());
     for (std::size_t i = 1; i < rows_.size(); ++i) {
       if (rows_[i].first != rows_[i - 1].first) continue;
@@ -46,14 +44,13 @@ class IdIndex {
   // The row of an id, or kNone after an error at `position` that says what `property` named.
   std::uint32_t find(std::string_view id, const std::string& property, const TextPosition& position,
                      Diagnostics* diagnostics) const {
-    const auto found = std::lower_bound(
-        rows_.begin(), rows_.end(), id,
-        [](const auto& row, std::string_view wanted) { return row.first < wanted; });
+    const auto found = std::lower_bound(rows_.begin(), rows_.end(), id,
+                                        [](const auto& row, std::string_view wanted) { return row.first < wanted; });
     if (found != rows_.end() && found->first == id) return found->second;
     std::vector<std::string> ids;
     for (const auto& [known, row] : rows_) ids.emplace_back(known);
-    diagnostics->error(position, property + " names no " + kind_ + ": \"" + std::string(id) +
-                                     "\"; " + allowed_names(id, ids));
+    diagnostics->error(position,
+                       property + " names no " + kind_ + ": \"" + std::string(id) + "\"; " + allowed_names(id, ids));
     return kNone;
   }
 
@@ -70,9 +67,8 @@ struct BuildContext {
   kernel::EnvironmentDescription description;
 
   // Flattens a block of free properties by its declaration; errors name `what` ("Sphere \"Unit\"").
-  bool flatten_properties(const std::vector<Property>& declared, const v1::Properties& given,
-                          const TextPosition& block, const std::string& what,
-                          std::vector<double>* out) {
+  bool flatten_properties(const std::vector<Property>& declared, const v1::Properties& given, const TextPosition& block,
+                          const std::string& what, std::vector<double>* out) {
     std::vector<PropertyProblem> problems;
     const bool good = flatten(declared, named_values(given), out, &problems);
     const TextPosition written = place_of(given.location());

@@ -11,8 +11,7 @@ constexpr const char* kDefaultCollision = "Standard";
 
 // Precondition: one of the choices of the grammar.
 Slot slot_of(const std::string& name) {
-  for (const Slot slot :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver})
+  for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver})
     if (name == slot_name(slot)) return slot;
   return Slot::kIntegrator;
 }
@@ -42,27 +41,22 @@ void PluginSelection::read_block(const Plugin& message) {
   const bool has_name = is_written(message, Plugin::kNameFieldNumber);
   const bool has_settings = message.custom_properties().property_size() > 0;
   if (!of_slot.empty() && !is_list(slot)) {
-    context_.diagnostics->error(
-        place_of(message, Plugin::kSlotFieldNumber),
-        "the slot " + quoted(message.slot()) + " has a Plugin already, at " +
-            context_.diagnostics->place_text(place_of(of_slot[0].message->location())) +
-            "; allowed: one");
+    context_.diagnostics->error(place_of(message, Plugin::kSlotFieldNumber),
+                                "the slot " + quoted(message.slot()) + " has a Plugin already, at " +
+                                    context_.diagnostics->place_text(place_of(of_slot[0].message->location())) +
+                                    "; allowed: one");
     return;
   }
   if ((has_name || has_settings) && !is_list(slot) && slot != Slot::kCollision) {
-    context_.diagnostics->error(has_name ? place_of(message, Plugin::kNameFieldNumber)
-                                         : place_of(message.custom_properties().location()),
-                                std::string(has_name ? "Name" : "CustomProperties") +
-                                    " of the slot " + quoted(message.slot()) +
-                                    " stands elsewhere; allowed: in " + naming_block(slot) +
-                                    " { … }");
-  }
-  if (has_settings && is_list(slot) && !has_name &&
-      !is_written(message, Plugin::kLibraryFieldNumber)) {
     context_.diagnostics->error(
-        place_of(message.custom_properties().location()),
-        "CustomProperties of an unnamed plugin; required: Name or Library, since the slot " +
-            quoted(message.slot()) + " may hold several");
+        has_name ? place_of(message, Plugin::kNameFieldNumber) : place_of(message.custom_properties().location()),
+        std::string(has_name ? "Name" : "CustomProperties") + " of the slot " + quoted(message.slot()) +
+            " stands elsewhere; allowed: in " + naming_block(slot) + " { … }");
+  }
+  if (has_settings && is_list(slot) && !has_name && !is_written(message, Plugin::kLibraryFieldNumber)) {
+    context_.diagnostics->error(place_of(message.custom_properties().location()),
+                                "CustomProperties of an unnamed plugin; required: Name or Library, since the slot " +
+                                    quoted(message.slot()) + " may hold several");
   }
   read_hosting(slot, message);
   of_slot.push_back({&message, nullptr, false});
@@ -76,12 +70,11 @@ void PluginSelection::read_hosting(Slot slot, const Plugin& message) {
     const bool hosting_differs = is_written(*other.message, Plugin::kHostingFieldNumber) &&
                                  is_written(message, Plugin::kHostingFieldNumber) &&
                                  other.message->hosting() != message.hosting();
-    const bool deadline_differs = other.message->has_deadline() && message.has_deadline() &&
-                                  other.message->deadline() != message.deadline();
+    const bool deadline_differs =
+        other.message->has_deadline() && message.has_deadline() && other.message->deadline() != message.deadline();
     if (!hosting_differs && !deadline_differs) continue;
     context_.diagnostics->error(
-        place_of(message,
-                 hosting_differs ? Plugin::kHostingFieldNumber : Plugin::kDeadlineFieldNumber),
+        place_of(message, hosting_differs ? Plugin::kHostingFieldNumber : Plugin::kDeadlineFieldNumber),
         std::string(hosting_differs ? "Hosting" : "Deadline") + " differs from that at " +
             context_.diagnostics->place_text(place_of(other.message->location())) +
             "; allowed: one for the whole slot " + quoted(message.slot()));
@@ -89,9 +82,8 @@ void PluginSelection::read_hosting(Slot slot, const Plugin& message) {
   if (message.hosting() == "direct") description.hosting = kernel::Hosting::kDirect;
   if (message.hosting() == "shm") description.hosting = kernel::Hosting::kSharedMemory;
   if (message.hosting() == "grpc") {
-    context_.diagnostics->error(
-        place_of(message, Plugin::kHostingFieldNumber),
-        "Hosting \"grpc\" is not supported by this version; allowed: \"direct\", \"shm\"");
+    context_.diagnostics->error(place_of(message, Plugin::kHostingFieldNumber),
+                                "Hosting \"grpc\" is not supported by this version; allowed: \"direct\", \"shm\"");
   }
   if (message.has_deadline()) description.deadline = message.deadline();
 }
@@ -101,25 +93,21 @@ void PluginSelection::read_library(Slot slot, Block* block) {
   const TextPosition place = place_of(*block->message, Plugin::kLibraryFieldNumber);
   const std::string& file = context_.scene.files(static_cast<int>(place.file));
   std::filesystem::path path = block->message->library();
-  if (path.is_relative() && !file.starts_with("--set "))
-    path = std::filesystem::path(file).parent_path() / path;
+  if (path.is_relative() && !file.starts_with("--set ")) path = std::filesystem::path(file).parent_path() / path;
   std::string problem;
   block->library = context_.catalog->add_library(path.string(), &problem);
   if (block->library == nullptr) {
-    context_.diagnostics->error(
-        place, "Library " + quoted(block->message->library()) + " cannot be used: " + problem +
-                   "; allowed: the path of a plugin library, from the folder of this file");
+    context_.diagnostics->error(place, "Library " + quoted(block->message->library()) + " cannot be used: " + problem +
+                                           "; allowed: the path of a plugin library, from the folder of this file");
   } else if (block->library->declaration.slot != slot) {
-    context_.diagnostics->error(place, "Library " + quoted(block->message->library()) +
-                                           " is a plugin for the slot \"" +
-                                           slot_name(block->library->declaration.slot) +
-                                           "\", not " + quoted(block->message->slot()));
+    context_.diagnostics->error(place, "Library " + quoted(block->message->library()) + " is a plugin for the slot \"" +
+                                           slot_name(block->library->declaration.slot) + "\", not " +
+                                           quoted(block->message->slot()));
     block->library = nullptr;
   } else if (is_written(*block->message, Plugin::kNameFieldNumber) &&
              block->message->name() != block->library->declaration.name) {
     context_.diagnostics->error(place_of(*block->message, Plugin::kNameFieldNumber),
-                                "Name is " + quoted(block->message->name()) +
-                                    "; the library's plugin is " +
+                                "Name is " + quoted(block->message->name()) + "; the library's plugin is " +
                                     quoted(block->library->declaration.name));
   }
 }
@@ -129,19 +117,16 @@ void PluginSelection::read_library(Slot slot, Block* block) {
 
 void PluginSelection::missing(Slot slot, const std::string& name, const TextPosition& position) {
   context_.diagnostics->error(
-      position, std::string("no ") + slot_name(slot) + " plugin " + quoted(name) +
-                    " is installed; " + allowed_names(name, context_.catalog->plugin_names(slot)) +
-                    context_.catalog->broken_text());
+      position, std::string("no ") + slot_name(slot) + " plugin " + quoted(name) + " is installed; " +
+                    allowed_names(name, context_.catalog->plugin_names(slot)) + context_.catalog->broken_text());
 }
 
-void PluginSelection::choose_named(Slot slot, const std::string& name, bool is_named,
-                                   const TextPosition& name_place, const TextPosition& block_place,
-                                   const v1::Properties& settings, bool is_needed) {
+void PluginSelection::choose_named(Slot slot, const std::string& name, bool is_named, const TextPosition& name_place,
+                                   const TextPosition& block_place, const v1::Properties& settings, bool is_needed) {
   const InstalledPlugin* library = blocks(slot).empty() ? nullptr : blocks(slot)[0].library;
   // a library that the scene brings along is meant to be used, unless the scene names another
   // plugin
-  const InstalledPlugin* plugin =
-      library != nullptr && !is_named ? library : context_.catalog->find_plugin(slot, name);
+  const InstalledPlugin* plugin = library != nullptr && !is_named ? library : context_.catalog->find_plugin(slot, name);
   if (plugin == nullptr) {
     if (is_named || is_needed) missing(slot, name, name_place);
     return;
@@ -151,8 +136,7 @@ void PluginSelection::choose_named(Slot slot, const std::string& name, bool is_n
 }
 
 const InstalledPlugin* PluginSelection::default_collision() const {
-  const InstalledPlugin* standard =
-      context_.catalog->find_plugin(Slot::kCollision, kDefaultCollision);
+  const InstalledPlugin* standard = context_.catalog->find_plugin(Slot::kCollision, kDefaultCollision);
   if (standard != nullptr) return standard;
   const std::vector<std::string> names = context_.catalog->plugin_names(Slot::kCollision);
   return names.size() == 1 ? context_.catalog->find_plugin(Slot::kCollision, names[0]) : nullptr;
@@ -161,14 +145,13 @@ const InstalledPlugin* PluginSelection::default_collision() const {
 const InstalledPlugin* PluginSelection::choose_collision(bool is_needed) {
   Block* block = blocks(Slot::kCollision).empty() ? nullptr : blocks(Slot::kCollision).data();
   const bool is_named = block != nullptr && is_written(*block->message, Plugin::kNameFieldNumber);
-  const InstalledPlugin* plugin =
-      is_named ? context_.catalog->find_plugin(Slot::kCollision, block->message->name())
-      : block != nullptr && block->library != nullptr ? block->library
-                                                      : default_collision();
+  const InstalledPlugin* plugin = is_named ? context_.catalog->find_plugin(Slot::kCollision, block->message->name())
+                                  : block != nullptr && block->library != nullptr ? block->library
+                                                                                  : default_collision();
   if (block != nullptr) block->is_used = true;
   if (plugin == nullptr) {
-    const TextPosition position = is_named ? place_of(*block->message, Plugin::kNameFieldNumber)
-                                           : place_of(context_.environment.location());
+    const TextPosition position =
+        is_named ? place_of(*block->message, Plugin::kNameFieldNumber) : place_of(context_.environment.location());
     if (is_needed || is_named)
       missing(Slot::kCollision, is_named ? block->message->name() : kDefaultCollision, position);
     return nullptr;
@@ -180,22 +163,18 @@ const InstalledPlugin* PluginSelection::choose_collision(bool is_needed) {
 // ---- slots with a list
 // -------------------------------------------------------------------------------------------
 
-std::uint32_t PluginSelection::serve(Slot slot, const std::string& type,
-                                     const TextPosition& position,
+std::uint32_t PluginSelection::serve(Slot slot, const std::string& type, const TextPosition& position,
                                      const TypeDeclaration** declaration) {
   const InstalledPlugin* plugin = context_.catalog->find_type(slot, type);
   if (plugin == nullptr) {
     context_.diagnostics->error(
-        position, std::string("no installed ") + slot_name(slot) + " plugin knows the type " +
-                      quoted(type) + "; " +
-                      allowed_names(type, context_.catalog->type_names(slot)) +
-                      context_.catalog->broken_text());
+        position, std::string("no installed ") + slot_name(slot) + " plugin knows the type " + quoted(type) + "; " +
+                      allowed_names(type, context_.catalog->type_names(slot)) + context_.catalog->broken_text());
     return kNone;
   }
   *declaration = find_type(plugin->declaration, type);
   const std::size_t next = context_.description.slot(slot).plugins.size();
-  const auto [row, is_new] =
-      rows_.try_emplace({slot, plugin->library}, static_cast<std::uint32_t>(next));
+  const auto [row, is_new] = rows_.try_emplace({slot, plugin->library}, static_cast<std::uint32_t>(next));
   if (is_new) {
     for (Block& block : blocks(slot))
       if (block.library == plugin) block.is_used = true;
@@ -212,8 +191,7 @@ void PluginSelection::add_choice(const InstalledPlugin& plugin, const v1::Proper
   const Slot slot = plugin.declaration.slot;
   TextPosition place = position;
   for (Block& block : blocks(slot)) {
-    const bool is_meant = block.library == &plugin ||
-                          block.message->name() == plugin.declaration.name ||
+    const bool is_meant = block.library == &plugin || block.message->name() == plugin.declaration.name ||
                           (slot == Slot::kCollision && block.library == nullptr);
     if (settings != nullptr || !is_meant) continue;
     settings = &block.message->custom_properties();
@@ -221,11 +199,10 @@ void PluginSelection::add_choice(const InstalledPlugin& plugin, const v1::Proper
     block.is_used = true;
   }
   kernel::PluginChoice choice{plugin.declaration, plugin.library, {}};
-  const std::string what =
-      std::string(slot_name(slot)) + " plugin " + quoted(plugin.declaration.name);
+  const std::string what = std::string(slot_name(slot)) + " plugin " + quoted(plugin.declaration.name);
   context_.flatten_properties(plugin.declaration.properties,
-                              settings == nullptr ? v1::Properties::default_instance() : *settings,
-                              place, what, &choice.settings);
+                              settings == nullptr ? v1::Properties::default_instance() : *settings, place, what,
+                              &choice.settings);
   context_.description.slot(slot).plugins.push_back(std::move(choice));
 }
 
@@ -238,9 +215,8 @@ void PluginSelection::report_unused() const {
                                       "the plugin " + quoted(block.library->declaration.name) +
                                           " of this Library is not used by anything in the scene");
       } else if (block.message->custom_properties().property_size() > 0) {
-        context_.diagnostics->warning(
-            place_of(block.message->custom_properties().location()),
-            "these CustomProperties are for no plugin that the scene uses");
+        context_.diagnostics->warning(place_of(block.message->custom_properties().location()),
+                                      "these CustomProperties are for no plugin that the scene uses");
       }
     }
   }

@@ -20,8 +20,8 @@ class PluginSelection {
   template <typename Block>
   void choose(Slot slot, const Block& block, bool is_needed) {
     choose_named(slot, block.type(), is_written(block, Block::kTypeFieldNumber),
-                 place_of(block, Block::kTypeFieldNumber), place_of(block.location()),
-                 block.custom_properties(), is_needed);
+                 place_of(block, Block::kTypeFieldNumber), place_of(block.location()), block.custom_properties(),
+                 is_needed);
   }
 
   // Chooses the collision plugin; null if there is none.
@@ -45,15 +45,13 @@ class PluginSelection {
   void read_block(const v1::Plugin& message);
   void read_hosting(Slot slot, const v1::Plugin& message);
   void read_library(Slot slot, Block* block);
-  void choose_named(Slot slot, const std::string& name, bool is_named,
-                    const TextPosition& name_place, const TextPosition& block_place,
-                    const v1::Properties& settings, bool is_needed);
+  void choose_named(Slot slot, const std::string& name, bool is_named, const TextPosition& name_place,
+                    const TextPosition& block_place, const v1::Properties& settings, bool is_needed);
   const InstalledPlugin* default_collision() const;
   void missing(Slot slot, const std::string& name, const TextPosition& position);
   // Appends the plugin to its slot. `settings` may be null: then they are looked up in the Plugins
   // blocks.
-  void add_choice(const InstalledPlugin& plugin, const v1::Properties* settings,
-                  const TextPosition& position);
+  void add_choice(const InstalledPlugin& plugin, const v1::Properties* settings, const TextPosition& position);
   std::vector<Block>& blocks(Slot slot) { return blocks_[slot]; }
 
   BuildContext& context_;

@@ -15,8 +15,7 @@ std::span<const double> numbers_of(const std::string& name, const std::vector<Pr
   std::size_t begin = 0;
   for (const Property& property : declared) {
     std::size_t size = property.flat_size();
-    if (property.kind == PropertyKind::kTable)
-      size += property.columns * static_cast<std::size_t>(flat[begin]);
+    if (property.kind == PropertyKind::kTable) size += property.columns * static_cast<std::size_t>(flat[begin]);
     if (property.name == name) return flat.subspan(begin, size);
     begin += size;
   }
@@ -62,8 +61,7 @@ bool has_size(const Solid& solid) {
   return true;
 }
 
-Solid build_shape(const Geometry& geometry, const InstalledPlugin& collision,
-                  BuildContext* context) {
+Solid build_shape(const Geometry& geometry, const InstalledPlugin& collision, BuildContext* context) {
   Solid bad;
   bad.is_good = false;
   const TypeDeclaration* type = find_type(collision.declaration, geometry.type());
@@ -71,25 +69,22 @@ Solid build_shape(const Geometry& geometry, const InstalledPlugin& collision,
     std::vector<std::string> names;
     for (const TypeDeclaration& known : collision.declaration.types) names.push_back(known.name);
     const InstalledPlugin* other = context->catalog->find_type(Slot::kCollision, geometry.type());
-    const std::string hint = other == nullptr
-                                 ? ""
-                                 : "; the plugin \"" + other->declaration.name +
-                                       "\" knows it: Plugin { Slot = \"collision\" Name = … }";
+    const std::string hint = other == nullptr ? ""
+                                              : "; the plugin \"" + other->declaration.name +
+                                                    "\" knows it: Plugin { Slot = \"collision\" Name = … }";
     context->diagnostics->error(place_of(geometry, Geometry::kTypeFieldNumber),
-                                "the collision plugin \"" + collision.declaration.name +
-                                    "\" knows no shape \"" + geometry.type() + "\"; " +
-                                    allowed_names(geometry.type(), names) + hint);
+                                "the collision plugin \"" + collision.declaration.name + "\" knows no shape \"" +
+                                    geometry.type() + "\"; " + allowed_names(geometry.type(), names) + hint);
     return bad;
   }
   kernel::ShapeDescription& shape = context->description.shapes.back();
   const std::string what = geometry.type() + " \"" + geometry.id() + '"';
-  if (!context->flatten_properties(type->properties, geometry.custom_properties(),
-                                   place_of(geometry.location()), what, &shape.parameters))
+  if (!context->flatten_properties(type->properties, geometry.custom_properties(), place_of(geometry.location()), what,
+                                   &shape.parameters))
     return bad;
   const Solid solid = read_solid(*type, shape.parameters);
   if (has_size(solid)) return solid;
-  context->diagnostics->error(place_of(geometry.location()),
-                              what + " has a size of zero or less; allowed: sizes > 0");
+  context->diagnostics->error(place_of(geometry.location()), what + " has a size of zero or less; allowed: sizes > 0");
   return bad;
 }
 
@@ -101,15 +96,13 @@ MassProperties mass_properties(const Solid& solid, double density) {
   return cylinder_mass_properties(solid.size.x(), solid.size.y(), density);
 }
 
-kernel::LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type,
-                               const Pose& X_BG) {
+kernel::LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG) {
   kernel::LocalBound bound;
   if (bounding_volume_type == "None" || !solid.has_mass()) return bound;
   bound.centre = X_BG.position;
   bound.orientation = X_BG.orientation;
   Vector3 half_extents = solid.size;
-  if (solid.kind == Solid::Kind::kCylinder)
-    half_extents = {solid.size.x(), solid.size.y() / 2, solid.size.x()};
+  if (solid.kind == Solid::Kind::kCylinder) half_extents = {solid.size.x(), solid.size.y() / 2, solid.size.x()};
   if (solid.kind == Solid::Kind::kSphere) {
     bound.kind = kernel::BoundKind::kSphere;
     bound.half_extents = {solid.size.x(), 0.0, 0.0};
@@ -117,8 +110,8 @@ kernel::LocalBound local_bound(const Solid& solid, const std::string& bounding_v
     // of a cylinder: the rim, not the corner of its box
     const double across = solid.kind == Solid::Kind::kBox ? half_extents.z() : 0.0;
     bound.kind = kernel::BoundKind::kSphere;
-    const double radius = std::sqrt(half_extents.x() * half_extents.x() +
-                                    half_extents.y() * half_extents.y() + across * across);
+    const double radius =
+        std::sqrt(half_extents.x() * half_extents.x() + half_extents.y() * half_extents.y() + across * across);
     // no corner outside by a rounding
     bound.half_extents = {radius * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()), 0.0, 0.0};
   } else {

@@ -32,8 +32,7 @@ PropertyKind list_kind(const pb::FieldDescriptor& field, const pb::FieldOptions&
   malformed(field, "is a list of numbers that is neither a vector nor a quaternion");
 }
 
-Property declare(const std::string& name, const pb::FieldDescriptor& field,
-                 const pb::FieldOptions& rules) {
+Property declare(const std::string& name, const pb::FieldDescriptor& field, const pb::FieldOptions& rules) {
   Property declared;
   declared.name = name;
   declared.unit = rules.GetExtension(options::unit);
@@ -61,8 +60,7 @@ Property declare(const std::string& name, const pb::FieldDescriptor& field,
 }
 
 Form form_of(const pb::FieldDescriptor& field) {
-  if (field.type() == pb::FieldDescriptor::TYPE_STRING)
-    return field.is_repeated() ? Form::kTexts : Form::kText;
+  if (field.type() == pb::FieldDescriptor::TYPE_STRING) return field.is_repeated() ? Form::kTexts : Form::kText;
   if (field.type() != pb::FieldDescriptor::TYPE_MESSAGE) return Form::kNumbers;
   if (is_named(field.message_type(), "Value")) return Form::kValue;
   return is_named(field.message_type(), "Properties") ? Form::kProperties : Form::kBlock;
@@ -102,8 +100,7 @@ class Grammar {
       rule->entries.push_back(entry(field));
       rule->names.push_back(rule->entries.back().name);
     }
-    if (rule->entries.size() > kMaximumEntries)
-      malformed(*message.field(0), "stands in a block of more than 64 names");
+    if (rule->entries.size() > kMaximumEntries) malformed(*message.field(0), "stands in a block of more than 64 names");
     std::sort(rule->entries.begin(), rule->entries.end(),
               [](const Entry& a, const Entry& b) { return a.name < b.name; });
     for (std::size_t i = 0; i < rule->entries.size(); ++i) rule->entries[i].index = i;
@@ -127,11 +124,8 @@ class Grammar {
     if (entry.form == Form::kBlock) entry.block = &rule(*field.message_type());
     if (rules.HasExtension(options::shorthand)) {
       entry.shorthand =
-          entry.block == nullptr
-              ? nullptr
-              : entry.block->find(pascal_case(rules.GetExtension(options::shorthand)));
-      if (entry.shorthand == nullptr)
-        malformed(field, "has a shorthand for no property of its block");
+          entry.block == nullptr ? nullptr : entry.block->find(pascal_case(rules.GetExtension(options::shorthand)));
+      if (entry.shorthand == nullptr) malformed(field, "has a shorthand for no property of its block");
     }
     read_default(rules.GetExtension(options::default_value), &entry);
     return entry;
@@ -157,9 +151,8 @@ std::string name_of(const pb::Descriptor& message, int field_number) {
 }
 
 const Entry* BlockRule::find(std::string_view wanted) const {
-  const auto found =
-      std::lower_bound(entries.begin(), entries.end(), wanted,
-                       [](const Entry& entry, std::string_view text) { return entry.name < text; });
+  const auto found = std::lower_bound(entries.begin(), entries.end(), wanted,
+                                      [](const Entry& entry, std::string_view text) { return entry.name < text; });
   return found != entries.end() && found->name == wanted ? &*found : nullptr;
 }
 

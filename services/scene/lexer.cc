@@ -20,9 +20,7 @@ struct CodePoint {
 };
 
 CodePoint decode(const char* cursor, const char* end) {
-  const auto byte = [&](std::size_t i) {
-    return static_cast<std::uint32_t>(static_cast<unsigned char>(cursor[i]));
-  };
+  const auto byte = [&](std::size_t i) { return static_cast<std::uint32_t>(static_cast<unsigned char>(cursor[i])); };
   const std::uint32_t first = byte(0);
   if (first < 0x80U) return {1, first};
   const std::size_t length = first >= 0xF0U ? 4 : first >= 0xE0U ? 3 : 2;
@@ -47,8 +45,8 @@ bool is_underflow(std::string_view number) {
   const std::size_t leading = digits.find_first_of("123456789");
   if (leading == std::string_view::npos) return true;
   // the power of ten of the leading digit, but for the exponent
-  long long power = leading < point ? static_cast<long long>(point - leading) - 1
-                                    : -static_cast<long long>(leading - point);
+  long long power =
+      leading < point ? static_cast<long long>(point - leading) - 1 : -static_cast<long long>(leading - point);
   if (mark != std::string_view::npos) {
     std::string_view exponent = number.substr(mark + 1);
     const bool is_negative = exponent.starts_with('-');
@@ -91,8 +89,7 @@ Lexer::Lexer(std::string_view text, std::uint32_t file)
 }
 
 TextPosition Lexer::position() const {
-  return {file_, line_,
-          static_cast<std::uint32_t>(cursor_ - line_start_) - continuation_bytes_ + 1};
+  return {file_, line_, static_cast<std::uint32_t>(cursor_ - line_start_) - continuation_bytes_ + 1};
 }
 
 void Lexer::start_line() {
@@ -147,19 +144,15 @@ void Lexer::skip_separators() {
 }
 
 void Lexer::refuse_character() const {
-  constexpr const char* kAllowed =
-      "; allowed: names, numbers, texts in double quotes, { } = , and comments";
-  if (*cursor_ == '\0')
-    throw SyntaxError{position(), "a byte of value zero; a scene is a text file"};
+  constexpr const char* kAllowed = "; allowed: names, numbers, texts in double quotes, { } = , and comments";
+  if (*cursor_ == '\0') throw SyntaxError{position(), "a byte of value zero; a scene is a text file"};
   const CodePoint code = decode(cursor_, end_);
-  if (code.length == 0)
-    throw SyntaxError{position(), "a byte that is no UTF-8; a scene is a text file in UTF-8"};
+  if (code.length == 0) throw SyntaxError{position(), "a byte that is no UTF-8; a scene is a text file in UTF-8"};
   std::array<char, 16> number{};
   std::snprintf(number.data(), number.size(), "U+%04X", code.value);
   const bool is_visible = code.value > 0x20U && code.value != 0x7FU;
   const std::string character = is_visible ? '"' + std::string(cursor_, code.length) + "\" " : "";
-  throw SyntaxError{position(),
-                    "unexpected character " + character + '(' + number.data() + ')' + kAllowed};
+  throw SyntaxError{position(), "unexpected character " + character + '(' + number.data() + ')' + kAllowed};
 }
 
 void Lexer::next(Token* token) {
@@ -197,8 +190,7 @@ void Lexer::read_name(Token* token) {
 void Lexer::read_number(Token* token) {
   const char* start = cursor_;
   // everything that could be meant as one number, so that 0x10 or 1.2.3 is refused as a whole
-  while (cursor_ != end_ &&
-         (is_word(*cursor_) || *cursor_ == '.' || *cursor_ == '+' || *cursor_ == '-')) {
+  while (cursor_ != end_ && (is_word(*cursor_) || *cursor_ == '.' || *cursor_ == '+' || *cursor_ == '-')) {
     const bool is_sign = *cursor_ == '+' || *cursor_ == '-';
     if (is_sign && cursor_ != start && cursor_[-1] != 'e' && cursor_[-1] != 'E') break;
     ++cursor_;
@@ -208,21 +200,17 @@ void Lexer::read_number(Token* token) {
   std::string_view digits = token->name;
   if (digits.starts_with('+')) digits.remove_prefix(1);
   const std::string_view unsigned_digits = digits.starts_with('-') ? digits.substr(1) : digits;
-  const bool starts_well = !unsigned_digits.empty() &&
-                           (is_digit(unsigned_digits[0]) || unsigned_digits[0] == '.') &&
+  const bool starts_well = !unsigned_digits.empty() && (is_digit(unsigned_digits[0]) || unsigned_digits[0] == '.') &&
                            !(token->name.starts_with('+') && digits.starts_with('-'));
   const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), token->number);
-  if (!starts_well || read.ec == std::errc::invalid_argument ||
-      read.ptr != digits.data() + digits.size()) {
-    throw SyntaxError{token->position,
-                      '"' + std::string(token->name) +
-                          "\" is no number; allowed: decimal numbers such as 2, -0.5 or 1.5e-3"};
+  if (!starts_well || read.ec == std::errc::invalid_argument || read.ptr != digits.data() + digits.size()) {
+    throw SyntaxError{token->position, '"' + std::string(token->name) +
+                                           "\" is no number; allowed: decimal numbers such as 2, -0.5 or 1.5e-3"};
   }
   if (read.ec != std::errc::result_out_of_range) return;
   if (!is_underflow(unsigned_digits)) {
-    throw SyntaxError{token->position,
-                      "the number " + std::string(token->name) +
-                          " is too large; allowed: magnitudes up to 1.7976931348623157e308"};
+    throw SyntaxError{token->position, "the number " + std::string(token->name) +
+                                           " is too large; allowed: magnitudes up to 1.7976931348623157e308"};
   }
   token->number = digits.starts_with('-') ? -0.0 : 0.0;
 }
@@ -233,9 +221,8 @@ void Lexer::read_text(Token* token) {
   ++cursor_;
   while (true) {
     if (cursor_ == end_ || *cursor_ == '\n') {
-      throw SyntaxError{
-          token->position,
-          "this text does not end; a text ends with a double quote on the line it begins on"};
+      throw SyntaxError{token->position,
+                        "this text does not end; a text ends with a double quote on the line it begins on"};
     }
     const TextPosition here = position();
     const char c = *cursor_;
@@ -246,8 +233,7 @@ void Lexer::read_text(Token* token) {
     }
     const CodePoint code = decode(cursor_, end_);
     if (code.length == 0)
-      throw SyntaxError{here,
-                        "a byte that is no UTF-8 inside a text; a scene is a text file in UTF-8"};
+      throw SyntaxError{here, "a byte that is no UTF-8 inside a text; a scene is a text file in UTF-8"};
     if ((code.value < 0x20U && c != '\t' && c != '\r') || code.value == 0x7FU) refuse_character();
     token->text.append(cursor_, code.length);
     cursor_ += code.length;

@@ -10,16 +10,7 @@
 
 namespace gravitas::scene {
 
-enum class TokenKind : std::uint32_t {
-  kName,
-  kNumber,
-  kText,
-  kOpen,
-  kClose,
-  kEquals,
-  kComma,
-  kEnd
-};
+enum class TokenKind : std::uint32_t { kName, kNumber, kText, kOpen, kClose, kEquals, kComma, kEnd };
 
 struct Token {
   TokenKind kind = TokenKind::kEnd;

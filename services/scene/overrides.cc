@@ -21,9 +21,8 @@ struct Refused {
 };
 
 // Words that a path begins with.
-const std::vector<std::string> kRoots = {"Integrator", "Solver",   "Space",    "Collision",
-                                         "Simulator",  "Body",     "Geometry", "Constraint",
-                                         "Force",      "Material", "Plugin",   "Environment"};
+const std::vector<std::string> kRoots = {"Integrator", "Solver",     "Space", "Collision", "Simulator", "Body",
+                                         "Geometry",   "Constraint", "Force", "Material",  "Plugin",    "Environment"};
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
@@ -50,24 +49,20 @@ class Override {
   // Of a byte of the text.
   TextPosition position(std::size_t offset) const {
     std::uint32_t column = 1;
-    for (const char c : text_.substr(0, offset))
-      column += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+    for (const char c : text_.substr(0, offset)) column += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
     return {file_, 1, column};
   }
 
   void apply() {
     const std::size_t equals = text_.find('=');
-    if (equals == std::string_view::npos)
-      throw Refused{0, "there is no \"=\"; allowed: PATH=VALUE"};
+    if (equals == std::string_view::npos) throw Refused{0, "there is no \"=\"; allowed: PATH=VALUE"};
     const Part path = trimmed({text_.substr(0, equals), 0});
     value_ = trimmed({text_.substr(equals + 1), equals + 1});
     if (path.text.empty()) throw Refused{0, "the path is empty; allowed: PATH=VALUE"};
-    if (value_.text.empty())
-      throw Refused{value_.offset, "the value is empty; allowed: a value, \"\" for no text"};
+    if (value_.text.empty()) throw Refused{value_.offset, "the value is empty; allowed: a value, \"\" for no text"};
     const std::size_t dot = path.text.find('.');
     const Part root = path.until(std::min(dot, path.text.size()));
-    const Part rest =
-        dot == std::string_view::npos ? path.from(path.text.size()) : path.from(dot + 1);
+    const Part rest = dot == std::string_view::npos ? path.from(path.text.size()) : path.from(dot + 1);
     if (dot != std::string_view::npos && rest.text.empty())
       throw Refused{rest.offset, "the path ends with a dot; allowed: PATH=VALUE"};
     apply_at(root, rest);
@@ -88,26 +83,20 @@ class Override {
     if (word == "Environment") return property(environment(root), rest, root);
     if (word == "Plugin") {
       const Part slot = rest.until(std::min(rest.text.find('.'), rest.text.size()));
-      return property(plugin(slot), rest.from(std::min(slot.text.size() + 1, rest.text.size())),
-                      slot);
+      return property(plugin(slot), rest.from(std::min(slot.text.size() + 1, rest.text.size())), slot);
     }
     if (word == "Body")
-      return with_id(environment(root)->mutable_space()->mutable_bodies()->mutable_body(), root,
-                     rest);
+      return with_id(environment(root)->mutable_space()->mutable_bodies()->mutable_body(), root, rest);
     if (word == "Constraint")
       return with_id(environment(root)->mutable_constraints()->mutable_constraint(), root, rest);
-    if (word == "Geometry")
-      return with_id(scene_->mutable_geometries()->mutable_geometry(), root, rest);
-    if (word == "Material")
-      return with_id(scene_->mutable_materials()->mutable_material(), root, rest);
+    if (word == "Geometry") return with_id(scene_->mutable_geometries()->mutable_geometry(), root, rest);
+    if (word == "Material") return with_id(scene_->mutable_materials()->mutable_material(), root, rest);
     if (word == "Force") return with_id(scene_->mutable_forces()->mutable_force(), root, rest);
-    throw Refused{root.offset, "the path begins with \"" + std::string(word) + "\"; " +
-                                   allowed_names(word, kRoots)};
+    throw Refused{root.offset, "the path begins with \"" + std::string(word) + "\"; " + allowed_names(word, kRoots)};
   }
 
   v1::Environment* environment(const Part& root) {
-    if (scene_->environment_size() == 0)
-      throw Refused{root.offset, "the scene has no Environment; add one"};
+    if (scene_->environment_size() == 0) throw Refused{root.offset, "the scene has no Environment; add one"};
     return scene_->mutable_environment(0);
   }
 
@@ -119,8 +108,8 @@ class Override {
     const BlockRule& rule = grammar_of(*v1::Plugin::descriptor());
     const Entry& entry = *rule.find("Slot");
     if (std::find(entry.choices.begin(), entry.choices.end(), slot.text) == entry.choices.end())
-      throw Refused{slot.offset, "no slot \"" + std::string(slot.text) + "\"; " +
-                                     allowed_names(slot.text, entry.choices)};
+      throw Refused{slot.offset,
+                    "no slot \"" + std::string(slot.text) + "\"; " + allowed_names(slot.text, entry.choices)};
     v1::Plugin* plugin = plugins->add_plugin();
     set_location(position(slot.offset), plugin->mutable_location());
     plugin->set_slot(std::string(slot.text));
@@ -140,14 +129,13 @@ class Override {
          end = rest.text.rfind('.', end - 1)) {
       const Part id = rest.until(end);
       for (auto& block : *blocks)
-        if (block.id() == id.text)
-          return property(&block, rest.from(std::min(end + 1, rest.text.size())), id);
+        if (block.id() == id.text) return property(&block, rest.from(std::min(end + 1, rest.text.size())), id);
     }
     std::vector<std::string> ids;
     for (const auto& block : *blocks) ids.push_back(block.id());
     const std::string_view id = rest.text.substr(0, rest.text.rfind('.'));
-    throw Refused{rest.offset, "no " + std::string(root.text) + " \"" + std::string(id) + "\"; " +
-                                   allowed_names(id, ids)};
+    throw Refused{rest.offset,
+                  "no " + std::string(root.text) + " \"" + std::string(id) + "\"; " + allowed_names(id, ids)};
   }
 
   // ---- the property that it ends with
@@ -155,17 +143,15 @@ class Override {
   void property(pb::Message* block, const Part& path, const Part& before) {
     const BlockRule& rule = grammar_of(*block->GetDescriptor());
     if (path.text.empty())
-      throw Refused{before.offset, "a property must follow \"" + std::string(before.text) + "\"; " +
-                                       allowed_names("", rule.names)};
+      throw Refused{before.offset,
+                    "a property must follow \"" + std::string(before.text) + "\"; " + allowed_names("", rule.names)};
     const Part first = path.until(std::min(path.text.find('.'), path.text.size()));
     const Part rest = path.from(std::min(first.text.size() + 1, path.text.size()));
     const Entry* entry = rule.find(first.text);
     if (entry == nullptr) return indirect(rule, block, path);
     if (entry->is_unsupported)
-      throw Refused{first.offset,
-                    entry->name + " is not supported by this version; allowed: leave it out"};
-    const bool is_single_block =
-        entry->is_block() && !entry->field->is_repeated() && !entry->is_joined;
+      throw Refused{first.offset, entry->name + " is not supported by this version; allowed: leave it out"};
+    const bool is_single_block = entry->is_block() && !entry->field->is_repeated() && !entry->is_joined;
     if (is_single_block && !rest.text.empty()) {
       if (entry->form == Form::kProperties) return free_property(*entry, block, rest);
       return property(inner(*entry, block), rest, first);
@@ -173,16 +159,14 @@ class Override {
     if (is_single_block && entry->shorthand != nullptr)
       return set(*entry->block, *entry->shorthand, inner(*entry, block));
     if (entry->is_block() || !rest.text.empty())
-      throw Refused{first.offset, '"' + std::string(path.text) + "\" is no property; " +
-                                      allowed_names("", rule.names)};
+      throw Refused{first.offset, '"' + std::string(path.text) + "\" is no property; " + allowed_names("", rule.names)};
     set(rule, *entry, block);
   }
 
   // A name that the block does not have itself: of a block inside it, or of its plugin.
   void indirect(const BlockRule& rule, pb::Message* block, const Part& path) {
     for (const Entry& entry : rule.entries) {
-      const bool is_single =
-          entry.form == Form::kBlock && !entry.field->is_repeated() && !entry.is_joined;
+      const bool is_single = entry.form == Form::kBlock && !entry.field->is_repeated() && !entry.is_joined;
       if (!is_single || entry.block->find(path.text) == nullptr) continue;
       if (entry.shorthand == nullptr) return property(inner(entry, block), path, path);
     }
@@ -197,8 +181,7 @@ class Override {
       else
         names.push_back(name);
     }
-    throw Refused{path.offset, "no property \"" + std::string(path.text) + "\"; " +
-                                   allowed_names(path.text, names)};
+    throw Refused{path.offset, "no property \"" + std::string(path.text) + "\"; " + allowed_names(path.text, names)};
   }
 
   static pb::Message* inner(const Entry& entry, pb::Message* block) {
@@ -207,14 +190,12 @@ class Override {
 
   void set(const BlockRule& rule, const Entry& entry, pb::Message* block) {
     if (entry.name == "Type" || entry.name == "Name") drop_old_properties(rule, entry, block);
-    assign(rule, entry, entry.form == Form::kText ? text_value() : any_value(), block,
-           diagnostics_);
+    assign(rule, entry, entry.form == Form::kText ? text_value() : any_value(), block, diagnostics_);
   }
 
   void free_property(const Entry& entry, pb::Message* block, const Part& name) {
     auto* properties = static_cast<v1::Properties*>(inner(entry, block));
-    if (properties->location().line() == 0)
-      set_location(position(name.offset), properties->mutable_location());
+    if (properties->location().line() == 0) set_location(position(name.offset), properties->mutable_location());
     assign_property(name.text, position(name.offset), any_value(), properties);
   }
 
@@ -226,8 +207,7 @@ class Override {
       if (entry.form != Form::kProperties) continue;
       auto* properties = static_cast<v1::Properties*>(inner(entry, block));
       if (properties->property_size() == 0) continue;
-      diagnostics_->warning(position(value_.offset),
-                            "the " + entry.name + " written for \"" + old + "\" are dropped");
+      diagnostics_->warning(position(value_.offset), "the " + entry.name + " written for \"" + old + "\" are dropped");
       properties->clear_property();
     }
   }
@@ -253,9 +233,8 @@ class Override {
       Parser parser(value_.text, file_, Parser::Words::kBare);
       PropertyValue value = parser.value(0);
       if (parser.current().kind != TokenKind::kEnd)
-        throw SyntaxError{
-            parser.current().position,
-            "after the value comes " + shown(parser.current()) + "; allowed: one value"};
+        throw SyntaxError{parser.current().position,
+                          "after the value comes " + shown(parser.current()) + "; allowed: one value"};
       shift(position(value_.offset).column - 1, &value);
       return value;
     } catch (SyntaxError& error) {

@@ -5,15 +5,14 @@
 
 namespace gravitas::scene {
 
-Parser::Parser(std::string_view text, std::uint32_t file, Words words)
-    : lexer_(text, file), words_(words) {
+Parser::Parser(std::string_view text, std::uint32_t file, Words words) : lexer_(text, file), words_(words) {
   advance();
 }
 
 void Parser::check_depth(unsigned depth) const {
   if (depth >= kMaximumDepth) {
-    throw SyntaxError{token_.position, "braces are nested too deep; allowed: " +
-                                           std::to_string(kMaximumDepth) + " levels"};
+    throw SyntaxError{token_.position,
+                      "braces are nested too deep; allowed: " + std::to_string(kMaximumDepth) + " levels"};
   }
 }
 
@@ -41,15 +40,13 @@ PropertyValue Parser::value(unsigned depth) {
         value.text = token_.name;
         break;
       }
-      throw SyntaxError{
-          token_.position,
-          "a value was expected, not " + shown(token_) +
-              "; allowed: a number, a text in double quotes, true, false, a list { v, v }"};
+      throw SyntaxError{token_.position,
+                        "a value was expected, not " + shown(token_) +
+                            "; allowed: a number, a text in double quotes, true, false, a list { v, v }"};
     default:
-      throw SyntaxError{
-          token_.position,
-          "a value was expected, not " + shown(token_) +
-              "; allowed: a number, a text in double quotes, true, false, a list { v, v }"};
+      throw SyntaxError{token_.position,
+                        "a value was expected, not " + shown(token_) +
+                            "; allowed: a number, a text in double quotes, true, false, a list { v, v }"};
   }
   advance();
   return value;
@@ -70,8 +67,8 @@ PropertyValue Parser::list(unsigned depth) {
     result.list.push_back(value(depth + 1));
     if (token_.kind == TokenKind::kClose) break;
     if (token_.kind != TokenKind::kComma) {
-      throw SyntaxError{token_.position, "a list goes on with " + shown(token_) +
-                                             "; allowed: a comma and the next element, or \"}\""};
+      throw SyntaxError{token_.position,
+                        "a list goes on with " + shown(token_) + "; allowed: a comma and the next element, or \"}\""};
     }
     advance();
     if (token_.kind == TokenKind::kClose)
@@ -93,16 +90,15 @@ void Parser::skip_block(unsigned depth) {
   advance();
   while (token_.kind != TokenKind::kClose) {
     if (token_.kind == TokenKind::kEnd) {
-      throw SyntaxError{token_.position, "the file ends inside the block opened in line " +
-                                             std::to_string(start.line) + "; a \"}\" is missing"};
+      throw SyntaxError{token_.position, "the file ends inside the block opened in line " + std::to_string(start.line) +
+                                             "; a \"}\" is missing"};
     }
     if (token_.kind != TokenKind::kName)
-      throw SyntaxError{token_.position, "a name was expected, not " + shown(token_) +
-                                             "; allowed: Name = value, Name { … }, or \"}\""};
+      throw SyntaxError{token_.position,
+                        "a name was expected, not " + shown(token_) + "; allowed: Name = value, Name { … }, or \"}\""};
     advance();
     if (token_.kind != TokenKind::kOpen && token_.kind != TokenKind::kEquals)
-      throw SyntaxError{token_.position,
-                        "a name is followed by " + shown(token_) + "; allowed: \"=\" or \"{\""};
+      throw SyntaxError{token_.position, "a name is followed by " + shown(token_) + "; allowed: \"=\" or \"{\""};
     skip_definition(depth + 1);
   }
   advance();

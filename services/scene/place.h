@@ -12,11 +12,9 @@ namespace gravitas::scene {
 
 // The place of a written property, or nowhere. The last one counts: an override comes after the
 // file.
-inline TextPosition find_place(int field_number,
-                               const google::protobuf::RepeatedField<std::uint32_t>& places) {
+inline TextPosition find_place(int field_number, const google::protobuf::RepeatedField<std::uint32_t>& places) {
   for (int i = places.size() - 4; i >= 0; i -= 4)
-    if (places[i] == static_cast<std::uint32_t>(field_number))
-      return {places[i + 1], places[i + 2], places[i + 3]};
+    if (places[i] == static_cast<std::uint32_t>(field_number)) return {places[i + 1], places[i + 2], places[i + 3]};
   return {};
 }
 

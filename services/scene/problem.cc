@@ -5,21 +5,17 @@
 namespace gravitas::scene {
 
 std::string to_string(const SceneError& error) {
-  if (error.file.starts_with("--set "))
-    return error.file + ": " + (error.is_warning ? "warning: " : "") + error.text;
+  if (error.file.starts_with("--set ")) return error.file + ": " + (error.is_warning ? "warning: " : "") + error.text;
   return error.file + ':' + std::to_string(error.line) + ':' + std::to_string(error.column) +
          (error.is_warning ? ": warning: " : ": error: ") + error.text;
 }
 
-TextPosition place_of(const v1::Location& location) {
-  return {location.file(), location.line(), location.column()};
-}
+TextPosition place_of(const v1::Location& location) { return {location.file(), location.line(), location.column()}; }
 
 Diagnostics::~Diagnostics() {
   if (warning_count_ <= kLimit) return;
   problems_->warnings.push_back(
-      at(last_warning_,
-         std::to_string(warning_count_ - kLimit) + " more warnings, the last one here", true));
+      at(last_warning_, std::to_string(warning_count_ - kLimit) + " more warnings, the last one here", true));
 }
 
 SceneError Diagnostics::at(const TextPosition& position, std::string text, bool is_warning) const {

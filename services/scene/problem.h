@@ -17,8 +17,8 @@ namespace gravitas::scene {
 struct SceneError {
   std::string file;  // as given by the caller, or "--set PATH=VALUE" for an override
   int line = 1;      // from 1
-  int column = 1;  // from 1, in characters (Unicode code points; a tab is one); of an override: in
-                   // PATH=VALUE
+  int column = 1;    // from 1, in characters (Unicode code points; a tab is one); of an override: in
+                     // PATH=VALUE
   std::string text;  // what is wrong; what is allowed
   bool is_warning = false;
 };
@@ -53,8 +53,7 @@ class Diagnostics {
   void warning(const TextPosition& position, std::string text);
   // Problems of plugin_sdk; those without a position are about `block`. `prefix` comes before every
   // text.
-  void add(const std::vector<PropertyProblem>& problems, const TextPosition& block,
-           const std::string& prefix);
+  void add(const std::vector<PropertyProblem>& problems, const TextPosition& block, const std::string& prefix);
 
   // No error was reported to this object.
   bool ok() const { return error_count_ == 0; }

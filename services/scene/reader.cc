@@ -36,8 +36,7 @@ class Reader {
   void read_scene(v1::Scene* scene, std::uint64_t* present) {
     items(scene_grammar(), scene, present, 0);
     if (parser_.current().kind == TokenKind::kClose)
-      throw SyntaxError{parser_.current().position,
-                        "a \"}\" that closes nothing; allowed: Name { … }"};
+      throw SyntaxError{parser_.current().position, "a \"}\" that closes nothing; allowed: Name { … }"};
   }
 
  private:
@@ -49,9 +48,8 @@ class Reader {
       parser_.advance();
       const TokenKind follows = parser_.current().kind;
       if (follows != TokenKind::kEquals && follows != TokenKind::kOpen) {
-        throw SyntaxError{parser_.current().position,
-                          '"' + std::string(name) + "\" is followed by " +
-                              shown(parser_.current()) + "; allowed: \"=\" or \"{\""};
+        throw SyntaxError{parser_.current().position, '"' + std::string(name) + "\" is followed by " +
+                                                          shown(parser_.current()) + "; allowed: \"=\" or \"{\""};
       }
       const Entry* entry = rule.find(name);
       if (entry == nullptr) {
@@ -65,26 +63,22 @@ class Reader {
     const TokenKind end = parser_.current().kind;
     if (end == TokenKind::kClose || (end == TokenKind::kEnd && depth == 0)) return;
     if (end == TokenKind::kEnd) {
-      throw SyntaxError{parser_.current().position, "the file ends inside the block " +
-                                                        open_block_text() + "; a \"}\" is missing"};
+      throw SyntaxError{parser_.current().position,
+                        "the file ends inside the block " + open_block_text() + "; a \"}\" is missing"};
     }
-    throw SyntaxError{parser_.current().position,
-                      "a name was expected, not " + shown(parser_.current()) +
-                          "; allowed: Name = value, Name { … }, or \"}\""};
+    throw SyntaxError{parser_.current().position, "a name was expected, not " + shown(parser_.current()) +
+                                                      "; allowed: Name = value, Name { … }, or \"}\""};
   }
 
   std::string open_block_text() const {
-    return open_.empty()
-               ? ""
-               : open_.back().first + " opened in line " + std::to_string(open_.back().second.line);
+    return open_.empty() ? "" : open_.back().first + " opened in line " + std::to_string(open_.back().second.line);
   }
 
   // One name that the grammar knows, at the token after it.
-  void item(const BlockRule& rule, const Entry& entry, const TextPosition& position,
-            pb::Message* block, std::uint64_t* present, unsigned depth) {
+  void item(const BlockRule& rule, const Entry& entry, const TextPosition& position, pb::Message* block,
+            std::uint64_t* present, unsigned depth) {
     const bool is_brace = parser_.current().kind == TokenKind::kOpen;
-    if (refused(rule, entry, position, *block, *present, is_brace))
-      return parser_.skip_definition(depth);
+    if (refused(rule, entry, position, *block, *present, is_brace)) return parser_.skip_definition(depth);
     *present |= std::uint64_t{1} << entry.index;
     if (entry.form == Form::kProperties) return properties(entry, position, block, depth);
     if (is_brace) return inner_block(entry, position, block, depth);
@@ -94,63 +88,50 @@ class Reader {
   }
 
   // Reports a name that cannot be taken here, whatever its value is.
-  bool refused(const BlockRule& rule, const Entry& entry, const TextPosition& position,
-               const pb::Message& block, std::uint64_t present, bool is_brace) {
+  bool refused(const BlockRule& rule, const Entry& entry, const TextPosition& position, const pb::Message& block,
+               std::uint64_t present, bool is_brace) {
     if (entry.is_unsupported) {
-      diagnostics_->error(position,
-                          entry.name + " is not supported by this version; allowed: leave it out");
+      diagnostics_->error(position, entry.name + " is not supported by this version; allowed: leave it out");
     } else if (is_brace && !entry.is_block()) {
-      diagnostics_->error(
-          position, entry.name + " is a property, no block; allowed: " + entry.name + " = value");
+      diagnostics_->error(position, entry.name + " is a property, no block; allowed: " + entry.name + " = value");
     } else if (!is_brace && entry.is_block() && entry.shorthand == nullptr) {
-      diagnostics_->error(
-          position, entry.name + " is a block, no property; allowed: " + entry.name + " { … }");
+      diagnostics_->error(position, entry.name + " is a block, no property; allowed: " + entry.name + " { … }");
     } else if ((present >> entry.index & 1U) != 0 && !entry.is_joined && !repeats(entry)) {
       // the first one has no place if it was refused
       const TextPosition first = first_place(rule, entry, block);
-      diagnostics_->error(
-          position, entry.name + " is given twice" +
-                        (first.known() ? ", first at " + diagnostics_->place_text(first) : "") +
-                        "; allowed: once");
+      diagnostics_->error(position, entry.name + " is given twice" +
+                                        (first.known() ? ", first at " + diagnostics_->place_text(first) : "") +
+                                        "; allowed: once");
     } else {
       return false;
     }
     return true;
   }
 
-  static bool repeats(const Entry& entry) {
-    return entry.form == Form::kBlock && entry.field->is_repeated();
-  }
+  static bool repeats(const Entry& entry) { return entry.form == Form::kBlock && entry.field->is_repeated(); }
 
-  static TextPosition first_place(const BlockRule& rule, const Entry& entry,
-                                  const pb::Message& block) {
+  static TextPosition first_place(const BlockRule& rule, const Entry& entry, const pb::Message& block) {
     const pb::Reflection& reflection = *block.GetReflection();
     if (entry.is_block()) {
       const pb::Message& inner = reflection.GetMessage(block, entry.field);
       const pb::FieldDescriptor* location = inner.GetDescriptor()->FindFieldByName("location");
-      return place_of(
-          static_cast<const v1::Location&>(inner.GetReflection()->GetMessage(inner, location)));
+      return place_of(static_cast<const v1::Location&>(inner.GetReflection()->GetMessage(inner, location)));
     }
     for (int i = 0; i < reflection.FieldSize(block, rule.places); i += 4) {
-      const auto at = [&](int j) {
-        return reflection.GetRepeatedUInt32(block, rule.places, i + j);
-      };
+      const auto at = [&](int j) { return reflection.GetRepeatedUInt32(block, rule.places, i + j); };
       if (at(0) == static_cast<std::uint32_t>(entry.field->number())) return {at(1), at(2), at(3)};
     }
     return {};
   }
 
-  void set_place(const TextPosition& position, pb::Message* block,
-                 const pb::FieldDescriptor* location) {
-    auto* place =
-        static_cast<v1::Location*>(block->GetReflection()->MutableMessage(block, location));
+  void set_place(const TextPosition& position, pb::Message* block, const pb::FieldDescriptor* location) {
+    auto* place = static_cast<v1::Location*>(block->GetReflection()->MutableMessage(block, location));
     // a joined block keeps its first place
     if (place->line() == 0) set_location(position, place);
   }
 
   // `Name { … }` at the brace.
-  void inner_block(const Entry& entry, const TextPosition& position, pb::Message* block,
-                   unsigned depth) {
+  void inner_block(const Entry& entry, const TextPosition& position, pb::Message* block, unsigned depth) {
     parser_.check_depth(depth);
     parser_.advance();
     const pb::Reflection& reflection = *block->GetReflection();
@@ -166,15 +147,13 @@ class Reader {
   }
 
   // `Name = value` of a block, at the value.
-  void shorthand(const Entry& entry, const TextPosition& position, pb::Message* block,
-                 unsigned depth) {
+  void shorthand(const Entry& entry, const TextPosition& position, pb::Message* block, unsigned depth) {
     pb::Message* inner = block->GetReflection()->MutableMessage(block, entry.field);
     set_place(position, inner, entry.block->location);
     PropertyValue value = parser_.value(depth);
     if (value.kind != PropertyValue::Kind::kText) {
       diagnostics_->error(value.position,
-                          entry.name + " is " + shown(value) +
-                              "; allowed: a text in double quotes, or a block { … }");
+                          entry.name + " is " + shown(value) + "; allowed: a text in double quotes, or a block { … }");
       return;
     }
     assign(*entry.block, *entry.shorthand, std::move(value), inner, diagnostics_);
@@ -182,12 +161,10 @@ class Reader {
   }
 
   // A block of names that a plugin declares, at the token after its name.
-  void properties(const Entry& entry, const TextPosition& position, pb::Message* block,
-                  unsigned depth) {
+  void properties(const Entry& entry, const TextPosition& position, pb::Message* block, unsigned depth) {
     parser_.check_depth(depth);
     parser_.advance();
-    auto* properties =
-        static_cast<v1::Properties*>(block->GetReflection()->MutableMessage(block, entry.field));
+    auto* properties = static_cast<v1::Properties*>(block->GetReflection()->MutableMessage(block, entry.field));
     set_location(position, properties->mutable_location());
     open_.emplace_back(entry.name, position);
     std::map<std::string_view, TextPosition> seen;
@@ -196,10 +173,9 @@ class Reader {
       const std::string_view name = parser_.current().name;
       parser_.advance();
       if (parser_.current().kind != TokenKind::kEquals) {
-        throw SyntaxError{parser_.current().position,
-                          '"' + std::string(name) + "\" is followed by " +
-                              shown(parser_.current()) + "; allowed inside " + entry.name +
-                              ": \"=\" and a value"};
+        throw SyntaxError{parser_.current().position, '"' + std::string(name) + "\" is followed by " +
+                                                          shown(parser_.current()) + "; allowed inside " + entry.name +
+                                                          ": \"=\" and a value"};
       }
       parser_.advance();
       PropertyValue value = parser_.value(depth + 1);
@@ -211,39 +187,33 @@ class Reader {
         to_message(std::move(value), property->mutable_value());
       } else {
         diagnostics_->error(name_position, std::string(name) + " is given twice, first at " +
-                                               diagnostics_->place_text(first->second) +
-                                               "; allowed: once");
+                                               diagnostics_->place_text(first->second) + "; allowed: once");
         if (diagnostics_->full()) throw EnoughErrors{};
       }
     }
     if (parser_.current().kind == TokenKind::kEnd) {
-      throw SyntaxError{parser_.current().position, "the file ends inside the block " +
-                                                        open_block_text() + "; a \"}\" is missing"};
+      throw SyntaxError{parser_.current().position,
+                        "the file ends inside the block " + open_block_text() + "; a \"}\" is missing"};
     }
     if (parser_.current().kind != TokenKind::kClose) {
-      throw SyntaxError{parser_.current().position,
-                        "a name was expected, not " + shown(parser_.current()) +
-                            "; allowed inside " + entry.name + ": Name = value, or \"}\""};
+      throw SyntaxError{parser_.current().position, "a name was expected, not " + shown(parser_.current()) +
+                                                        "; allowed inside " + entry.name + ": Name = value, or \"}\""};
     }
     open_.pop_back();
     parser_.advance();
   }
 
   // What can be said when a block is complete.
-  void finish(const BlockRule& rule, std::uint64_t present, const TextPosition& position,
-              pb::Message* block) {
+  void finish(const BlockRule& rule, std::uint64_t present, const TextPosition& position, pb::Message* block) {
     for (const Entry& entry : rule.entries) {
       if (!entry.is_required || (present >> entry.index & 1U) != 0) continue;
-      const std::string what =
-          entry.form == Form::kText ? "a text" : allowed_values(entry.declared);
-      diagnostics_->error(position,
-                          open_.back().first + " without " + entry.name + "; required: " + what);
+      const std::string what = entry.form == Form::kText ? "a text" : allowed_values(entry.declared);
+      diagnostics_->error(position, open_.back().first + " without " + entry.name + "; required: " + what);
     }
     fill_defaults(rule, present, block, diagnostics_);
   }
 
-  void unknown(const BlockRule& rule, std::string_view name, const TextPosition& position,
-               TokenKind follows) {
+  void unknown(const BlockRule& rule, std::string_view name, const TextPosition& position, TokenKind follows) {
     const char* kind = follows == TokenKind::kOpen ? "block" : "property";
     std::string text = std::string("unknown ") + kind + " \"" + std::string(name) + "\"";
     if (!open_.empty()) text += " in " + open_.back().first;
@@ -256,8 +226,7 @@ class Reader {
     for (const Entry& entry : rule.entries) {
       if (entry.form != Form::kProperties || !nearest_name(name, rule.names).empty()) continue;
       diagnostics_->error(position, text + "; " + allowed_names(name, rule.names) +
-                                        "; properties of its type go into " + entry.name +
-                                        " { … }");
+                                        "; properties of its type go into " + entry.name + " { … }");
       return;
     }
     diagnostics_->error(position, text + "; " + allowed_names(name, rule.names));
@@ -303,8 +272,7 @@ bool read_file(const std::string& path, std::string* text, std::string* why) {
 // Reads one text after another into one scene.
 class SceneReading {
  public:
-  SceneReading(v1::Scene* scene, Problems* problems)
-      : scene_(scene), diagnostics_(*scene, problems) {}
+  SceneReading(v1::Scene* scene, Problems* problems) : scene_(scene), diagnostics_(*scene, problems) {}
 
   std::uint32_t add_file(const std::string& name) {
     scene_->add_files(name);
@@ -352,8 +320,7 @@ bool read_files(std::span<const std::string> paths, SceneDocument* document, Pro
     if (read_file(path, &text, &why)) {
       reading.read(text, file);
     } else {
-      reading.diagnostics().error({file, 1, 1},
-                                  "cannot be read: " + why + "; a scene is a readable text file");
+      reading.diagnostics().error({file, 1, 1}, "cannot be read: " + why + "; a scene is a readable text file");
     }
   }
   return reading.finish();

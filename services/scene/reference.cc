@@ -30,14 +30,20 @@ std::string row(const std::string& name, const std::string& value, const std::st
 
 std::string value_of(const Entry& entry) {
   switch (entry.form) {
-    case Form::kNumbers: return allowed_values(entry.declared);
+    case Form::kNumbers:
+      return allowed_values(entry.declared);
     case Form::kText:
       return entry.choices.empty() ? "a text" : fmt::format("one of \"{}\"", fmt::join(entry.choices, "\", \""));
-    case Form::kTexts: return "a list of texts";
-    case Form::kValue: return "a value";
-    case Form::kProperties: return "a block: see the plugin";
+    case Form::kTexts:
+      return "a list of texts";
+    case Form::kValue:
+      return "a value";
+    case Form::kProperties:
+      return "a block: see the plugin";
     case Form::kBlock:
-      return entry.field->is_repeated() ? "blocks, any number" : entry.shorthand != nullptr ? "a text or a block" : "a block";
+      return entry.field->is_repeated()   ? "blocks, any number"
+             : entry.shorthand != nullptr ? "a text or a block"
+                                          : "a block";
   }
   return "";
 }
@@ -93,12 +99,14 @@ void write_properties(const std::string& title, const std::string& meaning, cons
 
 std::string reference_page(const Catalog& catalog) {
   std::string page =
-      "# Reference of the scene language\n\nWritten by `gravitas describe --reference` from the grammar and the plugins' "
+      "# Reference of the scene language\n\nWritten by `gravitas describe --reference` from the grammar and the "
+      "plugins' "
       "declarations; not edited by hand.\nSI units; quaternions are {w, x, y, z}, unit, body to world.\n\n## Blocks\n";
   std::set<std::string> written;
   write_block(scene_grammar(), &written, &page);
   page += "\n## Plugins\n";
-  for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator}) {
+  for (const Slot slot :
+       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator}) {
     page += fmt::format("\n### Slot {}\n", slot_name(slot));
     for (const InstalledPlugin& plugin : catalog.plugins()) {
       const PluginDeclaration& d = plugin.declaration;

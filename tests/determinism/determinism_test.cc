@@ -21,9 +21,10 @@ using kernel::Environment;
 using kernel::Hosting;
 
 constexpr const char* kHashes = GRAVITAS_SOURCE_DIR "/tests/determinism/hashes.json";
-constexpr const char* kScenes[] = {"two_spheres_motor", "bounce",   "sliding_boxes", "double_pendulum",
-                                   "stack",             "thruster", "pile"};
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator};
+constexpr const char* kScenes[] = {"two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack",
+                                   "thruster",          "pile",   "callbacks"};
+constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
+                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
 struct Hashes {
   std::string state, chain;
@@ -33,7 +34,8 @@ struct Hashes {
 void PrintTo(const Hashes& hashes, std::ostream* out) { *out << hashes.state << " / " << hashes.chain; }
 
 std::string path_of(const std::string& scene) {
-  return GRAVITAS_SOURCE_DIR + (scene == "pile" ? "/tests/determinism/" : std::string("/deploy/scenes/")) + scene + ".gravitas";
+  const bool is_ours = scene == "pile" || scene == "callbacks";
+  return GRAVITAS_SOURCE_DIR + std::string(is_ours ? "/tests/determinism/" : "/deploy/scenes/") + scene + ".gravitas";
 }
 
 Hashes hashes_of(const std::string& scene, std::vector<HostingChoice> hosting, std::uint32_t threads = 1,
@@ -44,7 +46,8 @@ Hashes hashes_of(const std::string& scene, std::vector<HostingChoice> hosting, s
   options.threads = threads;
   options.overrides = std::move(overrides);
   options.steps = steps;
-  const RunResult result = run(options, [] { return false; }, [](const Progress&) {});
+  const RunResult result = run(
+      options, [] { return false; }, [](const Progress&) {});
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   return {result.report.state_hash(), result.report.chain_hash()};
 }
@@ -68,9 +71,11 @@ TEST_P(SameBits, WithOneSlotElsewhereThanTheOthers) {
   constexpr std::uint32_t kSteps = 60;
   const Hashes reference = hashes_of(scene, kAllDirect, 1, {}, kSteps);
   for (const Slot slot : kSlots) {
-    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kDirect}, {slot, Hosting::kSharedMemory}}, 1, {}, kSteps), reference)
+    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kDirect}, {slot, Hosting::kSharedMemory}}, 1, {}, kSteps),
+              reference)
         << slot_name(slot) << " alone in a worker";
-    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kDirect}}, 3, {}, kSteps), reference)
+    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kDirect}}, 3, {}, kSteps),
+              reference)
         << slot_name(slot) << " alone in process";
   }
 }
@@ -80,7 +85,8 @@ TEST_P(SameBits, WithEverySpace) {
   EXPECT_EQ(hashes_of(scene, kAllDirect, 1, {"Space=Grid"}), hashes_of(scene, kAllDirect, 1, {"Space=Basic"}));
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SameBits, ::testing::ValuesIn(kScenes), [](const auto& one) { return std::string(one.param); });
+INSTANTIATE_TEST_SUITE_P(Scenes, SameBits, ::testing::ValuesIn(kScenes),
+                         [](const auto& one) { return std::string(one.param); });
 
 std::map<std::string, Hashes> committed() {
   std::ifstream file(kHashes);
@@ -105,11 +111,12 @@ TEST(CommittedHashes, AreThoseOfThisBuild) {
     std::ofstream file(kHashes);
     std::string rows;
     for (const auto& [scene, hashes] : now)
-      rows += fmt::format("{}  \"{}\": {{\"state_hash\": \"{}\", \"chain_hash\": \"{}\"}}", rows.empty() ? "" : ",\n", scene,
-                          hashes.state, hashes.chain);
+      rows += fmt::format("{}  \"{}\": {{\"state_hash\": \"{}\", \"chain_hash\": \"{}\"}}", rows.empty() ? "" : ",\n",
+                          scene, hashes.state, hashes.chain);
     file << "{\n" << rows << "\n}\n";
   }
-  EXPECT_EQ(committed(), now) << "if results were meant to change: GRAVITAS_WRITE_HASHES=1 build/release/bin/test_determinism";
+  EXPECT_EQ(committed(), now)
+      << "if results were meant to change: GRAVITAS_WRITE_HASHES=1 build/release/bin/test_determinism";
 }
 
 }  // namespace

@@ -19,7 +19,11 @@ template <auto kMisbehave>
 class FaultyIntegrator final : public IntegratorPlugin {
  public:
   static PluginDeclaration declaration() {
-    return {.name = "Faulty", .version = "1.0", .slot = Slot::kIntegrator, .meaning = "Misbehaves on purpose.", .theta = 1.0};
+    return {.name = "Faulty",
+            .version = "1.0",
+            .slot = Slot::kIntegrator,
+            .meaning = "Misbehaves on purpose.",
+            .theta = 1.0};
   }
   explicit FaultyIntegrator(PropertyCursor) {}
 

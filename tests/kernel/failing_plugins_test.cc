@@ -1,8 +1,7 @@
 // What a step does when a plugin fails: nothing. The environment pauses at its last commit and says which slot,
 // which plugin, what happened and how it was noticed.
-#include <gtest/gtest.h>
-
 #include <dirent.h>
+#include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <cstring>

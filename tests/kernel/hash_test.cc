@@ -10,9 +10,7 @@
 namespace gravitas::kernel {
 namespace {
 
-TEST(Hash, IsThirtyTwoHexadecimalDigits) {
-  EXPECT_EQ((Hash{0xABC, 0x1}.text()), "00000000000000010000000000000abc");
-}
+TEST(Hash, IsThirtyTwoHexadecimalDigits) { EXPECT_EQ((Hash{0xABC, 0x1}.text()), "00000000000000010000000000000abc"); }
 
 TEST(Hash, EveryBitOfEveryBodyCounts) {
   const auto hash_of = [](double y, double w) {

@@ -23,16 +23,15 @@ kernel::PluginChoice choice(const std::string& path, std::vector<double> setting
 
 }  // namespace
 
-std::string plugin_path(const std::string& name) {
-  return GRAVITAS_BINARY_DIR "/lib/gravitas/" + name + ".so";
-}
+std::string plugin_path(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas/" + name + ".so"; }
 
 std::string faulty_plugin_path(const std::string& name) {
   return GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + name + ".so";
 }
 
 WorldBuilder::WorldBuilder(kernel::Hosting mode) {
-  for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+  for (const Slot slot :
+       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
     description_.slot(slot).hosting = mode;
   space("space_basic");
   integrator("integrator_semi_implicit_euler");
@@ -139,8 +138,8 @@ std::uint32_t WorldBuilder::plugin_index(Slot slot, const std::string& path) {
 
 WorldBuilder& WorldBuilder::gravity(const Vector3& g) {
   const std::uint32_t row = static_cast<std::uint32_t>(description_.forces.size());
-  description_.forces.push_back({"gravity", "Gravity", {g.x(), g.y(), g.z()},
-                                 plugin_index(Slot::kForce, plugin_path("force_gravity"))});
+  description_.forces.push_back(
+      {"gravity", "Gravity", {g.x(), g.y(), g.z()}, plugin_index(Slot::kForce, plugin_path("force_gravity"))});
   for (kernel::BodyDescription& body : description_.bodies)
     if ((body.flags & kMovable) != 0) body.forces.push_back(row);
   return *this;
@@ -149,7 +148,8 @@ WorldBuilder& WorldBuilder::gravity(const Vector3& g) {
 WorldBuilder& WorldBuilder::force(const std::string& type, const std::string& library, std::vector<double> parameters) {
   body().forces.push_back(static_cast<std::uint32_t>(description_.forces.size()));
   const std::uint32_t plugin = plugin_index(Slot::kForce, plugin_path(library));
-  description_.forces.push_back({"force" + std::to_string(description_.forces.size()), type, std::move(parameters), plugin});
+  description_.forces.push_back(
+      {"force" + std::to_string(description_.forces.size()), type, std::move(parameters), plugin});
   return *this;
 }
 

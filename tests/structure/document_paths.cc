@@ -33,14 +33,14 @@ class PathCheck {
   void check_line(const std::string& document, int line, const std::string& text) {
     static const std::regex kBackticks("`([^`]+)`");
     static const std::regex kLink("\\]\\(([^)\\s]+)[^)]*\\)");
-    for (auto match = std::sregex_iterator(text.begin(), text.end(), kBackticks);
-         match != std::sregex_iterator(); ++match) {
+    for (auto match = std::sregex_iterator(text.begin(), text.end(), kBackticks); match != std::sregex_iterator();
+         ++match) {
       check_words(document, line, (*match)[1]);
     }
     // links are not read inside backticks
     const std::string prose = std::regex_replace(text, kBackticks, "``");
-    for (auto match = std::sregex_iterator(prose.begin(), prose.end(), kLink);
-         match != std::sregex_iterator(); ++match) {
+    for (auto match = std::sregex_iterator(prose.begin(), prose.end(), kLink); match != std::sregex_iterator();
+         ++match) {
       check_link(document, line, (*match)[1]);
     }
   }
@@ -56,10 +56,8 @@ class PathCheck {
       if (is_pattern(word)) continue;
       word = trimmed(word);
       const std::string room = room_of(word);
-      const bool in_a_room =
-          room != word && std::find(std::begin(kRooms), std::end(kRooms), room) != std::end(kRooms);
-      if (in_a_room && !exists(word))
-        findings_->push_back({document, line, word + " does not exist"});
+      const bool in_a_room = room != word && std::find(std::begin(kRooms), std::end(kRooms), room) != std::end(kRooms);
+      if (in_a_room && !exists(word)) findings_->push_back({document, line, word + " does not exist"});
     }
   }
 

@@ -17,7 +17,6 @@ namespace gravitas::structure {
 /// > { } $ … or ...). A line number at the end (":12") is cut off. A path counts as existing when
 /// it names a file or folder of the tree, or one below `generated`, where the build puts the
 /// headers it makes.
-std::vector<Finding> find_dead_paths(const SourceTree& tree,
-                                     const std::filesystem::path& generated);
+std::vector<Finding> find_dead_paths(const SourceTree& tree, const std::filesystem::path& generated);
 
 }  // namespace gravitas::structure

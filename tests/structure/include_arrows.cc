@@ -27,10 +27,8 @@ std::string plugin_folder(std::string_view path) {
   constexpr std::string_view kHello = "workers/hello/";
   if (path.starts_with(kHello)) return std::string(kHello);
   const std::size_t slot_end = path.find('/', path.find('/') + 1);
-  const std::size_t name_end =
-      slot_end == std::string_view::npos ? slot_end : path.find('/', slot_end + 1);
-  return std::string(
-      path.substr(0, name_end == std::string_view::npos ? path.rfind('/') + 1 : name_end + 1));
+  const std::size_t name_end = slot_end == std::string_view::npos ? slot_end : path.find('/', slot_end + 1);
+  return std::string(path.substr(0, name_end == std::string_view::npos ? path.rfind('/') + 1 : name_end + 1));
 }
 
 // why a file of `path` must not include `include`, a header of ours; empty when it may

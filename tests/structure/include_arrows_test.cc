@@ -26,8 +26,7 @@ TEST(IncludeArrows, AllowedOnesPass) {
       {"plugin_sdk/host/a.h", "#include \"gravitas/control/v1/control.pb.h\"\n"},
       {"kernel/a.cc", "#include \"kernel/a.h\"\n#include \"plugin_sdk/b.h\"\n#include <vector>\n"},
       {"workers/hello/plugin.cc", "#include \"workers/hello/a.h\"\n#include <Eigen/Dense>\n"},
-      {"workers/force/x/a.cc",
-       "#include \"plugin_sdk/b.h\"\n#include \"schemas/stage_frames.h\"\n"},
+      {"workers/force/x/a.cc", "#include \"plugin_sdk/b.h\"\n#include \"schemas/stage_frames.h\"\n"},
       {"workers/force/x/part/a.cc", "#include \"workers/force/x/a.h\"\n"},
       {"services/a.cc", "#include \"kernel/a.h\"\n#include \"plugin_sdk/b.h\"\n"},
       {"tests/kernel/a_test.cc", "#include \"kernel/a.h\"\n#include \"workers/force/x/a.h\"\n"},
@@ -52,25 +51,24 @@ TEST_P(WrongArrows, IsFoundOnItsLine) {
   EXPECT_TRUE(found.starts_with(GetParam().path + ":1: ")) << "found: '" << found << "'";
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Every, WrongArrows,
-    testing::Values(WrongArrow{"schemas/a.cc", "#include \"plugin_sdk/b.h\""},
-                    WrongArrow{"plugin_sdk/a.h", "#include \"kernel/a.h\""},
-                    WrongArrow{"plugin_sdk/a.h", "#include <services/a.h>"},
-                    WrongArrow{"plugin_sdk/a.h", "#include \"workers/hello/a.h\""},
-                    WrongArrow{"kernel/a.cc", "#include \"workers/force/x/a.h\""},
-                    WrongArrow{"kernel/a.cc", "#  include \"services/a.h\""},
-                    WrongArrow{"kernel/a.cc", "#include \"tests/a.h\""},
-                    WrongArrow{"kernel/a.cc", "#include \"plugin_sdk/host/host.h\""},
-                    WrongArrow{"workers/force/x/a.cc", "#include \"kernel/a.h\""},
-                    WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/y/a.h\""},
-                    WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/xy/a.h\""},
-                    WrongArrow{"workers/force/x/a.cc", "#include \"plugin_sdk/host/host.h\""},
-                    WrongArrow{"workers/force/x/a.cc", "#include \"gravitas/stage/v1/f.pb.h\""},
-                    WrongArrow{"workers/force/x/a.cc", "#include \"a.h\""},
-                    WrongArrow{"services/a.cc", "#include \"workers/hello/a.h\""},
-                    WrongArrow{"services/a.cc", "#include \"../kernel/a.h\""},
-                    WrongArrow{"tests/kernel/a_test.cc", "#include \"../../kernel/a.h\""}));
+INSTANTIATE_TEST_SUITE_P(Every, WrongArrows,
+                         testing::Values(WrongArrow{"schemas/a.cc", "#include \"plugin_sdk/b.h\""},
+                                         WrongArrow{"plugin_sdk/a.h", "#include \"kernel/a.h\""},
+                                         WrongArrow{"plugin_sdk/a.h", "#include <services/a.h>"},
+                                         WrongArrow{"plugin_sdk/a.h", "#include \"workers/hello/a.h\""},
+                                         WrongArrow{"kernel/a.cc", "#include \"workers/force/x/a.h\""},
+                                         WrongArrow{"kernel/a.cc", "#  include \"services/a.h\""},
+                                         WrongArrow{"kernel/a.cc", "#include \"tests/a.h\""},
+                                         WrongArrow{"kernel/a.cc", "#include \"plugin_sdk/host/host.h\""},
+                                         WrongArrow{"workers/force/x/a.cc", "#include \"kernel/a.h\""},
+                                         WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/y/a.h\""},
+                                         WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/xy/a.h\""},
+                                         WrongArrow{"workers/force/x/a.cc", "#include \"plugin_sdk/host/host.h\""},
+                                         WrongArrow{"workers/force/x/a.cc", "#include \"gravitas/stage/v1/f.pb.h\""},
+                                         WrongArrow{"workers/force/x/a.cc", "#include \"a.h\""},
+                                         WrongArrow{"services/a.cc", "#include \"workers/hello/a.h\""},
+                                         WrongArrow{"services/a.cc", "#include \"../kernel/a.h\""},
+                                         WrongArrow{"tests/kernel/a_test.cc", "#include \"../../kernel/a.h\""}));
 
 }  // namespace
 }  // namespace gravitas::structure

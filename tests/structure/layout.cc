@@ -73,9 +73,8 @@ std::vector<Finding> find_overlong_sources(const SourceTree& tree) {
 }
 
 std::vector<Finding> find_vague_names(const SourceTree& tree) {
-  static const std::regex kVague(
-      "(^|[/_-])(utils?|utilit(y|ies)|helpers?|common|misc|managers?)([/_.-]|$)",
-      std::regex::icase);
+  static const std::regex kVague("(^|[/_-])(utils?|utilit(y|ies)|helpers?|common|misc|managers?)([/_.-]|$)",
+                                 std::regex::icase);
   std::vector<Finding> findings;
   for (const std::string& path : tree.files) {
     std::smatch match;

@@ -18,9 +18,7 @@ std::string lines(int count) {
   return text;
 }
 
-TEST(TopLevel, OfThisRepositoryHoldsWhatItShould) {
-  EXPECT_EQ(report(find_strays_at_the_top(this_repository())), "");
-}
+TEST(TopLevel, OfThisRepositoryHoldsWhatItShould) { EXPECT_EQ(report(find_strays_at_the_top(this_repository())), ""); }
 
 TEST(TopLevel, StraysAreFound) {
   const SampleTree sample({{"CMakeLists.txt", ""},
@@ -62,9 +60,7 @@ TEST(Guides, MissingAndLongOnesAreFound) {
   EXPECT_EQ(findings[1].path, "tests/README.md");
 }
 
-TEST(Sizes, OfThisRepositoryReadWell) {
-  EXPECT_EQ(report(find_overlong_sources(this_repository())), "");
-}
+TEST(Sizes, OfThisRepositoryReadWell) { EXPECT_EQ(report(find_overlong_sources(this_repository())), ""); }
 
 TEST(Sizes, AFileAtTheLimitPassesAndOneBeyondIsFound) {
   const SampleTree sample({{"workers/a.cc", lines(kLongestFile)},
@@ -89,9 +85,7 @@ TEST(Sizes, AKernelBeyondAnAfternoonIsFound) {
   EXPECT_EQ(findings[0].path, "kernel");
 }
 
-TEST(Names, OfThisRepositorySayWhatIsInside) {
-  EXPECT_EQ(report(find_vague_names(this_repository())), "");
-}
+TEST(Names, OfThisRepositorySayWhatIsInside) { EXPECT_EQ(report(find_vague_names(this_repository())), ""); }
 
 TEST(Names, VagueOnesAreFoundAsWholeWords) {
   const SampleTree vague({{"kernel/utils.h", ""},
@@ -102,8 +96,7 @@ TEST(Names, VagueOnesAreFoundAsWholeWords) {
                           {"workers/body-manager.cc", ""}});
   EXPECT_EQ(find_vague_names(vague.tree()).size(), 6u) << report(find_vague_names(vague.tree()));
 
-  const SampleTree plain(
-      {{"kernel/commons_tragedy.h", ""}, {"kernel/miscount.cc", ""}, {"kernel/utility.h/x", ""}});
+  const SampleTree plain({{"kernel/commons_tragedy.h", ""}, {"kernel/miscount.cc", ""}, {"kernel/utility.h/x", ""}});
   EXPECT_EQ(find_vague_names(plain.tree()).size(), 1u) << report(find_vague_names(plain.tree()));
 }
 

@@ -24,8 +24,8 @@ const std::vector<Rule>& rules() {
        "libm's result depends on the processor: use plugin_sdk/math/transcendental.h", false},
       {std::regex("\\b(AngleAxis[df]?|Rotation2D[df]?|angularDistance|slerp|eulerAngles)\\b"),
        "Eigen calls libm inside: use plugin_sdk/math/rotation.h", false},
-      {std::regex("\\bunordered_(multi)?(map|set)\\b"),
-       "its order depends on addresses: use an ordered container", true},
+      {std::regex("\\bunordered_(multi)?(map|set)\\b"), "its order depends on addresses: use an ordered container",
+       true},
   };
   return kRules;
 }
@@ -42,8 +42,7 @@ std::vector<Finding> find_unrepeatable(const SourceTree& tree) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
       for (const Rule& rule : rules()) {
         std::smatch match;
-        if ((math && !rule.holds_in_math) || !std::regex_search(lines[i], match, rule.pattern))
-          continue;
+        if ((math && !rule.holds_in_math) || !std::regex_search(lines[i], match, rule.pattern)) continue;
         findings.push_back({path, static_cast<int>(i) + 1, match[0].str() + ": " + rule.reason});
       }
     }

@@ -67,8 +67,8 @@ class Scanner {
 
   // blanks [begin, end) and answers end
   std::size_t blank(std::size_t begin, std::size_t end) {
-    std::fill(line_.begin() + static_cast<std::ptrdiff_t>(begin),
-              line_.begin() + static_cast<std::ptrdiff_t>(end), ' ');
+    std::fill(line_.begin() + static_cast<std::ptrdiff_t>(begin), line_.begin() + static_cast<std::ptrdiff_t>(end),
+              ' ');
     return end;
   }
 
@@ -95,8 +95,7 @@ class Scanner {
     }
     // an apostrophe after a letter or digit separates digits
     const char c = line_[i];
-    const bool separator =
-        c == '\'' && i > 0 && std::isalnum(static_cast<unsigned char>(line_[i - 1])) != 0;
+    const bool separator = c == '\'' && i > 0 && std::isalnum(static_cast<unsigned char>(line_[i - 1])) != 0;
     if ((c != '"' && c != '\'') || separator) return i + 1;
 
     std::size_t end = i + 1;
@@ -131,8 +130,7 @@ SourceTree tree_of_folder(const std::filesystem::path& root) {
 
 SourceTree tree_of_repository(const std::filesystem::path& root) {
   SourceTree tree{root, {}};
-  for (std::string& file :
-       output_of("git -C " + quoted(root.string()) + " ls-files -z 2>/dev/null")) {
+  for (std::string& file : output_of("git -C " + quoted(root.string()) + " ls-files -z 2>/dev/null")) {
     if (std::filesystem::is_regular_file(root / file)) tree.files.push_back(std::move(file));
   }
   if (tree.files.empty()) return tree_of_folder(root);
@@ -148,8 +146,7 @@ std::vector<std::string> lines_of(const SourceTree& tree, const std::string& pat
   return lines;
 }
 
-std::vector<std::string> without_comments(const std::vector<std::string>& lines,
-                                          Literals literals) {
+std::vector<std::string> without_comments(const std::vector<std::string>& lines, Literals literals) {
   Scanner scanner(literals);
   std::vector<std::string> result;
   result.reserve(lines.size());

@@ -15,15 +15,13 @@ using Lines = std::vector<std::string>;
 
 TEST(SourceTree, OfThisRepositoryHoldsThisFileAndNoBuild) {
   const SourceTree tree = tree_of_repository(GRAVITAS_SOURCE_DIR);
-  EXPECT_EQ(std::count(tree.files.begin(), tree.files.end(), "tests/structure/source_tree_test.cc"),
-            1);
+  EXPECT_EQ(std::count(tree.files.begin(), tree.files.end(), "tests/structure/source_tree_test.cc"), 1);
   EXPECT_TRUE(std::none_of(tree.files.begin(), tree.files.end(),
                            [](const std::string& file) { return file.starts_with("build/"); }));
 }
 
 TEST(SourceTree, OfAFolderLeavesOutBuildAndGit) {
-  const SampleTree sample(
-      {{"kernel/a.cc", ""}, {"build/b.cc", ""}, {".git/c", ""}, {".ci/run", ""}});
+  const SampleTree sample({{"kernel/a.cc", ""}, {"build/b.cc", ""}, {".git/c", ""}, {".ci/run", ""}});
   EXPECT_EQ(sample.tree().files, (Lines{".ci/run", "kernel/a.cc"}));
 }
 
@@ -40,10 +38,8 @@ TEST(WithoutComments, BlanksCommentsOnly) {
 
 TEST(WithoutComments, MarksInsideLiteralsAreText) {
   const Lines source = {R"(f("// no", '"', "\"/*"); g(); // yes)"};
-  EXPECT_EQ(without_comments(source, Literals::kKeep),
-            Lines{R"(f("// no", '"', "\"/*"); g();       )"});
-  EXPECT_EQ(without_comments(source, Literals::kBlank),
-            Lines{R"(f("     ", ' ', "    "); g();       )"});
+  EXPECT_EQ(without_comments(source, Literals::kKeep), Lines{R"(f("// no", '"', "\"/*"); g();       )"});
+  EXPECT_EQ(without_comments(source, Literals::kBlank), Lines{R"(f("     ", ' ', "    "); g();       )"});
 }
 
 TEST(WithoutComments, RawStringsGoOverLines) {

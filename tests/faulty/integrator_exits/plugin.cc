@@ -5,9 +5,7 @@
 
 namespace {
 
-void misbehave(const gravitas::faulty::Request&, const gravitas::faulty::Reply&, gravitas::Host&) {
-  std::_Exit(0);
-}
+void misbehave(const gravitas::faulty::Request&, const gravitas::faulty::Reply&, gravitas::Host&) { std::_Exit(0); }
 
 }  // namespace
 

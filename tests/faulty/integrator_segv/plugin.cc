@@ -5,9 +5,7 @@
 
 namespace {
 
-void misbehave(const gravitas::faulty::Request&, const gravitas::faulty::Reply&, gravitas::Host&) {
-  raise(SIGSEGV);
-}
+void misbehave(const gravitas::faulty::Request&, const gravitas::faulty::Reply&, gravitas::Host&) { raise(SIGSEGV); }
 
 }  // namespace
 

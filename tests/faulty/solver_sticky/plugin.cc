@@ -1,6 +1,7 @@
 // Pulls touching bodies together: every contact gets an impulse of -1 N s along its normal.
-#include "plugin_sdk/body.h"
 #include "plugin_sdk/plugin.h"
+
+#include "plugin_sdk/body.h"
 
 namespace {
 

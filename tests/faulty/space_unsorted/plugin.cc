@@ -1,6 +1,7 @@
 // Answers all pairs in descending order.
-#include "plugin_sdk/pair_rule.h"
 #include "plugin_sdk/plugin.h"
+
+#include "plugin_sdk/pair_rule.h"
 
 namespace {
 

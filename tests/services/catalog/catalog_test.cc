@@ -23,8 +23,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-PluginDeclaration declare(Slot slot, const std::string& name,
-                          const std::vector<std::string>& types = {}) {
+PluginDeclaration declare(Slot slot, const std::string& name, const std::vector<std::string>& types = {}) {
   PluginDeclaration declaration;
   declaration.name = name;
   declaration.slot = slot;
@@ -36,9 +35,8 @@ PluginDeclaration declare(Slot slot, const std::string& name,
 class CatalogTest : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = files::temp_directory_path() /
-              ("gravitas_catalog_" + std::to_string(::getpid()) + '_' +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = files::temp_directory_path() / ("gravitas_catalog_" + std::to_string(::getpid()) + '_' +
+                                              testing::UnitTest::GetInstance()->current_test_info()->name());
     files::create_directories(folder_ / "plugins");
   }
   void TearDown() override { files::remove_all(folder_); }
@@ -54,8 +52,7 @@ class CatalogTest : public testing::Test {
   // A program that writes this answer, and its arguments to the file "arguments".
   std::string answering(const plugin::v1::Catalog& answer) const {
     std::ofstream(folder_ / "answer", std::ios::binary) << answer.SerializeAsString();
-    return program("echo \"$@\" > " + (folder_ / "arguments").string() + "\ncat " +
-                   (folder_ / "answer").string());
+    return program("echo \"$@\" > " + (folder_ / "arguments").string() + "\ncat " + (folder_ / "answer").string());
   }
 
   std::string library(const std::string& name) const {
@@ -79,8 +76,8 @@ plugin::v1::Catalog answer_of(const std::vector<PluginDeclaration>& declarations
 TEST_F(CatalogTest, AsksOnceAboutAllLibrariesInOrder) {
   const std::string b = library("b.so"), a = library("a.so");
   library("notes.txt");
-  const std::string worker = answering(answer_of(
-      {declare(Slot::kForce, "Winds", {"Wind", "Gust"}), declare(Slot::kSolver, "Sequential")}));
+  const std::string worker =
+      answering(answer_of({declare(Slot::kForce, "Winds", {"Wind", "Gust"}), declare(Slot::kSolver, "Sequential")}));
   const Catalog catalog = Catalog::installed(worker, plugins());
   EXPECT_THAT(catalog.broken(), IsEmpty());
   ASSERT_EQ(catalog.plugins().size(), 2U);
@@ -110,8 +107,7 @@ TEST_F(CatalogTest, KeepsWhatCannotBeUsedWithTheReason) {
   const std::string a = library("a.so");
   library("b.so");
   library("c.so");
-  plugin::v1::Catalog answer =
-      answer_of({declare(Slot::kForce, ""), declare(Slot::kSolver, "Good"), {}});
+  plugin::v1::Catalog answer = answer_of({declare(Slot::kForce, ""), declare(Slot::kSolver, "Good"), {}});
   answer.mutable_entries(2)->mutable_description()->set_name("Odd");
   answer.mutable_entries(2)->mutable_description()->set_slot(plugin::v1::SLOT_UNSPECIFIED);
   answer.mutable_entries(0)->set_problem("made for another schema");
@@ -121,8 +117,7 @@ TEST_F(CatalogTest, KeepsWhatCannotBeUsedWithTheReason) {
   EXPECT_EQ(catalog.broken()[0].library, a);
   EXPECT_EQ(catalog.broken()[0].problem, "made for another schema");
   EXPECT_EQ(catalog.broken()[1].problem, "it declares a slot that this version does not have");
-  EXPECT_THAT(catalog.broken_text(),
-              HasSubstr("; not usable: " + a + " (made for another schema), "));
+  EXPECT_THAT(catalog.broken_text(), HasSubstr("; not usable: " + a + " (made for another schema), "));
 }
 
 TEST_F(CatalogTest, SaysWhenNobodyCanBeAsked) {
@@ -132,13 +127,10 @@ TEST_F(CatalogTest, SaysWhenNobodyCanBeAsked) {
     EXPECT_THAT(catalog.plugins(), IsEmpty());
     return catalog.broken().empty() ? "" : catalog.broken()[0].problem;
   };
-  EXPECT_THAT(problem((folder_ / "none").string()),
-              HasSubstr("could not be started: No such file"));
-  EXPECT_THAT(problem(program("echo no >&2; exit 3")),
-              HasSubstr("--describe ended with status 3: no"));
+  EXPECT_THAT(problem((folder_ / "none").string()), HasSubstr("could not be started: No such file"));
+  EXPECT_THAT(problem(program("echo no >&2; exit 3")), HasSubstr("--describe ended with status 3: no"));
   EXPECT_THAT(problem(program("kill -9 $$")), HasSubstr("--describe was ended by signal 9"));
-  EXPECT_THAT(problem(program("echo nonsense")),
-              HasSubstr("--describe wrote no catalogue of 1 libraries"));
+  EXPECT_THAT(problem(program("echo nonsense")), HasSubstr("--describe wrote no catalogue of 1 libraries"));
   EXPECT_THAT(problem(program("true")), HasSubstr("--describe wrote no catalogue of 1 libraries"));
   const Catalog nowhere = Catalog::installed("/bin/true", (folder_ / "none").string());
   EXPECT_THAT(nowhere.broken().at(0).problem, HasSubstr("the folder cannot be read"));
@@ -157,8 +149,7 @@ TEST_F(CatalogTest, EndsAWorkerThatHangs) {
   const auto start = std::chrono::steady_clock::now();
   // one that keeps its output open, and one that closes it and stays
   for (const char* lines : {"sleep 1000", "exec >/dev/null 2>&1; sleep 1000"}) {
-    EXPECT_FALSE(describe_libraries(program(lines), {"/a.so"}, std::chrono::milliseconds(50),
-                                    &answer, &problem));
+    EXPECT_FALSE(describe_libraries(program(lines), {"/a.so"}, std::chrono::milliseconds(50), &answer, &problem));
     EXPECT_THAT(problem, HasSubstr("did not end within 50 ms"));
   }
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));

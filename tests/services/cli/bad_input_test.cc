@@ -7,11 +7,11 @@
 namespace gravitas {
 namespace {
 
+using ::testing::HasSubstr;
 using testing::ProgramResult;
 using testing::run_program;
 using testing::ScratchFolder;
 using testing::shipped_scene;
-using ::testing::HasSubstr;
 
 const std::string kSample = shipped_scene("two_spheres_motor");
 
@@ -40,19 +40,22 @@ std::string with_geometry(const std::string& properties) {
 
 const BadScene kBadScenes[] = {
     {"unknown_block", "Enviroment { }\n", "1:1", "Environment"},
-    {"unknown_property", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Masss = 1 }"), "4:49", "Mass"},
-    {"wrong_type", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Mass = \"heavy\" }"), "4:56", "number"},
+    {"unknown_property", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Masss = 1 }"), "4:49",
+     "Mass"},
+    {"wrong_type", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Mass = \"heavy\" }"), "4:56",
+     "number"},
     {"missing_id", with_body("Body { Type = \"Rigid\" GeometryId = \"S\" }"), "4:1", "Id"},
     {"duplicate_id",
-     with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" }\nBody { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" }"),
+     with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" }\nBody { Type = \"Rigid\" Id = \"A\" GeometryId "
+               "= \"S\" }"),
      "5:28", "\"A\""},
     {"dangling_id", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"T\" }"), "4:45", "\"S\""},
     {"non_finite", with_geometry("Radius = 1e999"), "2:65", "1e999"},
     {"zero_size", with_geometry("Radius = 0"), "2:65", "> 0"},
     {"negative_size", with_geometry("Radius = -1"), "2:65", "> 0"},
     {"far_from_unit",
-     with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" KineticProperties { Orientation = {1,1,0,0} } }"), "4:83",
-     "norm 1"},
+     with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" KineticProperties { Orientation = {1,1,0,0} } }"),
+     "4:83", "norm 1"},
     {"unbalanced", "Environment {\n", "2:1", "}"},
     {"deep", std::string(100'000, '{'), "1:", ""},
 };
@@ -74,9 +77,9 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Refused, ::testing::ValuesIn(kBadScenes),
 
 TEST(BadInput, AQuaternionThatIsNearlyUnitIsRepairedWithAWarning) {
   const ScratchFolder folder;
-  const std::string scene = folder.write(
-      "scene.gravitas",
-      with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" KineticProperties { Orientation = {1.0005,0,0,0} } }"));
+  const std::string scene =
+      folder.write("scene.gravitas", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" "
+                                               "KineticProperties { Orientation = {1.0005,0,0,0} } }"));
   const ProgramResult result = run_program({"run", scene}, folder);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr(scene + ":4:83: warning"));
@@ -93,7 +96,9 @@ TEST(BadInput, FilesThatCannotBeRead) {
 
 TEST(BadInput, AFileThatIsNoSceneAtAll) {
   const ScratchFolder folder;
-  const std::string path = folder.write("noise", std::string("\x7f" "ELF\0\1\2\3", 8));
+  const std::string path = folder.write("noise", std::string("\x7f"
+                                                             "ELF\0\1\2\3",
+                                                             8));
   EXPECT_EQ(run_program({"run", path}, folder).exit_code, 2);
 }
 
@@ -117,11 +122,11 @@ ProgramResult run_with_solver_library(const std::string& library, const ScratchF
 TEST(BadInput, LibrariesThatAreNoPluginsOrOfAnotherSchema) {
   const ScratchFolder folder;
   const std::string faulty = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/";
-  for (const auto& [library, expected] : std::vector<std::pair<std::string, std::string>>{
-           {folder.path("missing.so"), "No such file"},
-           {folder.write("text.so", "not a library"), "shared library"},
-           {faulty + "wrong_schema_hash.so", "schema"},
-           {faulty + "crash_on_load.so", "signal"}}) {
+  for (const auto& [library, expected] :
+       std::vector<std::pair<std::string, std::string>>{{folder.path("missing.so"), "No such file"},
+                                                        {folder.write("text.so", "not a library"), "shared library"},
+                                                        {faulty + "wrong_schema_hash.so", "schema"},
+                                                        {faulty + "crash_on_load.so", "signal"}}) {
     const ProgramResult result = run_with_solver_library(library, folder);
     EXPECT_EQ(result.exit_code, 2) << library;
     EXPECT_THAT(result.err, HasSubstr("plugins.gravitas:1:"));

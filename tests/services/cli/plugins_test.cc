@@ -11,11 +11,11 @@ namespace gravitas {
 namespace {
 
 using google::protobuf::util::JsonStringToMessage;
+using ::testing::HasSubstr;
 using testing::ProgramResult;
 using testing::run_program;
 using testing::ScratchFolder;
 using testing::shipped_scene;
-using ::testing::HasSubstr;
 
 TEST(Plan, NamesWhatIsNeededAndWhyTheRestIsNot) {
   const ScratchFolder folder;
@@ -51,7 +51,8 @@ TEST(Describe, ShowsPropertiesWithUnitRangeDefaultAndMeaning) {
   EXPECT_THAT(solver.out, HasSubstr("live"));
   // a type's name stands for the plugin that serves it, a path for the library
   EXPECT_THAT(run_program({"describe", "Sphere"}, folder).out, HasSubstr("Radius"));
-  const ProgramResult library = run_program({"describe", GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so", "--json"}, folder);
+  const ProgramResult library =
+      run_program({"describe", GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so", "--json"}, folder);
   plugin::v1::Description description;
   ASSERT_TRUE(JsonStringToMessage(library.out, &description).ok());
   EXPECT_EQ(description.name(), "Hello");

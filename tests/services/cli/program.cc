@@ -79,6 +79,8 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Scrat
   return finish_program(start_program(arguments, folder), folder);
 }
 
-std::string shipped_scene(const std::string& name) { return GRAVITAS_SOURCE_DIR "/deploy/scenes/" + name + ".gravitas"; }
+std::string shipped_scene(const std::string& name) {
+  return GRAVITAS_SOURCE_DIR "/deploy/scenes/" + name + ".gravitas";
+}
 
 }  // namespace gravitas::testing

@@ -17,12 +17,12 @@
 namespace gravitas {
 namespace {
 
+using ::testing::HasSubstr;
 using testing::ProgramResult;
 using testing::read_file;
 using testing::run_program;
 using testing::ScratchFolder;
 using testing::shipped_scene;
-using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 const std::string kSample = shipped_scene("two_spheres_motor");
@@ -74,12 +74,50 @@ TEST(Run, TheReportHasTheKeysThatScriptsReadAndNoOthersAreMissing) {
   const ScratchFolder folder;
   const ProgramResult result = run_program({"run", kSample, "--steps", "3", "--hosting", "direct", "--json"}, folder);
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  for (const char* key :
-       {"scene", "simulated_seconds", "steps", "bodies", "wall_seconds", "microseconds_per_step", "mean", "median", "p99",
-        "max", "energy", "initial", "final", "max_relative_drift", "linear_momentum", "angular_momentum",
-        "max_penetration", "max_joint_error", "state_hash", "chain_hash", "plan", "slots", "slot", "plugin", "hosting",
-        "pid", "left_out", "what", "why", "stages", "stage", "calls", "median_us", "p99_us", "transport_median_us",
-        "faults", "swaps", "events", "collision_start", "collision_end", "sleep", "wake", "break", "warnings"})
+  for (const char* key : {"scene",
+                          "simulated_seconds",
+                          "steps",
+                          "bodies",
+                          "wall_seconds",
+                          "microseconds_per_step",
+                          "mean",
+                          "median",
+                          "p99",
+                          "max",
+                          "energy",
+                          "initial",
+                          "final",
+                          "max_relative_drift",
+                          "linear_momentum",
+                          "angular_momentum",
+                          "max_penetration",
+                          "max_joint_error",
+                          "state_hash",
+                          "chain_hash",
+                          "plan",
+                          "slots",
+                          "slot",
+                          "plugin",
+                          "hosting",
+                          "pid",
+                          "left_out",
+                          "what",
+                          "why",
+                          "stages",
+                          "stage",
+                          "calls",
+                          "median_us",
+                          "p99_us",
+                          "transport_median_us",
+                          "faults",
+                          "swaps",
+                          "events",
+                          "collision_start",
+                          "collision_end",
+                          "sleep",
+                          "wake",
+                          "break",
+                          "warnings"})
     EXPECT_THAT(result.out, HasSubstr("\"" + std::string(key) + "\":")) << key;
 }
 
@@ -98,10 +136,12 @@ TEST(Run, HostingAndThreadsChangeNoBit) {
 TEST(Run, TheTrajectoryHasARowPerMovingBodyAndSampleAndReadsBackExactly) {
   const ScratchFolder folder;
   const std::string file = folder.path("motion.csv");
-  ASSERT_EQ(run_program({"run", kSample, "--steps", "10", "--hosting", "direct", "--trajectory", file}, folder).exit_code, 0);
+  ASSERT_EQ(
+      run_program({"run", kSample, "--steps", "10", "--hosting", "direct", "--trajectory", file}, folder).exit_code, 0);
   const auto rows = read_csv(file);
   ASSERT_EQ(rows.size(), 1U + 2 * 11);
-  EXPECT_THAT(read_file(file), StartsWith("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n0,Ball01,0,1,0,1,0,0,0,0,0,0,0,0,0\n"));
+  EXPECT_THAT(read_file(file),
+              StartsWith("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n0,Ball01,0,1,0,1,0,0,0,0,0,0,0,0,0\n"));
   for (std::size_t i = 1; i < rows.size(); ++i) {
     ASSERT_EQ(rows[i].size(), 15U);
     EXPECT_NE(rows[i][1], "Ground");
@@ -148,7 +188,8 @@ TEST(Run, DurationStepsAndTimeStepOverrideTheScene) {
 TEST(Run, EventsAreJsonLinesInOrder) {
   const ScratchFolder folder;
   const std::string file = folder.path("events.jsonl");
-  ASSERT_EQ(run_program({"run", kSample, "--hosting", "direct", "--duration", "1", "--events", file}, folder).exit_code, 0);
+  ASSERT_EQ(run_program({"run", kSample, "--hosting", "direct", "--duration", "1", "--events", file}, folder).exit_code,
+            0);
   std::istringstream lines(read_file(file));
   std::string first;
   ASSERT_TRUE(std::getline(lines, first));
@@ -167,9 +208,9 @@ TEST(Run, AnInterruptKeepsWhatWasComputed) {
   const ScratchFolder folder;
   const std::string pipe = folder.path("motion.csv");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const pid_t process = testing::start_program(
-      {"run", kSample, "--hosting", "direct", "--duration", "1e6", "--trajectory", pipe, "--report", folder.path("report.json")},
-      folder);
+  const pid_t process = testing::start_program({"run", kSample, "--hosting", "direct", "--duration", "1e6",
+                                                "--trajectory", pipe, "--report", folder.path("report.json")},
+                                               folder);
   // rows come out: the run is under way
   std::ifstream rows(pipe);
   std::string line;
@@ -190,7 +231,8 @@ TEST(Run, AnInterruptKeepsWhatWasComputed) {
 ProgramResult run_with_bad_integrator(const std::string& library, const ScratchFolder& folder) {
   const std::string plugins = folder.write(
       "plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Deadline = 0.2 Library = \"" GRAVITAS_BINARY_DIR
-                          "/lib/gravitas-faulty/" + library + ".so\" } }");
+                          "/lib/gravitas-faulty/" +
+                              library + ".so\" } }");
   return run_program({"run", kSample, plugins, "--set", "Integrator=Faulty", "--report", folder.path("report.json"),
                       "--trajectory", folder.path("motion.csv")},
                      folder);

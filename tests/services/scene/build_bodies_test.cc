@@ -37,8 +37,7 @@ std::vector<std::string> errors_of(const std::string& properties) {
 
 // Relative 1e-14: the closed form and the code multiply in another order.
 void expect_vector(const Vector3& value, const Vector3& expected) {
-  for (int i = 0; i < 3; ++i)
-    EXPECT_NEAR(value[i], expected[i], 1e-14 * (1.0 + std::fabs(expected[i]))) << i;
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(value[i], expected[i], 1e-14 * (1.0 + std::fabs(expected[i]))) << i;
 }
 
 // ---- mass
@@ -69,8 +68,7 @@ TEST(BuildBodies, MassAloneScalesTheMomentsOfTheShape) {
 }
 
 TEST(BuildBodies, MassAndMomentsOverrideTheShape) {
-  const BodyDescription brick =
-      body("GeometryId = \"Brick\" Mass = 3 PrincipalMoments = {1, 2, 3}");
+  const BodyDescription brick = body("GeometryId = \"Brick\" Mass = 3 PrincipalMoments = {1, 2, 3}");
   EXPECT_EQ(brick.mass, 3.0);
   EXPECT_EQ(brick.inertia, Vector3(1, 2, 3));
 }
@@ -89,11 +87,9 @@ TEST(BuildBodies, WithoutAGeometryTheyMustBeGiven) {
 }
 
 TEST(BuildBodies, AShapeOfThePluginsOwnNeedsThem) {
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Blob\" MassDensity = 1"),
-      ElementsAre(
-          "scene:2:14: error: Body \"Ball\" has a geometry whose mass is not known here; required: "
-          "Mass and PrincipalMoments"));
+  EXPECT_THAT(errors_of("GeometryId = \"Blob\" MassDensity = 1"),
+              ElementsAre("scene:2:14: error: Body \"Ball\" has a geometry whose mass is not known here; required: "
+                          "Mass and PrincipalMoments"));
   const BodyDescription blob = body("GeometryId = \"Blob\" Mass = 2 PrincipalMoments = {1, 1, 1}");
   EXPECT_EQ(blob.mass, 2.0);
   EXPECT_EQ(blob.bound.kind, BoundKind::kNone);
@@ -102,8 +98,7 @@ TEST(BuildBodies, AShapeOfThePluginsOwnNeedsThem) {
 
 TEST(BuildBodies, UnspecifiedDensityIsThatOfWater) {
   for (const char* density : {"", "MassDensity = 0"}) {
-    const BuiltScene built =
-        build(scene_with_body("GeometryId = \"Brick\"\n" + std::string(density)));
+    const BuiltScene built = build(scene_with_body("GeometryId = \"Brick\"\n" + std::string(density)));
     ASSERT_TRUE(built.description.has_value());
     EXPECT_EQ(built.description->bodies[0].mass, 48000.0);
     EXPECT_EQ(built.warnings().size(), 1U);
@@ -115,22 +110,17 @@ TEST(BuildBodies, UnspecifiedDensityIsThatOfWater) {
 }
 
 TEST(BuildBodies, RefuseContradictoryMasses) {
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Unit\" Mass = 1 MassDensity = 1"),
-      ElementsAre(
-          "scene:2:28: error: Body \"Ball\" has Mass and MassDensity; allowed: one of them"));
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Unit\" Mass = 0"),
-      ElementsAre(
-          "scene:2:28: error: Body \"Ball\" is movable and has Mass 0; allowed: a number > 0, or "
-          "Immovable = true"));
+  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 1 MassDensity = 1"),
+              ElementsAre("scene:2:28: error: Body \"Ball\" has Mass and MassDensity; allowed: one of them"));
+  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 0"),
+              ElementsAre("scene:2:28: error: Body \"Ball\" is movable and has Mass 0; allowed: a number > 0, or "
+                          "Immovable = true"));
   EXPECT_THAT(errors_of("GeometryId = \"Unit\" PrincipalMoments = {1, 1, 1}"),
               ElementsAre("scene:2:40: error: Body \"Ball\" has PrincipalMoments without Mass; "
                           "allowed: both together"));
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Unit\" Mass = 1 CentreOfMass = {0, 0, 0}"),
-      ElementsAre("scene:2:45: error: Body \"Ball\" has CentreOfMass or PrincipalAxes without "
-                  "PrincipalMoments; allowed: with Mass and PrincipalMoments"));
+  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 1 CentreOfMass = {0, 0, 0}"),
+              ElementsAre("scene:2:45: error: Body \"Ball\" has CentreOfMass or PrincipalAxes without "
+                          "PrincipalMoments; allowed: with Mass and PrincipalMoments"));
   EXPECT_THAT(errors_of("Mass = 1 PrincipalMoments = {1, 1, 1} CentreOfMass = {1, 0, 0}"),
               ElementsAre("scene:2:54: error: Body \"Ball\" has no geometry, so its Position is "
                           "the centre of mass; "
@@ -139,8 +129,7 @@ TEST(BuildBodies, RefuseContradictoryMasses) {
 
 TEST(BuildBodies, RefuseMassesThatNoSolidHas) {
   EXPECT_THAT(errors_of("Mass = 1 PrincipalMoments = {1, 1, 3}"),
-              ElementsAre(testing::StartsWith(
-                  "scene:2:29: error: Body \"Ball\" has a mass that no solid can have: ")));
+              ElementsAre(testing::StartsWith("scene:2:29: error: Body \"Ball\" has a mass that no solid can have: ")));
   EXPECT_THAT(errors_of("GeometryId = \"Brick\" MassDensity = 1e308"), testing::SizeIs(1));
   EXPECT_THAT(errors_of("Mass = 1 PrincipalMoments = {1, 0, 1}"),
               ElementsAre("scene:2:33: error: an element of PrincipalMoments is 0; allowed: a list "
@@ -152,17 +141,14 @@ TEST(BuildBodies, RefuseMassesThatNoSolidHas) {
 // -------------------------------------------------------------------------------------
 
 TEST(BuildBodies, UnboundedGeometryIsImmovable) {
-  const BodyDescription ground =
-      body("GeometryId = \"Ground\" BoundingVolumeType = \"None\" MassDensity = 0");
+  const BodyDescription ground = body("GeometryId = \"Ground\" BoundingVolumeType = \"None\" MassDensity = 0");
   EXPECT_EQ(ground.flags, kUnbounded | kHasShape);
   EXPECT_EQ(ground.mass, 0.0);
   EXPECT_EQ(ground.inertia, Vector3::Zero());
   EXPECT_EQ(ground.bound.kind, BoundKind::kNone);
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Ground\" Immovable = false"),
-      ElementsAre(
-          "scene:2:35: error: Body \"Ball\" has an unbounded geometry and is movable; allowed: "
-          "Immovable = true, or Kinematic = true"));
+  EXPECT_THAT(errors_of("GeometryId = \"Ground\" Immovable = false"),
+              ElementsAre("scene:2:35: error: Body \"Ball\" has an unbounded geometry and is movable; allowed: "
+                          "Immovable = true, or Kinematic = true"));
 }
 
 TEST(BuildBodies, ImmovableNeedsNoMass) {
@@ -173,17 +159,14 @@ TEST(BuildBodies, ImmovableNeedsNoMass) {
 }
 
 TEST(BuildBodies, KinematicKeepsItsVelocities) {
-  const BodyDescription belt = body(
-      "GeometryId = \"Brick\" Kinematic = true KineticProperties { LinearVelocity = {1, 0, 0} }");
+  const BodyDescription belt =
+      body("GeometryId = \"Brick\" Kinematic = true KineticProperties { LinearVelocity = {1, 0, 0} }");
   EXPECT_EQ(belt.flags, kKinematic | kHasShape);
   EXPECT_EQ(belt.mass, 0.0);
   EXPECT_EQ(belt.twist.linear, Vector3(1, 0, 0));
-  EXPECT_EQ(body("GeometryId = \"Ground\" Kinematic = true").flags,
-            kKinematic | kUnbounded | kHasShape);
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Brick\" Kinematic = true Immovable = true"),
-      ElementsAre(
-          "scene:2:51: error: Body \"Ball\" is Immovable and Kinematic; allowed: one of them"));
+  EXPECT_EQ(body("GeometryId = \"Ground\" Kinematic = true").flags, kKinematic | kUnbounded | kHasShape);
+  EXPECT_THAT(errors_of("GeometryId = \"Brick\" Kinematic = true Immovable = true"),
+              ElementsAre("scene:2:51: error: Body \"Ball\" is Immovable and Kinematic; allowed: one of them"));
 }
 
 TEST(BuildBodies, WhatNothingCanDoIsDroppedAndSaid) {
@@ -257,8 +240,7 @@ TEST(BuildBodies, BoundsFollowTheShape) {
   EXPECT_GE(bound("Brick", "Sphere").half_extents.x(), std::sqrt(14.0));
   EXPECT_NEAR(bound("Brick", "Sphere").half_extents.x(), std::sqrt(14.0), 1e-14);
   EXPECT_NEAR(bound("Rod", "Sphere").half_extents.x(), std::sqrt(1.25), 1e-14);
-  for (const char* shape : {"Unit", "Brick", "Rod"})
-    EXPECT_EQ(bound(shape, "None").kind, BoundKind::kNone) << shape;
+  for (const char* shape : {"Unit", "Brick", "Rod"}) EXPECT_EQ(bound(shape, "None").kind, BoundKind::kNone) << shape;
 }
 
 TEST(BuildBodies, BoundsStandWhereTheGeometryDoes) {
@@ -268,23 +250,20 @@ TEST(BuildBodies, BoundsStandWhereTheGeometryDoes) {
 }
 
 TEST(BuildBodies, ABoundOfTheUnboundedIsNone) {
-  EXPECT_THAT(
-      build(scene_with_body("GeometryId = \"Ground\" BoundingVolumeType = \"Sphere\"")).warnings(),
-      ElementsAre("scene:2:44: warning: Body \"Ball\" has an unbounded geometry: "
-                  "BoundingVolumeType \"Sphere\" "
-                  "is taken as \"None\""));
+  EXPECT_THAT(build(scene_with_body("GeometryId = \"Ground\" BoundingVolumeType = \"Sphere\"")).warnings(),
+              ElementsAre("scene:2:44: warning: Body \"Ball\" has an unbounded geometry: "
+                          "BoundingVolumeType \"Sphere\" "
+                          "is taken as \"None\""));
 }
 
 // ---- what they name
 // ----------------------------------------------------------------------------------------------
 
 TEST(BuildBodies, NameForcesInTheirOrder) {
-  EXPECT_THAT(body("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Down\"}").forces,
-              ElementsAre(1, 0));
+  EXPECT_THAT(body("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Down\"}").forces, ElementsAre(1, 0));
   EXPECT_THAT(body("GeometryId = \"Unit\" MassDensity = 1 Forces = {}").forces, IsEmpty());
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Air\"}"),
-      ElementsAre("scene:2:46: error: Forces names \"Air\" twice; allowed: each force once"));
+  EXPECT_THAT(errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Air\"}"),
+              ElementsAre("scene:2:46: error: Forces names \"Air\" twice; allowed: each force once"));
 }
 
 TEST(BuildBodies, RefuseNamesOfNothing) {
@@ -292,9 +271,8 @@ TEST(BuildBodies, RefuseNamesOfNothing) {
               ElementsAre("scene:2:14: error: GeometryId names no Geometry: \"Unti\"; did you mean "
                           "\"Unit\"? Allowed: "
                           "\"Blob\", \"Brick\", \"Ground\", \"Rod\", \"Unit\""));
-  EXPECT_THAT(
-      errors_of("GeometryId = \"Unit\" MassDensity = 1 Material = \"Steel\""),
-      ElementsAre("scene:2:48: error: Material names no Material: \"Steel\"; allowed: \"Ice\""));
+  EXPECT_THAT(errors_of("GeometryId = \"Unit\" MassDensity = 1 Material = \"Steel\""),
+              ElementsAre("scene:2:48: error: Material names no Material: \"Steel\"; allowed: \"Ice\""));
   EXPECT_THAT(errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Dwon\"}"),
               ElementsAre("scene:2:46: error: Forces names no Force: \"Dwon\"; did you mean "
                           "\"Down\"? Allowed: \"Air\", "
@@ -302,8 +280,7 @@ TEST(BuildBodies, RefuseNamesOfNothing) {
 }
 
 TEST(BuildBodies, CollisionFiltersAreOpen) {
-  const BodyDescription ball =
-      body("GeometryId = \"Unit\" MassDensity = 1 CollisionGroups = {\"A\"}");
+  const BodyDescription ball = body("GeometryId = \"Unit\" MassDensity = 1 CollisionGroups = {\"A\"}");
   EXPECT_EQ(ball.filter_group, 1U);
   EXPECT_EQ(ball.filter_mask, ~std::uint64_t{0});
 }

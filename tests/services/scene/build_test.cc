@@ -59,9 +59,9 @@ TEST(Build, CountsSteps) {
                                          {"1", "0", 0, 1.0},
                                          {"1e-6", "1000", 1000000000, 1e-6},
                                          {"0.0001", "100000.00005", 1000000001, 0.00005}}) {
-    const kernel::EnvironmentDescription description = built(
-        "Environment { } Simulator { CustomProperties { TimeStep = " + std::string(c.time_step) +
-        " Duration = " + c.duration + " } }");
+    const kernel::EnvironmentDescription description =
+        built("Environment { } Simulator { CustomProperties { TimeStep = " + std::string(c.time_step) +
+              " Duration = " + c.duration + " } }");
     EXPECT_EQ(description.steps, c.steps) << c.time_step << ' ' << c.duration;
     // the difference of two times near 1e5 is rounded to 1e-11
     EXPECT_NEAR(description.last_time_step, c.last, 2e-11) << c.time_step << ' ' << c.duration;
@@ -69,37 +69,26 @@ TEST(Build, CountsSteps) {
 }
 
 TEST(Build, RefusesTooManySteps) {
-  EXPECT_THAT(
-      errors_of("Environment { } Simulator { CustomProperties { TimeStep = 1e-9 } }"),
-      ElementsAre(
-          "scene:1:59: error: Duration/TimeStep is 1e+10; allowed: up to 4294967295 steps"));
-  EXPECT_THAT(
-      errors_of(
-          "Environment { } Simulator { CustomProperties { TimeStep = 1e-300 Duration = 1e300 } }"),
-      ElementsAre(HasSubstr("Duration/TimeStep is inf")));
+  EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { TimeStep = 1e-9 } }"),
+              ElementsAre("scene:1:59: error: Duration/TimeStep is 1e+10; allowed: up to 4294967295 steps"));
+  EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { TimeStep = 1e-300 Duration = 1e300 } }"),
+              ElementsAre(HasSubstr("Duration/TimeStep is inf")));
 }
 
 TEST(Build, RefusesWhatThisVersionLacks) {
-  EXPECT_THAT(
-      errors_of("Environment { } Simulator { Type = \"Smooth\" }"),
-      ElementsAre(
-          "scene:1:36: error: the simulator \"Smooth\" is not supported by this version; allowed: "
-          "\"Basic\""));
-  EXPECT_THAT(
-      errors_of("Environment { } Simulator { CustomProperties { Substeps = 4 } }"),
-      ElementsAre(
-          "scene:1:59: error: Substeps is 4, which is not supported by this version; allowed: 1"));
+  EXPECT_THAT(errors_of("Environment { } Simulator { Type = \"Smooth\" }"),
+              ElementsAre("scene:1:36: error: the simulator \"Smooth\" is not supported by this version; allowed: "
+                          "\"Basic\""));
+  EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { Substeps = 4 } }"),
+              ElementsAre("scene:1:59: error: Substeps is 4, which is not supported by this version; allowed: 1"));
   EXPECT_THAT(errors_of("Environment { CollisionFilter { DefaultAllow = false } }"),
               ElementsAre("scene:1:48: error: DefaultAllow = false is not supported by this "
                           "version; allowed: true"));
-  EXPECT_THAT(
-      errors_of("Environment { CollisionFilter { DefaultAllow = true Rules { } Exceptions { } } }"),
-      IsEmpty());
-  EXPECT_THAT(
-      errors_of("Environment { } Plugins { Plugin { Slot = \"solver\" Hosting = \"grpc\" } }"),
-      ElementsAre("scene:1:62: error: Hosting \"grpc\" is not supported by this version; allowed: "
-                  "\"direct\", "
-                  "\"shm\""));
+  EXPECT_THAT(errors_of("Environment { CollisionFilter { DefaultAllow = true Rules { } Exceptions { } } }"), IsEmpty());
+  EXPECT_THAT(errors_of("Environment { } Plugins { Plugin { Slot = \"solver\" Hosting = \"grpc\" } }"),
+              ElementsAre("scene:1:62: error: Hosting \"grpc\" is not supported by this version; allowed: "
+                          "\"direct\", "
+                          "\"shm\""));
 }
 
 // ---- plugins
@@ -145,16 +134,13 @@ TEST(Build, RefusesPluginsThatAreNotInstalled) {
 
 TEST(Build, LeavesSlotsEmptyThatNothingNeeds) {
   EXPECT_THAT(build("Environment { }", {}, Catalog()).errors(), IsEmpty());
+  EXPECT_THAT(build("Environment { KineticIntegrator = \"RK4\" }", {}, Catalog()).errors(),
+              ElementsAre("scene:1:35: error: no integrator plugin \"RK4\" is installed; none is allowed here"));
   EXPECT_THAT(
-      build("Environment { KineticIntegrator = \"RK4\" }", {}, Catalog()).errors(),
-      ElementsAre(
-          "scene:1:35: error: no integrator plugin \"RK4\" is installed; none is allowed here"));
-  EXPECT_THAT(build("Environment { Space { Bodies { Body { Id = \"A\" Immovable = true } } } }", {},
-                    Catalog())
-                  .errors(),
-              ElementsAre("scene:1:1: error: no integrator plugin \"SemiImplicitEuler\" is "
-                          "installed; none is allowed "
-                          "here"));
+      build("Environment { Space { Bodies { Body { Id = \"A\" Immovable = true } } } }", {}, Catalog()).errors(),
+      ElementsAre("scene:1:1: error: no integrator plugin \"SemiImplicitEuler\" is "
+                  "installed; none is allowed "
+                  "here"));
 }
 
 TEST(Build, ReadsHostingAndDeadlines) {
@@ -169,21 +155,17 @@ TEST(Build, ReadsHostingAndDeadlines) {
 }
 
 TEST(Build, RefusesContradictoryPluginBlocks) {
-  const auto plugins = [](const std::string& text) {
-    return errors_of("Environment { } Plugins {\n" + text + "\n}");
-  };
+  const auto plugins = [](const std::string& text) { return errors_of("Environment { } Plugins {\n" + text + "\n}"); };
   EXPECT_THAT(plugins("Plugin { Slot = \"solver\" }\nPlugin { Slot = \"solver\" }"),
               ElementsAre("scene:3:17: error: the slot \"solver\" has a Plugin already, at "
                           "scene:2:1; allowed: one"));
-  EXPECT_THAT(
-      plugins("Plugin { Slot = \"force\" Deadline = 1 }\nPlugin { Slot = \"force\" Deadline = 2 }"),
-      ElementsAre("scene:3:36: error: Deadline differs from that at scene:2:1; allowed: one for "
-                  "the whole slot "
-                  "\"force\""));
-  EXPECT_THAT(
-      plugins("Plugin { Slot = \"solver\" Name = \"LCP\" }"),
-      ElementsAre("scene:2:33: error: Name of the slot \"solver\" stands elsewhere; allowed: in "
-                  "ConstraintSolver { … }"));
+  EXPECT_THAT(plugins("Plugin { Slot = \"force\" Deadline = 1 }\nPlugin { Slot = \"force\" Deadline = 2 }"),
+              ElementsAre("scene:3:36: error: Deadline differs from that at scene:2:1; allowed: one for "
+                          "the whole slot "
+                          "\"force\""));
+  EXPECT_THAT(plugins("Plugin { Slot = \"solver\" Name = \"LCP\" }"),
+              ElementsAre("scene:2:33: error: Name of the slot \"solver\" stands elsewhere; allowed: in "
+                          "ConstraintSolver { … }"));
   EXPECT_THAT(plugins("Plugin { Slot = \"force\" CustomProperties { Fast = true } }"),
               ElementsAre("scene:2:25: error: CustomProperties of an unnamed plugin; required: "
                           "Name or Library, since "
@@ -205,21 +187,18 @@ TEST(Build, GivesPluginsOfListsTheirSettings) {
 }
 
 TEST(Build, SaysWhichSettingsAreOfNoUse) {
-  EXPECT_THAT(
-      build("Environment { } Plugins { Plugin { Slot = \"force\" Name = \"Drag\"\nCustomProperties "
-            "{ Fast = "
-            "true } } }")
-          .warnings(),
-      ElementsAre(
-          "scene:2:1: warning: these CustomProperties are for no plugin that the scene uses"));
+  EXPECT_THAT(build("Environment { } Plugins { Plugin { Slot = \"force\" Name = \"Drag\"\nCustomProperties "
+                    "{ Fast = "
+                    "true } } }")
+                  .warnings(),
+              ElementsAre("scene:2:1: warning: these CustomProperties are for no plugin that the scene uses"));
 }
 
 // ---- geometries and forces
 // ---------------------------------------------------------------------------------------
 
 TEST(Build, FlattensGeometries) {
-  const kernel::EnvironmentDescription description =
-      built(scene_with_body("GeometryId = \"Rod\" MassDensity = 1"));
+  const kernel::EnvironmentDescription description = built(scene_with_body("GeometryId = \"Rod\" MassDensity = 1"));
   ASSERT_EQ(description.shapes.size(), 5U);
   EXPECT_EQ(description.shapes[2].id, "Rod");
   EXPECT_EQ(description.shapes[2].type, "Cylinder");
@@ -233,24 +212,18 @@ TEST(Build, RefusesBadGeometries) {
   const auto geometry = [](const std::string& text) {
     return errors_of("Geometries {\nGeometry { Id = \"A\" " + text + " } } Environment { }");
   };
-  EXPECT_THAT(
-      geometry("Type = \"Spere\""),
-      ElementsAre(
-          "scene:2:28: error: the collision plugin \"Standard\" knows no shape \"Spere\"; did you "
-          "mean "
-          "\"Sphere\"? Allowed: \"Sphere\", \"Box\", \"Cylinder\", \"Halfspace\", \"Blob\""));
-  EXPECT_THAT(
-      geometry("Type = \"Sphere\""),
-      ElementsAre("scene:2:1: error: Sphere \"A\": Radius is missing; required: a number > 0"));
+  EXPECT_THAT(geometry("Type = \"Spere\""),
+              ElementsAre("scene:2:28: error: the collision plugin \"Standard\" knows no shape \"Spere\"; did you "
+                          "mean "
+                          "\"Sphere\"? Allowed: \"Sphere\", \"Box\", \"Cylinder\", \"Halfspace\", \"Blob\""));
+  EXPECT_THAT(geometry("Type = \"Sphere\""),
+              ElementsAre("scene:2:1: error: Sphere \"A\": Radius is missing; required: a number > 0"));
   EXPECT_THAT(geometry("Type = \"Sphere\" CustomProperties { Radius = -1 }"),
               ElementsAre("scene:2:65: error: Sphere \"A\": Radius is -1; allowed: a number > 0"));
-  EXPECT_THAT(
-      geometry("Type = \"Sphere\" CustomProperties { }"),
-      ElementsAre("scene:2:37: error: Sphere \"A\": Radius is missing; required: a number > 0"));
-  EXPECT_THAT(
-      geometry("Type = \"Halfspace\" CustomProperties { Radius = 1 }"),
-      ElementsAre(
-          "scene:2:59: error: Halfspace \"A\": unknown property \"Radius\"; none is allowed here"));
+  EXPECT_THAT(geometry("Type = \"Sphere\" CustomProperties { }"),
+              ElementsAre("scene:2:37: error: Sphere \"A\": Radius is missing; required: a number > 0"));
+  EXPECT_THAT(geometry("Type = \"Halfspace\" CustomProperties { Radius = 1 }"),
+              ElementsAre("scene:2:59: error: Halfspace \"A\": unknown property \"Radius\"; none is allowed here"));
 }
 
 TEST(Build, ABadGeometryIsReportedOnce) {
@@ -278,11 +251,9 @@ TEST(Build, FlattensForcesAndFindsTheirPlugins) {
 }
 
 TEST(Build, RefusesUnknownForces) {
-  EXPECT_THAT(
-      errors_of("Forces { Force { Type = \"Gravty\" Id = \"G\" } } Environment { }"),
-      ElementsAre(
-          "scene:1:25: error: no installed force plugin knows the type \"Gravty\"; did you mean "
-          "\"Gravity\"? Allowed: \"Drag\", \"Gravity\""));
+  EXPECT_THAT(errors_of("Forces { Force { Type = \"Gravty\" Id = \"G\" } } Environment { }"),
+              ElementsAre("scene:1:25: error: no installed force plugin knows the type \"Gravty\"; did you mean "
+                          "\"Gravity\"? Allowed: \"Drag\", \"Gravity\""));
 }
 
 // ---- joints
@@ -300,8 +271,8 @@ std::string scene_with_joint(const std::string& joint) {
 }
 
 TEST(Build, ResolvesJoints) {
-  const kernel::EnvironmentDescription description = built(
-      scene_with_joint("Body1 = \"B\" Body2 = \"A\" BreakingThreshold = 0.1 BreakingForce = 7"));
+  const kernel::EnvironmentDescription description =
+      built(scene_with_joint("Body1 = \"B\" Body2 = \"A\" BreakingThreshold = 0.1 BreakingForce = 7"));
   ASSERT_EQ(description.constraints.size(), 1U);
   const kernel::ConstraintDescription& joint = description.constraints[0];
   EXPECT_EQ(joint.id, "J");
@@ -322,10 +293,8 @@ TEST(Build, TheWorldIsABodyWithoutAName) {
 
 TEST(Build, RefusesJointsOfNothing) {
   const auto joint = [](const std::string& text) { return errors_of(scene_with_joint(text)); };
-  EXPECT_THAT(
-      joint(""),
-      ElementsAre("scene:1:238: error: Constraint \"J\" joins the world to the world; required: "
-                  "Body1 or Body2"));
+  EXPECT_THAT(joint(""), ElementsAre("scene:1:238: error: Constraint \"J\" joins the world to the world; required: "
+                                     "Body1 or Body2"));
   EXPECT_THAT(joint("Body1 = \"A\" Body2 = \"A\""),
               ElementsAre("scene:2:21: error: Constraint \"J\" joins \"A\" to itself; allowed: two "
                           "bodies, or one and "

@@ -15,8 +15,7 @@ std::vector<Token> tokens(const std::string& text) {
   kept = text;
   Lexer lexer(kept, 0);
   std::vector<Token> all(1);
-  for (lexer.next(&all.back()); all.back().kind != TokenKind::kEnd; lexer.next(&all.back()))
-    all.emplace_back();
+  for (lexer.next(&all.back()); all.back().kind != TokenKind::kEnd; lexer.next(&all.back())) all.emplace_back();
   return all;
 }
 
@@ -25,8 +24,7 @@ std::string error_of(const std::string& text) {
   try {
     tokens(text);
   } catch (const SyntaxError& error) {
-    return std::to_string(error.position.line) + ':' + std::to_string(error.position.column) +
-           ": " + error.text;
+    return std::to_string(error.position.line) + ':' + std::to_string(error.position.column) + ": " + error.text;
   }
   return "";
 }
@@ -73,17 +71,14 @@ TEST(Lexer, RoundsNumbersTooSmallToZero) {
 TEST(Lexer, RefusesWhatIsNoNumber) {
   for (const char* text : {"0x10", "1.2.3", "1e", "1_000", "-", "1e+", ".", "-inf", "5m"})
     EXPECT_EQ(error_of(text),
-              "1:1: \"" + std::string(text) +
-                  "\" is no number; allowed: decimal numbers such as 2, -0.5 or 1.5e-3");
+              "1:1: \"" + std::string(text) + "\" is no number; allowed: decimal numbers such as 2, -0.5 or 1.5e-3");
 }
 
 TEST(Lexer, RefusesNumbersTooLarge) {
-  for (const std::string& text :
-       {std::string("1e309"), std::string("-1e999"), "1" + std::string(400, '0'),
-        std::string("1e99999999999999999999"), "0.001e" + std::string("400")})
+  for (const std::string& text : {std::string("1e309"), std::string("-1e999"), "1" + std::string(400, '0'),
+                                  std::string("1e99999999999999999999"), "0.001e" + std::string("400")})
     EXPECT_EQ(error_of(text),
-              "1:1: the number " + text +
-                  " is too large; allowed: magnitudes up to 1.7976931348623157e308");
+              "1:1: the number " + text + " is too large; allowed: magnitudes up to 1.7976931348623157e308");
 }
 
 TEST(Lexer, SkipsCommentsOutsideTexts) {
@@ -116,37 +111,29 @@ TEST(Lexer, SkipsAByteOrderMarkAndTakesBothLineEnds) {
 
 TEST(Lexer, ResolvesEscapes) {
   EXPECT_EQ(tokens(R"("\"\\\n\t")")[0].text, "\"\\\n\t");
-  EXPECT_EQ(error_of(R"( "ab\x")"),
-            R"(1:5: an unknown escape inside a text; allowed: \" \\ \n \t)");
+  EXPECT_EQ(error_of(R"( "ab\x")"), R"(1:5: an unknown escape inside a text; allowed: \" \\ \n \t)");
   EXPECT_EQ(error_of("\"\\"), R"(1:2: an unknown escape inside a text; allowed: \" \\ \n \t)");
 }
 
 TEST(Lexer, RefusesTextsAndCommentsWithoutEnd) {
-  constexpr const char* kText =
-      "this text does not end; a text ends with a double quote on the line it begins on";
+  constexpr const char* kText = "this text does not end; a text ends with a double quote on the line it begins on";
   EXPECT_EQ(error_of("a\n  \"b"), std::string("2:3: ") + kText);
   EXPECT_EQ(error_of("\"b\nc\""), std::string("1:1: ") + kText);
-  EXPECT_EQ(error_of("a /* b\n c"),
-            "1:3: this comment does not end; a comment that begins with /* ends with */");
-  EXPECT_EQ(error_of("/*/"),
-            "1:1: this comment does not end; a comment that begins with /* ends with */");
+  EXPECT_EQ(error_of("a /* b\n c"), "1:3: this comment does not end; a comment that begins with /* ends with */");
+  EXPECT_EQ(error_of("/*/"), "1:1: this comment does not end; a comment that begins with /* ends with */");
 }
 
 TEST(Lexer, RefusesWhatIsNoText) {
-  constexpr const char* kAllowed =
-      "; allowed: names, numbers, texts in double quotes, { } = , and comments";
+  constexpr const char* kAllowed = "; allowed: names, numbers, texts in double quotes, { } = , and comments";
   EXPECT_EQ(error_of(std::string("a\0b", 3)), "1:2: a byte of value zero; a scene is a text file");
   EXPECT_EQ(error_of(std::string("# \0", 3)), "1:3: a byte of value zero; a scene is a text file");
-  EXPECT_EQ(error_of(std::string("\"\0\"", 3)),
-            "1:2: a byte of value zero; a scene is a text file");
+  EXPECT_EQ(error_of(std::string("\"\0\"", 3)), "1:2: a byte of value zero; a scene is a text file");
   EXPECT_EQ(error_of("a \xFF"), "1:3: a byte that is no UTF-8; a scene is a text file in UTF-8");
-  EXPECT_EQ(error_of("\"\xC3\""),
-            "1:2: a byte that is no UTF-8 inside a text; a scene is a text file in UTF-8");
+  EXPECT_EQ(error_of("\"\xC3\""), "1:2: a byte that is no UTF-8 inside a text; a scene is a text file in UTF-8");
   EXPECT_EQ(error_of("\"\xED\xA0\x80\""),  // half of a surrogate pair
             "1:2: a byte that is no UTF-8 inside a text; a scene is a text file in UTF-8");
   EXPECT_EQ(error_of("a ; b"), std::string("1:3: unexpected character \";\" (U+003B)") + kAllowed);
-  EXPECT_EQ(error_of("a \xC3\xA9"),
-            std::string("1:3: unexpected character \"\xC3\xA9\" (U+00E9)") + kAllowed);
+  EXPECT_EQ(error_of("a \xC3\xA9"), std::string("1:3: unexpected character \"\xC3\xA9\" (U+00E9)") + kAllowed);
   EXPECT_EQ(error_of("a / b"), std::string("1:3: unexpected character \"/\" (U+002F)") + kAllowed);
   EXPECT_EQ(error_of("\"\x01\""), std::string("1:2: unexpected character (U+0001)") + kAllowed);
 }

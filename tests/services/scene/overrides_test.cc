@@ -49,9 +49,7 @@ TEST(Overrides, ChooseThePluginsOfTheSlots) {
 
 TEST(Overrides, SetThePropertiesOfPlugins) {
   EXPECT_THAT(built({"Solver.Iterations=50"}).solver.plugins[0].settings, ElementsAre(50, 1));
-  EXPECT_THAT(built({"Solver.CustomProperties.Iterations=50", "Solver.Iterations = 60"})
-                  .solver.plugins[0]
-                  .settings,
+  EXPECT_THAT(built({"Solver.CustomProperties.Iterations=50", "Solver.Iterations = 60"}).solver.plugins[0].settings,
               ElementsAre(60, 1));
   EXPECT_THAT(built({"Space.CellSize=3"}).space.plugins[0].settings, ElementsAre(3));
   EXPECT_THAT(built({"Collision.Margin=0.5"}).collision.plugins[0].settings, ElementsAre(0.5));
@@ -62,27 +60,24 @@ TEST(Overrides, DropThePropertiesOfAnotherType) {
   ASSERT_TRUE(result.description.has_value());
   EXPECT_EQ(result.description->space.plugins[0].declaration.name, "KDTree");
   EXPECT_THAT(result.description->space.plugins[0].settings, ElementsAre(8));
-  EXPECT_THAT(result.warnings(),
-              ElementsAre("--set Space=KDTree: warning: the CustomProperties written for \"Grid\" "
-                          "are dropped"));
+  EXPECT_THAT(result.warnings(), ElementsAre("--set Space=KDTree: warning: the CustomProperties written for \"Grid\" "
+                                             "are dropped"));
   EXPECT_THAT(built({"Space=Grid"}).space.plugins[0].settings, ElementsAre(2));
 }
 
 TEST(Overrides, SetTimes) {
-  const kernel::EnvironmentDescription description =
-      built({"Simulator.TimeStep=0.5", "Simulator.Duration=2"});
+  const kernel::EnvironmentDescription description = built({"Simulator.TimeStep=0.5", "Simulator.Duration=2"});
   EXPECT_EQ(description.time_step, 0.5);
   EXPECT_EQ(description.steps, 4U);
   EXPECT_EQ(built({"Simulator.CustomProperties.TimeStep=0.25"}).time_step, 0.25);
 }
 
 TEST(Overrides, SetPropertiesOfBlocksWithIds) {
-  const kernel::EnvironmentDescription description = built(
-      {"Body.Ball01.LinearVelocity={1,0,0}", "Body.Ball01.KineticProperties.Position={0, 2, 0}",
-       "Body.Ball.02.MassDensity=500", "Geometry.Unit.Radius=2",
-       "Material.Ice.StaticFrictionCoefficient=0.25", "Body.Ball01.Material=Ice",
-       "Force.Down.Acceleration={0,-1,0}", "Body.Ball01.Forces={Down}",
-       "Constraint.Joint.BindPoint={0,1,0}", "Constraint.Joint.Body2=Ball.02"});
+  const kernel::EnvironmentDescription description =
+      built({"Body.Ball01.LinearVelocity={1,0,0}", "Body.Ball01.KineticProperties.Position={0, 2, 0}",
+             "Body.Ball.02.MassDensity=500", "Geometry.Unit.Radius=2", "Material.Ice.StaticFrictionCoefficient=0.25",
+             "Body.Ball01.Material=Ice", "Force.Down.Acceleration={0,-1,0}", "Body.Ball01.Forces={Down}",
+             "Constraint.Joint.BindPoint={0,1,0}", "Constraint.Joint.Body2=Ball.02"});
   EXPECT_EQ(description.bodies[0].twist.linear, Vector3(1, 0, 0));
   EXPECT_EQ(description.bodies[0].pose.position, Vector3(0, 2, 0));
   EXPECT_EQ(description.bodies[0].mass, 2.0 * description.bodies[1].mass);
@@ -116,43 +111,33 @@ TEST(Overrides, TakeTextsWithAndWithoutQuotes) {
 }
 
 TEST(Overrides, NameTheirMistakes) {
-  EXPECT_THAT(errors_of("Solver"),
-              ElementsAre("--set Solver: there is no \"=\"; allowed: PATH=VALUE"));
+  EXPECT_THAT(errors_of("Solver"), ElementsAre("--set Solver: there is no \"=\"; allowed: PATH=VALUE"));
   EXPECT_THAT(errors_of("=1"), ElementsAre("--set =1: the path is empty; allowed: PATH=VALUE"));
   EXPECT_THAT(errors_of("Solver="),
               ElementsAre("--set Solver=: the value is empty; allowed: a value, \"\" for no text"));
-  EXPECT_THAT(errors_of("Solver.=1"),
-              ElementsAre("--set Solver.=1: the path ends with a dot; allowed: PATH=VALUE"));
+  EXPECT_THAT(errors_of("Solver.=1"), ElementsAre("--set Solver.=1: the path ends with a dot; allowed: PATH=VALUE"));
   EXPECT_THAT(errors_of("Slover=LCP"),
-              ElementsAre(testing::StartsWith(
-                  "--set Slover=LCP: the path begins with \"Slover\"; did you mean "
-                  "\"Solver\"? Allowed: \"Integrator\", \"Solver\", ")));
+              ElementsAre(testing::StartsWith("--set Slover=LCP: the path begins with \"Slover\"; did you mean "
+                                              "\"Solver\"? Allowed: \"Integrator\", \"Solver\", ")));
   EXPECT_THAT(errors_of("Body.Ball03.Mass=1"),
               ElementsAre("--set Body.Ball03.Mass=1: no Body \"Ball03\"; did you mean \"Ball01\"? "
                           "Allowed: \"Ball01\", "
                           "\"Ball.02\""));
   EXPECT_THAT(errors_of("Body.Ball01=1"),
-              ElementsAre(testing::StartsWith(
-                  "--set Body.Ball01=1: a property must follow \"Ball01\"; allowed: ")));
+              ElementsAre(testing::StartsWith("--set Body.Ball01=1: a property must follow \"Ball01\"; allowed: ")));
   EXPECT_THAT(errors_of("Body.Ball01.LinearVelcity={0,0,0}"),
-              ElementsAre(testing::StartsWith(
-                  "--set Body.Ball01.LinearVelcity={0,0,0}: no property \"LinearVelcity\"; "
-                  "did you mean \"LinearVelocity\"? Allowed: ")));
+              ElementsAre(testing::StartsWith("--set Body.Ball01.LinearVelcity={0,0,0}: no property \"LinearVelcity\"; "
+                                              "did you mean \"LinearVelocity\"? Allowed: ")));
   EXPECT_THAT(errors_of("Simulator.TimeStep=-1"),
               ElementsAre("--set Simulator.TimeStep=-1: TimeStep is -1; allowed: a number > 0"));
-  EXPECT_THAT(
-      errors_of("Simulator.TimeStep=fast"),
-      ElementsAre("--set Simulator.TimeStep=fast: TimeStep is \"fast\"; allowed: a number > 0"));
+  EXPECT_THAT(errors_of("Simulator.TimeStep=fast"),
+              ElementsAre("--set Simulator.TimeStep=fast: TimeStep is \"fast\"; allowed: a number > 0"));
   EXPECT_THAT(errors_of("Simulator=Basik"),
-              ElementsAre(testing::StartsWith(
-                  "--set Simulator=Basik: Type is \"Basik\"; did you mean \"Basic\"?")));
-  EXPECT_THAT(
-      errors_of("Body.Ball01.Motion={}"),
-      ElementsAre(
-          "--set Body.Ball01.Motion={}: Motion is not supported by this version; allowed: leave it "
-          "out"));
-  EXPECT_THAT(errors_of("Space.Bodies=1"),
-              ElementsAre(testing::HasSubstr("\"Bodies\" is no property")));
+              ElementsAre(testing::StartsWith("--set Simulator=Basik: Type is \"Basik\"; did you mean \"Basic\"?")));
+  EXPECT_THAT(errors_of("Body.Ball01.Motion={}"),
+              ElementsAre("--set Body.Ball01.Motion={}: Motion is not supported by this version; allowed: leave it "
+                          "out"));
+  EXPECT_THAT(errors_of("Space.Bodies=1"), ElementsAre(testing::HasSubstr("\"Bodies\" is no property")));
   EXPECT_THAT(errors_of("Plugin.solvr.Deadline=1"),
               ElementsAre(testing::HasSubstr("no slot \"solvr\"; did you mean \"solver\"?")));
   EXPECT_THAT(build("", {"Solver=LCP"}).errors(),
@@ -160,9 +145,7 @@ TEST(Overrides, NameTheirMistakes) {
 }
 
 TEST(Overrides, ErrorsKnowTheirColumn) {
-  const auto column = [](const std::string& one) {
-    return build(kScene, {one}).read.problems.errors.at(0).column;
-  };
+  const auto column = [](const std::string& one) { return build(kScene, {one}).read.problems.errors.at(0).column; };
   EXPECT_EQ(column("Simulator.TimeStep = 1 2"), 24);
   EXPECT_EQ(column("Body.Ball01.LinearVelocity={1,x,0}"), 31);
   EXPECT_EQ(column("Body.Ball01.LinearVelocity={1,"), 31);
@@ -171,21 +154,16 @@ TEST(Overrides, ErrorsKnowTheirColumn) {
 }
 
 TEST(Overrides, MistakesThatOnlyBuildingFindsNameThemToo) {
-  EXPECT_THAT(
-      errors_of("Solver=LPC"),
-      ElementsAre(
-          "--set Solver=LPC: no solver plugin \"LPC\" is installed; did you mean \"LCP\"? Allowed: "
-          "\"LCP\", \"Sequential\""));
-  EXPECT_THAT(
-      errors_of("Solver.Iteration=5"),
-      ElementsAre("--set Solver.Iteration=5: solver plugin \"Sequential\": unknown property "
-                  "\"Iteration\"; did "
-                  "you mean \"Iterations\"? Allowed: \"Iterations\", \"CorrectionFactor\""));
-  EXPECT_THAT(
-      errors_of("Body.Ball01.GeometryId=Unti"),
-      ElementsAre(
-          "--set Body.Ball01.GeometryId=Unti: GeometryId names no Geometry: \"Unti\"; did you mean "
-          "\"Unit\"? Allowed: \"Unit\""));
+  EXPECT_THAT(errors_of("Solver=LPC"),
+              ElementsAre("--set Solver=LPC: no solver plugin \"LPC\" is installed; did you mean \"LCP\"? Allowed: "
+                          "\"LCP\", \"Sequential\""));
+  EXPECT_THAT(errors_of("Solver.Iteration=5"),
+              ElementsAre("--set Solver.Iteration=5: solver plugin \"Sequential\": unknown property "
+                          "\"Iteration\"; did "
+                          "you mean \"Iterations\"? Allowed: \"Iterations\", \"CorrectionFactor\""));
+  EXPECT_THAT(errors_of("Body.Ball01.GeometryId=Unti"),
+              ElementsAre("--set Body.Ball01.GeometryId=Unti: GeometryId names no Geometry: \"Unti\"; did you mean "
+                          "\"Unit\"? Allowed: \"Unit\""));
   EXPECT_THAT(errors_of("Simulator=Continuous"),
               ElementsAre("--set Simulator=Continuous: the simulator \"Continuous\" is not "
                           "supported by this version; "

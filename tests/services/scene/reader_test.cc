@@ -18,20 +18,14 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-std::vector<std::string> errors_of(const std::string& text) {
-  return texts(read(text).problems.errors);
-}
-std::vector<std::string> warnings_of(const std::string& text) {
-  return texts(read(text).problems.warnings);
-}
+std::vector<std::string> errors_of(const std::string& text) { return texts(read(text).problems.errors); }
+std::vector<std::string> warnings_of(const std::string& text) { return texts(read(text).problems.warnings); }
 
 // A body at line 1; its properties begin at column 41.
 std::string body(const std::string& properties) {
   return "Environment { Space { Bodies { Body {   " + properties + " } } } }";
 }
-const v1::Body& first_body(ReadScene& read) {
-  return read.scene().environment(0).space().bodies().body(0);
-}
+const v1::Body& first_body(ReadScene& read) { return read.scene().environment(0).space().bodies().body(0); }
 
 // ---- what is taken
 // -----------------------------------------------------------------------------------------------
@@ -74,8 +68,7 @@ TEST(Reader, TakesBlocksAndPropertiesInAnyOrder) {
 }
 
 TEST(Reader, TakesAComponentAsATextOrABlock) {
-  ReadScene scene =
-      read("Environment { KineticIntegrator { Type = \"RK4\" CustomProperties { Order = 4 } } }");
+  ReadScene scene = read("Environment { KineticIntegrator { Type = \"RK4\" CustomProperties { Order = 4 } } }");
   ASSERT_TRUE(scene.is_good);
   const v1::Component& integrator = scene.scene().environment(0).kinetic_integrator();
   EXPECT_EQ(integrator.type(), "RK4");
@@ -101,17 +94,15 @@ TEST(Reader, KeepsFreePropertiesWithTheirPlaces) {
 }
 
 TEST(Reader, JoinsListsOfElements) {
-  ReadScene scene =
-      read("Materials { Material { Id = \"A\" } } Materials { Material { Id = \"B\" } }");
+  ReadScene scene = read("Materials { Material { Id = \"A\" } } Materials { Material { Id = \"B\" } }");
   ASSERT_TRUE(scene.is_good);
   EXPECT_EQ(scene.scene().materials().material_size(), 2);
 }
 
 TEST(Reader, AcceptsWhatChangesNoResult) {
-  ReadScene scene =
-      read(body("Id = \"A\" VisualFile = \"a.obj\" VisualTransform = {{0, 0, 0}, {1, 0, 0, 0}} "
-                "CollisionGroups = {\"G\"}") +
-           "Plugins { Plugin { Slot = \"solver\" Standby = 2 } }");
+  ReadScene scene = read(body("Id = \"A\" VisualFile = \"a.obj\" VisualTransform = {{0, 0, 0}, {1, 0, 0, 0}} "
+                              "CollisionGroups = {\"G\"}") +
+                         "Plugins { Plugin { Slot = \"solver\" Standby = 2 } }");
   EXPECT_THAT(texts(scene.problems.errors), IsEmpty());
 }
 
@@ -119,64 +110,50 @@ TEST(Reader, AcceptsWhatChangesNoResult) {
 // ---------------------------------------------------------------------------------------------
 
 TEST(Reader, SuggestsNamesForUnknownOnes) {
-  EXPECT_THAT(
-      errors_of("Material { }"),
-      ElementsAre("scene:1:1: error: unknown block \"Material\"; it belongs into Materials { … }"));
-  EXPECT_THAT(
-      errors_of("Environmnt { Nonsense { a = { 1 } } }"),
-      ElementsAre(
-          "scene:1:1: error: unknown block \"Environmnt\"; did you mean \"Environment\"? Allowed: "
-          "\"Geometries\", \"Materials\", \"Forces\", \"Simulator\", \"Environment\", "
-          "\"Plugins\""));
-  EXPECT_THAT(
-      errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
-      ElementsAre(
-          "scene:1:32: error: unknown property \"TimeStp\" in CustomProperties; did you mean "
-          "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\""));
+  EXPECT_THAT(errors_of("Material { }"),
+              ElementsAre("scene:1:1: error: unknown block \"Material\"; it belongs into Materials { … }"));
+  EXPECT_THAT(errors_of("Environmnt { Nonsense { a = { 1 } } }"),
+              ElementsAre("scene:1:1: error: unknown block \"Environmnt\"; did you mean \"Environment\"? Allowed: "
+                          "\"Geometries\", \"Materials\", \"Forces\", \"Simulator\", \"Environment\", "
+                          "\"Plugins\""));
+  EXPECT_THAT(errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
+              ElementsAre("scene:1:32: error: unknown property \"TimeStp\" in CustomProperties; did you mean "
+                          "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\""));
 }
 
 TEST(Reader, SaysWhereANameBelongs) {
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\" Position = {0, 0, 0}")),
-      ElementsAre("scene:1:50: error: unknown property \"Position\" in Body; it belongs into "
-                  "KineticProperties { … }"));
-  EXPECT_THAT(
-      errors_of("Geometries { Geometry { Type = \"Sphere\" Id = \"A\" Radius = 1 } }"),
-      ElementsAre(
-          "scene:1:50: error: unknown property \"Radius\" in Geometry; allowed: \"Type\", \"Id\", "
-          "\"CustomProperties\"; properties of its type go into CustomProperties { … }"));
+  EXPECT_THAT(errors_of(body("Id = \"A\" Position = {0, 0, 0}")),
+              ElementsAre("scene:1:50: error: unknown property \"Position\" in Body; it belongs into "
+                          "KineticProperties { … }"));
+  EXPECT_THAT(errors_of("Geometries { Geometry { Type = \"Sphere\" Id = \"A\" Radius = 1 } }"),
+              ElementsAre("scene:1:50: error: unknown property \"Radius\" in Geometry; allowed: \"Type\", \"Id\", "
+                          "\"CustomProperties\"; properties of its type go into CustomProperties { … }"));
 }
 
 TEST(Reader, IsCaseSensitive) {
   EXPECT_THAT(errors_of(body("Id = \"A\" massdensity = 1")),
-              ElementsAre(testing::StartsWith(
-                  "scene:1:50: error: unknown property \"massdensity\" in Body; did you "
-                  "mean \"MassDensity\"? Allowed: ")));
+              ElementsAre(testing::StartsWith("scene:1:50: error: unknown property \"massdensity\" in Body; did you "
+                                              "mean \"MassDensity\"? Allowed: ")));
 }
 
 TEST(Reader, RefusesWrongKindsOfValues) {
-  EXPECT_THAT(errors_of(body("Id = 1")),
-              ElementsAre("scene:1:46: error: Id is 1; allowed: a text in double quotes"));
+  EXPECT_THAT(errors_of(body("Id = 1")), ElementsAre("scene:1:46: error: Id is 1; allowed: a text in double quotes"));
   EXPECT_THAT(errors_of(body("Id = \"A\" MassDensity = \"heavy\"")),
               ElementsAre("scene:1:64: error: MassDensity is \"heavy\"; allowed: a number >= 0"));
   EXPECT_THAT(errors_of(body("Id = \"A\" Immovable = 1")),
               ElementsAre("scene:1:62: error: Immovable is 1; allowed: true or false"));
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\" Forces = \"G\"")),
-      ElementsAre("scene:1:59: error: Forces is \"G\"; allowed: a list of texts, { \"…\" }"));
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\" Forces = {\"G\", 2}")),
-      ElementsAre("scene:1:65: error: an element of Forces is 2; allowed: texts in double quotes"));
+  EXPECT_THAT(errors_of(body("Id = \"A\" Forces = \"G\"")),
+              ElementsAre("scene:1:59: error: Forces is \"G\"; allowed: a list of texts, { \"…\" }"));
+  EXPECT_THAT(errors_of(body("Id = \"A\" Forces = {\"G\", 2}")),
+              ElementsAre("scene:1:65: error: an element of Forces is 2; allowed: texts in double quotes"));
   EXPECT_THAT(errors_of("Environment { ConstraintSolver = 1 }"),
               ElementsAre("scene:1:34: error: ConstraintSolver is 1; allowed: a text in double "
                           "quotes, or a block { … }"));
 }
 
 TEST(Reader, RefusesPropertiesAsBlocksAndBlocksAsProperties) {
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\" MassDensity { }")),
-      ElementsAre(
-          "scene:1:50: error: MassDensity is a property, no block; allowed: MassDensity = value"));
+  EXPECT_THAT(errors_of(body("Id = \"A\" MassDensity { }")),
+              ElementsAre("scene:1:50: error: MassDensity is a property, no block; allowed: MassDensity = value"));
   EXPECT_THAT(errors_of(body("Id = \"A\" KineticProperties = { }")),
               ElementsAre("scene:1:50: error: KineticProperties is a block, no property; allowed: "
                           "KineticProperties "
@@ -184,9 +161,7 @@ TEST(Reader, RefusesPropertiesAsBlocksAndBlocksAsProperties) {
 }
 
 TEST(Reader, RefusesValuesOutOfRange) {
-  const auto kinetic = [](const std::string& text) {
-    return body("Id = \"A\" KineticProperties { " + text + " }");
-  };
+  const auto kinetic = [](const std::string& text) { return body("Id = \"A\" KineticProperties { " + text + " }"); };
   EXPECT_THAT(errors_of(kinetic("Position = {0, 2e15, 0}")),
               ElementsAre("scene:1:85: error: an element of Position is 2e+15; allowed: a list of "
                           "3 numbers, each in "
@@ -198,23 +173,18 @@ TEST(Reader, RefusesValuesOutOfRange) {
                           "1e+15]"));
   EXPECT_THAT(errors_of(kinetic("DampingCoefficient = -1")),
               ElementsAre("scene:1:91: error: DampingCoefficient is -1; allowed: a number >= 0"));
-  EXPECT_THAT(
-      errors_of("Simulator { CustomProperties { TimeStep = 0 Duration = -1 Substeps = 1.5 } }"),
-      ElementsAre(
-          "scene:1:43: error: TimeStep is 0; allowed: a number > 0",
-          "scene:1:56: error: Duration is -1; allowed: a number >= 0",
-          "scene:1:70: error: Substeps is 1.5; allowed: a whole number in [1, 4294967295]"));
-  EXPECT_THAT(
-      errors_of("Materials { Material { Id = \"M\" RestitutionCoefficient = 1.1 } }"),
-      ElementsAre("scene:1:58: error: RestitutionCoefficient is 1.1; allowed: a number in [0, 1]"));
+  EXPECT_THAT(errors_of("Simulator { CustomProperties { TimeStep = 0 Duration = -1 Substeps = 1.5 } }"),
+              ElementsAre("scene:1:43: error: TimeStep is 0; allowed: a number > 0",
+                          "scene:1:56: error: Duration is -1; allowed: a number >= 0",
+                          "scene:1:70: error: Substeps is 1.5; allowed: a whole number in [1, 4294967295]"));
+  EXPECT_THAT(errors_of("Materials { Material { Id = \"M\" RestitutionCoefficient = 1.1 } }"),
+              ElementsAre("scene:1:58: error: RestitutionCoefficient is 1.1; allowed: a number in [0, 1]"));
 }
 
 TEST(Reader, RefusesUnknownChoices) {
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\" BoundingVolumeType = \"Spere\"")),
-      ElementsAre(
-          "scene:1:71: error: BoundingVolumeType is \"Spere\"; did you mean \"Sphere\"? Allowed: "
-          "\"None\", \"Sphere\", \"AxisAlignedBox\", \"OrientedBox\""));
+  EXPECT_THAT(errors_of(body("Id = \"A\" BoundingVolumeType = \"Spere\"")),
+              ElementsAre("scene:1:71: error: BoundingVolumeType is \"Spere\"; did you mean \"Sphere\"? Allowed: "
+                          "\"None\", \"Sphere\", \"AxisAlignedBox\", \"OrientedBox\""));
   EXPECT_THAT(errors_of(body("Id = \"A\" Type = \"Soft\"")),
               ElementsAre("scene:1:57: error: Type is \"Soft\"; allowed: \"Rigid\""));
 }
@@ -223,10 +193,8 @@ TEST(Reader, NormalisesOrientationsWithinATolerance) {
   const auto turned = [](const char* q) {
     return body("Id = \"A\" KineticProperties { Orientation = " + std::string(q) + " }");
   };
-  EXPECT_THAT(
-      warnings_of(turned("{0.7071, 0.7071, 0, 0}")),
-      ElementsAre(
-          "scene:1:84: warning: Orientation has the norm 0.9999904099540154 and was normalised"));
+  EXPECT_THAT(warnings_of(turned("{0.7071, 0.7071, 0, 0}")),
+              ElementsAre("scene:1:84: warning: Orientation has the norm 0.9999904099540154 and was normalised"));
   EXPECT_THAT(errors_of(turned("{1, 1, 0, 0}")),
               ElementsAre("scene:1:84: error: Orientation has the norm 1.4142135623730951; "
                           "allowed: a list of 4 numbers "
@@ -234,47 +202,35 @@ TEST(Reader, NormalisesOrientationsWithinATolerance) {
 }
 
 TEST(Reader, RefusesNamesGivenTwice) {
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\"\nId = \"B\"")),
-      ElementsAre("scene:2:1: error: Id is given twice, first at scene:1:46; allowed: once"));
-  EXPECT_THAT(
-      errors_of("Simulator { }\nSimulator { }"),
-      ElementsAre("scene:2:1: error: Simulator is given twice, first at scene:1:1; allowed: once"));
-  EXPECT_THAT(
-      errors_of("Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = 1\nA = 2 } } }"),
-      ElementsAre("scene:2:1: error: A is given twice, first at scene:1:57; allowed: once"));
-  EXPECT_THAT(
-      errors_of("Environment { ConstraintSolver = \"A\"\nConstraintSolver { Type = \"B\" } }"),
-      ElementsAre(
-          "scene:2:1: error: ConstraintSolver is given twice, first at scene:1:15; allowed: once"));
+  EXPECT_THAT(errors_of(body("Id = \"A\"\nId = \"B\"")),
+              ElementsAre("scene:2:1: error: Id is given twice, first at scene:1:46; allowed: once"));
+  EXPECT_THAT(errors_of("Simulator { }\nSimulator { }"),
+              ElementsAre("scene:2:1: error: Simulator is given twice, first at scene:1:1; allowed: once"));
+  EXPECT_THAT(errors_of("Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = 1\nA = 2 } } }"),
+              ElementsAre("scene:2:1: error: A is given twice, first at scene:1:57; allowed: once"));
+  EXPECT_THAT(errors_of("Environment { ConstraintSolver = \"A\"\nConstraintSolver { Type = \"B\" } }"),
+              ElementsAre("scene:2:1: error: ConstraintSolver is given twice, first at scene:1:15; allowed: once"));
 }
 
 TEST(Reader, RefusesMissingNames) {
   EXPECT_THAT(errors_of("Geometries {\n Geometry { } }"),
               ElementsAre("scene:2:2: error: Geometry without Id; required: a text",
                           "scene:2:2: error: Geometry without Type; required: a text"));
-  EXPECT_THAT(
-      errors_of(body("Id = \"\"")),
-      ElementsAre("scene:1:46: error: Id is empty; required: a text of at least one character"));
+  EXPECT_THAT(errors_of(body("Id = \"\"")),
+              ElementsAre("scene:1:46: error: Id is empty; required: a text of at least one character"));
   EXPECT_THAT(errors_of("Environment { KineticIntegrator { } }"),
               ElementsAre("scene:1:15: error: KineticIntegrator without Type; required: a text"));
 }
 
 TEST(Reader, RefusesWhatThisVersionDoesNotSupport) {
-  EXPECT_THAT(
-      errors_of(body("Id = \"A\" Motion = {{0, {0, 0, 0}, {1, 0, 0, 0}}}")),
-      ElementsAre(
-          "scene:1:50: error: Motion is not supported by this version; allowed: leave it out"));
-  EXPECT_THAT(
-      errors_of(
-          "Environment { CollisionFilter { Rules { Rule { Allow = false Body = \"A\" } } } }"),
-      ElementsAre(
-          "scene:1:41: error: Rule is not supported by this version; allowed: leave it out"));
+  EXPECT_THAT(errors_of(body("Id = \"A\" Motion = {{0, {0, 0, 0}, {1, 0, 0, 0}}}")),
+              ElementsAre("scene:1:50: error: Motion is not supported by this version; allowed: leave it out"));
+  EXPECT_THAT(errors_of("Environment { CollisionFilter { Rules { Rule { Allow = false Body = \"A\" } } } }"),
+              ElementsAre("scene:1:41: error: Rule is not supported by this version; allowed: leave it out"));
   for (const char* name : {"Fallback", "Process", "Command", "Address"})
-    EXPECT_THAT(
-        errors_of("Plugins { Plugin { Slot = \"solver\"\n" + std::string(name) + " = \"x\" } }"),
-        ElementsAre("scene:2:1: error: " + std::string(name) +
-                    " is not supported by this version; allowed: leave it out"));
+    EXPECT_THAT(errors_of("Plugins { Plugin { Slot = \"solver\"\n" + std::string(name) + " = \"x\" } }"),
+                ElementsAre("scene:2:1: error: " + std::string(name) +
+                            " is not supported by this version; allowed: leave it out"));
 }
 
 TEST(Reader, TrimsBlanksAroundIds) {
@@ -283,17 +239,14 @@ TEST(Reader, TrimsBlanksAroundIds) {
   EXPECT_EQ(first_body(scene).id(), "Ball01");
   EXPECT_EQ(first_body(scene).geometry_id(), "Unit Sphere");
   EXPECT_EQ(first_body(scene).forces(0), "G");
-  EXPECT_THAT(
-      texts(scene.problems.warnings),
-      ElementsAre(
-          "scene:1:46: warning: Id is \" Ball01\"; the blanks around \"Ball01\" are dropped",
-          "scene:1:69: warning: GeometryId is \" Unit Sphere \"; the blanks around \"Unit Sphere\" "
-          "are "
-          "dropped",
-          "scene:1:95: warning: Forces is \"G \"; the blanks around \"G\" are dropped"));
-  EXPECT_THAT(
-      errors_of(body("Id = \"  \"")),
-      ElementsAre("scene:1:46: error: Id is empty; required: a text of at least one character"));
+  EXPECT_THAT(texts(scene.problems.warnings),
+              ElementsAre("scene:1:46: warning: Id is \" Ball01\"; the blanks around \"Ball01\" are dropped",
+                          "scene:1:69: warning: GeometryId is \" Unit Sphere \"; the blanks around \"Unit Sphere\" "
+                          "are "
+                          "dropped",
+                          "scene:1:95: warning: Forces is \"G \"; the blanks around \"G\" are dropped"));
+  EXPECT_THAT(errors_of(body("Id = \"  \"")),
+              ElementsAre("scene:1:46: error: Id is empty; required: a text of at least one character"));
   EXPECT_THAT(errors_of(body("Id = \"a\\nb\"")),
               ElementsAre("scene:1:46: error: Id holds a tab, a line end or the like; allowed: "
                           "visible characters and "
@@ -304,17 +257,12 @@ TEST(Reader, TrimsBlanksAroundIds) {
 // ------------------------------------------------------------------------------------------------------
 
 TEST(Reader, RefusesBadLists) {
-  const auto forces = [](const char* list) {
-    return body("Id = \"A\" Forces = " + std::string(list));
-  };
-  EXPECT_THAT(
-      errors_of(forces("{\"a\" \"b\"}")),
-      ElementsAre(
-          "scene:1:64: error: a list goes on with the text \"b\"; allowed: a comma and the next "
-          "element, or \"}\""));
-  EXPECT_THAT(
-      errors_of(forces("{\"a\",}")),
-      ElementsAre("scene:1:64: error: an element is missing after the comma; allowed: a value"));
+  const auto forces = [](const char* list) { return body("Id = \"A\" Forces = " + std::string(list)); };
+  EXPECT_THAT(errors_of(forces("{\"a\" \"b\"}")),
+              ElementsAre("scene:1:64: error: a list goes on with the text \"b\"; allowed: a comma and the next "
+                          "element, or \"}\""));
+  EXPECT_THAT(errors_of(forces("{\"a\",}")),
+              ElementsAre("scene:1:64: error: an element is missing after the comma; allowed: a value"));
   EXPECT_THAT(errors_of(forces("{,}")), ElementsAre("scene:1:60: error: a value was expected, not "
                                                     "a comma; allowed: a number, a text in double "
                                                     "quotes, true, false, a list { v, v }"));
@@ -330,26 +278,20 @@ TEST(Reader, RefusesUnbalancedBraces) {
                           "2; a \"}\" is missing"));
   EXPECT_THAT(errors_of("Environment { } }"),
               ElementsAre("scene:1:17: error: a \"}\" that closes nothing; allowed: Name { … }"));
-  EXPECT_THAT(
-      errors_of("Forces { Force { CustomProperties {"),
-      ElementsAre(
-          "scene:1:36: error: the file ends inside the block CustomProperties opened in line 1; a "
-          "\"}\" is missing"));
-  EXPECT_THAT(
-      errors_of("Bogus {\n"),
-      ElementsAre(
-          testing::HasSubstr("unknown block \"Bogus\""),
-          "scene:2:1: error: the file ends inside the block opened in line 1; a \"}\" is missing"));
+  EXPECT_THAT(errors_of("Forces { Force { CustomProperties {"),
+              ElementsAre("scene:1:36: error: the file ends inside the block CustomProperties opened in line 1; a "
+                          "\"}\" is missing"));
+  EXPECT_THAT(errors_of("Bogus {\n"),
+              ElementsAre(testing::HasSubstr("unknown block \"Bogus\""),
+                          "scene:2:1: error: the file ends inside the block opened in line 1; a \"}\" is missing"));
 }
 
 TEST(Reader, RefusesOtherSyntax) {
-  EXPECT_THAT(
-      errors_of("Environment ="),
-      ElementsAre(
-          "scene:1:1: error: Environment is a block, no property; allowed: Environment { … }",
-          "scene:1:14: error: a value was expected, not the end of the file; allowed: a number, a "
-          "text "
-          "in double quotes, true, false, a list { v, v }"));
+  EXPECT_THAT(errors_of("Environment ="),
+              ElementsAre("scene:1:1: error: Environment is a block, no property; allowed: Environment { … }",
+                          "scene:1:14: error: a value was expected, not the end of the file; allowed: a number, a "
+                          "text "
+                          "in double quotes, true, false, a list { v, v }"));
   EXPECT_THAT(errors_of("Environment Id"),
               ElementsAre("scene:1:13: error: \"Environment\" is followed by the word \"Id\"; "
                           "allowed: \"=\" or \"{\""));
@@ -366,18 +308,15 @@ TEST(Reader, RefusesOtherSyntax) {
 TEST(Reader, RefusesDeepNesting) {
   std::string blocks, lists = "Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = ";
   for (int i = 0; i < 100000; ++i) blocks += "B { ", lists += '{';
-  EXPECT_THAT(errors_of(blocks),
-              ElementsAre(testing::HasSubstr("unknown block \"B\""),
-                          "scene:1:259: error: braces are nested too deep; allowed: 64 levels"));
-  EXPECT_THAT(errors_of(lists),
-              ElementsAre("scene:1:122: error: braces are nested too deep; allowed: 64 levels"));
+  EXPECT_THAT(errors_of(blocks), ElementsAre(testing::HasSubstr("unknown block \"B\""),
+                                             "scene:1:259: error: braces are nested too deep; allowed: 64 levels"));
+  EXPECT_THAT(errors_of(lists), ElementsAre("scene:1:122: error: braces are nested too deep; allowed: 64 levels"));
 }
 
 TEST(Reader, TakesNestingUpToTheLimit) {
   // three blocks around 61 lists
-  const std::string text =
-      "Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = " + std::string(61, '{') +
-      std::string(61, '}') + " } } }";
+  const std::string text = "Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = " + std::string(61, '{') +
+                           std::string(61, '}') + " } } }";
   EXPECT_THAT(errors_of(text), IsEmpty());
 }
 
@@ -387,8 +326,7 @@ TEST(Reader, ReportsSeveralErrorsUpToALimit) {
   EXPECT_EQ(errors_of(text).size(), 20U);
   text.clear();
   for (int i = 0; i < 50; ++i) text += "Body { Id = \" b" + std::to_string(i) + "\" }\n";
-  const std::vector<std::string> warnings =
-      warnings_of("Environment { Space { Bodies {\n" + text + "} } }");
+  const std::vector<std::string> warnings = warnings_of("Environment { Space { Bodies {\n" + text + "} } }");
   ASSERT_EQ(warnings.size(), 21U);
   EXPECT_EQ(warnings.back(), "scene:51:13: warning: 30 more warnings, the last one here");
 }
@@ -399,9 +337,8 @@ TEST(Reader, ReportsSeveralErrorsUpToALimit) {
 class ReaderFiles : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("gravitas_reader_" + std::to_string(::getpid()) + '_' +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = std::filesystem::temp_directory_path() / ("gravitas_reader_" + std::to_string(::getpid()) + '_' +
+                                                        testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(folder_);
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
@@ -415,9 +352,8 @@ class ReaderFiles : public testing::Test {
 };
 
 TEST_F(ReaderFiles, AreReadAsOneScene) {
-  const std::vector<std::string> paths = {
-      write("a", "Materials { Material { Id = \"A\" } }"),
-      write("b", "Environment { }\nMaterials { Material { Id = \"B\" } }")};
+  const std::vector<std::string> paths = {write("a", "Materials { Material { Id = \"A\" } }"),
+                                          write("b", "Environment { }\nMaterials { Material { Id = \"B\" } }")};
   SceneDocument document;
   Problems problems;
   ASSERT_TRUE(read_files(paths, &document, &problems));
@@ -427,14 +363,12 @@ TEST_F(ReaderFiles, AreReadAsOneScene) {
 }
 
 TEST_F(ReaderFiles, ErrorsNameTheirFiles) {
-  const std::vector<std::string> paths = {write("a", "Simulator { }"),
-                                          write("b", "\nSimulator { }")};
+  const std::vector<std::string> paths = {write("a", "Simulator { }"), write("b", "\nSimulator { }")};
   SceneDocument document;
   Problems problems;
   EXPECT_FALSE(read_files(paths, &document, &problems));
-  EXPECT_THAT(texts(problems.errors),
-              ElementsAre(paths[1] + ":2:1: error: Simulator is given twice, first at " + paths[0] +
-                          ":1:1; allowed: once"));
+  EXPECT_THAT(texts(problems.errors), ElementsAre(paths[1] + ":2:1: error: Simulator is given twice, first at " +
+                                                  paths[0] + ":1:1; allowed: once"));
 }
 
 TEST_F(ReaderFiles, ThatCannotBeReadAreErrors) {
@@ -442,14 +376,10 @@ TEST_F(ReaderFiles, ThatCannotBeReadAreErrors) {
   SceneDocument document;
   Problems problems;
   EXPECT_FALSE(read_files(paths, &document, &problems));
-  EXPECT_THAT(
-      texts(problems.errors),
-      ElementsAre(
-          paths[0] +
-              ":1:1: error: cannot be read: No such file or directory; a scene is a readable "
-              "text file",
-          paths[1] +
-              ":1:1: error: cannot be read: it is a folder; a scene is a readable text file"));
+  EXPECT_THAT(texts(problems.errors),
+              ElementsAre(paths[0] + ":1:1: error: cannot be read: No such file or directory; a scene is a readable "
+                                     "text file",
+                          paths[1] + ":1:1: error: cannot be read: it is a folder; a scene is a readable text file"));
 }
 
 }  // namespace

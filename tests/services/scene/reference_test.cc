@@ -9,7 +9,8 @@ namespace gravitas::scene {
 namespace {
 
 TEST(Reference, TheCommittedPageIsThatOfTheGrammarAndThePlugins) {
-  const Catalog catalog = Catalog::installed(GRAVITAS_BINARY_DIR "/bin/gravitas-worker", GRAVITAS_BINARY_DIR "/lib/gravitas");
+  const Catalog catalog =
+      Catalog::installed(GRAVITAS_BINARY_DIR "/bin/gravitas-worker", GRAVITAS_BINARY_DIR "/lib/gravitas");
   std::ifstream file(GRAVITAS_SOURCE_DIR "/services/scene/REFERENCE.md");
   std::stringstream committed;
   committed << file.rdbuf();

@@ -16,8 +16,7 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-const std::string kSample =
-    std::string(GRAVITAS_SOURCE_DIR) + "/deploy/scenes/two_spheres_motor.gravitas";
+const std::string kSample = std::string(GRAVITAS_SOURCE_DIR) + "/deploy/scenes/two_spheres_motor.gravitas";
 
 std::string sample_text() {
   std::ifstream file(kSample, std::ios::binary);
@@ -135,12 +134,9 @@ TEST(Sample, NoMutationCrashes) {
 
 TEST(Sample, NoMutatedOverrideCrashes) {
   const std::string text = sample_text();
-  const std::string good[] = {"Solver.Iterations=50",
-                              "Body.Ball01.LinearVelocity={1,0,0}",
-                              "Space=KDTree",
-                              "Simulator.TimeStep=0.001",
-                              "Constraint.MyAngularMotor.AngularSpeed=2",
-                              "Plugin.solver.Deadline=1"};
+  const std::string good[] = {
+      "Solver.Iterations=50",     "Body.Ball01.LinearVelocity={1,0,0}",       "Space=KDTree",
+      "Simulator.TimeStep=0.001", "Constraint.MyAngularMotor.AngularSpeed=2", "Plugin.solver.Deadline=1"};
   const std::string characters = "{}=.,\"\\#/ -+eABab01\n\xC3";
   std::mt19937_64 random(7);
   for (int i = 0; i < 2000; ++i) {
@@ -159,9 +155,8 @@ TEST(Sample, AMillionLinesAreRead) {
       "Environment { Space { Bodies {\n";
   for (int i = 0; i < kBodies; ++i) {
     const std::string number = std::to_string(i);
-    text += "Body {\nType = \"Rigid\"\nId = \"Ball" + number +
-            "\"\nGeometryId = \"S\"\nMassDensity = 1000.0\n" + "KineticProperties {\nPosition = {" +
-            number + ".5, 0, -" + number + "}\nOrientation = {1, 0, 0, 0}\n" +
+    text += "Body {\nType = \"Rigid\"\nId = \"Ball" + number + "\"\nGeometryId = \"S\"\nMassDensity = 1000.0\n" +
+            "KineticProperties {\nPosition = {" + number + ".5, 0, -" + number + "}\nOrientation = {1, 0, 0, 0}\n" +
             "LinearVelocity = {0, 0, 1}\nCanSleep = false }\n}\n";
   }
   text += "} } }\n";

@@ -24,8 +24,7 @@ Property point(const char* name) { return Property::vector(name, "m", "world").r
 std::vector<InstalledPlugin> declared_plugins() {
   return {
       plugin(Slot::kSpace, "Grid", {}, {Property::number("CellSize", "m").above(0.0)}),
-      plugin(Slot::kSpace, "KDTree", {},
-             {Property::integer("MaximumDepth").at_least(1.0).defaults_to({8.0})}),
+      plugin(Slot::kSpace, "KDTree", {}, {Property::integer("MaximumDepth").at_least(1.0).defaults_to({8.0})}),
       plugin(Slot::kCollision, "Standard",
              {{"Sphere", "", {length("Radius")}},
               {"Box", "", {Property::vector("HalfExtents", "m", "geometry").above(0.0).required()}},
@@ -35,22 +34,17 @@ std::vector<InstalledPlugin> declared_plugins() {
              {Property::number("Margin", "m").at_least(0.0).defaults_to({0.001})}),
       plugin(Slot::kForce, "Gravity",
              {{"Gravity", "", {Property::vector("Acceleration", "m/s^2", "world").required()}}}),
-      plugin(Slot::kForce, "Drag",
-             {{"Drag", "", {Property::number("LinearCoefficient", "kg/s").required()}}},
+      plugin(Slot::kForce, "Drag", {{"Drag", "", {Property::number("LinearCoefficient", "kg/s").required()}}},
              {Property::flag("Fast").defaults_to({0.0})}),
       plugin(Slot::kConstraint, "Joints",
              {{"Spherical", "", {point("BindPoint")}},
               {"AngularMotor",
                "",
-               {point("BindAxisPoint1"), point("BindAxisPoint2"),
-                Property::number("AngularSpeed", "rad/s").required(),
+               {point("BindAxisPoint1"), point("BindAxisPoint2"), Property::number("AngularSpeed", "rad/s").required(),
                 Property::number("MaximumTorque", "N*m").above(0.0)}}}),
       plugin(Slot::kSolver, "Sequential", {},
              {Property::integer("Iterations").at_least(1.0).defaults_to({100.0}),
-              Property::number("CorrectionFactor", "1")
-                  .at_least(0.0)
-                  .at_most(1.0)
-                  .defaults_to({1.0})}),
+              Property::number("CorrectionFactor", "1").at_least(0.0).at_most(1.0).defaults_to({1.0})}),
       plugin(Slot::kSolver, "LCP"),
       plugin(Slot::kIntegrator, "Euler"),
       plugin(Slot::kIntegrator, "SemiImplicitEuler"),
@@ -69,14 +63,12 @@ BuiltScene build(const std::string& text, const std::vector<std::string>& overri
   return build(text, overrides, Catalog(declared_plugins()));
 }
 
-BuiltScene build(const std::string& text, const std::vector<std::string>& overrides,
-                 Catalog catalog) {
+BuiltScene build(const std::string& text, const std::vector<std::string>& overrides, Catalog catalog) {
   BuiltScene result{read(text), std::nullopt};
   bool is_good = result.read.is_good;
   for (const std::string& one : overrides)
     is_good = is_good && apply_override(&result.read.scene(), one, &result.read.problems);
-  if (is_good)
-    result.description = scene::build(result.read.scene(), &catalog, &result.read.problems);
+  if (is_good) result.description = scene::build(result.read.scene(), &catalog, &result.read.problems);
   return result;
 }
 
@@ -90,8 +82,7 @@ std::vector<std::string> BuiltScene::errors() const { return texts(read.problems
 std::vector<std::string> BuiltScene::warnings() const { return texts(read.problems.warnings); }
 
 std::string scene_with_body(const std::string& body) {
-  return "Environment { Id = \"World\" Space { Type = \"Grid\" Bodies { Body { Id = \"Ball\"\n" +
-         body +
+  return "Environment { Id = \"World\" Space { Type = \"Grid\" Bodies { Body { Id = \"Ball\"\n" + body +
          "\n} } } }\n"
          "Geometries { Geometry { Type = \"Sphere\" Id = \"Unit\" CustomProperties { Radius = 0.5 "
          "} }\n"

@@ -43,8 +43,7 @@ struct BuiltScene {
 };
 
 BuiltScene build(const std::string& text, const std::vector<std::string>& overrides = {});
-BuiltScene build(const std::string& text, const std::vector<std::string>& overrides,
-                 Catalog catalog);
+BuiltScene build(const std::string& text, const std::vector<std::string>& overrides, Catalog catalog);
 
 std::vector<std::string> texts(const std::vector<SceneError>& errors);
 

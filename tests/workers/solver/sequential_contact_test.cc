@@ -23,8 +23,8 @@ struct Pair {
   std::uint32_t a = 0, b = 0;
 };
 
-Pair touching_spheres(double mass_a, double mass_b, const Vector3& va, const Vector3& vb,
-                      const Vector3& normal, double restitution, double friction) {
+Pair touching_spheres(double mass_a, double mass_b, const Vector3& va, const Vector3& vb, const Vector3& normal,
+                      double restitution, double friction) {
   const double radius = 0.5;
   Pair pair;
   pair.a = pair.problem.add_body(
@@ -34,11 +34,9 @@ Pair touching_spheres(double mass_a, double mass_b, const Vector3& va, const Vec
                                   .pose = {2.0 * radius * normal, Quaternion::Identity()},
                                   .linear = vb});
   pair.problem.make_trial(Vector3::Zero());
-  const Vector3 between =
-      pair.problem.trial_pose(pair.b).position - pair.problem.trial_pose(pair.a).position;
+  const Vector3 between = pair.problem.trial_pose(pair.b).position - pair.problem.trial_pose(pair.a).position;
   const Vector3 n = between.normalized();
-  const Vector3 middle =
-      0.5 * (pair.problem.trial_pose(pair.b).position + pair.problem.trial_pose(pair.a).position);
+  const Vector3 middle = 0.5 * (pair.problem.trial_pose(pair.b).position + pair.problem.trial_pose(pair.a).position);
   pair.problem.add_contact({.body1 = pair.a,
                             .body2 = pair.b,
                             .normal = n,
@@ -61,13 +59,11 @@ TEST(SequentialImpact, HeadOnSpheresFollowTheClosedForm) {
     // a few roundings of speeds of order one
     EXPECT_NEAR(answer.velocity(pair.a).x(), va, 2e-15);
     EXPECT_NEAR(answer.velocity(pair.b).x(), vb, 2e-15);
-    EXPECT_LE(
-        (pair.problem.momentum(answer.linear_velocity) - Vector3(ma * ua + mb * ub, 0, 0)).norm(),
-        2e-15);
+    EXPECT_LE((pair.problem.momentum(answer.linear_velocity) - Vector3(ma * ua + mb * ub, 0, 0)).norm(), 2e-15);
     EXPECT_TRUE(answer.converged());
     // no overlap is left: the pose change closes the gap exactly
-    const Vector3 gap = pair.problem.committed(answer, pair.b).position -
-                        pair.problem.committed(answer, pair.a).position;
+    const Vector3 gap =
+        pair.problem.committed(answer, pair.b).position - pair.problem.committed(answer, pair.a).position;
     EXPECT_NEAR(gap.norm(), 1.0, 1e-15);
   }
 }
@@ -85,20 +81,17 @@ TEST(SequentialImpact, ObliqueSpheresFollowTheClosedForm) {
     const double normal = -(1.0 + e) * relative.dot(n) / (1.0 / ma + 1.0 / mb);
     const Vector3 slip = relative - relative.dot(n) * n;
     // the point's arm is r - depth/2 of S*: the lever in K_t
-    const double arm =
-        0.5 * (pair.problem.trial_pose(1).position - pair.problem.trial_pose(0).position).norm();
+    const double arm = 0.5 * (pair.problem.trial_pose(1).position - pair.problem.trial_pose(0).position).norm();
     const double k = (1.0 / ma + 1.0 / mb) * (1.0 + 2.5 * arm * arm / 0.25);
     const double stop = slip.norm() / k;
     const Vector3 tangent = -std::min(stop, mu * normal) * slip.normalized();
     const Vector3 expected = normal * n + tangent;
     EXPECT_LE((answer.impulse(0) - expected).norm(), 1e-14) << mu;
     EXPECT_LE((answer.velocity(pair.b) - vb - expected / mb).norm(), 1e-14);
-    EXPECT_NEAR((answer.velocity(pair.b) - answer.velocity(pair.a)).dot(n), -e * relative.dot(n),
-                1e-14);
-    const Vector3 before = pair.problem.turning_momentum(pair.problem.trial_linear_velocity,
-                                                         pair.problem.trial_angular_velocity);
-    const Vector3 after =
-        pair.problem.turning_momentum(answer.linear_velocity, answer.angular_velocity);
+    EXPECT_NEAR((answer.velocity(pair.b) - answer.velocity(pair.a)).dot(n), -e * relative.dot(n), 1e-14);
+    const Vector3 before =
+        pair.problem.turning_momentum(pair.problem.trial_linear_velocity, pair.problem.trial_angular_velocity);
+    const Vector3 after = pair.problem.turning_momentum(answer.linear_velocity, answer.angular_velocity);
     EXPECT_LE((after - before).norm(), 1e-14);
     EXPECT_LE((pair.problem.momentum(answer.linear_velocity) - ma * va - mb * vb).norm(), 1e-14);
   }
@@ -109,16 +102,12 @@ SolverProblem falling_ball(double height, double speed, double restitution, doub
   SolverProblem problem;
   problem.time_step = time_step;
   const auto ground = problem.add_immovable();
-  const auto ball = problem.add_body({.mass = 2.0,
-                                      .pose = {{0.3, 0.5 + height, 0.0}, Quaternion::Identity()},
-                                      .linear = {0, speed, 0}});
+  const auto ball = problem.add_body(
+      {.mass = 2.0, .pose = {{0.3, 0.5 + height, 0.0}, Quaternion::Identity()}, .linear = {0, speed, 0}});
   problem.make_trial(kDown);
   const double gap = problem.trial_pose(ball).position.y() - 0.5;
-  problem.add_contact({.body1 = ground,
-                       .body2 = ball,
-                       .point = {0.3, 0.5 * gap, 0.0},
-                       .depth = -gap,
-                       .restitution = restitution});
+  problem.add_contact(
+      {.body1 = ground, .body2 = ball, .point = {0.3, 0.5 * gap, 0.0}, .depth = -gap, .restitution = restitution});
   return problem;
 }
 
@@ -135,8 +124,7 @@ TEST(SequentialImpact, ABallThatArrivesWithinTheStepHasItsSpeedOfArrival) {
   const double height = 0.02, speed = -3.0;
   const SolverAnswer answer = falling_ball(height, speed, 0.5, 0.01).solve(solver_with(100));
   // energy at the ground: v^2 + 2 g height
-  EXPECT_NEAR(answer.velocity(1).y(), 0.5 * std::sqrt(speed * speed + 2.0 * kGravity * height),
-              1e-14);
+  EXPECT_NEAR(answer.velocity(1).y(), 0.5 * std::sqrt(speed * speed + 2.0 * kGravity * height), 1e-14);
 }
 
 TEST(SequentialImpact, BelowTheRestSpeedNothingBounces) {
@@ -153,12 +141,10 @@ TEST(SequentialImpact, ABallThatLeavesIsLeftAlone) {
 
 TEST(SequentialImpact, AKinematicPaddleHitsAndKeepsItsOwnMotion) {
   SolverProblem problem;
-  const auto paddle =
-      problem.add_body({.linear = {0, 4.0, 0}, .angular = {0, 0, 0.3}, .kinematic = true});
+  const auto paddle = problem.add_body({.linear = {0, 4.0, 0}, .angular = {0, 0, 0.3}, .kinematic = true});
   const auto ball = problem.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}});
   problem.make_trial(Vector3::Zero());
-  problem.add_contact(
-      {.body1 = paddle, .body2 = ball, .point = {0, 0.02, 0}, .depth = 0.04, .restitution = 1.0});
+  problem.add_contact({.body1 = paddle, .body2 = ball, .point = {0, 0.02, 0}, .depth = 0.04, .restitution = 1.0});
   const SolverAnswer answer = problem.solve(solver_with(100));
   // elastic against an infinite mass: leaves at twice its speed
   EXPECT_NEAR(answer.velocity(ball).y(), 8.0, 2e-15);
@@ -175,10 +161,8 @@ SolverProblem box_on_ground(const Vector3& half, double mass, double overlap_at_
   const auto ground = problem.add_immovable();
   const Vector3 s = half.cwiseProduct(half);
   const Vector3 moments = mass / 3.0 * Vector3(s.y() + s.z(), s.x() + s.z(), s.x() + s.y());
-  const auto box =
-      problem.add_body({.mass = mass,
-                        .moments = moments,
-                        .pose = {{0.0, half.y() - overlap_at_start, 0.0}, Quaternion::Identity()}});
+  const auto box = problem.add_body(
+      {.mass = mass, .moments = moments, .pose = {{0.0, half.y() - overlap_at_start, 0.0}, Quaternion::Identity()}});
   problem.make_trial(kDown);
   const double depth = half.y() - problem.trial_pose(box).position.y();
   for (int corner = 0; corner < 4; ++corner) {
@@ -187,19 +171,16 @@ SolverProblem box_on_ground(const Vector3& half, double mass, double overlap_at_
     contact.body2 = box;
     contact.depth = depth;
     contact.key = static_cast<std::uint64_t>(corner) + 1;
-    contact.point = {corner % 2 == 0 ? half.x() : -half.x(), -0.5 * depth,
-                     corner < 2 ? half.z() : -half.z()};
+    contact.point = {corner % 2 == 0 ? half.x() : -half.x(), -0.5 * depth, corner < 2 ? half.z() : -half.z()};
     problem.add_contact(contact);
   }
   return problem;
 }
 
 TEST(SequentialRest, ABoxOnFourContactsRests) {
-  for (const Vector3& half :
-       {Vector3(0.5, 0.5, 0.5), Vector3(1.0, 0.05, 0.3), Vector3(0.1, 2.0, 0.1)}) {
+  for (const Vector3& half : {Vector3(0.5, 0.5, 0.5), Vector3(1.0, 0.05, 0.3), Vector3(0.1, 2.0, 0.1)}) {
     const double mass = 7.0;
-    SolverProblem problem =
-        box_on_ground(half, mass, 0.0, {.static_friction = 0.5, .dynamic_friction = 0.4});
+    SolverProblem problem = box_on_ground(half, mass, 0.0, {.static_friction = 0.5, .dynamic_friction = 0.4});
     const SolverAnswer answer = problem.solve(solver_with(200));
     EXPECT_TRUE(answer.converged());
     // speeds of order g h = 0.1
@@ -229,8 +210,7 @@ TEST(SequentialRest, OldOverlapGoesByTheCorrectionFactorAndNewOverlapAtOnce) {
 }
 
 TEST(SequentialRest, WarmStartedRestIsReachedInFewerSweepsWithTheSameAnswer) {
-  SolverProblem problem =
-      box_on_ground({0.5, 0.3, 0.2}, 3.0, 0.0, {.static_friction = 0.5, .dynamic_friction = 0.5});
+  SolverProblem problem = box_on_ground({0.5, 0.3, 0.2}, 3.0, 0.0, {.static_friction = 0.5, .dynamic_friction = 0.5});
   const SolverAnswer cold = problem.solve(solver_with(200));
   problem.contact_warm_impulse = cold.contact_impulse;
   problem.contact_warm_correction = cold.contact_correction;
@@ -245,22 +225,20 @@ TEST(SequentialRest, AStackOfFiveRests) {
   std::uint32_t below = problem.add_immovable();
   std::vector<std::uint32_t> boxes;
   for (int i = 0; i < 5; ++i)
-    boxes.push_back(problem.add_body({.mass = 1.0,
-                                      .moments = Vector3::Constant(1.0 / 6.0),
-                                      .pose = {{0, 0.5 + i, 0}, Quaternion::Identity()}}));
+    boxes.push_back(problem.add_body(
+        {.mass = 1.0, .moments = Vector3::Constant(1.0 / 6.0), .pose = {{0, 0.5 + i, 0}, Quaternion::Identity()}}));
   problem.make_trial(kDown);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const double fall = kGravity * problem.time_step * problem.time_step;
     for (int corner = 0; corner < 4; ++corner)
-      problem.add_contact(
-          {.body1 = below,
-           .body2 = boxes[i],
-           .point = {corner % 2 == 0 ? 0.5 : -0.5,
-                     static_cast<double>(i) - (i == 0 ? 0.5 : 1.0) * fall, corner < 2 ? 0.5 : -0.5},
-           .depth = i == 0 ? fall : 0.0,
-           .static_friction = 0.5,
-           .dynamic_friction = 0.5,
-           .key = 4 * i + static_cast<std::uint64_t>(corner)});
+      problem.add_contact({.body1 = below,
+                           .body2 = boxes[i],
+                           .point = {corner % 2 == 0 ? 0.5 : -0.5, static_cast<double>(i) - (i == 0 ? 0.5 : 1.0) * fall,
+                                     corner < 2 ? 0.5 : -0.5},
+                           .depth = i == 0 ? fall : 0.0,
+                           .static_friction = 0.5,
+                           .dynamic_friction = 0.5,
+                           .key = 4 * i + static_cast<std::uint64_t>(corner)});
     below = boxes[i];
   }
   const SolverAnswer answer = problem.solve(solver_with(5000));
@@ -269,8 +247,7 @@ TEST(SequentialRest, AStackOfFiveRests) {
     // the sweeps end at changes of 3e-15 m/s; the slowest mode of five boxes fades by some 0.9 a
     // sweep
     EXPECT_LE(answer.velocity(box).norm(), 1e-13);
-    EXPECT_NEAR(problem.committed(answer, box).position.y(), problem.bodies[box].pose.position.y(),
-                1e-15);
+    EXPECT_NEAR(problem.committed(answer, box).position.y(), problem.bodies[box].pose.position.y(), 1e-15);
   }
 }
 
@@ -345,8 +322,7 @@ TEST(SequentialSurface, AGrazingImpactNeverBecomesALeaving) {
   for (std::uint64_t key = 1; key <= 100; ++key) {
     SolverProblem problem;
     const auto ground = problem.add_immovable();
-    const auto ball =
-        problem.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}, .linear = {10, -0.5, 0}});
+    const auto ball = problem.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}, .linear = {10, -0.5, 0}});
     problem.make_trial(Vector3::Zero());
     problem.add_contact({.body1 = ground,
                          .body2 = ball,

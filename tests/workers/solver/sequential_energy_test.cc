@@ -43,19 +43,14 @@ SolverProblem random_impact(std::uint64_t seed, double friction, double restitut
   const std::uint32_t count = 2 + draw.below(4);
   for (std::uint32_t i = 0; i < count; ++i) {
     const double mass = draw.between(0.2, 5.0);
-    const Vector3 squares(draw.between(0.01, 0.3), draw.between(0.01, 0.3),
-                          draw.between(0.01, 0.3));
+    const Vector3 squares(draw.between(0.01, 0.3), draw.between(0.01, 0.3), draw.between(0.01, 0.3));
     const Vector3 moments =
-        mass / 3.0 *
-        Vector3(squares.y() + squares.z(), squares.x() + squares.z(), squares.x() + squares.y());
+        mass / 3.0 * Vector3(squares.y() + squares.z(), squares.x() + squares.z(), squares.x() + squares.y());
     const Vector3 at = draw.vector(2.0);
     const Quaternion turned = exp_rotation(draw.vector(3.0));
     const Vector3 linear = draw.vector(4.0);
-    problem.add_body({.mass = mass,
-                      .moments = moments,
-                      .pose = {at, turned},
-                      .linear = linear,
-                      .angular = draw.vector(6.0)});
+    problem.add_body(
+        {.mass = mass, .moments = moments, .pose = {at, turned}, .linear = linear, .angular = draw.vector(6.0)});
   }
   const std::uint32_t contacts = 1 + draw.below(6);
   for (std::uint32_t i = 0; i < contacts; ++i) {
@@ -79,8 +74,7 @@ SolverProblem random_impact(std::uint64_t seed, double friction, double restitut
 }
 
 double gained(const SolverProblem& problem, const SolverAnswer& answer) {
-  const double before =
-      problem.energy(problem.trial_linear_velocity, problem.trial_angular_velocity);
+  const double before = problem.energy(problem.trial_linear_velocity, problem.trial_angular_velocity);
   return problem.energy(answer.linear_velocity, answer.angular_velocity) / before - 1.0;
 }
 
@@ -119,8 +113,7 @@ TEST(SequentialEnergy, NeverRisesInRandomImpacts) {
         if (problem.contact_body[2 * i] == 0) from_ground += answer.impulse(i);
         size += answer.impulse(i).norm();
       }
-      const Vector3 change = problem.momentum(answer.linear_velocity) -
-                             problem.momentum(problem.trial_linear_velocity);
+      const Vector3 change = problem.momentum(answer.linear_velocity) - problem.momentum(problem.trial_linear_velocity);
       EXPECT_LE((change - from_ground).norm(), 1e-13 * size) << "seed " << seed;
     }
     // the bound is at work, and all but the problems with much friction at long arms have a
@@ -137,23 +130,20 @@ TEST(SequentialEnergy, ConvergedImpactsObeyTheirLaws) {
     problem.theta = 0.0;
     const SolverAnswer answer = problem.solve(recorder);
     const SequentialSummary& summary = recorder.summary;
-    if (!answer.converged() || summary.restitutions_lowered + summary.restitutions_dropped > 0)
-      continue;
+    if (!answer.converged() || summary.restitutions_lowered + summary.restitutions_dropped > 0) continue;
     for (std::size_t i = 0; i < problem.contact_key.size(); ++i) {
       const Vector3 n = vector_at(problem.contact_normal, i);
       const auto relative = [&](const auto& linear, const auto& angular) {
         Vector3 sum = Vector3::Zero();
         for (std::size_t side = 0; side < 2; ++side) {
           const std::uint32_t body = problem.contact_body[2 * i + side];
-          const Vector3 arm =
-              vector_at(problem.contact_point, i) - problem.bodies[body].pose.position;
+          const Vector3 arm = vector_at(problem.contact_point, i) - problem.bodies[body].pose.position;
           const Vector3 v = vector_at(linear, body) + vector_at(angular, body).cross(arm);
           sum += side == 0 ? Vector3(-v) : v;
         }
         return sum;
       };
-      const double before =
-          n.dot(relative(problem.trial_linear_velocity, problem.trial_angular_velocity));
+      const double before = n.dot(relative(problem.trial_linear_velocity, problem.trial_angular_velocity));
       const Vector3 after = relative(answer.linear_velocity, answer.angular_velocity);
       const double e = problem.contact_material[kMaterialColumns * i + kRestitution];
       const double law = n.dot(after) - e * std::max(0.0, -before);
@@ -185,10 +175,9 @@ SolverProblem struck_chain(const std::vector<std::uint32_t>& place) {
                           exp_rotation({0.1 * static_cast<double>(i), 0.2, 0})},
                  .angular = {0.1, 0, 0.3}};
   for (std::size_t i = count - 2; i < count; ++i)
-    bodies[i] = {
-        .mass = 0.5,
-        .pose = {{-1.0, -0.5 - static_cast<double>(i - count + 2), 0}, Quaternion::Identity()},
-        .linear = {3.0, 0.2, -0.1}};
+    bodies[i] = {.mass = 0.5,
+                 .pose = {{-1.0, -0.5 - static_cast<double>(i - count + 2), 0}, Quaternion::Identity()},
+                 .linear = {3.0, 0.2, -0.1}};
   SolverProblem problem;
   std::vector<TestBody> placed(count);
   for (std::size_t i = 0; i < count; ++i) placed[place[i]] = bodies[i];
@@ -213,10 +202,8 @@ SolverProblem struck_chain(const std::vector<std::uint32_t>& place) {
 TEST(SequentialOrder, PermutingTheBodiesPermutesTheAnswer) {
   const std::vector<std::uint32_t> plain = {0, 1, 2, 3, 4};
   const std::vector<std::uint32_t> mixed = {3, 0, 4, 2, 1};
-  const SolverAnswer a =
-      struck_chain(plain).solve(SequentialSolver(SequentialSettings{100000, 1.0}));
-  const SolverAnswer b =
-      struck_chain(mixed).solve(SequentialSolver(SequentialSettings{100000, 1.0}));
+  const SolverAnswer a = struck_chain(plain).solve(SequentialSolver(SequentialSettings{100000, 1.0}));
+  const SolverAnswer b = struck_chain(mixed).solve(SequentialSolver(SequentialSettings{100000, 1.0}));
   ASSERT_TRUE(a.converged());
   ASSERT_TRUE(b.converged());
   EXPECT_GT(a.impulse(0).norm(), 0.1);

@@ -14,9 +14,7 @@ namespace {
 constexpr double kGravity = 9.81;
 constexpr double kPi = 3.14159265358979323846;
 
-SequentialSolver solver_with(std::uint32_t iterations) {
-  return SequentialSolver(SequentialSettings{iterations, 1.0});
-}
+SequentialSolver solver_with(std::uint32_t iterations) { return SequentialSolver(SequentialSettings{iterations, 1.0}); }
 
 // A box with its lower face on the plane y = 0, and a load tilted by `slope` towards the direction
 // `heading` (rad about y): an incline in its own frame.
@@ -30,23 +28,22 @@ SolverProblem box_on_incline(double slope, double heading, double speed, double 
   const Vector3 half(0.5, 0.1, 0.5);
   const double mass = 3.0;
   const Vector3 s = half.cwiseProduct(half);
-  const auto box = problem.add_body(
-      {.mass = mass,
-       .moments = mass / 3.0 * Vector3(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()),
-       .pose = {{0, half.y(), 0}, Quaternion::Identity()},
-       .linear = speed * downhill});
+  const auto box = problem.add_body({.mass = mass,
+                                     .moments = mass / 3.0 * Vector3(s.y() + s.z(), s.x() + s.z(), s.x() + s.y()),
+                                     .pose = {{0, half.y(), 0}, Quaternion::Identity()},
+                                     .linear = speed * downhill});
   problem.make_trial(kGravity * (tilt.sin * downhill - tilt.cos * Vector3::UnitY()));
   const Vector3 at = problem.trial_pose(box).position;
   const double depth = half.y() - at.y();
   for (int corner = 0; corner < 4; ++corner)
-    problem.add_contact({.body1 = ground,
-                         .body2 = box,
-                         .point = {at.x() + (corner % 2 == 0 ? 0.5 : -0.5), -0.5 * depth,
-                                   at.z() + (corner < 2 ? 0.5 : -0.5)},
-                         .depth = depth,
-                         .static_friction = static_friction,
-                         .dynamic_friction = dynamic_friction,
-                         .key = static_cast<std::uint64_t>(corner)});
+    problem.add_contact(
+        {.body1 = ground,
+         .body2 = box,
+         .point = {at.x() + (corner % 2 == 0 ? 0.5 : -0.5), -0.5 * depth, at.z() + (corner < 2 ? 0.5 : -0.5)},
+         .depth = depth,
+         .static_friction = static_friction,
+         .dynamic_friction = dynamic_friction,
+         .key = static_cast<std::uint64_t>(corner)});
   return problem;
 }
 
@@ -81,8 +78,7 @@ TEST(SequentialFriction, ABlockSlidesAlikeInEveryDirection) {
       EXPECT_TRUE(answer.converged()) << direction;
       const Vector3 expected = (speed + acceleration * problem.time_step) * heading_of(direction);
       // relative to the speed: the whole contract of isotropy
-      EXPECT_LE((answer.velocity(1) - expected).norm(), 1e-12 * expected.norm())
-          << direction << " at " << speed;
+      EXPECT_LE((answer.velocity(1) - expected).norm(), 1e-12 * expected.norm()) << direction << " at " << speed;
       EXPECT_LE(answer.turning(1).norm(), 1e-12);
     }
   }
@@ -143,14 +139,13 @@ TEST(SequentialFriction, AMirroredProblemHasTheMirroredAnswer) {
                                        .angular = {0.5, sign * 2.0, sign * 0.3}});
     problem.make_trial({0, -kGravity, 0});
     for (int corner = 0; corner < 4; ++corner)
-      problem.add_contact(
-          {.body1 = ground,
-           .body2 = box,
-           .point = {sign * (corner % 2 == 0 ? 0.4 : -0.4), -0.005, corner < 2 ? 0.3 : -0.3},
-           .depth = 0.01,
-           .restitution = 0.3,
-           .static_friction = 0.4,
-           .dynamic_friction = 0.4});
+      problem.add_contact({.body1 = ground,
+                           .body2 = box,
+                           .point = {sign * (corner % 2 == 0 ? 0.4 : -0.4), -0.005, corner < 2 ? 0.3 : -0.3},
+                           .depth = 0.01,
+                           .restitution = 0.3,
+                           .static_friction = 0.4,
+                           .dynamic_friction = 0.4});
     return problem;
   };
   const SolverAnswer right = made(1.0).solve(solver_with(100000));
@@ -160,13 +155,12 @@ TEST(SequentialFriction, AMirroredProblemHasTheMirroredAnswer) {
   const Vector3 flip_turn(1, -1, -1);
   EXPECT_LE((left.velocity(1) - flip.cwiseProduct(right.velocity(1))).norm(), 1e-13);
   EXPECT_LE((left.turning(1) - flip_turn.cwiseProduct(right.turning(1))).norm(), 1e-13);
-  for (std::size_t i = 0; i < 4; ++i)
-    EXPECT_LE((left.impulse(i) - flip.cwiseProduct(right.impulse(i))).norm(), 1e-12);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_LE((left.impulse(i) - flip.cwiseProduct(right.impulse(i))).norm(), 1e-12);
 }
 
 // A ball on the ground: rolling friction mu_r, spinning friction mu_sp (both m).
-SolverProblem ball_on_ground(const Vector3& linear, const Vector3& angular, double friction,
-                             double rolling, double spinning) {
+SolverProblem ball_on_ground(const Vector3& linear, const Vector3& angular, double friction, double rolling,
+                             double spinning) {
   SolverProblem problem;
   const double radius = 0.5;
   const auto ground = problem.add_immovable();
@@ -192,11 +186,9 @@ SolverProblem ball_on_ground(const Vector3& linear, const Vector3& angular, doub
 
 TEST(SequentialFriction, SpinningFrictionSlowsAndStopsASpin) {
   const double mu = 0.02, inertia = 0.2, load = 2.0 * kGravity * 0.01;
-  const SolverAnswer slows =
-      ball_on_ground(Vector3::Zero(), {0, 5.0, 0}, 0.0, 0.0, mu).solve(solver_with(1000));
+  const SolverAnswer slows = ball_on_ground(Vector3::Zero(), {0, 5.0, 0}, 0.0, 0.0, mu).solve(solver_with(1000));
   EXPECT_NEAR(slows.turning(1).y(), 5.0 - mu * load / inertia, 1e-14);
-  const SolverAnswer stops =
-      ball_on_ground(Vector3::Zero(), {0, 0.01, 0}, 0.0, 0.0, mu).solve(solver_with(1000));
+  const SolverAnswer stops = ball_on_ground(Vector3::Zero(), {0, 0.01, 0}, 0.0, 0.0, mu).solve(solver_with(1000));
   EXPECT_NEAR(stops.turning(1).y(), 0.0, 1e-16);
   EXPECT_EQ(stops.turning(1).x(), 0.0);
 }
@@ -218,8 +210,7 @@ TEST(SequentialFriction, RollingFrictionSlowsARollingBallInEveryDirection) {
     EXPECT_LE((answer.turning(1) - rate * Vector3::UnitY().cross(way)).norm(), 1e-12 * rate);
   }
   // it stops in finite time and does not turn back
-  const SolverAnswer stops =
-      ball_on_ground({0.0005, 0, 0}, {0, 0, -0.001}, 0.8, mu, 0.0).solve(solver_with(5000));
+  const SolverAnswer stops = ball_on_ground({0.0005, 0, 0}, {0, 0, -0.001}, 0.8, mu, 0.0).solve(solver_with(5000));
   EXPECT_LE(stops.velocity(1).norm(), 1e-14);
   EXPECT_LE(stops.turning(1).norm(), 1e-14);
 }
@@ -227,8 +218,7 @@ TEST(SequentialFriction, RollingFrictionSlowsARollingBallInEveryDirection) {
 TEST(SequentialFriction, SlidingStartsToRollByTwoSeventhsAtRest) {
   // stick within one step: a ball that slides by less than friction can stop rolls at 5/7 of its
   // speed
-  const SolverAnswer answer =
-      ball_on_ground({0.1, 0, 0}, Vector3::Zero(), 10.0, 0.0, 0.0).solve(solver_with(1000));
+  const SolverAnswer answer = ball_on_ground({0.1, 0, 0}, Vector3::Zero(), 10.0, 0.0, 0.0).solve(solver_with(1000));
   EXPECT_NEAR(answer.velocity(1).x(), 0.1 * 5.0 / 7.0, 1e-15);
   EXPECT_NEAR(answer.turning(1).z(), -0.1 * 5.0 / 7.0 / 0.5, 1e-15);
 }

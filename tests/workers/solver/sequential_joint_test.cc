@@ -18,8 +18,7 @@ SequentialSolver solver_with(std::uint32_t iterations, double correction_factor 
 }
 
 // Velocity of body2's point relative to body1's where a discrepancy holds both, after the step.
-Vector3 relative_velocity(const SolverProblem& problem, const SolverAnswer& answer,
-                          std::size_t row) {
+Vector3 relative_velocity(const SolverProblem& problem, const SolverAnswer& answer, std::size_t row) {
   const Vector3 middle = 0.5 * (vector_at(problem.point1, row) + vector_at(problem.point2, row));
   Vector3 sum = Vector3::Zero();
   for (std::size_t side = 0; side < 2; ++side) {
@@ -35,9 +34,7 @@ Vector3 relative_velocity(const SolverProblem& problem, const SolverAnswer& answ
 // Error of a discrepancy in the committed state: its points are carried along.
 Vector3 committed_error(const SolverProblem& problem, const SolverAnswer& answer, std::size_t row) {
   const auto moved = [&](std::uint32_t body, const Vector3& point) {
-    return body == kNone
-               ? point
-               : carried(point, problem.trial_pose(body), problem.committed(answer, body));
+    return body == kNone ? point : carried(point, problem.trial_pose(body), problem.committed(answer, body));
   };
   return moved(problem.discrepancy_body[2 * row + 1], vector_at(problem.point2, row)) -
          moved(problem.discrepancy_body[2 * row], vector_at(problem.point1, row));
@@ -69,8 +66,7 @@ TEST(SequentialJoint, TheErrorGoesByTheCorrection) {
   for (const double factor : {1.0, 0.25}) {
     for (const double correction : {1.0, 0.5}) {
       SolverProblem problem;
-      const auto bob =
-          problem.add_body({.mass = 2.0, .pose = {{0, -1, 0}, Quaternion::Identity()}});
+      const auto bob = problem.add_body({.mass = 2.0, .pose = {{0, -1, 0}, Quaternion::Identity()}});
       Discrepancy d;
       d.point2 = {1e-3, -2e-3, 5e-4};
       d.correction = correction;
@@ -125,15 +121,12 @@ TEST(SequentialJoint, TwoBodiesConserveMomentumWhateverTheirError) {
     d.point2 = Vector3(0.7, 0.1, 0.3) + gap * Vector3(0.6, -0.8, 0.3);
     problem.add_discrepancy(a, b, d);
     const SolverAnswer answer = problem.solve(solver_with(100));
-    EXPECT_LE(
-        (problem.momentum(answer.linear_velocity) - problem.momentum(problem.trial_linear_velocity))
-            .norm(),
-        5e-15);
-    EXPECT_LE(
-        (problem.turning_momentum(answer.linear_velocity, answer.angular_velocity) -
-         problem.turning_momentum(problem.trial_linear_velocity, problem.trial_angular_velocity))
-            .norm(),
-        1e-14);
+    EXPECT_LE((problem.momentum(answer.linear_velocity) - problem.momentum(problem.trial_linear_velocity)).norm(),
+              5e-15);
+    EXPECT_LE((problem.turning_momentum(answer.linear_velocity, answer.angular_velocity) -
+               problem.turning_momentum(problem.trial_linear_velocity, problem.trial_angular_velocity))
+                  .norm(),
+              1e-14);
     EXPECT_LE(relative_velocity(problem, answer, 0).norm(), 1e-14);
     // the mass centre stays where the free motion has it
     EXPECT_LE((1.0 * answer.translation(a) + 5.0 * answer.translation(b)).norm(), 1e-16);
@@ -181,8 +174,7 @@ TEST(SequentialJoint, ARigidJointOfThreePointsHoldsAllSixWays) {
   const SolverAnswer answer = problem.solve(solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_LE((answer.turning(1) - answer.turning(0)).norm(), 1e-13);
-  for (std::size_t row = 0; row < 3; ++row)
-    EXPECT_LE(relative_velocity(problem, answer, row).norm(), 1e-14);
+  for (std::size_t row = 0; row < 3; ++row) EXPECT_LE(relative_velocity(problem, answer, row).norm(), 1e-14);
 }
 
 // ---- drives
@@ -227,8 +219,7 @@ TEST(SequentialJoint, AMotorOfRedundantPointsReachesItsSpeed) {
   const SolverAnswer answer = problem.solve(solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_NEAR((answer.turning(1) - answer.turning(0)).y(), speed, 1e-2);
-  for (std::size_t row = 0; row < 2; ++row)
-    EXPECT_LE(relative_velocity(problem, answer, row).norm(), 1e-13);
+  for (std::size_t row = 0; row < 2; ++row) EXPECT_LE(relative_velocity(problem, answer, row).norm(), 1e-13);
 }
 
 TEST(SequentialJoint, AMotorPushesNoHarderThanItMay) {
@@ -276,8 +267,7 @@ TEST(SequentialJoint, ALimitStopsAndNeverPulls) {
   d.upper = {0.2, 0, 0};
   const auto solved = [&](double x, double v) {
     SolverProblem problem;
-    const auto body =
-        problem.add_body({.pose = {{x, 0, 0}, Quaternion::Identity()}, .linear = {v, 0, 0}});
+    const auto body = problem.add_body({.pose = {{x, 0, 0}, Quaternion::Identity()}, .linear = {v, 0, 0}});
     problem.make_trial(Vector3::Zero());
     Discrepancy at = d;
     at.point2 = problem.trial_pose(body).position;
@@ -318,8 +308,7 @@ TEST(SequentialJoint, AUnilateralRowNeverPulls) {
 TEST(SequentialJoint, ARodKeepsItsLengthAndARopeGoesSlack) {
   const auto solved = [](double lower, double speed) {
     SolverProblem problem;
-    const auto bob =
-        problem.add_body({.pose = {{0, -1, 0}, Quaternion::Identity()}, .linear = {0.0, speed, 0}});
+    const auto bob = problem.add_body({.pose = {{0, -1, 0}, Quaternion::Identity()}, .linear = {0.0, speed, 0}});
     problem.make_trial(Vector3::Zero());
     Discrepancy d = problem.joint_at(kNone, bob, {0, -1, 0});
     d.point1.setZero();
@@ -348,8 +337,8 @@ TEST(SequentialJoint, ACompliantRowIsTheImplicitSpring) {
     for (const double damping : {0.0, 3.0}) {
       SolverProblem problem;
       const double mass = 2.0, h = problem.time_step, x = 0.1, v = 0.7;
-      const auto body = problem.add_body(
-          {.mass = mass, .pose = {{x, 0, 0}, Quaternion::Identity()}, .linear = {v, 0, 0}});
+      const auto body =
+          problem.add_body({.mass = mass, .pose = {{x, 0, 0}, Quaternion::Identity()}, .linear = {v, 0, 0}});
       problem.make_trial(Vector3::Zero());
       Discrepancy d;
       d.point2 = problem.trial_pose(body).position;
@@ -359,8 +348,7 @@ TEST(SequentialJoint, ACompliantRowIsTheImplicitSpring) {
       problem.add_discrepancy(kNone, body, d);
       const SolverAnswer answer = problem.solve(solver_with(100));
       // m (v' - v) = -h (k (x + h v') + c v')
-      const double expected =
-          (v - h * stiffness * x / mass) / (1.0 + (h * damping + h * h * stiffness) / mass);
+      const double expected = (v - h * stiffness * x / mass) / (1.0 + (h * damping + h * h * stiffness) / mass);
       EXPECT_NEAR(answer.velocity(body).x(), expected, 1e-13 * (1.0 + std::fabs(expected)))
           << stiffness << " " << damping;
       // theta = 1: x' = x + h v'
@@ -393,9 +381,7 @@ TEST(SequentialJoint, AChainHangsAtItsTension) {
   SolverProblem problem;
   const int links = 6;
   for (int i = 0; i < links; ++i)
-    problem.add_body({.mass = 1.0,
-                      .moments = {0.1, 0.01, 0.1},
-                      .pose = {{0, -0.5 - i, 0}, Quaternion::Identity()}});
+    problem.add_body({.mass = 1.0, .moments = {0.1, 0.01, 0.1}, .pose = {{0, -0.5 - i, 0}, Quaternion::Identity()}});
   problem.make_trial(kDown);
   for (std::uint32_t i = 0; i < links; ++i) {
     const std::uint32_t above = i == 0 ? kNone : i - 1;
@@ -405,10 +391,8 @@ TEST(SequentialJoint, AChainHangsAtItsTension) {
   EXPECT_TRUE(answer.converged());
   for (std::uint32_t i = 0; i < links; ++i) {
     EXPECT_LE(answer.velocity(i).norm(), 1e-12);
-    EXPECT_NEAR(answer.discrepancy_impulse[3 * i + 1], (links - i) * 9.81 * problem.time_step,
-                1e-11);
-    EXPECT_LE((problem.committed(answer, i).position - problem.bodies[i].pose.position).norm(),
-              1e-13);
+    EXPECT_NEAR(answer.discrepancy_impulse[3 * i + 1], (links - i) * 9.81 * problem.time_step, 1e-11);
+    EXPECT_LE((problem.committed(answer, i).position - problem.bodies[i].pose.position).norm(), 1e-13);
   }
 }
 

@@ -20,14 +20,11 @@ namespace {
 SolverProblem small_scene() {
   SolverProblem problem;
   const auto ground = problem.add_immovable();
-  const auto a = problem.add_body(
-      {.mass = 2.0, .pose = {{0, 0.5, 0}, Quaternion::Identity()}, .linear = {1, -1, 0}});
-  const auto b = problem.add_body(
-      {.mass = 1.0, .pose = {{1, 0.5, 0}, exp_rotation({0.1, 0.2, 0.3})}, .angular = {1, 2, 3}});
-  problem.add_body({.mass = 3.0,
-                    .pose = {{9, 9, 9}, exp_rotation({1, 2, 0})},
-                    .linear = {0.1, 0.2, 0.3},
-                    .angular = {3, 1, 2}});
+  const auto a = problem.add_body({.mass = 2.0, .pose = {{0, 0.5, 0}, Quaternion::Identity()}, .linear = {1, -1, 0}});
+  const auto b =
+      problem.add_body({.mass = 1.0, .pose = {{1, 0.5, 0}, exp_rotation({0.1, 0.2, 0.3})}, .angular = {1, 2, 3}});
+  problem.add_body(
+      {.mass = 3.0, .pose = {{9, 9, 9}, exp_rotation({1, 2, 0})}, .linear = {0.1, 0.2, 0.3}, .angular = {3, 1, 2}});
   problem.make_trial({0, -9.81, 0});
   problem.add_discrepancy(a, b, problem.joint_at(a, b, {0.5, 0.5, 0}));
   problem.add_contact({.body1 = ground,
@@ -51,12 +48,8 @@ TEST(SequentialRequest, TheSameRequestGivesTheSameBytesWhateverWasAskedBefore) {
   SolverProblem other = small_scene();
   other.linear_velocity[4] = -7.0;
   other.trial_linear_velocity[4] = -7.0;
-  other.add_contact({.body1 = 0,
-                     .body2 = 3,
-                     .point = {9, 8, 9},
-                     .depth = 0.2,
-                     .static_friction = 1.0,
-                     .dynamic_friction = 1.0});
+  other.add_contact(
+      {.body1 = 0, .body2 = 3, .point = {9, 8, 9}, .depth = 0.2, .static_friction = 1.0, .dynamic_friction = 1.0});
   EXPECT_NE(other.solve(solver).bytes(), first);
   SolverProblem empty;
   empty.solve(solver);
@@ -137,8 +130,7 @@ TEST(SequentialRequest, ImpossibleRequestsAreRefusedWithColumnAndRow) {
       {[](SolverProblem& p) { p.contact_normal[1] = 0.999; }, "contact_normal, row 0"},
       {[&](SolverProblem& p) { p.contact_depth[0] = nan; }, "contact_depth, row 0"},
       {[](SolverProblem& p) { p.contact_material[kRestitution] = 1.1; }, "contact_material, row 0"},
-      {[](SolverProblem& p) { p.contact_material[kStaticFriction] = -0.1; },
-       "contact_material, row 0"},
+      {[](SolverProblem& p) { p.contact_material[kStaticFriction] = -0.1; }, "contact_material, row 0"},
       {[](SolverProblem& p) { p.contact_warm_impulse.clear(); }, "contact_warm_impulse"},
       // finite, but the answer is not
       {[](SolverProblem& p) {
@@ -187,13 +179,10 @@ TEST(SequentialRequest, DegenerateBodiesAreBorne) {
 TEST(SurfacePerturbation, PhiloxGivesItsPublishedNumbers) {
   using Words = std::array<std::uint32_t, 4>;
   // known answers of the Random123 distribution
-  EXPECT_EQ(philox4x32({0, 0, 0, 0}, {0, 0}),
-            (Words{0x6627e8d5U, 0xe169c58dU, 0xbc57ac4cU, 0x9b00dbd8U}));
-  EXPECT_EQ(philox4x32({~0U, ~0U, ~0U, ~0U}, {~0U, ~0U}),
-            (Words{0x408f276dU, 0x41c83b0eU, 0xa20bc7c6U, 0x6d5451fdU}));
-  EXPECT_EQ(
-      philox4x32({0x243f6a88U, 0x85a308d3U, 0x13198a2eU, 0x03707344U}, {0xa4093822U, 0x299f31d0U}),
-      (Words{0xd16cfe09U, 0x94fdccebU, 0x5001e420U, 0x24126ea1U}));
+  EXPECT_EQ(philox4x32({0, 0, 0, 0}, {0, 0}), (Words{0x6627e8d5U, 0xe169c58dU, 0xbc57ac4cU, 0x9b00dbd8U}));
+  EXPECT_EQ(philox4x32({~0U, ~0U, ~0U, ~0U}, {~0U, ~0U}), (Words{0x408f276dU, 0x41c83b0eU, 0xa20bc7c6U, 0x6d5451fdU}));
+  EXPECT_EQ(philox4x32({0x243f6a88U, 0x85a308d3U, 0x13198a2eU, 0x03707344U}, {0xa4093822U, 0x299f31d0U}),
+            (Words{0xd16cfe09U, 0x94fdccebU, 0x5001e420U, 0x24126ea1U}));
 }
 
 TEST(SurfacePerturbation, LargeTiltsFallBackToTheNormal) {
@@ -239,9 +228,7 @@ TEST(CoulombContact, EverySolutionObeysTheLaw) {
     EXPECT_LE(std::min(impulse.x(), u.x() - target), tolerance) << trial;
     EXPECT_LE(tangent, mu * impulse.x() + tolerance);
     if (slip > 1e-6) {
-      EXPECT_LE((impulse.tail<2>() + mu * impulse.x() * u.tail<2>() / slip).norm(),
-                tolerance / slip)
-          << trial;
+      EXPECT_LE((impulse.tail<2>() + mu * impulse.x() * u.tail<2>() / slip).norm(), tolerance / slip) << trial;
     }
   }
 }

@@ -27,8 +27,8 @@
 namespace gravitas {
 
 struct SolverAnswer {
-  std::vector<double> linear_velocity, angular_velocity, pose_change, discrepancy_impulse,
-      discrepancy_correction, contact_impulse, contact_correction, contact_direction;
+  std::vector<double> linear_velocity, angular_velocity, pose_change, discrepancy_impulse, discrepancy_correction,
+      contact_impulse, contact_correction, contact_direction;
   std::vector<std::uint32_t> iterations, stop_reason;
   std::vector<double> residual;
 
@@ -38,19 +38,16 @@ struct SolverAnswer {
   Vector3 rotation(std::size_t body) const { return vector_at(pose_change, 2 * body + 1); }
   Vector3 impulse(std::size_t contact) const { return vector_at(contact_impulse, contact); }
   Vector3 direction(std::size_t contact) const { return vector_at(contact_direction, contact); }
-  bool converged() const {
-    return stop_reason[0] == static_cast<std::uint32_t>(StopReason::kConverged);
-  }
+  bool converged() const { return stop_reason[0] == static_cast<std::uint32_t>(StopReason::kConverged); }
   // All bytes of the answer.
   std::string bytes() const {
     std::string all;
-    for (const auto* column : {&linear_velocity, &angular_velocity, &pose_change,
-                               &discrepancy_impulse, &discrepancy_correction, &contact_impulse,
-                               &contact_correction, &contact_direction, &residual})
+    for (const auto* column :
+         {&linear_velocity, &angular_velocity, &pose_change, &discrepancy_impulse, &discrepancy_correction,
+          &contact_impulse, &contact_correction, &contact_direction, &residual})
       all.append(reinterpret_cast<const char*>(column->data()), column->size() * sizeof(double));
     for (const auto* column : {&iterations, &stop_reason})
-      all.append(reinterpret_cast<const char*>(column->data()),
-                 column->size() * sizeof(std::uint32_t));
+      all.append(reinterpret_cast<const char*>(column->data()), column->size() * sizeof(std::uint32_t));
     return all;
   }
 };
@@ -69,8 +66,8 @@ struct TestContact {
   Vector3 normal = Vector3::UnitY();
   Vector3 point = Vector3::Zero();
   double depth = 0.0;
-  double restitution = 0.0, static_friction = 0.0, dynamic_friction = 0.0, rolling = 0.0,
-         spinning = 0.0, perturbation = 0.0;
+  double restitution = 0.0, static_friction = 0.0, dynamic_friction = 0.0, rolling = 0.0, spinning = 0.0,
+         perturbation = 0.0;
   std::uint64_t key = 1;
 };
 
@@ -80,11 +77,10 @@ class SolverProblem {
   double theta = 1.0;
   std::vector<std::uint32_t> flags, discrepancy_body, mode, contact_body;
   std::vector<std::uint64_t> contact_key;
-  std::vector<double> inverse_mass, inverse_inertia, position, orientation, linear_velocity,
-      angular_velocity, trial_position, trial_orientation, trial_linear_velocity,
-      trial_angular_velocity, wrench, point1, point2, velocity, correction, axes, lower, upper,
-      compliance, damping, maximum_force, discrepancy_warm_impulse, discrepancy_warm_correction,
-      contact_normal, contact_point, contact_depth, contact_material, contact_warm_impulse,
+  std::vector<double> inverse_mass, inverse_inertia, position, orientation, linear_velocity, angular_velocity,
+      trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity, wrench, point1, point2,
+      velocity, correction, axes, lower, upper, compliance, damping, maximum_force, discrepancy_warm_impulse,
+      discrepancy_warm_correction, contact_normal, contact_point, contact_depth, contact_material, contact_warm_impulse,
       contact_warm_correction;
   std::vector<TestBody> bodies;
 
@@ -143,9 +139,8 @@ class SolverProblem {
     append(contact_point, c.point);
     contact_depth.push_back(c.depth);
     contact_key.push_back(c.key);
-    contact_material.insert(contact_material.end(),
-                            {c.restitution, c.static_friction, c.dynamic_friction, c.rolling,
-                             c.spinning, c.perturbation});
+    contact_material.insert(contact_material.end(), {c.restitution, c.static_friction, c.dynamic_friction, c.rolling,
+                                                     c.spinning, c.perturbation});
     contact_warm_impulse.insert(contact_warm_impulse.end(), 3, 0.0);
     contact_warm_correction.push_back(0.0);
     return static_cast<std::uint32_t>(contact_key.size() - 1);
@@ -278,9 +273,7 @@ class SolverProblem {
   }
 
  private:
-  static void append(std::vector<double>& to, const Vector3& v) {
-    to.insert(to.end(), {v.x(), v.y(), v.z()});
-  }
+  static void append(std::vector<double>& to, const Vector3& v) { to.insert(to.end(), {v.x(), v.y(), v.z()}); }
   static void append(std::vector<double>& to, const Quaternion& q) {
     to.insert(to.end(), {q.w(), q.x(), q.y(), q.z()});
   }

@@ -32,14 +32,13 @@ class Standard final : public CollisionPlugin {
                             .means("Half the edge along each axis.")}},
                       {"Cylinder",
                        "Cylinder about the y axis, centred on the origin.",
-                       {length("Radius", "Radius."),
-                        length("Height", "Distance between the end faces.")}},
+                       {length("Radius", "Radius."), length("Height", "Distance between the end faces.")}},
                       {"Halfspace", "Everything at y <= 0 of its frame is solid.", {}}}};
   }
   explicit Standard(PropertyCursor) {}
 
-  void manifolds(const stage::CollisionManifoldsRequest& request,
-                 const stage::CollisionManifoldsReply& reply, Host& host) override {
+  void manifolds(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
+                 Host& host) override {
     read_shapes(request);
     const std::span<const std::uint32_t> pair = request.pair();
     const std::size_t pairs = pair.size() / 2;
@@ -48,9 +47,8 @@ class Standard final : public CollisionPlugin {
     host.parallel_for(pairs, [&](std::uint64_t begin, std::uint64_t end) {
       for (std::uint64_t i = begin; i < end; ++i) {
         const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
-        collide(shapes_[request.body_shape()[a]], geometry_pose(request, a),
-                shapes_[request.body_shape()[b]], geometry_pose(request, b), request.margin(),
-                &manifolds_[i]);
+        collide(shapes_[request.body_shape()[a]], geometry_pose(request, a), shapes_[request.body_shape()[b]],
+                geometry_pose(request, b), request.margin(), &manifolds_[i]);
       }
     });
     for (std::size_t i = 0; i < pairs; ++i)
@@ -66,9 +64,8 @@ class Standard final : public CollisionPlugin {
     for (std::size_t i = 0; i < request.shape_type().size(); ++i) {
       if (i + 1 >= begin.size() || begin[i] > begin[i + 1] || begin[i + 1] > parameters.size())
         throw Refusal("the parameters of shape " + std::to_string(i) + " lie outside their column");
-      shapes_.push_back(
-          read_shape(request.shape_type()[i],
-                     PropertyCursor(parameters.subspan(begin[i], begin[i + 1] - begin[i])), i));
+      shapes_.push_back(read_shape(request.shape_type()[i],
+                                   PropertyCursor(parameters.subspan(begin[i], begin[i + 1] - begin[i])), i));
     }
   }
 
@@ -84,8 +81,7 @@ class Standard final : public CollisionPlugin {
     } else if (type == type_id("Halfspace")) {
       return {ShapeType::kHalfspace, Vector3::Ones()};
     } else {
-      throw Refusal("shape " + std::to_string(row) +
-                    " is of a type that this plugin does not know");
+      throw Refusal("shape " + std::to_string(row) + " is of a type that this plugin does not know");
     }
     if (!shape.size.allFinite() || !(shape.size.minCoeff() > 0.0))
       throw Refusal("shape " + std::to_string(row) + " has a size that is not finite and positive");
@@ -106,10 +102,9 @@ class Standard final : public CollisionPlugin {
   }
 
   static Pose geometry_pose(const stage::CollisionManifoldsRequest& request, std::uint32_t body) {
-    const Pose body_pose{vector_at(request.position(), body),
-                         quaternion_at(request.orientation(), body)};
-    return compose(body_pose, {vector_at(request.geometry_position(), body),
-                               quaternion_at(request.geometry_orientation(), body)});
+    const Pose body_pose{vector_at(request.position(), body), quaternion_at(request.orientation(), body)};
+    return compose(body_pose,
+                   {vector_at(request.geometry_position(), body), quaternion_at(request.geometry_orientation(), body)});
   }
 
   static void write_contact(const stage::CollisionManifoldsRequest& request,
@@ -120,8 +115,7 @@ class Standard final : public CollisionPlugin {
       return Vector3(vector_at(request.linear_velocity(), body) +
                      vector_at(request.angular_velocity(), body).cross(arm));
     };
-    const Vector3 relative =
-        velocity(request.pair()[2 * pair + 1]) - velocity(request.pair()[2 * pair]);
+    const Vector3 relative = velocity(request.pair()[2 * pair + 1]) - velocity(request.pair()[2 * pair]);
     const auto push = [](const stage::ReplyColumn<double>& column, const Vector3& v) {
       column.push(v.x(), v.y(), v.z());
     };

@@ -28,32 +28,38 @@ class AngularMotor final : public ConstraintPlugin {
             .meaning = "Hinge with a drive of constant speed.",
             .types = {{"AngularMotor",
                        "The second body turns about an axis, shared by both, at a given speed relative to the first.",
-                       {Property::vector("BindAxisPoint1", "m", "world").required().means("First point of the axis, at the start."),
+                       {Property::vector("BindAxisPoint1", "m", "world")
+                            .required()
+                            .means("First point of the axis, at the start."),
                         Property::vector("BindAxisPoint2", "m", "world").required().means("Second point of the axis."),
-                        Property::number("AngularSpeed", "rad/s").required().means(
-                            "Speed of body 2 relative to body 1, right-handed about point 1 -> point 2."),
-                        Property::number("MaximumTorque", "N*m").at_least(0.0).means(
-                            "Largest torque of the drive; unlimited if absent.")}}}};
+                        Property::number("AngularSpeed", "rad/s")
+                            .required()
+                            .means("Speed of body 2 relative to body 1, right-handed about point 1 -> point 2."),
+                        Property::number("MaximumTorque", "N*m")
+                            .at_least(0.0)
+                            .means("Largest torque of the drive; unlimited if absent.")}}}};
   }
   explicit AngularMotor(PropertyCursor) {}
 
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
-    bind_each(request, reply, [](std::uint64_t, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-      const Vector3 point1 = properties.vector();
-      const Vector3 point2 = properties.vector();
-      const double speed = properties.number();
-      const double torque = properties.number();
-      const double length = (point2 - point1).norm();
-      if (!(length > 0.0)) throw Refusal("AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
-      for (const Vector3& point : {point1, point2}) {
-        out.vector(inverse_transform_point(bodies.pose1, point));
-        out.vector(inverse_transform_point(bodies.pose2, point));
-      }
-      out.vector(bodies.pose1.orientation.conjugate() * orthonormal_basis((point2 - point1) / length).first);
-      out.number(0.5 * length);
-      out.number(speed);
-      out.number(torque == torque ? torque : kUnlimited);
-    });
+    bind_each(request, reply,
+              [](std::uint64_t, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+                const Vector3 point1 = properties.vector();
+                const Vector3 point2 = properties.vector();
+                const double speed = properties.number();
+                const double torque = properties.number();
+                const double length = (point2 - point1).norm();
+                if (!(length > 0.0))
+                  throw Refusal("AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
+                for (const Vector3& point : {point1, point2}) {
+                  out.vector(inverse_transform_point(bodies.pose1, point));
+                  out.vector(inverse_transform_point(bodies.pose2, point));
+                }
+                out.vector(bodies.pose1.orientation.conjugate() * orthonormal_basis((point2 - point1) / length).first);
+                out.number(0.5 * length);
+                out.number(speed);
+                out.number(torque == torque ? torque : kUnlimited);
+              });
   }
 
   void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,

@@ -9,22 +9,24 @@ namespace {
 class Spherical final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
-    return {.name = "Spherical",
-            .version = "1.0",
-            .slot = Slot::kConstraint,
-            .meaning = "Ball-and-socket joint.",
-            .types = {{"Spherical",
-                       "Two bodies share a point about which they turn freely.",
-                       {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start.")}}}};
+    return {
+        .name = "Spherical",
+        .version = "1.0",
+        .slot = Slot::kConstraint,
+        .meaning = "Ball-and-socket joint.",
+        .types = {{"Spherical",
+                   "Two bodies share a point about which they turn freely.",
+                   {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start.")}}}};
   }
   explicit Spherical(PropertyCursor) {}
 
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
-    bind_each(request, reply, [](std::uint64_t, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-      const Vector3 point = properties.vector();
-      out.vector(inverse_transform_point(bodies.pose1, point));
-      out.vector(inverse_transform_point(bodies.pose2, point));
-    });
+    bind_each(request, reply,
+              [](std::uint64_t, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+                const Vector3 point = properties.vector();
+                out.vector(inverse_transform_point(bodies.pose1, point));
+                out.vector(inverse_transform_point(bodies.pose2, point));
+              });
   }
 
   void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,

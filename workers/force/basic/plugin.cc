@@ -3,11 +3,12 @@
 // go with dt).
 //
 // With p the point of application (world) and x the centre of mass: torque = (p - x) x f + Torque.
+#include "plugin_sdk/plugin.h"
+
 #include <algorithm>
 #include <span>
 
 #include "plugin_sdk/force.h"
-#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 namespace {
@@ -16,7 +17,7 @@ enum Frame : std::uint32_t { kWorldFrame = 0, kBodyFrame = 1 };
 
 struct Parameters {
   Vector3 force;
-  Vector3 point;   // geometry frame
+  Vector3 point;  // geometry frame
   Vector3 torque;
   std::uint32_t frame;
   std::span<const double> table;  // rows t, fx, fy, fz
@@ -38,7 +39,9 @@ Parameters read(PropertyCursor cursor) {
 Vector3 force_at(const Parameters& p, double time) {
   const std::size_t rows = p.table.size() / 4;
   if (rows == 0) return p.force;
-  const auto row_force = [&](std::size_t row) { return Vector3(p.table[4 * row + 1], p.table[4 * row + 2], p.table[4 * row + 3]); };
+  const auto row_force = [&](std::size_t row) {
+    return Vector3(p.table[4 * row + 1], p.table[4 * row + 2], p.table[4 * row + 3]);
+  };
   std::size_t next = 0;
   while (next < rows && p.table[4 * next] <= time) ++next;
   if (next == 0) return row_force(0);
@@ -51,24 +54,30 @@ Vector3 force_at(const Parameters& p, double time) {
 class BasicForce final : public ForcePlugin {
  public:
   static PluginDeclaration declaration() {
-    return {.name = "BasicForce",
-            .version = "1.0",
-            .slot = Slot::kForce,
-            .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
-            .types = {{"Basic",
-                       "A given force at a point of the body.",
-                       {Property::vector("Force", "N", "world").defaults_to({0, 0, 0}).means(
-                            "The force, in N; in N s where Instantaneous is true. Required unless Table is given."),
-                        Property::vector("ApplicationPoint", "m", "geometry").defaults_to({0, 0, 0}).means(
-                            "Where it acts, in the frame of the body's geometry."),
-                        Property::vector("Torque", "N*m", "world").defaults_to({0, 0, 0}).means(
-                            "An additional torque (N m s where Instantaneous)."),
-                        Property::choice("Frame", {"World", "Body"}).defaults_to({0}).means(
-                            "Axes in which Force, Torque and Table are given: the world's or the geometry's."),
-                        Property::table("Table", 4, "s,N", "world").means(
-                            "Rows {t, fx, fy, fz}: the force over time, linear between rows; replaces Force."),
-                        Property::flag("Instantaneous").defaults_to({0}).means(
-                            "The value is an impulse, applied once at the start.")}}}};
+    return {
+        .name = "BasicForce",
+        .version = "1.0",
+        .slot = Slot::kForce,
+        .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
+        .types = {{"Basic",
+                   "A given force at a point of the body.",
+                   {Property::vector("Force", "N", "world")
+                        .defaults_to({0, 0, 0})
+                        .means("The force, in N; in N s where Instantaneous is true. Required unless Table is given."),
+                    Property::vector("ApplicationPoint", "m", "geometry")
+                        .defaults_to({0, 0, 0})
+                        .means("Where it acts, in the frame of the body's geometry."),
+                    Property::vector("Torque", "N*m", "world")
+                        .defaults_to({0, 0, 0})
+                        .means("An additional torque (N m s where Instantaneous)."),
+                    Property::choice("Frame", {"World", "Body"})
+                        .defaults_to({0})
+                        .means("Axes in which Force, Torque and Table are given: the world's or the geometry's."),
+                    Property::table("Table", 4, "s,N", "world")
+                        .means("Rows {t, fx, fy, fz}: the force over time, linear between rows; replaces Force."),
+                    Property::flag("Instantaneous")
+                        .defaults_to({0})
+                        .means("The value is an impulse, applied once at the start.")}}}};
   }
   explicit BasicForce(PropertyCursor) {}
 

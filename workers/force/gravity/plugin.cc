@@ -1,7 +1,8 @@
 // Force `Gravity` (§ 4.2): f = m g at the centre of mass, potential U = -m g.x (zero at the origin).
+#include "plugin_sdk/plugin.h"
+
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
-#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 namespace {
@@ -14,9 +15,10 @@ class Gravity final : public ForcePlugin {
             .slot = Slot::kForce,
             .meaning = "Uniform field of gravity.",
             .capabilities = {"potential"},
-            .types = {{"Gravity",
-                       "Pulls every body with its mass times the acceleration.",
-                       {Property::vector("Acceleration", "m/s^2", "world").required().means("Acceleration of free fall.")}}}};
+            .types = {
+                {"Gravity",
+                 "Pulls every body with its mass times the acceleration.",
+                 {Property::vector("Acceleration", "m/s^2", "world").required().means("Acceleration of free fall.")}}}};
   }
   explicit Gravity(PropertyCursor) {}
 

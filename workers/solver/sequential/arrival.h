@@ -10,8 +10,7 @@ namespace gravitas {
 // u* the same at S*: the speed after the way gap_n at constant acceleration, so that a fall from
 // rest bounces back to its own height whatever the step. s = 0 if u* >= 0, and below the rest speed
 // 2 |a| h, that what a body at rest gains by its load in two steps: such a contact rests.
-double arrival_speed(double start_velocity, double trial_velocity, double gap_at_start,
-                     double time_step);
+double arrival_speed(double start_velocity, double trial_velocity, double gap_at_start, double time_step);
 
 // Gap along `direction` at S_n of two surfaces with `gap` at S*: gap* - J (S* - S_n), both bodies
 // displaced as rigid bodies with the arms they have at S*. Turning round the normal or about a

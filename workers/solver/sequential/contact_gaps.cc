@@ -41,8 +41,8 @@ void ContactGaps::build(const RelaxationBodies& bodies, const stage::SolverSolve
 void ContactGaps::push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const {
   for (const Row& row : rows_) {
     if (row.multiplier == 0.0) continue;
-    row.direction.push(row.multiplier, bodies[row.body1].inverse_mass,
-                       bodies[row.body2].inverse_mass, x[row.body1], x[row.body2]);
+    row.direction.push(row.multiplier, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, x[row.body1],
+                       x[row.body2]);
   }
 }
 
@@ -58,9 +58,9 @@ double ContactGaps::largest_motion(const RelaxationMotion& x) const {
   for (const Row& row : rows_) {
     const Twist& one = x[row.body1];
     const Twist& two = x[row.body2];
-    largest = std::max(largest, one.linear.norm() + two.linear.norm() +
-                                    row.direction.angular1.norm() * one.angular.norm() +
-                                    row.direction.angular2.norm() * two.angular.norm());
+    largest =
+        std::max(largest, one.linear.norm() + two.linear.norm() + row.direction.angular1.norm() * one.angular.norm() +
+                              row.direction.angular2.norm() * two.angular.norm());
   }
   return largest;
 }
@@ -73,8 +73,7 @@ double ContactGaps::sweep(const RelaxationBodies& bodies, RelaxationMotion& x) {
   double change = 0.0;
   for (const Patch& patch : patches_) {
     if (sweep_whole(patch, bodies, x, &change)) continue;
-    for (std::size_t i = patch.first; i < patch.end; ++i)
-      change = std::max(change, sweep_row(rows_[i], bodies, x));
+    for (std::size_t i = patch.first; i < patch.end; ++i) change = std::max(change, sweep_row(rows_[i], bodies, x));
   }
   return change;
 }
@@ -85,14 +84,13 @@ double ContactGaps::sweep_row(Row& row, const RelaxationBodies& bodies, Relaxati
   const double amount = relaxed - row.multiplier;
   if (amount == 0.0) return 0.0;
   row.multiplier = relaxed;
-  row.direction.push(amount, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass,
-                     x[row.body1], x[row.body2]);
+  row.direction.push(amount, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, x[row.body1],
+                     x[row.body2]);
   return std::fabs(row.response * amount);
 }
 
 // All rows of a patch as closed; false, with nothing done, if one would have to pull.
-bool ContactGaps::sweep_whole(const Patch& patch, const RelaxationBodies& bodies,
-                              RelaxationMotion& x, double* change) {
+bool ContactGaps::sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x, double* change) {
   if (!patch.has_whole) return false;
   const auto count = static_cast<int>(patch.end - patch.first);
   ContactPatch::Rows missing = ContactPatch::Rows::Zero();
@@ -105,13 +103,12 @@ bool ContactGaps::sweep_whole(const Patch& patch, const RelaxationBodies& bodies
   ContactPatch::Rows amounts = ContactPatch::Rows::Zero();
   if (is_open || !patch.whole.solve(missing, &amounts)) return false;
   for (int i = 0; i < count; ++i)
-    if (rows_[patch.first + static_cast<std::size_t>(i)].multiplier + amounts(i) < 0.0)
-      return false;
+    if (rows_[patch.first + static_cast<std::size_t>(i)].multiplier + amounts(i) < 0.0) return false;
   for (int i = 0; i < count; ++i) {
     Row& row = rows_[patch.first + static_cast<std::size_t>(i)];
     row.multiplier += amounts(i);
-    row.direction.push(amounts(i), bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass,
-                       x[row.body1], x[row.body2]);
+    row.direction.push(amounts(i), bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, x[row.body1],
+                       x[row.body2]);
     *change = std::max(*change, std::fabs(missing(i)));
   }
   return true;
@@ -121,8 +118,7 @@ void ContactGaps::set_patches(const RelaxationBodies& bodies) {
   patches_.clear();
   for (std::size_t first = 0; first < rows_.size();) {
     std::size_t end = first + 1;
-    while (end < rows_.size() && rows_[end].body1 == rows_[first].body1 &&
-           rows_[end].body2 == rows_[first].body2)
+    while (end < rows_.size() && rows_[end].body1 == rows_[first].body1 && rows_[end].body2 == rows_[first].body2)
       ++end;
     Patch& patch = patches_.emplace_back();
     patch.first = static_cast<std::uint32_t>(first);
@@ -131,8 +127,7 @@ void ContactGaps::set_patches(const RelaxationBodies& bodies) {
     patch.has_whole = count > 1 && count <= ContactPatch::kRows;
     if (patch.has_whole) {
       ContactPatch::Response response = ContactPatch::Response::Zero();
-      const double masses =
-          bodies[rows_[first].body1].inverse_mass + bodies[rows_[first].body2].inverse_mass;
+      const double masses = bodies[rows_[first].body1].inverse_mass + bodies[rows_[first].body2].inverse_mass;
       for (int i = 0; i < count; ++i)
         for (int j = 0; j < count; ++j)
           response(i, j) = rows_[first + static_cast<std::size_t>(i)].direction.product(

@@ -21,8 +21,8 @@ class ContactGaps {
  public:
   // Rows of all contacts with a body that can be pushed, starting from `warm` (one per contact of
   // the request).
-  void build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request,
-             double correction_factor, const std::vector<double>& warm);
+  void build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request, double correction_factor,
+             const std::vector<double>& warm);
 
   bool is_empty() const { return rows_.empty(); }
   void push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const;
@@ -59,8 +59,7 @@ class ContactGaps {
   };
 
   void set_patches(const RelaxationBodies& bodies);
-  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x,
-                   double* change);
+  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x, double* change);
   double sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
 
   std::vector<Row> rows_;

@@ -14,8 +14,7 @@
 namespace gravitas {
 namespace {
 
-double material(const stage::SolverSolveRequest& request, std::size_t contact,
-                MaterialColumn column) {
+double material(const stage::SolverSolveRequest& request, std::size_t contact, MaterialColumn column) {
   return request.contact_material()[kMaterialColumns * contact + column];
 }
 
@@ -30,10 +29,8 @@ Matrix3 frame_of(const Vector3& normal) {
 
 // ---- rows
 
-void ContactImpulses::build(const RelaxationBodies& bodies,
-                            const stage::SolverSolveRequest& request,
-                            const std::vector<std::uint8_t>& closed,
-                            const std::vector<double>& warm) {
+void ContactImpulses::build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request,
+                            const std::vector<std::uint8_t>& closed, const std::vector<double>& warm) {
   rows_.clear();
   rolling_.clear();
   for (std::size_t i = 0; i < closed.size(); ++i) {
@@ -50,8 +47,7 @@ void ContactImpulses::build(const RelaxationBodies& bodies,
     row.has_friction = row.static_friction > 0.0;
     set_law(row, bodies, request);
     set_response(row, bodies);
-    set_rolling(row, bodies, material(request, i, kRollingFriction),
-                material(request, i, kSpinningFriction));
+    set_rolling(row, bodies, material(request, i, kRollingFriction), material(request, i, kSpinningFriction));
 
     row.impulse = row.frame.transpose() * vector_at(warm, i);
     row.impulse.x() = std::max(0.0, row.impulse.x());
@@ -63,8 +59,7 @@ void ContactImpulses::build(const RelaxationBodies& bodies,
 }
 
 // The direction of the normal law and its target e s.
-void ContactImpulses::set_law(Row& row, const RelaxationBodies& bodies,
-                              const stage::SolverSolveRequest& request) {
+void ContactImpulses::set_law(Row& row, const RelaxationBodies& bodies, const stage::SolverSolveRequest& request) {
   const std::size_t i = row.contact;
   const RelaxationBody& one = bodies[row.body1];
   const RelaxationBody& two = bodies[row.body2];
@@ -93,8 +88,8 @@ void ContactImpulses::set_law(Row& row, const RelaxationBodies& bodies,
 }
 
 void ContactImpulses::set_response(Row& row, const RelaxationBodies& bodies) {
-  const Matrix3 world = point_response(bodies[row.body1], row.arm1, row.arm1) +
-                        point_response(bodies[row.body2], row.arm2, row.arm2);
+  const Matrix3 world =
+      point_response(bodies[row.body1], row.arm1, row.arm1) + point_response(bodies[row.body2], row.arm2, row.arm2);
   const Matrix3 response = row.frame.transpose() * world * row.frame;
   row.response = 0.5 * (response + response.transpose());
   row.disc = FrictionDisc::of(row.response.bottomRightCorner<2, 2>());
@@ -127,8 +122,7 @@ void ContactImpulses::set_rolling(Row& row, const RelaxationBodies& bodies, doub
 Vector3 ContactImpulses::velocity_of(const Row& row, const RelaxationMotion& x) const {
   const Twist& one = x[row.body1];
   const Twist& two = x[row.body2];
-  return row.frame.transpose() *
-         (two.linear + two.angular.cross(row.arm2) - one.linear - one.angular.cross(row.arm1));
+  return row.frame.transpose() * (two.linear + two.angular.cross(row.arm2) - one.linear - one.angular.cross(row.arm1));
 }
 
 Vector3 ContactImpulses::turning_of(const Row& row, const RelaxationMotion& x) const {
@@ -146,8 +140,8 @@ void ContactImpulses::push(const Row& row, const Vector3& impulse, const Relaxat
   x[row.body2].angular += two.inverse_inertia * row.arm2.cross(world);
 }
 
-void ContactImpulses::push_turning(const Row& row, const Vector3& impulse,
-                                   const RelaxationBodies& bodies, RelaxationMotion& x) const {
+void ContactImpulses::push_turning(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
+                                   RelaxationMotion& x) const {
   const Vector3 world = row.frame * impulse;
   x[row.body1].angular -= bodies[row.body1].inverse_inertia * world;
   x[row.body2].angular += bodies[row.body2].inverse_inertia * world;
@@ -162,8 +156,7 @@ void ContactImpulses::push_all(const RelaxationBodies& bodies, RelaxationMotion&
   }
 }
 
-void ContactImpulses::push_friction(const RelaxationBodies& bodies, double factor,
-                                    RelaxationMotion& x) const {
+void ContactImpulses::push_friction(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const {
   for (const Row& row : rows_) {
     const Vector3 tangent(0.0, factor * row.impulse.y(), factor * row.impulse.z());
     if (!tangent.isZero(0.0)) push(row, tangent, bodies, x);
@@ -174,9 +167,8 @@ void ContactImpulses::push_friction(const RelaxationBodies& bodies, double facto
 }
 
 bool ContactImpulses::has_friction_impulse() const {
-  return std::any_of(
-             rows_.begin(), rows_.end(),
-             [](const Row& row) { return row.impulse.y() != 0.0 || row.impulse.z() != 0.0; }) ||
+  return std::any_of(rows_.begin(), rows_.end(),
+                     [](const Row& row) { return row.impulse.y() != 0.0 || row.impulse.z() != 0.0; }) ||
          std::any_of(rolling_.begin(), rolling_.end(),
                      [](const Rolling& rolling) { return !rolling.impulse.isZero(0.0); });
 }
@@ -192,8 +184,8 @@ double ContactImpulses::largest_motion(const RelaxationMotion& x) const {
   for (const Row& row : rows_) {
     const Twist& one = x[row.body1];
     const Twist& two = x[row.body2];
-    largest = std::max(largest, one.linear.norm() + one.angular.norm() * row.arm1.norm() +
-                                    two.linear.norm() + two.angular.norm() * row.arm2.norm());
+    largest = std::max(largest, one.linear.norm() + one.angular.norm() * row.arm1.norm() + two.linear.norm() +
+                                    two.angular.norm() * row.arm2.norm());
   }
   return largest;
 }
@@ -235,8 +227,7 @@ Vector3 ContactImpulses::relaxed(const Row& row, const Vector3& velocity) const 
   const double mu = row.slides ? row.dynamic_friction : row.static_friction;
   if (row.has_inverse) {
     const Vector3 free_velocity = velocity - row.response * row.impulse;
-    if (solve_coulomb_contact(row.response, row.inverse, free_velocity, row.target, mu, &impulse))
-      return impulse;
+    if (solve_coulomb_contact(row.response, row.inverse, free_velocity, row.target, mu, &impulse)) return impulse;
   }
   // without friction, or with bodies that cannot move every way: normal row, then friction
   const double missing = row.target - velocity.x();
@@ -247,8 +238,7 @@ Vector3 ContactImpulses::relaxed(const Row& row, const Vector3& velocity) const 
   return impulse;
 }
 
-double ContactImpulses::sweep_rolling(const Row& row, const RelaxationBodies& bodies,
-                                      RelaxationMotion& x) {
+double ContactImpulses::sweep_rolling(const Row& row, const RelaxationBodies& bodies, RelaxationMotion& x) {
   Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
   const Vector3 turning = turning_of(row, x);
   Vector3 impulse = rolling.impulse;
@@ -256,8 +246,8 @@ double ContactImpulses::sweep_rolling(const Row& row, const RelaxationBodies& bo
     const double bound = rolling.spinning_friction * row.impulse.x();
     impulse.x() = std::clamp(impulse.x() - turning.x() / rolling.normal_response, -bound, bound);
   }
-  impulse.tail<2>() = rolling.disc.updated(impulse.tail<2>(), turning.tail<2>(),
-                                           rolling.rolling_friction * row.impulse.x());
+  impulse.tail<2>() =
+      rolling.disc.updated(impulse.tail<2>(), turning.tail<2>(), rolling.rolling_friction * row.impulse.x());
   const Vector3 amount = impulse - rolling.impulse;
   if (amount.isZero(0.0)) return 0.0;
   rolling.impulse = impulse;
@@ -291,8 +281,8 @@ void ContactImpulses::store(std::vector<double>& impulses, std::vector<double>& 
 // ---- energy
 
 // Work of a contact's impulse and, in `size`, what it is large or small against.
-double ContactImpulses::work_of(const Row& row, const RelaxationMotion& before,
-                                const RelaxationMotion& after, double* size) const {
+double ContactImpulses::work_of(const Row& row, const RelaxationMotion& before, const RelaxationMotion& after,
+                                double* size) const {
   const Vector3 start = velocity_of(row, before);
   const Vector3 end = velocity_of(row, after);
   double work = 0.5 * row.impulse.dot(start + end);
@@ -312,8 +302,7 @@ void ContactImpulses::add_work(const RelaxationBodies& bodies, const RelaxationM
   }
 }
 
-std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before,
-                                                 const RelaxationMotion& after) {
+std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before, const RelaxationMotion& after) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     if (!(row.target > 0.0)) continue;
@@ -326,10 +315,8 @@ std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before,
   return count;
 }
 
-std::uint32_t ContactImpulses::drop_restitution(const RelaxationBodies& bodies,
-                                                const std::vector<std::uint32_t>& group,
-                                                const std::vector<double>& gained,
-                                                double tolerance) {
+std::uint32_t ContactImpulses::drop_restitution(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+                                                const std::vector<double>& gained, double tolerance) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     if (!(row.target > 0.0) || !(gained[group[owner_of(row, bodies)]] > tolerance)) continue;

@@ -70,15 +70,14 @@ class ContactImpulses {
 
   // Work of each contact's impulse, added to that of its second body, or of the first where the
   // second is not pushed.
-  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
-                const RelaxationMotion& after, std::vector<double>& work) const;
+  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before, const RelaxationMotion& after,
+                std::vector<double>& work) const;
   // Lowers e s of the contacts that arrive and whose impulse does positive work: to a half, a
   // quarter, then to zero. Returns how many were lowered.
   std::uint32_t lower_restitution(const RelaxationMotion& before, const RelaxationMotion& after);
   // Sets e s to zero for contacts of bodies in a group (by the number of its first body) that
   // gained more than `tolerance` J. Returns how many changed.
-  std::uint32_t drop_restitution(const RelaxationBodies& bodies,
-                                 const std::vector<std::uint32_t>& group,
+  std::uint32_t drop_restitution(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
                                  const std::vector<double>& gained, double tolerance);
   // Multiplies all impulses by the factor of their bodies' group.
   void scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
@@ -112,8 +111,7 @@ class ContactImpulses {
     double normal_response = 0.0;
     FrictionDisc disc;
     double rolling_friction = 0.0, spinning_friction = 0.0, length = 0.0;  // m
-    Vector3 impulse =
-        Vector3::Zero();  // torque impulses in the frame: about the normal, and two tangents
+    Vector3 impulse = Vector3::Zero();  // torque impulses in the frame: about the normal, and two tangents
   };
 
   // Consecutive rows of one pair of bodies.
@@ -130,26 +128,21 @@ class ContactImpulses {
   }
   Vector3 velocity_of(const Row& row, const RelaxationMotion& x) const;
   Vector3 turning_of(const Row& row, const RelaxationMotion& x) const;
-  void push(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
-            RelaxationMotion& x) const;
-  void push_turning(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
-                    RelaxationMotion& x) const;
+  void push(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies, RelaxationMotion& x) const;
+  void push_turning(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies, RelaxationMotion& x) const;
   void set_law(Row& row, const RelaxationBodies& bodies, const stage::SolverSolveRequest& request);
   void set_response(Row& row, const RelaxationBodies& bodies);
-  void set_rolling(Row& row, const RelaxationBodies& bodies, double rolling_friction,
-                   double spinning_friction);
+  void set_rolling(Row& row, const RelaxationBodies& bodies, double rolling_friction, double spinning_friction);
   void set_patches(const RelaxationBodies& bodies);
   ContactPatch whole_of(const Patch& patch, const RelaxationBodies& bodies) const;
-  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x,
-                   double* change);
+  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x, double* change);
   bool is_flat(const Patch& patch) const;
   bool is_in_cones(const Patch& patch, const PatchImpulses& impulses) const;
   bool spread_friction(const Patch& patch, PatchImpulses* impulses) const;
   double sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
   double sweep_rolling(const Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
   Vector3 relaxed(const Row& row, const Vector3& velocity) const;
-  double work_of(const Row& row, const RelaxationMotion& before, const RelaxationMotion& after,
-                 double* size) const;
+  double work_of(const Row& row, const RelaxationMotion& before, const RelaxationMotion& after, double* size) const;
 
   std::vector<Row> rows_;
   std::vector<Rolling> rolling_;

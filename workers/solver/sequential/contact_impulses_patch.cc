@@ -52,8 +52,8 @@ ContactPatch ContactImpulses::whole_of(const Patch& patch, const RelaxationBodie
     const Row& at = rows_[patch.first + static_cast<std::size_t>(i)];
     for (int j = 0; j < count; ++j) {
       const Row& from = rows_[patch.first + static_cast<std::size_t>(j)];
-      const Matrix3 world = point_response(bodies[at.body1], at.arm1, from.arm1) +
-                            point_response(bodies[at.body2], at.arm2, from.arm2);
+      const Matrix3 world =
+          point_response(bodies[at.body1], at.arm1, from.arm1) + point_response(bodies[at.body2], at.arm2, from.arm2);
       const Matrix3 part = at.frame.transpose() * world * from.frame;
       response.block(width * i, width * j, width, width) = part.topLeftCorner(width, width);
     }
@@ -63,8 +63,8 @@ ContactPatch ContactImpulses::whole_of(const Patch& patch, const RelaxationBodie
 
 // All contacts of a patch as sticking and arriving at e s; false, with nothing done, if an impulse
 // would leave its cone.
-bool ContactImpulses::sweep_whole(const Patch& patch, const RelaxationBodies& bodies,
-                                  RelaxationMotion& x, double* change) {
+bool ContactImpulses::sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x,
+                                  double* change) {
   if (!patch.has_whole) return false;
   const int width = rows_[patch.first].has_friction ? 3 : 1;
   const std::size_t count = patch.end - patch.first;
@@ -101,8 +101,7 @@ bool ContactImpulses::sweep_whole(const Patch& patch, const RelaxationBodies& bo
 bool ContactImpulses::is_in_cones(const Patch& patch, const PatchImpulses& impulses) const {
   for (std::size_t i = 0; i < patch.end - patch.first; ++i) {
     const double allowed = rows_[patch.first + i].static_friction * impulses[i].x();
-    if (impulses[i].x() < 0.0 || impulses[i].tail<2>().squaredNorm() > allowed * allowed)
-      return false;
+    if (impulses[i].x() < 0.0 || impulses[i].tail<2>().squaredNorm() > allowed * allowed) return false;
   }
   return true;
 }
@@ -121,8 +120,7 @@ bool ContactImpulses::spread_friction(const Patch& patch, PatchImpulses* impulse
   for (std::size_t i = 0; i < count; ++i) {
     const Vector3& impulse = (*impulses)[i];
     if (impulse.x() < 0.0) return false;
-    place[i] =
-        frame.rightCols<2>().transpose() * (rows_[patch.first + i].arm1 - rows_[patch.first].arm1);
+    place[i] = frame.rightCols<2>().transpose() * (rows_[patch.first + i].arm1 - rows_[patch.first].arm1);
     load += impulse.x();
     centre += impulse.x() * place[i];
     force += impulse.tail<2>();

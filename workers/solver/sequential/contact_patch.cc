@@ -47,8 +47,7 @@ bool invert(const Square& matrix, int size, Square* inverse) {
     }
   }
   for (int column = 0; column < size; ++column) {
-    Eigen::Matrix<double, ContactPatch::kRank, 1> x =
-        Eigen::Matrix<double, ContactPatch::kRank, 1>::Zero();
+    Eigen::Matrix<double, ContactPatch::kRank, 1> x = Eigen::Matrix<double, ContactPatch::kRank, 1>::Zero();
     x(column) = 1.0;
     for (int i = 0; i < size; ++i) {
       for (int k = 0; k < i; ++k) x(i) -= lower(i, k) * x(k);

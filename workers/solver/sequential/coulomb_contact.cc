@@ -99,9 +99,8 @@ bool search(const Slide& slide, Vector2* direction) {
 
 }  // namespace
 
-bool solve_coulomb_contact(const Matrix3& response, const Matrix3& inverse,
-                           const Vector3& free_velocity, double target, double friction,
-                           Vector3* impulse) {
+bool solve_coulomb_contact(const Matrix3& response, const Matrix3& inverse, const Vector3& free_velocity, double target,
+                           double friction, Vector3* impulse) {
   if (free_velocity.x() >= target) {
     impulse->setZero();
     return true;

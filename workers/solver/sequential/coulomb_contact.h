@@ -24,8 +24,7 @@ namespace gravitas {
 
 // False, with `impulse` untouched, if there is no answer but for rounding; the caller keeps what it
 // has. `inverse` is W^-1; `impulse` holds the present one, whose friction is the first guess of d.
-bool solve_coulomb_contact(const Matrix3& response, const Matrix3& inverse,
-                           const Vector3& free_velocity, double target, double friction,
-                           Vector3* impulse);
+bool solve_coulomb_contact(const Matrix3& response, const Matrix3& inverse, const Vector3& free_velocity, double target,
+                           double friction, Vector3* impulse);
 
 }  // namespace gravitas

@@ -19,8 +19,7 @@ struct FrictionDisc {
   // stops the slip, lambda - K^-1 slip, is within `radius` it is taken: exact. Else
   //   lambda <- radius g/|g|,  g = lambda - slip/k,  k the largest eigenvalue of K:
   // a projected gradient step, whose fixed point is slip = -c lambda, c >= 0, |lambda| = radius.
-  Eigen::Vector2d updated(const Eigen::Vector2d& impulse, const Eigen::Vector2d& slip,
-                          double radius) const;
+  Eigen::Vector2d updated(const Eigen::Vector2d& impulse, const Eigen::Vector2d& slip, double radius) const;
 };
 
 }  // namespace gravitas

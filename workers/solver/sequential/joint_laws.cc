@@ -14,9 +14,7 @@ bool has_lower_side(const JointAxisState& a) {
   return a.mode == AxisMode::kUnilateral || (a.mode == AxisMode::kLimited && a.lower > -kUnlimited);
 }
 
-bool has_upper_side(const JointAxisState& a) {
-  return a.mode == AxisMode::kLimited && a.upper < kUnlimited;
-}
+bool has_upper_side(const JointAxisState& a) { return a.mode == AxisMode::kLimited && a.upper < kUnlimited; }
 
 // A limit whose sides meet holds like a lock.
 bool is_held(const JointAxisState& a) {
@@ -89,13 +87,11 @@ JointLaw pose_law(const JointAxisState& a, double beta, double h) {
   if (has_lower_side(a)) {
     const double lower = lower_of(a);
     law.has_lower = true;
-    law.lower_target =
-        lower + std::min(0.0, (1.0 - beta) * (a.error_at_start - lower)) - a.error_at_trial;
+    law.lower_target = lower + std::min(0.0, (1.0 - beta) * (a.error_at_start - lower)) - a.error_at_trial;
   }
   if (has_upper_side(a)) {
     law.has_upper = true;
-    law.upper_target =
-        a.upper + std::max(0.0, (1.0 - beta) * (a.error_at_start - a.upper)) - a.error_at_trial;
+    law.upper_target = a.upper + std::max(0.0, (1.0 - beta) * (a.error_at_start - a.upper)) - a.error_at_trial;
   }
   return law;
 }

@@ -59,9 +59,7 @@ struct JointLaw {
   bool is_active() const { return has_lower || has_upper; }
   bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }
   // An equality that nothing softens or bounds.
-  bool is_rigid() const {
-    return is_equality() && gamma == 0.0 && bound == std::numeric_limits<double>::infinity();
-  }
+  bool is_rigid() const { return is_equality() && gamma == 0.0 && bound == std::numeric_limits<double>::infinity(); }
 };
 
 // What the laws of one axis are made from.
@@ -80,8 +78,7 @@ JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const 
 JointLaw pose_law(const JointAxisState& axis, double beta, double time_step);
 
 // `error_after` is e* + J delta, `slop` how far from a limit it still counts as closed.
-JointLaw velocity_law(const JointAxisState& axis, double error_after, double slop,
-                      double time_step);
+JointLaw velocity_law(const JointAxisState& axis, double error_after, double slop, double time_step);
 
 // The multiplier that makes a row right when its value is now J x + gamma lambda = value, and a
 // unit of multiplier changes that by `response` > 0.

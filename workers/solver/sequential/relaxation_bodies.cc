@@ -22,22 +22,18 @@ void RelaxationBodies::load(const stage::SolverSolveRequest& request) {
   for (std::size_t i = 0; i < rows; ++i) {
     RelaxationBody& body = bodies_[i];
     body.start = {vector_at(request.position(), i), quaternion_at(request.orientation(), i)};
-    body.trial = {vector_at(request.trial_position(), i),
-                  quaternion_at(request.trial_orientation(), i)};
-    body.start_velocity = {vector_at(request.linear_velocity(), i),
-                           vector_at(request.angular_velocity(), i)};
+    body.trial = {vector_at(request.trial_position(), i), quaternion_at(request.trial_orientation(), i)};
+    body.start_velocity = {vector_at(request.linear_velocity(), i), vector_at(request.angular_velocity(), i)};
     body.trial_velocity = {vector_at(request.trial_linear_velocity(), i),
                            vector_at(request.trial_angular_velocity(), i)};
     const std::uint32_t flags = request.flags()[i];
     if ((flags & kMovable) == 0 || (flags & kKinematic) != 0) continue;
     body.inverse_mass = request.inverse_mass()[i];
-    body.inverse_inertia =
-        world_inverse_inertia(body.trial.orientation, vector_at(request.inverse_inertia(), i));
+    body.inverse_inertia = world_inverse_inertia(body.trial.orientation, vector_at(request.inverse_inertia(), i));
   }
 }
 
-RelaxationDirection RelaxationDirection::through(const Vector3& point, const Vector3& axis,
-                                                 const RelaxationBody& body1,
+RelaxationDirection RelaxationDirection::through(const Vector3& point, const Vector3& axis, const RelaxationBody& body1,
                                                  const RelaxationBody& body2) {
   RelaxationDirection d;
   d.linear = axis;
@@ -70,8 +66,7 @@ Matrix3 point_response(const RelaxationBody& body, const Vector3& at, const Vect
   return body.inverse_mass * Matrix3::Identity() - skew(at) * body.inverse_inertia * skew(from);
 }
 
-double closing_slop(const Vector3& point, const RelaxationBody& body1,
-                    const RelaxationBody& body2) {
+double closing_slop(const Vector3& point, const RelaxationBody& body1, const RelaxationBody& body2) {
   double arm = 0.0;
   double coordinates = point.cwiseAbs().maxCoeff();
   for (const RelaxationBody* body : {&body1, &body2}) {

@@ -40,9 +40,7 @@ class RelaxationBodies {
   // Without the world.
   std::size_t count() const { return bodies_.size() - 1; }
   // The row itself, or that of the world for kNone.
-  std::uint32_t row(std::uint32_t body) const {
-    return body == kNone ? static_cast<std::uint32_t>(count()) : body;
-  }
+  std::uint32_t row(std::uint32_t body) const { return body == kNone ? static_cast<std::uint32_t>(count()) : body; }
   const RelaxationBody& operator[](std::uint32_t row) const { return bodies_[row]; }
 
  private:
@@ -58,11 +56,10 @@ struct RelaxationDirection {
   Vector3 turn2 = Vector3::Zero();  // I2^-1 angular2
 
   // Along a unit axis through a point (world) that both bodies are pushed at.
-  static RelaxationDirection through(const Vector3& point, const Vector3& axis,
-                                     const RelaxationBody& body1, const RelaxationBody& body2);
+  static RelaxationDirection through(const Vector3& point, const Vector3& axis, const RelaxationBody& body1,
+                                     const RelaxationBody& body2);
   // About a unit axis.
-  static RelaxationDirection about(const Vector3& axis, const RelaxationBody& body1,
-                                   const RelaxationBody& body2);
+  static RelaxationDirection about(const Vector3& axis, const RelaxationBody& body1, const RelaxationBody& body2);
 
   // J x for velocities or displacements of the two bodies.
   double along(const Twist& x1, const Twist& x2) const {
@@ -70,8 +67,7 @@ struct RelaxationDirection {
   }
   // this M^-1 other^T
   double product(const RelaxationDirection& other, double inverse_masses) const {
-    return inverse_masses * linear.dot(other.linear) + angular1.dot(other.turn1) +
-           angular2.dot(other.turn2);
+    return inverse_masses * linear.dot(other.linear) + angular1.dot(other.turn1) + angular2.dot(other.turn2);
   }
   // x += M^-1 J^T amount
   void push(double amount, double inverse_mass1, double inverse_mass2, Twist& x1, Twist& x2) const {

@@ -18,9 +18,8 @@ double inverse_masses_of(const RelaxationBodies& bodies, std::uint32_t body1, st
 
 }  // namespace
 
-RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1,
-                                             std::uint32_t body2, const RelaxationBodies& bodies,
-                                             double correction_factor) {
+RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
+                                             const RelaxationBodies& bodies, double correction_factor) {
   RelaxationDiscrepancy r;
   r.body1 = body1;
   r.body2 = body2;
@@ -37,14 +36,13 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
     const auto place = static_cast<std::size_t>(i);
     const Vector3 axis = axes.col(i);
     r.axes[place] = joint_axis_state(discrepancy, i, axis, start_error);
-    r.directions[place] = angular ? RelaxationDirection::about(axis, one, two)
-                                  : RelaxationDirection::through(middle, axis, one, two);
+    r.directions[place] =
+        angular ? RelaxationDirection::about(axis, one, two) : RelaxationDirection::through(middle, axis, one, two);
   }
   return r;
 }
 
-void RelaxationJoints::build(const RelaxationBodies& bodies,
-                             const std::vector<RelaxationDiscrepancy>& discrepancies,
+void RelaxationJoints::build(const RelaxationBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies,
                              const Laws& laws, const Multipliers& warm) {
   rows_.clear();
   blocks_.clear();
@@ -69,9 +67,8 @@ void RelaxationJoints::build(const RelaxationBodies& bodies,
 }
 
 // The active laws of discrepancies first ... end, into rigid_ and others_.
-void RelaxationJoints::collect(const std::vector<RelaxationDiscrepancy>& discrepancies,
-                               const Laws& laws, std::size_t first, std::size_t end,
-                               const Multipliers& warm) {
+void RelaxationJoints::collect(const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
+                               std::size_t first, std::size_t end, const Multipliers& warm) {
   rigid_.clear();
   others_.clear();
   for (std::size_t i = first; i < end; ++i) {
@@ -130,8 +127,7 @@ void RelaxationJoints::factorise(Block& block, double inverse_masses) {
     for (int row = column; row < block.rigid; ++row) {
       const auto& l = factor_[kept[static_cast<std::size_t>(row)]];
       double entry = row == column ? 1.0 : 0.0;
-      for (int k = column; k < row; ++k)
-        entry -= l[static_cast<std::size_t>(k)] * lower_inverse(k, column);
+      for (int k = column; k < row; ++k) entry -= l[static_cast<std::size_t>(k)] * lower_inverse(k, column);
       lower_inverse(row, column) = entry / l[static_cast<std::size_t>(row)];
     }
   }
@@ -139,10 +135,9 @@ void RelaxationJoints::factorise(Block& block, double inverse_masses) {
   for (int i = 0; i < block.rigid; ++i) {
     for (int j = 0; j < block.rigid; ++j) {
       double entry = 0.0;
-      for (int k = std::max(i, j); k < block.rigid; ++k)
-        entry += lower_inverse(k, i) * lower_inverse(k, j);
-      const double scale = rigid_[kept[static_cast<std::size_t>(i)]].response *
-                           rigid_[kept[static_cast<std::size_t>(j)]].response;
+      for (int k = std::max(i, j); k < block.rigid; ++k) entry += lower_inverse(k, i) * lower_inverse(k, j);
+      const double scale =
+          rigid_[kept[static_cast<std::size_t>(i)]].response * rigid_[kept[static_cast<std::size_t>(j)]].response;
       block.inverse(i, j) = entry / std::sqrt(scale);
     }
   }
@@ -159,8 +154,7 @@ void RelaxationJoints::orthogonalise(Block& block, double inverse_masses) {
       coupling[i] = rows_[base + i].own.product(row.own, inverse_masses);
     for (int i = 0; i < block.rigid; ++i) {
       double share = 0.0;
-      for (int j = 0; j < block.rigid; ++j)
-        share += block.inverse(i, j) * coupling[static_cast<std::size_t>(j)];
+      for (int j = 0; j < block.rigid; ++j) share += block.inverse(i, j) * coupling[static_cast<std::size_t>(j)];
       row.share[static_cast<std::size_t>(i)] = share;
       row.solved.subtract(share, rows_[base + static_cast<std::size_t>(i)].own);
     }
@@ -171,8 +165,7 @@ void RelaxationJoints::orthogonalise(Block& block, double inverse_masses) {
   }
 }
 
-double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, Twist& x1,
-                                     Twist& x2) {
+double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, Twist& x1, Twist& x2) {
   double change = 0.0;
   std::array<double, kBlock> residual{};
   for (std::size_t i = 0; i < static_cast<std::size_t>(block.rigid); ++i) {
@@ -182,8 +175,7 @@ double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, T
   }
   for (int i = 0; i < block.rigid; ++i) {
     double amount = 0.0;
-    for (int j = 0; j < block.rigid; ++j)
-      amount += block.inverse(i, j) * residual[static_cast<std::size_t>(j)];
+    for (int j = 0; j < block.rigid; ++j) amount += block.inverse(i, j) * residual[static_cast<std::size_t>(j)];
     Row& row = rows_[block.first + static_cast<std::size_t>(i)];
     row.multiplier += amount;
     row.own.push(amount, w1, w2, x1, x2);
@@ -191,8 +183,7 @@ double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, T
   return change;
 }
 
-double RelaxationJoints::sweep_others(const Block& block, double w1, double w2, Twist& x1,
-                                      Twist& x2) {
+double RelaxationJoints::sweep_others(const Block& block, double w1, double w2, Twist& x1, Twist& x2) {
   double change = 0.0;
   for (std::size_t i = block.first + static_cast<std::size_t>(block.rigid); i < block.end; ++i) {
     Row& row = rows_[i];
@@ -204,8 +195,7 @@ double RelaxationJoints::sweep_others(const Block& block, double w1, double w2, 
     row.solved.push(amount, w1, w2, x1, x2);
     // what J' pushes through the lock is the lock's multiplier
     for (int k = 0; k < block.rigid; ++k)
-      rows_[block.first + static_cast<std::size_t>(k)].multiplier -=
-          row.share[static_cast<std::size_t>(k)] * amount;
+      rows_[block.first + static_cast<std::size_t>(k)].multiplier -= row.share[static_cast<std::size_t>(k)] * amount;
     const double moved = (row.response - row.law.gamma) * amount;
     change = std::max(change, std::fabs(moved) * row.length);
   }
@@ -229,28 +219,26 @@ void RelaxationJoints::push_all(const RelaxationBodies& bodies, RelaxationMotion
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {
       if (rows_[i].multiplier == 0.0) continue;
-      rows_[i].own.push(rows_[i].multiplier, bodies[block.body1].inverse_mass,
-                        bodies[block.body2].inverse_mass, x[block.body1], x[block.body2]);
+      rows_[i].own.push(rows_[i].multiplier, bodies[block.body1].inverse_mass, bodies[block.body2].inverse_mass,
+                        x[block.body1], x[block.body2]);
     }
   }
 }
 
-void RelaxationJoints::push_velocity_only(const RelaxationBodies& bodies, double factor,
-                                          RelaxationMotion& x) const {
+void RelaxationJoints::push_velocity_only(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const {
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {
       const Row& row = rows_[i];
       if (!row.law.is_velocity_only || row.multiplier == 0.0) continue;
-      row.own.push(factor * row.multiplier, bodies[block.body1].inverse_mass,
-                   bodies[block.body2].inverse_mass, x[block.body1], x[block.body2]);
+      row.own.push(factor * row.multiplier, bodies[block.body1].inverse_mass, bodies[block.body2].inverse_mass,
+                   x[block.body1], x[block.body2]);
     }
   }
 }
 
 bool RelaxationJoints::has_velocity_only_impulse() const {
-  return std::any_of(rows_.begin(), rows_.end(), [](const Row& row) {
-    return row.law.is_velocity_only && row.multiplier != 0.0;
-  });
+  return std::any_of(rows_.begin(), rows_.end(),
+                     [](const Row& row) { return row.law.is_velocity_only && row.multiplier != 0.0; });
 }
 
 double RelaxationJoints::largest_violation(const RelaxationMotion& x) const {
@@ -276,8 +264,7 @@ double RelaxationJoints::largest_motion(const RelaxationMotion& x) const {
     for (std::size_t i = block.first; i < block.end; ++i) {
       const RelaxationDirection& own = rows_[i].own;
       const double motion = own.linear.norm() * (x1.linear.norm() + x2.linear.norm()) +
-                            own.angular1.norm() * x1.angular.norm() +
-                            own.angular2.norm() * x2.angular.norm();
+                            own.angular1.norm() * x1.angular.norm() + own.angular2.norm() * x2.angular.norm();
       largest = std::max(largest, motion * rows_[i].length);
     }
   }
@@ -307,21 +294,17 @@ void RelaxationJoints::add_work(const RelaxationBodies& bodies, const Relaxation
   }
 }
 
-void RelaxationJoints::exempt_driven(const RelaxationBodies& bodies,
-                                     const std::vector<std::uint32_t>& group,
+void RelaxationJoints::exempt_driven(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
                                      std::vector<double>& factor) const {
   for (const Block& block : blocks_)
     for (std::size_t i = block.first; i < block.end; ++i)
-      if (rows_[i].law.is_velocity_only && rows_[i].multiplier != 0.0)
-        factor[group[owner_of(block, bodies)]] = 1.0;
+      if (rows_[i].law.is_velocity_only && rows_[i].multiplier != 0.0) factor[group[owner_of(block, bodies)]] = 1.0;
 }
 
-void RelaxationJoints::scale(const RelaxationBodies& bodies,
-                             const std::vector<std::uint32_t>& group,
+void RelaxationJoints::scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
                              const std::vector<double>& factor) {
   for (const Block& block : blocks_)
-    for (std::size_t i = block.first; i < block.end; ++i)
-      rows_[i].multiplier *= factor[group[owner_of(block, bodies)]];
+    for (std::size_t i = block.first; i < block.end; ++i) rows_[i].multiplier *= factor[group[owner_of(block, bodies)]];
 }
 
 }  // namespace gravitas

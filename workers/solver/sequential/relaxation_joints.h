@@ -46,9 +46,8 @@ struct RelaxationDiscrepancy {
 };
 
 // Reads row `row` of the request. `correction_factor` multiplies the discrepancy's own.
-RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1,
-                                             std::uint32_t body2, const RelaxationBodies& bodies,
-                                             double correction_factor);
+RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
+                                             const RelaxationBodies& bodies, double correction_factor);
 
 class RelaxationJoints {
  public:
@@ -57,8 +56,7 @@ class RelaxationJoints {
   using Laws = std::vector<JointLaw>;
 
   // Rows of all active laws (3 per discrepancy), starting from `warm`.
-  void build(const RelaxationBodies& bodies,
-             const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
+  void build(const RelaxationBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
              const Multipliers& warm);
 
   bool is_empty() const { return rows_.empty(); }
@@ -84,8 +82,8 @@ class RelaxationJoints {
 
   // Work of the rows that neither drive nor soften, lambda (J before + J after)/2, J, added to that
   // of body2, or of body1 where body2 is not pushed.
-  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
-                const RelaxationMotion& after, std::vector<double>& work) const;
+  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before, const RelaxationMotion& after,
+                std::vector<double>& work) const;
   // Sets factor to 1 for the groups of bodies (by the number of their first) that a drive or a
   // spring acts on.
   void exempt_driven(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
@@ -117,8 +115,8 @@ class RelaxationJoints {
   static std::uint32_t owner_of(const Block& block, const RelaxationBodies& bodies) {
     return bodies[block.body2].is_pushed() ? block.body2 : block.body1;
   }
-  void collect(const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
-               std::size_t first, std::size_t end, const Multipliers& warm);
+  void collect(const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws, std::size_t first,
+               std::size_t end, const Multipliers& warm);
   void factorise(Block& block, double inverse_masses);
   void orthogonalise(Block& block, double inverse_masses);
   double sweep_rigid(const Block& block, double w1, double w2, Twist& x1, Twist& x2);

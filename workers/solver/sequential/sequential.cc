@@ -23,9 +23,7 @@ constexpr double kStillness = 128.0 * kRounding;
 // slowly is further from its end than one change.
 constexpr double kSlipToChange = 1e4;
 
-void copy(std::span<const double> from, std::vector<double>& to) {
-  to.assign(from.begin(), from.end());
-}
+void copy(std::span<const double> from, std::vector<double>& to) { to.assign(from.begin(), from.end()); }
 
 // Finite numbers whose squares or sums are not.
 void check_range(double violation, double motion) {
@@ -69,8 +67,8 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
     }
   }
 
-  const bool has_rows = !pose_joints_.is_empty() || !gaps_.is_empty() ||
-                        !velocity_joints_.is_empty() || !impulses_.is_empty();
+  const bool has_rows =
+      !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
   StopReason reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
   if (used_up_) reason = StopReason::kIterations;
   summary_.stop_reason = static_cast<std::uint32_t>(reason);
@@ -97,11 +95,9 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     const Discrepancy discrepancy = columns.at(i);
     const std::uint32_t body1 = bodies_.row(request.discrepancy_body()[2 * i]);
     const std::uint32_t body2 = bodies_.row(request.discrepancy_body()[2 * i + 1]);
-    discrepancies_.push_back(
-        relaxation_discrepancy(discrepancy, body1, body2, bodies_, settings_.correction_factor));
+    discrepancies_.push_back(relaxation_discrepancy(discrepancy, body1, body2, bodies_, settings_.correction_factor));
     const RelaxationDiscrepancy& r = discrepancies_.back();
-    for (const JointAxisState& axis : r.axes)
-      pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
+    for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
   pose_joints_.build(bodies_, discrepancies_, pose_laws_, joint_correction_);
@@ -109,8 +105,7 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   coordinates_ = std::max(coordinates_, gaps_.coordinates());
 
   trial_velocity_.clear();
-  for (std::uint32_t i = 0; i <= bodies_.count(); ++i)
-    trial_velocity_.push_back(bodies_[i].trial_velocity);
+  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);
   offset_.assign(bodies_.count() + 1, Twist{});
   closed_.assign(request.contact_key().size(), 0);
   velocity_laws_.assign(pose_laws_.size(), JointLaw{});
@@ -121,10 +116,9 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
 // displacement_ and the multipliers of the pose rows, on top of offset_.
 void SequentialSolver::solve_pose() {
   displacement_ = offset_;
-  const double violation = std::max(pose_joints_.largest_violation(displacement_),
-                                    gaps_.largest_violation(displacement_));
-  const double motion =
-      std::max(pose_joints_.largest_motion(displacement_), gaps_.largest_motion(displacement_));
+  const double violation =
+      std::max(pose_joints_.largest_violation(displacement_), gaps_.largest_violation(displacement_));
+  const double motion = std::max(pose_joints_.largest_motion(displacement_), gaps_.largest_motion(displacement_));
   check_range(violation, motion);
   const double representable = 0.25 * kRounding * coordinates_;
   if (violation <= std::max(representable, kRounding * motion)) {
@@ -199,10 +193,9 @@ void SequentialSolver::relax_velocity() {
   ++summary_.velocity_solutions;
   summary_.residual = 0.0;
   velocity_ = trial_velocity_;
-  const double violation = std::max(velocity_joints_.largest_violation(velocity_),
-                                    impulses_.largest_violation(velocity_));
-  const double motion =
-      std::max(velocity_joints_.largest_motion(velocity_), impulses_.largest_motion(velocity_));
+  const double violation =
+      std::max(velocity_joints_.largest_violation(velocity_), impulses_.largest_violation(velocity_));
+  const double motion = std::max(velocity_joints_.largest_motion(velocity_), impulses_.largest_motion(velocity_));
   check_range(violation, motion);
   if (violation <= kRounding * motion) {
     velocity_joints_.clear_multipliers();

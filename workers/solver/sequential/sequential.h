@@ -71,9 +71,9 @@ struct SequentialSettings {
 
 // What a solution took. The reply carries the first three.
 struct SequentialSummary {
-  std::uint32_t sweeps = 0;       // of all relaxations of the call
-  double residual = 0.0;          // largest change of a velocity in the last one's last sweep, m/s
-  std::uint32_t stop_reason = 0;  // StopReason
+  std::uint32_t sweeps = 0;                // of all relaxations of the call
+  double residual = 0.0;                   // largest change of a velocity in the last one's last sweep, m/s
+  std::uint32_t stop_reason = 0;           // StopReason
   std::uint32_t velocity_solutions = 0;    // relaxations of the velocities
   std::uint32_t restitutions_lowered = 0;  // times an e s was lowered for doing positive work
   std::uint32_t restitutions_dropped = 0;  // contacts set to e s = 0 for the energy of their bodies
@@ -87,8 +87,7 @@ class SequentialSolver {
   // Answers the request. Throws Refusal for an impossible one (solver_request_check.h), and where
   // the answer is not finite because the numbers overflow. What is kept between calls is room for
   // rows, nothing else.
-  SequentialSummary solve(const stage::SolverSolveRequest& request,
-                          const stage::SolverSolveReply& reply);
+  SequentialSummary solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply);
 
  private:
   void load(const stage::SolverSolveRequest& request);

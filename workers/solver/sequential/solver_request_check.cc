@@ -21,47 +21,41 @@ constexpr double kUnitTolerance = 1e-6;
 }
 
 template <typename T>
-void check_length(const char* column, std::span<const T> values, std::size_t rows,
-                  std::size_t components) {
+void check_length(const char* column, std::span<const T> values, std::size_t rows, std::size_t components) {
   if (values.size() == rows * components) return;
-  throw Refusal(std::string(column) + ": " + std::to_string(values.size()) + " numbers where " +
-                std::to_string(rows) + " rows of " + std::to_string(components) + " belong");
+  throw Refusal(std::string(column) + ": " + std::to_string(values.size()) + " numbers where " + std::to_string(rows) +
+                " rows of " + std::to_string(components) + " belong");
 }
 
 // A column of finite numbers, none below `least`.
-void check_numbers(const char* column, std::span<const double> values, std::size_t rows,
-                   std::size_t components, double least = -kUnlimited, double most = kUnlimited) {
+void check_numbers(const char* column, std::span<const double> values, std::size_t rows, std::size_t components,
+                   double least = -kUnlimited, double most = kUnlimited) {
   check_length(column, values, rows, components);
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double value = values[i];
     if (value >= least && value <= most) continue;
     const std::string text = std::to_string(value);
-    refuse(column, i / components,
-           std::isfinite(value) ? text + " is out of range" : text + " is not finite");
+    refuse(column, i / components, std::isfinite(value) ? text + " is out of range" : text + " is not finite");
   }
 }
 
-void check_unit(const char* column, std::span<const double> values, std::size_t rows,
-                std::size_t components) {
+void check_unit(const char* column, std::span<const double> values, std::size_t rows, std::size_t components) {
   check_numbers(column, values, rows, components);
   for (std::size_t row = 0; row < rows; ++row) {
     double square = 0.0;
-    for (std::size_t i = 0; i < components; ++i)
-      square += values[components * row + i] * values[components * row + i];
+    for (std::size_t i = 0; i < components; ++i) square += values[components * row + i] * values[components * row + i];
     const double norm = std::sqrt(square);
     if (!(std::fabs(norm - 1.0) <= kUnitTolerance))
       refuse(column, row, "of norm " + std::to_string(norm) + ", not unit");
   }
 }
 
-void check_pairs(const char* column, std::span<const std::uint32_t> values, std::size_t rows,
-                 std::size_t bodies, bool may_be_world) {
+void check_pairs(const char* column, std::span<const std::uint32_t> values, std::size_t rows, std::size_t bodies,
+                 bool may_be_world) {
   check_length(column, values, rows, 2);
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (values[i] < bodies || (may_be_world && values[i] == kNone)) continue;
-    refuse(
-        column, i / 2,
-        "body " + std::to_string(values[i]) + " of " + std::to_string(bodies) + " does not exist");
+    refuse(column, i / 2, "body " + std::to_string(values[i]) + " of " + std::to_string(bodies) + " does not exist");
   }
   for (std::size_t row = 0; row < rows; ++row) {
     if (values[2 * row] == values[2 * row + 1])
@@ -99,8 +93,7 @@ void check_discrepancies(const stage::SolverSolveRequest& r, std::size_t bodies)
   check_numbers("discrepancy_warm_impulse", r.discrepancy_warm_impulse(), rows, 3);
   check_numbers("discrepancy_warm_correction", r.discrepancy_warm_correction(), rows, 3);
   for (std::size_t row = 0; row < rows; ++row) {
-    if (!is_valid_mode(r.mode()[row]))
-      refuse("mode", row, std::to_string(r.mode()[row]) + " is no mode");
+    if (!is_valid_mode(r.mode()[row])) refuse("mode", row, std::to_string(r.mode()[row]) + " is no mode");
     for (int axis = 0; axis < 3; ++axis) {
       const std::size_t i = 3 * row + static_cast<std::size_t>(axis);
       if (axis_mode(r.mode()[row], axis) == AxisMode::kLimited && r.lower()[i] > r.upper()[i])
@@ -120,8 +113,7 @@ void check_contacts(const stage::SolverSolveRequest& r, std::size_t bodies) {
   check_numbers("contact_warm_correction", r.contact_warm_correction(), rows, 1);
   for (std::size_t row = 0; row < rows; ++row) {
     const double restitution = r.contact_material()[kMaterialColumns * row + kRestitution];
-    if (restitution > 1.0)
-      refuse("contact_material", row, "restitution " + std::to_string(restitution) + " above 1");
+    if (restitution > 1.0) refuse("contact_material", row, "restitution " + std::to_string(restitution) + " above 1");
   }
 }
 
@@ -130,10 +122,8 @@ void check_contacts(const stage::SolverSolveRequest& r, std::size_t bodies) {
 void check_solver_request(const stage::SolverSolveRequest& request) {
   const double step = request.time_step();
   const double theta = request.theta();
-  if (!(step > 0.0 && std::isfinite(step)))
-    refuse("time_step", 0, std::to_string(step) + " is not positive");
-  if (!(theta >= 0.0 && theta <= 1.0))
-    refuse("theta", 0, std::to_string(theta) + " is outside 0 ... 1");
+  if (!(step > 0.0 && std::isfinite(step))) refuse("time_step", 0, std::to_string(step) + " is not positive");
+  if (!(theta >= 0.0 && theta <= 1.0)) refuse("theta", 0, std::to_string(theta) + " is outside 0 ... 1");
   const std::size_t bodies = request.flags().size();
   check_bodies(request, bodies);
   check_discrepancies(request, bodies);

@@ -15,8 +15,7 @@ namespace gravitas {
 
 // Philox4x32-10: Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as 1, 2, 3",
 // SC11.
-std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
-                                        std::array<std::uint32_t, 2> key);
+std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter, std::array<std::uint32_t, 2> key);
 
 // n_mu = (n + d)/|n + d| with the components of d (world) uniform in (-epsilon, epsilon); `normal`
 // itself if n + d is shorter than 1e-3. The tilt is at most asin(sqrt(3) epsilon) while sqrt(3)

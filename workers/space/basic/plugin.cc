@@ -1,6 +1,7 @@
 // Space `Basic` (§ 4.6): every pair is tested. O(n^2) and nothing to go wrong: the reference for all others.
-#include "plugin_sdk/pair_rule.h"
 #include "plugin_sdk/plugin.h"
+
+#include "plugin_sdk/pair_rule.h"
 
 namespace gravitas {
 namespace {

@@ -6,13 +6,14 @@
 // A body that covers more than kMostCells cells (the ground, a body much larger than a cell, an unbounded one)
 // is not put into the grid but tested against all others. Cost: O(n log n) for bodies about as large as a cell,
 // O(n * large bodies) besides; all bodies in one cell are O(n^2), as with `Basic`.
+#include "plugin_sdk/plugin.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "plugin_sdk/pair_rule.h"
-#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 namespace {
@@ -52,8 +53,9 @@ class GridSpace final : public SpacePlugin {
             .version = "1.0",
             .slot = Slot::kSpace,
             .meaning = "Uniform grid of cells: O(n log n) for bodies of about one size.",
-            .properties = {Property::number("CellSize", "m").above(0.0).means(
-                               "Edge of a cell; twice the largest half extent of a bounded body if absent."),
+            .properties = {Property::number("CellSize", "m")
+                               .above(0.0)
+                               .means("Edge of a cell; twice the largest half extent of a bounded body if absent."),
                            Property::integer("CleanupInterval")
                                .at_least(1)
                                .at_most(1e9)

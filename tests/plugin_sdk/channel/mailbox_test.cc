@@ -1,0 +1,214 @@
+// Two sides that talk through two mailboxes: no message is lost, a silence ends in time, and a
+// message that was changed on its way is seen to be.
+#include "plugin_sdk/channel/mailbox.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "schemas/stage_frames.h"
+
+namespace gravitas::channel {
+namespace {
+
+constexpr std::uint64_t kMillisecond = 1'000'000;
+// Longer than any scheduler makes a test wait.
+constexpr std::uint64_t kLong = 60'000 * kMillisecond;
+
+struct Mailboxes {
+  std::unique_ptr<Mailbox> kernel{new Mailbox()};
+  std::unique_ptr<Mailbox> worker{new Mailbox()};
+};
+
+TEST(Mailbox, HasTheLayoutOfVersionOne) {
+  ASSERT_EQ(GRAVITAS_LAYOUT_VERSION, 1);
+  EXPECT_EQ(offsetof(Mailbox, signal), 0U);
+  EXPECT_EQ(offsetof(Mailbox, sleeping), 4U);
+  EXPECT_EQ(offsetof(Mailbox, cpu), 8U);
+  EXPECT_EQ(offsetof(Mailbox, progress), 16U);
+  EXPECT_EQ(offsetof(Mailbox, compute_ns), 24U);
+  EXPECT_EQ(offsetof(Mailbox, header), 64U);
+  EXPECT_EQ(offsetof(Mailbox, columns), 160U);
+  EXPECT_EQ(offsetof(Mailbox, reply), 160U + 48 * 24);
+  EXPECT_EQ(offsetof(Mailbox, text), 160U + 2 * 48 * 24);
+  EXPECT_EQ(sizeof(Mailbox), 3008U);
+}
+
+TEST(Mailbox, TwoThreadsTakeTurns) {
+  constexpr std::uint64_t kRounds = 20'000;
+  const Mailboxes boxes;
+  std::uint64_t wrong_in_worker = 0;
+
+  std::thread worker([&] {
+    std::uint32_t seen = 0;
+    for (std::uint64_t i = 1; i <= kRounds; ++i) {
+      if (wait(boxes.worker.get(), boxes.kernel.get(), seen, now_ns() + kLong) != Waited::kMessage) ++wrong_in_worker;
+      seen = boxes.kernel->signal.load();
+      if (boxes.kernel->header.sequence != i) ++wrong_in_worker;
+      boxes.worker->header.sequence = i;
+      boxes.worker->columns[GRAVITAS_MAX_COLUMNS - 1].count = 2 * i;
+      post(boxes.worker.get(), boxes.kernel.get());
+    }
+  });
+
+  std::uint64_t wrong = 0;
+  std::uint32_t seen = 0;
+  for (std::uint64_t i = 1; i <= kRounds; ++i) {
+    boxes.kernel->header.sequence = i;
+    post(boxes.kernel.get(), boxes.worker.get());
+    if (wait(boxes.kernel.get(), boxes.worker.get(), seen, now_ns() + kLong) != Waited::kMessage) ++wrong;
+    seen = boxes.worker->signal.load();
+    if (boxes.worker->header.sequence != i || boxes.worker->columns[GRAVITAS_MAX_COLUMNS - 1].count != 2 * i) ++wrong;
+  }
+  worker.join();
+  EXPECT_EQ(wrong, 0U);
+  EXPECT_EQ(wrong_in_worker, 0U);
+  EXPECT_EQ(seen, kRounds);
+}
+
+TEST(Mailbox, AMessageThatIsThereIsTakenAtOnce) {
+  const Mailboxes boxes;
+  post(boxes.worker.get(), boxes.kernel.get());
+  // even when the time is over already
+  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, 0), Waited::kMessage);
+  EXPECT_EQ(boxes.worker->signal.load(), 1U);
+}
+
+TEST(Mailbox, ASilenceEndsInTime) {
+  const Mailboxes boxes;
+  const std::uint64_t until = now_ns() + 5 * kMillisecond;
+  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, until), Waited::kTimeout);
+  EXPECT_GE(now_ns() + kMillisecond, until);  // at most a millisecond early
+  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, 0), Waited::kTimeout);
+  EXPECT_EQ(boxes.kernel->sleeping.load(), 0U);
+}
+
+TEST(Mailbox, ALateMessageIsStillThere) {
+  const Mailboxes boxes;
+  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kMillisecond), Waited::kTimeout);
+  post(boxes.worker.get(), boxes.kernel.get());
+  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kLong), Waited::kMessage);
+}
+
+TEST(Mailbox, ASleeperIsWoken) {
+  const Mailboxes boxes;
+  Waited waited = Waited::kTimeout;
+  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kLong); });
+  // long after the sleeper has stopped spinning
+  while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
+  const std::uint64_t before = now_ns();
+  post(boxes.worker.get(), boxes.kernel.get());
+  sleeper.join();
+  EXPECT_EQ(waited, Waited::kMessage);
+  EXPECT_LT(now_ns() - before, kLong);
+  EXPECT_EQ(boxes.kernel->sleeping.load(), 0U);
+}
+
+TEST(Mailbox, AWakeIsNoMessage) {
+  const Mailboxes boxes;
+  Waited waited = Waited::kMessage;
+  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + 20 * kMillisecond); });
+  while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
+  for (int i = 0; i < 100; ++i) wake(boxes.worker.get());
+  sleeper.join();
+  EXPECT_EQ(waited, Waited::kTimeout);
+}
+
+// The kernel does so for a worker that died: counts its signal up and wakes.
+TEST(Mailbox, CountingUpForTheOtherSideEndsAWait) {
+  const Mailboxes boxes;
+  Waited waited = Waited::kTimeout;
+  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kLong); });
+  while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
+  boxes.worker->signal.fetch_add(1);
+  wake(boxes.worker.get());
+  sleeper.join();
+  EXPECT_EQ(waited, Waited::kMessage);
+}
+
+// ---- digest -------------------------------------------------------------------------------------
+
+// A reply to Constraint.Bind: a column of u32 and one of f64.
+struct Frame {
+  gravitas_frame_header header{};
+  std::array<gravitas_frame_column, 2> columns{};
+  std::array<std::uint32_t, 3> begin = {0, 1, 2};
+  std::array<double, 2> bound = {0.5, -0.25};
+
+  Frame() {
+    header.magic = GRAVITAS_MAGIC;
+    header.column_count = 2;
+    columns[0] = {0, begin.size(), 8};
+    columns[1] = {64, bound.size(), 8};
+  }
+  std::uint64_t digest(bool with_data = true) const {
+    const std::array<const void*, 2> data = {begin.data(), bound.data()};
+    return frame_digest(header, columns.data(), stage::kConstraintBindReplyColumns, with_data ? data.data() : nullptr);
+  }
+};
+
+template <typename T>
+void flip(T* target, std::size_t bit) {
+  auto* bytes = reinterpret_cast<unsigned char*>(target);
+  bytes[bit / 8] = static_cast<unsigned char>(bytes[bit / 8] ^ (1U << (bit % 8)));
+}
+
+// Flips each bit of the part and expects a digest that was not there before.
+template <typename T>
+void expect_every_bit_counts(Frame* frame, T* part, const char* name, bool with_data = true) {
+  std::set<std::uint64_t> digests = {frame->digest(with_data)};
+  for (std::size_t bit = 0; bit < 8 * sizeof(T); ++bit) {
+    flip(part, bit);
+    EXPECT_TRUE(digests.insert(frame->digest(with_data)).second) << "bit " << bit << " of the " << name;
+    flip(part, bit);
+  }
+  EXPECT_TRUE(digests.contains(frame->digest(with_data)));
+}
+
+TEST(FrameDigest, ChangesWithAnyBit) {
+  Frame frame;
+  // without data, which a count with a flipped bit would run beyond
+  expect_every_bit_counts(&frame, &frame.columns, "columns", false);
+  expect_every_bit_counts(&frame, &frame.begin, "first column's data");
+  expect_every_bit_counts(&frame, &frame.bound, "second column's data");
+  struct Head {
+    unsigned char bytes[offsetof(gravitas_frame_header, digest)];
+  };
+  expect_every_bit_counts(&frame, reinterpret_cast<Head*>(&frame.header), "header");
+}
+
+TEST(FrameDigest, LeavesItselfOut) {
+  Frame frame;
+  const std::uint64_t before = frame.digest();
+  frame.header.digest = before;
+  EXPECT_EQ(frame.digest(), before);
+}
+
+TEST(FrameDigest, LeavesDataOutWhereThereAreNone) {
+  Frame frame;
+  const std::uint64_t before = frame.digest(false);
+  EXPECT_NE(before, frame.digest(true));
+  frame.bound[0] = 9.0;
+  EXPECT_EQ(frame.digest(false), before);
+  frame.columns[1].count = 1;
+  EXPECT_NE(frame.digest(false), before);
+}
+
+TEST(FrameDigest, TakesTheElementsThatAreCounted) {
+  Frame frame;
+  frame.columns[0].count = 2;
+  const std::uint64_t before = frame.digest();
+  frame.begin[2] = 77;
+  EXPECT_EQ(frame.digest(), before);
+  frame.begin[1] = 77;
+  EXPECT_NE(frame.digest(), before);
+}
+
+}  // namespace
+}  // namespace gravitas::channel

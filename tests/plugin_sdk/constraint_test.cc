@@ -1,0 +1,169 @@
+// The loops that joints are written with.
+#include "plugin_sdk/constraint.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/math/rotation.h"
+#include "tests/plugin_sdk/random.h"
+
+namespace gravitas {
+namespace {
+
+template <typename T>
+gravitas_column column_of(const std::vector<T>& numbers) {
+  return {numbers.data(), numbers.size()};
+}
+
+// Three joints on two bodies: 0-1, world-1, 1-world; with two, no and one property.
+struct Joints {
+  std::vector<std::uint64_t> type = {10, 20, 30};
+  std::vector<std::uint32_t> body = {0, 1, kNone, 1, 1, kNone};
+  std::vector<std::uint32_t> begin = {0, 2, 2, 3};
+  std::vector<double> numbers = {0.5, 0.25, 8.0};
+  std::vector<std::uint32_t> intact = {1, 1, 1};
+  std::vector<double> position = {1, 2, 3, 4, 5, 6};
+  std::vector<double> orientation = {1, 0, 0, 0, 0, 1, 0, 0};
+  std::vector<double> time = {0.0};
+
+  template <typename Bind>
+  void bind(Bind bind) {
+    const std::array<gravitas_column, 6> request = {column_of(type),    column_of(body),     column_of(begin),
+                                                    column_of(numbers), column_of(position), column_of(orientation)};
+    std::array<gravitas_reply_column, 2> reply = {gravitas_reply_column{bound_begin.data(), bound_begin.size(), 0},
+                                                  gravitas_reply_column{bound.data(), bound.size(), 0}};
+    bind_each(stage::ConstraintBindRequest(request.data()), stage::ConstraintBindReply(reply.data()), bind);
+    bound_begin.resize(reply[0].count);
+    bound.resize(reply[1].count);
+  }
+
+  template <typename Describe>
+  void describe(Describe describe) {
+    using Request = stage::ConstraintDiscrepanciesRequest;
+    using Reply = stage::ConstraintDiscrepanciesReply;
+    std::array<gravitas_column, Request::kColumnCount> request{};
+    request[Request::kConstraintType] = column_of(type);
+    request[Request::kConstraintBody] = column_of(body);
+    request[Request::kBoundBegin] = column_of(begin);
+    request[Request::kBound] = column_of(numbers);
+    request[Request::kIntact] = column_of(intact);
+    request[Request::kPosition] = column_of(position);
+    request[Request::kOrientation] = column_of(orientation);
+    std::array<gravitas_reply_column, Reply::kColumnCount> reply{};
+    std::vector<std::array<double, 64>> room(Reply::kColumnCount);
+    for (std::size_t i = 0; i < room.size(); ++i) reply[i] = {room[i].data(), 64, 0};
+    describe_each(Request(request.data()), Reply(reply.data()), describe);
+    described.resize(reply[Reply::kConstraint].count);
+    std::memcpy(described.data(), room[Reply::kConstraint].data(), described.size() * sizeof(std::uint32_t));
+  }
+
+  std::vector<std::uint32_t> bound_begin = std::vector<std::uint32_t>(8);
+  std::vector<double> bound = std::vector<double>(32);
+  std::vector<std::uint32_t> described;
+};
+
+TEST(BindEach, GivesEachJointItsTypePropertiesAndBodies) {
+  Joints joints;
+  std::vector<std::uint64_t> types;
+  std::vector<double> read;
+  std::vector<Vector3> first, second;
+  joints.bind([&](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+    types.push_back(type);
+    while (!properties.at_end()) read.push_back(properties.number());
+    first.push_back(bodies.pose1.position);
+    second.push_back(bodies.pose2.position);
+    if (type == 10) out.vector(Vector3(1, 2, 3));
+    if (type == 30) out.number(4);
+  });
+  EXPECT_EQ(types, joints.type);
+  EXPECT_EQ(read, joints.numbers);
+  // the world stands at the origin
+  const Vector3 a(1, 2, 3), b(4, 5, 6), world = Vector3::Zero();
+  EXPECT_EQ(first, (std::vector<Vector3>{a, world, b}));
+  EXPECT_EQ(second, (std::vector<Vector3>{b, b, world}));
+  EXPECT_EQ(joints.bound_begin, (std::vector<std::uint32_t>{0, 3, 3, 4}));
+  EXPECT_EQ(joints.bound, (std::vector<double>{1, 2, 3, 4}));
+}
+
+TEST(BindEach, OfNoJointsHasOneBeginning) {
+  Joints joints;
+  joints.type.clear(), joints.body.clear(), joints.numbers.clear(), joints.begin = {0};
+  joints.bind([](std::uint64_t, PropertyCursor, const JointBodies&, BoundWriter&) { FAIL(); });
+  EXPECT_EQ(joints.bound_begin, std::vector<std::uint32_t>{0});
+  EXPECT_TRUE(joints.bound.empty());
+}
+
+TEST(DescribeEach, TellsWhichJointADiscrepancyIsOf) {
+  Joints joints;
+  joints.describe([](std::uint64_t type, PropertyCursor, const JointBodies&, auto&& emit) {
+    for (std::uint64_t i = 0; i < type / 10; ++i) emit(Discrepancy{});
+  });
+  EXPECT_EQ(joints.described, (std::vector<std::uint32_t>{0, 1, 1, 2, 2, 2}));
+}
+
+TEST(DescribeEach, LeavesBrokenJointsOut) {
+  Joints joints;
+  joints.intact[1] = 0;
+  std::vector<std::uint64_t> types;
+  joints.describe([&](std::uint64_t type, PropertyCursor, const JointBodies&, auto&& emit) {
+    types.push_back(type);
+    emit(Discrepancy{});
+  });
+  EXPECT_EQ(types, (std::vector<std::uint64_t>{10, 30}));
+  EXPECT_EQ(joints.described, (std::vector<std::uint32_t>{0, 2}));
+}
+
+// Why the loops refuse what the test made of the joints.
+template <typename Spoil>
+std::string refusal(Spoil spoil) {
+  Joints joints;
+  spoil(&joints);
+  std::string bound, described;
+  try {
+    joints.bind([](std::uint64_t, PropertyCursor, const JointBodies&, BoundWriter&) {});
+  } catch (const Refusal& error) {
+    bound = error.what();
+  }
+  try {
+    joints.describe([](std::uint64_t, PropertyCursor, const JointBodies&, auto&&) {});
+  } catch (const Refusal& error) {
+    described = error.what();
+  }
+  EXPECT_EQ(bound, described);
+  return bound;
+}
+
+TEST(JointLoops, RefuseBodiesThatDoNotExist) {
+  EXPECT_EQ(refusal([](Joints* joints) { joints->body[1] = 2; }), "a joint names body 2, which does not exist");
+  EXPECT_EQ(refusal([](Joints* joints) { joints->body[3] = kNone - 1; }),
+            "a joint names body 4294967294, which does not exist");
+}
+
+TEST(JointLoops, RefuseParametersOutsideTheirColumn) {
+  EXPECT_EQ(refusal([](Joints* joints) { joints->begin[3] = 4; }),
+            "the parameters of joint 2 lie outside their column");
+  EXPECT_EQ(refusal([](Joints* joints) { joints->begin[1] = 3; }),
+            "the parameters of joint 1 lie outside their column");
+  EXPECT_EQ(refusal([](Joints* joints) { joints->begin.pop_back(); }),
+            "the parameters of joint 2 lie outside their column");
+}
+
+TEST(PointDiscrepancy, HoldsTwoAnchorsTogether) {
+  test::Random random(1);
+  const JointBodies bodies{random.pose(3.0), random.pose(3.0)};
+  const Vector3 anchor1 = random.vector(1.0), anchor2 = random.vector(1.0);
+  const Discrepancy d = point_discrepancy(anchor1, anchor2, bodies);
+  EXPECT_EQ(d.point1, transform_point(bodies.pose1, anchor1));
+  EXPECT_EQ(d.point2, transform_point(bodies.pose2, anchor2));
+  EXPECT_EQ(d.modes, pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked));
+  EXPECT_TRUE(d.velocity.isZero(0.0) && d.compliance.isZero(0.0));
+  EXPECT_EQ(d.correction, 1.0);
+  EXPECT_EQ(d.maximum_force, Vector3::Constant(kUnlimited));
+}
+
+}  // namespace
+}  // namespace gravitas

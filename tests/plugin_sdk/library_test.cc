@@ -1,0 +1,141 @@
+// Loading plugin libraries, good and bad: a library that is none, or not for this build, is refused
+// with a sentence that says why.
+#include "plugin_sdk/library.h"
+
+#include <dlfcn.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <link.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace gravitas {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string kHello = GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so";
+
+std::string faulty(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + name + ".so"; }
+
+// Why the library cannot be loaded.
+std::string problem_of(const std::string& path) {
+  std::string problem;
+  const PluginLibrary library = load_plugin_library(path, &problem);
+  EXPECT_EQ(library.table, nullptr);
+  EXPECT_EQ(library.declaration.name, "");
+  return problem;
+}
+
+// A file of the test's own, gone at the end.
+class TemporaryFile {
+ public:
+  TemporaryFile() {
+    std::string name = (fs::temp_directory_path() / "gravitas_library_XXXXXX").string();
+    const int descriptor = mkstemp(name.data());
+    if (descriptor >= 0) close(descriptor);
+    path_ = name;
+  }
+  ~TemporaryFile() { fs::remove(path_); }
+  void write(const std::string& text) const { std::ofstream(path_) << text; }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+TEST(PluginLibrary, LoadsAndDescribesAPlugin) {
+  std::string problem;
+  const PluginLibrary library = load_plugin_library(kHello, &problem);
+  EXPECT_EQ(problem, "");
+  ASSERT_NE(library.table, nullptr);
+  EXPECT_EQ(library.table->schema_hash, stage::kSchemaHash);
+  EXPECT_STREQ(library.table->build_id, GRAVITAS_BUILD_ID);
+  EXPECT_EQ(library.declaration.name, "Hello");
+  EXPECT_EQ(library.declaration.slot, Slot::kForce);
+  ASSERT_EQ(library.declaration.types.size(), 1U);
+  EXPECT_EQ(library.declaration.types[0].properties[0].name, "Push");
+}
+
+TEST(PluginLibrary, EveryLoadGivesACopyOfItsOwn) {
+  std::string problem;
+  const PluginLibrary first = load_plugin_library(kHello, &problem);
+  const PluginLibrary second = load_plugin_library(kHello, &problem);
+  ASSERT_TRUE(first.table != nullptr && second.table != nullptr) << problem;
+  EXPECT_NE(first.table, second.table);
+}
+
+TEST(PluginLibrary, AFileThatIsReplacedDoesNotChangeALoadedPlugin) {
+  const TemporaryFile file;
+  fs::copy_file(kHello, file.path(), fs::copy_options::overwrite_existing);
+  std::string problem;
+  const PluginLibrary library = load_plugin_library(file.path(), &problem);
+  ASSERT_NE(library.table, nullptr) << problem;
+  file.write(std::string(fs::file_size(kHello), 'x'));
+  void* instance = nullptr;
+  gravitas_error error{};
+  ASSERT_EQ(library.table->create(nullptr, 0, &instance, &error), GRAVITAS_OK) << error.text;
+  library.table->destroy(instance);
+  EXPECT_EQ(read_declaration(*library.table->description).name, "Hello");
+}
+
+TEST(PluginLibrary, RefusesWhatCannotBeRead) {
+  EXPECT_EQ(problem_of("/no/such/library.so"), "cannot read '/no/such/library.so': No such file or directory");
+  EXPECT_EQ(problem_of("/tmp"), "cannot read '/tmp': Is a directory");
+  EXPECT_EQ(problem_of("/dev/null"), "cannot read '/dev/null': Invalid argument");
+}
+
+TEST(PluginLibrary, RefusesWhatIsNoSharedLibrary) {
+  const TemporaryFile file;
+  const std::string refusal = "'" + file.path() + "' is not a shared library that can be loaded: ";
+  EXPECT_THAT(problem_of(file.path()), StartsWith(refusal));  // empty
+  file.write("#!/bin/sh\n" + std::string(4096, '#'));
+  EXPECT_THAT(problem_of(file.path()), StartsWith(refusal));
+  EXPECT_THAT(problem_of(file.path()), HasSubstr("invalid ELF header"));
+}
+
+TEST(PluginLibrary, RefusesALibraryThatWasCutShort) {
+  const TemporaryFile file;
+  fs::copy_file(kHello, file.path(), fs::copy_options::overwrite_existing);
+  fs::resize_file(file.path(), 200);
+  EXPECT_THAT(problem_of(file.path()),
+              StartsWith("'" + file.path() + "' is not a shared library that can be loaded: "));
+}
+
+TEST(PluginLibrary, RefusesALibraryThatIsNoPlugin) {
+  void* handle = dlopen("libm.so.6", RTLD_NOW);
+  ASSERT_NE(handle, nullptr);
+  link_map* map = nullptr;
+  ASSERT_EQ(dlinfo(handle, RTLD_DI_LINKMAP, &map), 0);
+  const std::string path = map->l_name;
+  EXPECT_EQ(problem_of(path), "'" + path + "' is not a plugin: it has no function gravitas_plugin");
+}
+
+TEST(PluginLibrary, RefusesAPluginWithoutATable) {
+  for (const char* name : {"null_table", "wrong_magic"}) {
+    const std::string path = faulty(name);
+    EXPECT_EQ(problem_of(path), "'" + path +
+                                    "' is not a plugin: gravitas_plugin() returns no "
+                                    "table of this interface");
+  }
+}
+
+TEST(PluginLibrary, RefusesAPluginForAnotherVersionOfTheInterface) {
+  const std::string abi = faulty("wrong_abi_version"), layout = faulty("wrong_layout_version");
+  EXPECT_EQ(problem_of(abi), "'" + abi + "' was built for version 2.1 of the plugin interface; this is 1.1");
+  EXPECT_EQ(problem_of(layout), "'" + layout + "' was built for version 1.2 of the plugin interface; this is 1.1");
+}
+
+TEST(PluginLibrary, RefusesAPluginForOtherStageContracts) {
+  const std::string path = faulty("wrong_schema_hash");
+  EXPECT_EQ(problem_of(path), "'" + path +
+                                  "' was built for another schema of the stage "
+                                  "contracts: rebuild it against this plugin_sdk");
+}
+
+}  // namespace
+}  // namespace gravitas

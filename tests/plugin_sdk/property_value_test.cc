@@ -1,0 +1,195 @@
+// Values against declarations: what is taken, how it is flattened, and what is said about the rest.
+#include "plugin_sdk/property_value.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace gravitas {
+namespace {
+
+using Values = std::vector<PropertyValue>;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+PropertyValue list(std::vector<double> numbers) { return PropertyValue::numbers(numbers); }
+
+// The numbers of one value, or none after an error.
+struct Flattened {
+  bool good = false;
+  std::vector<double> numbers;
+  std::vector<PropertyProblem> problems;
+  std::string text() const { return problems.empty() ? "" : problems[0].text; }
+};
+
+Flattened take(const Property& declared, const PropertyValue& value) {
+  Flattened result;
+  result.good = flatten_value(declared, value, &result.numbers, &result.problems);
+  EXPECT_EQ(result.good, !result.numbers.empty());
+  return result;
+}
+
+TEST(PropertyValue, TakesNumbersWithinBounds) {
+  const Property radius = Property::number("Radius", "m").above(0.0).at_most(2.0);
+  EXPECT_EQ(take(radius, PropertyValue::of(2.0)).numbers, std::vector<double>{2.0});
+  EXPECT_EQ(take(radius, PropertyValue::of(0.0)).text(), "Radius is 0; allowed: a number in (0, 2]");
+  EXPECT_EQ(take(radius, PropertyValue::of(2.5)).text(), "Radius is 2.5; allowed: a number in (0, 2]");
+  EXPECT_EQ(take(radius, PropertyValue::of("1")).text(), R"(Radius is "1"; allowed: a number in (0, 2])");
+  EXPECT_EQ(take(radius, PropertyValue::of(true)).text(), "Radius is true; allowed: a number in (0, 2]");
+  EXPECT_EQ(take(Property::number("Drag", "1").at_least(0.0), PropertyValue::of(-1.0)).text(),
+            "Drag is -1; allowed: a number >= 0");
+}
+
+TEST(PropertyValue, RefusesNumbersThatAreNotFinite) {
+  for (const double number : {kInfinity, -kInfinity, std::nan("")}) {
+    EXPECT_FALSE(take(Property::number("X", "m"), PropertyValue::of(number)).good);
+    EXPECT_FALSE(take(Property::vector("X", "m", "world"), list({0.0, number, 0.0})).good);
+    EXPECT_FALSE(take(Property::quaternion("X", "world"), list({number, 0.0, 0.0, 0.0})).good);
+  }
+}
+
+TEST(PropertyValue, TakesWholeNumbers) {
+  const Property iterations = Property::integer("Iterations").at_least(1.0);
+  EXPECT_EQ(take(iterations, PropertyValue::of(50.0)).numbers, std::vector<double>{50.0});
+  EXPECT_EQ(take(iterations, PropertyValue::of(2.5)).text(), "Iterations is 2.5; allowed: a whole number >= 1");
+  EXPECT_FALSE(take(iterations, PropertyValue::of(1e300)).good);
+}
+
+TEST(PropertyValue, TakesFlagsAndChoices) {
+  EXPECT_EQ(take(Property::flag("On"), PropertyValue::of(true)).numbers, std::vector<double>{1.0});
+  EXPECT_EQ(take(Property::flag("On"), PropertyValue::of(1.0)).text(), "On is 1; allowed: true or false");
+  const Property frame = Property::choice("Frame", {"World", "Body"});
+  EXPECT_EQ(take(frame, PropertyValue::of("Body")).numbers, std::vector<double>{1.0});
+  EXPECT_EQ(take(frame, PropertyValue::of("body")).text(),
+            R"(Frame is "body"; did you mean "Body"? Allowed: "World", "Body")");
+  EXPECT_EQ(take(frame, PropertyValue::of(0.0)).text(), R"(Frame is 0; allowed: one of "World", "Body")");
+}
+
+TEST(PropertyValue, TakesVectorsOfThree) {
+  const Property vector = Property::vector("HalfExtents", "m", "geometry").above(0.0);
+  EXPECT_EQ(take(vector, list({1.0, 2.0, 3.0})).numbers, (std::vector<double>{1.0, 2.0, 3.0}));
+  EXPECT_EQ(take(vector, list({1.0, 2.0})).text(),
+            "HalfExtents is a list of 2; allowed: a list of 3 numbers, each > 0");
+  EXPECT_EQ(take(vector, PropertyValue::of(1.0)).text(), "HalfExtents is 1; allowed: a list of 3 numbers, each > 0");
+}
+
+TEST(PropertyValue, PointsAtTheElementThatIsWrong) {
+  PropertyValue value = list({1.0, -2.0, 3.0});
+  value.list[1].position = {0, 7, 9};
+  const Flattened result = take(Property::vector("HalfExtents", "m", "geometry").above(0.0), value);
+  EXPECT_EQ(result.text(), "an element of HalfExtents is -2; allowed: a list of 3 numbers, each > 0");
+  EXPECT_EQ(result.problems[0].position, (TextPosition{0, 7, 9}));
+}
+
+TEST(PropertyValue, KeepsUnitQuaternionsBitForBit) {
+  const double c = std::sqrt(0.5);
+  const Flattened result = take(Property::quaternion("Q", "world"), list({c, 0.0, c, 0.0}));
+  EXPECT_EQ(result.numbers, (std::vector<double>{c, 0.0, c, 0.0}));
+  EXPECT_TRUE(result.problems.empty());
+}
+
+TEST(PropertyValue, NormalisesNearlyUnitQuaternions) {
+  const Property q = Property::quaternion("Q", "world");
+  // written with four digits: repaired and said
+  const Flattened coarse = take(q, list({0.7071, 0.7071, 0.0, 0.0}));
+  ASSERT_TRUE(coarse.good);
+  EXPECT_DOUBLE_EQ(coarse.numbers[0], std::sqrt(0.5));
+  ASSERT_EQ(coarse.problems.size(), 1U);
+  EXPECT_TRUE(coarse.problems[0].is_warning);
+  // with ten: repaired, nothing to say
+  const Flattened fine = take(q, list({0.7071067812, 0.7071067812, 0.0, 0.0}));
+  ASSERT_TRUE(fine.good);
+  EXPECT_DOUBLE_EQ(fine.numbers[0], std::sqrt(0.5));
+  EXPECT_TRUE(fine.problems.empty());
+  // the norm 1.001 is the last one taken
+  EXPECT_TRUE(take(q, list({1.0009, 0.0, 0.0, 0.0})).good);
+  EXPECT_EQ(take(q, list({1.0, 0.0, 0.0, 1.0})).text(),
+            "Q has the norm 1.4142135623730951; allowed: a list of 4 numbers (w, x, y, z) with "
+            "norm 1 (within 1e-3)");
+  EXPECT_FALSE(take(q, list({0.0, 0.0, 0.0, 0.0})).good);
+  EXPECT_FALSE(take(q, list({1e200, 0.0, 0.0, 0.0})).good);
+}
+
+TEST(PropertyValue, FlattensTablesWithTheirRowCount) {
+  const Property table = Property::table("Table", 4, "N", "world");
+  const PropertyValue nested = PropertyValue::of(
+      Values{PropertyValue::of(Values{PropertyValue::of(0.5), list({1.0, 2.0, 3.0})}), list({1.0, 4.0, 5.0, 6.0})});
+  EXPECT_EQ(take(table, nested).numbers, (std::vector<double>{2, 0.5, 1, 2, 3, 1, 4, 5, 6}));
+  EXPECT_EQ(take(table, list({})).numbers, std::vector<double>{0.0});
+  EXPECT_EQ(take(table, PropertyValue::of(Values{list({1.0, 2.0})})).text(),
+            "a row of Table has 2 numbers; allowed: a list of rows of 4 numbers");
+  EXPECT_FALSE(take(table, PropertyValue::of(Values{PropertyValue::of("x")})).good);
+}
+
+TEST(Flatten, FollowsTheOrderOfDeclaration) {
+  const std::vector<Property> declared = {
+      Property::number("Stiffness", "N/m").required(), Property::number("Damping", "N*s/m").defaults_to({0.25}),
+      Property::vector("Anchor", "m", "world"), Property::table("Table", 2, "1", "world"), Property::flag("On")};
+  std::vector<double> numbers = {99.0};
+  std::vector<PropertyProblem> problems;
+  ASSERT_TRUE(flatten(declared, {{"On", PropertyValue::of(true), {}}, {"Stiffness", PropertyValue::of(3.0), {}}},
+                      &numbers, &problems));
+  ASSERT_EQ(numbers.size(), 8U);
+  EXPECT_EQ(numbers[0], 99.0);
+  EXPECT_EQ(numbers[1], 3.0);
+  EXPECT_EQ(numbers[2], 0.25);
+  for (const std::size_t absent : {3U, 4U, 5U}) EXPECT_TRUE(std::isnan(numbers[absent]));
+  EXPECT_EQ(numbers[6], 0.0);
+  EXPECT_EQ(numbers[7], 1.0);
+}
+
+TEST(Flatten, WhatItWritesIsWhatTheCursorReads) {
+  const std::vector<Property> declared = {Property::choice("Kind", {"A", "B"}), Property::vector("V", "m", "world"),
+                                          Property::table("T", 2, "1", "world"), Property::integer("N")};
+  const std::vector<NamedValue> given = {{"T", PropertyValue::of(Values{list({1, 2}), list({3, 4})}), {}},
+                                         {"N", PropertyValue::of(7.0), {}},
+                                         {"V", list({1, 2, 3}), {}},
+                                         {"Kind", PropertyValue::of("B"), {}}};
+  std::vector<double> numbers;
+  std::vector<PropertyProblem> problems;
+  ASSERT_TRUE(flatten(declared, given, &numbers, &problems));
+  PropertyCursor cursor(numbers);
+  EXPECT_EQ(cursor.choice(), 1U);
+  EXPECT_EQ(cursor.vector(), Vector3(1, 2, 3));
+  EXPECT_EQ(cursor.table(2).size(), 4U);
+  EXPECT_EQ(cursor.integer(), 7);
+  EXPECT_TRUE(cursor.at_end());
+}
+
+TEST(Flatten, ReportsUnknownMissingAndRepeatedNames) {
+  const std::vector<Property> declared = {Property::number("Radius", "m").above(0.0).required(),
+                                          Property::number("Height", "m")};
+  std::vector<double> numbers;
+  std::vector<PropertyProblem> problems;
+  EXPECT_FALSE(flatten(declared,
+                       {{"Raduis", PropertyValue::of(1.0), {0, 3, 4}},
+                        {"Height", PropertyValue::of(1.0), {0, 4, 4}},
+                        {"Height", PropertyValue::of(2.0), {0, 5, 4}}},
+                       &numbers, &problems));
+  ASSERT_EQ(problems.size(), 3U);
+  EXPECT_EQ(problems[0].text, R"(unknown property "Raduis"; did you mean "Radius"? Allowed: "Radius", "Height")");
+  EXPECT_EQ(problems[0].position, (TextPosition{0, 3, 4}));
+  EXPECT_EQ(problems[1].text, "Height is given twice; allowed: once");
+  EXPECT_EQ(problems[1].position, (TextPosition{0, 5, 4}));
+  EXPECT_EQ(problems[2].text, "Radius is missing; required: a number > 0");
+  EXPECT_FALSE(problems[2].position.known());
+}
+
+TEST(PropertyText, NumbersReadBack) {
+  EXPECT_EQ(number_text(0.1), "0.1");
+  EXPECT_EQ(number_text(-3.0), "-3");
+  EXPECT_EQ(number_text(1e300), "1e+300");
+}
+
+TEST(PropertyText, CutsLongTextsBetweenCharacters) {
+  std::string text(59, 'x');
+  text += "\xC3\xA9\xC3\xA9";
+  EXPECT_EQ(shown(PropertyValue::of(text)), '"' + std::string(59, 'x') + "…\"");
+  EXPECT_EQ(shown(PropertyValue::of("a")), "\"a\"");
+}
+
+}  // namespace
+}  // namespace gravitas
