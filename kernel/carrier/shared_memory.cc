@@ -228,7 +228,7 @@ void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<con
   header.response_generation = response_generation_;
   for (std::size_t i = 0; i < columns.size(); ++i)
     mine->columns[i] = {arena.offset(columns[i]), arena.count(columns[i]), arena.capacity(columns[i])};
-  header.digest = channel::frame_digest(header, mine->columns, {}, nullptr);
+  header.digest = channel::frame_digest(header, std::span(mine->columns).first(columns.size()), {}, nullptr);
   std::memcpy(&mine->header, &header, sizeof header);
   channel::post(mine, connection_->theirs);
 }
@@ -330,7 +330,8 @@ void SharedMemoryCarrier::take_columns(const gravitas_frame_header& header, std:
                 columns[i].count * stage::element_size(infos[i].type));
     data[i] = arena->data(targets[i]);
   }
-  if (channel::frame_digest(header, columns.data(), infos, complete ? data.data() : nullptr) != header.digest)
+  if (channel::frame_digest(header, std::span(columns).first(infos.size()), infos, complete ? data.data() : nullptr) !=
+      header.digest)
     report_bad_frame("a digest that does not fit its content");
   for (std::size_t i = 0; i < infos.size(); ++i)
     if (complete || header.status == GRAVITAS_NEEDS_CAPACITY) arena->set_count(targets[i], columns[i].count);

@@ -71,13 +71,13 @@ Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint6
 
 void wake(const Mailbox* mailbox) { futex_wake(&mailbox->signal); }
 
-std::uint64_t frame_digest(const gravitas_frame_header& header, const gravitas_frame_column* columns,
+std::uint64_t frame_digest(const gravitas_frame_header& header, std::span<const gravitas_frame_column> columns,
                            std::span<const stage::ColumnInfo> infos, const void* const* data) {
   gravitas_frame_header bare = header;
   bare.digest = 0;
   Digest digest;
   digest.add(&bare, sizeof bare);
-  digest.add(columns, header.column_count * sizeof *columns);
+  digest.add(columns.data(), columns.size_bytes());
   for (std::size_t i = 0; data != nullptr && i < infos.size(); ++i)
     digest.add(data[i], static_cast<std::size_t>(columns[i].count) * stage::element_size(infos[i].type));
   return digest.value();

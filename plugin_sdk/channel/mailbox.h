@@ -58,10 +58,10 @@ void wake(const Mailbox* mailbox);
 // CLOCK_MONOTONIC in nanoseconds.
 std::uint64_t now_ns();
 
-// Digest of a frame: its header (without the digest itself), its header.column_count columns, and the data of each.
-// `data[i]` has columns[i].count elements of the type in `infos`; no data are added if `data` is null (a request:
-// the state segment cannot be written by its reader).
-std::uint64_t frame_digest(const gravitas_frame_header& header, const gravitas_frame_column* columns,
+// Digest of a frame: its header (without the digest itself), its columns, and the data of each. `data[i]` has
+// columns[i].count elements of the type in `infos`; no data are added if `data` is null (a request: the state segment
+// cannot be written by its reader).
+std::uint64_t frame_digest(const gravitas_frame_header& header, std::span<const gravitas_frame_column> columns,
                            std::span<const stage::ColumnInfo> infos, const void* const* data);
 
 }  // namespace gravitas::channel

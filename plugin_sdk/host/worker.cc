@@ -137,7 +137,8 @@ std::string Worker::read_request(const gravitas_frame_header& request, CallState
   if (request.column_count != method.request.size() || request.reply_count < method.reply.size() ||
       request.reply_count > GRAVITAS_MAX_COLUMNS)
     return "a frame with the wrong number of columns";
-  if (channel::frame_digest(request, kernel_->columns, {}, nullptr) != request.digest)
+  if (channel::frame_digest(request, std::span(kernel_->columns).first(method.request.size()), {}, nullptr) !=
+      request.digest)
     return "a frame whose digest does not fit";
   for (std::size_t i = 0; i < method.request.size(); ++i) {
     const gravitas_frame_column& column = kernel_->columns[i];
@@ -206,8 +207,9 @@ void Worker::write_reply(const CallState& call, std::int32_t status, const char*
     mine_->columns[i] = {call.room[i], call.reply[i].count, call.reply[i].capacity};
   std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
   for (std::size_t i = 0; i < call.reply_columns; ++i) data[i] = call.reply[i].data;
-  header.digest = channel::frame_digest(header, mine_->columns, stage::kMethods[header.method].reply,
-                                        status == GRAVITAS_OK ? data.data() : nullptr);
+  header.digest =
+      channel::frame_digest(header, std::span(mine_->columns).first(call.reply_columns),
+                            stage::kMethods[header.method].reply, status == GRAVITAS_OK ? data.data() : nullptr);
   std::strncpy(mine_->text, text, sizeof mine_->text - 1);
   mine_->compute_ns = compute_ns;
   std::memcpy(&mine_->header, &header, sizeof header);
@@ -232,7 +234,7 @@ std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* requ
     std::memcpy(call->reply[room].data, request[i].data, bytes_of(method.request[i], request[i].count));
     mine_->columns[i] = {call->room[room], request[i].count, call->reply[room].capacity};
   }
-  header.digest = channel::frame_digest(header, mine_->columns, method.request, data.data());
+  header.digest = channel::frame_digest(header, std::span(mine_->columns).first(columns), method.request, data.data());
   std::memcpy(&mine_->header, &header, sizeof header);
   channel::post(mine_, kernel_);
 
@@ -245,7 +247,7 @@ std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* requ
   const gravitas_frame_column& wrench = kernel_->columns[0];
   const std::size_t bytes = static_cast<std::size_t>(wrench.count) * sizeof(double);
   if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || answer.column_count != 1 ||
-      channel::frame_digest(answer, kernel_->columns, {}, nullptr) != answer.digest ||
+      channel::frame_digest(answer, std::span(kernel_->columns).first(1), {}, nullptr) != answer.digest ||
       !fits(state_, wrench.offset, bytes))
     return GRAVITAS_CALLBACK_FAILED;
   reply[0].count = wrench.count;

@@ -143,13 +143,12 @@ struct Frame {
 
   Frame() {
     header.magic = GRAVITAS_MAGIC;
-    header.column_count = 2;
     columns[0] = {0, begin.size(), 8};
     columns[1] = {64, bound.size(), 8};
   }
   std::uint64_t digest(bool with_data = true) const {
     const std::array<const void*, 2> data = {begin.data(), bound.data()};
-    return frame_digest(header, columns.data(), stage::kConstraintBindReplyColumns, with_data ? data.data() : nullptr);
+    return frame_digest(header, columns, stage::kConstraintBindReplyColumns, with_data ? data.data() : nullptr);
   }
 };
 

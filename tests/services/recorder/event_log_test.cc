@@ -24,7 +24,8 @@ using testing::ScratchFolder;
 // Ground (fixed), Ball and Cube (movable), Lift (kinematic), and a joint that hangs Ball from the world.
 kernel::EnvironmentDescription description() {
   kernel::EnvironmentDescription d;
-  for (const auto& [id, flags] : {std::pair{"Ground", 0U}, {"Ball", kMovable}, {"Cube", kMovable}, {"Lift", kKinematic}}) {
+  for (const auto& [id, flags] :
+       {std::pair{"Ground", 0U}, {"Ball", kMovable}, {"Cube", kMovable}, {"Lift", kKinematic}}) {
     kernel::BodyDescription body;
     body.id = id;
     body.flags = flags | kHasShape;

@@ -20,8 +20,8 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::Eq;
-using ::testing::StartsWith;
 using testing::ScratchFolder;
+using ::testing::StartsWith;
 
 constexpr const char* kHeader = "time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 

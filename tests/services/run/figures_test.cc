@@ -37,13 +37,13 @@ report::v1::Report figures_of(const std::string& scene, int steps) {
   return report;
 }
 
-// 2 kg at (1, 2, 0) with 3 m/s along x, moments 1, 2, 4, 5 rad/s about z; a rock of no account.
+// 2 kg at (1, 2, 0) with 3 m/s along x, moments 2, 3, 4, 5 rad/s about z; a rock of no account.
 constexpr const char* kTwoBodies = R"(
 Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -10, 0} } } }
 Simulator { CustomProperties { TimeStep = 0.1 Duration = 1 } }
 Environment { Space { Bodies {
   Body {
-    Id = "Top" Mass = 2 PrincipalMoments = {1, 2, 4}
+    Id = "Top" Mass = 2 PrincipalMoments = {2, 3, 4}
     KineticProperties { Position = {1, 2, 0} LinearVelocity = {3, 0, 0} AngularVelocity = {0, 0, 5} } Forces = { "Down" }
   }
   Body { Id = "Rock" Immovable = true KineticProperties { Position = {100, 0, 0} } }
@@ -81,7 +81,7 @@ Environment {
   Constraints { Constraint { Type = "AngularMotor" Id = "Spindle" Body1 = "A" Body2 = "B"
     CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {1, 0, 0} AngularSpeed = -1.5 } } }
 })",
-                                                100);
+                                               100);
   ASSERT_EQ(report.drives_size(), 1);
   EXPECT_EQ(report.drives(0).constraint(), "Spindle");
   EXPECT_EQ(report.drives(0).target(), -1.5);

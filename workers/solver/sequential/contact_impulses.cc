@@ -295,10 +295,12 @@ double ContactImpulses::work_of(const Row& row, const RelaxationMotion& before, 
 }
 
 void ContactImpulses::add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
-                               const RelaxationMotion& after, std::vector<double>& work) const {
-  double size = 0.0;
+                               const RelaxationMotion& after, const std::vector<std::uint32_t>& group,
+                               std::vector<Gain>& gains) const {
   for (const Row& row : rows_) {
-    work[owner_of(row, bodies)] += work_of(row, before, after, &size);
+    double size = 0.0;
+    const double work = work_of(row, before, after, &size);
+    gains[group[owner_of(row, bodies)]].add(work, size);
   }
 }
 
@@ -316,10 +318,10 @@ std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before,
 }
 
 std::uint32_t ContactImpulses::drop_restitution(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
-                                                const std::vector<double>& gained, double tolerance) {
+                                                const std::vector<Gain>& gains) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
-    if (!(row.target > 0.0) || !(gained[group[owner_of(row, bodies)]] > tolerance)) continue;
+    if (!(row.target > 0.0) || !gains[group[owner_of(row, bodies)]].is_real()) continue;
     row.target = 0.0;
     ++count;
   }

@@ -71,14 +71,14 @@ class ContactImpulses {
   // Work of each contact's impulse, added to that of its second body, or of the first where the
   // second is not pushed.
   void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before, const RelaxationMotion& after,
-                std::vector<double>& work) const;
+                const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const;
   // Lowers e s of the contacts that arrive and whose impulse does positive work: to a half, a
   // quarter, then to zero. Returns how many were lowered.
   std::uint32_t lower_restitution(const RelaxationMotion& before, const RelaxationMotion& after);
   // Sets e s to zero for contacts of bodies in a group (by the number of its first body) that
-  // gained more than `tolerance` J. Returns how many changed.
+  // gained. Returns how many changed.
   std::uint32_t drop_restitution(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
-                                 const std::vector<double>& gained, double tolerance);
+                                 const std::vector<Gain>& gains);
   // Multiplies all impulses by the factor of their bodies' group.
   void scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
              const std::vector<double>& factor);

@@ -88,4 +88,18 @@ Matrix3 point_response(const RelaxationBody& body, const Vector3& at, const Vect
 // holds a body that can be pushed, and eight units of rounding of the coordinates.
 double closing_slop(const Vector3& point, const RelaxationBody& body1, const RelaxationBody& body2);
 
+// What impulses gained or lost the bodies they act on, J. `size` sums the magnitudes of what cancels in `work`: an elastic
+// impact's work is the difference of two large numbers.
+struct Gain {
+  double work = 0.0;
+  double size = 0.0;
+
+  void add(double more_work, double more_size) {
+    work += more_work;
+    size += more_size;
+  }
+  // More than rounding.
+  bool is_real() const { return work > 1e-13 * size; }
+};
+
 }  // namespace gravitas

@@ -281,15 +281,17 @@ void RelaxationJoints::store(Multipliers& multipliers) const {
 }
 
 void RelaxationJoints::add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
-                                const RelaxationMotion& after, std::vector<double>& work) const {
+                                const RelaxationMotion& after, const std::vector<std::uint32_t>& group,
+                                std::vector<Gain>& gains) const {
   for (const Block& block : blocks_) {
-    const std::uint32_t owner = owner_of(block, bodies);
+    Gain& gain = gains[group[owner_of(block, bodies)]];
     for (std::size_t i = block.first; i < block.end; ++i) {
       const Row& row = rows_[i];
       if (row.law.is_velocity_only) continue;
-      work[owner] += 0.5 * row.multiplier *
-                     (row.own.along(before[block.body1], before[block.body2]) +
-                      row.own.along(after[block.body1], after[block.body2]));
+      const double start = row.own.along(before[block.body1], before[block.body2]);
+      const double end = row.own.along(after[block.body1], after[block.body2]);
+      gain.add(0.5 * row.multiplier * (start + end),
+               0.5 * std::fabs(row.multiplier) * (std::fabs(start) + std::fabs(end)));
     }
   }
 }

@@ -83,7 +83,7 @@ class RelaxationJoints {
   // Work of the rows that neither drive nor soften, lambda (J before + J after)/2, J, added to that
   // of body2, or of body1 where body2 is not pushed.
   void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before, const RelaxationMotion& after,
-                std::vector<double>& work) const;
+                const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const;
   // Sets factor to 1 for the groups of bodies (by the number of their first) that a drive or a
   // spring acts on.
   void exempt_driven(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,

@@ -252,26 +252,18 @@ void SequentialSolver::bound_energy() {
   }
 
   group_bodies();
-  const double tolerance = add_up_gains(velocity_);
-  const std::uint32_t dropped = impulses_.drop_restitution(bodies_, group_, gained_, tolerance);
+  add_up_gains(velocity_);
+  const std::uint32_t dropped = impulses_.drop_restitution(bodies_, group_, gains_);
   summary_.restitutions_dropped += dropped;
   if (dropped > 0) relax_velocity();
   if (!velocity_converged_) scale_back();
 }
 
-// gained_: what each group's bodies gain by the impulses between v* and `after`, J. Returns the
-// gain that is rounding.
-double SequentialSolver::add_up_gains(const RelaxationMotion& after) {
-  work_.assign(bodies_.count() + 1, 0.0);
-  impulses_.add_work(bodies_, trial_velocity_, after, work_);
-  velocity_joints_.add_work(bodies_, trial_velocity_, after, work_);
-  gained_.assign(work_.size(), 0.0);
-  double size = 0.0;
-  for (std::size_t i = 0; i < work_.size(); ++i) {
-    size = std::max(size, std::fabs(work_[i]));
-    gained_[group_[i]] += work_[i];
-  }
-  return 1e-13 * size;
+// gains_: what each group's bodies gain by the impulses between v* and `after`.
+void SequentialSolver::add_up_gains(const RelaxationMotion& after) {
+  gains_.assign(bodies_.count() + 1, Gain{});
+  impulses_.add_work(bodies_, trial_velocity_, after, group_, gains_);
+  velocity_joints_.add_work(bodies_, trial_velocity_, after, group_, gains_);
 }
 
 // Groups that gain although nothing bounces: sweeps that ran out. A share f of all their impulses
@@ -279,14 +271,15 @@ double SequentialSolver::add_up_gains(const RelaxationMotion& after) {
 // gains nothing.
 void SequentialSolver::scale_back() {
   add_up_gains(trial_velocity_);
-  factor_ = gained_;
-  const double tolerance = add_up_gains(velocity_);
+  factor_.clear();
+  for (const Gain& gain : gains_) factor_.push_back(gain.work);
+  add_up_gains(velocity_);
   bool any = false;
   for (std::size_t i = 0; i < factor_.size(); ++i) {
     const double along = factor_[i];
-    const bool gains = gained_[i] > tolerance;
+    const bool gains = gains_[i].is_real();
     any = any || gains;
-    factor_[i] = gains ? std::max(0.0, -along / (gained_[i] - along)) : 1.0;
+    factor_[i] = gains ? std::max(0.0, -along / (gains_[i].work - along)) : 1.0;
   }
   if (!any) return;
   velocity_joints_.exempt_driven(bodies_, group_, factor_);

@@ -99,7 +99,7 @@ class SequentialSolver {
   bool sweep_velocity(double tolerance);
   void bound_energy();
   void group_bodies();
-  double add_up_gains(const RelaxationMotion& after);
+  void add_up_gains(const RelaxationMotion& after);
   void scale_back();
   void sum_velocity();
   bool acts_on_velocity_alone() const;
@@ -128,7 +128,8 @@ class SequentialSolver {
   std::vector<double> joint_correction_, joint_impulse_;
   std::vector<double> contact_correction_, contact_impulse_, contact_direction_;
   std::vector<std::uint32_t> group_;
-  std::vector<double> work_, gained_, factor_;
+  std::vector<Gain> gains_;
+  std::vector<double> factor_;
 };
 
 }  // namespace gravitas

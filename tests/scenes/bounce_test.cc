@@ -1,0 +1,228 @@
+// Impacts: the ratio of the speeds, energy, apexes, coming to rest, mixed materials, two movable bodies.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using testing::SceneRun;
+using testing::set;
+
+constexpr double kG = 9.81, kRadius = 0.5, kHeight = 1.0;
+
+struct Case {
+  const char* integrator;
+  double restitution;
+};
+
+void PrintTo(const Case& which, std::ostream* out) { *out << which.integrator << ", e = " << which.restitution; }
+
+std::vector<std::string> overrides(const Case& which, double time_step) {
+  return {set("Integrator", std::string(which.integrator)), set("Simulator.TimeStep", time_step),
+          set("Material.Ground.RestitutionCoefficient", which.restitution),
+          set("Material.Rubber.RestitutionCoefficient", which.restitution)};
+}
+
+double height(const SceneRun& run) { return run.body("Ball").pose.position.y() - kRadius; }
+double speed(const SceneRun& run) { return run.body("Ball").twist.linear.y(); }
+
+class Bounce : public ::testing::TestWithParam<Case> {};
+
+INSTANTIATE_TEST_SUITE_P(EachIntegratorAndRestitution, Bounce,
+                         ::testing::Values(Case{"Euler", 0.0}, Case{"Euler", 0.5}, Case{"Euler", 0.8},
+                                           Case{"Euler", 1.0}, Case{"SemiImplicitEuler", 0.0},
+                                           Case{"SemiImplicitEuler", 0.5}, Case{"SemiImplicitEuler", 0.8},
+                                           Case{"SemiImplicitEuler", 1.0}));
+
+// Every landing leaves with e times the speed of arrival: that of a fall through what was left of the gap.
+TEST_P(Bounce, LeavesWithTheShareOfTheSpeedOfArrival) {
+  const double e = GetParam().restitution;
+  SceneRun run("bounce.gravitas", overrides(GetParam(), 0.004));
+  int landings = 0;
+  while (!run.is_done() && landings < 5) {
+    const double gap = height(run), before = speed(run);
+    run.step();
+    const double after = speed(run);
+    if (before >= 0.0 || after <= before) continue;
+    const double arrival = std::sqrt(before * before + 2.0 * kG * gap);
+    if (arrival < 2.0 * kG * run.time_step()) break;  // slower than this it rests
+    ++landings;
+    // a handful of operations on numbers of size arrival^2
+    ASSERT_NEAR(after, e * arrival, 1e-14 * arrival) << "landing " << landings;
+    ASSERT_NEAR(height(run), 0.0, 1e-15) << "landing " << landings;
+  }
+  EXPECT_EQ(landings, e == 0.0 ? 1 : 5);
+}
+
+// The modified energy of a first-order method differs from the true one by m g h |v|/2 and changes its sign with v at
+// a bounce: each costs (or, with Euler, gives) at most m g h |v|, and the rest of the step in which it lands another.
+void expect_elastic_energy(const Case& which) {
+  const double arrival = std::sqrt(2.0 * kG * kHeight), energy = 2.0 * kG * (kHeight + kRadius);
+  double coarser = 0.0;
+  for (const double h : {1.0 / 128, 1.0 / 256, 1.0 / 512, 1.0 / 1024}) {
+    SceneRun run("bounce.gravitas", overrides(which, h));
+    double worst = 0.0;
+    int landings = 0;
+    while (!run.is_done()) {
+      const double before = speed(run);
+      run.step();
+      landings += before < 0.0 && speed(run) > 0.0 ? 1 : 0;
+      worst = std::max(worst, std::fabs(run.energy() - energy));
+    }
+    EXPECT_GE(landings, 6);
+    EXPECT_LE(worst, 2.0 * (landings + 1) * 2.0 * kG * h * arrival) << h;
+    if (coarser > 0.0) {
+      EXPECT_NEAR(std::log2(coarser / worst), 1.0, 0.25) << h;
+    }
+    coarser = worst;
+  }
+}
+
+TEST(Bounce, KeepsTheEnergyToFirstOrderIfElastic) {
+  expect_elastic_energy({"Euler", 1.0});
+  expect_elastic_energy({"SemiImplicitEuler", 1.0});
+}
+
+TEST_P(Bounce, ApexesShrinkByTheSquare) {
+  const double e = GetParam().restitution, h = 1e-4;
+  SceneRun run("bounce.gravitas", overrides(GetParam(), h));
+  double apex = kHeight;
+  for (int bounce = 0; bounce < 3 && e > 0.0; ++bounce) {
+    while (speed(run) <= 0.0) run.step();
+    double top = 0.0;
+    for (; speed(run) > 0.0; run.step()) top = std::max(top, height(run));
+    const double arrival = std::sqrt(2.0 * kG * apex);
+    // the speed of arrival and the way up are each of first order: h v/2 and h e v/2; the apex lies between two states
+    EXPECT_NEAR(top, e * e * apex, h * (arrival + 2.0 * kG * h)) << "bounce " << bounce;
+    apex = top;
+  }
+  EXPECT_NEAR(apex, kHeight * std::pow(e, e == 0.0 ? 0.0 : 6.0), 4.0 * h * std::sqrt(2.0 * kG * kHeight));
+}
+
+// Time of the last step that moved the ball.
+double last_motion_of(SceneRun* run) {
+  double last = 0.0;
+  while (!run->is_done()) {
+    const double before = height(*run);
+    run->step();
+    if (std::fabs(speed(*run)) > 1e-12 || std::fabs(height(*run) - before) > 1e-12) last = run->time();
+  }
+  return last;
+}
+
+class Rest : public ::testing::TestWithParam<Case> {};
+
+// Explicit Euler gains g h in every flight (its position lags behind), so it cannot come below the rest speed with more
+// than e = 1/2: see the next test.
+INSTANTIATE_TEST_SUITE_P(EachIntegratorAndRestitution, Rest,
+                         ::testing::Values(Case{"Euler", 0.0}, Case{"Euler", 0.3}, Case{"SemiImplicitEuler", 0.0},
+                                           Case{"SemiImplicitEuler", 0.5}, Case{"SemiImplicitEuler", 0.8}));
+
+TEST_P(Rest, IsReachedInTimeAndIsExact) {
+  const double e = GetParam().restitution, h = 0.001;
+  SceneRun run("bounce.gravitas", overrides(GetParam(), h));
+  const double last_motion = last_motion_of(&run);
+  EXPECT_LE(std::fabs(speed(run)), 1e-12);
+  EXPECT_NEAR(height(run), 0.0, 1e-9);
+  EXPECT_EQ(run.body("Ball").twist.angular, Vector3::Zero());
+  // The time of the closed form, less flights below the rest speed 2 g h, which together take 4 h/(1 - e). A flight is
+  // timed to two steps, and loses or gains at most g h e/(1 - e) of its speed in all, so 2 h e/(1 - e) of its time.
+  const double expected = std::sqrt(2.0 * kHeight / kG) * (1.0 + e) / (1.0 - e);
+  const double flights = e == 0.0 ? 1.0 : std::log(2.0 * kG * h / std::sqrt(2.0 * kG * kHeight)) / std::log(e);
+  EXPECT_NEAR(last_motion, expected, (flights * (2.0 + 2.0 * e / (1.0 - e)) + 4.0 / (1.0 - e)) * h);
+}
+
+// What explicit Euler does badly: with e > 1/2 the ball ends in hops that leave with e g h/(1 - e) for ever. They
+// vanish with the time step.
+TEST(Bounce, ExplicitEulerKeepsHoppingLowAboveOneHalf) {
+  const double e = 0.8;
+  for (const double h : {0.004, 0.001}) {
+    SceneRun run("bounce.gravitas", overrides({"Euler", e}, h));
+    while (run.time() < 5.5) run.step();
+    double fastest = 0.0;
+    for (; !run.is_done(); run.step()) fastest = std::max(fastest, speed(run));
+    EXPECT_GT(fastest, 2.0 * kG * h);
+    // the fixed point of v = e (v + g h), within the step that the landing falls into
+    EXPECT_NEAR(fastest, e / (1.0 - e) * kG * h, kG * h + 1e-12);
+  }
+}
+
+TEST(Bounce, RestitutionIsTheMeanOfTheTwoMaterials) {
+  for (const auto& [ground, ball] :
+       {std::pair{0.2, 0.6}, std::pair{0.6, 0.2}, std::pair{0.0, 0.8}, std::pair{0.8, 0.0}}) {
+    SceneRun run("bounce.gravitas", {set("Material.Ground.RestitutionCoefficient", ground),
+                                     set("Material.Rubber.RestitutionCoefficient", ball)});
+    double arrival = 0.0;
+    while (speed(run) <= 0.0) {
+      arrival = std::sqrt(speed(run) * speed(run) + 2.0 * kG * height(run));
+      run.step();
+    }
+    EXPECT_NEAR(speed(run), 0.4 * arrival, 1e-14) << ground << " and " << ball;
+  }
+}
+
+TEST(Bounce, EventsTellOfEachLanding) {
+  SceneRun run("bounce.gravitas", {set("Simulator.Duration", 2)});
+  std::vector<double> landings;
+  while (!run.is_done()) {
+    const double before = speed(run);
+    run.step();
+    if (before < 0.0 && speed(run) > 0.0) landings.push_back(run.time());
+  }
+  std::vector<double> starts;
+  for (const kernel::Event& event : run.events()) {
+    ASSERT_LT(event.a, event.b);
+    if (event.kind == kernel::EventKind::kCollisionStart) starts.push_back(event.time);
+  }
+  ASSERT_GE(landings.size(), 2U);
+  EXPECT_EQ(starts, landings);
+  EXPECT_NEAR(run.events()[0].relative_speed, std::sqrt(2.0 * kG * kHeight), kG * run.time_step());
+  // J = m (1 + e) v
+  EXPECT_NEAR(run.events()[0].impulse, 2.0 * 1.8 * run.events()[0].relative_speed, 3.6 * kG * run.time_step());
+  EXPECT_NEAR(run.count_events(kernel::EventKind::kCollisionEnd), starts.size(), 1);
+}
+
+struct Impact {
+  const char* integrator;
+  double left_mass, right_mass, restitution;
+};
+
+void PrintTo(const Impact& impact, std::ostream* out) {
+  *out << impact.left_mass << " kg against " << impact.right_mass << " kg, e = " << impact.restitution;
+}
+
+class HeadOn : public ::testing::TestWithParam<Impact> {};
+
+INSTANTIATE_TEST_SUITE_P(EachMassAndRestitution, HeadOn,
+                         ::testing::Values(Impact{"Euler", 1, 1, 1}, Impact{"SemiImplicitEuler", 1, 1, 1},
+                                           Impact{"SemiImplicitEuler", 1, 1, 0}, Impact{"SemiImplicitEuler", 1, 3, 0.5},
+                                           Impact{"SemiImplicitEuler", 1000, 1, 0.8},
+                                           Impact{"SemiImplicitEuler", 1, 1e6, 1}, Impact{"Euler", 2, 0.5, 0.3}));
+
+TEST_P(HeadOn, ConservesMomentumAndObeysTheLawOfRestitution) {
+  const auto [integrator, m1, m2, e] = GetParam();
+  SceneRun run("collide.gravitas", {set("Integrator", std::string(integrator)), set("Body.Left.Mass", m1),
+                                    set("Body.Right.Mass", m2), set("Material.Rubber.RestitutionCoefficient", e)});
+  const double v1 = 2.0, v2 = -1.0;
+  run.to_end();
+  const double centre = (m1 * v1 + m2 * v2) / (m1 + m2);
+  EXPECT_NEAR(run.body("Left").twist.linear.x(), centre - m2 / (m1 + m2) * e * (v1 - v2), 1e-14);
+  EXPECT_NEAR(run.body("Right").twist.linear.x(), centre + m1 / (m1 + m2) * e * (v1 - v2), 1e-14);
+  // along the line of the centres alone, without turning
+  for (const char* ball : {"Left", "Right"}) {
+    EXPECT_EQ(run.body(ball).twist.linear.y(), 0.0);
+    EXPECT_EQ(run.body(ball).twist.linear.z(), 0.0);
+    EXPECT_EQ(run.body(ball).twist.angular, Vector3::Zero());
+  }
+  EXPECT_EQ(run.count_events(kernel::EventKind::kCollisionStart), 1U);
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,129 @@
+// Angular motors, and joints that break.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using testing::SceneRun;
+using testing::set;
+
+constexpr double kG = 9.81;
+
+class Motor : public ::testing::TestWithParam<const char*> {
+ protected:
+  std::vector<std::string> with(std::vector<std::string> more) const {
+    more.push_back(set("Integrator", std::string(GetParam())));
+    return more;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(EachIntegrator, Motor, ::testing::Values("Euler", "SemiImplicitEuler"),
+                         [](const auto& which) { return std::string(which.param); });
+
+TEST_P(Motor, ReachesItsSpeedInAStepAndKeepsIt) {
+  SceneRun run("motor_pair.gravitas", with({}));
+  while (!run.is_done()) {
+    run.step();
+    const Vector3 relative = run.body("Rotor").twist.angular - run.body("Stator").twist.angular;
+    ASSERT_LE((relative - Vector3(0, 2, 0)).norm(), 1e-9) << "at " << run.time();
+  }
+  ASSERT_EQ(run.report().drives_size(), 1);
+  EXPECT_NEAR(run.report().drives(0).speed(), 2.0, 1e-9);
+  EXPECT_EQ(run.report().drives(0).target(), 2.0);
+  EXPECT_LE(run.report().max_joint_error(), 1e-12);
+}
+
+TEST_P(Motor, BetweenFreeBodiesTurnsEachInTheMeasureOfTheOther) {
+  SceneRun run("motor_pair.gravitas", with({}));
+  const double stator = run.moments("Stator").y(), rotor = run.moments("Rotor").y();
+  while (!run.is_done()) {
+    run.step();
+    // rounding of moments of a few dozen kg m^2
+    ASSERT_LE(run.angular_momentum().norm(), 1e-11) << "at " << run.time();
+    ASSERT_LE(run.momentum().norm(), 1e-11) << "at " << run.time();
+  }
+  EXPECT_NEAR(run.body("Stator").twist.angular.y(), -2.0 * rotor / (stator + rotor), 1e-9);
+  EXPECT_NEAR(run.body("Rotor").twist.angular.y(), 2.0 * stator / (stator + rotor), 1e-9);
+}
+
+TEST_P(Motor, InATumblingPairKeepsItsSpeedAboutTheMovingAxis) {
+  // both turn about their common centre: the axis sweeps round
+  SceneRun run(
+      "motor_pair.gravitas",
+      with({set("Body.Stator.LinearVelocity", Vector3(0.5, 0, 0)),
+            set("Body.Rotor.LinearVelocity", Vector3(-0.5, 0, 0)), set("Body.Stator.AngularVelocity", Vector3(0, 0, 1)),
+            set("Body.Rotor.AngularVelocity", Vector3(0, 0, 1)), set("Simulator.TimeStep", 1.0 / 240)}));
+  const Vector3 momentum = run.momentum();
+  while (!run.is_done()) {
+    run.step();
+    const SceneRun::Motion stator = run.body("Stator"), rotor = run.body("Rotor");
+    const Vector3 axis = (rotor.pose.position - stator.pose.position).normalized();
+    // the drive acts along the axis of the free step, which the turn of this step, 1/240 rad, still tilts
+    ASSERT_NEAR(axis.dot(rotor.twist.angular - stator.twist.angular), 2.0, 1e-4) << "at " << run.time();
+    ASSERT_NEAR((rotor.pose.position - stator.pose.position).norm(), 1.0, 1e-6) << "at " << run.time();
+    ASSERT_LE((run.momentum() - momentum).norm(), 1e-10) << "at " << run.time();
+  }
+  EXPECT_LE(run.report().max_joint_error(), 1e-6);
+}
+
+TEST_P(Motor, HasALargestTorque) {
+  SceneRun run("motor_disc.gravitas", with({}));
+  const double inertia = run.moments("Rotor").y(), h = run.time_step();
+  EXPECT_NEAR(inertia, 0.5 * 12.0 * 0.25, 1e-12);
+  while (!run.is_done()) {
+    run.step();
+    const Vector3 w = run.body("Rotor").twist.angular;
+    ASSERT_NEAR(w.y(), std::min(5.0, run.step_count() * h * 3.0 / inertia), 1e-9) << "at " << run.time();
+    ASSERT_NEAR(std::hypot(w.x(), w.z()), 0.0, 1e-12);
+  }
+  EXPECT_LE(run.body("Rotor").pose.position.norm(), 1e-12);
+}
+
+TEST_P(Motor, JointBreaksBeyondItsForce) {
+  const std::string hanging = set("Body.Ball.Position", Vector3(0, -1, 0));
+  // 1 kg hangs at rest: the joint bears 9.81 N from the first step on
+  SceneRun holds("pendulum.gravitas", with({hanging, set("Constraint.Pivot.BreakingForce", kG * (1.0 + 1e-6))}));
+  holds.to_end();
+  EXPECT_TRUE(holds.holds("Pivot"));
+  EXPECT_EQ(holds.count_events(kernel::EventKind::kBreak), 0U);
+  EXPECT_NEAR(holds.body("Ball").pose.position.y(), -1.0, 1e-9);
+
+  SceneRun breaks("pendulum.gravitas", with({hanging, set("Constraint.Pivot.BreakingForce", kG * (1.0 - 1e-6))}));
+  breaks.steps(500);
+  EXPECT_FALSE(breaks.holds("Pivot"));
+  ASSERT_EQ(breaks.count_events(kernel::EventKind::kBreak), 1U);
+  EXPECT_EQ(breaks.events()[0].step, 1U);
+  EXPECT_EQ(breaks.events()[0].a, kNone);
+  EXPECT_EQ(breaks.events()[0].b, 0U);
+  EXPECT_EQ(breaks.events()[0].constraint, 0U);
+  // it held for its last step, then falls freely
+  EXPECT_NEAR(breaks.body("Ball").twist.linear.y(), -kG * 499 * breaks.time_step(), 1e-12);
+  // what no longer holds has no joint error
+  EXPECT_LE(breaks.report().max_joint_error(), 1e-12);
+}
+
+TEST_P(Motor, JointBreaksBeyondItsThreshold) {
+  // at 1/60 s the pendulum's joint opens by some 1e-6 m at the lowest point
+  const std::string coarse = set("Simulator.TimeStep", 1.0 / 60);
+  SceneRun holds("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-4)}));
+  holds.to_end();
+  EXPECT_TRUE(holds.holds("Pivot"));
+
+  SceneRun breaks("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-8)}));
+  breaks.to_end();
+  EXPECT_FALSE(breaks.holds("Pivot"));
+  EXPECT_EQ(breaks.count_events(kernel::EventKind::kBreak), 1U);
+  EXPECT_LE(breaks.report().max_joint_error(), 1e-8);
+  EXPECT_GT(breaks.body("Ball").pose.position.norm(), 10.0);
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,126 @@
+// Things that stand, and one that falls over.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using testing::angle_between;
+using testing::SceneRun;
+using testing::set;
+
+const double kPi = std::acos(-1.0);
+
+struct Method {
+  const char* integrator;
+  double time_step;
+};
+
+void PrintTo(const Method& method, std::ostream* out) { *out << method.integrator << ", dt = " << method.time_step; }
+
+class Standing : public ::testing::TestWithParam<Method> {
+ protected:
+  std::vector<std::string> method() const {
+    return {set("Integrator", std::string(GetParam().integrator)), set("Simulator.TimeStep", GetParam().time_step)};
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(EachMethod, Standing,
+                         ::testing::Values(Method{"Euler", 1.0 / 60}, Method{"Euler", 1.0 / 240},
+                                           Method{"SemiImplicitEuler", 1.0 / 60},
+                                           Method{"SemiImplicitEuler", 1.0 / 240}));
+
+// Runs to the end and gives the largest distances that the bodies had from where they started.
+struct Drift {
+  double way = 0.0;   // m
+  double turn = 0.0;  // rad
+};
+Drift drift_of(SceneRun* run, const std::vector<std::string>& bodies) {
+  std::map<std::string, Pose> start;
+  for (const std::string& id : bodies) start[id] = run->body(id).pose;
+  Drift drift;
+  while (!run->is_done()) {
+    run->step();
+    for (const std::string& id : bodies) {
+      const Pose now = run->body(id).pose;
+      drift.way = std::max(drift.way, (now.position - start[id].position).norm());
+      drift.turn = std::max(drift.turn, angle_between(now.orientation, start[id].orientation));
+    }
+  }
+  return drift;
+}
+
+TEST_P(Standing, ThreeCubesOnEachOtherStayWhereTheyAre) {
+  std::vector<std::string> scene = method();
+  scene.push_back("Solver.Iterations=5000");
+  SceneRun run("stack.gravitas", scene);
+  const double energy = run.energy();
+  const Drift drift = drift_of(&run, {"Lower", "Middle", "Upper"});
+  EXPECT_LE(drift.way, 1e-9);
+  EXPECT_LE(drift.turn, 1e-9);
+  EXPECT_LE(run.kinetic_energy(), 1e-15 * energy);
+  EXPECT_LE(run.report().max_penetration(), 1e-9);
+}
+
+// With as many sweeps as a step has by default the first steps, which have no warm start, end before they have converged.
+// What they leave is a shift of less than this, once.
+TEST(Stack, SettlesByLessThanAMicrometreWithTheDefaultSweeps) {
+  for (const double h : {1.0 / 60, 1.0 / 240}) {
+    SceneRun run("stack.gravitas", {set("Simulator.TimeStep", h)});
+    const double energy = run.energy();
+    const Drift drift = drift_of(&run, {"Lower", "Middle", "Upper"});
+    EXPECT_LE(drift.way, 1e-6) << "time step " << h;
+    EXPECT_LE(drift.turn, 1e-7) << "time step " << h;
+    EXPECT_LE(run.kinetic_energy(), 1e-15 * energy) << "time step " << h;
+    EXPECT_LE(run.report().max_penetration(), 1e-9) << "time step " << h;
+  }
+}
+
+// What we do badly: explicit Euler moves by the velocity that the first, unfinished solution left (1e-5 m/s), which opens
+// contacts by more than rounding; open contacts carry nothing, so that the cubes begin to rock by g h/2 and wander off.
+TEST(Stack, DISABLED_StandsWithExplicitEulerAndTheDefaultSweeps) {
+  SceneRun run("stack.gravitas", {"Integrator=Euler"});
+  const Drift drift = drift_of(&run, {"Lower", "Middle", "Upper"});
+  EXPECT_LE(drift.way, 1e-6);
+  EXPECT_LE(drift.turn, 1e-7);
+}
+
+TEST_P(Standing, CylindersAndABallOnABoxStayWhereTheyAre) {
+  SceneRun run("standing.gravitas", method());
+  const Drift drift = drift_of(&run, {"Upright", "Lying", "Support", "Ball"});
+  EXPECT_LE(drift.way, 1e-9);
+  EXPECT_LE(drift.turn, 1e-9);
+}
+
+TEST_P(Standing, ACubeOnItsEdgeFallsToTheSideItLeansTo) {
+  for (const double lean : {-0.1, 0.02, 0.1}) {
+    const double angle = kPi / 4.0 + lean;
+    const double height = 0.5 * (std::cos(angle) + std::sin(angle));
+    std::vector<std::string> scene = method();
+    scene.push_back(set("Body.Tipped.Position", Vector3(6, height, 0)));
+    scene.push_back(set("Body.Tipped.Orientation", testing::turned(Vector3::UnitZ(), angle)));
+    SceneRun run("standing.gravitas", scene);
+    run.to_end();
+    const SceneRun::Motion cube = run.body("Tipped");
+    EXPECT_NEAR(cube.pose.position.y(), 0.5, 1e-9) << "lean " << lean;
+    EXPECT_LE(cube.twist.linear.norm() + cube.twist.angular.norm(), 1e-9) << "lean " << lean;
+    // a positive turn about z is one towards -x, and 45 degrees more end on the next face
+    const double expected = lean > 0.0 ? kPi / 2.0 : 0.0;
+    // about the vertical it may turn a little: the edge's friction is shared between two contacts by relaxation
+    EXPECT_NEAR(angle_between(cube.pose.orientation, testing::turned(Vector3::UnitZ(), expected)), 0.0, 1e-5) << lean;
+    EXPECT_NEAR((cube.pose.orientation * Vector3::UnitX()).cwiseAbs().maxCoeff(), 1.0, 1e-9) << lean;
+    EXPECT_LE(run.report().max_penetration(), 1e-9) << "lean " << lean;
+    EXPECT_LT(run.energy(), run.report().energy().initial());
+  }
+}
+
+}  // namespace
+}  // namespace gravitas
