@@ -9,7 +9,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <mutex>
 #include <utility>
+
+#include "plugin_sdk/channel/digest.h"
 
 namespace gravitas {
 namespace {
@@ -61,30 +65,20 @@ std::vector<Property> read_properties(const gravitas_property* plain, std::uint6
   return properties;
 }
 
-}  // namespace
-
-PluginDeclaration read_declaration(const gravitas_description& plain) {
-  PluginDeclaration declaration;
-  declaration.name = plain.name;
-  declaration.version = plain.version;
-  declaration.meaning = plain.meaning;
-  declaration.slot = static_cast<Slot>(plain.slot);
-  declaration.capabilities.assign(plain.capabilities, plain.capabilities + plain.capability_count);
-  for (std::uint64_t i = 0; i < plain.type_count; ++i) {
-    const gravitas_type& type = plain.types[i];
-    declaration.types.push_back({type.name, type.meaning, read_properties(type.properties, type.property_count)});
-  }
-  declaration.properties = read_properties(plain.properties, plain.property_count);
-  declaration.theta = plain.theta;
-  return declaration;
+std::uint64_t content_digest(int descriptor) {
+  struct stat status;
+  if (fstat(descriptor, &status) != 0 || status.st_size == 0) return 0;
+  const auto size = static_cast<std::size_t>(status.st_size);
+  void* bytes = mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor, 0);
+  if (bytes == MAP_FAILED) return 0;
+  channel::Digest digest;
+  digest.add(bytes, size);
+  munmap(bytes, size);
+  return digest.value();
 }
 
-PluginLibrary load_plugin_library(const std::string& path, std::string* problem) {
-  const int copy = private_copy(path);
-  if (copy < 0) {
-    *problem = "cannot read '" + path + "': " + std::strerror(errno);
-    return {};
-  }
+// Loads and checks the copy of a library that errors call `path`.
+PluginLibrary load_copy(int copy, const std::string& path, std::string* problem) {
   // the descriptor stays open: debuggers and sanitizers read symbols through this name
   const std::string private_path = "/proc/self/fd/" + std::to_string(copy);
   void* handle = dlopen(private_path.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -122,6 +116,44 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
   PluginLibrary library;
   library.table = table;
   library.declaration = read_declaration(*table->description);
+  return library;
+}
+
+}  // namespace
+
+PluginDeclaration read_declaration(const gravitas_description& plain) {
+  PluginDeclaration declaration;
+  declaration.name = plain.name;
+  declaration.version = plain.version;
+  declaration.meaning = plain.meaning;
+  declaration.slot = static_cast<Slot>(plain.slot);
+  declaration.capabilities.assign(plain.capabilities, plain.capabilities + plain.capability_count);
+  for (std::uint64_t i = 0; i < plain.type_count; ++i) {
+    const gravitas_type& type = plain.types[i];
+    declaration.types.push_back({type.name, type.meaning, read_properties(type.properties, type.property_count)});
+  }
+  declaration.properties = read_properties(plain.properties, plain.property_count);
+  declaration.theta = plain.theta;
+  return declaration;
+}
+
+PluginLibrary load_plugin_library(const std::string& path, std::string* problem) {
+  const int copy = private_copy(path);
+  if (copy < 0) {
+    *problem = "cannot read '" + path + "': " + std::strerror(errno);
+    return {};
+  }
+  // the same content is loaded once: no library is ever unloaded, so each load more would be kept for ever
+  static std::mutex mutex;
+  static std::map<std::uint64_t, PluginLibrary> loaded;
+  const std::lock_guard lock(mutex);
+  const std::uint64_t content = content_digest(copy);
+  if (const auto known = loaded.find(content); known != loaded.end()) {
+    close(copy);
+    return known->second;
+  }
+  PluginLibrary library = load_copy(copy, path, problem);
+  if (library.table != nullptr) loaded.emplace(content, library);
   return library;
 }
 

@@ -15,7 +15,7 @@ struct PluginLibrary {
 };
 
 // Loads the library from a private copy (one path gives one handle in a process, and a file that is replaced
-// under a running program must not change it), checks magic, versions and schema hash, and reads its
+// under a running program must not change it; equal content is loaded once), checks magic, versions and schema hash, and reads its
 // declaration. Running its constructors may do anything: a kernel does this for direct hosting only.
 // On failure returns a library without table, and `problem` says why: not a readable file, no shared library,
 // no plugin, made for another schema or version of the interface.
