@@ -8,9 +8,9 @@
 //   box - half-space         closed form                               up to 4 vertices
 //   cylinder - half-space    closed form                               4 of a cap, 2 of a side line
 //   box - box                separating axes (15)                      face clipping, or 1 edge
-//   pair box - cylinder,          separating axes and an exact search of    patch clipping: 3 or 4
-//   on a cylinder - cylinder      the curved families (contact_axis.h)      face, 2 on a line, else
-//   1 half-space - half-space  no contact
+//   box - cylinder,          separating axes and an exact search of    patch clipping: 3 or 4 on a face,
+//   cylinder - cylinder      the curved families (contact_axis.h)      2 on a line, else 1
+//   half-space - half-space  no contact
 // For a gap between boxes and cylinders whose closest features own no separating axis, the normal
 // is that of the closest points (gjk.h).
 //
