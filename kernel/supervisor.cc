@@ -1,7 +1,6 @@
 #include "kernel/supervisor.h"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/epoll.h>
@@ -11,6 +10,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <deque>
@@ -80,8 +80,8 @@ WorkerProcess::~WorkerProcess() {
 }
 
 bool WorkerProcess::wait(int milliseconds) const {
-  pollfd ended = {pidfd_, POLLIN, 0};
-  return poll(&ended, 1, milliseconds) > 0;
+  std::unique_lock lock(mutex_);
+  return reaped_.wait_for(lock, std::chrono::milliseconds(milliseconds), [this] { return has_ended(); });
 }
 
 void WorkerProcess::kill() const { syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0); }
@@ -180,8 +180,12 @@ void Supervisor::reap(int pidfd) {
     process = std::move(shared_->processes[pidfd]);
     shared_->processes.erase(pidfd);
   }
-  process->ending_ = describe_ending(info);
-  process->ended_.store(true, std::memory_order_release);
+  {
+    const std::lock_guard lock(process->mutex_);
+    process->ending_ = describe_ending(info);
+    process->ended_.store(true, std::memory_order_release);
+  }
+  process->reaped_.notify_all();
   // called once; what it holds may hold the process
   const std::function<void()> on_end = std::move(process->on_end_);
   process->on_end_ = nullptr;

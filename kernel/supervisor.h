@@ -5,8 +5,10 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -21,7 +23,7 @@ class WorkerProcess {
   // How it ended, in words ("killed by signal 9 (Killed)"); valid once has_ended().
   const std::string& ending() const { return ending_; }
 
-  // Waits up to `milliseconds` for the process to end.
+  // Waits up to `milliseconds` for the process to have ended and been reaped; whether it has.
   bool wait(int milliseconds) const;
   void kill() const;
 
@@ -30,6 +32,8 @@ class WorkerProcess {
 
   int process_id_ = -1;
   int pidfd_ = -1;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable reaped_;
   std::atomic<bool> ended_{false};
   std::string ending_;
   std::function<void()> on_end_;

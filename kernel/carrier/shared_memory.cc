@@ -365,7 +365,6 @@ void SharedMemoryCarrier::answer_callback(const gravitas_frame_header& header, s
 void SharedMemoryCarrier::report_death() {
   // the end may be known to the socket before it is to the watcher
   connection_->process->wait(kDrainMilliseconds);
-  for (int i = 0; i < kDrainMilliseconds && !connection_->process->has_ended(); ++i) usleep(1000);
   throw StageFault(FaultKind::kDeath, "pidfd",
                    "its worker process " + std::to_string(process_id()) + " " +
                        (connection_->process->has_ended() ? "was " + connection_->process->ending() : "is gone"));

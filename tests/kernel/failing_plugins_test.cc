@@ -3,6 +3,7 @@
 #include <dirent.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstring>
 #include <string>
@@ -175,9 +176,12 @@ TEST(FailingPlugins, NothingIsLeftBehind) {
   for (const char* library : libraries) {
     live_and_die(library);
     // all children are reaped: there is none to wait for
-    EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
+    siginfo_t info{};
+    EXPECT_EQ(waitid(P_ALL, 0, &info, WEXITED | WNOHANG | WNOWAIT), -1) << "process " << info.si_pid;
   }
-  EXPECT_EQ(open_descriptors(), before);
+  // gRPC and the supervisor's thread close the last ones in their own time
+  for (int i = 0; i < 1000 && open_descriptors() > before; ++i) usleep(10'000);
+  EXPECT_LE(open_descriptors(), before);
 }
 
 }  // namespace
