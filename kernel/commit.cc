@@ -35,6 +35,7 @@ StepOutcome Environment::step() {
     return StepOutcome::kPaused;
   }
   step_profile_.add(channel::now_ns() - start);
+  if (commit_listener_ != nullptr) commit_listener_->on_commit(*this);
   return StepOutcome::kCommitted;
 }
 

@@ -1,8 +1,5 @@
 #include "kernel/control_session.h"
 
-#include <fcntl.h>
-#include <grpcpp/create_channel_posix.h>
-
 #include <utility>
 
 #include "plugin_sdk/floating_point.h"
@@ -35,9 +32,8 @@ Hello hello_of_this_kernel() {
   return hello;
 }
 
-ControlSession::ControlSession(int descriptor, Hello hello) {
-  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-  stub_ = control::v1::WorkerControl::NewStub(grpc::CreateInsecureChannelFromFd("worker", descriptor));
+ControlSession::ControlSession(const std::shared_ptr<grpc::Channel>& channel, Hello hello)
+    : stub_(control::v1::WorkerControl::NewStub(channel)) {
   thread_ = std::thread([this, hello = std::move(hello)]() mutable { run(std::move(hello)); });
 }
 
@@ -88,14 +84,20 @@ std::string ControlSession::greet(const Hello& hello) {
   return {};
 }
 
-// What differs would make the worker compute other bits, or not be the worker that was started.
-std::string ControlSession::judge(const Hello& hello) const {
+// What differs would make the worker compute other bits, or not be the worker that was started. A worker that cannot
+// know its floating-point environment leaves it out: its bits are its own, and the report says so.
+std::string ControlSession::judge(const Hello& hello) {
   const auto& ours = hello.floating_point();
   const auto& theirs = welcome_.floating_point();
   if (welcome_.magic() != GRAVITAS_MAGIC) return "it is no Gravitas worker";
   if (welcome_.protocol() != kProtocol) return "it speaks another version of the control protocol";
   if (welcome_.schema_hash() != hello.schema_hash()) return "it was built for another schema of the stage contracts";
   if (welcome_.epoch() != hello.epoch() || welcome_.nonce() != hello.nonce()) return "it answers to another greeting";
+  if (!welcome_.has_floating_point()) {
+    const std::lock_guard lock(mutex_);
+    faults_.emplace_back("it does not say how its floating-point arithmetic is set: its bits may differ elsewhere");
+    return {};
+  }
   if (theirs.mxcsr() != ours.mxcsr()) return "its floating-point control register differs from the kernel's";
   if (theirs.c_library() != ours.c_library()) return "it runs on another C library, " + theirs.c_library();
   if (!std::equal(ours.cpu_features().begin(), ours.cpu_features().end(), theirs.cpu_features().begin(),

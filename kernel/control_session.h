@@ -15,8 +15,8 @@ namespace gravitas::kernel {
 
 class ControlSession {
  public:
-  // Takes over the descriptor (a connected stream socket) and greets the worker in a thread of its own.
-  ControlSession(int descriptor, control::v1::Hello hello);
+  // Greets the worker at the other end of the channel in a thread of its own.
+  ControlSession(const std::shared_ptr<grpc::Channel>& channel, control::v1::Hello hello);
   ~ControlSession();
 
   // Waits for the worker's answer to the greeting. Empty text: it serves; else why it does not.
@@ -33,7 +33,7 @@ class ControlSession {
  private:
   void run(control::v1::Hello hello);
   std::string greet(const control::v1::Hello& hello);
-  std::string judge(const control::v1::Hello& hello) const;
+  std::string judge(const control::v1::Hello& hello);
   void beat();
   void cancel();
 

@@ -44,7 +44,10 @@ std::string validate_joint(const EnvironmentDescription& d, const ConstraintDesc
 
 }  // namespace
 
-const char* hosting_name(Hosting hosting) { return hosting == Hosting::kDirect ? "direct" : "shm"; }
+const char* hosting_name(Hosting hosting) {
+  constexpr const char* kNames[] = {"direct", "shm", "grpc"};
+  return kNames[static_cast<std::uint32_t>(hosting)];
+}
 
 SlotDescription& EnvironmentDescription::slot(Slot which) {
   switch (which) {

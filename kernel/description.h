@@ -19,15 +19,20 @@ namespace gravitas::kernel {
 enum class Hosting : std::uint32_t {
   kDirect,        // in the kernel's process
   kSharedMemory,  // in a worker process, data in shared memory
+  kGrpc,          // in a worker process, data as gRPC messages
 };
 
-// "direct", "shm".
+// "direct", "shm", "grpc".
 const char* hosting_name(Hosting hosting);
 
 struct PluginChoice {
   PluginDeclaration declaration;
   std::string library;           // path of the shared library
   std::vector<double> settings;  // values of the plugin's own properties
+  // Instead of the library, whatever the slot's hosting, gRPC to a worker: one that this shell command starts, given
+  // `--listen ADDRESS`, or one that listens at this address already and serves all plugins that name it, in order.
+  std::string command = {};
+  std::string address = {};
 };
 
 struct SlotDescription {

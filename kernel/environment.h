@@ -24,6 +24,7 @@
 #include "kernel/model.h"
 #include "kernel/plan.h"
 #include "kernel/profile.h"
+#include "kernel/saved_state.h"
 #include "kernel/slot.h"
 #include "kernel/stage.h"
 #include "kernel/state.h"
@@ -39,16 +40,21 @@ struct StateView {
   std::span<const double> position, orientation, linear_velocity, angular_velocity;
 };
 
-// Largest overlap (m) and joint error (m; rad count as m) of the state that the last step committed.
-struct CommitFigures {
-  double penetration = 0.0;
-  double joint_error = 0.0;
-};
-
 // One failed call, as the report shows it.
 struct FaultRecord {
   std::uint32_t step;
   StageFault fault;
+};
+
+class Environment;
+
+// Hears of every commit: a recorder.
+class CommitListener {
+ public:
+  virtual ~CommitListener() = default;
+  // Called at the end of a step, when S_{n+1} is the committed state and its events have been told. What it throws
+  // comes out of step(); the commit stands.
+  virtual void on_commit(const Environment& environment) = 0;
 };
 
 class Environment : private DerivativeSource {
@@ -87,10 +93,22 @@ class Environment : private DerivativeSource {
   const DurationHistogram& stage_time(Stage stage) const { return profile_[static_cast<std::size_t>(stage)]; }
   // Time of the stage that was not spent in the plugin.
   const DurationHistogram& transport_time(Stage stage) const { return transport_[static_cast<std::size_t>(stage)]; }
+  // Time in which the answers of the stage were checked: wire, structure, numbers.
+  const DurationHistogram& validation_time(Stage stage) const { return validation_[static_cast<std::size_t>(stage)]; }
   const DurationHistogram& step_time() const { return step_profile_; }
 
   // At most one listener; null: no events are made.
   void set_listener(EventListener* listener) { listener_ = listener; }
+  // At most one; null: nobody.
+  void set_commit_listener(CommitListener* listener) { commit_listener_ = listener; }
+
+  // The committed state with everything that the next steps depend on; its columns are valid until the next step.
+  SavedState saved_state() const;
+
+  // Goes on from a saved state of the same description: the steps that follow are those that followed it, bit for bit.
+  // Joints stay bound, and potentials measured, from the initial state. Possible before the first step alone. Takes
+  // any bytes: returns the first thing that cannot be (empty if restored), and then nothing has changed.
+  std::string restore(const SavedState& saved);
 
  private:
   // simulators/basic.cc: the order of the stages.
@@ -123,6 +141,10 @@ class Environment : private DerivativeSource {
   void bind_joints();
   void ask_constant_forces();
 
+  // restore.cc
+  double length_of_step(std::uint32_t step) const;
+  std::string find_misfit(const SavedState& saved) const;
+
   // forces.cc
   std::span<const ColumnId> trial_columns() const override;
   ColumnId wrench_column() const override { return data_.wrench.id(); }
@@ -133,12 +155,17 @@ class Environment : private DerivativeSource {
   // Asks a slot and books the time.
   Untrusted<StageCall> ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives);
 
+  // Books the time since the answer came, and that of the check of its frame.
+  void book_check(Stage stage);
+
   // Asks a slot and checks the answer; what the check finds is the fault of the plugin that was asked.
   template <typename Check>
   auto ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives, Check&& check) {
     const Untrusted<StageCall> answer = ask(stage, slot, call, derivatives);
     try {
-      return check(answer);
+      const auto checked = check(answer);
+      book_check(stage);
+      return checked;
     } catch (StageFault& fault) {
       slot->fail(std::move(fault), call.target);
     }
@@ -181,9 +208,11 @@ class Environment : private DerivativeSource {
   Hash state_hash_, chain_hash_;
   std::optional<FaultRecord> fault_;
   EventListener* listener_ = nullptr;
+  CommitListener* commit_listener_ = nullptr;
   // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.
   std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};
-  std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_;
+  std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_, validation_;
+  std::uint64_t check_begin_ns_ = 0;  // of the last answer
   DurationHistogram step_profile_;
 };
 

@@ -14,6 +14,7 @@ struct LeftOut {
   std::string why;
 };
 
+// One host of a slot and the plugins it holds.
 struct PlannedSlot {
   Slot slot;
   std::vector<std::string> plugins;

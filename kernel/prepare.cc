@@ -1,5 +1,6 @@
 // What an environment does once, before its first step: start its hosts, bind its joints, ask for the forces.
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 #include <stdexcept>
 
@@ -55,9 +56,12 @@ void Environment::start_slots() {
   const std::array<StageSlot*, 6> slots = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};
   for (StageSlot* slot : slots) slot->start(description_.threads);
   for (StageSlot* slot : slots) slot->finish_start();
-  for (PlannedSlot& planned : plan_.slots)
+  // the planner knows slots; the hosts are known now
+  std::vector<PlannedSlot> hosts;
+  for (const PlannedSlot& planned : plan_.slots)
     for (const StageSlot* slot : slots)
-      if (slot->which() == planned.slot) planned.process_id = slot->process_id();
+      if (slot->which() == planned.slot) std::ranges::move(slot->hosts(), std::back_inserter(hosts));
+  plan_.slots = std::move(hosts);
 }
 
 void Environment::bind_joints() {

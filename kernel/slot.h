@@ -6,9 +6,16 @@
 #include <string>
 
 #include "kernel/carrier/carrier.h"
+#include "kernel/plan.h"
 #include "kernel/validate.h"
 
 namespace gravitas::kernel {
+
+// Of a call with all its attempts at room, ns.
+struct CallTimes {
+  std::uint64_t compute = 0;  // the plugin worked
+  std::uint64_t check = 0;    // the frame of the answer was checked
+};
 
 class StageSlot {
  public:
@@ -21,18 +28,15 @@ class StageSlot {
   void stop();
   void drain();
 
-  bool is_running() const { return carrier_ != nullptr; }
+  bool is_running() const { return !hosts_.empty(); }
   Slot which() const { return which_; }
   const SlotDescription& description() const { return description_; }
-  std::vector<std::string> take_complaints() {
-    return carrier_ ? carrier_->take_complaints() : std::vector<std::string>();
-  }
-  int process_id() const { return carrier_ ? carrier_->process_id() : 0; }
+  std::vector<std::string> take_complaints();
+  // The hosts as the plan shows them.
+  std::vector<PlannedSlot> hosts() const;
 
   // Asks; the answer lies in the call's reply columns but is not to be used before validation.
-  // Time the plugin worked is added to *compute_ns.
-  Untrusted<StageCall> ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
-                           std::uint64_t* compute_ns);
+  Untrusted<StageCall> ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives, CallTimes* times);
 
   // Throws the fault with this slot and the plugin that was asked written into it.
   [[noreturn]] void fail(StageFault fault, std::uint32_t target) const;
@@ -40,8 +44,21 @@ class StageSlot {
  private:
   Slot which_;
   SlotDescription description_;
-  std::unique_ptr<PendingCarrier> pending_;
-  std::unique_ptr<Carrier> carrier_;
+  // The plugins of a slot live in one host, but for those that are commands or at an address.
+  struct Host {
+    SlotDescription description;
+    std::unique_ptr<PendingCarrier> pending;
+    std::unique_ptr<Carrier> carrier;
+  };
+  struct Route {
+    std::size_t host;
+    std::uint32_t target;
+  };
+  void assign_hosts();
+  [[noreturn]] void fail(StageFault fault, const Host& host) const;
+
+  std::vector<Host> hosts_;
+  std::vector<Route> routes_;  // per plugin of the slot
 };
 
 }  // namespace gravitas::kernel

@@ -24,17 +24,24 @@ std::uint64_t new_contact_key(std::uint32_t a, std::uint32_t b, std::uint32_t fe
 Untrusted<StageCall> Environment::ask(Stage stage, StageSlot* slot, const StageCall& call,
                                       DerivativeSource* derivatives) {
   const std::uint64_t start = channel::now_ns();
-  std::uint64_t compute_ns = 0;
-  Untrusted<StageCall> answer = slot->ask(call, &arena_, derivatives, &compute_ns);
-  const std::uint64_t total = channel::now_ns() - start;
+  CallTimes times;
+  Untrusted<StageCall> answer = slot->ask(call, &arena_, derivatives, &times);
+  const std::uint64_t end = channel::now_ns();
+  const std::uint64_t total = end - start;
+  check_begin_ns_ = end - times.check;
   profile_[static_cast<std::size_t>(stage)].add(total);
   if (slot->description().hosting == Hosting::kDirect &&
       static_cast<double>(total) > 1e9 * slot->description().deadline) {
     std::uint64_t& longest = overrun_ns_[static_cast<std::size_t>(stage)];
     longest = std::max(longest, total);
   }
-  if (compute_ns > 0) transport_[static_cast<std::size_t>(stage)].add(total - std::min(total, compute_ns));
+  if (times.compute > 0) transport_[static_cast<std::size_t>(stage)].add(total - std::min(total, times.compute));
   return answer;
+}
+
+void Environment::book_check(Stage stage) {
+  const std::uint64_t spent = channel::now_ns() - check_begin_ns_;
+  validation_[static_cast<std::size_t>(stage)].add(spent);
 }
 
 std::vector<std::string> Environment::warnings() {
@@ -68,6 +75,11 @@ void Environment::begin_step() {
   data_.time_step[0] = step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
   data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;
   start_wrench_known_ = false;
+  if (!wrench_is_constant_) {
+    // no trace of earlier steps: a step must be the same after a restore
+    std::ranges::fill(data_.wrench.span(), 0.0);
+    std::ranges::fill(data_.start_wrench.span(), 0.0);
+  }
   if (!has_impulses_ || step_count_ != 0) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* impulse = &data_.impulse[6 * i];

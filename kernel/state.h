@@ -9,6 +9,9 @@
 
 namespace gravitas::kernel {
 
+// What the rows of a column of the state stand for: columns of one kind have the same number of rows.
+enum class StateRows : std::uint32_t { kBody, kJoint, kPluginState, kContact, kDiscrepancy, kTouching };
+
 struct State {
   State(Arena* arena, const EnvironmentDescription& description);
   // The initial state; after Arena::seal().
@@ -40,6 +43,27 @@ struct State {
 
   // Pairs of bodies that touch, ascending.
   Column<std::uint32_t> touching;  // 2
+
+  // visit(name, what a row is, numbers per row, column) for every column, always in this order.
+  template <typename Visit>
+  void visit_columns(Visit&& visit) const {
+    visit("position", StateRows::kBody, 3U, position);
+    visit("orientation", StateRows::kBody, 4U, orientation);
+    visit("linear_velocity", StateRows::kBody, 3U, linear_velocity);
+    visit("angular_velocity", StateRows::kBody, 3U, angular_velocity);
+    visit("intact", StateRows::kJoint, 1U, intact);
+    visit("plugin_state", StateRows::kPluginState, 1U, plugin_state);
+    visit("state_changed", StateRows::kBody, 1U, state_changed);
+    visit("contact_body", StateRows::kContact, 2U, contact_body);
+    visit("contact_feature", StateRows::kContact, 1U, contact_feature);
+    visit("contact_key", StateRows::kContact, 1U, contact_key);
+    visit("contact_impulse", StateRows::kContact, 3U, contact_impulse);
+    visit("contact_correction", StateRows::kContact, 1U, contact_correction);
+    visit("discrepancy_constraint", StateRows::kDiscrepancy, 1U, discrepancy_constraint);
+    visit("discrepancy_impulse", StateRows::kDiscrepancy, 3U, discrepancy_impulse);
+    visit("discrepancy_correction", StateRows::kDiscrepancy, 3U, discrepancy_correction);
+    visit("touching", StateRows::kTouching, 2U, touching);
+  }
 };
 
 }  // namespace gravitas::kernel

@@ -1,5 +1,6 @@
 #include "plugin_sdk/constraint.h"
 
+#include <cmath>
 #include <string>
 
 namespace gravitas {
@@ -30,7 +31,23 @@ std::span<const double> slice(std::span<const double> numbers, std::span<const s
   return numbers.subspan(begin[row], begin[row + 1] - begin[row]);
 }
 
+void push_bound(const stage::ConstraintBindReply& reply, std::size_t joint, std::span<const double> numbers) {
+  for (const double number : numbers) {
+    if (!std::isfinite(number))
+      throw Refusal("joint " + std::to_string(joint) +
+                    " binds to numbers that are not finite: its properties or the poses of its bodies are not, or too "
+                    "large");
+    reply.bound().push(number);
+  }
+}
+
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d) {
+  if (!d.point1.allFinite() || !d.point2.allFinite() || !d.velocity.allFinite() || !std::isfinite(d.correction) ||
+      !d.axes.coeffs().allFinite() || !d.lower.allFinite() || !d.upper.allFinite() || !d.compliance.allFinite() ||
+      !d.damping.allFinite() || !d.maximum_force.allFinite())
+    throw Refusal("joint " + std::to_string(joint) +
+                  " has a discrepancy that is not finite: its bound numbers or the poses of its bodies are not, or too "
+                  "large");
   reply.constraint().push(joint);
   push_vector(reply.point1(), d.point1);
   push_vector(reply.point2(), d.point2);

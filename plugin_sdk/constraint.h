@@ -31,11 +31,13 @@ class BoundWriter {
 namespace detail {
 JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
                       std::span<const double> orientation, std::size_t joint);
+void push_bound(const stage::ConstraintBindReply& reply, std::size_t joint, std::span<const double> numbers);
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d);
 std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row);
 }  // namespace detail
 
-// Calls bind(type id, properties of the joint, bodies at the start, writer) for every joint.
+// Calls bind(type id, properties of the joint, bodies at the start, writer) for every joint. Throws Refusal for a body
+// that does not exist, and for bound numbers that are not finite.
 template <typename Bind>
 void bind_each(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Bind&& bind) {
   reply.bound_begin().push(0);
@@ -43,12 +45,13 @@ void bind_each(const stage::ConstraintBindRequest& request, const stage::Constra
     BoundWriter writer;
     bind(request.constraint_type()[i], PropertyCursor(detail::slice(request.parameter(), request.parameter_begin(), i)),
          detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i), writer);
-    for (const double number : writer.numbers()) reply.bound().push(number);
+    detail::push_bound(reply, i, writer.numbers());
     reply.bound_begin().push(reply.bound().count());
   }
 }
 
 // Calls describe(type id, bound numbers, bodies, emit) for every joint that holds; emit(discrepancy) adds one.
+// Throws Refusal for a discrepancy that is not finite.
 template <typename Describe>
 void describe_each(const stage::ConstraintDiscrepanciesRequest& request,
                    const stage::ConstraintDiscrepanciesReply& reply, Describe&& describe) {

@@ -1,6 +1,9 @@
 // For authors of forces: the loop over the applications of a Force.Wrenches call.
 #pragma once
 
+#include <cmath>
+#include <string>
+
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/plugin.h"
@@ -16,7 +19,7 @@ struct ApplicationAnswer {
 };
 
 // Calls answer(type id, flattened properties of the force, body) for every application in order and writes what it
-// returns. Throws Refusal for an index outside the request.
+// returns. Throws Refusal for an index outside the request, and for an answer that is not finite.
 template <typename Answer>
 void for_each_application(const stage::ForceWrenchesRequest& request, const stage::ForceWrenchesReply& reply,
                           Answer&& answer) {
@@ -29,6 +32,10 @@ void for_each_application(const stage::ForceWrenchesRequest& request, const stag
     const ApplicationAnswer a =
         answer(request.force_type()[force],
                PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force])), body);
+    if (!a.wrench.force.allFinite() || !a.wrench.torque.allFinite() || !a.impulse.force.allFinite() ||
+        !a.impulse.torque.allFinite() || !std::isfinite(a.potential))
+      throw Refusal("the wrench of application " + std::to_string(i / 2) +
+                    " is not finite: the force's properties or the body's mass or state are not, or too large");
     const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
       column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());
     };

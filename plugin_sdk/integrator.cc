@@ -1,5 +1,7 @@
 #include "plugin_sdk/integrator.h"
 
+#include <string>
+
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
 
@@ -61,6 +63,12 @@ Acceleration Derivatives::acceleration(std::size_t body, const BodyState& state,
 
 BodyState Derivatives::start(std::size_t body) const { return detail::state_at(request_, body); }
 
+Twist accelerated(const Twist& twist, const Acceleration& acceleration, double damping, double time_step) {
+  const double slowed = damping_factor(damping, time_step);
+  return {slowed * (twist.linear + time_step * acceleration.linear),
+          slowed * (twist.angular + time_step * acceleration.angular)};
+}
+
 double damping_factor(double damping, double time_step) {
   return damping == 0.0 ? 1.0 : math::exp(-damping * time_step);
 }
@@ -75,6 +83,10 @@ BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t
 void push_state(const stage::IntegratorIntegrateReply& reply, const BodyState& state) {
   const Vector3 &x = state.pose.position, &v = state.twist.linear, &w = state.twist.angular;
   const Quaternion& q = state.pose.orientation;
+  if (!x.allFinite() || !q.coeffs().allFinite() || !v.allFinite() || !w.allFinite())
+    throw Refusal(
+        "body " + std::to_string(reply.position().count() / 3) +
+        " comes to a state that is not finite: its state, forces, inertia, damping or the time step overflow");
   reply.position().push(x.x(), x.y(), x.z());
   reply.orientation().push(q.w(), q.x(), q.y(), q.z());
   reply.linear_velocity().push(v.x(), v.y(), v.z());

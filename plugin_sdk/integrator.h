@@ -54,10 +54,14 @@ class Derivatives {
 };
 
 // Calls move(body, state) for every movable body and writes the state it returns as S*; kinematic bodies go on
-// with their velocities (exactly, x + h v and exp(h w) q), immovable ones stay as they are, bit for bit.
+// with their velocities (exactly, x + h v and exp(h w) q), immovable ones stay as they are, bit for bit. Throws Refusal
+// where a state comes out that is not finite.
 template <typename Move>
 void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                    Move&& move);
+
+// Velocities after `time_step` of constant acceleration, slowed by damping: e^(-c h) (v + h a), e^(-c h) (w + h alpha).
+Twist accelerated(const Twist& twist, const Acceleration& acceleration, double damping, double time_step);
 
 // Factor by which damping slows a body in time h: exp(-c h) for any c >= 0, never a change of sign.
 double damping_factor(double damping, double time_step);

@@ -3,6 +3,8 @@
 #include <cstring>
 #include <deque>
 
+#include "plugin_sdk/property_value.h"
+
 namespace gravitas {
 
 const char* slot_name(Slot slot) {
@@ -135,13 +137,18 @@ const gravitas_description* plain_description(PluginDeclaration declaration) {
   return &owner.description;
 }
 
+void demand_settings(const PluginDeclaration& declaration, const double* settings, std::uint64_t count) {
+  const std::string problem = check_flattened(declaration.properties, {settings, count});
+  if (!problem.empty()) throw Refusal("settings of " + declaration.name + ": " + problem);
+}
+
 void set_error(gravitas_error* error, const char* text) {
   std::strncpy(error->text, text, sizeof error->text - 1);
   error->text[sizeof error->text - 1] = '\0';
 }
 
 bool needs_capacity(stage::Method method, const gravitas_reply_column* reply) {
-  const std::size_t columns = stage::kMethods[static_cast<std::uint32_t>(method)].reply.size();
+  const std::size_t columns = stage::method_info(method).reply.size();
   for (std::size_t i = 0; i < columns; ++i)
     if (reply[i].count > reply[i].capacity) return true;
   return false;

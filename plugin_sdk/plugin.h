@@ -182,6 +182,9 @@ template <typename Body>
 std::int32_t guarded(gravitas_error* error, Body&& body);
 void set_error(gravitas_error* error, const char* text);
 
+// Throws Refusal if the numbers are not what the plugin's own properties take.
+void demand_settings(const PluginDeclaration& declaration, const double* settings, std::uint64_t count);
+
 // True if a reply column was asked to hold more than there is room for.
 bool needs_capacity(stage::Method method, const gravitas_reply_column* reply);
 
@@ -207,6 +210,7 @@ std::int32_t guarded(gravitas_error* error, Body&& body) {
 template <typename P>
 std::int32_t create(const double* settings, std::uint64_t count, void** instance, gravitas_error* error) {
   return guarded(error, [&]() -> std::int32_t {
+    demand_settings(P::declaration(), settings, count);
     *instance = new P(PropertyCursor({settings, count}));
     return GRAVITAS_OK;
   });

@@ -1,16 +1,29 @@
 #include "plugin_sdk/property_value.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/near_miss.h"
 
 namespace gravitas {
 namespace {
+
+// One number of a flattened value.
+bool takes(const Property& p, double number) {
+  if (!std::isfinite(number) || number > p.maximum || number < p.minimum) return false;
+  if (p.exclusive_minimum && number == p.minimum) return false;
+  if (p.kind == PropertyKind::kFlag) return number == 0.0 || number == 1.0;
+  if (p.kind == PropertyKind::kChoice && (number < 0.0 || number >= static_cast<double>(p.choices.size())))
+    return false;
+  const bool is_whole = p.kind == PropertyKind::kInteger || p.kind == PropertyKind::kChoice;
+  return !is_whole || number == std::floor(number);
+}
 
 constexpr double kNormTolerance = 1e-3;
 constexpr double kRoundingOfSquaredNorm = 1e-15;
@@ -257,6 +270,29 @@ bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue
     }
   }
   return good;
+}
+
+std::string check_flattened(const std::vector<Property>& declared, std::span<const double> numbers) {
+  for (const Property& p : declared) {
+    std::size_t size = p.flat_size(), first = 0;
+    if (size > numbers.size()) return "fewer numbers than the properties take";
+    if (p.kind == PropertyKind::kTable) {
+      const double rows = numbers[0];
+      if (!(rows >= 0.0) || rows != std::floor(rows)) return p.name + " has " + number_text(rows) + " rows";
+      if (rows * p.columns > static_cast<double>(numbers.size() - 1)) return "fewer numbers than the properties take";
+      first = 1;
+      size = 1 + static_cast<std::size_t>(rows) * p.columns;
+    }
+    const std::span<const double> values = numbers.subspan(first, size - first);
+    numbers = numbers.subspan(size);
+    const bool may_be_absent = !p.is_required && p.default_numbers.empty();
+    if (may_be_absent && std::ranges::all_of(values, [](double number) { return std::isnan(number); })) continue;
+    for (const double number : values)
+      if (!takes(p, number)) return p.name + " = " + number_text(number) + "; allowed: " + allowed_values(p);
+    if (p.kind == PropertyKind::kQuaternion && first_not_unit(values, 4) != kNoRow)
+      return p.name + " is no unit quaternion";
+  }
+  return numbers.empty() ? "" : "more numbers than the properties take";
 }
 
 std::string allowed_values(const Property& declared) {

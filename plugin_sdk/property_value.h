@@ -76,6 +76,10 @@ bool flatten_value(const Property& declared, const PropertyValue& given, std::ve
 bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue>& given, std::vector<double>* out,
              std::vector<PropertyProblem>* problems);
 
+// Checks flattened values, which may come from anywhere: their number, and that each is one that its
+// property takes. Empty, or what is wrong; what is allowed.
+std::string check_flattened(const std::vector<Property>& declared, std::span<const double> numbers);
+
 // What a property takes: "a number > 0", "a list of 3 numbers", "one of "World", "Body"".
 std::string allowed_values(const Property& declared);
 

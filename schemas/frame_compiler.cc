@@ -2,6 +2,7 @@
 // place where a column is declared; refuses numeric fields without unit or frame.
 //
 //   frame_compiler --proto-root schemas --out stage_frames.h    generate
+//   frame_compiler --proto-root schemas --hash                  print the schema hash
 //   frame_compiler --proto-root schemas --lint FILE...          check units and frames, print findings, exit 1 if any
 #include <google/protobuf/compiler/importer.h>
 #include <google/protobuf/descriptor.h>
@@ -68,7 +69,7 @@ void lint_message(const pb::Descriptor& message, std::vector<std::string>* findi
 struct Column {
   std::string name, element, rows, unit, frame;
   unsigned components = 1, rows_index = 255, extra = 0;
-  bool is_scalar = false;
+  bool is_scalar = false, asset = false;
 };
 
 std::string element_type(const pb::FieldDescriptor& field) {
@@ -104,8 +105,11 @@ using RowNumbers = std::map<std::string, unsigned>;
 bool read_columns(const pb::Descriptor& message, RowNumbers* rows, std::vector<Column>* columns) {
   for (int i = 0; i < message.field_count(); ++i) {
     const pb::FieldDescriptor& field = *message.field(i);
+    // what travels beside the columns (call.proto)
+    if (field.type() == pb::FieldDescriptor::TYPE_MESSAGE && !field.is_repeated()) continue;
     const pb::FieldOptions about = field_options(field);
     Column column;
+    column.asset = about.GetExtension(options::asset);
     column.name = field.name();
     column.element = element_type(field);
     column.rows = about.GetExtension(options::rows);
@@ -139,7 +143,8 @@ void write_info(std::ostream& out, const std::string& array, const std::vector<C
   for (const Column& c : columns) {
     const char* type = c.element == "double" ? "kF64" : c.element == "std::uint32_t" ? "kU32" : "kU64";
     out << "    {\"" << c.name << "\", ElementType::" << type << ", " << c.components << ", " << c.rows_index << ", "
-        << c.extra << ", \"" << c.rows << "\", \"" << c.unit << "\", \"" << c.frame << "\"},\n";
+        << c.extra << ", " << (c.asset ? "true" : "false") << ", \"" << c.rows << "\", \"" << c.unit << "\", \""
+        << c.frame << "\"},\n";
   }
   out << "};\n";
 }
@@ -184,12 +189,16 @@ std::uint64_t hash_text(const std::string& text, std::uint64_t hash) {
   return hash;
 }
 
+std::uint64_t schema_hash(const std::vector<const pb::FileDescriptor*>& files) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const pb::FileDescriptor* file : files) hash = hash_text(file->DebugString(), hash);
+  return hash;
+}
+
 int generate(const std::vector<const pb::FileDescriptor*>& files, const std::string& out_path) {
   std::ostringstream classes, infos, methods, table;
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
   unsigned method_number = 0;
   for (const pb::FileDescriptor* file : files) {
-    hash = hash_text(file->DebugString(), hash);
     for (int s = 0; s < file->service_count(); ++s) {
       const pb::ServiceDescriptor& service = *file->service(s);
       for (int m = 0; m < service.method_count(); ++m) {
@@ -204,8 +213,9 @@ int generate(const std::vector<const pb::FileDescriptor*>& files, const std::str
         write_request(classes, method.input_type()->name(), request);
         write_reply(classes, method.output_type()->name(), reply);
         methods << "  k" << name << " = " << method_number++ << ",\n";
-        table << "    {\"" << service.name() << '.' << method.name() << "\", k" << name << "RequestColumns, k" << name
-              << "ReplyColumns, " << rows.size() << "},\n";
+        table << "    {\"" << service.name() << '.' << method.name() << "\", \"/" << service.full_name() << '/'
+              << method.name() << "\", k" << name << "RequestColumns, k" << name << "ReplyColumns, " << rows.size()
+              << "},\n";
       }
     }
   }
@@ -216,11 +226,13 @@ int generate(const std::vector<const pb::FileDescriptor*>& files, const std::str
          "\"schemas/frame/layout.h\"\n\n"
       << "namespace gravitas::stage {\n\n"
       << "// Hash of the stage schemas: two sides with different hashes do not talk.\n"
-      << "inline constexpr std::uint64_t kSchemaHash = 0x" << std::hex << hash << std::dec << "ULL;\n\n"
+      << "inline constexpr std::uint64_t kSchemaHash = 0x" << std::hex << schema_hash(files) << std::dec << "ULL;\n\n"
       << "enum class Method : std::uint32_t {\n"
       << methods.str() << "};\ninline constexpr std::uint32_t kMethodCount = " << method_number << ";\n\n"
       << infos.str() << "\ninline constexpr MethodInfo kMethods[] = {\n"
       << table.str() << "};\n\n"
+      << "constexpr const MethodInfo& method_info(Method method) { return "
+         "kMethods[static_cast<std::uint32_t>(method)]; }\n\n"
       << classes.str() << "}  // namespace gravitas::stage\n";
   return out.good() ? 0 : 1;
 }
@@ -229,7 +241,7 @@ int generate(const std::vector<const pb::FileDescriptor*>& files, const std::str
 
 int main(int argc, char** argv) {
   std::string root, out;
-  bool lint = false;
+  bool lint = false, hash = false;
   std::vector<std::string> names;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
@@ -239,12 +251,14 @@ int main(int argc, char** argv) {
       out = argv[++i];
     } else if (argument == "--lint") {
       lint = true;
+    } else if (argument == "--hash") {
+      hash = true;
     } else {
       names.push_back(argument);
     }
   }
-  if (root.empty() || (out.empty() && !lint)) {
-    std::cerr << "usage: frame_compiler --proto-root DIR (--out FILE | --lint PROTO...)\n";
+  if (root.empty() || (out.empty() && !lint && !hash)) {
+    std::cerr << "usage: frame_compiler --proto-root DIR (--out FILE | --hash | --lint PROTO...)\n";
     return 2;
   }
   if (!lint)
@@ -262,6 +276,10 @@ int main(int argc, char** argv) {
     const pb::FileDescriptor* file = importer.Import(name);
     if (file == nullptr) return 1;
     files.push_back(file);
+  }
+  if (hash) {
+    std::cout << "0x" << std::hex << schema_hash(files) << '\n';
+    return 0;
   }
   if (!lint) return generate(files, out);
 

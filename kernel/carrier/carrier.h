@@ -22,13 +22,14 @@ struct StageCall {
   std::span<const ColumnId> request;
   std::span<const ColumnId> reply;
 
-  const stage::MethodInfo& info() const { return stage::kMethods[static_cast<std::uint32_t>(method)]; }
+  const stage::MethodInfo& info() const { return stage::method_info(method); }
 };
 
 struct CallResult {
   std::int32_t status = GRAVITAS_OK;  // GRAVITAS_OK, _NEEDS_CAPACITY (counts say how much), _REFUSED, _FAILED …
   std::string text;                   // why it was refused or failed
   std::uint64_t compute_ns = 0;       // time the plugin worked, if the carrier knows it apart
+  std::uint64_t check_ns = 0;         // time the frame of the answer was checked
 };
 
 // Answers Integrator.Derivative while an Integrate call is open. `request` names arena columns that hold the
@@ -70,8 +71,9 @@ class PendingCarrier {
   virtual ~PendingCarrier() = default;
   virtual std::unique_ptr<Carrier> finish() = 0;
 };
-std::unique_ptr<PendingCarrier> start_shared_memory_carrier(const std::vector<PluginChoice>& plugins,
-                                                            std::uint32_t threads, double deadline);
+// The plugins of the slot go to one worker: library plugins, or one command, or those of one address.
+std::unique_ptr<PendingCarrier> start_shared_memory_carrier(const SlotDescription& slot, std::uint32_t threads);
+std::unique_ptr<PendingCarrier> start_grpc_carrier(const SlotDescription& slot, std::uint32_t threads);
 
 // Program that hosts plugins in a process of its own: `gravitas-worker` beside the running program, unless set.
 void set_worker_program(std::string path);

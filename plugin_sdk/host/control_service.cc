@@ -39,6 +39,13 @@ Admission ControlService::judge(const Hello& hello) const {
     return {Refusal::REASON_FLOATING_POINT, "floating-point arithmetic is set differently in kernel and worker"};
   if (hello.plugins_size() != static_cast<int>(plugins_.size()))
     return {Refusal::REASON_SETTINGS, "the kernel expects another number of plugins in this worker"};
+  // a library that could not be loaded has no name: `admit` says what is wrong with it
+  for (int i = 0; i < hello.plugins_size(); ++i) {
+    const std::string& name = plugins_[static_cast<std::size_t>(i)].name();
+    if (!name.empty() && hello.plugins(i).plugin() != name)
+      return {Refusal::REASON_LIBRARY,
+              "this worker serves plugin '" + name + "', not '" + hello.plugins(i).plugin() + "'"};
+  }
   return admit_(hello);
 }
 
@@ -72,6 +79,12 @@ std::vector<std::string> ControlService::take_complaints() {
 grpc::Status ControlService::Session(grpc::ServerContext*,
                                      grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
   if (taken_.exchange(true)) return {grpc::StatusCode::ALREADY_EXISTS, "this worker has its kernel"};
+  const grpc::Status status = serve_kernel(stream);
+  taken_ = false;
+  return status;
+}
+
+grpc::Status ControlService::serve_kernel(grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
   KernelMessage message;
   if (!stream->Read(&message) || !message.has_hello())
     return {grpc::StatusCode::INVALID_ARGUMENT, "the first message must be Hello"};
@@ -110,12 +123,21 @@ grpc::Status ControlService::Session(grpc::ServerContext*,
   return grpc::Status::OK;
 }
 
-std::unique_ptr<grpc::Server> serve_descriptor(grpc::Service* service, int descriptor) {
+std::unique_ptr<grpc::ServerBuilder> server_builder(grpc::Service* service) {
+  auto builder = std::make_unique<grpc::ServerBuilder>();
+  builder->RegisterService(service);
+  builder->SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
+  builder->SetMaxReceiveMessageSize(-1);
+  builder->SetMaxSendMessageSize(-1);
+  // as in the kernel: large messages in large parts
+  builder->AddChannelArgument(GRPC_ARG_HTTP2_MAX_FRAME_SIZE, 1 << 20);
+  builder->AddChannelArgument(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 1 << 24);
+  return builder;
+}
+
+std::unique_ptr<grpc::Server> serve_descriptor(grpc::ServerBuilder* builder, int descriptor) {
   fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-  grpc::ServerBuilder builder;
-  builder.RegisterService(service);
-  builder.SetSyncServerOption(grpc::ServerBuilder::MAX_POLLERS, 1);
-  std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
   if (server) grpc::AddInsecureChannelFromFd(server.get(), descriptor);
   return server;
 }

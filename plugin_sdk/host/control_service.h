@@ -28,7 +28,7 @@ struct Admission {
 class ControlService final : public control::v1::WorkerControl::Service {
  public:
   // `plugins` describes what this worker serves; `mxcsr` is the floating-point control of the thread that will
-  // run them; `admit` is called once, in the stream's thread.
+  // run them; `admit` is called once per session, in the stream's thread. There is one session at a time.
   ControlService(std::vector<plugin::v1::Description> plugins, std::uint32_t mxcsr,
                  std::function<Admission(const control::v1::Hello&)> admit);
 
@@ -39,12 +39,15 @@ class ControlService final : public control::v1::WorkerControl::Service {
   // Something the kernel should hear of besides the answers of calls; goes out with the next heartbeat.
   void complain(std::string text);
 
+  // Whether this worker can serve the kernel that says so of itself: empty text, or why not. `admit` has the last word.
+  Admission judge(const control::v1::Hello& hello) const;
+
   grpc::Status Session(
       grpc::ServerContext* context,
       grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream) override;
 
  private:
-  Admission judge(const control::v1::Hello& hello) const;
+  grpc::Status serve_kernel(grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream);
   std::vector<std::string> take_complaints();
   control::v1::WorkerMessage welcome(const control::v1::Hello& hello) const;
 
@@ -56,7 +59,10 @@ class ControlService final : public control::v1::WorkerControl::Service {
   std::vector<std::string> complaints_;
 };
 
-// A server that serves one inherited socket and listens nowhere.
-std::unique_ptr<grpc::Server> serve_descriptor(grpc::Service* service, int descriptor);
+// A server being built, for messages of any size.
+std::unique_ptr<grpc::ServerBuilder> server_builder(grpc::Service* service);
+
+// Serves one inherited socket and listens nowhere.
+std::unique_ptr<grpc::Server> serve_descriptor(grpc::ServerBuilder* builder, int descriptor);
 
 }  // namespace gravitas::host

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cstring>
 
-#include "plugin_sdk/host/worker.h"
+#include "plugin_sdk/host/mailbox_loop.h"
 
 namespace gravitas::host {
 namespace {

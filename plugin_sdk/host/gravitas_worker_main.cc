@@ -2,25 +2,37 @@
 //
 //   gravitas-worker --describe LIBRARY...                             says what the libraries are, as a message on
 //                                                                     standard output
-//   gravitas-worker --control-fd N --descriptor-fd M LIBRARY...       serves a kernel over inherited sockets
+//   gravitas-worker --control-fd N --descriptor-fd M LIBRARY...       serves a kernel over inherited sockets, data in
+//                                                                     shared memory
+//   gravitas-worker --control-fd N LIBRARY...                         the same, data as gRPC messages
+//   gravitas-worker --exec PROGRAM ARGUMENT...                        becomes that program, which dies with the kernel
+//   gravitas-worker --listen ADDRESS LIBRARY...                       serves one kernel after the other at an address
+//                                                                     of this machine, data as gRPC messages
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <iostream>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/host/control_service.h"
 #include "plugin_sdk/host/describe.h"
 #include "plugin_sdk/host/description_message.h"
-#include "plugin_sdk/host/worker.h"
+#include "plugin_sdk/host/mailbox_loop.h"
+#include "plugin_sdk/host/stream_loop.h"
 
 namespace {
 
@@ -30,12 +42,15 @@ struct Arguments {
   bool describe = false;
   int control = -1;
   int descriptors = -1;
+  std::string address;
   std::vector<std::string> libraries;
 };
 
 int usage() {
   std::cerr << "usage: gravitas-worker --describe LIBRARY...\n"
-            << "       gravitas-worker --control-fd N --descriptor-fd M LIBRARY...\n";
+            << "       gravitas-worker --listen ADDRESS LIBRARY...     127.0.0.1:PORT, [::1]:PORT or unix:PATH\n"
+            << "       gravitas-worker --exec PROGRAM ARGUMENT...     as a kernel starts a command\n"
+            << "       gravitas-worker --control-fd N [--descriptor-fd M] LIBRARY...     as a kernel starts it\n";
   return 2;
 }
 
@@ -46,14 +61,17 @@ bool parse(int argc, char** argv, Arguments* arguments) {
       arguments->describe = true;
     } else if ((word == "--control-fd" || word == "--descriptor-fd") && i + 1 < argc) {
       (word == "--control-fd" ? arguments->control : arguments->descriptors) = std::atoi(argv[++i]);
+    } else if (word == "--listen" && i + 1 < argc) {
+      arguments->address = argv[++i];
     } else if (word.starts_with("--")) {
       return false;
     } else {
       arguments->libraries.push_back(word);
     }
   }
-  return arguments->describe != (arguments->control >= 0 && arguments->descriptors >= 0) &&
-         !arguments->libraries.empty();
+  const int ways =
+      (arguments->describe ? 1 : 0) + (arguments->control >= 0 ? 1 : 0) + (arguments->address.empty() ? 0 : 1);
+  return ways == 1 && (arguments->descriptors < 0 || arguments->control >= 0) && !arguments->libraries.empty();
 }
 
 int describe(const std::vector<std::string>& libraries) {
@@ -62,16 +80,77 @@ int describe(const std::vector<std::string>& libraries) {
 }
 
 // The kernel's Hello, handed from the control stream's thread to the first thread, and the answer back.
-struct Handshake {
-  std::mutex mutex;
-  std::condition_variable changed;
-  const control::v1::Hello* hello = nullptr;
-  bool answered = false;
-  host::Admission admission;
+class Handshake {
+ public:
+  // In the stream's thread.
+  host::Admission admit(const control::v1::Hello& hello) {
+    std::unique_lock lock(mutex_);
+    hello_ = &hello;
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return admission_.has_value(); });
+    hello_ = nullptr;
+    return *std::exchange(admission_, std::nullopt);
+  }
+  void end() {
+    const std::lock_guard lock(mutex_);
+    stopping = true;
+    changed_.notify_all();
+  }
+
+  // In the first thread: the greeting, or null if the session ended without one.
+  const control::v1::Hello* wait() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return hello_ != nullptr || stopping.load(); });
+    return hello_;
+  }
+  void answer(host::Admission admission) {
+    const std::lock_guard lock(mutex_);
+    admission_ = std::move(admission);
+    changed_.notify_all();
+  }
+
+  std::atomic<bool> stopping{false};
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  const control::v1::Hello* hello_ = nullptr;
+  std::optional<host::Admission> admission_;
 };
 
+// Creates the plugins as the greeting says.
+host::Admission create(const control::v1::Hello& hello, host::HostedPlugins* plugins) {
+  std::vector<std::vector<double>> settings;
+  for (const auto& plugin : hello.plugins()) settings.emplace_back(plugin.numbers().begin(), plugin.numbers().end());
+  const std::string refusal = plugins->create(settings, hello.threads());
+  if (!refusal.empty()) return {control::v1::Refusal::REASON_SETTINGS, refusal};
+  return {};
+}
+
+// Starts to listen; says where on standard output, so that a script that let the system choose the port knows it.
+std::unique_ptr<grpc::Server> listen(grpc::ServerBuilder* builder, const std::string& address) {
+  if (!channel::is_local_address(address)) {
+    std::cerr << "gravitas-worker: --listen " << address
+              << ": the connection is not encrypted, so only this machine is allowed: 127.0.0.1:PORT, [::1]:PORT or "
+                 "unix:PATH\n";
+    return nullptr;
+  }
+  int port = 0;
+  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder->AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
+  if (!server || port == 0) {
+    std::cerr << "gravitas-worker: cannot listen at " << address << ": is it a free address of this machine?\n";
+    return nullptr;
+  }
+  if (!address.starts_with("unix:"))
+    std::cout << "listening at " << address.substr(0, address.rfind(':') + 1) << port << std::endl;
+  return server;
+}
+
 int serve(const Arguments& arguments) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  const bool listens = !arguments.address.empty();
+  if (!listens) prctl(PR_SET_PDEATHSIG, SIGKILL);
   signal(SIGPIPE, SIG_IGN);
 
   std::vector<PluginLibrary> libraries;
@@ -83,54 +162,65 @@ int serve(const Arguments& arguments) {
     descriptions.push_back(host::to_message(library.declaration));
     libraries.push_back(std::move(library));
   }
-  if (!problem.empty()) descriptions.resize(arguments.libraries.size());
+  if (!problem.empty()) {
+    if (listens) {
+      std::cerr << "gravitas-worker: " << problem << '\n';
+      return 1;
+    }
+    descriptions.resize(arguments.libraries.size());
+  }
 
   Handshake handshake;
-  std::atomic<bool> stopping{false};
   host::ControlService service(std::move(descriptions), floating_point_control(),
                                [&](const control::v1::Hello& hello) -> host::Admission {
                                  if (!problem.empty()) return {control::v1::Refusal::REASON_LIBRARY, problem};
-                                 std::unique_lock lock(handshake.mutex);
-                                 handshake.hello = &hello;
-                                 handshake.changed.notify_all();
-                                 handshake.changed.wait(lock, [&] { return handshake.answered; });
-                                 return handshake.admission;
+                                 return handshake.admit(hello);
                                });
   service.on_end = [&](bool kernel_is_gone) {
-    if (kernel_is_gone) std::_Exit(0);
-    stopping = true;
-    handshake.changed.notify_all();
+    if (kernel_is_gone && !listens) std::_Exit(0);
+    handshake.end();
   };
-  const std::unique_ptr<grpc::Server> server = host::serve_descriptor(&service, arguments.control);
-  if (!server) return 1;
+  const std::unique_ptr<grpc::ServerBuilder> builder = host::server_builder(&service);
+  const std::unique_ptr<host::StreamLoop> streams =
+      arguments.descriptors < 0 ? std::make_unique<host::StreamLoop>(builder.get()) : nullptr;
+  const std::unique_ptr<grpc::Server> server =
+      listens ? listen(builder.get(), arguments.address) : host::serve_descriptor(builder.get(), arguments.control);
+  if (!server) std::_Exit(1);
 
-  host::Worker worker(std::move(libraries), arguments.descriptors);
-  std::uint64_t epoch = 0;
-  std::uint32_t threads = 1;
-  {
-    std::unique_lock lock(handshake.mutex);
-    handshake.changed.wait(lock, [&] { return handshake.hello != nullptr || stopping.load(); });
-    if (handshake.hello != nullptr) {
-      std::vector<std::vector<double>> settings;
-      for (const auto& plugin : handshake.hello->plugins())
-        settings.emplace_back(plugin.numbers().begin(), plugin.numbers().end());
-      epoch = handshake.hello->epoch();
-      threads = handshake.hello->threads();
-      const std::string refusal = worker.create_instances(settings);
-      if (!refusal.empty()) handshake.admission = {control::v1::Refusal::REASON_SETTINGS, refusal};
-      handshake.answered = true;
-      handshake.changed.notify_all();
+  int code = 0;
+  do {
+    // a session: instances of its own
+    host::HostedPlugins plugins(libraries);
+    const control::v1::Hello* hello = handshake.wait();
+    if (hello != nullptr) {
+      const std::uint64_t epoch = hello->epoch();
+      handshake.answer(create(*hello, &plugins));
+      if (streams) {
+        streams->serve(&plugins, epoch, handshake.stopping, &service.calls);
+      } else {
+        host::MailboxLoop loop(&plugins, arguments.descriptors);
+        code = loop.serve(epoch, handshake.stopping, &service.calls,
+                          [&](std::string text) { service.complain(std::move(text)); });
+      }
     }
-  }
-  const int code = worker.serve(epoch, threads, stopping, &service.calls,
-                                [&](std::string text) { service.complain(std::move(text)); });
-  // instances are gone with the process: a hanging destructor must not keep it
-  std::_Exit(code);
+    // instances are gone with the process: a hanging destructor must not keep it
+    if (!listens) std::_Exit(code);
+    handshake.stopping = false;
+  } while (true);
+}
+
+// The signal of a parent's death stays asked for across the exec.
+int become(char** argv) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  execvp(argv[0], argv);
+  std::cerr << "gravitas-worker: cannot start '" << argv[0] << "': " << std::strerror(errno) << '\n';
+  return 127;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 2 && std::string(argv[1]) == "--exec") return become(argv + 2);
   const std::string missing = missing_cpu_features();
   if (!missing.empty()) {
     std::cerr << "gravitas-worker: " << missing << '\n';

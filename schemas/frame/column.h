@@ -14,13 +14,15 @@ enum class ElementType : std::uint8_t { kF64, kU32, kU64 };
 constexpr std::size_t element_size(ElementType type) { return type == ElementType::kU32 ? 4 : 8; }
 
 // `rows_index` numbers the row words of a method (request and reply together), so that columns with the same
-// number must have the same count of rows; 255 for a single value. `extra` is 1 for columns with one row more.
+// number must have the same count of rows; 255 for a single value. `extra` is 1 for columns with one row more;
+// `asset` marks a column that stays the same for a run and can be large.
 struct ColumnInfo {
   const char* name;
   ElementType type;
   std::uint32_t components;
   std::uint8_t rows_index;
   std::uint8_t extra;
+  bool asset;
   const char* rows;
   const char* unit;
   const char* frame;
@@ -30,6 +32,7 @@ inline constexpr std::uint8_t kScalar = 255;
 
 struct MethodInfo {
   const char* name;  // "Space.Pairs"
+  const char* path;  // "/gravitas.stage.v1.Space/Pairs", as gRPC calls it
   std::span<const ColumnInfo> request;
   std::span<const ColumnInfo> reply;
   std::uint32_t row_words;

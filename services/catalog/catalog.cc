@@ -96,6 +96,21 @@ const InstalledPlugin* Catalog::add_library(const std::string& path, std::string
   return &plugins_.back();
 }
 
+const InstalledPlugin* Catalog::add_command(const std::string& command, std::string* problem) {
+  // a catalogue that asks nobody runs nobody's commands
+  if (worker_path_.empty()) {
+    *problem = "this catalogue starts no commands";
+    return nullptr;
+  }
+  plugin::v1::Catalog answer;
+  if (!describe_command(command, kTimeout, &answer, problem)) return nullptr;
+  PluginDeclaration declaration = host::from_message(answer.entries(0).description());
+  *problem = usability(answer.entries(0), declaration);
+  if (!problem->empty()) return nullptr;
+  plugins_.push_back({"", std::move(declaration), command});
+  return &plugins_.back();
+}
+
 const InstalledPlugin* Catalog::find_plugin(Slot slot, const std::string& name) const {
   for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
     if (plugin->declaration.slot == slot && plugin->declaration.name == name) return &*plugin;

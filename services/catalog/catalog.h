@@ -12,8 +12,9 @@
 namespace gravitas {
 
 struct InstalledPlugin {
-  std::string library;  // absolute path
+  std::string library;  // absolute path, unless it is a command
   PluginDeclaration declaration;
+  std::string command = {};
 };
 
 // A file that stands where plugins stand and is none that can be used.
@@ -36,6 +37,9 @@ class Catalog {
   // cannot be used. Precondition: made by installed(), else there is no worker to ask and the
   // answer is null.
   const InstalledPlugin* add_library(const std::string& path, std::string* problem);
+
+  // The same for a shell command that starts a worker of one plugin.
+  const InstalledPlugin* add_command(const std::string& command, std::string* problem);
 
   // The plugin of that name in the slot, or null. The pointers this class returns stay valid while
   // it lives.

@@ -47,10 +47,7 @@ struct Pipe {
 };
 
 // Starts the worker in a process group of its own, so that a timeout also reaches what it started.
-int spawn(const std::string& worker_path, const std::vector<std::string>& libraries, const Pipe& out, const Pipe& err,
-          pid_t* pid) {
-  std::vector<std::string> words = {worker_path, "--describe"};
-  words.insert(words.end(), libraries.begin(), libraries.end());
+int spawn(std::vector<std::string> words, const Pipe& out, const Pipe& err, pid_t* pid) {
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -64,7 +61,7 @@ int spawn(const std::string& worker_path, const std::vector<std::string>& librar
   posix_spawn_file_actions_adddup2(&actions, err.write, STDERR_FILENO);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
   posix_spawnattr_setpgroup(&attributes, 0);
-  const int result = ::posix_spawn(pid, worker_path.c_str(), &actions, &attributes, arguments.data(), environ);
+  const int result = ::posix_spawn(pid, words[0].c_str(), &actions, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   return result;
@@ -112,24 +109,27 @@ int wait_for(pid_t pid, Clock::time_point until, bool* is_in_time) {
   return status;
 }
 
-std::string first_line(const std::string& messages) {
-  const std::string line = messages.substr(0, std::min(messages.find('\n'), kShownCharacters));
-  return line.empty() ? "" : ": " + line;
+// The last line says why: what stands before it is a trace, if anything.
+std::string last_line(const std::string& messages) {
+  const std::size_t end = messages.find_last_not_of("\n ");
+  if (end == std::string::npos) return "";
+  const std::size_t before = messages.find_last_of('\n', end);
+  const std::size_t begin = before == std::string::npos ? 0 : before + 1;
+  return ": " + messages.substr(begin, std::min(end + 1 - begin, kShownCharacters));
 }
 
-}  // namespace
-
-bool describe_libraries(const std::string& worker_path, const std::vector<std::string>& libraries,
-                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem) {
+// `what` stands for the program in messages.
+bool describe(const std::string& what, const std::vector<std::string>& words, int entries,
+              std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem) {
   Pipe out, err;
   if (out.read < 0 || err.read < 0) {
     *problem = std::string("no pipe could be made: ") + std::strerror(errno);
     return false;
   }
   pid_t pid = -1;
-  const int failure = spawn(worker_path, libraries, out, err, &pid);
+  const int failure = spawn(words, out, err, &pid);
   if (failure != 0) {
-    *problem = worker_path + " could not be started: " + std::strerror(failure);
+    *problem = what + " could not be started: " + std::strerror(failure);
     return false;
   }
   Pipe::close_end(&out.write);
@@ -140,20 +140,31 @@ bool describe_libraries(const std::string& worker_path, const std::vector<std::s
   bool is_complete = read_all(&out, &err, until, &bytes, &messages);
   const int status = wait_for(pid, until, &is_complete);
   if (!is_complete) {
-    *problem = worker_path + " --describe did not end within " + std::to_string(timeout.count()) + " ms" +
-               first_line(messages);
+    *problem = what + " --describe did not end within " + std::to_string(timeout.count()) + " ms" + last_line(messages);
   } else if (WIFSIGNALED(status)) {
-    *problem =
-        worker_path + " --describe was ended by signal " + std::to_string(WTERMSIG(status)) + first_line(messages);
+    *problem = what + " --describe was ended by signal " + std::to_string(WTERMSIG(status)) + last_line(messages);
   } else if (WEXITSTATUS(status) != 0) {
-    *problem =
-        worker_path + " --describe ended with status " + std::to_string(WEXITSTATUS(status)) + first_line(messages);
-  } else if (!answer->ParseFromString(bytes) || answer->entries_size() != static_cast<int>(libraries.size())) {
-    *problem = worker_path + " --describe wrote no catalogue of " + std::to_string(libraries.size()) + " libraries";
+    *problem = what + " --describe ended with status " + std::to_string(WEXITSTATUS(status)) + last_line(messages);
+  } else if (!answer->ParseFromString(bytes) || answer->entries_size() != entries) {
+    *problem = what + " --describe wrote no catalogue of " + std::to_string(entries) + " plugins";
   } else {
     return true;
   }
   return false;
+}
+
+}  // namespace
+
+bool describe_libraries(const std::string& worker_path, const std::vector<std::string>& libraries,
+                        std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem) {
+  std::vector<std::string> words = {worker_path, "--describe"};
+  words.insert(words.end(), libraries.begin(), libraries.end());
+  return describe(worker_path, words, static_cast<int>(libraries.size()), timeout, answer, problem);
+}
+
+bool describe_command(const std::string& command, std::chrono::milliseconds timeout, plugin::v1::Catalog* answer,
+                      std::string* problem) {
+  return describe(command, {"/bin/sh", "-c", "exec " + command + " --describe"}, 1, timeout, answer, problem);
 }
 
 }  // namespace gravitas

@@ -1,5 +1,5 @@
-// Asks `gravitas-worker --describe LIBRARY…` what plugin libraries hold, in a process of its own:
-// loading a library runs its code, which may crash or hang.
+// Asks `gravitas-worker --describe LIBRARY…` what plugin libraries hold, and `COMMAND --describe` what a command
+// serves, in a process of its own: their code may crash or hang.
 #pragma once
 
 #include <chrono>
@@ -16,5 +16,9 @@ namespace gravitas {
 // else.
 bool describe_libraries(const std::string& worker_path, const std::vector<std::string>& libraries,
                         std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem);
+
+// The same for a shell command that starts a worker of one plugin.
+bool describe_command(const std::string& command, std::chrono::milliseconds timeout, plugin::v1::Catalog* answer,
+                      std::string* problem);
 
 }  // namespace gravitas

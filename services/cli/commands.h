@@ -16,5 +16,6 @@ void add_run(CLI::App* app, Action* action);
 void add_plan(CLI::App* app, Action* action);
 void add_plugins(CLI::App* app, Action* action);
 void add_describe(CLI::App* app, Action* action);
+void add_check(CLI::App* app, Action* action);
 
 }  // namespace gravitas::cli

@@ -2,18 +2,30 @@
 
 #include <fmt/format.h>
 
+#include "plugin_sdk/channel/address.h"
+
 namespace gravitas::cli {
 namespace {
 
 constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
                            Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
-kernel::Hosting parse_mode(const std::string& word, const std::string& mode) {
-  if (mode == "direct") return kernel::Hosting::kDirect;
-  if (mode == "shm") return kernel::Hosting::kSharedMemory;
-  if (mode.starts_with("grpc"))
-    throw BadInput(fmt::format("--hosting {}: 'grpc' is not supported by this version; allowed: direct, shm", word));
-  throw BadInput(fmt::format("--hosting {}: unknown mode '{}'; allowed: direct, shm", word, mode));
+HostingChoice parse_mode(const std::string& word, std::optional<Slot> slot, const std::string& mode) {
+  if (mode == "direct") return {slot, kernel::Hosting::kDirect, ""};
+  if (mode == "shm") return {slot, kernel::Hosting::kSharedMemory, ""};
+  if (mode == "grpc") return {slot, kernel::Hosting::kGrpc, ""};
+  if (mode.starts_with("grpc:")) {
+    const std::string address = mode.substr(5);
+    if (!slot)
+      throw BadInput(fmt::format("--hosting {}: a worker at an address serves one slot: SLOT=grpc:ADDRESS", word));
+    if (!channel::is_local_address(address))
+      throw BadInput(
+          fmt::format("--hosting {}: '{}' is no address of this machine; allowed, since the connection is "
+                      "not encrypted: 127.0.0.1:PORT, [::1]:PORT, unix:PATH",
+                      word, address));
+    return {slot, kernel::Hosting::kGrpc, address};
+  }
+  throw BadInput(fmt::format("--hosting {}: unknown mode '{}'; allowed: direct, shm, grpc, grpc:ADDRESS", word, mode));
 }
 
 }  // namespace
@@ -23,7 +35,7 @@ std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words) 
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
     if (equals == std::string::npos) {
-      choices.push_back({std::nullopt, parse_mode(word, word)});
+      choices.push_back(parse_mode(word, std::nullopt, word));
       continue;
     }
     const std::string name = word.substr(0, equals);
@@ -35,7 +47,7 @@ std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words) 
           fmt::format("--hosting {}: unknown slot '{}'; allowed: space, collision, constraint, force, solver, "
                       "integrator",
                       word, name));
-    choices.push_back({found, parse_mode(word, word.substr(equals + 1))});
+    choices.push_back(parse_mode(word, found, word.substr(equals + 1)));
   }
   return choices;
 }

@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   cli::add_plan(&app, &action);
   cli::add_plugins(&app, &action);
   cli::add_describe(&app, &action);
+  cli::add_check(&app, &action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

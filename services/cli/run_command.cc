@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <iostream>
+#include <limits>
 #include <memory>
 
 #include "services/cli/commands.h"
@@ -38,7 +39,10 @@ void add_scene_options(CLI::App* command, CommandLine* line) {
   command->add_option("--set", options.overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50")
       ->take_all()
       ->allow_extra_args(false);
-  command->add_option("--hosting", line->hosting, "direct or shm, for all slots or for one: solver=direct")
+  command
+      ->add_option("--hosting", line->hosting,
+                   "direct, shm or grpc, for all slots or for one: solver=direct; SLOT=grpc:ADDRESS: a worker of this "
+                   "machine that listens")
       ->take_all()
       ->allow_extra_args(false);
   command->add_option("--threads", options.threads, "Threads of each host")->check(CLI::Range(1, 1024));
@@ -73,6 +77,32 @@ class ProgressLine {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
 };
 
+// A word as a shell reads it.
+std::string quoted(const std::string& word) {
+  const std::string plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./,:=+@%";
+  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+// The command that goes on from a checkpoint: the scene and how far, not the files it wrote.
+std::string resume_command(const RunOptions& options, const std::string& checkpoint) {
+  std::string command = "gravitas run";
+  for (const std::string& scene : options.scenes) command += " " + quoted(scene);
+  if (options.duration) command += fmt::format(" --duration {}", *options.duration);
+  if (options.steps) command += fmt::format(" --steps {}", *options.steps);
+  if (options.time_step) command += fmt::format(" --dt {}", *options.time_step);
+  for (const std::string& one : options.overrides) command += " --set " + quoted(one);
+  return command + " --resume " + quoted(checkpoint);
+}
+
+void print_checkpoint(const RunOptions& options, const RunResult& result) {
+  if (result.checkpoint.empty()) return;
+  std::cerr << fmt::format("gravitas: checkpoint '{}' holds step {}; to go on: {}\n", result.checkpoint,
+                           result.checkpoint_step, resume_command(options, result.checkpoint));
+}
+
 void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warnings) {
   for (const std::string& warning : warnings) std::cerr << warning << '\n';
 }
@@ -81,6 +111,8 @@ int run_scene(CommandLine* line) {
   line->options.hosting = parse_hosting(line->hosting);
   std::signal(SIGINT, request_interrupt);
   std::signal(SIGTERM, request_interrupt);
+  // a file beyond the limit of its size is an error of that write, as a full disk is
+  std::signal(SIGXFSZ, SIG_IGN);
   ProgressLine progress(line->progress, line->quiet);
   const RunResult result = run(
       line->options, [] { return interrupt_requested != 0; }, [&](const Progress& now) { progress.show(now); });
@@ -91,15 +123,24 @@ int run_scene(CommandLine* line) {
   } else if (!line->quiet) {
     std::cout << result.summary;
   }
-  if (result.outcome == RunOutcome::kPaused) {
-    std::cerr << "gravitas: " << result.fault << "\n";
-    return kPaused;
+  switch (result.outcome) {
+    case RunOutcome::kCompleted:
+      return kDone;
+    case RunOutcome::kPaused:
+      std::cerr << "gravitas: " << result.fault << "\n";
+      print_checkpoint(line->options, result);
+      return kPaused;
+    case RunOutcome::kInterrupted:
+      std::cerr << fmt::format("gravitas: interrupted after step {}; what was computed is kept\n",
+                               result.report.steps());
+      print_checkpoint(line->options, result);
+      return kInterrupted;
+    case RunOutcome::kFailed:
+      break;
   }
-  if (result.outcome == RunOutcome::kInterrupted) {
-    std::cerr << fmt::format("gravitas: interrupted after step {}; what was computed is kept\n", result.report.steps());
-    return kInterrupted;
-  }
-  return kDone;
+  std::cerr << fmt::format("gravitas: stopped after step {}: {}\n", result.report.steps(), result.fault);
+  print_checkpoint(line->options, result);
+  return kOurFault;
 }
 
 int plan_scene(CommandLine* line) {
@@ -135,6 +176,15 @@ void add_run(CLI::App* app, Action* action) {
                       "Interval of the trajectory's samples, s; every step if absent");
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
+  CLI::Option* checkpoint = command->add_option(
+      "--checkpoint", options.checkpoint,
+      "Keep a checkpoint in this file (replaced as a whole) and a journal in FILE.journal: at the start, where the run "
+      "ends, and as --checkpoint-every says");
+  command->add_option("--checkpoint-every", options.checkpoint_every, "Steps between checkpoints, counted from t = 0")
+      ->check(CLI::Range(1U, std::numeric_limits<std::uint32_t>::max()))
+      ->needs(checkpoint);
+  command->add_option("--resume", options.resume,
+                      "Go on from this checkpoint; --steps and --duration count from t = 0");
   command->add_flag("--json", line->json, "Print the report instead of the summary");
   command->add_flag("--progress", line->progress, "Show progress from the start");
   command->add_flag("--quiet", line->quiet, "Print nothing but errors");

@@ -1,5 +1,6 @@
 #include "services/recorder/event_log.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -81,6 +82,32 @@ void EventLog::write(const kernel::Event& event, const char* kind) {
   message.set_impulse(event.impulse);
   const std::string line = to_json(message, JsonForm::kLine);
   write_failed_ |= std::fwrite(line.data(), 1, line.size(), file_) != line.size();
+}
+
+void EventLog::write(recorder::v1::Tally* tally) const {
+  tally->set_collision_start(counts_.collision_start());
+  tally->set_collision_end(counts_.collision_end());
+  tally->set_break_(counts_.break_());
+  tally->clear_meetings();
+  for (const Meeting& meeting : meetings_) {
+    recorder::v1::Meeting* message = tally->add_meetings();
+    message->set_body(meeting.body);
+    message->set_with(meeting.with);
+    message->set_time(meeting.time);
+    message->set_speed(meeting.speed);
+  }
+}
+
+void EventLog::resume(const recorder::v1::Tally& tally) {
+  counts_.set_collision_start(tally.collision_start());
+  counts_.set_collision_end(tally.collision_end());
+  counts_.set_break_(tally.break_());
+  for (const recorder::v1::Meeting& message : tally.meetings()) {
+    const auto body = std::ranges::find(description_.bodies, message.body(), &kernel::BodyDescription::id);
+    if (body == description_.bodies.end() || meetings_.size() >= kMostMeetings) continue;
+    has_met_[static_cast<std::size_t>(body - description_.bodies.begin())] = true;
+    meetings_.push_back({message.body(), message.with(), message.time(), message.speed()});
+  }
 }
 
 void EventLog::close() {

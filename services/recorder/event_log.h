@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 
@@ -29,6 +30,9 @@ class EventLog final : public kernel::EventListener {
 
   const report::v1::EventCounts& counts() const { return counts_; }
   const std::vector<Meeting>& meetings() const { return meetings_; }
+  // Counts and meetings, into a checkpoint and out of it; the file is not part of it.
+  void write(recorder::v1::Tally* tally) const;
+  void resume(const recorder::v1::Tally& tally);
   // Writes out everything; throws std::system_error if that fails.
   void close();
 

@@ -111,4 +111,18 @@ void Figures::write(report::v1::Report* report) const {
   }
 }
 
+void Figures::write(recorder::v1::Tally* tally) const {
+  tally->set_largest_kinetic_energy(largest_kinetic_);
+  tally->set_largest_energy_deviation(largest_deviation_);
+  tally->set_penetration(penetration_);
+  tally->set_joint_error(joint_error_);
+}
+
+void Figures::resume(const recorder::v1::Tally& tally) {
+  largest_kinetic_ = std::max(largest_kinetic_, tally.largest_kinetic_energy());
+  largest_deviation_ = std::max(largest_deviation_, tally.largest_energy_deviation());
+  penetration_ = std::max(penetration_, tally.penetration());
+  joint_error_ = std::max(joint_error_, tally.joint_error());
+}
+
 }  // namespace gravitas

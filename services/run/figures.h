@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 
@@ -19,6 +20,11 @@ class Figures {
 
   // Energy, momenta, penetration, joint error, drives.
   void write(report::v1::Report* report) const;
+
+  // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
+  // from the restored state on.
+  void write(recorder::v1::Tally* tally) const;
+  void resume(const recorder::v1::Tally& tally);
 
  private:
   struct Totals {

@@ -11,10 +11,14 @@
 
 #include "kernel/carrier/carrier.h"
 #include "services/catalog/catalog.h"
+#include "services/recorder/checkpoint.h"
 #include "services/recorder/event_log.h"
+#include "services/recorder/identity.h"
 #include "services/recorder/json.h"
+#include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
 #include "services/run/figures.h"
+#include "services/run/resumption.h"
 #include "services/run/summary.h"
 #include "services/scene/build.h"
 #include "services/scene/overrides.h"
@@ -39,7 +43,10 @@ void apply_hosting(const std::vector<HostingChoice>& choices, kernel::Environmen
   for (const HostingChoice& choice : choices) {
     for (const Slot slot :
          {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
-      if (!choice.slot || *choice.slot == slot) description->slot(slot).hosting = choice.hosting;
+      if (!choice.slot || *choice.slot == slot) {
+        description->slot(slot).hosting = choice.hosting;
+        for (kernel::PluginChoice& plugin : description->slot(slot).plugins) plugin.address = choice.address;
+      }
   }
 }
 
@@ -54,6 +61,7 @@ void write_stages(const kernel::Environment& environment, report::v1::Report* re
     timing->set_median_us(time.quantile_us(0.5));
     timing->set_p99_us(time.quantile_us(0.99));
     timing->set_transport_median_us(environment.transport_time(stage).quantile_us(0.5));
+    timing->set_validation_median_us(environment.validation_time(stage).quantile_us(0.5));
   }
   const kernel::DurationHistogram& steps = environment.step_time();
   report::v1::Durations* durations = report->mutable_microseconds_per_step();
@@ -156,78 +164,235 @@ report::v1::Plan plan_message(const kernel::Environment& environment) {
   return message;
 }
 
+namespace {
+
+const char* outcome_name(RunOutcome outcome) {
+  switch (outcome) {
+    case RunOutcome::kCompleted:
+      return "completed";
+    case RunOutcome::kInterrupted:
+      return "interrupted";
+    case RunOutcome::kPaused:
+      return "paused";
+    case RunOutcome::kFailed:
+      break;
+  }
+  return "failed";
+}
+
+// Errors of a disk rather than of a name.
+bool is_full(const std::error_code& code) {
+  return code == std::errc::no_space_on_device || code == std::errc::file_too_large || code == std::errc::io_error ||
+         code == std::error_code(EDQUOT, std::generic_category());
+}
+
+// A run in its phases. What fails on the way ends the stepping and is kept; the phases after it still do what they can.
+class Run {
+ public:
+  explicit Run(const RunOptions& options) : options_(options), description_(load(options, &warnings_)) {}
+
+  // Starts the environment and brings it to the state where the run begins.
+  void prepare() {
+    std::optional<Resumption> resumed;
+    if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
+    if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
+    environment_ = start(description_);
+    figures_ = std::make_unique<Figures>(description_);
+    guard([&] { figures_->follow(environment_.get()); });
+    if (resumed) resume(&*resumed);
+    if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
+  }
+
+  void open_files() {
+    try {
+      events_ = std::make_unique<EventLog>(options_.events, description_);
+      if (!options_.trajectory.empty())
+        trajectory_ =
+            std::make_unique<TrajectoryWriter>(options_.trajectory, description_, options_.sample_every.value_or(0.0));
+    } catch (const std::system_error& error) {
+      throw BadInput(error.what());
+    }
+    events_->resume(resumed_tally_);
+    environment_->set_listener(events_.get());
+  }
+
+  void go(const std::function<bool()>& interrupted, const std::function<void(const Progress&)>& progress) {
+    const Clock::time_point begin = Clock::now();
+    guard([&] {
+      if (trajectory_) trajectory_->offer(*environment_, is_done());
+      while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
+        if (interrupted()) {
+          result_.outcome = RunOutcome::kInterrupted;
+        } else if (environment_->step() == kernel::StepOutcome::kPaused) {
+          pause(*environment_->fault());
+        } else {
+          figures_->follow(environment_.get());
+          if (trajectory_) trajectory_->offer(*environment_, is_done());
+          progress({environment_->time(), environment_->time_step() * description_.steps, environment_->step_count(),
+                    environment_->total_steps()});
+        }
+      }
+    });
+    wall_seconds_ = std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  // Whatever ended the run: the last commit is kept where a checkpoint is wanted or needed.
+  void keep_last_state() {
+    const bool keeps = recorder_ && recorder_->keeps();
+    guard([&] {
+      if (is_unrepeatable_) return;
+      if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
+      if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
+    });
+    // after a failure the one before
+    if (!keeps || !recorder_->saved_step()) return;
+    result_.checkpoint = recorder_->path();
+    result_.checkpoint_step = *recorder_->saved_step();
+  }
+
+  void finish() {
+    guard([&] {
+      if (trajectory_ && result_.outcome != RunOutcome::kFailed) trajectory_->offer(*environment_, true);
+      if (trajectory_) trajectory_->close();
+    });
+    guard([&] { events_->close(); });
+    write_report();
+    guard([&] {
+      if (!options_.report.empty()) write_report_file(options_.report, result_.report);
+    });
+    result_.summary = summarize(result_.report, events_->meetings());
+  }
+
+  RunResult take_result() { return std::move(result_); }
+
+ private:
+  void resume(Resumption* from) {
+    const std::string problem = environment_->restore(saved_state_of(&from->checkpoint));
+    if (!problem.empty()) throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem));
+    resumed_tally_ = from->checkpoint.tally();
+    journal_ = std::move(from->journal);
+    figures_->resume(resumed_tally_);
+    guard([&] { figures_->follow(environment_.get()); });
+  }
+
+  // Where no recorder keeps a checkpoint.
+  void keep_paused_state() {
+    std::string path = checkpoint_path_;
+    if (path.empty())
+      path = checkpoint_target(std::filesystem::path(options_.scenes[0]).stem().string() + ".paused.checkpoint");
+    Recorder(identity_of(description_), [this] { return tally(); }).save_to(path, *environment_);
+    result_.checkpoint = path;
+    result_.checkpoint_step = environment_->step_count();
+  }
+
+  bool is_done() const { return environment_->step_count() >= environment_->total_steps(); }
+
+  // Errors that end a run and do not lose it.
+  template <typename Action>
+  void guard(Action&& action) {
+    try {
+      action();
+    } catch (const kernel::StageFault& fault) {
+      // a force that was asked for its potential failed
+      pause({environment_->step_count(), fault});
+    } catch (const NotRepeatable& problem) {
+      is_unrepeatable_ = true;
+      fail(problem.what());
+    } catch (const std::system_error& error) {
+      fail(error.what());
+    } catch (const std::length_error& error) {
+      fail(error.what());
+    }
+  }
+
+  void pause(const kernel::FaultRecord& record) {
+    result_.outcome = RunOutcome::kPaused;
+    result_.fault = fault_text(record.step, record.fault);
+    write_fault(record, &result_.report);
+  }
+
+  void fail(const std::string& why) {
+    result_.outcome = RunOutcome::kFailed;
+    if (result_.fault.find(why) == std::string::npos) result_.fault += (result_.fault.empty() ? "" : "; ") + why;
+  }
+
+  // What the report counts, for a checkpoint.
+  recorder::v1::Tally tally() const {
+    recorder::v1::Tally tally = resumed_tally_;
+    figures_->write(&tally);
+    if (events_) events_->write(&tally);
+    return tally;
+  }
+
+  // Listens if there is something to keep or to compare.
+  void start_recorder() {
+    if (checkpoint_path_.empty() && journal_.commits.empty()) return;
+    recorder_.emplace(identity_of(description_), [this] { return tally(); });
+    recorder_->expect(journal_of(options_.resume), journal_.commits);
+    environment_->set_commit_listener(&*recorder_);
+    if (checkpoint_path_.empty()) return;
+    // the journal of another file starts anew
+    const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == checkpoint_path_;
+    try {
+      recorder_->keep(checkpoint_path_, options_.checkpoint_every, goes_on ? journal_ : JournalReading{},
+                      *environment_);
+    } catch (const std::system_error& error) {
+      if (is_full(error.code())) throw;
+      throw BadInput(error.what());
+    } catch (const std::runtime_error& problem) {
+      throw BadInput(problem.what());
+    }
+  }
+
+  void write_report();
+
+  const RunOptions& options_;
+  std::vector<std::string> warnings_;
+  const kernel::EnvironmentDescription description_;
+  std::string checkpoint_path_;
+  RunResult result_;
+  std::unique_ptr<kernel::Environment> environment_;
+  std::unique_ptr<Figures> figures_;
+  recorder::v1::Tally resumed_tally_;  // of the checkpoint
+  JournalReading journal_;             // of the checkpoint
+  std::unique_ptr<TrajectoryWriter> trajectory_;
+  std::unique_ptr<EventLog> events_;
+  std::optional<Recorder> recorder_;
+  bool is_unrepeatable_ = false;
+  double wall_seconds_ = 0.0;
+};
+
+void Run::write_report() {
+  report::v1::Report& report = result_.report;
+  for (const std::string& path : options_.scenes)
+    report.set_scene(report.scene() + (report.scene().empty() ? "" : " ") + path);
+  report.set_simulated_seconds(environment_->time());
+  report.set_steps(environment_->step_count());
+  report.set_time_step(environment_->time_step());
+  report.set_bodies(environment_->model().body_count);
+  report.set_wall_seconds(wall_seconds_);
+  report.set_outcome(outcome_name(result_.outcome));
+  report.set_state_hash(environment_->state_hash().text());
+  report.set_chain_hash(environment_->chain_hash().text());
+  *report.mutable_plan() = plan_message(*environment_);
+  *report.mutable_events() = events_->counts();
+  for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
+  for (std::string& warning : environment_->warnings()) report.add_warnings(std::move(warning));
+  figures_->write(&report);
+  write_stages(*environment_, &report);
+}
+
+}  // namespace
+
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {
-  RunResult result;
-  std::vector<std::string> warnings;
-  const kernel::EnvironmentDescription description = load(options, &warnings);
-  std::unique_ptr<TrajectoryWriter> trajectory;
-  std::unique_ptr<EventLog> events;
-  try {
-    if (!options.trajectory.empty())
-      trajectory =
-          std::make_unique<TrajectoryWriter>(options.trajectory, description, options.sample_every.value_or(0.0));
-    events = std::make_unique<EventLog>(options.events, description);
-  } catch (const std::system_error& error) {
-    throw BadInput(error.what());
-  }
-
-  const std::unique_ptr<kernel::Environment> environment = start(description);
-  environment->set_listener(events.get());
-  Figures figures(description);
-  const Clock::time_point begin = Clock::now();
-  try {
-    figures.follow(environment.get());
-    if (trajectory) trajectory->offer(*environment, environment->total_steps() == 0);
-    while (environment->step_count() < environment->total_steps()) {
-      if (interrupted()) {
-        result.outcome = RunOutcome::kInterrupted;
-        break;
-      }
-      if (environment->step() == kernel::StepOutcome::kPaused) {
-        result.outcome = RunOutcome::kPaused;
-        result.fault = fault_text(environment->fault()->step, environment->fault()->fault);
-        write_fault(*environment->fault(), &result.report);
-        break;
-      }
-      figures.follow(environment.get());
-      if (trajectory) trajectory->offer(*environment, environment->step_count() == environment->total_steps());
-      progress({environment->time(), environment->time_step() * description.steps, environment->step_count(),
-                environment->total_steps()});
-    }
-  } catch (const kernel::StageFault& fault) {
-    // a force that was asked for its potential failed
-    result.outcome = RunOutcome::kPaused;
-    result.fault = fault_text(environment->step_count(), fault);
-    write_fault({environment->step_count(), fault}, &result.report);
-  }
-  const double wall = std::chrono::duration<double>(Clock::now() - begin).count();
-  if (trajectory) trajectory->offer(*environment, true);
-
-  report::v1::Report& report = result.report;
-  for (const std::string& path : options.scenes)
-    report.set_scene(report.scene() + (report.scene().empty() ? "" : " ") + path);
-  report.set_simulated_seconds(environment->time());
-  report.set_steps(environment->step_count());
-  report.set_time_step(environment->time_step());
-  report.set_bodies(environment->model().body_count);
-  report.set_wall_seconds(wall);
-  report.set_outcome(result.outcome == RunOutcome::kCompleted     ? "completed"
-                     : result.outcome == RunOutcome::kInterrupted ? "interrupted"
-                                                                  : "paused");
-  report.set_state_hash(environment->state_hash().text());
-  report.set_chain_hash(environment->chain_hash().text());
-  *report.mutable_plan() = plan_message(*environment);
-  *report.mutable_events() = events->counts();
-  for (std::string& warning : warnings) report.add_warnings(std::move(warning));
-  for (std::string& warning : environment->warnings()) report.add_warnings(std::move(warning));
-  figures.write(&report);
-  write_stages(*environment, &report);
-  if (trajectory) trajectory->close();
-  events->close();
-  if (!options.report.empty()) write_report_file(options.report, report);
-  result.summary = summarize(report, events->meetings());
-  return result;
+  Run one(options);
+  one.prepare();
+  one.open_files();
+  one.go(interrupted, progress);
+  one.keep_last_state();
+  one.finish();
+  return one.take_result();
 }
 
 }  // namespace gravitas

@@ -16,6 +16,7 @@ namespace gravitas {
 struct HostingChoice {
   std::optional<Slot> slot;  // none: all
   kernel::Hosting hosting;
+  std::string address = {};  // with kGrpc: of a worker that somebody else started
 };
 
 struct RunOptions {
@@ -27,6 +28,9 @@ struct RunOptions {
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events;
   std::optional<double> sample_every;  // s; every step if absent
+  std::string checkpoint;              // file that is kept up to date; none if empty
+  std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
+  std::string resume;                  // checkpoint to go on from
   std::uint32_t threads = 1;
 };
 
@@ -36,13 +40,22 @@ class BadInput : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-enum class RunOutcome { kCompleted, kInterrupted, kPaused };
+enum class RunOutcome {
+  kCompleted,
+  kInterrupted,
+  kPaused,  // by a plugin
+  kFailed   // a file could not be written, or a step that a journal knows came out differently
+};
 
 struct RunResult {
   RunOutcome outcome = RunOutcome::kCompleted;
   report::v1::Report report;
   std::string summary;  // what happened, for a person
-  std::string fault;    // why the run paused: slot, plugin, cause, step
+  std::string fault;    // why the run paused (slot, plugin, cause, step) or failed
+  // File with the state that the run ended in (after a failure: that of the last checkpoint), and its step; empty if
+  // none was written.
+  std::string checkpoint;
+  std::uint32_t checkpoint_step = 0;
 };
 
 // The scene as the kernel's description. Throws BadInput. `warnings` gets the reader's warnings.
@@ -60,8 +73,10 @@ struct Progress {
   std::uint32_t step, steps;
 };
 
-// Runs to the end, until `interrupted` says so, or until the environment pauses; writes the files asked for.
-// Throws BadInput for input and files that cannot be used, std::system_error if a result cannot be written.
+// Runs to the end, until `interrupted` says so, until the environment pauses or a file cannot be written; writes the
+// files asked for. A run that pauses and keeps no checkpoint writes one, SCENE.paused.checkpoint in the current folder.
+// A resumed run's trajectory and events begin with the resumed state; its report counts from t = 0.
+// Throws BadInput for input and files that cannot be used.
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress);
 

@@ -2,6 +2,8 @@
 
 #include <filesystem>
 
+#include "plugin_sdk/channel/address.h"
+
 namespace gravitas::scene {
 namespace {
 
@@ -25,6 +27,15 @@ const char* naming_block(Slot slot) {
 }
 
 std::string quoted(const std::string& name) { return '"' + name + '"'; }
+
+// The command as one that runs in the folder.
+std::string in_folder(const std::filesystem::path& folder, const std::string& command) {
+  if (folder.empty()) return command;
+  std::string quoted_folder;
+  for (const char c : std::filesystem::absolute(folder).string())
+    quoted_folder += c == '\'' ? "'\\''" : std::string(1, c);
+  return "env -C '" + quoted_folder + "' " + command;
+}
 
 }  // namespace
 
@@ -59,6 +70,7 @@ void PluginSelection::read_block(const Plugin& message) {
                                     quoted(message.slot()) + " may hold several");
   }
   read_hosting(slot, message);
+  check_place(message);
   of_slot.push_back({&message, nullptr, false});
   read_library(slot, &of_slot.back());
 }
@@ -81,33 +93,59 @@ void PluginSelection::read_hosting(Slot slot, const Plugin& message) {
   }
   if (message.hosting() == "direct") description.hosting = kernel::Hosting::kDirect;
   if (message.hosting() == "shm") description.hosting = kernel::Hosting::kSharedMemory;
-  if (message.hosting() == "grpc") {
-    context_.diagnostics->error(place_of(message, Plugin::kHostingFieldNumber),
-                                "Hosting \"grpc\" is not supported by this version; allowed: \"direct\", \"shm\"");
-  }
+  if (message.hosting() == "grpc") description.hosting = kernel::Hosting::kGrpc;
   if (message.has_deadline()) description.deadline = message.deadline();
 }
 
+void PluginSelection::check_place(const Plugin& message) const {
+  const bool has_command = is_written(message, Plugin::kCommandFieldNumber);
+  const bool has_address = is_written(message, Plugin::kAddressFieldNumber);
+  if (!has_command && !has_address) return;
+  const std::string name = has_command ? "Command" : "Address";
+  const auto error = [&](int field, const std::string& what) {
+    context_.diagnostics->error(place_of(message, field), what);
+  };
+  if (has_command && has_address) error(Plugin::kAddressFieldNumber, "Address beside Command; allowed: one of them");
+  if (has_command && is_written(message, Plugin::kLibraryFieldNumber))
+    error(Plugin::kLibraryFieldNumber, "Library beside Command; allowed: one of them");
+  if (is_written(message, Plugin::kHostingFieldNumber) && message.hosting() != "grpc")
+    error(Plugin::kHostingFieldNumber,
+          name + " is reached by gRPC, not by Hosting " + quoted(message.hosting()) + "; allowed: \"grpc\"");
+  if (has_address && !channel::is_local_address(message.address()))
+    error(Plugin::kAddressFieldNumber,
+          "Address " + quoted(message.address()) +
+              " is not of this machine; allowed, since the connection is not encrypted: 127.0.0.1:PORT, [::1]:PORT, "
+              "unix:PATH");
+}
+
 void PluginSelection::read_library(Slot slot, Block* block) {
-  if (!is_written(*block->message, Plugin::kLibraryFieldNumber)) return;
-  const TextPosition place = place_of(*block->message, Plugin::kLibraryFieldNumber);
+  const bool is_command = is_written(*block->message, Plugin::kCommandFieldNumber);
+  if (!is_command && !is_written(*block->message, Plugin::kLibraryFieldNumber)) return;
+  const TextPosition place =
+      place_of(*block->message, is_command ? Plugin::kCommandFieldNumber : Plugin::kLibraryFieldNumber);
   const std::string& file = context_.scene.files(static_cast<int>(place.file));
-  std::filesystem::path path = block->message->library();
-  if (path.is_relative() && !file.starts_with("--set ")) path = std::filesystem::path(file).parent_path() / path;
+  const std::filesystem::path folder =
+      file.starts_with("--set ") ? std::filesystem::path() : std::filesystem::path(file).parent_path();
+  const std::string written = is_command ? block->message->command() : block->message->library();
   std::string problem;
-  block->library = context_.catalog->add_library(path.string(), &problem);
+  block->library = is_command ? context_.catalog->add_command(in_folder(folder, written), &problem)
+                              : context_.catalog->add_library((folder / written).string(), &problem);
+  const std::string what = (is_command ? "Command " : "Library ") + quoted(written);
   if (block->library == nullptr) {
-    context_.diagnostics->error(place, "Library " + quoted(block->message->library()) + " cannot be used: " + problem +
-                                           "; allowed: the path of a plugin library, from the folder of this file");
+    context_.diagnostics->error(place, what + " cannot be used: " + problem +
+                                           (is_command ? "; allowed: a command that starts a worker of one plugin and "
+                                                         "knows --describe and --listen"
+                                                       : "; allowed: the path of a plugin library, from the folder of "
+                                                         "this file"));
   } else if (block->library->declaration.slot != slot) {
-    context_.diagnostics->error(place, "Library " + quoted(block->message->library()) + " is a plugin for the slot \"" +
+    context_.diagnostics->error(place, what + " is a plugin for the slot \"" +
                                            slot_name(block->library->declaration.slot) + "\", not " +
                                            quoted(block->message->slot()));
     block->library = nullptr;
   } else if (is_written(*block->message, Plugin::kNameFieldNumber) &&
              block->message->name() != block->library->declaration.name) {
     context_.diagnostics->error(place_of(*block->message, Plugin::kNameFieldNumber),
-                                "Name is " + quoted(block->message->name()) + "; the library's plugin is " +
+                                "Name is " + quoted(block->message->name()) + "; the plugin there is " +
                                     quoted(block->library->declaration.name));
   }
 }
@@ -174,7 +212,8 @@ std::uint32_t PluginSelection::serve(Slot slot, const std::string& type, const T
   }
   *declaration = find_type(plugin->declaration, type);
   const std::size_t next = context_.description.slot(slot).plugins.size();
-  const auto [row, is_new] = rows_.try_emplace({slot, plugin->library}, static_cast<std::uint32_t>(next));
+  const auto [row, is_new] =
+      rows_.try_emplace({slot, plugin->library + plugin->command}, static_cast<std::uint32_t>(next));
   if (is_new) {
     for (Block& block : blocks(slot))
       if (block.library == plugin) block.is_used = true;
@@ -198,7 +237,10 @@ void PluginSelection::add_choice(const InstalledPlugin& plugin, const v1::Proper
     place = place_of(block.message->location());
     block.is_used = true;
   }
-  kernel::PluginChoice choice{plugin.declaration, plugin.library, {}};
+  kernel::PluginChoice choice{plugin.declaration, plugin.library, {}, plugin.command};
+  for (const Block& block : blocks(slot))
+    if (block.library == &plugin || block.message->name() == plugin.declaration.name || !is_list(slot))
+      choice.address = block.message->address();
   const std::string what = std::string(slot_name(slot)) + " plugin " + quoted(plugin.declaration.name);
   context_.flatten_properties(plugin.declaration.properties,
                               settings == nullptr ? v1::Properties::default_instance() : *settings, place, what,

@@ -38,12 +38,13 @@ class PluginSelection {
  private:
   struct Block {
     const v1::Plugin* message = nullptr;
-    const InstalledPlugin* library = nullptr;  // of its Library
+    const InstalledPlugin* library = nullptr;  // of its Library or Command
     bool is_used = false;
   };
 
   void read_block(const v1::Plugin& message);
   void read_hosting(Slot slot, const v1::Plugin& message);
+  void check_place(const v1::Plugin& message) const;
   void read_library(Slot slot, Block* block);
   void choose_named(Slot slot, const std::string& name, bool is_named, const TextPosition& name_place,
                     const TextPosition& block_place, const v1::Properties& settings, bool is_needed);

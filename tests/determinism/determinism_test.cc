@@ -54,6 +54,7 @@ Hashes hashes_of(const std::string& scene, std::vector<HostingChoice> hosting, s
 
 const std::vector<HostingChoice> kAllDirect = {{std::nullopt, Hosting::kDirect}};
 const std::vector<HostingChoice> kAllWorkers = {{std::nullopt, Hosting::kSharedMemory}};
+const std::vector<HostingChoice> kAllMessages = {{std::nullopt, Hosting::kGrpc}};
 
 class SameBits : public ::testing::TestWithParam<const char*> {};
 
@@ -64,6 +65,7 @@ TEST_P(SameBits, InProcessAndInWorkersWithOneThreadOrTwoAndAgain) {
   EXPECT_EQ(hashes_of(scene, kAllDirect, 2), reference) << "two threads";
   EXPECT_EQ(hashes_of(scene, kAllWorkers), reference) << "in workers";
   EXPECT_EQ(hashes_of(scene, kAllWorkers, 2), reference) << "in workers with two threads";
+  EXPECT_EQ(hashes_of(scene, kAllMessages), reference) << "in workers by gRPC";
 }
 
 TEST_P(SameBits, WithOneSlotElsewhereThanTheOthers) {
@@ -77,6 +79,9 @@ TEST_P(SameBits, WithOneSlotElsewhereThanTheOthers) {
     EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kDirect}}, 3, {}, kSteps),
               reference)
         << slot_name(slot) << " alone in process";
+    EXPECT_EQ(hashes_of(scene, {{std::nullopt, Hosting::kSharedMemory}, {slot, Hosting::kGrpc}}, 2, {}, kSteps),
+              reference)
+        << slot_name(slot) << " alone by gRPC";
   }
 }
 

@@ -40,10 +40,12 @@ INSTANTIATE_TEST_SUITE_P(Scene, Shipped, ::testing::ValuesIn(shipped_scenes()),
 TEST_P(Shipped, RunsToItsEndAlikeInThisProcessAndInWorkers) {
   const RunResult direct = run_in(GetParam(), kernel::Hosting::kDirect);
   const RunResult workers = run_in(GetParam(), kernel::Hosting::kSharedMemory);
+  const RunResult messages = run_in(GetParam(), kernel::Hosting::kGrpc);
   ASSERT_EQ(direct.outcome, RunOutcome::kCompleted) << direct.fault;
   ASSERT_EQ(workers.outcome, RunOutcome::kCompleted) << workers.fault;
   EXPECT_EQ(direct.report.state_hash(), workers.report.state_hash());
   EXPECT_EQ(direct.report.chain_hash(), workers.report.chain_hash());
+  EXPECT_EQ(direct.report.chain_hash(), messages.report.chain_hash());
   EXPECT_EQ(workers.report.faults_size(), 0);
   EXPECT_GT(workers.report.steps(), 0U);
   EXPECT_TRUE(std::isfinite(direct.report.energy().final()));

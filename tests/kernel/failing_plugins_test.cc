@@ -58,14 +58,18 @@ void expect_pause_at_third_step(const WorldBuilder& builder, const Expected& exp
   EXPECT_EQ(world.chain_hash(), chain);
 }
 
-class InWorker : public ::testing::TestWithParam<Expected> {};
-
-TEST_P(InWorker, PausesAtTheLastCommit) {
-  WorldBuilder builder = ball_on_ground(Hosting::kSharedMemory);
-  builder.plugin(Slot::kIntegrator, faulty_plugin_path(GetParam().library));
+void expect_pause_in_worker(Hosting hosting, const Expected& expected) {
+  WorldBuilder builder = ball_on_ground(hosting);
+  builder.plugin(Slot::kIntegrator, faulty_plugin_path(expected.library));
   builder.description().integrator.deadline = 0.1;
-  expect_pause_at_third_step(builder, GetParam());
+  expect_pause_at_third_step(builder, expected);
 }
+
+class InWorker : public ::testing::TestWithParam<Expected> {};
+TEST_P(InWorker, PausesAtTheLastCommit) { expect_pause_in_worker(Hosting::kSharedMemory, GetParam()); }
+
+class InGrpcWorker : public ::testing::TestWithParam<Expected> {};
+TEST_P(InGrpcWorker, PausesAtTheLastCommit) { expect_pause_in_worker(Hosting::kGrpc, GetParam()); }
 
 // Ends the process, or never answers: only a worker's failure can be survived.
 const Expected kFatal[] = {
@@ -84,13 +88,20 @@ const Expected kWrong[] = {
     {"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
     {"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
     {"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
-    {"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"},
 };
+
+// Where messages have the room they need the worker notices it, elsewhere the kernel.
+const Expected kGreedy[] = {{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}};
+const Expected kGreedyInMessages[] = {{"integrator_wants_room", FaultKind::kFailure, "status", "room for"}};
 
 std::string name_of(const ::testing::TestParamInfo<Expected>& one) { return one.param.library; }
 
 INSTANTIATE_TEST_SUITE_P(Fatal, InWorker, ::testing::ValuesIn(kFatal), name_of);
 INSTANTIATE_TEST_SUITE_P(Wrong, InWorker, ::testing::ValuesIn(kWrong), name_of);
+INSTANTIATE_TEST_SUITE_P(Greedy, InWorker, ::testing::ValuesIn(kGreedy), name_of);
+INSTANTIATE_TEST_SUITE_P(Fatal, InGrpcWorker, ::testing::ValuesIn(kFatal), name_of);
+INSTANTIATE_TEST_SUITE_P(Wrong, InGrpcWorker, ::testing::ValuesIn(kWrong), name_of);
+INSTANTIATE_TEST_SUITE_P(Greedy, InGrpcWorker, ::testing::ValuesIn(kGreedyInMessages), name_of);
 
 class InProcess : public ::testing::TestWithParam<Expected> {};
 
@@ -101,6 +112,7 @@ TEST_P(InProcess, PausesAtTheLastCommit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Wrong, InProcess, ::testing::ValuesIn(kWrong), name_of);
+INSTANTIATE_TEST_SUITE_P(Greedy, InProcess, ::testing::ValuesIn(kGreedy), name_of);
 
 TEST(FailingPlugins, PairsOutOfOrderAreRefused) {
   WorldBuilder builder = ball_on_ground(Hosting::kDirect);
@@ -121,7 +133,7 @@ TEST(FailingPlugins, ContactsThatPullAreRefused) {
 }
 
 TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
-  for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory}) {
+  for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc}) {
     WorldBuilder builder = ball_on_ground(hosting);
     builder.description().solver.plugins[0].library = GRAVITAS_SOURCE_DIR "/README.md";
     try {
@@ -161,8 +173,8 @@ int open_descriptors() {
 }
 
 TEST(FailingPlugins, NothingIsLeftBehind) {
-  const auto live_and_die = [](const char* library) {
-    WorldBuilder builder = ball_on_ground(Hosting::kSharedMemory);
+  const auto live_and_die = [](Hosting hosting, const char* library) {
+    WorldBuilder builder = ball_on_ground(hosting);
     if (library != nullptr) builder.plugin(Slot::kIntegrator, faulty_plugin_path(library));
     builder.description().integrator.deadline = 0.1;
     Environment world(builder.description());
@@ -171,13 +183,17 @@ TEST(FailingPlugins, NothingIsLeftBehind) {
   };
   // what is made once per process (the supervisor, gRPC, the declarations of libraries) is made by the first round
   const char* const libraries[] = {nullptr, "integrator_killed", "integrator_hangs"};
-  for (const char* library : libraries) live_and_die(library);
+  constexpr Hosting kHostings[] = {Hosting::kSharedMemory, Hosting::kGrpc};
+  for (const Hosting hosting : kHostings)
+    for (const char* library : libraries) live_and_die(hosting, library);
   const int before = open_descriptors();
-  for (const char* library : libraries) {
-    live_and_die(library);
-    // all children are reaped: there is none to wait for
-    siginfo_t info{};
-    EXPECT_EQ(waitid(P_ALL, 0, &info, WEXITED | WNOHANG | WNOWAIT), -1) << "process " << info.si_pid;
+  for (const Hosting hosting : kHostings) {
+    for (const char* library : libraries) {
+      live_and_die(hosting, library);
+      // all children are reaped: there is none to wait for
+      siginfo_t info{};
+      EXPECT_EQ(waitid(P_ALL, 0, &info, WEXITED | WNOHANG | WNOWAIT), -1) << "process " << info.si_pid;
+    }
   }
   // gRPC and the supervisor's thread close the last ones in their own time
   for (int i = 0; i < 1000 && open_descriptors() > before; ++i) usleep(10'000);

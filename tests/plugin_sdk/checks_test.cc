@@ -63,7 +63,7 @@ TEST(FirstNotUnit, AllowsRoundingButNoMore) {
 
 using Counts = std::vector<std::uint64_t>;
 
-const stage::MethodInfo& info(stage::Method method) { return stage::kMethods[static_cast<std::uint32_t>(method)]; }
+const stage::MethodInfo& info(stage::Method method) { return stage::method_info(method); }
 
 // Space.Pairs of three bodies with the given number of elements in `pair`.
 std::string check_pairs(std::uint64_t pair) {

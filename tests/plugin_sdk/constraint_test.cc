@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -150,6 +151,20 @@ TEST(JointLoops, RefuseParametersOutsideTheirColumn) {
             "the parameters of joint 1 lie outside their column");
   EXPECT_EQ(refusal([](Joints* joints) { joints->begin.pop_back(); }),
             "the parameters of joint 2 lie outside their column");
+}
+
+TEST(JointLoops, RefuseNumbersThatAreNotFinite) {
+  Joints joints;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(
+      joints.bind([&](std::uint64_t, PropertyCursor, const JointBodies&, BoundWriter& out) { out.number(nan); }),
+      Refusal);
+  EXPECT_THROW(joints.describe([&](std::uint64_t, PropertyCursor, const JointBodies&, auto&& emit) {
+    Discrepancy d;
+    d.velocity.z() = nan;
+    emit(d);
+  }),
+               Refusal);
 }
 
 TEST(PointDiscrepancy, HoldsTwoAnchorsTogether) {

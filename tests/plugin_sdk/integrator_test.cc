@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "plugin_sdk/math/rotation.h"
@@ -152,6 +153,21 @@ TEST(ForEachBody, KinematicBodiesGoOnWithTheirVelocities) {
   EXPECT_EQ(after.pose.position, Vector3(before.pose.position + 0.1 * before.twist.linear));
   const Quaternion turn = after.pose.orientation * before.pose.orientation.conjugate();
   EXPECT_LT((log_rotation(turn) - 0.1 * before.twist.angular).norm(), 1e-15);
+}
+
+TEST(ForEachBody, RefusesAStateThatIsNotFinite) {
+  Step step({kMovable, kMovable});
+  try {
+    for_each_body(step.request(), step.reply(), [](std::size_t body, const BodyState& s) {
+      BodyState next = s;
+      if (body == 1) next.twist.angular.y() = std::numeric_limits<double>::infinity();
+      return next;
+    });
+    FAIL() << "an infinite spin was answered";
+  } catch (const Refusal& refusal) {
+    EXPECT_TRUE(std::string(refusal.what()).starts_with("body 1 comes to a state that is not finite"))
+        << refusal.what();
+  }
 }
 
 TEST(ForEachBody, FillsEveryColumnAndEstimatesNoError) {

@@ -24,9 +24,15 @@ using Pairs = std::function<void(const stage::SpacePairsRequest&, const stage::S
 int alive = 0;
 
 // A space whose answer is what the test says.
-class Toy final : public SpacePlugin {
+class Toy : public SpacePlugin {
  public:
-  static PluginDeclaration declaration() { return test::full_declaration(); }
+  static PluginDeclaration declaration() {
+    return {.name = "Toy",
+            .version = "1.0",
+            .slot = Slot::kSpace,
+            .meaning = "Answers what a test says.",
+            .properties = {Property::number("Number", "1").at_most(1000.0).means("Is remembered.")}};
+  }
   explicit Toy(PropertyCursor settings) : number(settings.number()) {
     if (number < 0.0) throw Refusal("a negative number");
     if (number == 1000.0) throw 1000;
@@ -39,6 +45,12 @@ class Toy final : public SpacePlugin {
 
   double number;
   Pairs answer;
+};
+
+class Described final : public Toy {
+ public:
+  static PluginDeclaration declaration() { return test::full_declaration(); }
+  using Toy::Toy;
 };
 
 // A call of Space.Pairs with room for four numbers.
@@ -72,7 +84,7 @@ TEST(PluginTable, SaysWhatItWasBuiltFor) {
 }
 
 TEST(PluginTable, CarriesTheWholeDeclaration) {
-  test::expect_equal(read_declaration(*plugin_table<Toy>()->description), test::full_declaration());
+  test::expect_equal(read_declaration(*plugin_table<Described>()->description), test::full_declaration());
 }
 
 TEST(PluginTable, CreatesAndDestroysInstances) {
@@ -103,7 +115,11 @@ TEST(PluginTable, SaysWhyAnInstanceCannotBe) {
   EXPECT_EQ(create({-1.0}, &text), GRAVITAS_REFUSED);
   EXPECT_EQ(text, "a negative number");
   EXPECT_EQ(create({}, &text), GRAVITAS_REFUSED);
-  EXPECT_EQ(text, "fewer numbers than the declared properties take");
+  EXPECT_EQ(text, "settings of Toy: fewer numbers than the properties take");
+  EXPECT_EQ(create({1.0, 2.0}, &text), GRAVITAS_REFUSED);
+  EXPECT_EQ(text, "settings of Toy: more numbers than the properties take");
+  EXPECT_EQ(create({1001.0}, &text), GRAVITAS_REFUSED);
+  EXPECT_EQ(text, "settings of Toy: Number = 1001; allowed: a number <= 1000");
   EXPECT_EQ(create({1000.0}, &text), GRAVITAS_FAILED);
   EXPECT_EQ(text, "an exception that is no std::exception");
   EXPECT_EQ(alive, 0);

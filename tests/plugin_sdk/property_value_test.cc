@@ -191,5 +191,43 @@ TEST(PropertyText, CutsLongTextsBetweenCharacters) {
   EXPECT_EQ(shown(PropertyValue::of("a")), "\"a\"");
 }
 
+TEST(CheckFlattened, TakesWhatFlattenMakes) {
+  const std::vector<Property> declared = {Property::number("Mass", "kg").above(0.0).required(),
+                                          Property::flag("IsOn").defaults_to({1.0}),
+                                          Property::choice("Frame", {"World", "Body"}),
+                                          Property::integer("Count").at_least(0.0).defaults_to({3.0}),
+                                          Property::quaternion("Turn", "world"),
+                                          Property::table("Points", 2, "m", "world")};
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> good = {2.0, 0.0, 1.0, 4.0, 0.6, 0.0, 0.8, 0.0, 2.0, 1.0, 2.0, 3.0, 4.0};
+  EXPECT_EQ(check_flattened(declared, good), "");
+  // what may be absent
+  EXPECT_EQ(check_flattened(declared, {{2.0, 1.0, kNone, 3.0, kNone, kNone, kNone, kNone, 0.0}}), "");
+
+  const auto with = [&](std::size_t i, double number) {
+    std::vector<double> numbers = good;
+    numbers[i] = number;
+    return check_flattened(declared, numbers);
+  };
+  EXPECT_EQ(with(0, 0.0), "Mass = 0; allowed: a number > 0");
+  EXPECT_NE(with(0, kNone), "");
+  EXPECT_NE(with(0, std::numeric_limits<double>::infinity()), "");
+  EXPECT_NE(with(1, 2.0), "");
+  EXPECT_NE(with(1, kNone), "");
+  EXPECT_NE(with(2, 2.0), "");
+  EXPECT_NE(with(2, 0.5), "");
+  EXPECT_NE(with(3, 0.5), "");
+  EXPECT_NE(with(3, -1.0), "");
+  EXPECT_EQ(with(4, 0.7), "Turn is no unit quaternion");
+  // a table as long as it says, and of whole rows
+  EXPECT_EQ(with(8, 3.0), "fewer numbers than the properties take");
+  EXPECT_EQ(with(8, 1.0), "more numbers than the properties take");
+  EXPECT_EQ(with(8, 1e300), "fewer numbers than the properties take");
+  EXPECT_EQ(with(8, 0.5), "Points has 0.5 rows");
+  EXPECT_EQ(with(8, -1.0), "Points has -1 rows");
+  EXPECT_NE(with(9, kNone), "");
+  EXPECT_EQ(check_flattened(declared, {}), "fewer numbers than the properties take");
+}
+
 }  // namespace
 }  // namespace gravitas

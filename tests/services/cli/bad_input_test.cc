@@ -134,12 +134,30 @@ TEST(BadInput, LibrariesThatAreNoPluginsOrOfAnotherSchema) {
   }
 }
 
+TEST(BadInput, CommandsThatStartNoWorker) {
+  const ScratchFolder folder;
+  for (const auto& [command, expected] :
+       std::vector<std::pair<std::string, std::string>>{{"false", "false --describe ended with status 1"},
+                                                        {"echo", "wrote no catalogue of 1 plugins"},
+                                                        {"no-such-program", "No such file or directory"}}) {
+    const std::string plugins =
+        folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Command = \"" + command + "\" } }");
+    const ProgramResult result = run_program({"run", kSample, plugins}, folder);
+    EXPECT_EQ(result.exit_code, 2) << command;
+    EXPECT_THAT(result.err, HasSubstr("plugins.gravitas:1:46: error: Command \"" + command + "\" cannot be used"));
+    EXPECT_THAT(result.err, HasSubstr(expected));
+  }
+}
+
 TEST(BadInput, OptionsOfTheCommandLine) {
   const ScratchFolder folder;
   for (const auto& [option, expected] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"--frobnicate"}, "--frobnicate"},
-           {{"--hosting", "cloud"}, "allowed: direct, shm"},
-           {{"--hosting", "grpc"}, "not supported by this version"},
+           {{"--hosting", "cloud"}, "allowed: direct, shm, grpc"},
+           {{"--hosting", "grpc:127.0.0.1:7000"}, "SLOT=grpc:ADDRESS"},
+           {{"--hosting", "solver=grpc:192.0.2.1:7000"}, "no address of this machine"},
+           {{"--hosting", "solver=grpc:"}, "no address of this machine"},
+           {{"--hosting", "integrator=grpc:unix:/nowhere"}, "no worker answers at unix:/nowhere"},
            {{"--hosting", "sovler=shm"}, "allowed: space, collision"},
            {{"--dt", "0"}, "--dt 0: it must be"},
            {{"--duration", "-1"}, "--duration -1: it must be"},

@@ -234,7 +234,7 @@ ProgramResult run_with_bad_integrator(const std::string& library, const ScratchF
                           "/lib/gravitas-faulty/" +
                               library + ".so\" } }");
   return run_program({"run", kSample, plugins, "--set", "Integrator=Faulty", "--report", folder.path("report.json"),
-                      "--trajectory", folder.path("motion.csv")},
+                      "--trajectory", folder.path("motion.csv"), "--checkpoint", folder.path("kept")},
                      folder);
 }
 

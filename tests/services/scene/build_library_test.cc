@@ -108,7 +108,7 @@ TEST_F(BuildLibrary, OfAnotherNameIsRefused) {
                          "Environment { }\nPlugins { Plugin { Slot = \"force\" Name = \"Gale\" Library = "
                          "\"own.so\" } }")
                   .errors(),
-              ElementsAre(at("2:42") + "error: Name is \"Gale\"; the library's plugin is \"Winds\""));
+              ElementsAre(at("2:42") + "error: Name is \"Gale\"; the plugin there is \"Winds\""));
 }
 
 TEST_F(BuildLibrary, ThatNothingUsesIsSaid) {

@@ -85,10 +85,16 @@ TEST(Build, RefusesWhatThisVersionLacks) {
               ElementsAre("scene:1:48: error: DefaultAllow = false is not supported by this "
                           "version; allowed: true"));
   EXPECT_THAT(errors_of("Environment { CollisionFilter { DefaultAllow = true Rules { } Exceptions { } } }"), IsEmpty());
-  EXPECT_THAT(errors_of("Environment { } Plugins { Plugin { Slot = \"solver\" Hosting = \"grpc\" } }"),
-              ElementsAre("scene:1:62: error: Hosting \"grpc\" is not supported by this version; allowed: "
-                          "\"direct\", "
-                          "\"shm\""));
+}
+
+TEST(Build, ChecksWhereAWorkerIs) {
+  const auto errors = [](const std::string& place) {
+    return errors_of("Environment { } Plugins { Plugin { Slot = \"solver\" " + place + " } }");
+  };
+  EXPECT_THAT(errors("Hosting = \"grpc\""), IsEmpty());
+  EXPECT_THAT(errors("Hosting = \"shm\" Address = \"127.0.0.1:7000\""),
+              ElementsAre(HasSubstr("Address is reached by gRPC, not by Hosting \"shm\"")));
+  EXPECT_THAT(errors("Address = \"192.0.2.1:7000\""), ElementsAre(HasSubstr("is not of this machine")));
 }
 
 // ---- plugins

@@ -212,5 +212,11 @@ TEST_F(AngularMotor, RefusesAnAxisOfOnePoint) {
             "AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
 }
 
+TEST_F(AngularMotor, RefusesAJointOfAnotherType) {
+  const JointProblem foreign(&plugin_, "Spherical");
+  EXPECT_EQ(plugin_.refusal(stage::Method::kConstraintBind, foreign.bind_request(properties(1.0))),
+            "a joint is of a type that this plugin does not know");
+}
+
 }  // namespace
 }  // namespace gravitas::test

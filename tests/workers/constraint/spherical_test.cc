@@ -130,5 +130,11 @@ TEST_F(Spherical, RefusesABodyThatDoesNotExist) {
             "a joint names body 2, which does not exist");
 }
 
+TEST_F(Spherical, RefusesAJointOfAnotherType) {
+  const JointProblem foreign(&plugin_, "AngularMotor");
+  EXPECT_EQ(plugin_.refusal(stage::Method::kConstraintBind, foreign.bind_request({0, 0, 0})),
+            "a joint is of a type that this plugin does not know");
+}
+
 }  // namespace
 }  // namespace gravitas::test

@@ -1,6 +1,8 @@
 // Force `Gravity`: m g at the centre of mass, and its potential.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/plugin_sdk/random.h"
 #include "tests/workers/force/force_problem.h"
 
@@ -26,6 +28,19 @@ TEST_F(Gravity, PullsWithMassTimesAcceleration) {
   // U = -m g.x
   EXPECT_DOUBLE_EQ(answer.potential, 19.62 * 10 + 3.0);
   EXPECT_EQ(answer.flags, kPromises);
+}
+
+TEST_F(Gravity, RefusesWhatIsNotFinite) {
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e308}) {
+    ForceProblem problem;
+    problem.types = {type_id("Gravity")};
+    problem.properties = {{0, bad, 0}};
+    problem.bodies = {ForcedBody{.mass = 20.0}};
+    problem.applications = {0, 0};
+    EXPECT_EQ(gravity_.refusal(stage::Method::kForceWrenches, problem.request()),
+              "the wrench of application 0 is not finite: the force's properties or the body's mass or state are not, "
+              "or too large");
+  }
 }
 
 // What a constant wrench with a potential promises: U(x) = U(x0) - f.(x - x0), f the same.

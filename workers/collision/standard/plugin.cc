@@ -5,9 +5,13 @@
 // own place, and written in order.
 #include "plugin_sdk/plugin.h"
 
+#include <cmath>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/checks.h"
 #include "workers/collision/standard/narrow_phase.h"
 
 namespace gravitas::collision {
@@ -43,6 +47,7 @@ class Standard final : public CollisionPlugin {
     const std::span<const std::uint32_t> pair = request.pair();
     const std::size_t pairs = pair.size() / 2;
     check_pairs(request);
+    check_bodies(request);
     manifolds_.resize(pairs);
     host.parallel_for(pairs, [&](std::uint64_t begin, std::uint64_t end) {
       for (std::uint64_t i = begin; i < end; ++i) {
@@ -94,11 +99,22 @@ class Standard final : public CollisionPlugin {
       const std::uint32_t body = request.pair()[i];
       if (body >= bodies || request.body_shape()[body] >= shapes_.size())
         throw Refusal("pair " + std::to_string(i / 2) + " names a body without shape");
-      if (!vector_at(request.position(), body).allFinite() ||
-          !quaternion_at(request.orientation(), body).coeffs().allFinite())
-        throw Refusal("body " + std::to_string(body) + " has a pose that is not finite");
     }
-    if (!(request.margin() >= 0.0)) throw Refusal("the margin is negative");
+    if (!(request.margin() >= 0.0)) throw Refusal("the margin is negative, or no number");
+  }
+
+  static void check_bodies(const stage::CollisionManifoldsRequest& request) {
+    const auto require_finite = [](const char* what, std::span<const double> column, std::size_t components) {
+      const std::size_t i = first_not_finite(column);
+      if (i != kNoRow)
+        throw Refusal("body " + std::to_string(i / components) + " has a " + what + " that is not finite");
+    };
+    require_finite("geometry position", request.geometry_position(), 3);
+    require_finite("geometry orientation", request.geometry_orientation(), 4);
+    require_finite("position", request.position(), 3);
+    require_finite("orientation", request.orientation(), 4);
+    require_finite("linear velocity", request.linear_velocity(), 3);
+    require_finite("angular velocity", request.angular_velocity(), 3);
   }
 
   static Pose geometry_pose(const stage::CollisionManifoldsRequest& request, std::uint32_t body) {
@@ -116,6 +132,9 @@ class Standard final : public CollisionPlugin {
                      vector_at(request.angular_velocity(), body).cross(arm));
     };
     const Vector3 relative = velocity(request.pair()[2 * pair + 1]) - velocity(request.pair()[2 * pair]);
+    if (!relative.allFinite() || !contact.point.allFinite() || !std::isfinite(contact.depth))
+      throw Refusal("a contact of pair " + std::to_string(pair) +
+                    " is not finite: sizes, positions or velocities overflow");
     const auto push = [](const stage::ReplyColumn<double>& column, const Vector3& v) {
       column.push(v.x(), v.y(), v.z());
     };

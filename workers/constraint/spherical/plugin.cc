@@ -22,7 +22,8 @@ class Spherical final : public ConstraintPlugin {
 
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
     bind_each(request, reply,
-              [](std::uint64_t, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+              [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+                if (type != type_id("Spherical")) throw Refusal("a joint is of a type that this plugin does not know");
                 const Vector3 point = properties.vector();
                 out.vector(inverse_transform_point(bodies.pose1, point));
                 out.vector(inverse_transform_point(bodies.pose2, point));

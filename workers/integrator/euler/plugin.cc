@@ -29,10 +29,8 @@ class Euler final : public IntegratorPlugin {
     Derivatives derivatives(request, host, &room_);
     const std::span<const double> wrenches = derivatives.wrenches_at_start();
     for_each_body(request, reply, [&](std::size_t body, const BodyState& s) {
-      const Acceleration a = derivatives.acceleration(body, s, wrenches);
-      const double slowed = damping_factor(request.damping()[body], h);
       return BodyState{displaced(s.pose, h * s.twist.linear, h * s.twist.angular),
-                       {slowed * (s.twist.linear + h * a.linear), slowed * (s.twist.angular + h * a.angular)}};
+                       accelerated(s.twist, derivatives.acceleration(body, s, wrenches), request.damping()[body], h)};
     });
   }
 

@@ -1,4 +1,4 @@
-#include "plugin_sdk/host/worker.h"
+#include "plugin_sdk/host/mailbox_loop.h"
 
 #include <sched.h>
 #include <unistd.h>
@@ -6,16 +6,19 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <utility>
-
-#include "plugin_sdk/floating_point.h"
 
 namespace gravitas::host {
 
 using channel::SegmentRole;
 
-struct Worker::CallState {
-  Worker* worker = nullptr;
+struct MailboxLoop::OpenCall final : CallServices {
+  explicit OpenCall(MailboxLoop* owner) : worker(owner) {}
+  void mark_progress() override { worker->mine_->progress.fetch_add(1, std::memory_order_relaxed); }
+  std::int32_t derivative(const gravitas_column* asked, gravitas_reply_column* answer) override {
+    return worker->ask_derivative(this, asked, answer);
+  }
+
+  MailboxLoop* worker;
   gravitas_frame_header request{};
   std::size_t reply_columns = 0;
   std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns{};
@@ -35,36 +38,15 @@ std::size_t bytes_of(const stage::ColumnInfo& column, std::uint64_t count) {
   return static_cast<std::size_t>(count) * stage::element_size(column.type);
 }
 
-bool fits(const channel::Segment& segment, std::uint64_t offset, std::uint64_t bytes) {
-  return offset % GRAVITAS_COLUMN_ALIGNMENT == 0 && bytes <= segment.size() && offset <= segment.size() - bytes;
-}
-
-void mark_progress(void* context) {
-  static_cast<channel::Mailbox*>(context)->progress.fetch_add(1, std::memory_order_relaxed);
+// Whatever the counts are: their bytes are not counted before they are known to be few.
+bool fits(const channel::Segment& segment, std::uint64_t offset, std::uint64_t count, std::size_t element_size) {
+  return offset % GRAVITAS_COLUMN_ALIGNMENT == 0 && count <= segment.size() / element_size &&
+         offset <= segment.size() - count * element_size;
 }
 
 }  // namespace
 
-Worker::Worker(std::vector<PluginLibrary> libraries, int descriptor_socket)
-    : libraries_(std::move(libraries)), descriptor_socket_(descriptor_socket) {}
-
-Worker::~Worker() {
-  for (std::size_t i = 0; i < instances_.size(); ++i) libraries_[i].table->destroy(instances_[i]);
-}
-
-std::string Worker::create_instances(const std::vector<std::vector<double>>& settings) {
-  for (std::size_t i = 0; i < libraries_.size(); ++i) {
-    gravitas_error error{};
-    void* instance = nullptr;
-    const gravitas_plugin_table& table = *libraries_[i].table;
-    if (table.create(settings[i].data(), settings[i].size(), &instance, &error) != GRAVITAS_OK)
-      return libraries_[i].declaration.name + ": " + error.text;
-    instances_.push_back(instance);
-  }
-  return {};
-}
-
-bool Worker::receive_segments() {
+bool MailboxLoop::receive_segments() {
   channel::SegmentMessage message{};
   const int descriptor = channel::receive_segment(descriptor_socket_, &message);
   if (descriptor < 0) return false;
@@ -94,16 +76,15 @@ bool Worker::receive_segments() {
   return true;
 }
 
-bool Worker::map_announced_segments(const gravitas_frame_header& header) {
+bool MailboxLoop::map_announced_segments(const gravitas_frame_header& header) {
   while (state_generation_ != header.state_generation || response_generation_ != header.response_generation)
     if (!receive_segments()) return false;
   return true;
 }
 
-int Worker::serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<bool>& stopping,
-                  std::atomic<std::uint64_t>* calls, const std::function<void(std::string)>& complain) {
+int MailboxLoop::serve(std::uint64_t epoch, const std::atomic<bool>& stopping, std::atomic<std::uint64_t>* calls,
+                       const std::function<void(std::string)>& complain) {
   epoch_ = epoch;
-  threads_ = std::make_unique<ThreadPool>(threads);
   while (kernel_ == nullptr || mine_ == nullptr)
     if (!receive_segments()) return 1;
   install_crash_reporter(mine_, kernel_, epoch_);
@@ -126,12 +107,11 @@ int Worker::serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<
   return 0;
 }
 
-std::string Worker::read_request(const gravitas_frame_header& request, CallState* call) {
-  call->worker = this;
+std::string MailboxLoop::read_request(const gravitas_frame_header& request, OpenCall* call) {
   call->request = request;
   if (request.magic != GRAVITAS_MAGIC || request.schema_hash != stage::kSchemaHash) return "a frame of another schema";
   if (request.method >= stage::kMethodCount) return "an unknown method";
-  if (request.target >= instances_.size()) return "no such plugin in this worker";
+  if (request.target >= plugins_->count()) return "no such plugin in this worker";
   const stage::MethodInfo& method = stage::kMethods[request.method];
   call->reply_columns = method.reply.size();
   if (request.column_count != method.request.size() || request.reply_count < method.reply.size() ||
@@ -142,62 +122,33 @@ std::string Worker::read_request(const gravitas_frame_header& request, CallState
     return "a frame whose digest does not fit";
   for (std::size_t i = 0; i < method.request.size(); ++i) {
     const gravitas_frame_column& column = kernel_->columns[i];
-    if (!fits(state_, column.offset, bytes_of(method.request[i], column.count)))
+    if (!fits(state_, column.offset, column.count, stage::element_size(method.request[i].type)))
       return std::string("column ") + method.request[i].name + " lies outside the state segment";
     call->columns[i] = {state_.data() + column.offset, column.count};
   }
   for (std::size_t i = 0; i < request.reply_count; ++i) {
     const gravitas_frame_column& room = kernel_->reply[i];
-    if (!fits(response_, room.offset, room.capacity * 8)) return "room for a reply outside the response segment";
+    if (!fits(response_, room.offset, room.capacity, 8)) return "room for a reply outside the response segment";
     call->room[i] = room.offset;
     call->reply[i] = {response_.data() + room.offset, room.capacity, 0};
   }
   return {};
 }
 
-void Worker::answer(const gravitas_frame_header& request) {
-  CallState call;
+void MailboxLoop::answer(const gravitas_frame_header& request) {
+  OpenCall call(this);
   const std::string problem = read_request(request, &call);
   if (!problem.empty()) {
     call.request.method = std::min(request.method, stage::kMethodCount - 1);
     write_reply(call, GRAVITAS_FAILED, problem.c_str(), 0);
     return;
   }
-  struct Services {
-    CallState* call;
-    channel::Mailbox* mine;
-    ThreadPool* threads;
-  } services{&call, mine_, threads_.get()};
-  gravitas_host host{};
-  host.context = &services;
-  host.mark_progress = [](void* context) { mark_progress(static_cast<Services*>(context)->mine); };
-  host.parallel_for = [](void* context, std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t),
-                         void* argument) {
-    static_cast<Services*>(context)->threads->parallel_for(count, body, argument);
-  };
-  if (request.method == static_cast<std::uint32_t>(stage::Method::kIntegratorIntegrate)) {
-    host.derivative = [](void* context, const gravitas_column* columns, gravitas_reply_column* reply) {
-      CallState* current = static_cast<Services*>(context)->call;
-      return current->worker->ask_derivative(current, columns, reply);
-    };
-  }
-
-  const std::uint32_t control = floating_point_control();
-  gravitas_error error{};
-  const std::uint64_t start = channel::now_ns();
-  std::int32_t status = libraries_[request.target].table->call(instances_[request.target], request.method,
-                                                               call.columns.data(), call.reply.data(), &host, &error);
-  const std::uint64_t compute_ns = channel::now_ns() - start;
-  const char* text = error.text;
-  if (floating_point_control() != control) {
-    set_floating_point_control(control);
-    status = GRAVITAS_FAILED;
-    text = "the plugin changed the floating-point environment";
-  }
-  write_reply(call, status, text, compute_ns);
+  const CallEnd end = plugins_->call(request.target, static_cast<stage::Method>(request.method), call.columns.data(),
+                                     call.reply.data(), &call);
+  write_reply(call, end.status, end.text.c_str(), end.compute_ns);
 }
 
-void Worker::write_reply(const CallState& call, std::int32_t status, const char* text, std::uint64_t compute_ns) {
+void MailboxLoop::write_reply(const OpenCall& call, std::int32_t status, const char* text, std::uint64_t compute_ns) {
   gravitas_frame_header header = call.request;
   header.kind = GRAVITAS_FRAME_REPLY;
   header.status = status;
@@ -217,8 +168,8 @@ void Worker::write_reply(const CallState& call, std::int32_t status, const char*
 }
 
 // The trial state goes to the rooms behind the reply's; the answer comes in the state segment.
-std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* request, gravitas_reply_column* reply) {
-  const stage::MethodInfo& method = stage::kMethods[static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative)];
+std::int32_t MailboxLoop::ask_derivative(OpenCall* call, const gravitas_column* request, gravitas_reply_column* reply) {
+  const stage::MethodInfo& method = stage::method_info(stage::Method::kIntegratorDerivative);
   const std::size_t columns = method.request.size();
   if (call->request.reply_count < call->reply_columns + columns) return GRAVITAS_CALLBACK_FAILED;
 
@@ -248,7 +199,7 @@ std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* requ
   const std::size_t bytes = static_cast<std::size_t>(wrench.count) * sizeof(double);
   if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || answer.column_count != 1 ||
       channel::frame_digest(answer, std::span(kernel_->columns).first(1), {}, nullptr) != answer.digest ||
-      !fits(state_, wrench.offset, bytes))
+      !fits(state_, wrench.offset, wrench.count, stage::element_size(method.reply[0].type)))
     return GRAVITAS_CALLBACK_FAILED;
   reply[0].count = wrench.count;
   if (wrench.count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
@@ -257,7 +208,7 @@ std::int32_t Worker::ask_derivative(CallState* call, const gravitas_column* requ
 }
 
 // Two sides on one core cannot spin: after a few such meetings the worker lets itself be moved.
-void Worker::leave_crowded_core() {
+void MailboxLoop::leave_crowded_core() {
   const int here = sched_getcpu();
   if (here < 0 || kernel_->cpu.load(std::memory_order_relaxed) != static_cast<std::uint32_t>(here)) {
     collisions_ = 0;

@@ -10,46 +10,38 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
-#include <vector>
 
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/channel/segment.h"
-#include "plugin_sdk/library.h"
-#include "plugin_sdk/thread_pool.h"
+#include "plugin_sdk/host/hosted_plugins.h"
 
 namespace gravitas::host {
 
-class Worker {
+class MailboxLoop {
  public:
-  Worker(std::vector<PluginLibrary> libraries, int descriptor_socket);
-  ~Worker();
-
-  // Creates the instances; `settings` has the numbers of each. Empty, or why a plugin refused.
-  std::string create_instances(const std::vector<std::vector<double>>& settings);
+  MailboxLoop(HostedPlugins* plugins, int descriptor_socket)
+      : plugins_(plugins), descriptor_socket_(descriptor_socket) {}
 
   // Serves calls until a stop frame comes, `stopping` is set, or the kernel is gone. Returns the exit code.
   // `complain` takes what the kernel should hear of besides the answers.
-  int serve(std::uint64_t epoch, std::uint32_t threads, const std::atomic<bool>& stopping,
-            std::atomic<std::uint64_t>* calls, const std::function<void(std::string)>& complain);
+  int serve(std::uint64_t epoch, const std::atomic<bool>& stopping, std::atomic<std::uint64_t>* calls,
+            const std::function<void(std::string)>& complain);
 
  private:
-  struct CallState;
+  struct OpenCall;
 
   bool receive_segments();
   bool map_announced_segments(const gravitas_frame_header& header);
   void answer(const gravitas_frame_header& request);
-  std::string read_request(const gravitas_frame_header& request, CallState* call);
-  void write_reply(const CallState& call, std::int32_t status, const char* text, std::uint64_t compute_ns);
-  std::int32_t ask_derivative(CallState* call, const gravitas_column* request, gravitas_reply_column* reply);
+  std::string read_request(const gravitas_frame_header& request, OpenCall* call);
+  void write_reply(const OpenCall& call, std::int32_t status, const char* text, std::uint64_t compute_ns);
+  std::int32_t ask_derivative(OpenCall* call, const gravitas_column* request, gravitas_reply_column* reply);
   void leave_crowded_core();
 
-  std::vector<PluginLibrary> libraries_;
-  std::vector<void*> instances_;
+  HostedPlugins* plugins_;
   int descriptor_socket_;
   std::uint64_t epoch_ = 0;
-  std::unique_ptr<ThreadPool> threads_;
 
   channel::Segment kernel_segment_, worker_segment_, state_, response_;
   std::uint64_t state_generation_ = 0, response_generation_ = 0;

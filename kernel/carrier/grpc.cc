@@ -1,0 +1,294 @@
+// A worker with its data as typed protobuf messages (schemas/gravitas/stage/v1/call.proto): one gRPC stream per
+// method over the connection that also carries the control stream. Slower than shared memory, and what a worker in
+// another language, or at an address, speaks.
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/grpcpp.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <set>
+
+#include "gravitas/stage/v1/call.pb.h"
+#include "kernel/carrier/carrier.h"
+#include "kernel/carrier/worker_link.h"
+#include "plugin_sdk/channel/mailbox.h"
+#include "schemas/wire/columns.h"
+
+namespace gravitas::kernel {
+namespace {
+
+using stage::MethodInfo;
+using stage::v1::Outcome;
+
+// A large constant column goes ahead of the calls, in parts, once per worker; a smaller one in every call.
+constexpr std::uint64_t kAssetBytes = 65536;
+constexpr std::uint64_t kAssetPart = 1 << 20;
+// A waiting kernel looks whether the worker's process lives this often.
+constexpr std::uint64_t kLookNs = 50'000'000;
+
+const MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
+
+class GrpcCarrier final : public Carrier {
+ public:
+  GrpcCarrier(const SlotDescription& slot, std::uint32_t threads)
+      : deadline_ns_(static_cast<std::uint64_t>(slot.deadline * 1e9)), link_(slot, threads, false, [] {}) {}
+  ~GrpcCarrier() override;
+
+  void finish() { link_.finish(); }
+  CallResult call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) override;
+  void drain() override { link_.drain(); }
+  int process_id() const override { return link_.process_id(); }
+  Hosting hosting() const override { return Hosting::kGrpc; }
+  std::vector<std::string> take_complaints() override { return link_.take_faults(); }
+
+ private:
+  // The stream of a method.
+  struct Stream {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::GenericClientAsyncReaderWriter> io;
+  };
+  // Time left of a call.
+  struct Patience {
+    std::uint64_t until, cap;  // CLOCK_MONOTONIC, ns
+  };
+
+  Stream& stream_of(const MethodInfo& method, Patience* patience);
+  void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
+  void wait(Patience* patience);
+  void send_assets(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
+                   stage::v1::Call* header, Patience* patience);
+  void answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header, Arena* arena,
+                       DerivativeSource* derivatives, Patience* patience);
+  void take_columns(const wire::ColumnsReader& reader, const MethodInfo& method, std::span<const ColumnId> targets,
+                    const Outcome& outcome, Arena* arena);
+  [[noreturn]] void report_bad_frame(const std::string& what);
+
+  std::uint64_t deadline_ns_;
+  std::uint64_t sequence_ = 0;
+  grpc::CompletionQueue queue_;
+  WorkerLink link_;
+  std::array<std::unique_ptr<Stream>, stage::kMethodCount> streams_;
+  std::set<std::uint64_t> sent_assets_;
+};
+
+// The bytes of a message: columns, header, and a derivative's columns.
+grpc::ByteBuffer message_of(std::span<const stage::ColumnInfo> infos, std::span<const gravitas_column> columns,
+                            const stage::v1::Call& header, std::span<const gravitas_column> derivative) {
+  const std::size_t header_size = header.ByteSizeLong();
+  const std::size_t derivative_size = derivative.empty() ? 0 : wire::columns_size(kDerivative.reply, derivative);
+  std::size_t size =
+      wire::columns_size(infos, columns) + wire::submessage_head_size(wire::kHeader, header_size) + header_size;
+  if (!derivative.empty()) size += wire::submessage_head_size(wire::kDerivative, derivative_size) + derivative_size;
+
+  grpc_slice raw = grpc_slice_malloc(size);
+  std::uint8_t* out = wire::write_columns(infos, columns, GRPC_SLICE_START_PTR(raw));
+  out = wire::write_submessage_head(wire::kHeader, header_size, out);
+  out = header.SerializeWithCachedSizesToArray(out);
+  if (!derivative.empty()) {
+    out = wire::write_submessage_head(wire::kDerivative, derivative_size, out);
+    wire::write_columns(kDerivative.reply, derivative, out);
+  }
+  const grpc::Slice slice(raw, grpc::Slice::STEAL_REF);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+grpc::ByteBuffer message_of(const stage::v1::AssetChunk& chunk) {
+  const std::size_t chunk_size = chunk.ByteSizeLong();
+  grpc_slice raw = grpc_slice_malloc(wire::submessage_head_size(wire::kAsset, chunk_size) + chunk_size);
+  std::uint8_t* out = wire::write_submessage_head(wire::kAsset, chunk_size, GRPC_SLICE_START_PTR(raw));
+  chunk.SerializeWithCachedSizesToArray(out);
+  const grpc::Slice slice(raw, grpc::Slice::STEAL_REF);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+GrpcCarrier::~GrpcCarrier() {
+  for (const std::unique_ptr<Stream>& stream : streams_)
+    if (stream) stream->context.TryCancel();
+  queue_.Shutdown();
+  void* tag = nullptr;
+  bool ok = false;
+  while (queue_.Next(&tag, &ok)) {
+  }
+}
+
+void GrpcCarrier::report_bad_frame(const std::string& what) {
+  link_.kill();
+  throw StageFault(FaultKind::kBadFrame, "wire", "its answer has " + what);
+}
+
+// Waits for the one operation that is under way, whose failure means that the worker is gone.
+void GrpcCarrier::wait(Patience* patience) {
+  for (;;) {
+    const std::uint64_t now = channel::now_ns();
+    const std::uint64_t look = std::min({patience->until, patience->cap, now + kLookNs});
+    const auto until = std::chrono::system_clock::now() + std::chrono::nanoseconds(look - std::min(look, now));
+    void* tag = nullptr;
+    bool ok = false;
+    if (queue_.AsyncNext(&tag, &ok, until) == grpc::CompletionQueue::GOT_EVENT) {
+      if (!ok) link_.report_death();
+      return;
+    }
+    if (link_.has_ended()) link_.report_death();
+    const std::uint64_t later = channel::now_ns();
+    if (later < patience->until && later < patience->cap) continue;
+    link_.kill();
+    throw StageFault(FaultKind::kDeadline, "deadline",
+                     later >= patience->cap ? "the call took longer than ten times its deadline"
+                                            : "no answer and no mark of progress within its deadline of " +
+                                                  std::to_string(deadline_ns_ / 1'000'000) + " ms");
+  }
+}
+
+GrpcCarrier::Stream& GrpcCarrier::stream_of(const MethodInfo& method, Patience* patience) {
+  std::unique_ptr<Stream>& stream = streams_[static_cast<std::size_t>(&method - stage::kMethods)];
+  if (!stream) {
+    stream = std::make_unique<Stream>();
+    stream->io = grpc::GenericStub(link_.channel()).PrepareCall(&stream->context, method.path, &queue_);
+    stream->io->StartCall(stream.get());
+    wait(patience);
+  }
+  return *stream;
+}
+
+void GrpcCarrier::write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience) {
+  stream->io->Write(message, stream);
+  wait(patience);
+}
+
+// Columns that stay the same for the run go once, by the hash of their content.
+void GrpcCarrier::send_assets(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
+                              stage::v1::Call* header, Patience* patience) {
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::uint64_t size = columns[i].count * stage::element_size(method.request[i].type);
+    if (!method.request[i].asset || size < kAssetBytes) continue;
+    const std::uint64_t hash = XXH3_64bits(columns[i].data, size);
+    for (std::uint64_t offset = 0; offset < size && !sent_assets_.contains(hash); offset += kAssetPart) {
+      stage::v1::AssetChunk chunk;
+      chunk.set_hash(hash);
+      chunk.set_size(size);
+      chunk.set_offset(offset);
+      chunk.set_data(static_cast<const char*>(columns[i].data) + offset, std::min(kAssetPart, size - offset));
+      write(stream, message_of(chunk), patience);
+    }
+    sent_assets_.insert(hash);
+    stage::v1::AssetUse* use = header->add_assets();
+    use->set_column(static_cast<std::uint32_t>(i) + 1);
+    use->set_hash(hash);
+    columns[i] = {nullptr, 0};
+  }
+}
+
+CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
+  if (link_.has_ended()) link_.report_death();
+  const MethodInfo& method = call.info();
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns;
+  for (std::size_t i = 0; i < call.request.size(); ++i)
+    columns[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
+  const std::span<gravitas_column> request = std::span(columns).first(call.request.size());
+
+  const std::uint64_t start = channel::now_ns();
+  Patience patience{start + deadline_ns_, start + kDeadlineCap * deadline_ns_};
+  stage::v1::Call header;
+  header.set_epoch(link_.epoch());
+  header.set_sequence(++sequence_);
+  header.set_target(call.target);
+  header.set_deadline_microseconds(deadline_ns_ / 1000);
+  header.set_digest(wire::columns_digest(method.request, request));
+  Stream& stream = stream_of(method, &patience);
+  send_assets(&stream, method, request, &header, &patience);
+  write(&stream, message_of(method.request, request, header, {}), &patience);
+
+  for (;;) {
+    grpc::ByteBuffer message;
+    stream.io->Read(&message, &stream);
+    wait(&patience);
+    grpc::Slice slice;
+    message.DumpToSingleSlice(&slice);
+    wire::ColumnsReader reader(method.reply);
+    const std::string problem = reader.parse(std::as_bytes(std::span(slice.begin(), slice.size())));
+    Outcome outcome;
+    if (!problem.empty()) report_bad_frame("a wrong message: " + problem);
+    if (!reader.header().has ||
+        !outcome.ParseFromArray(reader.header().bytes.data(), static_cast<int>(reader.header().bytes.size())))
+      report_bad_frame("no outcome");
+    // a late or foreign message is dropped
+    if (outcome.epoch() != link_.epoch() || outcome.sequence() != sequence_) continue;
+    if (outcome.marks() != 0) {
+      patience.until = channel::now_ns() + deadline_ns_;
+      continue;
+    }
+    if (reader.derivative().has) {
+      const std::uint64_t asked = channel::now_ns();
+      answer_callback(&stream, reader, header, arena, derivatives, &patience);
+      // the plugin's clock stood still
+      const std::uint64_t pause = channel::now_ns() - asked;
+      patience.until += pause;
+      patience.cap += pause;
+      continue;
+    }
+    CallResult result;
+    result.status = outcome.status();
+    result.compute_ns = outcome.compute_nanoseconds();
+    result.text = outcome.text();
+    if (result.status == GRAVITAS_NEEDS_CAPACITY) report_bad_frame("a status that does not exist here");
+    const std::uint64_t check_begin = channel::now_ns();
+    if (result.status == GRAVITAS_OK) take_columns(reader, method, call.reply, outcome, arena);
+    result.check_ns = channel::now_ns() - check_begin;
+    return result;
+  }
+}
+
+// The kernel's columns grow as the answer needs; how long it may be was checked against what a message may hold.
+void GrpcCarrier::take_columns(const wire::ColumnsReader& reader, const MethodInfo& method,
+                               std::span<const ColumnId> targets, const Outcome& outcome, Arena* arena) {
+  for (std::size_t i = 0; i < targets.size(); ++i)
+    if (reader.count(i) > arena->capacity(targets[i])) arena->grow(targets[i], reader.count(i));
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    reader.copy(i, arena->data(targets[i]));
+    arena->set_count(targets[i], reader.count(i));
+    columns[i] = {arena->data(targets[i]), reader.count(i)};
+  }
+  if (outcome.digest() != 0 &&
+      outcome.digest() != wire::columns_digest(method.reply, std::span(columns).first(targets.size())))
+    report_bad_frame("a digest that does not fit its content");
+}
+
+void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header,
+                                  Arena* arena, DerivativeSource* derivatives, Patience* patience) {
+  if (derivatives == nullptr) report_bad_frame("a callback that was not offered");
+  wire::ColumnsReader trial(kDerivative.request);
+  const std::string problem = trial.parse(reader.derivative().bytes);
+  if (!problem.empty()) report_bad_frame("a wrong callback: " + problem);
+  const std::span<const ColumnId> columns = derivatives->trial_columns();
+  for (std::size_t i = 0; i < columns.size(); ++i)
+    if (trial.count(i) != arena->count(columns[i])) report_bad_frame("a trial state of the wrong size");
+  for (std::size_t i = 0; i < columns.size(); ++i) trial.copy(i, arena->data(columns[i]));
+
+  derivatives->evaluate();
+  const ColumnId wrench = derivatives->wrench_column();
+  const std::array<gravitas_column, 1> answer = {gravitas_column{arena->data(wrench), arena->count(wrench)}};
+  write(stream, message_of({}, {}, header, answer), patience);
+}
+
+class PendingWorker final : public PendingCarrier {
+ public:
+  explicit PendingWorker(std::unique_ptr<GrpcCarrier> carrier) : carrier_(std::move(carrier)) {}
+  std::unique_ptr<Carrier> finish() override {
+    carrier_->finish();
+    return std::move(carrier_);
+  }
+
+ private:
+  std::unique_ptr<GrpcCarrier> carrier_;
+};
+
+}  // namespace
+
+std::unique_ptr<PendingCarrier> start_grpc_carrier(const SlotDescription& slot, std::uint32_t threads) {
+  return std::make_unique<PendingWorker>(std::make_unique<GrpcCarrier>(slot, threads));
+}
+
+}  // namespace gravitas::kernel

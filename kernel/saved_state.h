@@ -1,0 +1,34 @@
+// A committed state on its way out of an environment and back: plain columns by name, and what identifies them. How
+// they are kept is the business of a recorder; the kernel says what there is, and checks what comes back.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "kernel/hash.h"
+
+namespace gravitas::kernel {
+
+// Largest overlap (m) and joint error (m; rad count as m) of the state that the last step committed.
+struct CommitFigures {
+  double penetration = 0.0;
+  double joint_error = 0.0;
+};
+
+struct SavedColumn {
+  std::string_view name;  // as in kernel/state.h
+  std::variant<std::span<const double>, std::span<const std::uint32_t>, std::span<const std::uint64_t>> numbers;
+};
+
+struct SavedState {
+  std::uint32_t step = 0;    // number of the state, counted from t = 0
+  double step_length = 0.0;  // s, of the step that led to it; 0 for the initial state
+  Hash state_hash, chain_hash;
+  CommitFigures figures;
+  std::vector<SavedColumn> columns;  // all of State::visit_columns(), in its order
+};
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,11 @@
+// Addresses at which a worker may be reached without encryption: this machine's own.
+#pragma once
+
+#include <string_view>
+
+namespace gravitas::channel {
+
+// True for "unix:PATH", "127.N.N.N:PORT", "localhost:PORT" and "[::1]:PORT".
+bool is_local_address(std::string_view address);
+
+}  // namespace gravitas::channel

@@ -1,0 +1,384 @@
+// Slot constraint: a joint is right where it was bound, its errors are how far bodies are moved, its rows are the rate
+// of its errors, and it knows no frame but those of its bodies. Modes and axes along which nothing is held are free to
+// choose, so that errors are compared by their size.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plugin_sdk/conformance/hostile_numbers.h"
+#include "plugin_sdk/conformance/joints.h"
+#include "plugin_sdk/conformance/sample_values.h"
+#include "plugin_sdk/conformance/slot_cases.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas::conformance {
+namespace {
+
+// Rounding of points within ten metres, carried through some rotations.
+constexpr double kRounding = 1e-13;
+constexpr const char* kPointJoints[] = {"Spherical",    "Revolute",  "Rigid",
+                                        "AngularMotor", "Universal", "ConstantVelocity"};
+
+// Two bodies somewhere, with a joint of a type between them.
+Joints joined(const TypeDeclaration& type, Draw* draw) {
+  Joints world;
+  for (int i = 0; i < 2; ++i) world.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
+  world.joints = {{.type = type_id(type.name), .properties = sample_values(type.properties, draw)}};
+  return world;
+}
+
+std::vector<TypeDeclaration> types_of(Subject& subject) {
+  constexpr const char* kKnown[] = {"Spherical", "AngularMotor"};
+  return askable_types(subject.declaration(), kKnown, [&](const TypeDeclaration& type, Draw* draw) {
+    return subject.ask(stage::Method::kConstraintBind, joined(type, draw).bind_request());
+  });
+}
+
+using Ends = std::pair<std::uint32_t, std::uint32_t>;
+
+std::string shown_ends(const Ends& ends) {
+  const auto name = [](std::uint32_t body) { return body == kNone ? "the world" : "body " + std::to_string(body); };
+  return name(ends.first) + " and " + name(ends.second);
+}
+
+double largest_error(const std::vector<DescribedJoint>& described) {
+  double largest = 0.0;
+  for (const DescribedJoint& d : described)
+    if (!d.discrepancy.is_angular()) largest = std::max(largest, error_of(d.discrepancy));
+  return largest;
+}
+
+// ---- every type
+
+void judge_bind(Subject& subject) {
+  Draw draw(41);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    for (const Ends& ends : {Ends{0, 1}, Ends{1, 0}, Ends{kNone, 1}, Ends{0, kNone}}) {
+      for (int repeat = 0; repeat < 5; ++repeat) {
+        Joints world = joined(type, &draw);
+        world.joints[0].body1 = ends.first, world.joints[0].body2 = ends.second;
+        Inquiry inquiry(subject, type.name + " between " + shown_ends(ends) + ", where it was bound");
+        world.bind(&inquiry);
+        const std::vector<DescribedJoint> described = world.describe(&inquiry);
+        inquiry.expect(!described.empty(), "has no discrepancy");
+        for (std::size_t i = 0; i < described.size(); ++i)
+          inquiry.expect_near("joint error of discrepancy " + std::to_string(i), error_of(described[i].discrepancy),
+                              0.0, kRounding);
+      }
+    }
+  }
+}
+
+// True if any move along the axis is an error.
+bool is_held(const Discrepancy& d, int axis) {
+  const AxisMode mode = axis_mode(d.modes, axis);
+  return mode == AxisMode::kLocked || (mode == AxisMode::kLimited && d.lower[axis] == d.upper[axis]);
+}
+
+// For small moves the error over the held axes is what the rows say: |J v| t.
+void judge_rows(Subject& subject) {
+  constexpr double kTime = 1e-6;
+  Draw draw(42);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Joints world = joined(type, &draw);
+    Inquiry inquiry(subject, type.name + " where it was bound, and 1e-6 s later");
+    world.bind(&inquiry);
+    const std::vector<DescribedJoint> before = world.describe(&inquiry);
+    std::vector<double> rates;
+    for (const DescribedJoint& d : before) {
+      const Matrix3 axes = to_rotation_matrix(d.discrepancy.axes);
+      double square = 0.0;
+      for (int k = 0; k < 3; ++k) {
+        if (!is_held(d.discrepancy, k)) continue;
+        const double along = world.row_velocity(d, axes.col(k));
+        square += along * along;
+      }
+      rates.push_back(std::sqrt(square));
+    }
+    for (JointedBody& body : world.bodies)
+      body.pose = displaced(body.pose, kTime * body.twist.linear, kTime * body.twist.angular);
+    const std::vector<DescribedJoint> after = world.describe(&inquiry);
+    inquiry.expect(after.size() == before.size(), "has " + std::to_string(after.size()) + " discrepancies instead of " +
+                                                      std::to_string(before.size()));
+    for (std::size_t i = 0; i < after.size(); ++i)
+      // the next order, and rounding of points over the time
+      inquiry.expect_near("growth (m/s) of the joint error of discrepancy " + std::to_string(i),
+                          error_of(after[i].discrepancy) / kTime, rates[i], 1e-4 * (1.0 + rates[i]));
+  }
+}
+
+// Both bodies moved as one: nothing that a solver sees changes but its direction.
+void judge_frames(Subject& subject) {
+  Draw draw(43);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Joints world = joined(type, &draw);
+    Inquiry inquiry(subject, type.name + " out of place, and the same in a world that is shifted and turned");
+    world.bind(&inquiry);
+    world.bodies[1].pose = displaced(world.bodies[1].pose, draw.vector(0.1), draw.vector(0.1));
+    const std::vector<DescribedJoint> plain = world.describe(&inquiry);
+    const Pose moved = draw.pose(3.0);
+    for (JointedBody& body : world.bodies) {
+      body.pose = compose(moved, body.pose);
+      body.pose.orientation = normalized(body.pose.orientation);
+      body.twist = {moved.orientation * body.twist.linear, moved.orientation * body.twist.angular};
+    }
+    const std::vector<DescribedJoint> other = world.describe(&inquiry);
+    inquiry.expect(other.size() == plain.size(),
+                   "has " + std::to_string(other.size()) + " discrepancies instead of " + std::to_string(plain.size()));
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      const Discrepancy &a = plain[i].discrepancy, &b = other[i].discrepancy;
+      const std::string of = " of discrepancy " + std::to_string(i);
+      inquiry.expect_near("joint error" + of, error_of(b), error_of(a), 10 * kRounding);
+      inquiry.expect_near("desired speed" + of, b.velocity.norm(), a.velocity.norm(), 10 * kRounding);
+      inquiry.expect(a.modes == b.modes,
+                     "modes" + of + " are " + std::to_string(b.modes) + " instead of " + std::to_string(a.modes));
+      inquiry.expect_near("compliance" + of, b.compliance, a.compliance, kRounding);
+      inquiry.expect_near("damping" + of, b.damping, a.damping, kRounding);
+    }
+  }
+}
+
+// The world is a body at the origin that does not move.
+void judge_world(Subject& subject) {
+  Draw draw(44);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Joints by_world = joined(type, &draw);
+    by_world.bodies[0] = {};
+    Joints by_body = by_world;
+    by_world.joints[0].body1 = kNone;
+    Inquiry inquiry(subject, type.name + " to the world, and to a body at rest at the origin");
+    by_world.bind(&inquiry), by_body.bind(&inquiry);
+    const Pose moved = displaced(by_world.bodies[1].pose, draw.vector(0.1), draw.vector(0.1));
+    by_world.bodies[1].pose = by_body.bodies[1].pose = moved;
+    const std::vector<DescribedJoint> a = by_world.describe(&inquiry), b = by_body.describe(&inquiry);
+    inquiry.expect(a.size() == b.size(),
+                   "has " + std::to_string(a.size()) + " discrepancies instead of " + std::to_string(b.size()));
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const std::string of = " of discrepancy " + std::to_string(i);
+      inquiry.expect_near("point1" + of, a[i].discrepancy.point1, b[i].discrepancy.point1, kRounding);
+      inquiry.expect_near("point2" + of, a[i].discrepancy.point2, b[i].discrepancy.point2, kRounding);
+      inquiry.expect_near("velocity" + of, a[i].discrepancy.velocity, b[i].discrepancy.velocity, 10 * kRounding);
+    }
+  }
+}
+
+// Many joints at once, one of them broken: each as if it were alone.
+void judge_independence(Subject& subject) {
+  Draw draw(45);
+  Joints all;
+  for (int i = 0; i < 5; ++i) all.bodies.push_back({draw.pose(3.0), {draw.vector(2.0), draw.vector(2.0)}});
+  for (std::uint32_t copy = 0; copy < 3; ++copy)
+    for (const TypeDeclaration& type : types_of(subject))
+      all.joints.push_back({.type = type_id(type.name),
+                            .body1 = copy == 2 ? kNone : copy,
+                            .body2 = copy + 2,
+                            .properties = sample_values(type.properties, &draw)});
+  if (all.joints.empty()) return;
+  const std::size_t broken = all.joints.size() / 2;
+  const std::vector<JointedBody> start = all.bodies;
+  std::vector<JointedBody> moved = start;
+  for (JointedBody& body : moved) body.pose = displaced(body.pose, draw.vector(0.1), draw.vector(0.1));
+  Inquiry inquiry(subject, "");
+  inquiry.now_asked(std::to_string(all.joints.size()) + " joints, number " + std::to_string(broken) + " broken");
+  all.bind(&inquiry);
+  all.bodies = moved;
+  all.joints[broken].intact = 0;
+  const std::vector<DescribedJoint> together = all.describe(&inquiry);
+  std::size_t next = 0;
+  for (std::uint32_t j = 0; j < all.joints.size(); ++j) {
+    if (all.joints[j].intact == 0) continue;
+    Joints alone;
+    alone.bodies = start;
+    alone.joints = {all.joints[j]};
+    inquiry.now_asked("joint " + std::to_string(j) + " of " + std::to_string(all.joints.size()) +
+                      ", alone and among the others");
+    alone.bind(&inquiry);
+    alone.bodies = moved;
+    for (const DescribedJoint& one : alone.describe(&inquiry)) {
+      inquiry.expect(next < together.size() && together[next].joint == j, "has fewer discrepancies among the others");
+      const Discrepancy &a = together[next++].discrepancy, &b = one.discrepancy;
+      inquiry.expect_near("point1", a.point1, b.point1, 0.0);
+      inquiry.expect_near("point2", a.point2, b.point2, 0.0);
+      inquiry.expect_near("velocity", a.velocity, b.velocity, 0.0);
+      inquiry.expect(a.modes == b.modes && a.axes.coeffs() == b.axes.coeffs(), "has other modes or axes");
+    }
+  }
+  inquiry.now_asked(std::to_string(all.joints.size()) + " joints, number " + std::to_string(broken) + " broken");
+  inquiry.expect(next == together.size(),
+                 "has " + std::to_string(together.size()) + " discrepancies, should have " + std::to_string(next));
+}
+
+void judge_nothing(Subject& subject) {
+  Inquiry inquiry(subject, "no joints");
+  Joints world;
+  world.bodies = {JointedBody{}};
+  world.bind(&inquiry);
+  inquiry.expect(world.describe(&inquiry).empty(), "has a discrepancy");
+}
+
+void judge_refusals(Subject& subject) {
+  Draw draw(46);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Joints world = joined(type, &draw);
+    Inquiry inquiry(subject, type.name);
+    world.bind(&inquiry);
+    expect_foreign_indices_refused(subject, type.name, stage::Method::kConstraintBind, world.bind_request());
+    expect_foreign_indices_refused(subject, type.name, stage::Method::kConstraintDiscrepancies,
+                                   world.describe_request());
+    world.joints[0].type = type_id("NoSuchJoint");
+    inquiry.now_asked("a joint of a type that the plugin did not declare, with the properties of " + type.name);
+    inquiry.demand_refusal(stage::Method::kConstraintBind, world.bind_request());
+  }
+}
+
+void judge_hostile(Subject& subject) {
+  Draw draw(47);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Joints world = joined(type, &draw);
+    Inquiry inquiry(subject, type.name);
+    world.bind(&inquiry);
+    expect_hostile_numbers_survived(subject, "binding " + type.name, stage::Method::kConstraintBind,
+                                    world.bind_request());
+    expect_hostile_numbers_survived(subject, type.name, stage::Method::kConstraintDiscrepancies,
+                                    world.describe_request());
+    if (world.joints[0].properties.empty()) continue;
+    world.joints[0].properties.pop_back();
+    inquiry.now_asked("binding " + type.name + ", its last property missing");
+    inquiry.answer_or_refusal(stage::Method::kConstraintBind, world.bind_request());
+  }
+}
+
+// ---- types of the scene language
+
+// Joints that share a point: body 2 moved by d is |d| wrong.
+void judge_displacement(Subject& subject) {
+  Draw draw(48);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    if (std::ranges::find(kPointJoints, type.name) == std::end(kPointJoints)) continue;
+    Joints world = joined(type, &draw);
+    const Vector3 shift(0.1, -0.2, 0.3);
+    Inquiry inquiry(subject, type.name + " after body 2 was moved by (0.1, -0.2, 0.3)");
+    world.bind(&inquiry);
+    world.bodies[1].pose.position += shift;
+    inquiry.expect_near("largest joint error", largest_error(world.describe(&inquiry)), shift.norm(), kRounding);
+    world.bodies[0].pose.position += shift;
+    inquiry.now_asked(type.name + " after both bodies were moved by (0.1, -0.2, 0.3)");
+    inquiry.expect_near("largest joint error", largest_error(world.describe(&inquiry)), 0.0, kRounding);
+  }
+}
+
+// Turns body 2 about a point.
+void turn_about(const Vector3& point, const Vector3& rotation, JointedBody* body) {
+  const Quaternion turn = exp_rotation(rotation);
+  body->pose = {point + turn * (body->pose.position - point), normalized(turn * body->pose.orientation)};
+}
+
+void judge_spherical(Subject& subject) {
+  Draw draw(49);
+  const TypeDeclaration& type = *find_type(subject.declaration(), "Spherical");
+  for (int i = 0; i < 5; ++i) {
+    Joints world = joined(type, &draw);
+    const Vector3 point = draw.vector(2.0), turn = draw.vector(2.0);
+    world.joints[0].properties = flattened(type, {given("BindPoint", point)});
+    Inquiry inquiry(subject, "Spherical at " + shown(point) + " after body 2 turned about it by " + shown(turn));
+    world.bind(&inquiry);
+    turn_about(point, turn, &world.bodies[1]);
+    for (const DescribedJoint& d : world.describe(&inquiry)) {
+      inquiry.expect_near("joint error", error_of(d.discrepancy), 0.0, kRounding);
+      inquiry.expect_near("point1", d.discrepancy.point1, point, kRounding);
+    }
+  }
+}
+
+// A hinge turns about its axis, and its drive wants the set speed: with it every row has the velocity it asks for.
+void judge_motor(Subject& subject) {
+  Draw draw(50);
+  const TypeDeclaration& type = *find_type(subject.declaration(), "AngularMotor");
+  for (const double speed : {3.0, -0.5, 0.0}) {
+    Joints world = joined(type, &draw);
+    const Vector3 point1 = draw.vector(1.0), point2 = point1 + draw.direction();
+    const Vector3 axis = (point2 - point1).normalized();
+    world.joints[0].properties = flattened(
+        type, {given("BindAxisPoint1", point1), given("BindAxisPoint2", point2), given("AngularSpeed", speed)});
+    Inquiry inquiry(subject,
+                    "AngularMotor of " + number_text(speed) + " rad/s, body 2 turned by 0.7 rad, at that speed");
+    world.bind(&inquiry);
+    turn_about(point1, 0.7 * axis, &world.bodies[1]);
+    JointedBody &one = world.bodies[0], &other = world.bodies[1];
+    other.twist.angular = one.twist.angular + speed * axis;
+    // the point on the axis has one velocity
+    const Vector3 at_point = one.twist.linear + one.twist.angular.cross(point1 - one.pose.position);
+    other.twist.linear = at_point - other.twist.angular.cross(point1 - other.pose.position);
+    bool driven = false;
+    for (const DescribedJoint& d : world.describe(&inquiry)) {
+      inquiry.expect_near("joint error", error_of(d.discrepancy), 0.0, kRounding);
+      const Matrix3 axes = to_rotation_matrix(d.discrepancy.axes);
+      for (int k = 0; k < 3; ++k) {
+        const AxisMode mode = axis_mode(d.discrepancy.modes, k);
+        driven = driven || mode == AxisMode::kDriven;
+        if (mode == AxisMode::kFree) continue;
+        inquiry.expect_near("velocity of a row along " + shown(axes.col(k)), world.row_velocity(d, axes.col(k)),
+                            d.discrepancy.velocity.dot(axes.col(k)), 10 * kRounding);
+      }
+    }
+    inquiry.expect(driven, "has no driven axis");
+  }
+}
+
+}  // namespace
+
+std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
+  std::vector<Case> cases = {
+      make_types_case("constraint/types", types_of),
+      make_case("constraint/nothing", "Without joints there is no discrepancy.", judge_nothing),
+      make_case("constraint/bind", "A joint has no error where it was bound, to a body or to the world.", judge_bind),
+      make_case("constraint/rows", "The rows of the held axes are the rate of the joint error.", judge_rows),
+      make_case("constraint/frames", "A joint knows no frame but those of its bodies.", judge_frames),
+      make_case("constraint/world", "The world is a body at the origin, at rest.", judge_world),
+      make_case("constraint/independence", "Each joint is described for itself; a broken one not at all.",
+                judge_independence),
+      make_case("constraint/displacement", "A body moved from its joint is as wrong as it was moved.",
+                judge_displacement),
+      make_case("constraint/refusals", "Bodies that do not exist and types that were not declared are refused.",
+                judge_refusals),
+      make_case("constraint/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
+                judge_hostile)};
+  if (find_type(declaration, "Spherical") != nullptr)
+    cases.push_back(make_case("constraint/spherical", "Bodies turn freely about their shared point.", judge_spherical));
+  if (find_type(declaration, "AngularMotor") != nullptr)
+    cases.push_back(make_case("constraint/motor", "A motor's rows want its speed about its axis, and no other motion.",
+                              judge_motor));
+  return cases;
+}
+
+// The discrepancies of joints that the subject itself has bound.
+std::vector<Question> constraint_questions(Subject& subject, Draw* draw) {
+  std::vector<Question> questions;
+  const std::vector<TypeDeclaration> types = types_of(subject);
+  if (types.empty()) return questions;
+  for (const std::uint32_t count : {1U, 12U, 100U}) {
+    Joints chain;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      chain.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
+      const TypeDeclaration& type = types[i % types.size()];
+      chain.joints.push_back({.type = type_id(type.name),
+                              .body1 = i == 0 ? kNone : i - 1,
+                              .body2 = i,
+                              .properties = sample_values(type.properties, draw)});
+    }
+    const std::string joints = std::to_string(count) + " joints";
+    questions.push_back({"binding " + joints, stage::Method::kConstraintBind, chain.bind_request(), {}});
+    try {
+      Inquiry inquiry(subject, joints);
+      chain.bind(&inquiry);
+    } catch (const Finding&) {
+      continue;  // C5 says what is wrong with its bind
+    }
+    for (JointedBody& body : chain.bodies) body.pose = displaced(body.pose, draw->vector(0.01), draw->vector(0.01));
+    questions.push_back(
+        {"discrepancies of " + joints, stage::Method::kConstraintDiscrepancies, chain.describe_request(), {}});
+  }
+  return questions;
+}
+
+}  // namespace gravitas::conformance

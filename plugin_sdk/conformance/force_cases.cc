@@ -1,0 +1,384 @@
+// Slot force: the known answers of the scene language's types, and laws that hold for any type: one row per
+// application, each for itself; what an answer promises of other states; a potential whose slope is the force.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plugin_sdk/conformance/hostile_numbers.h"
+#include "plugin_sdk/conformance/inquiry.h"
+#include "plugin_sdk/conformance/sample_values.h"
+#include "plugin_sdk/conformance/slot_cases.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/force.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas::conformance {
+namespace {
+
+constexpr stage::Method kWrenches = stage::Method::kForceWrenches;
+
+struct PushedBody {
+  double mass = 2.0;
+  Pose geometry = {};
+  Pose pose = {};
+  Twist twist = {};
+};
+
+// Forces, bodies, and who acts on whom.
+class Forces {
+ public:
+  double time = 0.0;
+  std::vector<PushedBody> bodies;
+  std::vector<std::uint64_t> types;
+  std::vector<std::vector<double>> parameters;
+  std::vector<std::uint32_t> applications;  // force, body
+
+  void add_force(std::uint64_t type, std::vector<double> values) {
+    types.push_back(type);
+    parameters.push_back(std::move(values));
+  }
+  void apply(std::size_t force, std::size_t body) {
+    applications.insert(applications.end(), {static_cast<std::uint32_t>(force), static_cast<std::uint32_t>(body)});
+  }
+  MessageColumns request() const {
+    MessageColumns columns = empty_request(kWrenches);
+    columns.f64("time") = {time};
+    columns.u64("force_type") = types;
+    columns.u32("force_parameter_begin") = {0};
+    for (const std::vector<double>& values : parameters) {
+      std::vector<double>& all = columns.f64("force_parameter");
+      all.insert(all.end(), values.begin(), values.end());
+      columns.u32("force_parameter_begin").push_back(static_cast<std::uint32_t>(all.size()));
+    }
+    columns.u32("application") = applications;
+    for (const PushedBody& body : bodies) {
+      columns.f64("mass").push_back(body.mass);
+      append(&columns.f64("geometry_position"), body.geometry.position);
+      append(&columns.f64("geometry_orientation"), body.geometry.orientation);
+      append(&columns.f64("position"), body.pose.position);
+      append(&columns.f64("orientation"), body.pose.orientation);
+      append(&columns.f64("linear_velocity"), body.twist.linear);
+      append(&columns.f64("angular_velocity"), body.twist.angular);
+    }
+    return columns;
+  }
+};
+
+struct ForceAnswer {
+  Wrench wrench, impulse;
+  double potential = 0.0;
+  std::uint32_t flags = 0;
+};
+
+std::vector<ForceAnswer> ask(Inquiry* inquiry, const Forces& forces) {
+  const MessageColumns reply = inquiry->answer(kWrenches, forces.request());
+  std::vector<ForceAnswer> answers;
+  for (std::size_t i = 0; i < reply.u32("flags").size(); ++i) {
+    const std::vector<double>&wrench = reply.f64("wrench"), &impulse = reply.f64("impulse");
+    answers.push_back({{vector_at(wrench, 2 * i), vector_at(wrench, 2 * i + 1)},
+                       {vector_at(impulse, 2 * i), vector_at(impulse, 2 * i + 1)},
+                       reply.f64("potential")[i],
+                       reply.u32("flags")[i]});
+    inquiry->expect(answers.back().flags <= (kConstantWrench | kHasPotential),
+                    "flags of application " + std::to_string(i) + " are " + std::to_string(answers.back().flags) +
+                        ": bits that have no meaning");
+  }
+  return answers;
+}
+
+PushedBody random_body(Draw* draw) {
+  return {draw->uniform(0.5, 5.0), draw->pose(0.5), draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}};
+}
+
+Answer probe(Subject& subject, const TypeDeclaration& type, Draw* draw) {
+  Forces forces;
+  forces.bodies = {random_body(draw)};
+  forces.add_force(type_id(type.name), sample_values(type.properties, draw));
+  forces.apply(0, 0);
+  return subject.ask(kWrenches, forces.request());
+}
+
+std::vector<TypeDeclaration> types_of(Subject& subject) {
+  constexpr const char* kKnown[] = {"Gravity", "Basic"};
+  return askable_types(subject.declaration(), kKnown,
+                       [&](const TypeDeclaration& type, Draw* draw) { return probe(subject, type, draw); });
+}
+
+// Forces of all types, two of each, on some bodies.
+Forces mixture(Subject& subject, std::size_t bodies, Draw* draw) {
+  const std::vector<TypeDeclaration> types = types_of(subject);
+  Forces forces;
+  forces.time = 0.4;
+  for (std::size_t i = 0; i < bodies; ++i) forces.bodies.push_back(random_body(draw));
+  for (int copy = 0; copy < 2; ++copy)
+    for (const TypeDeclaration& type : types)
+      forces.add_force(type_id(type.name), sample_values(type.properties, draw));
+  for (std::size_t force = 0; force < forces.types.size(); ++force) forces.apply(force, force % bodies);
+  for (std::size_t body = 0; body < bodies && !types.empty(); ++body) forces.apply(body % forces.types.size(), body);
+  return forces;
+}
+
+void expect_wrench(const Inquiry& inquiry, const std::string& what, const Wrench& came, const Wrench& right,
+                   double tolerance) {
+  inquiry.expect_near("force" + what, came.force, right.force, tolerance);
+  inquiry.expect_near("torque" + what, came.torque, right.torque, tolerance);
+}
+
+// ---- laws of every type
+
+void judge_nothing(Subject& subject) {
+  Draw draw(31);
+  Inquiry inquiry(subject, "no force and no body");
+  inquiry.expect(ask(&inquiry, Forces{}).empty(), "answered rows that nobody asked for");
+  Forces idle = mixture(subject, 3, &draw);
+  idle.applications.clear();
+  inquiry.now_asked("forces and bodies, nothing applied");
+  inquiry.expect(ask(&inquiry, idle).empty(), "answered rows that nobody asked for");
+}
+
+void judge_independence(Subject& subject) {
+  Draw draw(32);
+  const Forces forces = mixture(subject, 7, &draw);
+  const std::size_t count = forces.applications.size() / 2;
+  Inquiry inquiry(subject, std::to_string(count) + " applications at once, and the same backwards");
+  const MessageColumns all = inquiry.answer(kWrenches, forces.request());
+  Forces backwards = forces;
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t k = 0; k < 2; ++k)
+      backwards.applications[2 * i + k] = forces.applications[2 * (count - 1 - i) + k];
+  const MessageColumns reversed = inquiry.answer(kWrenches, backwards.request());
+  for (std::size_t i = 0; i < count; ++i) {
+    Forces one = forces;
+    one.applications = {forces.applications[2 * i], forces.applications[2 * i + 1]};
+    inquiry.now_asked("application " + std::to_string(i) + " of " + std::to_string(count) +
+                      ", alone and among the others");
+    const MessageColumns alone = inquiry.answer(kWrenches, one.request());
+    for (const char* column : {"wrench", "impulse", "potential"}) {
+      const std::size_t width = alone.f64(column).size();
+      const std::span<const double> right = alone.f64(column);
+      inquiry.expect_equal(column, std::span(all.f64(column)).subspan(i * width, width), right);
+      inquiry.expect_equal(std::string(column) + " in another order",
+                           std::span(reversed.f64(column)).subspan((count - 1 - i) * width, width), right);
+    }
+  }
+}
+
+// A wrench that is said to be constant is taken once and for ever.
+void judge_constant(Subject& subject) {
+  Draw draw(33);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Forces forces;
+    forces.bodies = {random_body(&draw)};
+    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
+    forces.apply(0, 0);
+    Inquiry inquiry(subject, "a force " + type.name + " in two states and at two times");
+    const ForceAnswer first = ask(&inquiry, forces)[0];
+    if ((first.flags & kConstantWrench) == 0) continue;
+    const Vector3 start = forces.bodies[0].pose.position;
+    forces.bodies[0].pose = draw.pose(5.0);
+    forces.bodies[0].twist = {draw.vector(9.0), draw.vector(9.0)};
+    forces.time = 17.0;
+    const ForceAnswer then = ask(&inquiry, forces)[0];
+    const double tolerance = 1e-12 * (1.0 + first.wrench.force.norm() + first.wrench.torque.norm());
+    expect_wrench(inquiry, ", said to be constant,", then.wrench, first.wrench, tolerance);
+    if ((first.flags & kHasPotential) == 0) continue;
+    const double right = first.potential - first.wrench.force.dot(forces.bodies[0].pose.position - start);
+    inquiry.expect_near("potential", then.potential, right, 1e-12 * (1.0 + std::fabs(right)));
+  }
+}
+
+// f = -dU/dx and torque = -dU/dturn, by central differences, at rest.
+void judge_potential(Subject& subject) {
+  Draw draw(34);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Forces forces;
+    forces.bodies = {random_body(&draw)};
+    forces.bodies[0].twist = {};
+    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
+    forces.apply(0, 0);
+    Inquiry inquiry(subject, "a force " + type.name + " on a body at rest");
+    const ForceAnswer here = ask(&inquiry, forces)[0];
+    if ((here.flags & kHasPotential) == 0) continue;
+    constexpr double kStep = 1e-5;
+    const PushedBody start = forces.bodies[0];
+    const auto potential_at = [&](const Vector3& shift, const Vector3& turn) {
+      forces.bodies[0].pose = displaced(start.pose, shift, turn);
+      return ask(&inquiry, forces)[0].potential;
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3 along = kStep * Vector3::Unit(axis);
+      const double slope = (potential_at(along, Vector3::Zero()) - potential_at(-along, Vector3::Zero())) / (2 * kStep);
+      const double turned =
+          (potential_at(Vector3::Zero(), along) - potential_at(Vector3::Zero(), -along)) / (2 * kStep);
+      // second order in the step, and rounding of U over it
+      const double tolerance =
+          1e-6 * (1.0 + here.wrench.force.norm() + here.wrench.torque.norm()) + 1e-10 * std::fabs(here.potential);
+      const std::string name = std::string(1, static_cast<char>('x' + axis));
+      inquiry.expect_near("force along " + name + " (against the slope of its potential)", here.wrench.force[axis],
+                          -slope, tolerance);
+      inquiry.expect_near("torque about " + name + " (against the slope of its potential)", here.wrench.torque[axis],
+                          -turned, tolerance);
+    }
+  }
+}
+
+void judge_hostile(Subject& subject) {
+  Draw draw(35);
+  for (const TypeDeclaration& type : types_of(subject)) {
+    Forces forces;
+    forces.bodies = {random_body(&draw), random_body(&draw)};
+    forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
+    forces.apply(0, 0);
+    forces.apply(0, 1);
+    const std::string scene = "a force " + type.name + " on two bodies";
+    expect_hostile_numbers_survived(subject, scene, kWrenches, forces.request());
+    expect_foreign_indices_refused(subject, scene, kWrenches, forces.request());
+
+    // the last number missing
+    if (forces.parameters[0].empty()) continue;
+    forces.parameters[0].pop_back();
+    Inquiry inquiry(subject, scene + ", its last parameter missing");
+    inquiry.answer_or_refusal(kWrenches, forces.request());
+  }
+  Inquiry inquiry(subject, "a force of a type that the plugin did not declare");
+  Forces foreign;
+  foreign.bodies = {random_body(&draw)};
+  foreign.add_force(type_id("NoSuchForce"), {1.0, 2.0});
+  foreign.apply(0, 0);
+  inquiry.answer_or_refusal(kWrenches, foreign.request());
+}
+
+// ---- known answers of the scene language
+
+// f = m g at the centre of mass, U = -m g.x.
+void judge_gravity(Subject& subject) {
+  Draw draw(36);
+  const TypeDeclaration& type = *find_type(subject.declaration(), "Gravity");
+  for (const Vector3& g : {Vector3(0, -9.81, 0), Vector3(1, 2, -3), Vector3(0, 0, 0)}) {
+    Forces forces;
+    for (int i = 0; i < 4; ++i) forces.bodies.push_back(random_body(&draw));
+    forces.add_force(type_id("Gravity"), flattened(type, {given("Acceleration", g)}));
+    for (std::size_t i = 0; i < 4; ++i) forces.apply(0, i);
+    Inquiry inquiry(subject, "");
+    inquiry.now_asked("Gravity " + shown(g) + " on four bodies");
+    const std::vector<ForceAnswer> answers = ask(&inquiry, forces);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const PushedBody& body = forces.bodies[i];
+      inquiry.now_asked("Gravity " + shown(g) + " on " + number_text(body.mass) + " kg at " +
+                        shown(body.pose.position));
+      expect_wrench(inquiry, "", answers[i].wrench, {body.mass * g, Vector3::Zero()}, 1e-13 * (1.0 + g.norm()));
+      expect_wrench(inquiry, " impulse", answers[i].impulse, {}, 0.0);
+      inquiry.expect((answers[i].flags & kHasPotential) != 0, "is not said to have a potential");
+      const double right = -body.mass * g.dot(body.pose.position);
+      inquiry.expect_near("potential", answers[i].potential, right, 1e-12 * (1.0 + g.norm()));
+    }
+  }
+}
+
+struct BasicTrial {
+  const char* name;
+  std::vector<NamedValue> values;
+  Vector3 force;  // as given, in the axes of the frame
+  Vector3 point = Vector3::Zero();
+  Vector3 torque = Vector3::Zero();
+  bool in_body = false;
+  bool instantaneous = false;
+};
+
+NamedValue force_table() {
+  std::vector<PropertyValue> rows;
+  for (const std::vector<double>& row : {std::vector<double>{1, 0, 0, 0}, {2, 4, 0, -8}, {4, 0, 6, 0}})
+    rows.push_back(PropertyValue::numbers(row));
+  return {"Table", PropertyValue::of(rows), {}};
+}
+
+std::vector<BasicTrial> basic_trials() {
+  const Vector3 f(3, -2, 1), p(0.3, -0.1, 0.7), t(0.5, 0, -2);
+  std::vector<BasicTrial> trials = {
+      {"at the geometry's origin", {given("Force", f)}, f},
+      {"at a point", {given("Force", f), given("ApplicationPoint", p)}, f, p},
+      {"with a torque", {given("Force", f), given("Torque", t)}, f, Vector3::Zero(), t},
+      {"in body axes",
+       {given("Force", f), given("ApplicationPoint", p), given("Torque", t), given("Frame", "Body")},
+       f,
+       p,
+       t,
+       true},
+      {"as an impulse", {given("Force", f), given("ApplicationPoint", p), given("Instantaneous", true)}, f, p}};
+  trials.back().instantaneous = true;
+  return trials;
+}
+
+// f at x_G + q_G p about the centre of mass, plus the torque; geometry frame G.
+void judge_basic(Subject& subject) {
+  Draw draw(37);
+  const TypeDeclaration& type = *find_type(subject.declaration(), "Basic");
+  for (const BasicTrial& trial : basic_trials()) {
+    Forces forces;
+    forces.bodies = {random_body(&draw)};
+    const PushedBody& body = forces.bodies[0];
+    forces.add_force(type_id("Basic"), flattened(type, trial.values));
+    forces.apply(0, 0);
+    Inquiry inquiry(subject, "Basic force (3, -2, 1) N " + std::string(trial.name));
+    const ForceAnswer came = ask(&inquiry, forces)[0];
+    const Quaternion to_world = body.pose.orientation * body.geometry.orientation;
+    const Vector3 arm = body.pose.orientation * body.geometry.position + to_world * trial.point;
+    const Vector3 force = trial.in_body ? Vector3(to_world * trial.force) : trial.force;
+    const Vector3 torque = trial.in_body ? Vector3(to_world * trial.torque) : trial.torque;
+    const Wrench right{force, arm.cross(force) + torque};
+    expect_wrench(inquiry, "", came.wrench, trial.instantaneous ? Wrench{} : right, 1e-13);
+    expect_wrench(inquiry, " impulse", came.impulse, trial.instantaneous ? right : Wrench{}, 1e-13);
+  }
+}
+
+// Linear between the rows {1, 0 0 0}, {2, 4 0 -8}, {4, 0 6 0}, constant outside.
+void judge_basic_table(Subject& subject) {
+  const TypeDeclaration& type = *find_type(subject.declaration(), "Basic");
+  Forces forces;
+  forces.bodies = {PushedBody{}};
+  forces.add_force(type_id("Basic"), flattened(type, {force_table()}));
+  forces.apply(0, 0);
+  const std::pair<double, Vector3> known[] = {{0.0, {0, 0, 0}},    {1.5, {2, 0, -4}}, {2.0, {4, 0, -8}},
+                                              {3.5, {1, 4.5, -2}}, {4.0, {0, 6, 0}},  {9.0, {0, 6, 0}}};
+  for (const auto& [time, right] : known) {
+    forces.time = time;
+    Inquiry inquiry(subject, "Basic force by a table at t = " + number_text(time));
+    const ForceAnswer came = ask(&inquiry, forces)[0];
+    inquiry.expect_near("force", came.wrench.force, right, 1e-13);
+    inquiry.expect((came.flags & kConstantWrench) == 0, "is said to be constant");
+  }
+}
+
+}  // namespace
+
+std::vector<Case> force_cases(const PluginDeclaration& declaration) {
+  std::vector<Case> cases = {
+      make_types_case("force/types", types_of),
+      make_case("force/nothing", "Without an application there is no row.", judge_nothing),
+      make_case("force/independence", "Each application is answered for itself, in any order, bit for bit.",
+                judge_independence),
+      make_case("force/constant", "A wrench said to be constant is the same in every state.", judge_constant),
+      make_case("force/potential", "Force and torque are the slope of the potential.", judge_potential),
+      make_case("force/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
+                judge_hostile)};
+  if (find_type(declaration, "Gravity") != nullptr)
+    cases.push_back(make_case("force/gravity", "Gravity pulls with m g at the centre of mass.", judge_gravity));
+  if (find_type(declaration, "Basic") != nullptr) {
+    cases.push_back(make_case("force/basic", "A given force acts at its point, in its axes.", judge_basic));
+    cases.push_back(
+        make_case("force/basic-table", "A force by a table is linear between its rows.", judge_basic_table));
+  }
+  return cases;
+}
+
+std::vector<Question> force_questions(Subject& subject, Draw* draw) {
+  std::vector<Question> questions;
+  for (const std::size_t count : {std::size_t{1}, std::size_t{12}, std::size_t{300}}) {
+    Forces forces = mixture(subject, count, draw);
+    questions.push_back(
+        {"forces of every type on " + std::to_string(count) + " bodies", kWrenches, forces.request(), {}});
+  }
+  return questions;
+}
+
+}  // namespace gravitas::conformance

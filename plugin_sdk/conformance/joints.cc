@@ -1,0 +1,105 @@
+#include "plugin_sdk/conformance/joints.h"
+
+#include <algorithm>
+
+namespace gravitas::conformance {
+namespace {
+
+void check_bound(const Inquiry& inquiry, const std::vector<std::uint32_t>& begin, std::size_t numbers) {
+  inquiry.expect(begin.front() == 0 && begin.back() == numbers && std::ranges::is_sorted(begin),
+                 "bound_begin does not cut up the " + std::to_string(numbers) + " bound numbers");
+}
+
+}  // namespace
+
+void Joints::add_poses(MessageColumns* request) const {
+  for (const JointedBody& body : bodies) {
+    append(&request->f64("position"), body.pose.position);
+    append(&request->f64("orientation"), body.pose.orientation);
+  }
+}
+
+MessageColumns Joints::bind_request() const {
+  MessageColumns request = empty_request(stage::Method::kConstraintBind);
+  request.u32("parameter_begin") = {0};
+  for (const Joint& joint : joints) {
+    request.u64("constraint_type").push_back(joint.type);
+    request.u32("constraint_body").push_back(joint.body1);
+    request.u32("constraint_body").push_back(joint.body2);
+    std::vector<double>& all = request.f64("parameter");
+    all.insert(all.end(), joint.properties.begin(), joint.properties.end());
+    request.u32("parameter_begin").push_back(static_cast<std::uint32_t>(all.size()));
+  }
+  add_poses(&request);
+  return request;
+}
+
+void Joints::bind(Inquiry* inquiry) {
+  const MessageColumns reply = inquiry->answer(stage::Method::kConstraintBind, bind_request());
+  bound_begin_ = reply.u32("bound_begin");
+  bound_ = reply.f64("bound");
+  check_bound(*inquiry, bound_begin_, bound_.size());
+}
+
+MessageColumns Joints::describe_request() const {
+  MessageColumns request = empty_request(stage::Method::kConstraintDiscrepancies);
+  request.f64("time_step") = {0.01};
+  for (const Joint& joint : joints) {
+    request.u64("constraint_type").push_back(joint.type);
+    request.u32("constraint_body").push_back(joint.body1);
+    request.u32("constraint_body").push_back(joint.body2);
+    request.u32("intact").push_back(joint.intact);
+  }
+  request.u32("bound_begin") = bound_begin_;
+  request.f64("bound") = bound_;
+  add_poses(&request);
+  for (const JointedBody& body : bodies) {
+    append(&request.f64("linear_velocity"), body.twist.linear);
+    append(&request.f64("angular_velocity"), body.twist.angular);
+  }
+  return request;
+}
+
+std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
+  const MessageColumns reply = inquiry->answer(stage::Method::kConstraintDiscrepancies, describe_request());
+  const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),       reply.f64("velocity"),
+                                   reply.f64("correction"), reply.f64("axes"),         reply.u32("mode"),
+                                   reply.f64("lower"),      reply.f64("upper"),        reply.f64("compliance"),
+                                   reply.f64("damping"),    reply.f64("maximum_force")};
+  inquiry->expect_unit("axes", columns.axes, 4);
+  std::vector<DescribedJoint> described;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::uint32_t joint = reply.u32("constraint")[i];
+    const std::string row = " of row " + std::to_string(i) + " ";
+    inquiry->expect(joint < joints.size() && joints[joint].intact != 0,
+                    "constraint" + row + "is " + std::to_string(joint) + ", no joint that holds");
+    inquiry->expect(described.empty() || described.back().joint <= joint, "constraint" + row + "is out of order");
+    inquiry->expect(is_valid_mode(columns.mode[i]), "mode" + row + "is " + std::to_string(columns.mode[i]));
+    const Discrepancy d = columns.at(i);
+    inquiry->expect(d.correction >= 0.0 && d.correction <= 1.0,
+                    "correction" + row + "is " + number_text(d.correction) + ", outside 0 … 1");
+    inquiry->expect((d.lower.array() <= d.upper.array()).all(),
+                    "lower" + row + "is " + shown(d.lower) + ", above upper " + shown(d.upper));
+    inquiry->expect(d.compliance.minCoeff() >= 0.0 && d.damping.minCoeff() >= 0.0 && d.maximum_force.minCoeff() >= 0.0,
+                    "compliance, damping or maximum_force" + row + "is negative");
+    described.push_back({joint, d});
+  }
+  return described;
+}
+
+JointedBody Joints::end(const Joint& joint, int which) const {
+  const std::uint32_t body = which == 1 ? joint.body1 : joint.body2;
+  return body == kNone ? JointedBody{} : bodies[body];
+}
+
+double Joints::row_velocity(const DescribedJoint& described, const Vector3& axis) const {
+  const JointedBody one = end(joints[described.joint], 1), other = end(joints[described.joint], 2);
+  return jacobian_row(described.discrepancy, axis, one.pose.position, other.pose.position)
+      .velocity(one.twist.linear, one.twist.angular, other.twist.linear, other.twist.angular);
+}
+
+double error_of(const Discrepancy& discrepancy) {
+  return joint_error(discrepancy, discrepancy.point2 - discrepancy.point1);
+}
+
+}  // namespace gravitas::conformance

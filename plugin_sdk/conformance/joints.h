@@ -1,0 +1,57 @@
+// Joints between bodies for questions to a constraint: bound at the present poses, described in any state.
+#pragma once
+
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/conformance/inquiry.h"
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/dynamics.h"
+
+namespace gravitas::conformance {
+
+struct JointedBody {
+  Pose pose = {};
+  Twist twist = {};
+};
+
+struct Joint {
+  std::uint64_t type = 0;
+  std::uint32_t body1 = 0, body2 = 1;  // kNone: the world
+  std::vector<double> properties;
+  std::uint32_t intact = 1;
+};
+
+// A discrepancy and the joint it belongs to.
+struct DescribedJoint {
+  std::uint32_t joint;
+  Discrepancy discrepancy;
+};
+
+class Joints {
+ public:
+  std::vector<JointedBody> bodies;
+  std::vector<Joint> joints;
+
+  MessageColumns bind_request() const;
+  // Binds at the present poses.
+  void bind(Inquiry* inquiry);
+  MessageColumns describe_request() const;
+  // The discrepancies in the present state, checked for what every discrepancy must be.
+  std::vector<DescribedJoint> describe(Inquiry* inquiry) const;
+
+  JointedBody end(const Joint& joint, int which) const;
+  // J v along an axis in the present state.
+  double row_velocity(const DescribedJoint& described, const Vector3& axis) const;
+
+ private:
+  void add_poses(MessageColumns* request) const;
+
+  std::vector<std::uint32_t> bound_begin_ = {0};
+  std::vector<double> bound_;
+};
+
+// Error x2 - x1 of a discrepancy as joint_error() measures it.
+double error_of(const Discrepancy& discrepancy);
+
+}  // namespace gravitas::conformance

@@ -1,0 +1,144 @@
+#include "plugin_sdk/conformance/sample_values.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/conformance/inquiry.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas::conformance {
+namespace {
+
+constexpr int kTableRows = 8;
+
+double number_within(const Property& p, Draw* draw) {
+  const double low = std::isfinite(p.minimum) ? p.minimum : std::min(-1.0, p.maximum - 2.0);
+  const double high = std::isfinite(p.maximum) ? std::min(p.maximum, low + 2.0) : low + 2.0;
+  // inside, so that an exclusive bound is none
+  return draw->uniform(low + 0.1 * (high - low), high);
+}
+
+void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* draw, std::vector<double>* out) {
+  switch (p.kind) {
+    case PropertyKind::kNumber:
+      out->push_back(number_within(p, draw));
+      break;
+    case PropertyKind::kInteger:
+      out->push_back(std::ceil(number_within(p, draw)));
+      break;
+    case PropertyKind::kFlag:
+    case PropertyKind::kChoice:
+      out->push_back(0.0);
+      break;
+    case PropertyKind::kVector:
+      if (p.unit == "1" && !std::isfinite(p.minimum)) {
+        append(out, Vector3(axes.col((*next_axis)++ % 3)));
+      } else {
+        for (int k = 0; k < 3; ++k) out->push_back(number_within(p, draw));
+      }
+      break;
+    case PropertyKind::kQuaternion:
+      append(out, draw->rotation());
+      break;
+    case PropertyKind::kTable:
+      out->push_back(kTableRows);
+      for (int row = 0; row < kTableRows; ++row) {
+        out->push_back(static_cast<double>(row) / kTableRows);
+        for (std::uint32_t k = 1; k < p.columns; ++k) out->push_back(number_within(p, draw));
+      }
+      break;
+  }
+}
+
+}  // namespace
+
+std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw) {
+  std::vector<double> numbers;
+  const Matrix3 axes = to_rotation_matrix(draw->rotation());
+  int next_axis = 0;
+  for (const Property& p : properties) {
+    if (!p.default_numbers.empty()) {
+      numbers.insert(numbers.end(), p.default_numbers.begin(), p.default_numbers.end());
+    } else if (p.is_required) {
+      append_drawn(p, axes, &next_axis, draw, &numbers);
+    } else if (p.kind == PropertyKind::kTable) {
+      numbers.push_back(0.0);
+    } else {
+      numbers.insert(numbers.end(), p.flat_size(), std::numeric_limits<double>::quiet_NaN());
+    }
+  }
+  return numbers;
+}
+
+std::vector<double> default_settings(const PluginDeclaration& declaration) {
+  Draw draw(1);
+  return sample_values(declaration.properties, &draw);
+}
+
+NamedValue given(std::string name, double value) { return {std::move(name), PropertyValue::of(value), {}}; }
+NamedValue given(std::string name, const Vector3& value) {
+  return {std::move(name), PropertyValue::numbers({value.data(), 3}), {}};
+}
+NamedValue given(std::string name, const char* choice) { return {std::move(name), PropertyValue::of(choice), {}}; }
+NamedValue given(std::string name, bool flag) { return {std::move(name), PropertyValue::of(flag), {}}; }
+
+std::vector<double> flattened(const TypeDeclaration& type, const std::vector<NamedValue>& values) {
+  std::vector<double> numbers;
+  std::vector<PropertyProblem> problems;
+  if (flatten(type.properties, values, &numbers, &problems)) return numbers;
+  std::string text = "type " + type.name + " does not take what the scene language gives it";
+  for (const PropertyProblem& problem : problems) text += ": " + problem.text;
+  throw Finding(text);
+}
+
+const TypeDeclaration* find_type(const PluginDeclaration& declaration, std::string_view name) {
+  const auto found = std::ranges::find(declaration.types, name, &TypeDeclaration::name);
+  return found == declaration.types.end() ? nullptr : &*found;
+}
+
+std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration, std::span<const char* const> known,
+                                           const std::function<Answer(const TypeDeclaration&, Draw*)>& probe) {
+  constexpr int kProbes = 4;
+  std::vector<TypeDeclaration> askable;
+  for (const TypeDeclaration& type : declaration.types) {
+    bool is_refused = false;
+    if (std::ranges::find(known, type.name) == known.end()) {
+      Draw draw(type_id(type.name));
+      for (int i = 0; i < kProbes && !is_refused; ++i) {
+        const Answer answer = probe(type, &draw);
+        is_refused = answer.fault.empty() && answer.status == GRAVITAS_REFUSED;
+      }
+    }
+    if (!is_refused) askable.push_back(type);
+  }
+  return askable;
+}
+
+Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&)> askable) {
+  return make_case(std::move(name), "Types are declared, and values within their bounds are answered.",
+                   [askable = std::move(askable)](Subject& subject) {
+                     const std::size_t count = subject.declaration().types.size();
+                     Inquiry inquiry(subject, std::to_string(count) + " declared types");
+                     inquiry.expect(count > 0, "a plugin of this slot serves at least one type");
+                     inquiry.expect(!askable(subject).empty(), "each refused values within its declared bounds");
+                   });
+}
+
+bool has_capability(const PluginDeclaration& declaration, std::string_view name) {
+  return std::ranges::find(declaration.capabilities, name) != declaration.capabilities.end();
+}
+
+double capability_number(const PluginDeclaration& declaration, std::string_view name, double otherwise) {
+  for (const std::string& capability : declaration.capabilities) {
+    if (!capability.starts_with(name) || capability.size() <= name.size() || capability[name.size()] != '=') continue;
+    double number = otherwise;
+    std::from_chars(capability.data() + name.size() + 1, capability.data() + capability.size(), number);
+    return number;
+  }
+  return otherwise;
+}
+
+}  // namespace gravitas::conformance

@@ -1,0 +1,49 @@
+// Values for declared properties: what a scene could give for types that the kit knows by their declaration only,
+// and what it gives for those of the scene language.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plugin_sdk/conformance/conformance.h"
+#include "plugin_sdk/conformance/draw.h"
+#include "plugin_sdk/plugin.h"
+#include "plugin_sdk/property_value.h"
+
+namespace gravitas::conformance {
+
+// Flattened values within the declared bounds: the default where there is one, nothing where the property may be
+// absent, else drawn. Vectors without unit are directions and perpendicular to each other (the axes of a joint);
+// tables have eight rows whose first column ascends.
+std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw);
+
+// The settings of a plugin that a scene says nothing about.
+std::vector<double> default_settings(const PluginDeclaration& declaration);
+
+// `Name = value` in a scene.
+NamedValue given(std::string name, double value);
+NamedValue given(std::string name, const Vector3& value);
+NamedValue given(std::string name, const char* choice);
+NamedValue given(std::string name, bool flag);
+
+// Flattened values of a type as a scene gives them; a Finding if the declaration does not take them.
+std::vector<double> flattened(const TypeDeclaration& type, const std::vector<NamedValue>& values);
+
+// The declaration of a type, or null.
+const TypeDeclaration* find_type(const PluginDeclaration& declaration, std::string_view name);
+
+// Those declared types for which questions can be made: the `known` ones of the scene language, and others unless they
+// refuse drawn values (a list of faces, say, cannot be drawn). `probe` asks the subject with freshly drawn values.
+std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration, std::span<const char* const> known,
+                                           const std::function<Answer(const TypeDeclaration&, Draw*)>& probe);
+// A case by which there is at least one.
+Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&)> askable);
+
+// True if the plugin declares the capability; the number behind `name=`, or `otherwise`.
+bool has_capability(const PluginDeclaration& declaration, std::string_view name);
+double capability_number(const PluginDeclaration& declaration, std::string_view name, double otherwise);
+
+}  // namespace gravitas::conformance

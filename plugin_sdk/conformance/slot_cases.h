@@ -1,0 +1,25 @@
+// What each slot contributes: its cases of C5, and its ordinary questions.
+#pragma once
+
+#include <vector>
+
+#include "plugin_sdk/conformance/conformance.h"
+#include "plugin_sdk/conformance/draw.h"
+
+namespace gravitas::conformance {
+
+std::vector<Case> space_cases(const PluginDeclaration& declaration);
+std::vector<Case> collision_cases(const PluginDeclaration& declaration);
+std::vector<Case> constraint_cases(const PluginDeclaration& declaration);
+std::vector<Case> force_cases(const PluginDeclaration& declaration);
+std::vector<Case> solver_cases(const PluginDeclaration& declaration);
+std::vector<Case> integrator_cases(const PluginDeclaration& declaration);
+
+std::vector<Question> space_questions(Draw* draw);
+std::vector<Question> collision_questions(Subject& subject, Draw* draw);
+std::vector<Question> constraint_questions(Subject& subject, Draw* draw);
+std::vector<Question> force_questions(Subject& subject, Draw* draw);
+std::vector<Question> solver_questions(Draw* draw);
+std::vector<Question> integrator_questions(Draw* draw);
+
+}  // namespace gravitas::conformance

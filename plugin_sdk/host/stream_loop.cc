@@ -1,0 +1,349 @@
+#include "plugin_sdk/host/stream_loop.h"
+
+#include <grpcpp/support/byte_buffer.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <utility>
+
+#include "plugin_sdk/channel/mailbox.h"
+
+namespace gravitas::host {
+
+using stage::ColumnInfo;
+using stage::MethodInfo;
+using stage::v1::Call;
+using stage::v1::Outcome;
+
+namespace {
+
+// How long a wait lasts before the loop looks at its flag again.
+constexpr int kIdleMilliseconds = 100;
+// Marks of progress closer together than this go out as one.
+constexpr std::uint64_t kMarkNs = 20'000'000;
+// Room for the elements of a reply column before a plugin has said how much it takes.
+constexpr std::uint64_t kFirstRoom = 64;
+
+const MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
+
+// A message of columns and one message beside them.
+grpc::ByteBuffer message_of(std::span<const ColumnInfo> infos, std::span<const gravitas_column> columns,
+                            const google::protobuf::MessageLite& header,
+                            std::span<const gravitas_column> derivative = {}) {
+  const std::size_t header_size = header.ByteSizeLong();
+  const std::size_t derivative_size = derivative.empty() ? 0 : wire::columns_size(kDerivative.request, derivative);
+  std::size_t size =
+      wire::columns_size(infos, columns) + wire::submessage_head_size(wire::kHeader, header_size) + header_size;
+  if (!derivative.empty()) size += wire::submessage_head_size(wire::kDerivative, derivative_size) + derivative_size;
+
+  grpc_slice raw = grpc_slice_malloc(size);
+  std::uint8_t* out = wire::write_columns(infos, columns, GRPC_SLICE_START_PTR(raw));
+  out = wire::write_submessage_head(wire::kHeader, header_size, out);
+  out = header.SerializeWithCachedSizesToArray(out);
+  if (!derivative.empty()) {
+    out = wire::write_submessage_head(wire::kDerivative, derivative_size, out);
+    wire::write_columns(kDerivative.request, derivative, out);
+  }
+  const grpc::Slice slice(raw, grpc::Slice::STEAL_REF);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+}  // namespace
+
+// What a completion belongs to.
+struct StreamLoop::Operation {
+  enum Kind { kAccept, kRead, kWrite, kFinish } kind;
+  Stream* stream;
+};
+
+struct StreamLoop::Stream {
+  grpc::GenericServerContext context;
+  grpc::GenericServerAsyncReaderWriter io{&context};
+  Operation accept{Operation::kAccept, this}, read{Operation::kRead, this}, write{Operation::kWrite, this},
+      finish{Operation::kFinish, this};
+  stage::Method method{};
+  grpc::ByteBuffer incoming;
+  bool writing = false, arrived = false, open = true, finished = false;
+
+  std::array<Room, GRAVITAS_MAX_COLUMNS> request_rooms, reply_rooms;
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns{};
+  std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply{};
+};
+
+std::byte* StreamLoop::Room::data() const {
+  auto address = reinterpret_cast<std::uintptr_t>(bytes.data());
+  address = (address + GRAVITAS_COLUMN_ALIGNMENT - 1) / GRAVITAS_COLUMN_ALIGNMENT * GRAVITAS_COLUMN_ALIGNMENT;
+  return reinterpret_cast<std::byte*>(address);
+}
+
+void* StreamLoop::Room::reserve(std::uint64_t elements) {
+  if (elements > capacity || bytes.empty()) {
+    capacity = std::max(elements, 2 * capacity);
+    bytes.resize(capacity * 8 + GRAVITAS_COLUMN_ALIGNMENT);
+  }
+  return data();
+}
+
+// What the plugin reaches of the stream while its call is open.
+struct StreamLoop::OpenCall final : CallServices {
+  OpenCall(StreamLoop* owner, Stream* on, const Call& asked) : loop(owner), stream(on), call(asked) {}
+
+  void mark_progress() override {
+    const std::uint64_t now = channel::now_ns();
+    const std::lock_guard lock(loop->io_);
+    ++marks;
+    if (now - last_mark < kMarkNs) return;
+    last_mark = now;
+    Outcome outcome = head();
+    outcome.set_marks(marks);
+    loop->write(stream, message_of({}, {}, outcome));
+  }
+
+  // The plugin's first thread asks; the kernel's next message is the answer.
+  std::int32_t derivative(const gravitas_column* asked, gravitas_reply_column* answer) override {
+    const std::lock_guard lock(loop->io_);
+    if (!loop->write(stream, message_of({}, {}, head(), std::span(asked, kDerivative.request.size()))))
+      return GRAVITAS_CALLBACK_FAILED;
+    loop->read(stream);
+    while (stream->open && !stream->arrived) loop->pump(kIdleMilliseconds);
+    if (!std::exchange(stream->arrived, false)) return GRAVITAS_CALLBACK_FAILED;
+
+    grpc::Slice slice;
+    stream->incoming.DumpToSingleSlice(&slice);
+    wire::ColumnsReader outer({});
+    if (!outer.parse(std::as_bytes(std::span(slice.begin(), slice.size()))).empty() || !outer.derivative().has)
+      return GRAVITAS_CALLBACK_FAILED;
+    wire::ColumnsReader reader(kDerivative.reply);
+    if (!reader.parse(outer.derivative().bytes).empty()) return GRAVITAS_CALLBACK_FAILED;
+    for (std::size_t i = 0; i < kDerivative.reply.size(); ++i) {
+      answer[i].count = reader.count(i);
+      if (answer[i].count > answer[i].capacity) return GRAVITAS_CALLBACK_FAILED;
+      reader.copy(i, answer[i].data);
+    }
+    return GRAVITAS_OK;
+  }
+
+  Outcome head() const {
+    Outcome outcome;
+    outcome.set_epoch(call.epoch());
+    outcome.set_sequence(call.sequence());
+    return outcome;
+  }
+
+  StreamLoop* loop;
+  Stream* stream;
+  const Call& call;
+  std::uint64_t marks = 0;
+  std::uint64_t last_mark = channel::now_ns();
+};
+
+StreamLoop::StreamLoop(grpc::ServerBuilder* builder) {
+  builder->RegisterAsyncGenericService(&service_);
+  // not the only one that polls: the control service must be served before and beside the calls
+  queue_ = builder->AddCompletionQueue(false);
+}
+
+StreamLoop::~StreamLoop() {
+  queue_->Shutdown();
+  while (pump(-1)) {
+  }
+}
+
+void StreamLoop::accept() {
+  streams_.push_back(std::make_unique<Stream>());
+  accepting_ = streams_.back().get();
+  service_.RequestCall(&accepting_->context, &accepting_->io, queue_.get(), queue_.get(), &accepting_->accept);
+}
+
+// Takes one completion; false when there will be none any more.
+bool StreamLoop::pump(int milliseconds) {
+  void* tag = nullptr;
+  bool ok = false;
+  if (milliseconds < 0) {
+    if (!queue_->Next(&tag, &ok)) return false;
+  } else {
+    const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(milliseconds);
+    const auto got = queue_->AsyncNext(&tag, &ok, until);
+    if (got != grpc::CompletionQueue::GOT_EVENT) return got == grpc::CompletionQueue::TIMEOUT;
+  }
+  const Operation& operation = *static_cast<Operation*>(tag);
+  Stream* stream = operation.stream;
+  switch (operation.kind) {
+    case Operation::kAccept: {
+      if (!ok) break;
+      accept();
+      std::uint32_t method = 0;
+      while (method < stage::kMethodCount && stream->context.method() != stage::kMethods[method].path) ++method;
+      if (method == stage::kMethodCount || static_cast<stage::Method>(method) == stage::Method::kIntegratorDerivative) {
+        stream->open = false;
+        stream->io.Finish({grpc::StatusCode::UNIMPLEMENTED, "no method of a stage: " + stream->context.method()},
+                          &stream->finish);
+        break;
+      }
+      stream->method = static_cast<stage::Method>(method);
+      read(stream);
+      break;
+    }
+    case Operation::kRead:
+      if (ok) {
+        stream->arrived = true;
+        readable_.push_back(stream);
+      } else {
+        stream->open = false;
+        stream->io.Finish(grpc::Status::OK, &stream->finish);
+      }
+      break;
+    case Operation::kWrite:
+      stream->writing = false;
+      break;
+    case Operation::kFinish:
+      stream->finished = true;
+      break;
+  }
+  return true;
+}
+
+void StreamLoop::read(Stream* stream) { stream->io.Read(&stream->incoming, &stream->read); }
+
+// Waits until the message before has gone out; false if the stream is broken.
+bool StreamLoop::write(Stream* stream, const grpc::ByteBuffer& message) {
+  while (stream->open && stream->writing) pump(kIdleMilliseconds);
+  if (!stream->open) return false;
+  stream->writing = true;
+  stream->io.Write(message, &stream->write);
+  return true;
+}
+
+void StreamLoop::serve(HostedPlugins* plugins, std::uint64_t epoch, const std::atomic<bool>& stopping,
+                       std::atomic<std::uint64_t>* calls) {
+  plugins_ = plugins;
+  epoch_ = epoch;
+  if (accepting_ == nullptr) accept();
+  while (!stopping.load()) {
+    if (!pump(kIdleMilliseconds)) return;
+    while (!readable_.empty()) {
+      Stream* stream = readable_.front();
+      readable_.pop_front();
+      // what a derivative's answer was taken from
+      if (!std::exchange(stream->arrived, false)) continue;
+      handle(stream);
+      calls->fetch_add(1);
+    }
+    std::erase_if(streams_, [&](const auto& stream) { return stream->finished && !stream->writing; });
+  }
+}
+
+std::string StreamLoop::take_asset(std::span<const std::byte> bytes) {
+  stage::v1::AssetChunk chunk;
+  if (!chunk.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return "an asset that cannot be read";
+  std::vector<std::byte>& asset = assets_[chunk.hash()];
+  if (chunk.size() > wire::kMostElements * 8 || chunk.offset() != asset.size() ||
+      chunk.data().size() > chunk.size() - asset.size())
+    return "a part of an asset that does not follow the part before it";
+  const auto data = std::as_bytes(std::span(chunk.data()));
+  asset.insert(asset.end(), data.begin(), data.end());
+  if (asset.size() == chunk.size() && XXH3_64bits(asset.data(), asset.size()) != chunk.hash()) {
+    assets_.erase(chunk.hash());
+    return "an asset whose content does not fit its hash";
+  }
+  return {};
+}
+
+// Copies the columns out of the message; empty, or what is wrong with it.
+std::string StreamLoop::read_request(Stream* stream, const wire::ColumnsReader& reader, Call* call) {
+  if (!reader.header().has ||
+      !call->ParseFromArray(reader.header().bytes.data(), static_cast<int>(reader.header().bytes.size())))
+    return "a request without a call";
+  if (call->epoch() != epoch_) return "a request of another incarnation";
+  if (call->target() >= plugins_->count()) return "no such plugin in this worker";
+  const MethodInfo& method = stage::method_info(stream->method);
+  for (std::size_t i = 0; i < method.request.size(); ++i) {
+    void* room = stream->request_rooms[i].reserve(reader.count(i));
+    reader.copy(i, room);
+    stream->columns[i] = {room, reader.count(i)};
+  }
+  for (const stage::v1::AssetUse& use : call->assets()) {
+    const auto asset = assets_.find(use.hash());
+    if (use.column() == 0 || use.column() > method.request.size() || asset == assets_.end())
+      return "a column whose asset was not sent";
+    const ColumnInfo& info = method.request[use.column() - 1];
+    stream->columns[use.column() - 1] = {asset->second.data(), asset->second.size() / stage::element_size(info.type)};
+  }
+  if (call->digest() != 0 &&
+      call->digest() != wire::columns_digest(method.request, std::span(stream->columns).first(method.request.size())))
+    return "a request whose digest does not fit its columns";
+  return {};
+}
+
+void StreamLoop::handle(Stream* stream) {
+  grpc::Slice slice;
+  stream->incoming.DumpToSingleSlice(&slice);
+  wire::ColumnsReader reader(stage::method_info(stream->method).request);
+  Call call;
+  std::string problem = reader.parse(std::as_bytes(std::span(slice.begin(), slice.size())));
+  if (problem.empty() && reader.asset().has) {
+    problem = take_asset(reader.asset().bytes);
+    if (problem.empty()) {
+      read(stream);
+      return;
+    }
+  } else if (problem.empty()) {
+    problem = read_request(stream, reader, &call);
+  }
+  if (problem.empty()) {
+    answer(stream, call);
+  } else {
+    write_outcome(stream, call, GRAVITAS_FAILED, problem);
+  }
+  if (stream->open) read(stream);
+}
+
+void StreamLoop::answer(Stream* stream, const Call& call) {
+  const MethodInfo& method = stage::method_info(stream->method);
+  OpenCall services(this, stream, call);
+  CallEnd end;
+  do {
+    for (std::size_t i = 0; i < method.reply.size(); ++i) {
+      Room& room = stream->reply_rooms[i];
+      void* data = room.reserve(std::max(stream->reply[i].count, kFirstRoom));
+      stream->reply[i] = {data, room.capacity, 0};
+    }
+    end = plugins_->call(call.target(), stream->method, stream->columns.data(), stream->reply.data(), &services);
+    for (std::size_t i = 0; i < method.reply.size() && end.status == GRAVITAS_NEEDS_CAPACITY; ++i) {
+      if (stream->reply[i].count <= wire::kMostElements) continue;
+      end.status = GRAVITAS_FAILED;
+      end.text = std::string("it asks for room for ") + std::to_string(stream->reply[i].count) + " numbers in column " +
+                 method.reply[i].name;
+      stream->reply[i].count = 0;
+    }
+  } while (end.status == GRAVITAS_NEEDS_CAPACITY);
+
+  if (end.status != GRAVITAS_OK) {
+    for (gravitas_reply_column& column : stream->reply) column.count = 0;
+    write_outcome(stream, call, end.status, end.text);
+    return;
+  }
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns{};
+  for (std::size_t i = 0; i < method.reply.size(); ++i) columns[i] = {stream->reply[i].data, stream->reply[i].count};
+  const std::span<const gravitas_column> reply = std::span(columns).first(method.reply.size());
+  Outcome outcome = services.head();
+  outcome.set_compute_nanoseconds(end.compute_ns);
+  outcome.set_digest(wire::columns_digest(method.reply, reply));
+  const std::lock_guard lock(io_);
+  write(stream, message_of(method.reply, reply, outcome));
+}
+
+void StreamLoop::write_outcome(Stream* stream, const Call& call, std::int32_t status, const std::string& text) {
+  Outcome outcome;
+  outcome.set_epoch(call.epoch());
+  outcome.set_sequence(call.sequence());
+  outcome.set_status(static_cast<Outcome::Status>(status));
+  outcome.set_text(text);
+  const std::lock_guard lock(io_);
+  write(stream, message_of({}, {}, outcome));
+}
+
+}  // namespace gravitas::host

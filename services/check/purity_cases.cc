@@ -1,0 +1,105 @@
+// C2: the same request gets the same bytes: twice, after others, in a fresh process, on another carrier, with other
+// numbers of threads.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "services/check/answer_text.h"
+#include "services/check/examination.h"
+
+namespace gravitas::check {
+
+using conformance::Answer;
+using conformance::Level;
+using conformance::Question;
+
+namespace {
+
+// Asks the questions in an order and compares each answer with that of the undisturbed process.
+std::string compare(Examination& examination, CarrierSubject* subject, const std::vector<std::size_t>& order,
+                    const std::string& where) {
+  const std::vector<Answer>& expected = examination.answers();
+  for (const std::size_t i : order) {
+    const Question& question = examination.questions()[i];
+    const std::string differs = difference(question.method, expected[i], subject->ask(question));
+    if (differs.empty()) continue;
+    examination.blamed_call = call_text(question.method, question.request);
+    return fmt::format("'{}' {}: {}", question.name, where, differs);
+  }
+  return {};
+}
+
+std::vector<std::size_t> forward(Examination& examination) {
+  std::vector<std::size_t> order(examination.questions().size());
+  std::iota(order.begin(), order.end(), 0);
+  return order;
+}
+
+std::vector<std::size_t> backward(Examination& examination) {
+  std::vector<std::size_t> order = forward(examination);
+  std::ranges::reverse(order);
+  return order;
+}
+
+std::string judge_answered(Examination& examination) {
+  examination.answers();
+  return {};
+}
+
+std::string judge_twice(Examination& examination) {
+  const std::unique_ptr<CarrierSubject> subject = examination.fresh(examination.usual_hosting());
+  std::vector<std::size_t> order;
+  for (const std::size_t i : forward(examination)) order.insert(order.end(), 3, i);
+  return compare(examination, subject.get(), order, "asked three times in a row");
+}
+
+std::string judge_after_others(Examination& examination) {
+  const std::unique_ptr<CarrierSubject> subject = examination.fresh(examination.usual_hosting());
+  std::vector<std::size_t> order = forward(examination);
+  const std::vector<std::size_t> back = backward(examination);
+  order.insert(order.end(), back.begin(), back.end());
+  return compare(examination, subject.get(), order, "asked again after all others, in reverse order");
+}
+
+std::string judge_fresh(Examination& examination) {
+  const std::unique_ptr<CarrierSubject> subject = examination.fresh(examination.usual_hosting());
+  return compare(examination, subject.get(), backward(examination),
+                 "in another process that was asked in reverse order");
+}
+
+std::string judge_carriers(Examination& examination) {
+  for (const kernel::Hosting hosting : examination.examinee.carriers()) {
+    if (hosting == examination.usual_hosting()) continue;
+    const std::unique_ptr<CarrierSubject> subject = examination.fresh(hosting);
+    const std::string finding = compare(examination, subject.get(), forward(examination),
+                                        fmt::format("hosted by {}", kernel::hosting_name(hosting)));
+    if (!finding.empty()) return finding;
+  }
+  return {};
+}
+
+std::string judge_threads(Examination& examination) {
+  for (const std::uint32_t threads : {2U, 3U}) {
+    const std::unique_ptr<CarrierSubject> subject = examination.fresh(examination.usual_hosting(), threads);
+    const std::string finding =
+        compare(examination, subject.get(), forward(examination), fmt::format("with {} threads instead of 1", threads));
+    if (!finding.empty()) return finding;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<CheckCase> purity_cases() {
+  return {
+      {Level::kPurity, "purity/answered", "Ordinary questions are answered.", judge_answered},
+      {Level::kPurity, "purity/twice", "The same question gets the same bytes.", judge_twice},
+      {Level::kPurity, "purity/after-others", "What was asked before does not matter.", judge_after_others},
+      {Level::kPurity, "purity/fresh-process", "Which process answers does not matter.", judge_fresh},
+      {Level::kPurity, "purity/carriers", "How the process is reached does not matter.", judge_carriers},
+      {Level::kPurity, "purity/threads", "The number of threads does not matter.", judge_threads},
+  };
+}
+
+}  // namespace gravitas::check

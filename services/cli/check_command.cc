@@ -1,0 +1,109 @@
+// `gravitas check`.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <iostream>
+#include <memory>
+
+#include "services/check/check_text.h"
+#include "services/check/describe.h"
+#include "services/check/examination.h"
+#include "services/cli/commands.h"
+#include "services/recorder/json.h"
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupt_requested = 0;
+
+void request_interrupt(int) { interrupt_requested = 1; }
+
+// A line of progress on a person's terminal, for work longer than two seconds.
+class CaseLine {
+ public:
+  void show(const check::Progress& progress) {
+    const auto now = Clock::now();
+    if (isatty(STDERR_FILENO) != 1 || now - start_ < std::chrono::seconds(2) ||
+        now - last_ < std::chrono::milliseconds(100))
+      return;
+    last_ = now;
+    std::string text = fmt::format("{} {}", progress.level, progress.name);
+    if (progress.all > 0) text += fmt::format(", call {} of {}", progress.done, progress.all);
+    std::cerr << fmt::format("\r{:<70}", text) << std::flush;
+    is_shown_ = true;
+  }
+  ~CaseLine() {
+    if (is_shown_) std::cerr << fmt::format("\r{:<70}\r", "");
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now(), last_{};
+  bool is_shown_ = false;
+};
+
+struct Arguments {
+  std::string plugin;
+  check::Options options;
+  bool json = false;
+};
+
+// A level or case that does not exist would leave nothing to fail.
+void demand_known(const check::Options& options, const PluginDeclaration& declaration) {
+  if (options.only_case.empty()) return;
+  std::string names;
+  for (const check::CheckCase& one : check::all_cases(declaration)) {
+    if (one.name == options.only_case) return;
+    names += "\n  " + one.name;
+  }
+  throw BadInput(fmt::format("--case {}: this plugin has no such case; allowed:{}", options.only_case, names));
+}
+
+int check_plugin(const Arguments& arguments) {
+  std::signal(SIGINT, request_interrupt);
+  std::signal(SIGTERM, request_interrupt);
+  check::Examinee examinee = check::find_examinee(arguments.plugin);
+  check::complete(&examinee, arguments.options.quick);
+  if (examinee.problem.empty()) demand_known(arguments.options, examinee.declaration);
+  report::v1::CheckReport report;
+  {
+    CaseLine line;
+    report = check::examine(
+        examinee, arguments.options, [&](const check::Progress& now) { line.show(now); },
+        [] { return interrupt_requested != 0; });
+  }
+  std::cout << (arguments.json ? to_json(report, JsonForm::kPage) : check::check_text(report));
+  if (interrupt_requested != 0) return kInterrupted;
+  return report.conforms() ? kDone : kExaminedFailed;
+}
+
+}  // namespace
+
+void add_check(CLI::App* app, Action* action) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app->add_subcommand("check", "Judge a plugin by the contract that every plugin keeps");
+  command->footer(
+      "Levels: C0 handshake, C1 wire, C2 purity, C3 state, C4 limits, C5 numbers. Exit code 0: it conforms, 4: it does "
+      "not, 2: it is no plugin.\n"
+      "Example: gravitas check build/release/lib/gravitas/hello.so --quick\n"
+      "         gravitas check 'python3 my_worker.py'");
+  command
+      ->add_option("PLUGIN", arguments->plugin,
+                   "A plugin library, a command that starts a worker, or the name of an installed plugin")
+      ->required();
+  command->add_flag("--quick", arguments->options.quick, "At most two seconds: few calls, and the short cases only");
+  CLI::Option* level = command->add_option("--level", arguments->options.level, "Judge this level only: C0 to C5")
+                           ->check(CLI::IsMember({"C0", "C1", "C2", "C3", "C4", "C5"}));
+  command->add_option("--case", arguments->options.only_case, "Judge this case only, as a finding names it")
+      ->excludes(level);
+  command->add_option("--calls", arguments->options.calls, "Calls of level C4")
+      ->check(CLI::Range(1000U, 1000000000U))
+      ->capture_default_str();
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->callback([=] { *action = [=] { return check_plugin(*arguments); }; });
+}
+
+}  // namespace gravitas::cli

@@ -1,0 +1,21 @@
+// Files that are whole or not there: a crash, a power cut or a full disk leaves the previous content.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gravitas {
+
+// Writes all bytes to a file descriptor; throws std::system_error naming `what`.
+void write_all(int file, std::span<const std::byte> bytes, const std::string& what);
+
+// Puts `bytes` into the place of the file: PATH.tmp in the same folder, fsync, rename, fsync of the folder. On failure
+// throws std::system_error naming the file; what was at `path` is still there, and PATH.tmp is gone.
+void replace_file(const std::string& path, std::span<const std::byte> bytes);
+
+// All bytes of a regular file. Throws std::system_error, or std::runtime_error if it is no regular file.
+std::vector<std::byte> read_whole_file(const std::string& path);
+
+}  // namespace gravitas

@@ -1,0 +1,21 @@
+// What a recorded run is a run of: digests of everything in a scene that determines its trajectory. Ids, hosting,
+// threads and how far the run goes are not part of it, so that a run may go on elsewhere and further.
+#pragma once
+
+#include <string>
+
+#include "gravitas/recorder/v1/checkpoint.pb.h"
+#include "kernel/description.h"
+#include "kernel/hash.h"
+
+namespace gravitas {
+
+recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& description);
+
+// The parts in which a record differs from the scene, with both time steps if these do; empty if it is the same.
+std::string find_difference(const recorder::v1::Identity& recorded, const recorder::v1::Identity& scene);
+
+// One number for the identity and this build.
+kernel::Hash digest_of(const recorder::v1::Identity& identity);
+
+}  // namespace gravitas

@@ -1,0 +1,67 @@
+// The journal beside a checkpoint: what happened at each commit, appended while the run goes on. On resume the steps
+// between the checkpoint and the journal's end are made again and must come out with the same chain hash.
+//
+//   header: magic 8 | version 4 | 0 4 | run 16 | check 8                                   little-endian
+//   record: kind 1 | 0 3 | size 4 | payload | check 8
+//   kinds:  1 commit: step 4, chain hash 16 (36 bytes a step in all)
+//
+// A check is XXH3-64 of the record, seeded with the check before it, so that records can neither be changed nor
+// exchanged. `run` is the digest of the scene's identity and the build. A record that is not whole (a crash tears the
+// last one) ends the journal. Decisions that change what the next commit is made of get kinds of their own, and are
+// written before that commit; commits may be buffered, since the journal only vouches for them.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kernel/hash.h"
+
+namespace gravitas {
+
+struct JournalEntry {
+  std::uint32_t step;
+  kernel::Hash chain;
+};
+
+// What could be read of a journal.
+struct JournalReading {
+  std::vector<JournalEntry> commits;  // beyond the step asked for, ascending
+  std::uint64_t end = 0;              // offset behind the last whole record; 0: not a journal of this run
+  std::uint64_t check = 0;            // of that record
+  std::uint32_t last_step = 0;        // of all commits
+  std::string note;                   // what was left aside and why; empty: nothing
+};
+
+// Reads any bytes. `after`: the step that is already known.
+JournalReading read_journal(std::span<const std::byte> bytes, const kernel::Hash& run, std::uint32_t after);
+
+class JournalWriter {
+ public:
+  // Goes on behind what was read; a reading of nothing starts a new journal. Throws std::system_error if the file cannot
+  // be made, std::runtime_error if another run is writing it.
+  JournalWriter(const std::string& path, const kernel::Hash& run, const JournalReading& known);
+  ~JournalWriter();
+  JournalWriter(const JournalWriter&) = delete;
+  JournalWriter& operator=(const JournalWriter&) = delete;
+
+  // Steps that the journal knows are not written again. Throws std::system_error when what is buffered cannot be
+  // written; it is then lost.
+  void append(const JournalEntry& commit);
+  void flush();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::string path_;
+  int file_ = -1;
+  std::uint64_t check_ = 0;
+  std::uint32_t last_step_;
+  std::vector<std::byte> buffer_;
+  Clock::time_point last_flush_ = Clock::now();
+};
+
+}  // namespace gravitas

@@ -1,0 +1,79 @@
+#include "services/recorder/recorder.h"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "services/recorder/checkpoint.h"
+#include "services/recorder/durable_file.h"
+#include "services/recorder/identity.h"
+
+namespace gravitas {
+namespace {
+
+// The run's last step was shorter than the others: a longer run takes another step there, so nothing of it is kept.
+bool ends_in_a_shortened_step(const kernel::Environment& environment) {
+  return environment.step_count() > 0 && environment.step_count() == environment.total_steps() &&
+         environment.saved_state().step_length != environment.time_step();
+}
+
+}  // namespace
+
+std::string journal_of(const std::string& checkpoint) { return checkpoint + ".journal"; }
+
+Recorder::Recorder(recorder::v1::Identity identity, std::function<recorder::v1::Tally()> tally)
+    : identity_(std::move(identity)), tally_(std::move(tally)) {}
+
+void Recorder::expect(const std::string& journal, std::vector<JournalEntry> commits) {
+  expected_journal_ = journal;
+  expected_ = std::move(commits);
+  next_expected_ = 0;
+}
+
+void Recorder::keep(const std::string& path, std::uint32_t every, const JournalReading& known,
+                    const kernel::Environment& environment) {
+  journal_.emplace(journal_of(path), digest_of(identity_), known);
+  path_ = path;
+  every_ = every;
+  save(environment);
+}
+
+void Recorder::on_commit(const kernel::Environment& environment) {
+  if (ends_in_a_shortened_step(environment)) return;
+  const JournalEntry commit{environment.step_count(), environment.chain_hash()};
+  check(commit);
+  if (!journal_) return;
+  journal_->append(commit);
+  if (every_ != 0 && commit.step % every_ == 0) save(environment);
+}
+
+void Recorder::check(const JournalEntry& commit) {
+  while (next_expected_ < expected_.size() && expected_[next_expected_].step < commit.step) ++next_expected_;
+  if (next_expected_ == expected_.size()) return;
+  const JournalEntry& before = expected_[next_expected_];
+  if (before.step != commit.step || before.chain == commit.chain) return;
+  throw NotRepeatable(
+      fmt::format("step {} came out differently: chain hash {} now, {} in the journal '{}'; the run cannot go on as it "
+                  "was, since a plugin or this machine does not give the same bits again",
+                  commit.step, commit.chain.text(), before.chain.text(), expected_journal_));
+}
+
+void Recorder::save(const kernel::Environment& environment) {
+  journal_->flush();
+  if (ends_in_a_shortened_step(environment)) return;
+  save_to(path_, environment);
+  saved_step_ = environment.step_count();
+}
+
+void Recorder::save_to(const std::string& path, const kernel::Environment& environment) const {
+  const recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_());
+  try {
+    replace_file(path, serialize_checkpoint(checkpoint));
+  } catch (const std::system_error& error) {
+    throw std::system_error(error.code(), "checkpoint '" + path + "'");
+  }
+}
+
+}  // namespace gravitas

@@ -1,0 +1,76 @@
+// Listens to an environment's commits and keeps what a later process needs to go on: a checkpoint every so many steps,
+// and a journal of all of them. After a resume it holds the new steps against the old journal.
+//
+//   commit n -> as the old journal has it? -> FILE.journal (buffered) -> every N steps: FILE (replaced as a whole)
+//
+// A shortened last step is in neither file, since a longer run takes another step there.
+// A write that fails throws std::system_error out of Environment::step(): the step is committed, the last checkpoint
+// is untouched.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "gravitas/recorder/v1/checkpoint.pb.h"
+#include "kernel/environment.h"
+#include "services/recorder/journal.h"
+
+namespace gravitas {
+
+std::string journal_of(const std::string& checkpoint);
+
+// A step that was made again came out differently.
+class NotRepeatable : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Recorder final : public kernel::CommitListener {
+ public:
+  // `tally` says what the report has counted so far.
+  Recorder(recorder::v1::Identity identity, std::function<recorder::v1::Tally()> tally);
+
+  // The next steps must have the chain hashes of this journal.
+  void expect(const std::string& journal, std::vector<JournalEntry> commits);
+
+  // Keeps a checkpoint in the file, now, after every `every` steps counted from t = 0 (never if 0), and at save(); and
+  // the journal beside it, which goes on behind `known`. Throws as JournalWriter and replace_file() do.
+  void keep(const std::string& path, std::uint32_t every, const JournalReading& known,
+            const kernel::Environment& environment);
+
+  // Throws NotRepeatable, std::system_error.
+  void on_commit(const kernel::Environment& environment) override;
+
+  // Brings file and journal to the committed state. Throws std::system_error.
+  void save(const kernel::Environment& environment);
+
+  // Writes the committed state to a file of its own.
+  void save_to(const std::string& path, const kernel::Environment& environment) const;
+
+  bool keeps() const { return journal_.has_value(); }
+  const std::string& path() const { return path_; }
+  // Step of the last checkpoint that was put into path().
+  std::optional<std::uint32_t> saved_step() const { return saved_step_; }
+
+ private:
+  void check(const JournalEntry& commit);
+
+  recorder::v1::Identity identity_;
+  std::function<recorder::v1::Tally()> tally_;
+
+  std::string expected_journal_;
+  std::vector<JournalEntry> expected_;
+  std::size_t next_expected_ = 0;
+
+  std::string path_;
+  std::uint32_t every_ = 0;
+  std::optional<std::uint32_t> saved_step_;
+  std::optional<JournalWriter> journal_;
+};
+
+}  // namespace gravitas

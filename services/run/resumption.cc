@@ -1,0 +1,72 @@
+#include "services/run/resumption.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <stdexcept>
+#include <system_error>
+
+#include "services/recorder/checkpoint.h"
+#include "services/recorder/durable_file.h"
+#include "services/recorder/identity.h"
+#include "services/recorder/recorder.h"
+#include "services/run/session.h"
+
+namespace gravitas {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::byte> read_or_refuse(const std::string& path) {
+  try {
+    return read_whole_file(path);
+  } catch (const std::runtime_error& problem) {
+    throw BadInput(fmt::format("checkpoint {}", problem.what()));
+  }
+}
+
+JournalReading read_journal_beside(const std::string& path, const kernel::Hash& run, std::uint32_t step,
+                                   std::vector<std::string>* warnings) {
+  const std::string journal = journal_of(path);
+  if (!fs::exists(journal)) return {};
+  JournalReading reading;
+  try {
+    reading = read_journal(read_whole_file(journal), run, step);
+  } catch (const std::runtime_error& problem) {
+    reading.note = problem.what();
+  }
+  if (!reading.note.empty()) warnings->push_back(fmt::format("journal '{}': {}; left aside", journal, reading.note));
+  return reading;
+}
+
+}  // namespace
+
+Resumption read_resumption(const std::string& path, const kernel::EnvironmentDescription& description,
+                           std::vector<std::string>* warnings) {
+  const auto refuse = [&](const std::string& why) { throw BadInput(fmt::format("checkpoint '{}': {}", path, why)); };
+  const std::vector<std::byte> bytes = read_or_refuse(path);
+  std::string problem;
+  std::optional<recorder::v1::Checkpoint> checkpoint = parse_checkpoint(bytes, &problem);
+  if (!checkpoint) refuse(problem);
+  const recorder::v1::Identity scene = identity_of(description);
+  problem = find_obstacle(*checkpoint, scene);
+  if (!problem.empty()) refuse(problem);
+  if (checkpoint->step() > description.steps)
+    refuse(
+        fmt::format("it is the state after step {}, beyond the end of this run at step {}; --steps and --duration "
+                    "count from t = 0",
+                    checkpoint->step(), description.steps));
+  JournalReading journal = read_journal_beside(path, digest_of(scene), checkpoint->step(), warnings);
+  return {std::move(*checkpoint), std::move(journal)};
+}
+
+std::string checkpoint_target(const std::string& path) {
+  std::error_code none;
+  const fs::file_status status = fs::status(path, none);
+  if (!fs::exists(status)) return path;
+  if (!fs::is_regular_file(status))
+    throw BadInput(fmt::format("checkpoint '{}': it is not an ordinary file, and is not replaced", path));
+  return fs::is_symlink(fs::symlink_status(path)) ? fs::canonical(path).string() : path;
+}
+
+}  // namespace gravitas

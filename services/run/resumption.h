@@ -1,0 +1,27 @@
+// What `--resume` names: a checkpoint and the journal beside it, read and held against the scene.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gravitas/recorder/v1/checkpoint.pb.h"
+#include "kernel/description.h"
+#include "services/recorder/journal.h"
+
+namespace gravitas {
+
+struct Resumption {
+  recorder::v1::Checkpoint checkpoint;
+  JournalReading journal;  // of the steps after the checkpoint
+};
+
+// Throws BadInput if the file cannot be read, is no checkpoint, is one of another build or scene, or lies beyond the
+// end of the run. A journal that is missing is none; one that cannot be used in full is a warning.
+Resumption read_resumption(const std::string& path, const kernel::EnvironmentDescription& description,
+                           std::vector<std::string>* warnings);
+
+// The file itself where `path` is a symbolic link to one. Throws BadInput if there is something else than an ordinary
+// file, which a checkpoint must not replace.
+std::string checkpoint_target(const std::string& path);
+
+}  // namespace gravitas

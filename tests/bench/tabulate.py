@@ -1,0 +1,115 @@
+"""Turns the benchmark program's JSON into a table and a drawing.
+
+    tabulate.py build/bench.json FOLDER      writes FOLDER/RESULTS.md and FOLDER/cost_per_step.svg
+"""
+import json
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+
+TO_MICROSECONDS = {"ns": 1e-3, "us": 1.0, "ms": 1e3, "s": 1e6}
+
+# What is promised: benchmark, what it is, counter or None for its time, bound, unit.
+BOUNDS = [
+    ("empty_call/direct/real_time", "stage call, direct", None, 0.1, "us"),
+    ("empty_call/shm/real_time", "stage call, shm, hot", None, 1.1, "us"),
+    ("sleeping_call/shm/iterations:300/manual_time", "stage call, shm, sleeping worker", None, 100, "us"),
+    ("empty_call/grpc/real_time", "stage call, gRPC, one body", None, None, "us"),
+    ("integrate_call/direct/1000/real_time", "Integrate, 1000 bodies, direct", None, None, "us"),
+    ("integrate_call/shm/1000/real_time", "Integrate, 1000 bodies, shm", None, None, "us"),
+    ("integrate_call/grpc/1000/real_time", "Integrate, 1000 bodies, gRPC", None, 400, "us"),
+    ("integrate_call/grpc/10000/real_time", "Integrate, 10,000 bodies, gRPC", None, 3000, "us"),
+    ("free_body/direct/real_time", "step of one free body, direct", None, 0.5, "us"),
+    ("free_body/shm/real_time", "step of one free body, shm", None, None, "us"),
+    ("free_body/grpc/real_time", "step of one free body, gRPC", None, None, "us"),
+    ("four_derivatives/direct/1/real_time", "step with four derivatives, one body, direct", None, None, "us"),
+    ("four_derivatives/shm/1/real_time", "step with four derivatives, one body, shm", None, None, "us"),
+    ("four_derivatives/grpc/1/real_time", "step with four derivatives, one body, gRPC", None, None, "us"),
+    ("four_derivatives/shm/1000/real_time", "step with four derivatives, 1000 bodies, shm", None, None, "us"),
+    ("start_to_first_step/iterations:20/real_time", "exec to the end of a run of one step, five workers", None, 150e3,
+     "us"),
+    ("pile_in_workers/iterations:100/real_time", "validation in a step of pile1000, shm", "validation_percent", 3, "%"),
+    ("memory/iterations:1/real_time", "memory of a body, all slots direct", "bytes_per_body", None, "B"),
+    ("memory/iterations:1/real_time", "resident memory of a worker", "megabytes_per_worker", None, "MB"),
+]
+
+
+def medians(path):
+    """Benchmark name -> its median run."""
+    report = json.loads(Path(path).read_text())
+    runs = {}
+    for run in report["benchmarks"]:
+        if run.get("aggregate_name") == "median":
+            runs[run["run_name"]] = run
+    return report["context"], runs
+
+
+def microseconds(run):
+    return run["real_time"] * TO_MICROSECONDS[run["time_unit"]]
+
+
+def shown(value):
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def table(context, runs):
+    lines = [
+        "# Benchmark results",
+        "",
+        f"Made by `deploy/bench` on {context['date'][:10]}: {context['num_cpus']} cores at "
+        f"{context['mhz_per_cpu']} MHz, load {context['load_avg'][0]:.1f} at the start. Medians of five.",
+        "",
+        "| what | measured | promised |",
+        "| --- | --- | --- |",
+    ]
+    for name, what, counter, bound, unit in BOUNDS:
+        run = runs.get(name)
+        if run is None:
+            sys.exit(f"tabulate.py: no benchmark {name} in the report")
+        value = run[counter] if counter else microseconds(run)
+        promise = "" if bound is None else f"≤ {shown(bound)} {unit}" + ("" if value <= bound else " **missed**")
+        lines.append(f"| {what} | {shown(value)} {unit} | {promise} |")
+    lines += ["", "Cost per step against the number of bodies (free fall, space and collision at work), microseconds:", "",
+              "| bodies | direct | shm | grpc |", "| --- | --- | --- | --- |"]
+    curves = falling(runs)
+    for bodies in sorted(curves["direct"]):
+        lines.append(f"| {bodies} | " + " | ".join(shown(curves[c][bodies]) for c in curves) + " |")
+    lines += ["", "![cost per step](cost_per_step.svg)", ""]
+    return "\n".join(lines)
+
+
+def falling(runs):
+    curves = {"direct": {}, "shm": {}, "grpc": {}}
+    for name, run in runs.items():
+        parts = name.split("/")
+        if parts[0] == "falling":
+            curves[parts[1]][int(parts[2])] = microseconds(run)
+    return curves
+
+
+def draw(runs, path):
+    figure, axes = plt.subplots(figsize=(6.4, 4.2))
+    for carrier, points in falling(runs).items():
+        bodies = sorted(points)
+        axes.loglog(bodies, [points[n] for n in bodies], marker="o", label=carrier)
+    axes.set_xlabel("bodies")
+    axes.set_ylabel("step [µs]")
+    axes.set_title("Cost per step: n balls in free fall")
+    axes.grid(True, which="major", alpha=0.3)
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, metadata={"Date": None})
+
+
+def main():
+    context, runs = medians(sys.argv[1])
+    folder = Path(sys.argv[2])
+    (folder / "RESULTS.md").write_text(table(context, runs))
+    draw(runs, folder / "cost_per_step.svg")
+
+
+main()

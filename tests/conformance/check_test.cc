@@ -1,0 +1,124 @@
+// The verdicts of `gravitas check`: every plugin of the tree conforms, every one that misbehaves on purpose fails at the
+// level that stands beside it. No plugin is named here.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "kernel/carrier/carrier.h"
+#include "services/check/describe.h"
+#include "services/check/examination.h"
+
+namespace gravitas::check {
+namespace {
+
+namespace files = std::filesystem;
+
+const std::string kPlugins = GRAVITAS_BINARY_DIR "/lib/gravitas";
+const std::string kFaulty = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty";
+// Fewer calls than a full check makes, which takes minutes: `gravitas check PLUGIN` by hand makes them all.
+constexpr std::uint32_t kFewCalls = 1000;
+
+std::vector<std::string> libraries_of(const std::string& folder) {
+  std::vector<std::string> names;
+  if (!files::is_directory(folder)) return names;
+  for (const files::directory_entry& entry : files::directory_iterator(folder))
+    if (entry.path().extension() == ".so") names.push_back(entry.path().stem().string());
+  std::ranges::sort(names);
+  return names;
+}
+
+report::v1::CheckReport check_library(const std::string& path, const Options& options) {
+  kernel::set_worker_program(GRAVITAS_BINARY_DIR "/bin/gravitas-worker");
+  Examinee examinee = find_examinee(path);
+  complete(&examinee, options.quick);
+  return examine(
+      examinee, options, [](const Progress&) {}, [] { return false; });
+}
+
+bool fails(const report::v1::CheckReport& report, const std::string& level) {
+  return std::ranges::any_of(report.levels(), [&](const report::v1::CheckLevel& one) {
+    return one.level() == level && one.verdict() == "failed";
+  });
+}
+
+// The level at which a bad plugin fails, as its folder says.
+std::string level_of(const std::string& name) {
+  std::ifstream file(GRAVITAS_SOURCE_DIR "/tests/faulty/" + name + "/level");
+  std::string level;
+  file >> level;
+  return level;
+}
+
+void expect_failure(const report::v1::CheckReport& report, const std::string& level) {
+  EXPECT_FALSE(report.conforms());
+  ASSERT_FALSE(level.empty()) << "there is no file `level` beside its plugin.cc";
+  EXPECT_TRUE(fails(report, level)) << report.DebugString();
+  // a finding says how to see it again
+  for (const report::v1::CheckFinding& finding : report.findings()) {
+    EXPECT_FALSE(finding.text().empty());
+    EXPECT_NE(finding.again().find("--case"), std::string::npos);
+  }
+}
+
+class CheckOfTheTree : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(CheckOfTheTree, ConformsInAQuickCheck) {
+  const auto report = check_library(kPlugins + "/" + GetParam() + ".so", {.quick = true, .level = {}, .only_case = {}});
+  EXPECT_TRUE(report.conforms()) << report.DebugString();
+  // two seconds on an idle machine
+  EXPECT_LT(report.seconds(), 20.0);
+}
+
+TEST_P(CheckOfTheTree, ConformsInAFullCheckOfFewCalls) {
+  const auto report =
+      check_library(kPlugins + "/" + GetParam() + ".so", {.calls = kFewCalls, .level = {}, .only_case = {}});
+  EXPECT_TRUE(report.conforms()) << report.DebugString();
+  for (const report::v1::CheckLevel& level : report.levels()) EXPECT_EQ(level.verdict(), "passed") << level.level();
+}
+
+class CheckOfFaults : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(CheckOfFaults, FailsAtItsLevelInAQuickCheck) {
+  const auto report = check_library(kFaulty + "/" + GetParam() + ".so", {.quick = true, .level = {}, .only_case = {}});
+  expect_failure(report, level_of(GetParam()));
+  EXPECT_LT(report.seconds(), 20.0);
+}
+
+class CheckOfSlowFaults : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(CheckOfSlowFaults, FailsAtItsLevelInAFullCheck) {
+  const std::string level = level_of("long/" + GetParam());
+  expect_failure(check_library(kFaulty + "/long/" + GetParam() + ".so", {.level = level, .only_case = {}}), level);
+}
+
+std::string name_of(const ::testing::TestParamInfo<std::string>& info) { return info.param; }
+
+INSTANTIATE_TEST_SUITE_P(All, CheckOfTheTree, ::testing::ValuesIn(libraries_of(kPlugins)), name_of);
+INSTANTIATE_TEST_SUITE_P(All, CheckOfFaults, ::testing::ValuesIn(libraries_of(kFaulty)), name_of);
+INSTANTIATE_TEST_SUITE_P(All, CheckOfSlowFaults, ::testing::ValuesIn(libraries_of(kFaulty + "/long")), name_of);
+
+// A command is judged as a library is, over the one carrier that it has.
+TEST(CheckOfACommand, ThatServesAGoodPluginConforms) {
+  const std::vector<std::string> good = libraries_of(kPlugins);
+  ASSERT_FALSE(good.empty());
+  std::string command = GRAVITAS_BINARY_DIR "/bin/gravitas-worker " + kPlugins + "/" + good.front() + ".so";
+  const auto report = check_library(command, {.quick = true, .level = {}, .only_case = {}});
+  EXPECT_TRUE(report.conforms()) << report.DebugString();
+  EXPECT_EQ(report.command(), command);
+}
+
+TEST(CheckOfOneCase, ThatIsNamedIsJudgedAlone) {
+  const std::vector<std::string> good = libraries_of(kPlugins);
+  ASSERT_FALSE(good.empty());
+  const auto report = check_library(kPlugins + "/" + good.front() + ".so", {.level = {}, .only_case = "purity/twice"});
+  for (const report::v1::CheckLevel& level : report.levels()) EXPECT_EQ(level.cases(), level.level() == "C2" ? 1U : 0U);
+  // which says nothing about the rest
+  EXPECT_EQ(report.badge(), "no finding in what was asked for: C2");
+}
+
+}  // namespace
+}  // namespace gravitas::check

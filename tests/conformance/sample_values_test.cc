@@ -1,0 +1,111 @@
+// Values drawn for declared properties, and the draws themselves.
+#include "plugin_sdk/conformance/sample_values.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "plugin_sdk/conformance/inquiry.h"
+
+namespace gravitas::conformance {
+namespace {
+
+using testing::HasSubstr;
+
+// The reference sequence of SplitMix64 for the seed 1234567.
+TEST(Draw, IsSplitMix) {
+  Draw draw(1234567);
+  EXPECT_EQ(draw.bits(), 6457827717110365317ULL);
+  EXPECT_EQ(draw.bits(), 3203168211198807973ULL);
+  EXPECT_EQ(draw.bits(), 9817491932198370423ULL);
+}
+
+TEST(Draw, StaysWithinItsBounds) {
+  Draw draw(1);
+  for (int i = 0; i < 1000; ++i) {
+    const double number = draw.uniform(-2.0, 3.0);
+    EXPECT_TRUE(number >= -2.0 && number < 3.0);
+    EXPECT_LT(draw.below(7), 7U);
+    EXPECT_NEAR(draw.direction().norm(), 1.0, 1e-15);
+    EXPECT_NEAR(draw.rotation().norm(), 1.0, 1e-15);
+  }
+}
+
+TEST(SampleValues, KeepTheDeclaredBounds) {
+  const std::vector<Property> properties = {
+      Property::number("Radius", "m").above(0.0).required(),
+      Property::number("Share", "1").at_least(0.25).at_most(0.5).required(),
+      Property::number("Depth", "m").at_most(-4.0).required(),
+      Property::integer("Sweeps").at_least(3.0).at_most(4.0).required(),
+  };
+  Draw draw(1);
+  for (int i = 0; i < 200; ++i) {
+    const std::vector<double> values = sample_values(properties, &draw);
+    ASSERT_EQ(values.size(), 4U);
+    EXPECT_GT(values[0], 0.0);
+    EXPECT_TRUE(values[1] >= 0.25 && values[1] <= 0.5);
+    EXPECT_LE(values[2], -4.0);
+    EXPECT_EQ(values[3], 4.0);
+  }
+}
+
+TEST(SampleValues, TakeDefaultsAndLeaveOutWhatMayBeAbsent) {
+  const std::vector<Property> properties = {
+      Property::vector("Point", "m", "world").defaults_to({1, 2, 3}),
+      Property::number("MaximumTorque", "N*m").at_least(0.0),
+      Property::table("Table", 4, "s,N", "world"),
+      Property::flag("Instantaneous").defaults_to({0}),
+  };
+  Draw draw(1);
+  const std::vector<double> values = sample_values(properties, &draw);
+  ASSERT_EQ(values.size(), 6U);
+  EXPECT_EQ(std::vector<double>(values.begin(), values.begin() + 3), (std::vector<double>{1, 2, 3}));
+  EXPECT_TRUE(std::isnan(values[3]));
+  EXPECT_EQ(values[4], 0.0);
+  EXPECT_EQ(values[5], 0.0);
+}
+
+TEST(SampleValues, AxesArePerpendicular) {
+  const std::vector<Property> properties = {Property::vector("Axis1", "1", "world").required(),
+                                            Property::vector("Axis2", "1", "world").required()};
+  Draw draw(1);
+  const std::vector<double> values = sample_values(properties, &draw);
+  ASSERT_EQ(values.size(), 6U);
+  const Vector3 one(values[0], values[1], values[2]), other(values[3], values[4], values[5]);
+  EXPECT_NEAR(one.norm(), 1.0, 1e-15);
+  EXPECT_NEAR(other.norm(), 1.0, 1e-15);
+  EXPECT_NEAR(one.dot(other), 0.0, 1e-15);
+}
+
+TEST(SampleValues, TablesAscend) {
+  Draw draw(1);
+  const std::vector<double> values = sample_values({Property::table("Table", 4, "s,N", "world").required()}, &draw);
+  ASSERT_EQ(values.size(), 33U);
+  EXPECT_EQ(values[0], 8.0);
+  for (std::size_t row = 1; row < 8; ++row) EXPECT_GT(values[1 + 4 * row], values[1 + 4 * (row - 1)]);
+}
+
+TEST(SampleValues, WhatTheSceneLanguageGivesMustBeTaken) {
+  const TypeDeclaration ball{"Sphere", "", {Property::number("Radius", "m").above(0.0).required()}};
+  EXPECT_EQ(flattened(ball, {given("Radius", 0.5)}), std::vector<double>{0.5});
+  try {
+    flattened(ball, {given("Radius", -0.5)});
+    FAIL() << "a negative radius was taken";
+  } catch (const Finding& finding) {
+    EXPECT_THAT(finding.what(), HasSubstr("type Sphere does not take what the scene language gives it"));
+  }
+}
+
+TEST(Capabilities, AreNamesAndNumbers) {
+  const PluginDeclaration declaration{
+      .name = "X", .version = "1", .slot = Slot::kIntegrator, .meaning = "", .capabilities = {"order=4", "soft"}};
+  EXPECT_TRUE(has_capability(declaration, "soft"));
+  EXPECT_FALSE(has_capability(declaration, "sof"));
+  EXPECT_EQ(capability_number(declaration, "order", 1.0), 4.0);
+  EXPECT_EQ(capability_number(declaration, "soft", 1.0), 1.0);
+  EXPECT_EQ(capability_number(declaration, "stages", 7.0), 7.0);
+}
+
+}  // namespace
+}  // namespace gravitas::conformance

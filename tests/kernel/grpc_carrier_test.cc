@@ -1,0 +1,179 @@
+// Workers reached by gRPC that the kernel did not start over inherited sockets: at an address, and by a command.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "kernel/carrier/carrier.h"
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::FaultKind;
+using kernel::Hosting;
+using kernel::StageFault;
+using kernel::StepOutcome;
+using ::testing::HasSubstr;
+using testing::plugin_path;
+using testing::WorldBuilder;
+
+WorldBuilder balls(std::uint32_t count) {
+  WorldBuilder builder(Hosting::kDirect);
+  builder.steps(5, 0.01).ground();
+  for (std::uint32_t i = 0; i < count; ++i) builder.sphere(0.5 + 1e-6 * i, 1.0, Vector3(2.0 * i, 0.49, 0));
+  builder.gravity(Vector3(0, -10, 0));
+  return builder;
+}
+
+// The worker's bits, or why there are none.
+std::string chain_of(const WorldBuilder& builder) {
+  Environment world(builder.description());
+  while (world.step_count() < world.total_steps())
+    if (world.step() == StepOutcome::kPaused) return world.fault()->fault.text;
+  return world.chain_hash().text();
+}
+
+StageFault start_fault(const WorldBuilder& builder) {
+  try {
+    Environment world(builder.description());
+  } catch (const StageFault& fault) {
+    return fault;
+  }
+  ADD_FAILURE() << "it started";
+  return {FaultKind::kHandshake, "", ""};
+}
+
+// A worker that listens, started as a user starts it.
+class ListeningWorker {
+ public:
+  explicit ListeningWorker(const std::string& library) {
+    int out[2];
+    EXPECT_EQ(pipe(out), 0);
+    process_ = fork();
+    if (process_ == 0) {
+      dup2(out[1], STDOUT_FILENO);
+      execl(kernel::worker_program().c_str(), "gravitas-worker", "--listen", "127.0.0.1:0", library.c_str(), nullptr);
+      _exit(127);
+    }
+    close(out[1]);
+    std::FILE* said = fdopen(out[0], "r");
+    char line[256] = "";
+    EXPECT_NE(std::fgets(line, sizeof line, said), nullptr);
+    std::fclose(said);
+    const std::string text = line;
+    EXPECT_THAT(text, HasSubstr("listening at 127.0.0.1:"));
+    address_ = text.substr(13, text.size() - 14);
+  }
+  ~ListeningWorker() { end(); }
+  ListeningWorker(const ListeningWorker&) = delete;
+  ListeningWorker& operator=(const ListeningWorker&) = delete;
+
+  void end() {
+    if (process_ <= 0) return;
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+    process_ = -1;
+  }
+  const std::string& address() const { return address_; }
+  pid_t process() const { return process_; }
+
+ private:
+  pid_t process_ = -1;
+  std::string address_;
+};
+
+TEST(GrpcCarrier, AListeningWorkerServesOneKernelAfterTheOther) {
+  const ListeningWorker worker(plugin_path("solver_sequential"));
+  WorldBuilder builder = balls(3);
+  const std::string direct = chain_of(builder);
+  builder.description().solver.plugins[0].address = worker.address();
+  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_of(builder), direct);
+  Environment world(builder.description());
+  bool found = false;
+  for (const kernel::PlannedSlot& slot : world.plan().slots) {
+    if (slot.slot != Slot::kSolver) continue;
+    EXPECT_EQ(slot.hosting, Hosting::kGrpc);
+    EXPECT_EQ(slot.process_id, worker.process());
+    found = true;
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST(GrpcCarrier, AListeningWorkerServesOneKernelAtATime) {
+  const ListeningWorker worker(plugin_path("solver_sequential"));
+  WorldBuilder builder = balls(3);
+  builder.description().solver.plugins[0].address = worker.address();
+  Environment first(builder.description());
+  const StageFault fault = start_fault(builder);
+  EXPECT_EQ(fault.kind, FaultKind::kHandshake);
+  EXPECT_EQ(first.step(), StepOutcome::kCommitted);
+}
+
+TEST(GrpcCarrier, TheEndOfAListeningWorkerPausesTheEnvironment) {
+  ListeningWorker worker(plugin_path("solver_sequential"));
+  WorldBuilder builder = balls(3);
+  builder.description().solver.plugins[0].address = worker.address();
+  Environment world(builder.description());
+  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  worker.end();
+  ASSERT_EQ(world.step(), StepOutcome::kPaused);
+  EXPECT_EQ(world.fault()->fault.kind, FaultKind::kDeath);
+  EXPECT_THAT(world.fault()->fault.text, HasSubstr(worker.address() + " is gone"));
+  EXPECT_EQ(world.step_count(), 1U);
+}
+
+TEST(GrpcCarrier, AWorkerOfAnotherPluginRefuses) {
+  const ListeningWorker worker(plugin_path("solver_sequential"));
+  WorldBuilder builder = balls(3);
+  builder.description().integrator.plugins[0].address = worker.address();
+  EXPECT_THAT(start_fault(builder).text, HasSubstr("this worker serves plugin 'Sequential', not 'SemiImplicitEuler'"));
+}
+
+TEST(GrpcCarrier, AnAddressWithoutWorkerIsAnError) {
+  WorldBuilder builder = balls(1);
+  builder.description().solver.plugins[0].address = "unix:/nowhere/at/all";
+  EXPECT_THAT(start_fault(builder).text, HasSubstr("no worker answers at unix:/nowhere/at/all: No such file"));
+  builder.description().solver.plugins[0].address = "192.0.2.1:7000";
+  EXPECT_THAT(start_fault(builder).text, HasSubstr("no address of this machine"));
+}
+
+TEST(GrpcCarrier, ACommandStartsAWorkerBesideTheSlotsLibraries) {
+  WorldBuilder builder = balls(3);
+  builder.force("Basic", "force_basic", {0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  const std::string direct = chain_of(builder);
+  kernel::PluginChoice& gravity = builder.description().force.plugins[0];
+  gravity.command = kernel::worker_program() + " " + gravity.library;
+  EXPECT_EQ(chain_of(builder), direct);
+  builder.hosting(Slot::kForce, Hosting::kSharedMemory);
+  EXPECT_EQ(chain_of(builder), direct);
+}
+
+TEST(GrpcCarrier, ACommandThatIsNoWorkerIsAnError) {
+  WorldBuilder builder = balls(1);
+  builder.description().solver.plugins[0].command = "true";
+  EXPECT_THAT(start_fault(builder).text, HasSubstr("'true' was ended by itself with exit code 0 before it listened"));
+  builder.description().solver.plugins[0].command = "no-such-program";
+  EXPECT_THAT(start_fault(builder).text, HasSubstr("exit code 127"));
+}
+
+// Nine thousand shapes are more than goes inline: they travel as an asset, in the one call that needs it.
+TEST(GrpcCarrier, LargeColumnsTravelAsAssets) {
+  WorldBuilder builder = balls(9000);
+  builder.steps(2, 0.01);
+  const std::string direct = chain_of(builder);
+  builder.hosting(Slot::kCollision, Hosting::kGrpc);
+  EXPECT_EQ(chain_of(builder), direct);
+}
+
+}  // namespace
+}  // namespace gravitas

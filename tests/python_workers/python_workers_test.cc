@@ -1,0 +1,271 @@
+// Workers in another language: the Python SDK's own tests, a force and a solver in scenes with answers known
+// beforehand, and the conformance kit's verdict on both.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "services/run/figures.h"
+#include "services/run/session.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Hosting;
+using testing::Contains;
+using testing::HasSubstr;
+
+const std::string kFolder = GRAVITAS_SOURCE_DIR "/tests/python_workers/";
+const std::string kScenes = GRAVITAS_SOURCE_DIR "/tests/scenes/";
+const std::string kPython = "PYTHONPATH=" GRAVITAS_BINARY_DIR "/lib/python";
+
+// What the workers inherit.
+class PythonPath : public ::testing::Environment {
+ public:
+  void SetUp() override { setenv("PYTHONPATH", GRAVITAS_BINARY_DIR "/lib/python", 1); }
+};
+const ::testing::Environment* const kEnvironment = ::testing::AddGlobalTestEnvironment(new PythonPath);
+
+// A scene whose plugins are hosted directly, but for those that a scene file hosts itself.
+class MixedRun {
+ public:
+  MixedRun(std::vector<std::string> scenes, std::vector<std::string> overrides, Slot elsewhere) {
+    RunOptions options;
+    options.scenes = std::move(scenes);
+    options.overrides = std::move(overrides);
+    for (const Slot slot :
+         {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+      if (slot != elsewhere) options.hosting.push_back({slot, Hosting::kDirect, ""});
+    description_ = load(options, &warnings_);
+    environment_ = start(description_);
+    figures_ = std::make_unique<Figures>(description_);
+    figures_->follow(environment_.get());
+  }
+
+  void steps(std::uint32_t count) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (environment_->step() == kernel::StepOutcome::kPaused)
+        throw std::runtime_error(environment_->fault()->fault.what());
+      figures_->follow(environment_.get());
+    }
+  }
+
+  std::size_t row(const std::string& id) const {
+    const std::vector<std::string>& ids = environment_->model().body_id;
+    return static_cast<std::size_t>(std::ranges::find(ids, id) - ids.begin());
+  }
+  Vector3 position(const std::string& id) const { return vector_at(environment_->state().position, row(id)); }
+  Vector3 velocity(const std::string& id) const { return vector_at(environment_->state().linear_velocity, row(id)); }
+  Vector3 turning(const std::string& id) const { return vector_at(environment_->state().angular_velocity, row(id)); }
+
+  kernel::Environment& environment() { return *environment_; }
+  const report::v1::Report& report() {
+    figures_->write(&report_);
+    return report_;
+  }
+
+ private:
+  std::vector<std::string> warnings_;
+  kernel::EnvironmentDescription description_;
+  std::unique_ptr<kernel::Environment> environment_;
+  std::unique_ptr<Figures> figures_;
+  report::v1::Report report_;
+};
+
+struct Ended {
+  int code;
+  std::string words;  // both of its outputs
+};
+
+Ended ended(const std::string& command) {
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  if (pipe == nullptr) return {-1, "popen failed"};
+  Ended result{0, ""};
+  for (int c = fgetc(pipe); c != EOF; c = fgetc(pipe)) result.words += static_cast<char>(c);
+  const int status = pclose(pipe);
+  result.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return result;
+}
+
+TEST(PythonSdk, PassesItsOwnTests) {
+  const Ended tests = ended(kPython + " /usr/bin/python3 -B " + kFolder + "sdk_test.py");
+  EXPECT_EQ(tests.code, 0) << tests.words;
+  EXPECT_THAT(tests.words, testing::ContainsRegex("Ran [1-9][0-9] tests"));
+}
+
+// ---- the force
+
+TEST(PythonForce, TakesTheShareOfTheVelocityThatItsCoefficientsSay) {
+  MixedRun run({kFolder + "falling_with_drag.gravitas"}, {}, Slot::kForce);
+  const double h = 0.01;
+  Vector3 oil(3, 0, -4), air(1, 2, 2);
+  for (int step = 0; step < 200; ++step) {
+    run.steps(1);
+    oil -= h * 2.0 / 1.5 * oil;
+    air += h * (Vector3(0, -9.81, 0) - (0.1 + 0.5 * air.norm()) / 2.0 * air);
+    // rounding of two hundred steps
+    ASSERT_LE((run.velocity("InOil") - oil).norm(), 1e-13) << "step " << step;
+    ASSERT_LE((run.velocity("InAir") - air).norm(), 1e-12) << "step " << step;
+  }
+  EXPECT_EQ(run.turning("InAir"), Vector3(0, 0, 0));
+  EXPECT_NEAR(run.velocity("Free").y(), -9.81 * 2.0, 1e-12);
+}
+
+TEST(PythonForce, DeclaresItsRangesToTheReaderOfScenes) {
+  try {
+    MixedRun run({kFolder + "falling_with_drag.gravitas"}, {"Force.Oil.LinearCoefficient=-1"}, Slot::kForce);
+    FAIL() << "a negative coefficient was taken";
+  } catch (const BadInput& problem) {
+    EXPECT_THAT(problem.what(), HasSubstr("LinearCoefficient"));
+  }
+}
+
+struct Outcome {
+  std::string chain;
+  std::vector<std::string> warnings;
+};
+
+Outcome outcome_of(const std::vector<std::string>& scenes, const std::vector<std::string>& overrides) {
+  RunOptions options;
+  options.scenes = scenes;
+  options.overrides = overrides;
+  options.steps = 50;
+  const RunResult result = run(
+      options, [] { return false; }, [](const Progress&) {});
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  return {result.report.chain_hash(), {result.report.warnings().begin(), result.report.warnings().end()}};
+}
+
+TEST(PythonForce, GivesTheSameBitsAgainAndTheReportSaysWhatIsNotKnownOfThem) {
+  const Outcome once = outcome_of({kFolder + "falling_with_drag.gravitas"}, {});
+  const Outcome again = outcome_of({kFolder + "falling_with_drag.gravitas"}, {});
+  EXPECT_EQ(once.chain, again.chain);
+  EXPECT_THAT(once.warnings, Contains(HasSubstr("floating-point")));
+}
+
+// ---- the solver
+
+std::vector<std::string> scene(const std::string& name) { return {kScenes + name, kFolder + "solver.gravitas"}; }
+
+MixedRun solved_in_python(const std::string& name, std::vector<std::string> overrides = {}) {
+  overrides.push_back("Solver=PythonIslands");
+  return MixedRun(scene(name), std::move(overrides), Slot::kSolver);
+}
+
+TEST(PythonSolver, KeepsABoxAtRest) {
+  MixedRun run = solved_in_python("box_on_plane.gravitas");
+  const Vector3 start = run.position("Box");
+  for (int i = 0; i < 200; ++i) {
+    run.steps(1);
+    ASSERT_LE((run.position("Box") - start).norm(), 1e-9) << "step " << i;
+    ASSERT_LE(run.velocity("Box").norm() + run.turning("Box").norm(), 1e-9) << "step " << i;
+  }
+  EXPECT_LE(run.report().max_penetration(), 1e-12);
+}
+
+// Deceleration mu g in every step, and rest afterwards.
+TEST(PythonSolver, SlidesABoxToAStop) {
+  MixedRun run = solved_in_python("box_on_plane.gravitas", {"Body.Box.LinearVelocity={2,0,0}"});
+  const double per_step = 0.3 * 9.81 * 0.01;
+  const int stop = static_cast<int>(2.0 / per_step);
+  for (int i = 1; i <= stop; ++i) {
+    run.steps(1);
+    ASSERT_NEAR(run.velocity("Box").x(), 2.0 - i * per_step, 1e-9) << "step " << i;
+  }
+  run.steps(1);
+  const double stopped = run.position("Box").x();
+  run.steps(50);
+  EXPECT_NEAR(run.position("Box").x(), stopped, 1e-9);
+  EXPECT_NEAR(run.position("Box").y(), 0.1, 1e-9);
+}
+
+// e times the speed of a fall through what was left of the gap.
+TEST(PythonSolver, BouncesWithTheShareOfTheSpeedOfArrival) {
+  MixedRun run = solved_in_python("bounce.gravitas");
+  int landings = 0;
+  for (int i = 0; i < 600 && landings < 3; ++i) {
+    const double gap = run.position("Ball").y() - 0.5, before = run.velocity("Ball").y();
+    run.steps(1);
+    const double after = run.velocity("Ball").y();
+    if (before >= 0.0 || after <= before) continue;
+    ++landings;
+    const double arrival = std::sqrt(before * before + 2.0 * 9.81 * gap);
+    ASSERT_NEAR(after, 0.8 * arrival, 1e-12 * arrival);
+    ASSERT_NEAR(run.position("Ball").y(), 0.5, 1e-12);
+  }
+  EXPECT_EQ(landings, 3);
+}
+
+// Torque over moment, then the motor's speed: a disc of 12 kg and 0.5 m has 1.5 kg m^2.
+TEST(PythonSolver, DrivesAMotorWithItsTorqueUpToItsSpeed) {
+  MixedRun run = solved_in_python("motor_disc.gravitas");
+  for (int i = 1; i <= 240; ++i) {
+    run.steps(1);
+    ASSERT_NEAR(run.turning("Rotor").y(), std::min(5.0, i * 0.01 * 3.0 / 1.5), 1e-12) << "step " << i;
+  }
+}
+
+struct Both {
+  const char* scene;
+  std::vector<std::string> bodies;
+  std::uint32_t steps;
+};
+
+void PrintTo(const Both& both, std::ostream* out) { *out << both.scene; }
+
+class BothSolvers : public ::testing::TestWithParam<Both> {};
+
+INSTANTIATE_TEST_SUITE_P(Scenes, BothSolvers,
+                         ::testing::Values(Both{"pendulum.gravitas", {"Ball"}, 300},
+                                           Both{"double_pendulum.gravitas", {"Upper", "Lower"}, 200},
+                                           Both{"motor_disc.gravitas", {"Rotor"}, 200},
+                                           Both{"bounce.gravitas", {"Ball"}, 200}),
+                         [](const auto& one) {
+                           const std::string name = one.param.scene;
+                           return name.substr(0, name.find('.'));
+                         });
+
+// The laws have one solution here: whoever solves them, the motion is the same.
+TEST_P(BothSolvers, MoveTheBodiesAlike) {
+  MixedRun python = solved_in_python(GetParam().scene);
+  MixedRun sequential({kScenes + GetParam().scene}, {"Solver=Sequential", "Solver.Iterations=10000"}, Slot::kSolver);
+  python.steps(GetParam().steps);
+  sequential.steps(GetParam().steps);
+  for (const std::string& body : GetParam().bodies) {
+    EXPECT_LE((python.position(body) - sequential.position(body)).norm(), 1e-9) << body;
+    EXPECT_LE((python.velocity(body) - sequential.velocity(body)).norm(), 1e-9) << body;
+  }
+  EXPECT_LE(python.report().max_joint_error(), 1e-5);
+}
+
+TEST(PythonSolver, GivesTheSameBitsAgain) {
+  const std::vector<std::string> overrides = {"Solver=PythonIslands"};
+  EXPECT_EQ(outcome_of(scene("stack.gravitas"), overrides).chain, outcome_of(scene("stack.gravitas"), overrides).chain);
+}
+
+// ---- the kit
+
+class PythonWorker : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Both, PythonWorker, ::testing::Values("force_drag", "solver_islands"),
+                         [](const auto& one) { return std::string(one.param); });
+
+// With a thousand calls, so that a solver in Python does not take a minute for them.
+TEST_P(PythonWorker, ConformsSaysTheKit) {
+  const std::string command = "/usr/bin/python3 " + kFolder + GetParam() + ".py";
+  const Ended check =
+      ended(kPython + " " GRAVITAS_BINARY_DIR "/bin/gravitas check '" + command + "' --quick --calls 1000");
+  EXPECT_EQ(check.code, 0) << check.words;
+}
+
+}  // namespace
+}  // namespace gravitas

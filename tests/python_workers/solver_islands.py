@@ -1,0 +1,513 @@
+#!/usr/bin/python3
+"""A solver in Python: joints by factorisation, contacts by projected Gauss-Seidel, island by island.
+
+    S_n, S*, discrepancies, contacts
+      -> pose change       delta = M^-1 J^T mu      no joint open, no gap negative
+      -> closed contacts   gaps and limits that S* (+) delta leaves at zero
+      -> velocity          v_{n+1} = v* + M^-1 J^T lambda
+      -> pose change again, with theta h M^-1 J^T lambda of friction, drives and springs
+
+The laws are those of schemas/gravitas/stage/v1/solver.proto. Bodies that no joint or contact joins are solved apart,
+and do not know of each other. Restitution that would make an island gain energy is dropped for that island. Every
+island is a dense problem: a pile of hundreds of bodies is not what this is for.
+"""
+
+import numpy
+
+from complementarity import EPSILON, STILLNESS, Contact, Laws, Rows, apply, cross, dot, solve
+from gravitas_worker import KINEMATIC, MOVABLE, NONE, Property, Refusal, Solver, check_finite, check_indices, main
+from surface import perturbed_normal
+
+NOTHING_TO_DO, CONVERGED, ITERATIONS = 0, 1, 2
+FREE, LOCKED, LIMITED, UNILATERAL, FRICTION, DRIVEN = range(6)
+ANGULAR = 1 << 12
+UNLIMITED = numpy.finfo(float).max
+
+
+class Islands(Solver):
+    name = "PythonIslands"
+    version = "1.0"
+    meaning = "Joints by factorisation, contacts by projected Gauss-Seidel, island by island."
+    properties = [
+        Property.integer("Iterations", at_least=1, at_most=100000, default=500, live=True,
+                         meaning="Largest number of sweeps of one problem; fewer where it converges."),
+        Property.number("CorrectionFactor", "1", at_least=0.0, at_most=1.0, default=1.0, live=True,
+                        meaning="Share of the joint error and overlap of the step before that a step removes."),
+    ]
+
+    def __init__(self, settings):
+        self._settings = settings
+
+    def solve(self, request, reply, host):
+        check_request(request)
+        scene = Scene(request, self._settings.CorrectionFactor)
+        islands = [Island(scene, *parts, self._settings.Iterations, host) for parts in scene.islands()]
+        try:
+            for island in islands:
+                island.solve()
+        except (OverflowError, numpy.linalg.LinAlgError):
+            raise Refusal("masses, velocities, errors or arms so large that their products are not finite")
+        scene.write(reply)
+        if not (numpy.isfinite(scene.velocity).all() and numpy.isfinite(scene.displacement).all()):
+            raise Refusal("the answer is not finite: masses, velocities or errors overflow")
+        reply.iterations = sum(island.sweeps for island in islands)
+        reply.residual = max((island.residual for island in islands), default=0.0)
+        converged = all(island.converged for island in islands)
+        reply.stop_reason = NOTHING_TO_DO if not islands else CONVERGED if converged else ITERATIONS
+
+
+class Bodies:
+    """The bodies of a request, and the world as one more, which nothing moves."""
+
+    def __init__(self, request):
+        def with_world(column, world):
+            return numpy.concatenate([column, [world]])
+
+        self.count = len(request.flags)
+        origin, identity = numpy.zeros(3), [1.0, 0.0, 0.0, 0.0]
+        flags = with_world(request.flags, 0)
+        self.is_pushed = ((flags & MOVABLE) != 0) & ((flags & KINEMATIC) == 0)
+        self.position = with_world(request.position, origin)
+        self.orientation = with_world(request.orientation, identity)
+        self.trial_position = with_world(request.trial_position, origin)
+        self.trial_orientation = with_world(request.trial_orientation, identity)
+        self.velocity = with_world(numpy.hstack([request.linear_velocity, request.angular_velocity]), numpy.zeros(6))
+        self.trial_velocity = with_world(
+            numpy.hstack([request.trial_linear_velocity, request.trial_angular_velocity]), numpy.zeros(6))
+        self.inverse_mass = numpy.where(self.is_pushed, with_world(request.inverse_mass, 0.0), 0.0)
+        axes = rotation(self.trial_orientation)
+        moments = numpy.where(self.is_pushed[:, None], with_world(request.inverse_inertia, origin), 0.0)
+        scaled = axes * moments[:, None, :]
+        self.inertia = numpy.stack([apply(scaled, axes[:, i]) for i in range(3)], axis=-1)  # inverse, world, at S*
+        turning = (self.inertia[:, 0, 0] + self.inertia[:, 1, 1] + self.inertia[:, 2, 2]) / 3
+        self.gyration = numpy.sqrt(numpy.divide(self.inverse_mass, turning, out=numpy.zeros_like(turning),
+                                                where=turning > 0))
+
+    def carried(self, point, body):
+        """A point that was given in the world at S*, where it is at S_n."""
+        inward = rotation(self.trial_orientation[body]).swapaxes(-1, -2)
+        local = apply(inward, point - self.trial_position[body])
+        return apply(rotation(self.orientation[body]), local) + self.position[body]
+
+    def turn(self, body):
+        """Rotation vector from S_n to S*."""
+        return rotation_vector(product(self.trial_orientation[body], conjugate(self.orientation[body])))
+
+    def moved(self):
+        """Displacement from S_n to S*."""
+        return numpy.hstack([self.trial_position - self.position, self.turn(slice(None))])
+
+    def slop(self, point, body1, body2):
+        """Gap up to which a contact or limit counts as closed: rounding's size."""
+        arm, size = numpy.zeros(len(point)), numpy.abs(point).max(axis=1, initial=0.0)
+        for body in (body1, body2):
+            pushed = self.is_pushed[body]
+            reach = numpy.sqrt(dot(point - self.trial_position[body], point - self.trial_position[body]))
+            arm = numpy.maximum(arm, numpy.where(pushed, reach, 0.0))
+            size = numpy.maximum(size, numpy.where(pushed, numpy.abs(self.trial_position[body]).max(axis=1), 0.0))
+        return 1e-9 * arm + 8 * EPSILON * size
+
+
+class Scene:
+    """Rows and laws of the whole request, and what is answered."""
+
+    def __init__(self, request, correction_factor):
+        self.step, self.theta = request.time_step, request.theta
+        self.bodies = Bodies(request)
+        self.velocity = self.bodies.trial_velocity.copy()
+        self.displacement = numpy.zeros_like(self.velocity)
+        self._set_joints(request, correction_factor)
+        self._set_contacts(request, correction_factor)
+
+    # ---- joints: three rows a discrepancy
+
+    def _set_joints(self, r, correction_factor):
+        bodies, world = self.bodies, self.bodies.count
+        self.joint_body = numpy.where(r.discrepancy_body == NONE, world, r.discrepancy_body).astype(numpy.intp)
+        body1, body2 = self.joint_body[:, 0], self.joint_body[:, 1]
+        middle = 0.5 * (r.point1 + r.point2)
+        axes = rotation(r.axes).swapaxes(-1, -2)  # [row, axis]
+        angular = (r.mode & ANGULAR) != 0
+        error = r.point2 - r.point1
+        turned = error + bodies.turn(body1) - bodies.turn(body2)
+        carried = bodies.carried(r.point2, body2) - bodies.carried(r.point1, body1)
+        start = numpy.where(angular[:, None], turned, carried)
+
+        def along(vectors):
+            return numpy.stack([dot(axes[:, i], vectors) for i in range(3)], axis=-1).reshape(-1)
+
+        self.error_start, self.error_trial, self.desired = along(start), along(error), along(r.velocity)
+        self.mode = numpy.stack([r.mode >> 4 * i & 0xF for i in range(3)], axis=-1).reshape(-1)
+        self.lower, self.upper = r.lower.reshape(-1), r.upper.reshape(-1)
+        self.compliance, self.damping = r.compliance.reshape(-1), r.damping.reshape(-1)
+        self.maximum_force = r.maximum_force.reshape(-1)
+        self.beta = numpy.repeat(correction_factor * r.correction, 3)
+        self.slop = numpy.repeat(numpy.where(angular, 1e-9, bodies.slop(middle, body1, body2)), 3)
+        self.joint_size = numpy.abs(r.point2).max(axis=1, initial=0.0)
+        self.joint_warm = r.discrepancy_warm_impulse.reshape(-1), r.discrepancy_warm_correction.reshape(-1)
+        self.joint_impulse, self.joint_correction = numpy.zeros_like(self.lower), numpy.zeros_like(self.lower)
+
+        flat, one, two = axes.reshape(-1, 3), numpy.repeat(body1, 3), numpy.repeat(body2, 3)
+        linear, turning = numpy.flatnonzero(~numpy.repeat(angular, 3)), numpy.flatnonzero(numpy.repeat(angular, 3))
+        rows = Rows.joined(
+            Rows(bodies, one[linear], two[linear], flat[linear], numpy.repeat(middle, 3, axis=0)[linear]),
+            Rows(bodies, one[turning], two[turning], flat[turning]))
+        self.joint_rows = rows.part(numpy.argsort(numpy.concatenate([linear, turning])))
+
+    def joint_law(self, laws, row, i, after):
+        """Sets the law of joint row i as row `row`: of the pose change, or of the velocity where the pose change
+        leaves the error `after`."""
+        mode, start, trial = self.mode[i], self.error_start[i], self.error_trial[i]
+        lower, upper, h = self.lower[i], self.upper[i], self.step
+        is_held = mode == LOCKED or (mode == LIMITED and lower == upper)
+        is_limit = mode in (LIMITED, UNILATERAL) and not is_held
+        rest = 0.0 if mode in (LOCKED, UNILATERAL) else lower
+        has_lower = mode == UNILATERAL or (mode == LIMITED and lower > -UNLIMITED)
+        has_upper = mode == LIMITED and upper < UNLIMITED
+        is_soft = self.compliance[i] > 0 and (is_held or is_limit)
+        is_pose = after is None
+        if self.maximum_force[i] < UNLIMITED:
+            laws.bound[row] = self.maximum_force[i] * (h * h if is_pose else h)
+        if is_soft and not is_pose:
+            self._set_spring(laws, row, i, is_held, has_lower, has_upper, rest)
+        elif is_pose and is_held and not is_soft:
+            laws.set_equality(row, rest + (1 - self.beta[i]) * (start - rest) - trial)
+        elif is_pose and is_limit and not is_soft:
+            laws.has_lower[row], laws.has_upper[row] = has_lower, has_upper
+            if has_lower:
+                laws.lower[row] = rest + min(0.0, (1 - self.beta[i]) * (start - rest)) - trial
+            if has_upper:
+                laws.upper[row] = upper + max(0.0, (1 - self.beta[i]) * (start - upper)) - trial
+        elif not is_pose and mode in (DRIVEN, FRICTION):
+            laws.set_equality(row, self.desired[i])
+            laws.velocity_only[row] = True
+            if self.damping[i] > 0:
+                laws.gamma[row] = 1 / (h * self.damping[i])
+        elif not is_pose and is_held:
+            laws.set_equality(row, self.desired[i])
+        elif not is_pose and is_limit:
+            laws.has_lower[row] = has_lower and after <= rest + self.slop[i]
+            laws.has_upper[row] = has_upper and after >= upper - self.slop[i]
+            laws.lower[row] = laws.upper[row] = self.desired[i]
+
+    def _set_spring(self, laws, row, i, is_held, has_lower, has_upper, rest):
+        """Spring and damper at the end of the step: implicit Euler."""
+        start, trial = self.error_start[i], self.error_trial[i]
+        softness = self.compliance[i] * self.damping[i] + self.step
+        laws.gamma[row] = self.compliance[i] / (self.step * softness)
+        laws.velocity_only[row] = True
+        if is_held or (has_lower and min(start, trial) < rest):
+            laws.has_lower[row] = True
+            laws.lower[row] = self.desired[i] - (start - rest) / softness
+        if is_held or (has_upper and max(start, trial) > self.upper[i]):
+            limit = rest if is_held else self.upper[i]
+            laws.has_upper[row] = True
+            laws.upper[row] = self.desired[i] - (start - limit) / softness
+
+    # ---- contacts: a gap row, and six rows for velocities
+
+    def _set_contacts(self, r, correction_factor):
+        bodies = self.bodies
+        self.contact_body = r.contact_body.astype(numpy.intp)
+        body1, body2 = self.contact_body[:, 0], self.contact_body[:, 1]
+        normal, point, self.gap = r.contact_normal, r.contact_point, -r.contact_depth
+        self.gap_rows = Rows(bodies, body1, body2, normal, point)
+        to_surface = -0.5 * self.gap[:, None] * normal
+        carried = bodies.carried(point - to_surface, body2) - bodies.carried(point + to_surface, body1)
+        self.gap_law = numpy.minimum(0.0, (1 - correction_factor) * dot(normal, carried)) - self.gap
+        self.gap_slop = bodies.slop(point, body1, body2)
+        self.contact_size = numpy.abs(point).max(axis=1, initial=0.0)
+
+        before = self.gap - self.gap_rows.along(bodies.moved())
+        self.direction, speed = self._impact(r, normal, before)
+        tangent1 = tangent_of(self.direction)
+        self.frame = numpy.stack([self.direction, tangent1, cross(self.direction, tangent1)], axis=1)
+        self.bounce = r.contact_material[:, 0] * speed
+        self.friction = r.contact_material[:, 1:5].copy()  # static, dynamic, rolling, spinning
+        self.friction[:, 0] = numpy.maximum(self.friction[:, 0], self.friction[:, 1])
+        along = [Rows(bodies, body1, body2, self.frame[:, i], point) for i in range(3)]
+        about = [Rows(bodies, body1, body2, self.frame[:, i]) for i in range(3)]
+        order = numpy.arange(6 * len(normal)).reshape(6, -1).T.reshape(-1)
+        self.contact_rows = Rows.joined(*along, *about).part(order)  # row 6 i + k
+        warm = numpy.zeros((len(normal), 6))
+        warm[:, :3] = apply(self.frame, r.contact_warm_impulse)
+        self.contact_warm = warm.reshape(-1), r.contact_warm_correction
+        self.contact_impulse = numpy.zeros((len(normal), 3))
+        self.contact_correction = numpy.zeros(len(normal))
+
+    def _impact(self, r, normal, gap):
+        """Direction of the normal law, and the speed of arrival along it."""
+        bodies = self.bodies
+
+        def arrival(rows):
+            start, trial = rows.along(bodies.velocity), rows.along(bodies.trial_velocity)
+            gained = trial - start
+            square = start * start - 2 * (gained / self.step) * numpy.maximum(0.0, gap)
+            speed = numpy.sqrt(numpy.maximum(0.0, square))
+            rests = ~(trial < 0) | (speed < 2 * numpy.abs(gained))
+            return start, trial, numpy.where(rests, 0.0, speed)
+
+        start, _, speed = arrival(self.gap_rows)
+        spread = r.contact_material[:, 5]
+        if not ((spread > 0) & (speed > 0)).any():
+            return normal.copy(), speed
+        tilted = perturbed_normal(normal, spread, r.contact_key)
+        rows = Rows(bodies, self.gap_rows.body1, self.gap_rows.body2, tilted, r.contact_point)
+        start_across, trial_across, speed_across = arrival(rows)
+        keeps = (trial_across < 0) & ((start_across < 0) == (start < 0))
+        keeps &= (speed_across > 0) & (dot(tilted, normal) > 0)
+        is_tilted = (spread > 0) & (speed > 0) & keeps
+        return numpy.where(is_tilted[:, None], tilted, normal), numpy.where(is_tilted, speed_across, speed)
+
+    # ---- islands
+
+    def islands(self):
+        """(discrepancies, contacts) of each set of bodies that hang together, in the order of its first body."""
+        parent = list(range(self.bodies.count + 1))
+
+        def root(body):
+            while parent[body] != body:
+                parent[body] = parent[parent[body]]
+                body = parent[body]
+            return body
+
+        pairs = [*self.joint_body.tolist(), *self.contact_body.tolist()]
+        pushed = self.bodies.is_pushed
+        for one, two in pairs:
+            if pushed[one] and pushed[two]:
+                first, second = sorted((root(one), root(two)))
+                parent[second] = first
+        found = {}
+        for i, (one, two) in enumerate(pairs):
+            if pushed[one] or pushed[two]:
+                parts = found.setdefault(root(two if pushed[two] else one), ([], []))
+                joints = len(self.joint_body)
+                parts[i >= joints].append(i if i < joints else i - joints)
+        return [found[body] for body in sorted(found)]
+
+    def write(self, reply):
+        count = self.bodies.count
+        reply.linear_velocity, reply.angular_velocity = self.velocity[:count, :3], self.velocity[:count, 3:]
+        reply.pose_change = self.displacement[:count]
+        reply.discrepancy_impulse, reply.discrepancy_correction = self.joint_impulse, self.joint_correction
+        reply.contact_impulse, reply.contact_correction = self.contact_impulse, self.contact_correction
+        reply.contact_direction = self.direction
+
+
+class Island:
+    """The two problems of bodies that hang together."""
+
+    def __init__(self, scene, joints, contacts, iterations, host):
+        self._scene, self._iterations, self._host = scene, iterations, host
+        self._joints = (3 * numpy.array(joints, int)[:, None] + numpy.arange(3)).reshape(-1)
+        self._contacts = numpy.array(contacts, int)
+        self._size = max(scene.joint_size[joints].max(initial=0.0), scene.contact_size[contacts].max(initial=0.0))
+        self._pose_rows = Rows.joined(scene.joint_rows.part(self._joints), scene.gap_rows.part(self._contacts))
+        self._pose_laws = Laws(len(self._pose_rows))
+        for row, i in enumerate(self._joints):
+            scene.joint_law(self._pose_laws, row, i, None)
+        gaps = slice(len(self._joints), None)
+        self._pose_laws.has_lower[gaps] = True
+        self._pose_laws.lower[gaps] = scene.gap_law[self._contacts]
+        self._pose_warm = numpy.concatenate(
+            [scene.joint_warm[1][self._joints], scene.contact_warm[1][self._contacts]])
+        self._closed = numpy.zeros(len(self._contacts), bool)
+        self._sides = numpy.zeros((len(self._joints), 2), bool)
+        self.sweeps, self.residual, self.converged = 0, 0.0, True
+
+    def solve(self):
+        scene = self._scene
+        offset = numpy.zeros_like(scene.displacement)
+        self._solve_pose(offset)
+        self._find_closed(offset)
+        self._solve_velocity()
+        factor = scene.theta * scene.step
+        pushes = self._velocity_only * self._multipliers
+        if factor > 0 and pushes.any():
+            self._velocity_rows.push(factor * pushes, offset)
+            self._solve_pose(offset)
+            if self._find_closed(offset):
+                self._solve_velocity()
+                offset[:] = 0.0
+                self._velocity_rows.push(factor * self._velocity_only * self._multipliers, offset)
+                self._solve_pose(offset)
+        scene.displacement += self._displacement
+        self._velocity_rows.push(self._multipliers, scene.velocity)
+        self._store()
+
+    def _solve_pose(self, offset):
+        rows, laws = self._pose_rows, self._pose_laws
+        violation = float((laws.violation(rows.along(offset)) * rows.length).max(initial=0.0))
+        motion, representable = rows.motion(offset), 0.25 * EPSILON * self._size
+        self._corrections = numpy.zeros(len(rows))
+        if not violation <= max(representable, EPSILON * motion):
+            tolerance = max(representable, STILLNESS * max(violation, motion))
+            self._corrections = self._take(solve(rows, laws, (), offset, self._pose_warm, self._iterations, tolerance,
+                                                 self._host))
+        self._displacement = offset.copy()
+        rows.push(self._corrections, self._displacement)
+
+    def _take(self, outcome):
+        self.sweeps += outcome.sweeps
+        self.residual = outcome.residual
+        self.converged = self.converged and outcome.converged
+        return outcome.multipliers
+
+    def _find_closed(self, offset):
+        """Which contacts and limits the pose change closes, beside those that are closed already; whether any."""
+        scene, count = self._scene, len(self._joints)
+        moved = self._pose_rows.along(self._displacement)
+        closed = scene.gap[self._contacts] + moved[count:] <= scene.gap_slop[self._contacts]
+        laws = Laws(count)
+        for row, i in enumerate(self._joints):
+            scene.joint_law(laws, row, i, scene.error_trial[i] + moved[row])
+        sides = numpy.stack([laws.has_lower, laws.has_upper], axis=1)
+        is_new = bool((closed & ~self._closed).any() or (sides & ~self._sides).any())
+        self._closed |= closed
+        self._sides |= sides
+        laws.has_lower, laws.has_upper = self._sides[:, 0].copy(), self._sides[:, 1].copy()
+        self._joint_laws = laws
+        return is_new
+
+    def _solve_velocity(self):
+        scene, count = self._scene, len(self._joints)
+        contacts, numbers = [], []
+        for contact in self._contacts[self._closed]:
+            static, dynamic, rolling, spinning = scene.friction[contact]
+            contacts.append(Contact(count + len(numbers), scene.bounce[contact], static, dynamic, rolling, spinning))
+            numbers += range(6 * contact, 6 * contact + (6 if contacts[-1].turns() else 3))
+        self._velocity_rows = Rows.joined(scene.joint_rows.part(self._joints), scene.contact_rows.part(numbers))
+        self._velocity_laws = Laws(len(self._velocity_rows))
+        for name, values in self._joint_laws.__dict__.items():
+            self._velocity_laws.__dict__[name][:count] = values
+        self._velocity_contacts = contacts
+        self._velocity_only = self._velocity_laws.velocity_only.copy()
+        for contact in contacts:
+            self._velocity_only[contact.first + 1 : contact.first + (6 if contact.turns() else 3)] = True
+        self._warm = numpy.concatenate([scene.joint_warm[0][self._joints], scene.contact_warm[0][numbers]])
+        self._relax()
+        self._bound_energy()
+
+    def _relax(self):
+        rows, laws, velocity = self._velocity_rows, self._velocity_laws, self._scene.bodies.trial_velocity
+        value = rows.along(velocity)
+        missing = [contact.target - value[contact.first] for contact in self._velocity_contacts]
+        violation = max(float((laws.violation(value) * rows.length).max(initial=0.0)), max(missing, default=0.0))
+        motion = rows.motion(velocity)
+        self._multipliers = numpy.zeros(len(rows))
+        if not violation <= EPSILON * motion:
+            self._multipliers = self._take(solve(rows, laws, self._velocity_contacts, velocity, self._warm,
+                                                 self._iterations, STILLNESS * max(violation, motion), self._host))
+
+    def _bound_energy(self):
+        """What joints and contacts do to the island's energy must not be positive; drives and springs may be."""
+        if any(contact.target > 0 for contact in self._velocity_contacts) and self._gain()[0] > 0:
+            for contact in self._velocity_contacts:
+                contact.target, contact.slides = 0.0, False
+            self._relax()
+        gain, along = self._gain()
+        is_driven = (self._velocity_laws.velocity_only & (self._multipliers != 0)).any()
+        if gain > 0 and not self.converged and not is_driven:
+            # a share f of all impulses gains f L + f^2 (W - L)
+            self._multipliers *= max(0.0, -along / (gain - along))
+
+    def _gain(self):
+        """Work of the impulses, zero where it is rounding, and what it would be at the velocities before."""
+        velocity = self._scene.bodies.trial_velocity.copy()
+        before = self._velocity_rows.along(velocity)
+        self._velocity_rows.push(self._multipliers, velocity)
+        after = self._velocity_rows.along(velocity)
+        acting = numpy.where(self._velocity_laws.velocity_only, 0.0, self._multipliers)
+        work = float((0.5 * acting * (before + after)).sum())
+        size = float((0.5 * numpy.abs(acting) * (numpy.abs(before) + numpy.abs(after))).sum())
+        return (work if work > 1e-13 * size else 0.0), float((acting * before).sum())
+
+    def _store(self):
+        scene, count = self._scene, len(self._joints)
+        scene.joint_correction[self._joints] = self._corrections[:count]
+        scene.contact_correction[self._contacts] = self._corrections[count:]
+        scene.joint_impulse[self._joints] = self._multipliers[:count]
+        for contact, number in zip(self._velocity_contacts, self._contacts[self._closed]):
+            impulse = self._multipliers[contact.first : contact.first + 3, None]
+            frame = scene.frame[number]
+            scene.contact_impulse[number] = (impulse[0] * frame[0] + impulse[1] * frame[1]) + impulse[2] * frame[2]
+
+
+def check_request(r):
+    """Refuses what cannot be computed with, column by column."""
+    bodies, least = len(r.flags), {}
+    if not (0 < r.time_step < numpy.inf):
+        raise Refusal(f"time_step is {r.time_step:g}; allowed: finite, above 0")
+    if not 0 <= r.theta <= 1:
+        raise Refusal(f"theta is {r.theta:g}; allowed: 0 to 1")
+    for name in ("inverse_mass", "inverse_inertia", "compliance", "damping", "maximum_force", "contact_material"):
+        least[name] = 0.0
+    for name, column in vars(r).items():
+        if not isinstance(column, numpy.ndarray) or column.dtype.kind != "f":
+            continue
+        check_finite(name, column)
+        check_range(name, column, least.get(name, -numpy.inf), numpy.inf)
+    check_range("correction", r.correction, 0.0, 1.0)
+    check_range("contact_material", r.contact_material[:, 0], 0.0, 1.0)
+    for name in ("orientation", "trial_orientation", "axes", "contact_normal"):
+        column = getattr(r, name)
+        check_range(f"{name} (its norm)", numpy.sqrt((column * column).sum(axis=1)), 1 - 1e-6, 1 + 1e-6)
+    check_indices("discrepancy_body", r.discrepancy_body, bodies, none_allowed=True)
+    check_indices("contact_body", r.contact_body, bodies)
+    for name in ("discrepancy_body", "contact_body"):
+        pairs = getattr(r, name)
+        if (pairs[:, 0] == pairs[:, 1]).any():
+            raise Refusal(f"column {name}: a body is paired with itself")
+    modes = numpy.stack([r.mode >> 4 * i & 0xF for i in range(3)], axis=-1)
+    if (modes > DRIVEN).any() or (r.mode >= 2 * ANGULAR).any():
+        raise Refusal("column mode: a mode that does not exist")
+    if ((modes == LIMITED) & (r.lower > r.upper)).any():
+        raise Refusal("column lower: above upper")
+
+
+def check_range(name, column, low, high):
+    bad = ~((column >= low) & (column <= high))
+    if bad.any():
+        row = int(numpy.argwhere(bad)[0][0])
+        raise Refusal(f"column {name}, row {row}: {float(column[bad][0]):g}; allowed: {low:g} to {high:g}")
+
+
+# ---- rotations, as rows (w, x, y, z)
+
+
+def rotation(q):
+    """Matrices."""
+    w, x, y, z = (q[..., i] for i in range(4))
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+    return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def conjugate(q):
+    return q * numpy.array([1.0, -1.0, -1.0, -1.0])
+
+
+def product(p, q):
+    scalar = p[..., 0] * q[..., 0] - dot(p[..., 1:], q[..., 1:])
+    vector = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + cross(p[..., 1:], q[..., 1:])
+    return numpy.concatenate([scalar[..., None], vector], axis=-1)
+
+
+def rotation_vector(q):
+    """Along the shorter arc."""
+    q = numpy.where(q[..., :1] < 0, -q, q)
+    sine = numpy.sqrt(dot(q[..., 1:], q[..., 1:]))
+    angle = 2 * numpy.arctan2(sine, q[..., 0])
+    return q[..., 1:] * numpy.where(sine > 0, angle / numpy.where(sine > 0, sine, 1.0), 2.0)[..., None]
+
+
+def tangent_of(normal):
+    """A unit vector across each: away from the smallest component."""
+    axis = numpy.eye(3)[numpy.abs(normal).argmin(axis=1)] if len(normal) else normal
+    across = cross(normal, axis)
+    return across / numpy.sqrt(dot(across, across))[:, None]
+
+
+if __name__ == "__main__":
+    main(Islands)

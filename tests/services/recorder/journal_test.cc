@@ -1,0 +1,147 @@
+// The journal: what is read back, what a tear or an edit costs, whose it is.
+#include "services/recorder/journal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "services/recorder/durable_file.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ScratchFolder;
+
+const kernel::Hash kRun{11, 22};
+constexpr std::size_t kHeader = 40, kRecord = 36;
+
+JournalEntry entry(std::uint32_t step) { return {step, {step * 1000003ULL, ~std::uint64_t{step}}}; }
+
+void write_steps(const std::string& path, const JournalReading& known, std::uint32_t first, std::uint32_t last) {
+  JournalWriter writer(path, kRun, known);
+  for (std::uint32_t step = first; step <= last; ++step) writer.append(entry(step));
+  writer.flush();
+}
+
+std::vector<std::uint32_t> steps_of(const JournalReading& reading) {
+  std::vector<std::uint32_t> steps;
+  for (const JournalEntry& one : reading.commits) {
+    EXPECT_EQ(one.chain, entry(one.step).chain);
+    steps.push_back(one.step);
+  }
+  return steps;
+}
+
+std::vector<std::uint32_t> range(std::uint32_t first, std::uint32_t last) {
+  std::vector<std::uint32_t> steps;
+  for (std::uint32_t step = first; step <= last; ++step) steps.push_back(step);
+  return steps;
+}
+
+TEST(Journal, GivesBackTheStepsBeyondTheOneThatIsKnown) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 20);
+  const std::vector<std::byte> bytes = read_whole_file(path);
+  EXPECT_EQ(bytes.size(), kHeader + 20 * kRecord);
+  EXPECT_EQ(steps_of(read_journal(bytes, kRun, 0)), range(1, 20));
+  EXPECT_EQ(steps_of(read_journal(bytes, kRun, 12)), range(13, 20));
+  EXPECT_TRUE(steps_of(read_journal(bytes, kRun, 20)).empty());
+  const JournalReading reading = read_journal(bytes, kRun, 20);
+  EXPECT_EQ(reading.last_step, 20U);
+  EXPECT_EQ(reading.end, bytes.size());
+  EXPECT_EQ(reading.note, "");
+}
+
+TEST(Journal, GoesOnBehindWhatWasReadWithoutRepeatingIt) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 10);
+  // resumed at step 6: 7 to 10 are made again, 11 is new
+  write_steps(path, read_journal(read_whole_file(path), kRun, 6), 7, 12);
+  EXPECT_EQ(steps_of(read_journal(read_whole_file(path), kRun, 0)), range(1, 12));
+}
+
+TEST(Journal, ATornTailIsLeftAsideAndOverwritten) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 10);
+  const std::vector<std::byte> whole = read_whole_file(path);
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const JournalReading reading = read_journal(std::span(whole).first(size), kRun, 0);
+    const std::size_t records = size < kHeader ? 0 : (size - kHeader) / kRecord;
+    ASSERT_EQ(reading.commits.size(), records) << size;
+    ASSERT_EQ(reading.note.empty(), size >= kHeader && (size - kHeader) % kRecord == 0) << size;
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(whole.data()), static_cast<std::streamsize>(size));
+    write_steps(path, reading, static_cast<std::uint32_t>(records) + 1, 10);
+    ASSERT_EQ(read_whole_file(path), whole) << size;
+  }
+}
+
+TEST(Journal, NoFlippedBitPasses) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 4);
+  std::vector<std::byte> bytes = read_whole_file(path);
+  for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    const std::byte mask{static_cast<unsigned char>(1U << bit % 8)};
+    bytes[bit / 8] ^= mask;
+    const JournalReading reading = read_journal(bytes, kRun, 0);
+    const std::size_t sound = bit / 8 < kHeader ? 0 : (bit / 8 - kHeader) / kRecord;
+    EXPECT_EQ(steps_of(reading), range(1, static_cast<std::uint32_t>(sound))) << bit;
+    EXPECT_NE(reading.note, "") << bit;
+    bytes[bit / 8] ^= mask;
+  }
+}
+
+TEST(Journal, RecordsCannotBeExchangedOrRepeated) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 4);
+  std::vector<std::byte> bytes = read_whole_file(path);
+  const auto record = [&](std::size_t i) { return bytes.begin() + static_cast<std::ptrdiff_t>(kHeader + i * kRecord); };
+  std::vector<std::byte> cut = bytes;
+  cut.erase(cut.begin() + kHeader + kRecord, cut.begin() + kHeader + 2 * kRecord);
+  EXPECT_EQ(steps_of(read_journal(cut, kRun, 0)), range(1, 1));
+  std::swap_ranges(record(1), record(2), record(2));
+  EXPECT_EQ(steps_of(read_journal(bytes, kRun, 0)), range(1, 1));
+}
+
+TEST(Journal, ThatOfAnotherRunIsNone) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 4);
+  const JournalReading reading = read_journal(read_whole_file(path), {11, 23}, 0);
+  EXPECT_TRUE(reading.commits.empty());
+  EXPECT_EQ(reading.end, 0U);
+  EXPECT_THAT(reading.note, HasSubstr("another scene or build"));
+}
+
+TEST(Journal, IsWrittenByOneRunAtATime) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  const JournalWriter first(path, kRun, {});
+  try {
+    const JournalWriter second(path, kRun, {});
+    FAIL() << "two writers";
+  } catch (const std::runtime_error& problem) {
+    EXPECT_THAT(problem.what(), HasSubstr("another run is writing it"));
+  }
+}
+
+TEST(Journal, WhatCannotBeWrittenIsSaid) {
+  const ScratchFolder folder;
+  EXPECT_THROW(JournalWriter(folder.path("none/j"), kRun, {}), std::system_error);
+}
+
+}  // namespace
+}  // namespace gravitas

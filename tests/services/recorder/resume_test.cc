@@ -1,0 +1,287 @@
+// Runs that stop and go on: the chain is that of the run that never stopped, in any hosting, and the report too.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "services/recorder/checkpoint.h"
+#include "services/recorder/durable_file.h"
+#include "services/recorder/identity.h"
+#include "services/recorder/journal.h"
+#include "services/recorder/recorder.h"
+#include "services/run/session.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Hosting;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::ScratchFolder;
+
+struct Case {
+  const char* scene;
+  std::uint32_t steps, stop;
+};
+
+void PrintTo(const Case& one, std::ostream* out) { *out << one.scene; }
+
+RunOptions options_of(const std::string& scene, Hosting hosting, std::uint32_t steps) {
+  RunOptions options;
+  options.scenes = {scene.starts_with('/') ? scene : testing::shipped_scene(scene)};
+  options.hosting = {{std::nullopt, hosting}};
+  options.steps = steps;
+  return options;
+}
+
+RunResult run_quietly(const RunOptions& options) {
+  return run(
+      options, [] { return false; }, [](const Progress&) {});
+}
+
+const std::string kCallbacks = GRAVITAS_SOURCE_DIR "/tests/determinism/callbacks.gravitas";
+const std::string kPile = GRAVITAS_SOURCE_DIR "/tests/determinism/pile.gravitas";
+
+class Resume : public ::testing::TestWithParam<Case> {};
+
+INSTANTIATE_TEST_SUITE_P(Scene, Resume,
+                         ::testing::Values(Case{"bounce", 240, 100}, Case{"double_pendulum", 240, 77},
+                                           Case{"pendulum", 200, 100}, Case{"sliding_boxes", 240, 120},
+                                           Case{"slope", 200, 50}, Case{"stack", 300, 251}, Case{"thruster", 200, 99},
+                                           Case{"two_spheres_motor", 300, 130}, Case{kCallbacks.c_str(), 120, 60},
+                                           Case{kPile.c_str(), 120, 64}),
+                         [](const auto& which) {
+                           const std::string path = which.param.scene;
+                           const std::size_t slash = path.rfind('/');
+                           return slash == std::string::npos ? path
+                                                             : path.substr(slash + 1, path.rfind('.') - slash - 1);
+                         });
+
+TEST_P(Resume, EndsWithTheChainAndTheReportOfTheRunThatNeverStopped) {
+  const auto [scene, steps, stop] = GetParam();
+  const ScratchFolder folder;
+  const RunResult whole = run_quietly(options_of(scene, Hosting::kDirect, steps));
+  for (const auto& [first, second] : {std::pair{Hosting::kDirect, Hosting::kDirect},
+                                      {Hosting::kDirect, Hosting::kSharedMemory},
+                                      {Hosting::kSharedMemory, Hosting::kDirect}}) {
+    RunOptions part = options_of(scene, first, stop);
+    part.checkpoint = folder.path("checkpoint");
+    part.checkpoint_every = 25;
+    const RunResult stopped = run_quietly(part);
+    ASSERT_EQ(stopped.outcome, RunOutcome::kCompleted) << stopped.fault;
+    EXPECT_EQ(stopped.checkpoint_step, stop);
+    RunOptions rest = options_of(scene, second, steps);
+    rest.resume = part.checkpoint;
+    const RunResult resumed = run_quietly(rest);
+    ASSERT_EQ(resumed.outcome, RunOutcome::kCompleted) << resumed.fault;
+    EXPECT_EQ(resumed.report.steps(), steps);
+    EXPECT_EQ(resumed.report.chain_hash(), whole.report.chain_hash());
+    EXPECT_EQ(resumed.report.state_hash(), whole.report.state_hash());
+    // the report counts from t = 0
+    EXPECT_EQ(resumed.report.energy().initial(), whole.report.energy().initial());
+    EXPECT_EQ(resumed.report.energy().final(), whole.report.energy().final());
+    EXPECT_EQ(resumed.report.energy().max_relative_drift(), whole.report.energy().max_relative_drift());
+    EXPECT_EQ(resumed.report.max_penetration(), whole.report.max_penetration());
+    EXPECT_EQ(resumed.report.max_joint_error(), whole.report.max_joint_error());
+    EXPECT_EQ(resumed.report.simulated_seconds(), whole.report.simulated_seconds());
+    EXPECT_EQ(resumed.report.events().DebugString(), whole.report.events().DebugString());
+    EXPECT_EQ(resumed.report.angular_momentum().DebugString(), whole.report.angular_momentum().DebugString());
+  }
+}
+
+// A run of the sample that ended at step 200 with checkpoints every 60 steps: the last one whose state is older than
+// the journal's end stands for what a kill leaves.
+class Killed : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    RunOptions options = options_of("two_spheres_motor", Hosting::kDirect, 120);
+    options.checkpoint = path_;
+    ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
+    const std::vector<std::byte> early = read_whole_file(path_);
+    options = options_of("two_spheres_motor", Hosting::kDirect, 200);
+    options.checkpoint = options.resume = path_;
+    ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
+    replace_file(path_, early);
+  }
+
+  RunOptions go_on() const {
+    RunOptions options = options_of("two_spheres_motor", Hosting::kDirect, 250);
+    options.checkpoint = options.resume = path_;
+    return options;
+  }
+
+  kernel::Hash run_identity() const {
+    std::vector<std::string> warnings;
+    return digest_of(identity_of(load(go_on(), &warnings)));
+  }
+
+  const ScratchFolder folder_;
+  const std::string path_ = folder_.path("checkpoint"), journal_ = journal_of(path_);
+};
+
+TEST_F(Killed, TheStepsThatTheJournalKnowsAreComparedAndNotRepeatedInIt) {
+  const JournalReading before = read_journal(read_whole_file(journal_), run_identity(), 120);
+  ASSERT_EQ(before.commits.size(), 80U);
+  const RunResult result = run_quietly(go_on());
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  EXPECT_EQ(result.report.chain_hash(),
+            run_quietly(options_of("two_spheres_motor", Hosting::kDirect, 250)).report.chain_hash());
+  const JournalReading after = read_journal(read_whole_file(journal_), run_identity(), 0);
+  EXPECT_EQ(after.note, "");
+  ASSERT_EQ(after.commits.size(), 250U);
+  for (std::uint32_t i = 0; i < 250; ++i) EXPECT_EQ(after.commits[i].step, i + 1);
+  EXPECT_EQ(after.commits.back().chain.text(), result.report.chain_hash());
+}
+
+TEST_F(Killed, AStepThatComesOutDifferentlyEndsTheRunAndKeepsTheCheckpoint) {
+  // a journal of this very run that knows another chain at step 170
+  JournalReading known = read_journal(read_whole_file(journal_), run_identity(), 0);
+  {
+    JournalWriter writer(journal_, run_identity(), {});
+    for (JournalEntry& entry : known.commits) {
+      if (entry.step == 170) entry.chain.low ^= 1;
+      writer.append(entry);
+    }
+    writer.flush();
+  }
+  const std::vector<std::byte> checkpoint = read_whole_file(path_);
+  RunOptions options = go_on();
+  options.checkpoint.clear();
+  const RunResult result = run_quietly(options);
+  EXPECT_EQ(result.outcome, RunOutcome::kFailed);
+  EXPECT_THAT(result.fault, HasSubstr("step 170 came out differently"));
+  EXPECT_THAT(result.fault, HasSubstr(known.commits[169].chain.text()));
+  EXPECT_THAT(result.fault, HasSubstr(result.report.chain_hash()));
+  EXPECT_EQ(result.report.outcome(), "failed");
+  EXPECT_EQ(read_whole_file(path_), checkpoint);
+}
+
+TEST_F(Killed, ATornJournalIsUsedAsFarAsItGoes) {
+  std::vector<std::byte> bytes = read_whole_file(journal_);
+  bytes.resize(bytes.size() - 500);
+  replace_file(journal_, bytes);
+  const RunResult result = run_quietly(go_on());
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("are no whole record")));
+  EXPECT_EQ(read_journal(read_whole_file(journal_), run_identity(), 0).commits.size(), 250U);
+}
+
+TEST_F(Killed, AForeignJournalIsLeftAsideWithAWarning) {
+  std::ofstream(journal_) << "something else, long enough to be a header of a journal that it is not";
+  const RunResult result = run_quietly(go_on());
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("not a journal that this build reads")));
+}
+
+TEST_F(Killed, AtItsEndARunIsDoneAtOnce) {
+  RunOptions options = options_of("two_spheres_motor", Hosting::kDirect, 120);
+  options.resume = path_;
+  const RunResult result = run_quietly(options);
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted);
+  EXPECT_EQ(result.report.steps(), 120U);
+  EXPECT_EQ(result.report.microseconds_per_step().max(), 0.0);
+  EXPECT_EQ(result.report.chain_hash(),
+            run_quietly(options_of("two_spheres_motor", Hosting::kDirect, 120)).report.chain_hash());
+}
+
+TEST_F(Killed, ATrajectoryBeginsWithTheResumedState) {
+  RunOptions options = go_on();
+  options.trajectory = folder_.path("motion.csv");
+  ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
+  std::istringstream text(testing::read_file(options.trajectory));
+  std::string header, first;
+  std::getline(text, header), std::getline(text, first);
+  EXPECT_EQ(std::stod(first), 120 * (1.0 / 60.0));
+}
+
+TEST(Recorder, AShortenedLastStepReplacesNoCheckpointThatGoesFurther) {
+  const ScratchFolder folder;
+  RunOptions options = options_of("two_spheres_motor", Hosting::kDirect, 0);
+  options.steps.reset();
+  options.duration = 100.4 / 60.0;
+  options.checkpoint = folder.path("checkpoint");
+  options.checkpoint_every = 10;
+  const RunResult result = run_quietly(options);
+  EXPECT_EQ(result.report.steps(), 101U);
+  EXPECT_EQ(result.checkpoint_step, 100U);
+  RunOptions further = options_of("two_spheres_motor", Hosting::kDirect, 150);
+  further.resume = options.checkpoint;
+  EXPECT_EQ(run_quietly(further).report.chain_hash(),
+            run_quietly(options_of("two_spheres_motor", Hosting::kDirect, 150)).report.chain_hash());
+}
+
+// A limit on the size of files stands for a disk that fills up: set after a step, lifted at the end.
+class FullDisk : public ::testing::Test {
+ protected:
+  FullDisk() : handler_(signal(SIGXFSZ, SIG_IGN)) { getrlimit(RLIMIT_FSIZE, &before_); }
+  ~FullDisk() override {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    signal(SIGXFSZ, handler_);
+  }
+
+  // Runs a pile with a checkpoint every 50 steps, and files limited to `size` bytes from step 60 on.
+  RunResult run_into_limit(rlim_t size) {
+    RunOptions options = options_of(kPile, Hosting::kDirect, 120);
+    options.checkpoint = path_;
+    options.checkpoint_every = 50;
+    RunResult result = run(
+        options, [] { return false; },
+        [&](const Progress& now) {
+          const rlimit small = {size, before_.rlim_max};
+          if (now.step == 60) setrlimit(RLIMIT_FSIZE, &small);
+        });
+    setrlimit(RLIMIT_FSIZE, &before_);
+    return result;
+  }
+
+  void expect_the_checkpoint_of_step_50_resumes() const {
+    RunOptions rest = options_of(kPile, Hosting::kDirect, 120);
+    rest.resume = path_;
+    const RunResult result = run_quietly(rest);
+    EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    EXPECT_EQ(result.report.chain_hash(), run_quietly(options_of(kPile, Hosting::kDirect, 120)).report.chain_hash());
+  }
+
+  const ScratchFolder folder_;
+  const std::string path_ = folder_.path("checkpoint");
+
+ private:
+  rlimit before_ = {};
+  sighandler_t handler_;
+};
+
+TEST_F(FullDisk, UnderACheckpointStopsTheRunAtThatCommitAndKeepsTheOneBefore) {
+  // between the journal of a hundred steps, 3640 bytes, and a checkpoint of thirty bodies
+  constexpr rlim_t kLimit = 5000;
+  const RunResult result = run_into_limit(kLimit);
+  ASSERT_GT(read_whole_file(path_).size(), kLimit);
+  EXPECT_EQ(result.outcome, RunOutcome::kFailed);
+  EXPECT_EQ(result.report.steps(), 100U);
+  EXPECT_EQ(result.fault, "checkpoint '" + path_ + "': File too large");
+  EXPECT_EQ(result.checkpoint, path_);
+  EXPECT_EQ(result.checkpoint_step, 50U);
+  expect_the_checkpoint_of_step_50_resumes();
+}
+
+TEST_F(FullDisk, UnderTheJournalStopsTheRunAndKeepsTheCheckpoint) {
+  const RunResult result = run_into_limit(1000);
+  EXPECT_EQ(result.outcome, RunOutcome::kFailed);
+  EXPECT_THAT(result.fault, HasSubstr("journal '" + journal_of(path_) + "': File too large"));
+  EXPECT_GE(result.report.steps(), 60U);
+  EXPECT_LE(result.report.steps(), 100U);
+  expect_the_checkpoint_of_step_50_resumes();
+}
+
+TEST(Recorder, ARunWithoutCheckpointsWritesNoFile) {
+  const ScratchFolder folder;
+  const RunResult result = run_quietly(options_of("bounce", Hosting::kDirect, 10));
+  EXPECT_EQ(result.checkpoint, "");
+}
+
+}  // namespace
+}  // namespace gravitas
