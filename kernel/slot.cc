@@ -1,6 +1,7 @@
 #include "kernel/slot.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace gravitas::kernel {
@@ -86,6 +87,21 @@ std::vector<PlannedSlot> StageSlot::hosts() const {
   return planned;
 }
 
+void StageSlot::make_room(std::span<const ColumnId> columns, Arena* arena) {
+  // what is only wanted holds nothing yet that could be copied when the arena moves
+  std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> wanted;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    wanted[i] = arena->count(columns[i]);
+    arena->set_count(columns[i], 0);
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (wanted[i] > kLargestColumn)
+      throw StageFault(FaultKind::kBadStructure, "structure",
+                       "it asks for room for " + std::to_string(wanted[i]) + " numbers in one column");
+    if (wanted[i] > arena->capacity(columns[i])) arena->grow(columns[i], wanted[i]);
+  }
+}
+
 Untrusted<StageCall> StageSlot::ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
                                     CallTimes* times) {
   const Route route = routes_[call.target];
@@ -101,15 +117,7 @@ Untrusted<StageCall> StageSlot::ask(const StageCall& call, Arena* arena, Derivat
         throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
       if (result.status != GRAVITAS_NEEDS_CAPACITY)
         throw StageFault(FaultKind::kFailure, "status", "it failed: " + result.text);
-      for (const ColumnId column : call.reply) {
-        const std::uint64_t wanted = arena->count(column);
-        if (wanted <= arena->capacity(column)) continue;
-        if (wanted > kLargestColumn)
-          throw StageFault(FaultKind::kBadStructure, "structure",
-                           "it asks for room for " + std::to_string(wanted) + " numbers in one column");
-        arena->set_count(column, 0);
-        arena->grow(column, wanted);
-      }
+      make_room(call.reply, arena);
     }
     throw StageFault(FaultKind::kBadStructure, "structure", "it asks for more room again and again");
   } catch (StageFault& fault) {

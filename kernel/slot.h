@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
 #include "kernel/carrier/carrier.h"
@@ -55,6 +56,8 @@ class StageSlot {
     std::uint32_t target;
   };
   void assign_hosts();
+  // Makes room for as much as the columns' counts say, and leaves them empty.
+  static void make_room(std::span<const ColumnId> columns, Arena* arena);
   [[noreturn]] void fail(StageFault fault, const Host& host) const;
 
   std::vector<Host> hosts_;

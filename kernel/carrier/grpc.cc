@@ -14,7 +14,7 @@
 #include "kernel/carrier/carrier.h"
 #include "kernel/carrier/worker_link.h"
 #include "plugin_sdk/channel/mailbox.h"
-#include "schemas/wire/columns.h"
+#include "schemas/wire/byte_buffer.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -72,27 +72,6 @@ class GrpcCarrier final : public Carrier {
   std::array<std::unique_ptr<Stream>, stage::kMethodCount> streams_;
   std::set<std::uint64_t> sent_assets_;
 };
-
-// The bytes of a message: columns, header, and a derivative's columns.
-grpc::ByteBuffer message_of(std::span<const stage::ColumnInfo> infos, std::span<const gravitas_column> columns,
-                            const stage::v1::Call& header, std::span<const gravitas_column> derivative) {
-  const std::size_t header_size = header.ByteSizeLong();
-  const std::size_t derivative_size = derivative.empty() ? 0 : wire::columns_size(kDerivative.reply, derivative);
-  std::size_t size =
-      wire::columns_size(infos, columns) + wire::submessage_head_size(wire::kHeader, header_size) + header_size;
-  if (!derivative.empty()) size += wire::submessage_head_size(wire::kDerivative, derivative_size) + derivative_size;
-
-  grpc_slice raw = grpc_slice_malloc(size);
-  std::uint8_t* out = wire::write_columns(infos, columns, GRPC_SLICE_START_PTR(raw));
-  out = wire::write_submessage_head(wire::kHeader, header_size, out);
-  out = header.SerializeWithCachedSizesToArray(out);
-  if (!derivative.empty()) {
-    out = wire::write_submessage_head(wire::kDerivative, derivative_size, out);
-    wire::write_columns(kDerivative.reply, derivative, out);
-  }
-  const grpc::Slice slice(raw, grpc::Slice::STEAL_REF);
-  return grpc::ByteBuffer(&slice, 1);
-}
 
 grpc::ByteBuffer message_of(const stage::v1::AssetChunk& chunk) {
   const std::size_t chunk_size = chunk.ByteSizeLong();
@@ -198,16 +177,15 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   header.set_digest(wire::columns_digest(method.request, request));
   Stream& stream = stream_of(method, &patience);
   send_assets(&stream, method, request, &header, &patience);
-  write(&stream, message_of(method.request, request, header, {}), &patience);
+  write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
 
   for (;;) {
     grpc::ByteBuffer message;
     stream.io->Read(&message, &stream);
     wait(&patience);
-    grpc::Slice slice;
-    message.DumpToSingleSlice(&slice);
+    const wire::FlatMessage flat(message);
     wire::ColumnsReader reader(method.reply);
-    const std::string problem = reader.parse(std::as_bytes(std::span(slice.begin(), slice.size())));
+    const std::string problem = reader.parse(flat.bytes());
     Outcome outcome;
     if (!problem.empty()) report_bad_frame("a wrong message: " + problem);
     if (!reader.header().has ||
@@ -270,7 +248,7 @@ void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& rea
   derivatives->evaluate();
   const ColumnId wrench = derivatives->wrench_column();
   const std::array<gravitas_column, 1> answer = {gravitas_column{arena->data(wrench), arena->count(wrench)}};
-  write(stream, message_of({}, {}, header, answer), patience);
+  write(stream, wire::to_byte_buffer({{}, {}, &header, kDerivative.reply, answer}), patience);
 }
 
 class PendingWorker final : public PendingCarrier {

@@ -1,6 +1,5 @@
 #include "plugin_sdk/host/stream_loop.h"
 
-#include <grpcpp/support/byte_buffer.h>
 #include <xxhash.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "plugin_sdk/channel/mailbox.h"
+#include "schemas/wire/byte_buffer.h"
 
 namespace gravitas::host {
 
@@ -28,28 +28,6 @@ constexpr std::uint64_t kMarkNs = 20'000'000;
 constexpr std::uint64_t kFirstRoom = 64;
 
 const MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
-
-// A message of columns and one message beside them.
-grpc::ByteBuffer message_of(std::span<const ColumnInfo> infos, std::span<const gravitas_column> columns,
-                            const google::protobuf::MessageLite& header,
-                            std::span<const gravitas_column> derivative = {}) {
-  const std::size_t header_size = header.ByteSizeLong();
-  const std::size_t derivative_size = derivative.empty() ? 0 : wire::columns_size(kDerivative.request, derivative);
-  std::size_t size =
-      wire::columns_size(infos, columns) + wire::submessage_head_size(wire::kHeader, header_size) + header_size;
-  if (!derivative.empty()) size += wire::submessage_head_size(wire::kDerivative, derivative_size) + derivative_size;
-
-  grpc_slice raw = grpc_slice_malloc(size);
-  std::uint8_t* out = wire::write_columns(infos, columns, GRPC_SLICE_START_PTR(raw));
-  out = wire::write_submessage_head(wire::kHeader, header_size, out);
-  out = header.SerializeWithCachedSizesToArray(out);
-  if (!derivative.empty()) {
-    out = wire::write_submessage_head(wire::kDerivative, derivative_size, out);
-    wire::write_columns(kDerivative.request, derivative, out);
-  }
-  const grpc::Slice slice(raw, grpc::Slice::STEAL_REF);
-  return grpc::ByteBuffer(&slice, 1);
-}
 
 }  // namespace
 
@@ -99,23 +77,22 @@ struct StreamLoop::OpenCall final : CallServices {
     last_mark = now;
     Outcome outcome = head();
     outcome.set_marks(marks);
-    loop->write(stream, message_of({}, {}, outcome));
+    loop->write(stream, wire::to_byte_buffer({{}, {}, &outcome}));
   }
 
   // The plugin's first thread asks; the kernel's next message is the answer.
   std::int32_t derivative(const gravitas_column* asked, gravitas_reply_column* answer) override {
     const std::lock_guard lock(loop->io_);
-    if (!loop->write(stream, message_of({}, {}, head(), std::span(asked, kDerivative.request.size()))))
-      return GRAVITAS_CALLBACK_FAILED;
+    const Outcome outcome = head();
+    const wire::MessageParts message{{}, {}, &outcome, kDerivative.request, {asked, kDerivative.request.size()}};
+    if (!loop->write(stream, wire::to_byte_buffer(message))) return GRAVITAS_CALLBACK_FAILED;
     loop->read(stream);
     while (stream->open && !stream->arrived) loop->pump(kIdleMilliseconds);
     if (!std::exchange(stream->arrived, false)) return GRAVITAS_CALLBACK_FAILED;
 
-    grpc::Slice slice;
-    stream->incoming.DumpToSingleSlice(&slice);
+    const wire::FlatMessage message_bytes(stream->incoming);
     wire::ColumnsReader outer({});
-    if (!outer.parse(std::as_bytes(std::span(slice.begin(), slice.size()))).empty() || !outer.derivative().has)
-      return GRAVITAS_CALLBACK_FAILED;
+    if (!outer.parse(message_bytes.bytes()).empty() || !outer.derivative().has) return GRAVITAS_CALLBACK_FAILED;
     wire::ColumnsReader reader(kDerivative.reply);
     if (!reader.parse(outer.derivative().bytes).empty()) return GRAVITAS_CALLBACK_FAILED;
     for (std::size_t i = 0; i < kDerivative.reply.size(); ++i) {
@@ -279,11 +256,10 @@ std::string StreamLoop::read_request(Stream* stream, const wire::ColumnsReader& 
 }
 
 void StreamLoop::handle(Stream* stream) {
-  grpc::Slice slice;
-  stream->incoming.DumpToSingleSlice(&slice);
+  const wire::FlatMessage message(stream->incoming);
   wire::ColumnsReader reader(stage::method_info(stream->method).request);
   Call call;
-  std::string problem = reader.parse(std::as_bytes(std::span(slice.begin(), slice.size())));
+  std::string problem = reader.parse(message.bytes());
   if (problem.empty() && reader.asset().has) {
     problem = take_asset(reader.asset().bytes);
     if (problem.empty()) {
@@ -333,7 +309,7 @@ void StreamLoop::answer(Stream* stream, const Call& call) {
   outcome.set_compute_nanoseconds(end.compute_ns);
   outcome.set_digest(wire::columns_digest(method.reply, reply));
   const std::lock_guard lock(io_);
-  write(stream, message_of(method.reply, reply, outcome));
+  write(stream, wire::to_byte_buffer({method.reply, reply, &outcome}));
 }
 
 void StreamLoop::write_outcome(Stream* stream, const Call& call, std::int32_t status, const std::string& text) {
@@ -343,7 +319,7 @@ void StreamLoop::write_outcome(Stream* stream, const Call& call, std::int32_t st
   outcome.set_status(static_cast<Outcome::Status>(status));
   outcome.set_text(text);
   const std::lock_guard lock(io_);
-  write(stream, message_of({}, {}, outcome));
+  write(stream, wire::to_byte_buffer({{}, {}, &outcome}));
 }
 
 }  // namespace gravitas::host

@@ -88,6 +88,7 @@ const Expected kWrong[] = {
     {"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
     {"integrator_moves_ground", FaultKind::kBadNumbers, "numbers", "immovable body 'body0'"},
     {"integrator_short", FaultKind::kBadStructure, "structure", "position has 1 rows"},
+    {"integrator_long", FaultKind::kBadStructure, "structure", "position has 200000 rows"},
 };
 
 // Where messages have the room they need the worker notices it, elsewhere the kernel.
