@@ -152,6 +152,8 @@ int serve(const Arguments& arguments) {
   const bool listens = !arguments.address.empty();
   if (!listens) prctl(PR_SET_PDEATHSIG, SIGKILL);
   signal(SIGPIPE, SIG_IGN);
+  // a worker that dies of a signal must be seen to: nobody, such as a sanitizer, makes an exit code of it
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) signal(number, SIG_DFL);
 
   std::vector<PluginLibrary> libraries;
   std::vector<plugin::v1::Description> descriptions;
