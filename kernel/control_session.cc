@@ -1,5 +1,7 @@
 #include "kernel/control_session.h"
 
+#include <grpcpp/grpcpp.h>
+
 #include <utility>
 
 #include "plugin_sdk/floating_point.h"

@@ -79,7 +79,7 @@ std::vector<std::string> ControlService::take_complaints() {
 grpc::Status ControlService::Session(grpc::ServerContext*,
                                      grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
   if (taken_.exchange(true)) return {grpc::StatusCode::ALREADY_EXISTS, "this worker has its kernel"};
-  const grpc::Status status = serve_kernel(stream);
+  grpc::Status status = serve_kernel(stream);
   taken_ = false;
   return status;
 }

@@ -51,10 +51,9 @@ struct StreamLoop::Stream {
   std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply{};
 };
 
-std::byte* StreamLoop::Room::data() const {
-  auto address = reinterpret_cast<std::uintptr_t>(bytes.data());
-  address = (address + GRAVITAS_COLUMN_ALIGNMENT - 1) / GRAVITAS_COLUMN_ALIGNMENT * GRAVITAS_COLUMN_ALIGNMENT;
-  return reinterpret_cast<std::byte*>(address);
+std::byte* StreamLoop::Room::data() {
+  const std::uintptr_t beyond = reinterpret_cast<std::uintptr_t>(bytes.data()) % GRAVITAS_COLUMN_ALIGNMENT;
+  return bytes.data() + (beyond == 0 ? 0 : GRAVITAS_COLUMN_ALIGNMENT - beyond);
 }
 
 void* StreamLoop::Room::reserve(std::uint64_t elements) {

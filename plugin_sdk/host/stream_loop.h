@@ -42,7 +42,7 @@ class StreamLoop {
   struct Room {
     std::vector<std::byte> bytes;
     std::uint64_t capacity = 0;
-    std::byte* data() const;
+    std::byte* data();
     void* reserve(std::uint64_t elements);
   };
 
