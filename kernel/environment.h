@@ -213,6 +213,7 @@ class Environment : private DerivativeSource {
   std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};
   std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_, validation_;
   std::uint64_t check_begin_ns_ = 0;  // of the last answer
+  std::uint64_t lap_ns_ = 0;          // the last look at the clock that ended something
   DurationHistogram step_profile_;
 };
 
