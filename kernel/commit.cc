@@ -25,6 +25,8 @@ StepOutcome Environment::step() {
   if (fault_) return StepOutcome::kPaused;
   const std::uint64_t start = lap_ns_ = channel::now_ns();
   try {
+    for (StageSlot* slot : {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_})
+      slot->begin_step(step_count_ + 1);
     if (model_.body_count > 0) {
       run_basic();
     } else {

@@ -16,6 +16,8 @@ using control::v1::WorkerMessage;
 namespace {
 
 constexpr std::chrono::milliseconds kHeartbeat{500};
+// A worker that leaves a heartbeat unanswered for this long hangs as a whole: its threads answer during a call, too.
+constexpr std::chrono::seconds kSilence{2};
 constexpr std::uint32_t kProtocol = 1;
 
 }  // namespace
@@ -117,6 +119,7 @@ void ControlSession::beat() {
     lock.unlock();
     KernelMessage ping;
     ping.mutable_ping()->set_sequence(sequence);
+    unanswered_since_ = std::chrono::steady_clock::now().time_since_epoch().count();
     bool alive = stream_->Write(ping);
     WorkerMessage answer;
     while (alive && !answer.has_pong()) {
@@ -126,6 +129,7 @@ void ControlSession::beat() {
         faults_.push_back(answer.fault().text());
       }
     }
+    unanswered_since_ = alive ? kAnswered : kEnded;
     lock.lock();
     if (!alive) return;
   }
@@ -134,6 +138,12 @@ void ControlSession::beat() {
   KernelMessage drain;
   drain.mutable_drain();
   stream_->Write(drain);
+}
+
+bool ControlSession::answers_heartbeats() const {
+  const std::int64_t since = unanswered_since_;
+  if (since == kAnswered || since == kEnded) return since == kAnswered;
+  return std::chrono::steady_clock::now().time_since_epoch() - std::chrono::nanoseconds(since) < kSilence;
 }
 
 void ControlSession::drain() {

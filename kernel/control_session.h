@@ -1,8 +1,10 @@
 // The kernel's end of the control stream to one worker incarnation: handshake, heartbeat, drain.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -24,6 +26,9 @@ class ControlSession {
 
   const control::v1::Welcome& welcome() const { return welcome_; }
 
+  // False when the last heartbeat has been waiting for its answer for long, or the stream has ended.
+  bool answers_heartbeats() const;
+
   // Asks the worker to finish and exit.
   void drain();
 
@@ -37,12 +42,14 @@ class ControlSession {
   void beat();
   void cancel();
 
+  static constexpr std::int64_t kAnswered = 0, kEnded = 1;
   std::unique_ptr<control::v1::WorkerControl::Stub> stub_;
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReaderWriter<control::v1::KernelMessage, control::v1::WorkerMessage>> stream_;
   control::v1::Welcome welcome_;
 
-  std::mutex mutex_;
+  std::atomic<std::int64_t> unanswered_since_{kAnswered};  // steady clock, ns
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool greeted_ = false;
   bool draining_ = false;

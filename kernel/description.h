@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -33,11 +34,14 @@ struct PluginChoice {
   // `--listen ADDRESS`, or one that listens at this address already and serves all plugins that name it, in order.
   std::string command = {};
   std::string address = {};
+  // What takes over when nothing else helps, with the same types; null: nothing.
+  std::shared_ptr<const PluginChoice> fallback = nullptr;
 };
 
 struct SlotDescription {
   Hosting hosting = Hosting::kSharedMemory;
   double deadline = 2.0;              // s, for one call, counted from the last mark of progress
+  std::uint32_t standbys = 1;         // workers that wait, warm, to take over from one that fails; none if direct
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
 };
 

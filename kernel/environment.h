@@ -5,8 +5,9 @@
 //   while (world.step() == StepOutcome::kCommitted && world.step_count() < world.total_steps()) …
 //
 // step() is a transaction: it works on scratch columns and the second of two states, and swaps the states at
-// the end. If a stage fails, nothing has happened: the outcome is kPaused, fault() says why, and the state is
-// that of the last commit. An environment is used by one thread at a time.
+// the end. A stage that fails is asked again elsewhere (slot_host.h); where that ends, nothing has happened: the outcome
+// is kPaused, fault() says why, and the state is that of the last commit. An environment is used by one thread at a
+// time.
 #pragma once
 
 #include <array>
@@ -29,7 +30,9 @@
 #include "kernel/stage.h"
 #include "kernel/state.h"
 #include "kernel/step_data.h"
+#include "kernel/swap.h"
 #include "kernel/validate.h"
+#include "plugin_sdk/channel/mailbox.h"
 
 namespace gravitas::kernel {
 
@@ -40,26 +43,32 @@ struct StateView {
   std::span<const double> position, orientation, linear_velocity, angular_velocity;
 };
 
-// One failed call, as the report shows it.
-struct FaultRecord {
-  std::uint32_t step;
-  StageFault fault;
-};
-
 class Environment;
 
-// Hears of every commit: a recorder.
+// A request that nobody may be asked again, as it was made.
+struct PoisonedCall {
+  const StageCall& call;
+  const Arena& arena;  // with the columns of the call
+  const PluginChoice& plugin;
+  const StageFault& fault;
+};
+
+// Hears of what a recorder keeps.
 class CommitListener {
  public:
   virtual ~CommitListener() = default;
+  // Others answer from now on; told before the commit that uses them.
+  virtual void on_decision(const Environment&, const Decision&) {}
+  virtual void on_poison(const Environment&, const PoisonedCall&) {}
   // Called at the end of a step, when S_{n+1} is the committed state and its events have been told. What it throws
   // comes out of step(); the commit stands.
   virtual void on_commit(const Environment& environment) = 0;
 };
 
-class Environment : private DerivativeSource {
+class Environment : private DerivativeSource, private SlotObserver {
  public:
-  explicit Environment(EnvironmentDescription description);
+  // `starter` makes the hosts; tests and simulated campaigns bring their own.
+  explicit Environment(EnvironmentDescription description, const HostStarter& starter = start_host);
   ~Environment() override;
   Environment(const Environment&) = delete;
   Environment& operator=(const Environment&) = delete;
@@ -86,8 +95,23 @@ class Environment : private DerivativeSource {
   Hash state_hash() const { return state_hash_; }
   Hash chain_hash() const { return chain_hash_; }
 
-  const Plan& plan() const { return plan_; }
+  // With the processes of now.
+  Plan plan() const;
+  // The failed call that paused this environment.
   const std::optional<FaultRecord>& fault() const { return fault_; }
+  // All failed calls, survived or not, in the order in which they were noticed.
+  const std::vector<FaultRecord>& faults() const { return faults_; }
+
+  // Exchanges a plugin, its settings or its hosting; see swap.h. Throws std::invalid_argument with the reason where that
+  // is impossible: the plan leaves the slot out, or the plugin does not serve what the scene needs of it.
+  void order_swap(SwapOrder order);
+  // Asks a second plugin the same for the rest of the run and compares the answers; swap records show how they differ.
+  void compare(SwapOrder order);
+  std::vector<SwapRecord> swaps() const;
+  // Throws std::invalid_argument if the slot is left out or hosted in this process.
+  void inject(FaultInjection fault);
+  // See StageSlot::set_rerun_every().
+  void set_rerun_every(Slot slot, std::uint32_t calls) { slot_of(slot).set_rerun_every(calls); }
   // What is worth a line in the report and no fault: complaints of workers, direct calls beyond their deadline.
   std::vector<std::string> warnings();
   const DurationHistogram& stage_time(Stage stage) const { return profile_[static_cast<std::size_t>(stage)]; }
@@ -137,8 +161,9 @@ class Environment : private DerivativeSource {
   void finish_commit();
 
   // prepare.cc: what is asked once.
-  void start_slots();
+  void start_slots(const HostStarter& starter);
   void bind_joints();
+  void bind(const ConstraintGroup& group, const Column<double>& position, const Column<double>& orientation);
   void ask_constant_forces();
 
   // restore.cc
@@ -148,27 +173,35 @@ class Environment : private DerivativeSource {
   // forces.cc
   std::span<const ColumnId> trial_columns() const override;
   ColumnId wrench_column() const override { return data_.wrench.id(); }
+  void begin_attempt(bool counts) override;
   void evaluate() override;
   void ask_forces(const std::array<ColumnId, 5>& state_columns);
   void sum_wrenches();
 
-  // Asks a slot and books the time.
-  Untrusted<StageCall> ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives);
+  // exchange.cc: others in a slot.
+  StageSlot& slot_of(Slot slot);
+  std::uint32_t place_of(const SwapOrder& order);
+  void check_fallbacks() const;
+  void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) override;
+  void on_decision(const Decision& decision) override;
+  void on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) override;
+  void bind_again(std::uint32_t target);
 
-  // Books the time since the answer came, and that of the check of its frame.
+  // Books the time of a call, and of the check of its answer, which begins with that of its frame.
+  void book_call(Stage stage, StageSlot* slot, std::uint64_t start, const CallTimes& times);
   void book_check(Stage stage);
 
   // Asks a slot and checks the answer; what the check finds is the fault of the plugin that was asked.
   template <typename Check>
   auto ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives, Check&& check) {
-    const Untrusted<StageCall> answer = ask(stage, slot, call, derivatives);
-    try {
-      const auto checked = check(answer);
-      book_check(stage);
+    // the first stage begins with the step
+    const std::uint64_t start = stage == Stage::kIntegrate ? lap_ns_ : channel::now_ns();
+    return slot->ask(call, &arena_, derivatives, [&](const Untrusted<StageCall>& answer, const CallTimes* times) {
+      if (times != nullptr) book_call(stage, slot, start, *times);
+      auto checked = check(answer);
+      if (times != nullptr) book_check(stage);
       return checked;
-    } catch (StageFault& fault) {
-      slot->fail(std::move(fault), call.target);
-    }
+    });
   }
 
   const State& front() const { return states_[front_]; }
@@ -202,11 +235,13 @@ class Environment : private DerivativeSource {
   bool has_impulses_ = false;
   std::vector<double> initial_potential_;  // per application
   bool start_wrench_known_ = false;
+  bool attempt_counts_ = true;
   std::vector<std::size_t> next_in_group_;  // scratch of sum_wrenches()
 
   CommitFigures figures_;
   Hash state_hash_, chain_hash_;
   std::optional<FaultRecord> fault_;
+  std::vector<FaultRecord> faults_;
   EventListener* listener_ = nullptr;
   CommitListener* commit_listener_ = nullptr;
   // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.

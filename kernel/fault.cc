@@ -18,6 +18,10 @@ const char* fault_kind_name(FaultKind kind) {
       return "bad_structure";
     case FaultKind::kBadNumbers:
       return "bad_numbers";
+    case FaultKind::kBadPhysics:
+      return "bad_physics";
+    case FaultKind::kDisagreement:
+      return "disagreement";
     case FaultKind::kHandshake:
       return "handshake";
   }

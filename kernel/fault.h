@@ -1,5 +1,5 @@
-// A stage call that failed: who, how, how it was noticed. Thrown through the step, caught in Environment::step();
-// the committed state is untouched.
+// A stage call that failed: who, how, how it was noticed. Thrown through the step; the slot's ladder (slot_host.h)
+// catches it, and where that ends, Environment::step(). The committed state is untouched.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +19,8 @@ enum class FaultKind : std::uint32_t {
   kBadFrame,      // the answer's frame is wrong: sizes, epoch, digest
   kBadStructure,  // ids, order, uniqueness, lengths
   kBadNumbers,    // not finite, not unit, wrong sign
+  kBadPhysics,    // momentum, energy, residuals, pairs that are missing
+  kDisagreement,  // another process answers the same request with other bytes
   kHandshake      // the worker could not be started or refused to serve
 };
 
@@ -33,10 +35,20 @@ class StageFault : public std::exception {
   const char* what() const noexcept override { return text.c_str(); }
 
   FaultKind kind;
-  std::string detected_by;  // "pidfd", "deadline", "status", "wire", "structure", "numbers", "handshake"
+  std::string detected_by;  // "pidfd", "deadline", "status", "wire", "structure", "numbers", "physics", "handshake" …
   std::string text;
   Slot slot = Slot::kSpace;  // filled where the slot is known
   std::string plugin;
+};
+
+// One failed call and what became of it, as the report shows it.
+struct FaultRecord {
+  std::uint32_t step;  // that was being made
+  StageFault fault;
+  std::string recovered_by =
+      {};                     // "standby", "cold start", "rollback", "previous build", "fallback NAME"; empty: paused
+  std::string injected = {};  // kind of the fault that was ordered; empty: it came by itself
+  double recovery_us = 0.0;   // from when it was noticed to the good answer
 };
 
 }  // namespace gravitas::kernel

@@ -54,11 +54,16 @@ void Environment::sum_wrenches() {
   }
 }
 
+void Environment::begin_attempt(bool counts) {
+  attempt_counts_ = counts;
+  if (counts) start_wrench_known_ = false;
+}
+
 void Environment::evaluate() {
   validator_.derivative_request(data_);
   ask_forces(trial_columns_);
   sum_wrenches();
-  if (start_wrench_known_ || !has_reactions()) return;
+  if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
   std::ranges::copy(data_.wrench.span(), data_.start_wrench.data());
   start_wrench_known_ = true;
 }

@@ -17,7 +17,7 @@ EnvironmentDescription checked(EnvironmentDescription description) {
 
 }  // namespace
 
-Environment::Environment(EnvironmentDescription description)
+Environment::Environment(EnvironmentDescription description, const HostStarter& starter)
     : description_(checked(std::move(description))),
       plan_(make_plan(&description_)),
       model_(&arena_, description_),
@@ -39,9 +39,9 @@ Environment::Environment(EnvironmentDescription description)
   states_[0].write(description_);
   states_[1].write(description_);
   data_.margin[0] = margin_;
-  data_.theta[0] =
-      integrator_.description().plugins.empty() ? 0.5 : integrator_.description().plugins[0].declaration.theta;
-  start_slots();
+  data_.theta[0] = description_.integrator.plugins.empty() ? 0.5 : description_.integrator.plugins[0].declaration.theta;
+  check_fallbacks();
+  start_slots(starter);
   bind_joints();
   ask_constant_forces();
   state_hash_ = kernel::state_hash(front());
@@ -52,27 +52,24 @@ Environment::~Environment() {
   for (StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_}) slot->drain();
 }
 
-void Environment::start_slots() {
+void Environment::start_slots(const HostStarter& starter) {
   const std::array<StageSlot*, 6> slots = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};
-  for (StageSlot* slot : slots) slot->start(description_.threads);
+  for (StageSlot* slot : slots) slot->start(description_.threads, starter, this, &faults_);
   for (StageSlot* slot : slots) slot->finish_start();
-  // the planner knows slots; the hosts are known now
-  std::vector<PlannedSlot> hosts;
-  for (const PlannedSlot& planned : plan_.slots)
-    for (const StageSlot* slot : slots)
-      if (slot->which() == planned.slot) std::ranges::move(slot->hosts(), std::back_inserter(hosts));
-  plan_.slots = std::move(hosts);
 }
 
 void Environment::bind_joints() {
-  for (const ConstraintGroup& group : model_.constraint_groups) {
-    const std::array<ColumnId, 6> request = {group.type.id(),      group.body.id(),       group.parameter_begin.id(),
-                                             group.parameter.id(), front().position.id(), front().orientation.id()};
-    const std::array<ColumnId, 2> reply = {group.bound_begin.id(), group.bound.id()};
-    const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
-    ask(Stage::kConstrain, &constraint_, call, nullptr,
-        [&](const auto& answer) { return validator_.bound(answer, group); });
-  }
+  for (const ConstraintGroup& group : model_.constraint_groups) bind(group, front().position, front().orientation);
+}
+
+void Environment::bind(const ConstraintGroup& group, const Column<double>& position,
+                       const Column<double>& orientation) {
+  const std::array<ColumnId, 6> request = {group.type.id(),      group.body.id(), group.parameter_begin.id(),
+                                           group.parameter.id(), position.id(),   orientation.id()};
+  const std::array<ColumnId, 2> reply = {group.bound_begin.id(), group.bound.id()};
+  const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
+  ask(Stage::kConstrain, &constraint_, call, nullptr,
+      [&](const auto& answer) { return validator_.bound(answer, group); });
 }
 
 // The forces are asked once in the initial state. If all say that this is their answer for ever, they are not

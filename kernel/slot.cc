@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include "plugin_sdk/channel/mailbox.h"
+
 namespace gravitas::kernel {
 namespace {
 
@@ -14,75 +16,71 @@ constexpr int kCapacityRounds = 64;
 
 StageSlot::StageSlot(Slot which, SlotDescription description) : which_(which), description_(std::move(description)) {}
 
-void StageSlot::assign_hosts() {
+void StageSlot::assign_hosts(std::uint32_t threads, const HostStarter& starter) {
   const auto same_host = [](const PluginChoice& a, const PluginChoice& b) {
     return a.command.empty() && b.command.empty() && a.address == b.address;
   };
+  std::vector<SlotDescription> hosts;
   for (const PluginChoice& plugin : description_.plugins) {
     const auto found =
-        std::ranges::find_if(hosts_, [&](const Host& host) { return same_host(host.description.plugins[0], plugin); });
-    const auto host = static_cast<std::size_t>(found - hosts_.begin());
-    if (found == hosts_.end()) {
-      hosts_.emplace_back().description = description_;
-      hosts_.back().description.plugins.clear();
-      if (!plugin.command.empty() || !plugin.address.empty()) hosts_.back().description.hosting = Hosting::kGrpc;
+        std::ranges::find_if(hosts, [&](const SlotDescription& host) { return same_host(host.plugins[0], plugin); });
+    const auto host = static_cast<std::size_t>(found - hosts.begin());
+    if (found == hosts.end()) {
+      hosts.push_back(description_);
+      hosts.back().plugins.clear();
+      if (!plugin.command.empty() || !plugin.address.empty()) hosts.back().hosting = Hosting::kGrpc;
     }
-    routes_.push_back({host, static_cast<std::uint32_t>(hosts_[host].description.plugins.size())});
-    hosts_[host].description.plugins.push_back(plugin);
+    routes_.push_back({host, static_cast<std::uint32_t>(hosts[host].plugins.size())});
+    hosts[host].plugins.push_back(plugin);
   }
+  for (SlotDescription& host : hosts) hosts_.emplace_back(std::move(host), threads, starter);
 }
 
-void StageSlot::start(std::uint32_t threads) {
-  assign_hosts();
-  for (Host& host : hosts_) {
-    try {
-      if (host.description.hosting == Hosting::kDirect) {
-        host.carrier = make_direct_carrier(host.description.plugins, threads);
-      } else if (host.description.hosting == Hosting::kSharedMemory) {
-        host.pending = start_shared_memory_carrier(host.description, threads);
-      } else {
-        host.pending = start_grpc_carrier(host.description, threads);
-      }
-    } catch (StageFault& fault) {
-      fail(std::move(fault), host);
-    }
-  }
+void StageSlot::start(std::uint32_t threads, const HostStarter& starter, SlotObserver* observer,
+                      std::vector<FaultRecord>* log) {
+  observer_ = observer;
+  log_ = log;
+  assign_hosts(threads, starter);
+  for (SlotHost& host : hosts_) host.begin_start();
 }
 
 void StageSlot::finish_start() {
-  for (Host& host : hosts_) {
-    if (!host.pending) continue;
+  for (std::size_t i = 0; i < hosts_.size(); ++i) {
     try {
-      host.carrier = host.pending->finish();
+      hosts_[i].finish_start();
     } catch (StageFault& fault) {
-      fail(std::move(fault), host);
+      const auto first = std::ranges::find_if(routes_, [&](const Route& route) { return route.host == i; });
+      name(&fault, static_cast<std::uint32_t>(first - routes_.begin()));
+      throw;
     }
-    host.pending.reset();
+    needs_attention_ |= hosts_[i].description().hosting != Hosting::kDirect;
   }
 }
 
-void StageSlot::stop() { hosts_.clear(); }
+void StageSlot::stop() {
+  hosts_.clear();
+  needs_attention_ = false;
+}
 
 void StageSlot::drain() {
-  for (Host& host : hosts_)
-    if (host.carrier) host.carrier->drain();
+  for (SlotHost& host : hosts_) host.drain();
 }
 
 std::vector<std::string> StageSlot::take_complaints() {
-  std::vector<std::string> all;
-  for (Host& host : hosts_)
-    for (std::string& one : host.carrier->take_complaints()) all.push_back(std::move(one));
+  std::vector<std::string> all = std::exchange(complaints_, {});
+  for (SlotHost& host : hosts_)
+    for (std::string& one : host.take_complaints()) all.push_back(std::move(one));
   return all;
 }
 
 std::vector<PlannedSlot> StageSlot::hosts() const {
   std::vector<PlannedSlot> planned;
-  for (const Host& host : hosts_) {
+  for (const SlotHost& host : hosts_) {
     PlannedSlot& one = planned.emplace_back();
     one.slot = which_;
-    one.hosting = host.description.hosting;
-    one.process_id = host.carrier ? host.carrier->process_id() : 0;
-    for (const PluginChoice& plugin : host.description.plugins) one.plugins.push_back(plugin.declaration.name);
+    one.hosting = host.description().hosting;
+    one.process_id = host.process_id();
+    for (const PluginChoice& plugin : host.description().plugins) one.plugins.push_back(plugin.declaration.name);
   }
   return planned;
 }
@@ -102,41 +100,90 @@ void StageSlot::make_room(std::span<const ColumnId> columns, Arena* arena) {
   }
 }
 
-Untrusted<StageCall> StageSlot::ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
-                                    CallTimes* times) {
+void StageSlot::call_with_room(Carrier* carrier, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+                               CallTimes* times) {
+  for (int round = 0; round < kCapacityRounds; ++round) {
+    const CallResult result = carrier->call(call, arena, derivatives);
+    times->compute += result.compute_ns;
+    times->check += result.check_ns;
+    if (result.status == GRAVITAS_OK) return;
+    if (result.status == GRAVITAS_REFUSED)
+      throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
+    if (result.status != GRAVITAS_NEEDS_CAPACITY)
+      throw StageFault(FaultKind::kFailure, "status", "it failed: " + result.text);
+    make_room(call.reply, arena);
+  }
+  throw StageFault(FaultKind::kBadStructure, "structure", "it asks for more room again and again");
+}
+
+void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* derivatives, CallTimes* times) {
   const Route route = routes_[call.target];
   StageCall routed = call;
   routed.target = route.target;
-  try {
-    for (int round = 0; round < kCapacityRounds; ++round) {
-      const CallResult result = hosts_[route.host].carrier->call(routed, arena, derivatives);
-      times->compute += result.compute_ns;
-      times->check += result.check_ns;
-      if (result.status == GRAVITAS_OK) return Untrusted<StageCall>(call);
-      if (result.status == GRAVITAS_REFUSED)
-        throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
-      if (result.status != GRAVITAS_NEEDS_CAPACITY)
-        throw StageFault(FaultKind::kFailure, "status", "it failed: " + result.text);
-      make_room(call.reply, arena);
+  if (!order_.empty()) order_.clear();
+  if (!armed_.empty()) {
+    const auto due = std::ranges::find_if(armed_, [&](const FaultInjection& one) { return one.step == step_; });
+    if (due != armed_.end()) {
+      order_ = due->order;
+      routed.fault = order_;
+      if (--due->times == 0) armed_.erase(due);
     }
-    throw StageFault(FaultKind::kBadStructure, "structure", "it asks for more room again and again");
-  } catch (StageFault& fault) {
-    // a fault of a nested call has its slot already
-    if (!fault.plugin.empty()) throw;
-    fail(std::move(fault), call.target);
+  }
+  if (derivatives != nullptr) derivatives->begin_attempt(true);
+  call_with_room(&hosts_[route.host].carrier(), routed, arena, derivatives, times);
+}
+
+void StageSlot::name(StageFault* fault, std::uint32_t target) const {
+  fault->slot = which_;
+  fault->plugin = description_.plugins[target].declaration.name;
+}
+
+void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attempts) {
+  // a nested call's ladder is at its end: nobody here is to blame
+  if (!fault.plugin.empty()) throw StageFault(fault);
+  attempts->noticed_ns.push_back(channel::now_ns());
+  name(&fault, call.target);
+  const std::size_t host = routes_[call.target].host;
+  const PluginChoice plugin = description_.plugins[call.target];
+  log_->push_back({step_, fault});
+  log_->back().injected = order_.substr(0, order_.find(','));
+  Recovery recovery;
+  bool poison = false;
+  try {
+    recovery = hosts_[host].recover(fault, attempts, &poison);
+  } catch (StageFault& last) {
+    if (poison) observer_->on_poison(call, plugin, fault);
+    name(&last, call.target);
+    throw;
+  }
+  log_->back().recovered_by = recovery.how;
+  if (poison) observer_->on_poison(call, plugin, fault);
+  if (!recovery.plugins_changed) return;
+  if (recovery.how == "rollback") close_probation(host, SwapState::kRolledBack, fault.text);
+  adopt(host, recovery.how);
+}
+
+void StageSlot::note_recovery(const Attempts& attempts) {
+  const std::uint64_t now = channel::now_ns();
+  // the last records are this call's, but for those of calls nested in it
+  std::size_t next = attempts.noticed_ns.size();
+  for (auto record = log_->rbegin(); record != log_->rend() && next > 0; ++record) {
+    if (record->fault.slot != which_) continue;
+    record->recovery_us = 1e-3 * static_cast<double>(now - attempts.noticed_ns[--next]);
   }
 }
 
-void StageSlot::fail(StageFault fault, const Host& host) const {
-  fault.slot = which_;
-  fault.plugin = host.description.plugins[0].declaration.name;
-  throw fault;
-}
-
-void StageSlot::fail(StageFault fault, std::uint32_t target) const {
-  fault.slot = which_;
-  fault.plugin = description_.plugins[target].declaration.name;
-  throw fault;
+void StageSlot::adopt(std::size_t host, const std::string& why) {
+  const SlotDescription& now = hosts_[host].description();
+  for (std::uint32_t target = 0; target < routes_.size(); ++target) {
+    if (routes_[target].host != host) continue;
+    const PluginChoice before = std::exchange(description_.plugins[target], now.plugins[routes_[target].target]);
+    const PluginChoice& plugin = description_.plugins[target];
+    if (host == 0) description_.hosting = now.hosting;
+    observer_->on_decision({which_, target, step_, why, &now, &plugin});
+    observer_->on_plugin_change(*this, target, before);
+  }
+  needs_attention_ = true;
 }
 
 }  // namespace gravitas::kernel

@@ -1,13 +1,19 @@
 // A slot of an environment: where one kind of question goes. It hides which carrier is used, makes room when an
-// answer needs more, and turns every failure into a StageFault that names the slot and the plugin.
+// answer needs more, has a failed call answered by somebody else, and exchanges plugins between two steps.
 #pragma once
 
+#include <algorithm>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "kernel/carrier/carrier.h"
+#include "kernel/fault_injection.h"
 #include "kernel/plan.h"
+#include "kernel/slot_host.h"
+#include "kernel/swap.h"
 #include "kernel/validate.h"
 
 namespace gravitas::kernel {
@@ -18,12 +24,35 @@ struct CallTimes {
   std::uint64_t check = 0;    // the frame of the answer was checked
 };
 
+// Who answers from now on, and why: what a run must know again to be resumed.
+struct Decision {
+  Slot slot;
+  std::uint32_t target;  // of the slot's plugins
+  std::uint32_t step;    // first that is made so
+  std::string why;       // "swap", "rollback", "previous build", "fallback NAME"
+  const SlotDescription* host;
+  const PluginChoice* plugin;
+};
+
+class StageSlot;
+
+// What a slot tells its environment, before the step that it concerns is committed.
+class SlotObserver {
+ public:
+  virtual ~SlotObserver() = default;
+  // Another plugin is in place and has not been asked yet. May ask the slot itself.
+  virtual void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) = 0;
+  virtual void on_decision(const Decision& decision) = 0;
+  // Nobody may be asked this again: `plugin` died of it, or answered it wrongly, twice.
+  virtual void on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) = 0;
+};
+
 class StageSlot {
  public:
   StageSlot(Slot which, SlotDescription description);
 
-  // Starting is split so that the workers of all slots start side by side.
-  void start(std::uint32_t threads);
+  // Starting is split so that the workers of all slots start side by side. `log` gets the failed calls.
+  void start(std::uint32_t threads, const HostStarter& starter, SlotObserver* observer, std::vector<FaultRecord>* log);
   void finish_start();
   // Lets the host end, and ends it: for a slot that is not asked any more.
   void stop();
@@ -36,32 +65,107 @@ class StageSlot {
   // The hosts as the plan shows them.
   std::vector<PlannedSlot> hosts() const;
 
-  // Asks; the answer lies in the call's reply columns but is not to be used before validation.
-  Untrusted<StageCall> ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives, CallTimes* times);
+  // Before step number `step` is made: standbys, swaps.
+  void begin_step(std::uint32_t step) {
+    step_ = step;
+    if (needs_attention_) attend();
+  }
 
-  // Throws the fault with this slot and the plugin that was asked written into it.
-  [[noreturn]] void fail(StageFault fault, std::uint32_t target) const;
+  // Asks until somebody gives an answer that `check` accepts: check(Untrusted<StageCall>, const CallTimes*) makes a
+  // Trusted<…> of it, or throws (times are null for an answer that is only compared). Throws the last StageFault, with
+  // this slot and the plugin in it, where the ladder ends.
+  template <typename Check>
+  auto ask(const StageCall& call, Arena* arena, DerivativeSource* derivatives, Check&& check) {
+    Attempts attempts;
+    for (;;) {
+      try {
+        CallTimes times;
+        attempt(call, arena, derivatives, &times);
+        auto checked = check(Untrusted<StageCall>(call), &times);
+        if (attempts.made > 0) note_recovery(attempts);
+        hosts_[routes_[call.target].host].count_good_answer();
+        if (is_watched_) watch(call, arena, derivatives, [&] { check(Untrusted<StageCall>(call), nullptr); });
+        return checked;
+      } catch (StageFault& fault) {
+        recover(std::move(fault), call, &attempts);
+      }
+    }
+  }
+
+  // How long a call took in all.
+  void note_duration(std::uint64_t nanoseconds) { longest_call_ns_ = std::max(longest_call_ns_, nanoseconds); }
+
+  // A worker commits a fault; consumed by the first attempts at that step.
+  void inject(FaultInjection fault) { armed_.push_back(std::move(fault)); }
+
+  // Begins a swap of the plugin in row `target`; see swap.h. With `only_compare` it never cuts over.
+  void order_swap(SwapOrder order, std::uint32_t target, bool only_compare = false);
+  // All so far, in the order they were asked for.
+  std::vector<SwapRecord> swaps() const;
+  // Every so many calls another process is asked the same, and must give the same bytes; 0: never.
+  void set_rerun_every(std::uint32_t calls);
 
  private:
-  Slot which_;
-  SlotDescription description_;
   // The plugins of a slot live in one host, but for those that are commands or at an address.
-  struct Host {
-    SlotDescription description;
-    std::unique_ptr<PendingCarrier> pending;
-    std::unique_ptr<Carrier> carrier;
-  };
   struct Route {
     std::size_t host;
     std::uint32_t target;
   };
-  void assign_hosts();
+  // A swap that has cut over and may still be rolled back.
+  struct Probation {
+    std::size_t host;
+    std::size_t record;
+  };
+  struct Rerun {
+    std::uint32_t every = 0;
+    std::uint64_t calls = 0;
+    std::vector<std::unique_ptr<Carrier>> checkers;  // per host
+  };
+
+  void assign_hosts(std::uint32_t threads, const HostStarter& starter);
   // Makes room for as much as the columns' counts say, and leaves them empty.
   static void make_room(std::span<const ColumnId> columns, Arena* arena);
-  [[noreturn]] void fail(StageFault fault, const Host& host) const;
+  static void call_with_room(Carrier* carrier, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+                             CallTimes* times);
+  void attempt(const StageCall& call, Arena* arena, DerivativeSource* derivatives, CallTimes* times);
+  void recover(StageFault fault, const StageCall& call, Attempts* attempts);
+  void note_recovery(const Attempts& attempts);
+  void name(StageFault* fault, std::uint32_t target) const;
 
-  std::vector<Host> hosts_;
+  void attend();
+  void prepare_swaps();
+  void advance_swaps();
+  bool advance_swap(PendingSwap* swap);
+  void cut_over(PendingSwap* swap);
+  void refuse(PendingSwap* swap, const std::string& reason);
+  void close_probation(std::size_t host, SwapState state, const std::string& reason);
+  void update_watch();
+  // The plugins of a host have changed: tells, and notes who serves the routes.
+  void adopt(std::size_t host, const std::string& why);
+
+  void watch(const StageCall& call, Arena* arena, DerivativeSource* derivatives, const std::function<void()>& recheck);
+  bool watch_swap(PendingSwap* swap, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+                  const std::function<void()>& recheck);
+  void rerun(const StageCall& call, Arena* arena, DerivativeSource* derivatives, const std::function<void()>& recheck);
+
+  Slot which_;
+  SlotDescription description_;
+  SlotObserver* observer_ = nullptr;
+  std::vector<FaultRecord>* log_ = nullptr;
+  std::vector<SlotHost> hosts_;
   std::vector<Route> routes_;  // per plugin of the slot
+  std::uint32_t step_ = 0;
+  bool needs_attention_ = false;
+  bool is_watched_ = false;
+
+  std::vector<FaultInjection> armed_;
+  std::string order_;  // of the fault that is being injected
+  std::vector<PendingSwap> pending_;
+  std::vector<SwapRecord> swaps_;
+  std::vector<Probation> probation_;
+  std::uint64_t longest_call_ns_ = 0;
+  Rerun rerun_;
+  std::vector<std::string> complaints_;
 };
 
 }  // namespace gravitas::kernel

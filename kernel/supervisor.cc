@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <cstring>
 #include <deque>
 #include <map>
@@ -29,31 +30,36 @@ extern char** environ;
 namespace gravitas::kernel {
 namespace {
 
-// First descriptor that a worker inherits.
-constexpr int kFirstInherited = 3;
+// Read at a time: what a pipe holds.
+constexpr std::size_t kPipeSize = 65536;
+// Pipes' worth that are read once a process has ended: a child that it left behind may write on for ever.
+constexpr int kLastReads = 16;
 
 std::string describe_ending(const siginfo_t& info) {
   if (info.si_code == CLD_EXITED) return "ended by itself with exit code " + std::to_string(info.si_status);
   return "killed by signal " + std::to_string(info.si_status) + " (" + strsignal(info.si_status) + ")";
 }
 
-// Runs posix_spawn with the descriptors in place; returns errno.
+// Runs posix_spawn with the descriptors in place, `descriptors[i]` as number i + 1; returns errno.
 int spawn_process(const std::vector<std::string>& arguments, const std::vector<int>& descriptors, pid_t* pid) {
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
 
+  // copies above all targets, so that no dup2 overwrites a source
+  const int end = 1 + static_cast<int>(descriptors.size());
+  std::vector<int> copies;
+  int problem = 0;
+  for (const int descriptor : descriptors) {
+    copies.push_back(fcntl(descriptor, F_DUPFD_CLOEXEC, end));
+    if (copies.back() < 0 && problem == 0) problem = errno;
+  }
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_adddup2(&actions, 2, 1);
-  // copies above all targets, so that no dup2 overwrites a source
-  std::vector<int> copies;
-  for (const int descriptor : descriptors)
-    copies.push_back(fcntl(descriptor, F_DUPFD_CLOEXEC, kFirstInherited + static_cast<int>(descriptors.size())));
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   for (std::size_t i = 0; i < copies.size(); ++i)
-    posix_spawn_file_actions_adddup2(&actions, copies[i], kFirstInherited + static_cast<int>(i));
-  posix_spawn_file_actions_addclosefrom_np(&actions, kFirstInherited + static_cast<int>(descriptors.size()));
+    posix_spawn_file_actions_adddup2(&actions, copies[i], static_cast<int>(i) + 1);
+  posix_spawn_file_actions_addclosefrom_np(&actions, end);
 
   // signals as a fresh program expects them
   posix_spawnattr_t attributes;
@@ -66,16 +72,30 @@ int spawn_process(const std::vector<std::string>& arguments, const std::vector<i
   posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
 
-  const int problem = posix_spawn(pid, argv[0], &actions, &attributes, argv.data(), environ);
+  if (problem == 0) problem = posix_spawn(pid, argv[0], &actions, &attributes, argv.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
-  for (const int copy : copies) close(copy);
+  for (const int copy : copies)
+    if (copy >= 0) close(copy);
   return problem;
+}
+
+// The process writes as if to a file: only our end must not wait.
+bool make_output_pipe(int* ours, int* theirs) {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) return false;
+  fcntl(ends[0], F_SETFL, O_NONBLOCK);
+  *ours = ends[0];
+  *theirs = ends[1];
+  return true;
 }
 
 }  // namespace
 
 WorkerProcess::~WorkerProcess() {
+  for (const std::string& line : output_.take()) std::fprintf(stderr, "process %d, %s\n", process_id_, line.c_str());
+  for (const int pipe : output_pipes_)
+    if (pipe >= 0) close(pipe);
   if (pidfd_ >= 0) close(pidfd_);
 }
 
@@ -85,6 +105,16 @@ bool WorkerProcess::wait(int milliseconds) const {
 }
 
 void WorkerProcess::kill() const { syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0); }
+
+std::vector<std::string> WorkerProcess::take_output() {
+  const std::lock_guard lock(mutex_);
+  return output_.take();
+}
+
+std::string WorkerProcess::last_words() const {
+  const std::lock_guard lock(mutex_);
+  return output_.last_words();
+}
 
 struct Supervisor::Order {
   const std::vector<std::string>& arguments;
@@ -98,7 +128,8 @@ struct Supervisor::Shared {
   std::mutex mutex;
   std::condition_variable done;
   std::deque<Order*> orders;
-  std::map<int, std::shared_ptr<WorkerProcess>> processes;  // by pidfd
+  // by pidfd and by output pipe; of the supervisor's thread alone
+  std::map<int, std::shared_ptr<WorkerProcess>> watched;
 };
 
 Supervisor& Supervisor::instance() {
@@ -123,9 +154,9 @@ std::shared_ptr<WorkerProcess> Supervisor::spawn(const std::vector<std::string>&
   Order order{arguments, descriptors, std::make_shared<WorkerProcess>(), 0, false};
   order.process->on_end_ = std::move(on_end);
   std::unique_lock lock(shared_->mutex);
-  shared_->orders.push_back(&order);
   const std::uint64_t one = 1;
   if (write(doorbell_, &one, sizeof one) < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  shared_->orders.push_back(&order);
   shared_->done.wait(lock, [&] { return order.done; });
   if (order.problem != 0) throw std::system_error(order.problem, std::generic_category(), arguments[0]);
   return order.process;
@@ -136,8 +167,17 @@ void Supervisor::run() {
     epoll_event events[16];
     const int count = epoll_wait(epoll_, events, 16, -1);
     for (int i = 0; i < count; ++i) {
-      if (events[i].data.fd != doorbell_) {
-        reap(events[i].data.fd);
+      const int descriptor = events[i].data.fd;
+      if (descriptor != doorbell_) {
+        // what was closed since the events were fetched is not watched any more
+        const auto found = shared_->watched.find(descriptor);
+        if (found == shared_->watched.end()) continue;
+        const std::shared_ptr<WorkerProcess> process = found->second;
+        if (descriptor == process->pidfd_) {
+          reap(process);
+        } else {
+          read_output(process.get(), descriptor == process->output_pipes_[0] ? 0 : 1);
+        }
         continue;
       }
       std::uint64_t rings = 0;
@@ -150,35 +190,80 @@ void Supervisor::run() {
   }
 }
 
-void Supervisor::execute(Order* order) {
-  WorkerProcess& process = *order->process;
-  order->done = true;
-  order->problem = spawn_process(order->arguments, order->descriptors, &process.process_id_);
-  if (order->problem != 0) return;
-  // nobody else reaps our children, so the number is still that process
-  process.pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, process.process_id_, 0));
-  if (process.pidfd_ < 0) {
-    order->problem = errno;
-    return;
-  }
-  shared_->processes[process.pidfd_] = order->process;
+void Supervisor::watch(int descriptor, const std::shared_ptr<WorkerProcess>& process) {
+  shared_->watched[descriptor] = process;
   epoll_event event{};
   event.events = EPOLLIN;
-  event.data.fd = process.pidfd_;
-  epoll_ctl(epoll_, EPOLL_CTL_ADD, process.pidfd_, &event);
+  event.data.fd = descriptor;
+  epoll_ctl(epoll_, EPOLL_CTL_ADD, descriptor, &event);
 }
 
-void Supervisor::reap(int pidfd) {
+void Supervisor::forget(int descriptor) {
+  epoll_ctl(epoll_, EPOLL_CTL_DEL, descriptor, nullptr);
+  shared_->watched.erase(descriptor);
+}
+
+void Supervisor::execute(Order* order) {
+  const std::shared_ptr<WorkerProcess>& process = order->process;
+  order->done = true;
+  std::array<int, 2> theirs = {-1, -1};
+  for (std::size_t i = 0; i < 2 && order->problem == 0; ++i)
+    if (!make_output_pipe(&process->output_pipes_[i], &theirs[i])) order->problem = errno;
+  if (order->problem == 0) {
+    std::vector<int> descriptors = {theirs[0], theirs[1]};
+    descriptors.insert(descriptors.end(), order->descriptors.begin(), order->descriptors.end());
+    order->problem = spawn_process(order->arguments, descriptors, &process->process_id_);
+  }
+  for (const int end : theirs)
+    if (end >= 0) close(end);
+  if (order->problem != 0) return;
+
+  // nobody else reaps our children, so the number is still that process
+  process->pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, process->process_id_, 0));
+  if (process->pidfd_ < 0) {
+    order->problem = errno;
+    ::kill(process->process_id_, SIGKILL);
+    waitpid(process->process_id_, nullptr, 0);
+    return;
+  }
+  watch(process->pidfd_, process);
+  for (const int pipe : process->output_pipes_) watch(pipe, process);
+}
+
+bool Supervisor::read_output(WorkerProcess* process, std::size_t stream) {
+  static thread_local std::array<char, kPipeSize> bytes;
+  if (process->output_pipes_[stream] < 0) return false;
+  const ssize_t got = read(process->output_pipes_[stream], bytes.data(), bytes.size());
+  if (got < 0 && (errno == EAGAIN || errno == EINTR)) return errno == EINTR;
+  if (got <= 0) {
+    close_output(process, stream);
+    return false;
+  }
+  const std::lock_guard lock(process->mutex_);
+  process->output_.add(static_cast<OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
+  return true;
+}
+
+void Supervisor::close_output(WorkerProcess* process, std::size_t stream) {
+  int& pipe = process->output_pipes_[stream];
+  if (pipe < 0) return;
+  forget(pipe);
+  close(pipe);
+  pipe = -1;
+  const std::lock_guard lock(process->mutex_);
+  process->output_.end(static_cast<OutputStream>(stream));
+}
+
+void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {
   siginfo_t info{};
-  if (waitid(static_cast<idtype_t>(P_PIDFD), static_cast<id_t>(pidfd), &info, WEXITED | WNOHANG) != 0 ||
+  if (waitid(static_cast<idtype_t>(P_PIDFD), static_cast<id_t>(process->pidfd_), &info, WEXITED | WNOHANG) != 0 ||
       info.si_pid == 0)
     return;
-  epoll_ctl(epoll_, EPOLL_CTL_DEL, pidfd, nullptr);
-  std::shared_ptr<WorkerProcess> process;
-  {
-    const std::lock_guard lock(shared_->mutex);
-    process = std::move(shared_->processes[pidfd]);
-    shared_->processes.erase(pidfd);
+  forget(process->pidfd_);
+  for (std::size_t stream = 0; stream < process->output_pipes_.size(); ++stream) {
+    for (int i = 0; i < kLastReads && read_output(process.get(), stream); ++i) {
+    }
+    close_output(process.get(), stream);
   }
   {
     const std::lock_guard lock(process->mutex_);

@@ -1,9 +1,10 @@
-// Worker processes: starting them, and knowing at once when one ends.
+// Worker processes: starting them, reading what they write, and knowing at once when one ends.
 //
-// One thread of the process does both, for as long as the process lives: the parent-death signal of a worker
+// One thread of the process does all of it, for as long as the process lives: the parent-death signal of a worker
 // follows the *thread* that started it. A process is known by its pidfd, never by its number alone.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <functional>
@@ -12,10 +13,13 @@
 #include <string>
 #include <vector>
 
+#include "kernel/process_output.h"
+
 namespace gravitas::kernel {
 
 class WorkerProcess {
  public:
+  // Output that nobody has taken goes to our standard error, with the process's number.
   ~WorkerProcess();
 
   int process_id() const { return process_id_; }
@@ -27,15 +31,21 @@ class WorkerProcess {
   bool wait(int milliseconds) const;
   void kill() const;
 
+  // What it wrote since the last time, and the last of it (process_output.h). Whole once has_ended().
+  std::vector<std::string> take_output();
+  std::string last_words() const;
+
  private:
   friend class Supervisor;
 
   int process_id_ = -1;
   int pidfd_ = -1;
+  std::array<int, 2> output_pipes_ = {-1, -1};  // standard output, standard error; the supervisor's
   mutable std::mutex mutex_;
   mutable std::condition_variable reaped_;
   std::atomic<bool> ended_{false};
   std::string ending_;
+  ProcessOutput output_;
   std::function<void()> on_end_;
 };
 
@@ -45,8 +55,9 @@ class Supervisor {
   static Supervisor& instance();
 
   // Starts `arguments[0]` with its descriptors 3, 4, … being `descriptors` (which stay open here) and no others
-  // but the standard ones; its standard output goes to our standard error. `on_end` runs in the supervisor's
-  // thread when the process has ended. Throws std::system_error.
+  // but the standard ones: an empty input, and pipes that are read here whatever it writes. `on_end` runs in the
+  // supervisor's thread, in which nothing can be spawned, when the process has ended and its output has been read.
+  // Throws std::system_error.
   std::shared_ptr<WorkerProcess> spawn(const std::vector<std::string>& arguments, const std::vector<int>& descriptors,
                                        std::function<void()> on_end);
 
@@ -56,7 +67,12 @@ class Supervisor {
   Supervisor();
   void run();
   void execute(Order* order);
-  void reap(int pidfd);
+  void watch(int descriptor, const std::shared_ptr<WorkerProcess>& process);
+  void forget(int descriptor);
+  // Reads once; false if there is nothing to be read now, or ever again.
+  bool read_output(WorkerProcess* process, std::size_t stream);
+  void close_output(WorkerProcess* process, std::size_t stream);
+  void reap(const std::shared_ptr<WorkerProcess>& process);
 
   int epoll_ = -1;
   int doorbell_ = -1;

@@ -3,9 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "kernel/arena.h"
@@ -21,13 +24,18 @@ struct StageCall {
   std::uint32_t target;  // which of the host's plugins
   std::span<const ColumnId> request;
   std::span<const ColumnId> reply;
+  // A fault that the worker is to commit in this very call ("slow,factor=10": plugin_sdk/host/fault_kinds.h); not
+  // longer than a mailbox's text. Direct hosting ignores it.
+  std::string_view fault = {};
+  // Instead of the slot's; 0: the slot's.
+  std::uint64_t deadline_ns = 0;
 
   const stage::MethodInfo& info() const { return stage::method_info(method); }
 };
 
 struct CallResult {
   std::int32_t status = GRAVITAS_OK;  // GRAVITAS_OK, _NEEDS_CAPACITY (counts say how much), _REFUSED, _FAILED …
-  std::string text;                   // why it was refused or failed
+  std::string text;                   // why it was refused or failed; what came of an ordered fault, if it was answered
   std::uint64_t compute_ns = 0;       // time the plugin worked, if the carrier knows it apart
   std::uint64_t check_ns = 0;         // time the frame of the answer was checked
 };
@@ -37,6 +45,8 @@ struct CallResult {
 class DerivativeSource {
  public:
   virtual ~DerivativeSource() = default;
+  // Before each attempt at a call; `counts` is false if its answer is only compared.
+  virtual void begin_attempt(bool /*counts*/) {}
   // Columns that the trial state is to be copied to (kColumnCount of the request).
   virtual std::span<const ColumnId> trial_columns() const = 0;
   virtual ColumnId wrench_column() const = 0;
@@ -54,29 +64,44 @@ class Carrier {
   // Asks the host to end; the destructor waits for it. Several hosts then end side by side.
   virtual void drain() {}
 
+  // Ends the host at once; the destructor waits for it.
+  virtual void kill() {}
+
+  // False once the host's process has ended, or has not answered a heartbeat for long.
+  virtual bool is_alive() const { return true; }
+
   // Process that hosts the plugins.
   virtual int process_id() const = 0;
   virtual Hosting hosting() const = 0;
 
-  // What the host said went wrong besides its answers; taken out.
+  // What the host said went wrong besides its answers, and what a worker process wrote ("stdout: …"); taken out.
   virtual std::vector<std::string> take_complaints() { return {}; }
+
+  // What keeps the host's process from harm, as it is enforced ("seccomp", "memory 4096 MiB"), and what could not be
+  // ("no landlock: …"). Empty: nothing does.
+  virtual std::vector<std::string> sandbox() const { return {}; }
 };
 
 // Loads the plugins into this process.
 std::unique_ptr<Carrier> make_direct_carrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads);
 
-// A worker process that is being started; finish() waits for it, so that several can start at once.
-class PendingCarrier {
- public:
-  virtual ~PendingCarrier() = default;
-  virtual std::unique_ptr<Carrier> finish() = 0;
-};
-// The plugins of the slot go to one worker: library plugins, or one command, or those of one address.
-std::unique_ptr<PendingCarrier> start_shared_memory_carrier(const SlotDescription& slot, std::uint32_t threads);
-std::unique_ptr<PendingCarrier> start_grpc_carrier(const SlotDescription& slot, std::uint32_t threads);
+// Start a worker and wait until it serves. The plugins of the slot go to one worker: library plugins, or one command,
+// or those of one address. A stop that is asked for meanwhile ends the waiting. Throw StageFault.
+std::unique_ptr<Carrier> start_shared_memory_carrier(const SlotDescription& slot, std::uint32_t threads,
+                                                     std::stop_token stop = {});
+std::unique_ptr<Carrier> start_grpc_carrier(const SlotDescription& slot, std::uint32_t threads,
+                                            std::stop_token stop = {});
+
+// How an environment gets its hosts; called from several threads.
+using HostStarter = std::function<std::unique_ptr<Carrier>(const SlotDescription&, std::uint32_t, std::stop_token)>;
+// By the slot's hosting, one of the three above.
+std::unique_ptr<Carrier> start_host(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop);
 
 // Program that hosts plugins in a process of its own: `gravitas-worker` beside the running program, unless set.
 void set_worker_program(std::string path);
 const std::string& worker_program();
+
+// Whether worker processes that are started from now on restrict themselves (on unless set): off for debuggers.
+void set_worker_sandbox(bool on);
 
 }  // namespace gravitas::kernel

@@ -32,16 +32,22 @@ const MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDer
 
 class GrpcCarrier final : public Carrier {
  public:
-  GrpcCarrier(const SlotDescription& slot, std::uint32_t threads)
-      : deadline_ns_(static_cast<std::uint64_t>(slot.deadline * 1e9)), link_(slot, threads, false, [] {}) {}
+  GrpcCarrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop)
+      : slot_deadline_ns_(static_cast<std::uint64_t>(slot.deadline * 1e9)),
+        link_(
+            slot, threads, false, [] {}, std::move(stop)) {
+    link_.finish();
+  }
   ~GrpcCarrier() override;
 
-  void finish() { link_.finish(); }
   CallResult call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) override;
   void drain() override { link_.drain(); }
+  void kill() override { link_.kill(); }
+  bool is_alive() const override { return link_.is_alive(); }
   int process_id() const override { return link_.process_id(); }
   Hosting hosting() const override { return Hosting::kGrpc; }
-  std::vector<std::string> take_complaints() override { return link_.take_faults(); }
+  std::vector<std::string> take_complaints() override { return link_.take_complaints(); }
+  std::vector<std::string> sandbox() const override { return link_.sandbox(); }
 
  private:
   // The stream of a method.
@@ -56,16 +62,17 @@ class GrpcCarrier final : public Carrier {
 
   Stream& stream_of(const MethodInfo& method, Patience* patience);
   void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
-  void wait(Patience* patience);
+  void wait(Stream* stream, Patience* patience);
+  [[noreturn]] void report_broken(Stream* stream);
   void send_assets(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
                    stage::v1::Call* header, Patience* patience);
   void answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header, Arena* arena,
                        DerivativeSource* derivatives, Patience* patience);
   void take_columns(const wire::ColumnsReader& reader, const MethodInfo& method, std::span<const ColumnId> targets,
                     const Outcome& outcome, Arena* arena);
-  [[noreturn]] void report_bad_frame(const std::string& what);
 
-  std::uint64_t deadline_ns_;
+  const std::uint64_t slot_deadline_ns_;
+  std::uint64_t deadline_ns_ = 0;  // of the call
   std::uint64_t sequence_ = 0;
   grpc::CompletionQueue queue_;
   WorkerLink link_;
@@ -92,13 +99,22 @@ GrpcCarrier::~GrpcCarrier() {
   }
 }
 
-void GrpcCarrier::report_bad_frame(const std::string& what) {
+// Says why an operation on the stream failed: its worker ended the stream with a status, or is gone.
+void GrpcCarrier::report_broken(Stream* stream) {
+  grpc::Status status;
+  void* tag = nullptr;
+  bool ok = false;
+  stream->io->Finish(&status, stream);
+  const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(kDrainMilliseconds);
+  if (queue_.AsyncNext(&tag, &ok, until) != grpc::CompletionQueue::GOT_EVENT || status.ok() ||
+      status.error_code() == grpc::StatusCode::UNAVAILABLE || link_.has_ended())
+    link_.report_death();
   link_.kill();
-  throw StageFault(FaultKind::kBadFrame, "wire", "its answer has " + what);
+  throw StageFault(FaultKind::kFailure, "stream", "it ended the stream of its method: " + status.error_message());
 }
 
-// Waits for the one operation that is under way, whose failure means that the worker is gone.
-void GrpcCarrier::wait(Patience* patience) {
+// Waits for the one operation that is under way.
+void GrpcCarrier::wait(Stream* stream, Patience* patience) {
   for (;;) {
     const std::uint64_t now = channel::now_ns();
     const std::uint64_t look = std::min({patience->until, patience->cap, now + kLookNs});
@@ -106,17 +122,13 @@ void GrpcCarrier::wait(Patience* patience) {
     void* tag = nullptr;
     bool ok = false;
     if (queue_.AsyncNext(&tag, &ok, until) == grpc::CompletionQueue::GOT_EVENT) {
-      if (!ok) link_.report_death();
+      if (!ok) report_broken(stream);
       return;
     }
     if (link_.has_ended()) link_.report_death();
     const std::uint64_t later = channel::now_ns();
     if (later < patience->until && later < patience->cap) continue;
-    link_.kill();
-    throw StageFault(FaultKind::kDeadline, "deadline",
-                     later >= patience->cap ? "the call took longer than ten times its deadline"
-                                            : "no answer and no mark of progress within its deadline of " +
-                                                  std::to_string(deadline_ns_ / 1'000'000) + " ms");
+    link_.report_overdue(later >= patience->cap, deadline_ns_);
   }
 }
 
@@ -126,14 +138,14 @@ GrpcCarrier::Stream& GrpcCarrier::stream_of(const MethodInfo& method, Patience* 
     stream = std::make_unique<Stream>();
     stream->io = grpc::GenericStub(link_.channel()).PrepareCall(&stream->context, method.path, &queue_);
     stream->io->StartCall(stream.get());
-    wait(patience);
+    wait(stream.get(), patience);
   }
   return *stream;
 }
 
 void GrpcCarrier::write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience) {
   stream->io->Write(message, stream);
-  wait(patience);
+  wait(stream, patience);
 }
 
 // Columns that stay the same for the run go once, by the hash of their content.
@@ -167,6 +179,7 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
     columns[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
   const std::span<gravitas_column> request = std::span(columns).first(call.request.size());
 
+  deadline_ns_ = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   const std::uint64_t start = channel::now_ns();
   Patience patience{start + deadline_ns_, start + kDeadlineCap * deadline_ns_};
   stage::v1::Call header;
@@ -175,6 +188,7 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   header.set_target(call.target);
   header.set_deadline_microseconds(deadline_ns_ / 1000);
   header.set_digest(wire::columns_digest(method.request, request));
+  if (!call.fault.empty()) header.set_fault(std::string(call.fault));
   Stream& stream = stream_of(method, &patience);
   send_assets(&stream, method, request, &header, &patience);
   write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
@@ -182,15 +196,15 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   for (;;) {
     grpc::ByteBuffer message;
     stream.io->Read(&message, &stream);
-    wait(&patience);
+    wait(&stream, &patience);
     const wire::FlatMessage flat(message);
     wire::ColumnsReader reader(method.reply);
     const std::string problem = reader.parse(flat.bytes());
     Outcome outcome;
-    if (!problem.empty()) report_bad_frame("a wrong message: " + problem);
+    if (!problem.empty()) link_.report_bad_frame("a wrong message: " + problem);
     if (!reader.header().has ||
         !outcome.ParseFromArray(reader.header().bytes.data(), static_cast<int>(reader.header().bytes.size())))
-      report_bad_frame("no outcome");
+      link_.report_bad_frame("no outcome");
     // a late or foreign message is dropped
     if (outcome.epoch() != link_.epoch() || outcome.sequence() != sequence_) continue;
     if (outcome.marks() != 0) {
@@ -198,19 +212,14 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
       continue;
     }
     if (reader.derivative().has) {
-      const std::uint64_t asked = channel::now_ns();
       answer_callback(&stream, reader, header, arena, derivatives, &patience);
-      // the plugin's clock stood still
-      const std::uint64_t pause = channel::now_ns() - asked;
-      patience.until += pause;
-      patience.cap += pause;
       continue;
     }
     CallResult result;
     result.status = outcome.status();
     result.compute_ns = outcome.compute_nanoseconds();
     result.text = outcome.text();
-    if (result.status == GRAVITAS_NEEDS_CAPACITY) report_bad_frame("a status that does not exist here");
+    if (result.status == GRAVITAS_NEEDS_CAPACITY) link_.report_bad_frame("a status that does not exist here");
     const std::uint64_t check_begin = channel::now_ns();
     if (result.status == GRAVITAS_OK) take_columns(reader, method, call.reply, outcome, arena);
     result.check_ns = channel::now_ns() - check_begin;
@@ -231,42 +240,35 @@ void GrpcCarrier::take_columns(const wire::ColumnsReader& reader, const MethodIn
   }
   if (outcome.digest() != 0 &&
       outcome.digest() != wire::columns_digest(method.reply, std::span(columns).first(targets.size())))
-    report_bad_frame("a digest that does not fit its content");
+    link_.report_bad_frame("a digest that does not fit its content");
 }
 
 void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header,
                                   Arena* arena, DerivativeSource* derivatives, Patience* patience) {
-  if (derivatives == nullptr) report_bad_frame("a callback that was not offered");
+  if (derivatives == nullptr) link_.report_bad_frame("a callback that was not offered");
   wire::ColumnsReader trial(kDerivative.request);
   const std::string problem = trial.parse(reader.derivative().bytes);
-  if (!problem.empty()) report_bad_frame("a wrong callback: " + problem);
+  if (!problem.empty()) link_.report_bad_frame("a wrong callback: " + problem);
   const std::span<const ColumnId> columns = derivatives->trial_columns();
   for (std::size_t i = 0; i < columns.size(); ++i)
-    if (trial.count(i) != arena->count(columns[i])) report_bad_frame("a trial state of the wrong size");
+    if (trial.count(i) != arena->count(columns[i])) link_.report_bad_frame("a trial state of the wrong size");
   for (std::size_t i = 0; i < columns.size(); ++i) trial.copy(i, arena->data(columns[i]));
 
+  const std::uint64_t asked = channel::now_ns();
   derivatives->evaluate();
+  // the plugin's clock stood still
+  const std::uint64_t pause = channel::now_ns() - asked;
+  patience->until += pause;
+  patience->cap += pause;
   const ColumnId wrench = derivatives->wrench_column();
   const std::array<gravitas_column, 1> answer = {gravitas_column{arena->data(wrench), arena->count(wrench)}};
   write(stream, wire::to_byte_buffer({{}, {}, &header, kDerivative.reply, answer}), patience);
 }
 
-class PendingWorker final : public PendingCarrier {
- public:
-  explicit PendingWorker(std::unique_ptr<GrpcCarrier> carrier) : carrier_(std::move(carrier)) {}
-  std::unique_ptr<Carrier> finish() override {
-    carrier_->finish();
-    return std::move(carrier_);
-  }
-
- private:
-  std::unique_ptr<GrpcCarrier> carrier_;
-};
-
 }  // namespace
 
-std::unique_ptr<PendingCarrier> start_grpc_carrier(const SlotDescription& slot, std::uint32_t threads) {
-  return std::make_unique<PendingWorker>(std::make_unique<GrpcCarrier>(slot, threads));
+std::unique_ptr<Carrier> start_grpc_carrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop) {
+  return std::make_unique<GrpcCarrier>(slot, threads, std::move(stop));
 }
 
 }  // namespace gravitas::kernel

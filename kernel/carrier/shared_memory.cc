@@ -28,16 +28,17 @@ constexpr std::uint64_t aligned(std::uint64_t bytes, std::uint64_t unit) { retur
 
 class SharedMemoryCarrier final : public Carrier {
  public:
-  SharedMemoryCarrier(const SlotDescription& slot, std::uint32_t threads);
+  SharedMemoryCarrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop);
   ~SharedMemoryCarrier() override;
 
-  // Waits for the handshake and hands over the mailboxes.
-  void finish();
   CallResult call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) override;
   void drain() override;
+  void kill() override { link_->kill(); }
+  bool is_alive() const override { return link_->is_alive(); }
   int process_id() const override { return link_->process_id(); }
   Hosting hosting() const override { return Hosting::kSharedMemory; }
-  std::vector<std::string> take_complaints() override { return link_->take_faults(); }
+  std::vector<std::string> take_complaints() override { return link_->take_complaints(); }
+  std::vector<std::string> sandbox() const override { return link_->sandbox(); }
 
  private:
   // What outlives this object until the process has been reaped: the mailbox that the watcher wakes.
@@ -55,9 +56,9 @@ class SharedMemoryCarrier final : public Carrier {
                     std::span<const ColumnId> targets, std::size_t first_room, Arena* arena);
   void answer_callback(const gravitas_frame_header& header, std::size_t first_room, Arena* arena,
                        DerivativeSource* derivatives);
-  [[noreturn]] void report_bad_frame(const std::string& what);
 
-  std::uint64_t deadline_ns_;
+  const std::uint64_t slot_deadline_ns_;
+  std::uint64_t deadline_ns_ = 0;  // of the call
   std::uint64_t sequence_ = 0;
   std::uint32_t seen_ = 0;
   std::shared_ptr<Mailboxes> boxes_ = std::make_shared<Mailboxes>();
@@ -70,8 +71,8 @@ class SharedMemoryCarrier final : public Carrier {
   std::size_t room_count_ = 0;
 };
 
-SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint32_t threads)
-    : deadline_ns_(static_cast<std::uint64_t>(slot.deadline * 1e9)) {
+SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop)
+    : slot_deadline_ns_(static_cast<std::uint64_t>(slot.deadline * 1e9)) {
   boxes_->kernel_segment =
       Segment::create("gravitas kernel mailbox", aligned(sizeof(Mailbox), kPage), channel::Sharing::kReadersOnly);
   boxes_->worker_segment =
@@ -79,14 +80,12 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
   boxes_->mine = reinterpret_cast<Mailbox*>(boxes_->kernel_segment.data());
   boxes_->theirs = reinterpret_cast<Mailbox*>(boxes_->worker_segment.data());
   boxes_->theirs->cpu = ~0U;
-  link_ = std::make_unique<WorkerLink>(slot, threads, true, [boxes = boxes_] {
-    // a dead process posts nothing any more: its word is ours to count up, and the sleeper ours to wake
+  // a dead process posts nothing any more: its word is ours to count up, and the sleeper ours to wake
+  const auto on_end = [boxes = boxes_] {
     boxes->theirs->signal.fetch_add(1, std::memory_order_seq_cst);
     channel::wake(boxes->theirs);
-  });
-}
-
-void SharedMemoryCarrier::finish() {
+  };
+  link_ = std::make_unique<WorkerLink>(slot, threads, true, on_end, std::move(stop));
   link_->finish();
   const auto send = [&](SegmentRole role, const Segment& segment) {
     return channel::send_segment(link_->descriptor_socket(), {role, 0, 0, segment.size()}, segment.descriptor());
@@ -162,6 +161,7 @@ void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<con
 
 CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
   if (link_->has_ended()) link_->report_death();
+  deadline_ns_ = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   make_rooms(call, *arena, derivatives);
   send_new_segments(*arena);
 
@@ -173,6 +173,10 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
   request.reply_count = static_cast<std::uint32_t>(room_count_);
   request.deadline_ns = channel::now_ns() + deadline_ns_;
   for (std::size_t i = 0; i < room_count_; ++i) boxes_->mine->reply[i] = {rooms_[i].offset, 0, rooms_[i].capacity};
+  if (!call.fault.empty()) {
+    request.fault = 1;
+    boxes_->mine->text[call.fault.copy(boxes_->mine->text, sizeof Mailbox::text - 1)] = '\0';
+  }
   post_frame(request, call.request, *arena);
 
   std::uint64_t spent_ns = 0;
@@ -181,12 +185,13 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
     answer_callback(answer, call.reply.size(), arena, derivatives);
     answer = wait_for_message(&spent_ns);
   }
-  if (answer.kind != GRAVITAS_FRAME_REPLY || answer.method != request.method) report_bad_frame("another message");
+  if (answer.kind != GRAVITAS_FRAME_REPLY || answer.method != request.method)
+    link_->report_bad_frame("another message");
 
   CallResult result;
   result.status = answer.status;
   result.compute_ns = boxes_->theirs->compute_ns;
-  if (answer.status != GRAVITAS_OK) {
+  if (answer.status != GRAVITAS_OK || !call.fault.empty()) {
     std::array<char, sizeof Mailbox::text> text;
     std::memcpy(text.data(), boxes_->theirs->text, text.size());
     text.back() = '\0';
@@ -207,6 +212,8 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
   std::uint64_t until = std::min(start + deadline_ns_, cap);
   std::uint64_t marks = theirs->progress.load(std::memory_order_relaxed);
   for (;;) {
+    // an end from here on counts the signal up; one before may have been seen together with the last message
+    if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_) link_->report_death();
     const std::uint64_t look = std::min(until, channel::now_ns() + kLookNs);
     if (channel::wait(mine, theirs, seen_, look) == channel::Waited::kMessage) {
       seen_ = theirs->signal.load(std::memory_order_acquire);
@@ -215,14 +222,17 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
       if (header.kind == GRAVITAS_FRAME_CRASH && header.epoch == link_->epoch()) {
         link_->report_death();
       }
-      if (header.epoch == link_->epoch() && header.sequence == sequence_ && header.magic == GRAVITAS_MAGIC) {
+      // a dead worker's last word may be a reply, but not a question, which may also be the one it asked before
+      const bool is_dead_question = header.kind == GRAVITAS_FRAME_CALLBACK && link_->has_ended();
+      if (header.epoch == link_->epoch() && header.sequence == sequence_ && header.magic == GRAVITAS_MAGIC &&
+          !is_dead_question) {
         *spent_ns += channel::now_ns() - start;
         return header;
       }
       // a late or foreign message is dropped
       if (link_->has_ended()) link_->report_death();
       if (header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
-        report_bad_frame("a header without the magic");
+        link_->report_bad_frame("a header without the magic");
       continue;
     }
     const std::uint64_t now = channel::now_ns();
@@ -231,11 +241,7 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
       marks = seen_marks;
       until = std::min(now + deadline_ns_, cap);
     } else if (now >= until) {
-      link_->kill();
-      throw StageFault(FaultKind::kDeadline, "deadline",
-                       now >= cap ? "the call took longer than ten times its deadline"
-                                  : "no answer and no mark of progress within its deadline of " +
-                                        std::to_string(deadline_ns_ / 1'000'000) + " ms");
+      link_->report_overdue(now >= cap, deadline_ns_);
     }
   }
 }
@@ -249,7 +255,7 @@ void SharedMemoryCarrier::take_columns(const gravitas_frame_header& header, std:
   for (std::size_t i = 0; i < infos.size(); ++i) data[i] = arena->data(targets[i]);
   const std::string problem = read_reply_frame(header, columns, infos, std::span(rooms_).subspan(first_room),
                                                response_.data(), std::span(data).first(infos.size()));
-  if (!problem.empty()) report_bad_frame(problem);
+  if (!problem.empty()) link_->report_bad_frame(problem);
   for (std::size_t i = 0; i < infos.size(); ++i)
     if (header.status == GRAVITAS_OK || header.status == GRAVITAS_NEEDS_CAPACITY)
       arena->set_count(targets[i], columns[i].count);
@@ -258,18 +264,18 @@ void SharedMemoryCarrier::take_columns(const gravitas_frame_header& header, std:
 void SharedMemoryCarrier::answer_callback(const gravitas_frame_header& header, std::size_t first_room, Arena* arena,
                                           DerivativeSource* derivatives) {
   const auto method = static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative);
-  if (derivatives == nullptr || header.method != method) report_bad_frame("a callback that was not offered");
+  if (derivatives == nullptr || header.method != method) link_->report_bad_frame("a callback that was not offered");
   const std::span<const ColumnId> trial = derivatives->trial_columns();
   std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> expected;
   for (std::size_t i = 0; i < trial.size(); ++i) expected[i] = arena->count(trial[i]);
   gravitas_frame_header received = header;
   received.status = GRAVITAS_OK;
-  if (header.status != GRAVITAS_OK) report_bad_frame("a callback with a status");
+  if (header.status != GRAVITAS_OK) link_->report_bad_frame("a callback with a status");
   take_columns(received, stage::kMethods[method].request, trial, first_room, arena);
   for (std::size_t i = 0; i < trial.size(); ++i) {
     if (arena->count(trial[i]) == expected[i]) continue;
     arena->set_count(trial[i], expected[i]);
-    report_bad_frame("a trial state of the wrong size");
+    link_->report_bad_frame("a trial state of the wrong size");
   }
 
   derivatives->evaluate();
@@ -280,28 +286,11 @@ void SharedMemoryCarrier::answer_callback(const gravitas_frame_header& header, s
   post_frame(answer, wrench, *arena);
 }
 
-void SharedMemoryCarrier::report_bad_frame(const std::string& what) {
-  // whatever it would say next is not to be trusted either
-  link_->kill();
-  throw StageFault(FaultKind::kBadFrame, "wire", "its answer has " + what);
-}
-
-class PendingWorker final : public PendingCarrier {
- public:
-  explicit PendingWorker(std::unique_ptr<SharedMemoryCarrier> carrier) : carrier_(std::move(carrier)) {}
-  std::unique_ptr<Carrier> finish() override {
-    carrier_->finish();
-    return std::move(carrier_);
-  }
-
- private:
-  std::unique_ptr<SharedMemoryCarrier> carrier_;
-};
-
 }  // namespace
 
-std::unique_ptr<PendingCarrier> start_shared_memory_carrier(const SlotDescription& slot, std::uint32_t threads) {
-  return std::make_unique<PendingWorker>(std::make_unique<SharedMemoryCarrier>(slot, threads));
+std::unique_ptr<Carrier> start_shared_memory_carrier(const SlotDescription& slot, std::uint32_t threads,
+                                                     std::stop_token stop) {
+  return std::make_unique<SharedMemoryCarrier>(slot, threads, std::move(stop));
 }
 
 }  // namespace gravitas::kernel

@@ -34,12 +34,43 @@ std::string program = [] {
   return self.substr(0, self.rfind('/') + 1) + "gravitas-worker";
 }();
 
+bool sandboxed = true;
+
+// What a worker may take of address space: `gravitas-worker` has this limit of its own, and more only with threads in
+// hundreds, whose stacks count.
+constexpr std::uint64_t kWorkerMemory = std::uint64_t{4} << 30;
+constexpr std::uint64_t kThreadMemory = std::uint64_t{16} << 20;
+
+// The beginning of a worker's command line.
+std::vector<std::string> worker_words() {
+  std::vector<std::string> words = {program};
+  if (!sandboxed) words.emplace_back("--no-sandbox");
+  return words;
+}
+
+// How long a worker that failed to start may take to have ended, so that its last words can be told.
+constexpr int kLastWordsMilliseconds = 100;
+
+std::string last_words(const WorkerProcess& process) {
+  const std::string words = process.last_words();
+  return words.empty() ? words : "; its last words: " + words;
+}
+
 std::uint64_t next_epoch() {
   static std::atomic<std::uint64_t> epoch{0};
   return ++epoch;
 }
 
 [[noreturn]] void fail_start(const std::string& why) { throw StageFault(FaultKind::kHandshake, "handshake", why); }
+
+std::shared_ptr<WorkerProcess> spawn(const std::vector<std::string>& arguments, const std::vector<int>& descriptors,
+                                     std::function<void()> on_end) {
+  try {
+    return Supervisor::instance().spawn(arguments, descriptors, std::move(on_end));
+  } catch (const std::system_error& error) {
+    fail_start("cannot start '" + arguments[0] + "': " + error.what());
+  }
+}
 
 // Connects to a "unix:PATH"; -1 with errno.
 int connect_unix(const std::string& path) {
@@ -111,9 +142,50 @@ void set_worker_program(std::string path) { program = std::move(path); }
 
 const std::string& worker_program() { return program; }
 
+void set_worker_sandbox(bool on) { sandboxed = on; }
+
+std::unique_ptr<Carrier> start_host(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop) {
+  if (slot.hosting == Hosting::kDirect) return make_direct_carrier(slot.plugins, threads);
+  const auto start = slot.hosting == Hosting::kSharedMemory ? &start_shared_memory_carrier : &start_grpc_carrier;
+  return start(slot, threads, std::move(stop));
+}
+
+ListeningCommand start_listening_command(const std::string& command, std::chrono::milliseconds limit,
+                                         std::function<void()> on_end, const std::stop_token& stop) {
+  const PrivateFolder folder;
+  std::vector<std::string> words = worker_words();
+  words.insert(words.end(), {"--exec", "/bin/sh", "-c", "exec " + command + " --listen unix:" + folder.socket()});
+  ListeningCommand started{spawn(words, {}, std::move(on_end)), -1};
+  const auto until = std::chrono::steady_clock::now() + limit;
+  while ((started.descriptor = connect_unix(folder.socket())) < 0) {
+    if (started.process->has_ended())
+      fail_start("'" + command + "' was " + started.process->ending() + " before it listened" +
+                 last_words(*started.process));
+    if (std::chrono::steady_clock::now() > until || stop.stop_requested()) {
+      started.process->kill();
+      started.process->wait(kDrainMilliseconds);
+      fail_start("'" + command + "' did not listen at the socket it was given with --listen" +
+                 last_words(*started.process));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return started;
+}
+
+std::shared_ptr<grpc::Channel> worker_channel(int descriptor) {
+  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);
+  arguments.SetMaxSendMessageSize(-1);
+  // a large message should not wait for its receiver's leave every 64 KiB, nor come in parts of 16 KiB
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_FRAME_SIZE, 1 << 20);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 1 << 24);
+  return grpc::CreateCustomInsecureChannelFromFd("worker", descriptor, arguments);
+}
+
 WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
-                       std::function<void()> on_end)
-    : epoch_(next_epoch()), address_(slot.plugins[0].address) {
+                       std::function<void()> on_end, std::stop_token stop)
+    : stop_(std::move(stop)), epoch_(next_epoch()), address_(slot.plugins[0].address) {
   control::v1::Hello hello = hello_of_this_kernel();
   hello.set_epoch(epoch_);
   hello.set_nonce(channel::now_ns() ^ (static_cast<std::uint64_t>(getpid()) << 32));
@@ -128,32 +200,39 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
     if (!channel::is_local_address(address_)) fail_start("'" + address_ + "' is no address of this machine");
     const int descriptor = address_.starts_with("unix:") ? connect_unix(address_.substr(5)) : connect_tcp(address_);
     if (descriptor < 0) fail_start("no worker answers at " + address_ + ": " + std::strerror(errno));
-    use_socket(descriptor);
+    channel_ = worker_channel(descriptor);
   } else if (!slot.plugins[0].command.empty()) {
-    start_command(slot.plugins[0].command, std::move(on_end));
+    const ListeningCommand started =
+        start_listening_command(slot.plugins[0].command, kStartLimit, std::move(on_end), stop_);
+    process_ = started.process;
+    channel_ = worker_channel(started.descriptor);
   } else {
-    start_program(slot, with_descriptors, std::move(on_end));
+    start_program(slot, threads, with_descriptors, std::move(on_end));
   }
   control_ = std::make_unique<ControlSession>(channel_, std::move(hello));
 }
 
-void WorkerLink::start_program(const SlotDescription& slot, bool with_descriptors, std::function<void()> on_end) {
+void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
+                               std::function<void()> on_end) {
   int control[2], descriptors[2] = {-1, -1};
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, control) != 0 ||
       (with_descriptors && socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, descriptors) != 0))
     fail_start(std::string("no sockets: ") + std::strerror(errno));
   descriptor_socket_ = descriptors[0];
-  use_socket(control[0]);
+  channel_ = worker_channel(control[0]);
 
-  std::vector<std::string> arguments = {program, "--control-fd", "3"};
+  std::vector<std::string> arguments = worker_words();
+  arguments.insert(arguments.end(), {"--control-fd", "3"});
   std::vector<int> inherited = {control[1]};
   if (with_descriptors) {
     arguments.insert(arguments.end(), {"--descriptor-fd", "4"});
     inherited.push_back(descriptors[1]);
   }
+  if (const std::uint64_t memory = kWorkerMemory / 2 + threads * kThreadMemory; memory > kWorkerMemory)
+    arguments.insert(arguments.end(), {"--memory-limit", std::to_string(memory)});
   for (const PluginChoice& plugin : slot.plugins) arguments.push_back(plugin.library);
   try {
-    spawn(arguments, inherited, std::move(on_end));
+    process_ = spawn(arguments, inherited, std::move(on_end));
   } catch (...) {
     for (const int descriptor : inherited) close(descriptor);
     if (descriptor_socket_ >= 0) close(descriptor_socket_);
@@ -162,53 +241,21 @@ void WorkerLink::start_program(const SlotDescription& slot, bool with_descriptor
   for (const int descriptor : inherited) close(descriptor);
 }
 
-// Its socket is connected as soon as it is there, and has no name any more afterwards.
-void WorkerLink::start_command(const std::string& command, std::function<void()> on_end) {
-  const PrivateFolder folder;
-  spawn({program, "--exec", "/bin/sh", "-c", "exec " + command + " --listen unix:" + folder.socket()}, {},
-        std::move(on_end));
-  const auto until = std::chrono::steady_clock::now() + kStartLimit;
-  int descriptor = -1;
-  while ((descriptor = connect_unix(folder.socket())) < 0) {
-    if (process_->has_ended()) fail_start("'" + command + "' was " + process_->ending() + " before it listened");
-    if (std::chrono::steady_clock::now() > until) {
-      kill();
-      fail_start("'" + command + "' did not listen at the socket it was given with --listen");
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  use_socket(descriptor);
-}
-
-void WorkerLink::spawn(const std::vector<std::string>& arguments, const std::vector<int>& descriptors,
-                       std::function<void()> on_end) {
-  try {
-    process_ = Supervisor::instance().spawn(arguments, descriptors, std::move(on_end));
-  } catch (const std::system_error& error) {
-    fail_start("cannot start '" + arguments[0] + "': " + error.what());
-  }
-}
-
-void WorkerLink::use_socket(int descriptor) {
-  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(-1);
-  arguments.SetMaxSendMessageSize(-1);
-  // a large message should not wait for its receiver's leave every 64 KiB, nor come in parts of 16 KiB
-  arguments.SetInt(GRPC_ARG_HTTP2_MAX_FRAME_SIZE, 1 << 20);
-  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 1 << 24);
-  channel_ = grpc::CreateCustomInsecureChannelFromFd("worker", descriptor, arguments);
-}
-
 WorkerLink::~WorkerLink() {
   if (control_) drain();
   if (descriptor_socket_ >= 0) close(descriptor_socket_);
-  if (process_ && !process_->wait(kDrainMilliseconds)) kill();
+  if (!process_ || process_->wait(kDrainMilliseconds)) return;
+  kill();
+  process_->wait(kDrainMilliseconds);
 }
 
 void WorkerLink::finish() {
+  const std::stop_callback give_up(stop_, [this] { kill(); });
   const std::string problem = control_->wait_until_ready(kStartLimit);
-  if (!problem.empty()) fail_start(problem);
+  if (!problem.empty()) {
+    if (process_) process_->wait(kLastWordsMilliseconds);
+    fail_start(process_ ? problem + last_words(*process_) : problem);
+  }
   const auto& served = control_->welcome().plugins();
   if (served.size() != static_cast<int>(plugins_.size()))
     fail_start("it serves another number of plugins than asked for");
@@ -218,20 +265,44 @@ void WorkerLink::finish() {
 }
 
 void WorkerLink::kill() {
-  if (!process_) return;
-  process_->kill();
-  process_->wait(kDrainMilliseconds);
+  if (process_) process_->kill();
+}
+
+std::vector<std::string> WorkerLink::take_complaints() {
+  std::vector<std::string> all = control_->take_faults();
+  if (process_)
+    for (std::string& line : process_->take_output()) all.push_back(std::move(line));
+  return all;
+}
+
+std::vector<std::string> WorkerLink::sandbox() const {
+  const auto& list = control_->welcome().sandbox();
+  return {list.begin(), list.end()};
 }
 
 int WorkerLink::process_id() const { return process_ ? process_->process_id() : control_->welcome().process_id(); }
 
 void WorkerLink::report_death() {
   if (!process_) throw StageFault(FaultKind::kDeath, "stream", "the worker at " + address_ + " is gone");
+  const std::string who = "its worker process " + std::to_string(process_id());
   // the end may be known to the socket before it is to the watcher
-  process_->wait(kDrainMilliseconds);
-  throw StageFault(FaultKind::kDeath, "pidfd",
-                   "its worker process " + std::to_string(process_id()) + " " +
-                       (process_->has_ended() ? "was " + process_->ending() : "is gone"));
+  if (process_->wait(kDrainMilliseconds))
+    throw StageFault(FaultKind::kDeath, "pidfd", who + " was " + process_->ending() + last_words(*process_));
+  kill();
+  throw StageFault(FaultKind::kFailure, "stream", who + " closed its stream" + last_words(*process_));
+}
+
+void WorkerLink::report_overdue(bool at_cap, std::uint64_t deadline_ns) {
+  kill();
+  throw StageFault(FaultKind::kDeadline, "deadline",
+                   at_cap ? "the call took longer than ten times its deadline"
+                          : "no answer and no mark of progress within its deadline of " +
+                                std::to_string(deadline_ns / 1'000'000) + " ms");
+}
+
+void WorkerLink::report_bad_frame(const std::string& what) {
+  kill();
+  throw StageFault(FaultKind::kBadFrame, "wire", "its answer has " + what);
 }
 
 }  // namespace gravitas::kernel

@@ -4,12 +4,15 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
+#include "kernel/carrier/carrier.h"
 #include "kernel/control_session.h"
 #include "kernel/description.h"
 #include "kernel/fault.h"
@@ -22,12 +25,25 @@ inline constexpr int kDrainMilliseconds = 1000;
 // A call ends at this many deadlines, whatever its marks of progress.
 inline constexpr std::uint64_t kDeadlineCap = 10;
 
+// A command of somebody's own, started with `--listen unix:PATH` on a socket in a folder that only we can enter and
+// that is gone afterwards; it ends with us. Waits until it listens. Throws StageFault.
+struct ListeningCommand {
+  std::shared_ptr<WorkerProcess> process;
+  int descriptor;  // connected
+};
+ListeningCommand start_listening_command(const std::string& command, std::chrono::milliseconds limit,
+                                         std::function<void()> on_end, const std::stop_token& stop = {});
+
+// The gRPC channel to a worker over a connected socket, which it closes.
+std::shared_ptr<grpc::Channel> worker_channel(int descriptor);
+
 class WorkerLink {
  public:
   // Starts `gravitas-worker` with the plugins of the slot, or what the slot names instead. `with_descriptors`: with
   // a second socket pair, for shared memory. `on_end` runs in the supervisor's thread when a process of ours has
-  // ended. Throws StageFault.
-  WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors, std::function<void()> on_end);
+  // ended. Whoever asks `stop` to stop ends the waiting for it here and in finish(). Throws StageFault.
+  WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors, std::function<void()> on_end,
+             std::stop_token stop = {});
   ~WorkerLink();
   WorkerLink(const WorkerLink&) = delete;
   WorkerLink& operator=(const WorkerLink&) = delete;
@@ -37,6 +53,7 @@ class WorkerLink {
 
   // Asks it to end; the destructor waits for it.
   void drain() { control_->drain(); }
+  // Ends it; the destructor waits for it.
   void kill();
 
   // Incarnation; unique in this process, so an answer of another one can never be taken for one of this.
@@ -44,20 +61,24 @@ class WorkerLink {
   // Of the handshake for a worker that is no process of ours.
   int process_id() const;
   bool has_ended() const { return process_ && process_->has_ended(); }
-  // Throws the fault that says how it ended.
+  bool is_alive() const { return !has_ended() && control_->answers_heartbeats(); }
+  // Each ends the worker, whatever it would say next, and throws the fault that says how it failed.
   [[noreturn]] void report_death();
+  [[noreturn]] void report_overdue(bool at_cap, std::uint64_t deadline_ns);
+  [[noreturn]] void report_bad_frame(const std::string& what);
 
   int descriptor_socket() const { return descriptor_socket_; }
   const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
-  std::vector<std::string> take_faults() { return control_->take_faults(); }
+  // What it said went wrong, and the lines it wrote (process_output.h); taken out.
+  std::vector<std::string> take_complaints();
+  // Of the handshake.
+  std::vector<std::string> sandbox() const;
 
  private:
-  void start_program(const SlotDescription& slot, bool with_descriptors, std::function<void()> on_end);
-  void start_command(const std::string& command, std::function<void()> on_end);
-  void spawn(const std::vector<std::string>& arguments, const std::vector<int>& descriptors,
-             std::function<void()> on_end);
-  void use_socket(int descriptor);
+  void start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
+                     std::function<void()> on_end);
 
+  std::stop_token stop_;
   std::uint64_t epoch_;
   std::vector<std::string> plugins_;  // names
   std::string address_;               // of a worker that is no process of ours

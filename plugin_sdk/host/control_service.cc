@@ -63,6 +63,7 @@ WorkerMessage ControlService::welcome(const Hello& hello) const {
   for (const std::string& feature : cpu_features()) welcome->mutable_floating_point()->add_cpu_features(feature);
   welcome->set_process_id(getpid());
   for (const plugin::v1::Description& description : plugins_) *welcome->add_plugins() = description;
+  for (const std::string& measure : sandbox) welcome->add_sandbox(measure);
   return message;
 }
 

@@ -35,6 +35,8 @@ class ControlService final : public control::v1::WorkerControl::Service {
   // Called (from a thread of gRPC) when the kernel asks the worker to end, or is gone.
   std::function<void(bool kernel_is_gone)> on_end;
   std::atomic<std::uint64_t> calls{0};
+  // What the Welcome says of the sandbox (sandbox.h); set before the first session.
+  std::vector<std::string> sandbox;
 
   // Something the kernel should hear of besides the answers of calls; goes out with the next heartbeat.
   void complain(std::string text);

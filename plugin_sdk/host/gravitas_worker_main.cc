@@ -8,12 +8,17 @@
 //   gravitas-worker --exec PROGRAM ARGUMENT...                        becomes that program, which dies with the kernel
 //   gravitas-worker --listen ADDRESS LIBRARY...                       serves one kernel after the other at an address
 //                                                                     of this machine, data as gRPC messages
+//
+// Before it loads a library or starts a program it restricts itself (sandbox.h). `--no-sandbox` as the first word
+// leaves that out, for debuggers; `--memory-limit BYTES` (default 4 GiB) is what it may take of address space.
+#include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
@@ -26,12 +31,13 @@
 #include <utility>
 #include <vector>
 
-#include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/host/control_service.h"
 #include "plugin_sdk/host/describe.h"
 #include "plugin_sdk/host/description_message.h"
+#include "plugin_sdk/host/listener.h"
 #include "plugin_sdk/host/mailbox_loop.h"
+#include "plugin_sdk/host/sandbox.h"
 #include "plugin_sdk/host/stream_loop.h"
 
 namespace {
@@ -39,9 +45,11 @@ namespace {
 using namespace gravitas;
 
 struct Arguments {
+  bool sandbox = true;
   bool describe = false;
   int control = -1;
   int descriptors = -1;
+  std::uint64_t memory_limit = host::kDefaultMemoryLimit;
   std::string address;
   std::vector<std::string> libraries;
 };
@@ -50,12 +58,21 @@ int usage() {
   std::cerr << "usage: gravitas-worker --describe LIBRARY...\n"
             << "       gravitas-worker --listen ADDRESS LIBRARY...     127.0.0.1:PORT, [::1]:PORT or unix:PATH\n"
             << "       gravitas-worker --exec PROGRAM ARGUMENT...     as a kernel starts a command\n"
-            << "       gravitas-worker --control-fd N [--descriptor-fd M] LIBRARY...     as a kernel starts it\n";
+            << "       gravitas-worker --control-fd N [--descriptor-fd M] LIBRARY...     as a kernel starts it\n"
+            << "       gravitas-worker --no-sandbox ...     for debuggers: the process does not restrict itself\n"
+            << "--memory-limit BYTES, beside the libraries: address space that it may take, 4 GiB if absent\n";
   return 2;
 }
 
+// A positive number of bytes.
+bool parse_bytes(const char* text, std::uint64_t* bytes) {
+  const char* end = text + std::strlen(text);
+  const auto [rest, error] = std::from_chars(text, end, *bytes);
+  return error == std::errc() && rest == end && *bytes > 0;
+}
+
 bool parse(int argc, char** argv, Arguments* arguments) {
-  for (int i = 1; i < argc; ++i) {
+  for (int i = 0; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--describe") {
       arguments->describe = true;
@@ -63,6 +80,8 @@ bool parse(int argc, char** argv, Arguments* arguments) {
       (word == "--control-fd" ? arguments->control : arguments->descriptors) = std::atoi(argv[++i]);
     } else if (word == "--listen" && i + 1 < argc) {
       arguments->address = argv[++i];
+    } else if (word == "--memory-limit" && i + 1 < argc) {
+      if (!parse_bytes(argv[++i], &arguments->memory_limit)) return false;
     } else if (word.starts_with("--")) {
       return false;
     } else {
@@ -127,37 +146,42 @@ host::Admission create(const control::v1::Hello& hello, host::HostedPlugins* plu
   return {};
 }
 
-// Starts to listen; says where on standard output, so that a script that let the system choose the port knows it.
-std::unique_ptr<grpc::Server> listen(grpc::ServerBuilder* builder, const std::string& address) {
-  if (!channel::is_local_address(address)) {
-    std::cerr << "gravitas-worker: --listen " << address
-              << ": the connection is not encrypted, so only this machine is allowed: 127.0.0.1:PORT, [::1]:PORT or "
-                 "unix:PATH\n";
-    return nullptr;
-  }
-  int port = 0;
-  builder->AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder->AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
-  std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
-  if (!server || port == 0) {
-    std::cerr << "gravitas-worker: cannot listen at " << address << ": is it a free address of this machine?\n";
-    return nullptr;
-  }
-  if (!address.starts_with("unix:"))
-    std::cout << "listening at " << address.substr(0, address.rfind(':') + 1) << port << std::endl;
-  return server;
+// The signal of its parent's death comes never to a worker whose parent is dead already. Then the other end of what it
+// inherited, a socket or pipe, is closed.
+void die_with_kernel(int inherited) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  pollfd end = {inherited, 0, 0};
+  if (poll(&end, 1, 0) > 0 && (end.revents & (POLLHUP | POLLERR)) != 0) std::_Exit(0);
+}
+
+// Restricts the process as the arguments say. Returns what is enforced.
+std::vector<std::string> enter_sandbox(const Arguments& arguments, int socket) {
+  if (!arguments.sandbox) return {};
+  std::vector<int> kept = {socket};
+  if (arguments.descriptors >= 0) kept.push_back(arguments.descriptors);
+  host::close_inherited(kept);
+  return host::enter_sandbox(arguments.libraries, arguments.memory_limit);
 }
 
 int serve(const Arguments& arguments) {
   const bool listens = !arguments.address.empty();
-  if (!listens) prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (!listens) die_with_kernel(arguments.control);
   signal(SIGPIPE, SIG_IGN);
   // a worker that dies of a signal must be seen to: nobody, such as a sanitizer, makes an exit code of it
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) signal(number, SIG_DFL);
+  // a line that was printed is out, however the process ends
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+
+  std::string problem;
+  const int socket = listens ? host::listen_at(arguments.address, &problem) : arguments.control;
+  if (socket < 0) {
+    std::cerr << "gravitas-worker: " << problem << '\n';
+    return 1;
+  }
+  std::vector<std::string> sandbox = enter_sandbox(arguments, socket);
 
   std::vector<PluginLibrary> libraries;
   std::vector<plugin::v1::Description> descriptions;
-  std::string problem;
   for (const std::string& path : arguments.libraries) {
     PluginLibrary library = load_plugin_library(path, &problem);
     if (library.table == nullptr) break;
@@ -178,6 +202,7 @@ int serve(const Arguments& arguments) {
                                  if (!problem.empty()) return {control::v1::Refusal::REASON_LIBRARY, problem};
                                  return handshake.admit(hello);
                                });
+  service.sandbox = std::move(sandbox);
   service.on_end = [&](bool kernel_is_gone) {
     if (kernel_is_gone && !listens) std::_Exit(0);
     handshake.end();
@@ -186,8 +211,14 @@ int serve(const Arguments& arguments) {
   const std::unique_ptr<host::StreamLoop> streams =
       arguments.descriptors < 0 ? std::make_unique<host::StreamLoop>(builder.get()) : nullptr;
   const std::unique_ptr<grpc::Server> server =
-      listens ? listen(builder.get(), arguments.address) : host::serve_descriptor(builder.get(), arguments.control);
+      listens ? builder->BuildAndStart() : host::serve_descriptor(builder.get(), socket);
   if (!server) std::_Exit(1);
+  if (listens) {
+    host::take_connections(socket, server.get());
+    // so that a script that let the system choose the port knows it
+    if (!arguments.address.starts_with("unix:"))
+      std::cout << "listening at " << host::address_of(socket, arguments.address) << std::endl;
+  }
 
   int code = 0;
   do {
@@ -212,8 +243,11 @@ int serve(const Arguments& arguments) {
 }
 
 // The signal of a parent's death stays asked for across the exec.
-int become(char** argv) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
+int become(char** argv, bool sandbox) {
+  die_with_kernel(STDOUT_FILENO);
+  if (sandbox)
+    for (const std::string& measure : host::enter_bare_sandbox())
+      if (measure.starts_with("no ")) std::cerr << "gravitas-worker: " << measure << '\n';
   execvp(argv[0], argv);
   std::cerr << "gravitas-worker: cannot start '" << argv[0] << "': " << std::strerror(errno) << '\n';
   return 127;
@@ -222,13 +256,18 @@ int become(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc > 2 && std::string(argv[1]) == "--exec") return become(argv + 2);
+  Arguments arguments;
+  ++argv, --argc;
+  if (argc > 0 && std::string(argv[0]) == "--no-sandbox") {
+    arguments.sandbox = false;
+    ++argv, --argc;
+  }
+  if (argc > 1 && std::string(argv[0]) == "--exec") return become(argv + 1, arguments.sandbox);
   const std::string missing = missing_cpu_features();
   if (!missing.empty()) {
     std::cerr << "gravitas-worker: " << missing << '\n';
     return 1;
   }
-  Arguments arguments;
   if (!parse(argc, argv, &arguments)) return usage();
   return arguments.describe ? describe(arguments.libraries) : serve(arguments);
 }

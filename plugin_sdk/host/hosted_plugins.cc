@@ -37,7 +37,7 @@ std::string HostedPlugins::create(const std::vector<std::vector<double>>& settin
 }
 
 CallEnd HostedPlugins::call(std::uint32_t target, stage::Method method, const gravitas_column* request,
-                            gravitas_reply_column* reply, CallServices* services) {
+                            gravitas_reply_column* reply, CallServices* services, FaultInjection* fault) {
   struct Context {
     CallServices* services;
     ThreadPool* threads;
@@ -65,6 +65,11 @@ CallEnd HostedPlugins::call(std::uint32_t target, stage::Method method, const gr
   end.status = libraries_[target].table->call(instances_[target], static_cast<std::uint32_t>(method), request, reply,
                                               &host, &error);
   end.compute_ns = channel::now_ns() - start;
+  if (fault != nullptr && end.status != GRAVITAS_NEEDS_CAPACITY) {
+    end.status = fault->after_plugin(stage::method_info(method), request, reply, end.status, end.compute_ns, &error);
+    end.compute_ns = channel::now_ns() - start;
+    end.text = fault->note();
+  }
   if (floating_point_control() != control) {
     set_floating_point_control(control);
     end.status = GRAVITAS_FAILED;

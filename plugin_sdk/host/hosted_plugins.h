@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/host/fault_injection.h"
 #include "plugin_sdk/library.h"
 #include "plugin_sdk/thread_pool.h"
 
@@ -23,7 +24,7 @@ class CallServices {
 
 struct CallEnd {
   std::int32_t status = GRAVITAS_OK;
-  std::string text;
+  std::string text;  // why it is not GRAVITAS_OK; else what came of an ordered fault
   std::uint64_t compute_ns = 0;
 };
 
@@ -40,8 +41,9 @@ class HostedPlugins {
   std::size_t count() const { return instances_.size(); }
 
   // One call to a plugin, in the caller's thread. A plugin that leaves the floating-point environment changed fails.
+  // `fault` is what the call orders to go wrong, or null.
   CallEnd call(std::uint32_t target, stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
-               CallServices* services);
+               CallServices* services, FaultInjection* fault = nullptr);
 
  private:
   std::vector<PluginLibrary> libraries_;

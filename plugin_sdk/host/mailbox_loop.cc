@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <optional>
+
+#include "plugin_sdk/host/fault_injection.h"
 
 namespace gravitas::host {
 
@@ -25,6 +28,8 @@ struct MailboxLoop::OpenCall final : CallServices {
   std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply{};
   // Offsets of the rooms in the response segment: the reply's, then those for a derivative request.
   std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> room{};
+  // What the request orders to go wrong.
+  std::optional<FaultInjection> fault;
 };
 
 namespace {
@@ -135,16 +140,31 @@ std::string MailboxLoop::read_request(const gravitas_frame_header& request, Open
   return {};
 }
 
+// Empty, or why the order cannot be obeyed.
+std::string MailboxLoop::read_order(OpenCall* call) const {
+  std::string problem;
+  std::array<char, sizeof channel::Mailbox::text> order;
+  std::memcpy(order.data(), kernel_->text, order.size());
+  order.back() = '\0';
+  if (std::optional<FaultOrder> parsed = parse_fault_order(order.data(), &problem); parsed)
+    call->fault.emplace(std::move(*parsed));
+  return problem;
+}
+
 void MailboxLoop::answer(const gravitas_frame_header& request) {
   OpenCall call(this);
-  const std::string problem = read_request(request, &call);
+  std::string problem = read_request(request, &call);
+  if (problem.empty() && request.fault != 0) problem = read_order(&call);
   if (!problem.empty()) {
     call.request.method = std::min(request.method, stage::kMethodCount - 1);
     write_reply(call, GRAVITAS_FAILED, problem.c_str(), 0);
     return;
   }
+  FaultInjection* fault = call.fault ? &*call.fault : nullptr;
+  if (fault != nullptr) fault->pass(Moment::kRead);
   const CallEnd end = plugins_->call(request.target, static_cast<stage::Method>(request.method), call.columns.data(),
-                                     call.reply.data(), &call);
+                                     call.reply.data(), &call, fault);
+  if (end.status != GRAVITAS_OK) call.fault.reset();
   write_reply(call, end.status, end.text.c_str(), end.compute_ns);
 }
 
@@ -154,6 +174,10 @@ void MailboxLoop::write_reply(const OpenCall& call, std::int32_t status, const c
   header.status = status;
   header.column_count = static_cast<std::uint32_t>(call.reply_columns);
   header.reply_count = 0;
+  if (call.fault) {
+    header.epoch = call.fault->epoch(header.epoch);
+    header.sequence = call.fault->sequence(header.sequence);
+  }
   for (std::size_t i = 0; i < call.reply_columns; ++i)
     mine_->columns[i] = {call.room[i], call.reply[i].count, call.reply[i].capacity};
   std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
@@ -163,6 +187,15 @@ void MailboxLoop::write_reply(const OpenCall& call, std::int32_t status, const c
                             stage::kMethods[header.method].reply, status == GRAVITAS_OK ? data.data() : nullptr);
   std::strncpy(mine_->text, text, sizeof mine_->text - 1);
   mine_->compute_ns = compute_ns;
+  if (!call.fault) return post(header);
+  call.fault->spoil_frame(&header, std::span(mine_->columns).first(call.reply_columns),
+                          stage::kMethods[call.request.method].reply, call.reply.data());
+  call.fault->pass(Moment::kWrite);
+  for (int i = 0; i < call.fault->copies(); ++i) post(header);
+  call.fault->pass(Moment::kReply);
+}
+
+void MailboxLoop::post(const gravitas_frame_header& header) {
   std::memcpy(&mine_->header, &header, sizeof header);
   channel::post(mine_, kernel_);
 }
@@ -186,8 +219,7 @@ std::int32_t MailboxLoop::ask_derivative(OpenCall* call, const gravitas_column* 
     mine_->columns[i] = {call->room[room], request[i].count, call->reply[room].capacity};
   }
   header.digest = channel::frame_digest(header, std::span(mine_->columns).first(columns), method.request, data.data());
-  std::memcpy(&mine_->header, &header, sizeof header);
-  channel::post(mine_, kernel_);
+  post(header);
 
   // the kernel answers, or kills this process
   while (channel::wait(mine_, kernel_, seen_, channel::now_ns() + kIdleNs) == channel::Waited::kTimeout) {

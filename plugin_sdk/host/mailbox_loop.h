@@ -35,7 +35,9 @@ class MailboxLoop {
   bool map_announced_segments(const gravitas_frame_header& header);
   void answer(const gravitas_frame_header& request);
   std::string read_request(const gravitas_frame_header& request, OpenCall* call);
+  std::string read_order(OpenCall* call) const;
   void write_reply(const OpenCall& call, std::int32_t status, const char* text, std::uint64_t compute_ns);
+  void post(const gravitas_frame_header& header);
   std::int32_t ask_derivative(OpenCall* call, const gravitas_column* request, gravitas_reply_column* reply);
   void leave_crowded_core();
 

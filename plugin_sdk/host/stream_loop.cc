@@ -6,9 +6,11 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/host/fault_injection.h"
 #include "schemas/wire/byte_buffer.h"
 
 namespace gravitas::host {
@@ -185,11 +187,11 @@ bool StreamLoop::pump(int milliseconds) {
 void StreamLoop::read(Stream* stream) { stream->io.Read(&stream->incoming, &stream->read); }
 
 // Waits until the message before has gone out; false if the stream is broken.
-bool StreamLoop::write(Stream* stream, const grpc::ByteBuffer& message) {
+bool StreamLoop::write(Stream* stream, const grpc::ByteBuffer& message, grpc::WriteOptions options) {
   while (stream->open && stream->writing) pump(kIdleMilliseconds);
   if (!stream->open) return false;
   stream->writing = true;
-  stream->io.Write(message, &stream->write);
+  stream->io.Write(message, options, &stream->write);
   return true;
 }
 
@@ -197,6 +199,8 @@ void StreamLoop::serve(HostedPlugins* plugins, std::uint64_t epoch, const std::a
                        std::atomic<std::uint64_t>* calls) {
   plugins_ = plugins;
   epoch_ = epoch;
+  // the assets of the kernel before
+  assets_.clear();
   if (accepting_ == nullptr) accept();
   while (!stopping.load()) {
     if (!pump(kIdleMilliseconds)) return;
@@ -268,17 +272,23 @@ void StreamLoop::handle(Stream* stream) {
   } else if (problem.empty()) {
     problem = read_request(stream, reader, &call);
   }
+  std::optional<FaultInjection> fault;
+  if (problem.empty() && !call.fault().empty()) {
+    if (std::optional<FaultOrder> order = parse_fault_order(call.fault(), &problem); order)
+      fault.emplace(std::move(*order));
+  }
   if (problem.empty()) {
-    answer(stream, call);
+    answer(stream, call, fault ? &*fault : nullptr);
   } else {
     write_outcome(stream, call, GRAVITAS_FAILED, problem);
   }
   if (stream->open) read(stream);
 }
 
-void StreamLoop::answer(Stream* stream, const Call& call) {
+void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault) {
   const MethodInfo& method = stage::method_info(stream->method);
   OpenCall services(this, stream, call);
+  if (fault != nullptr) fault->pass(Moment::kRead);
   CallEnd end;
   do {
     for (std::size_t i = 0; i < method.reply.size(); ++i) {
@@ -286,7 +296,7 @@ void StreamLoop::answer(Stream* stream, const Call& call) {
       void* data = room.reserve(std::max(stream->reply[i].count, kFirstRoom));
       stream->reply[i] = {data, room.capacity, 0};
     }
-    end = plugins_->call(call.target(), stream->method, stream->columns.data(), stream->reply.data(), &services);
+    end = plugins_->call(call.target(), stream->method, stream->columns.data(), stream->reply.data(), &services, fault);
     for (std::size_t i = 0; i < method.reply.size() && end.status == GRAVITAS_NEEDS_CAPACITY; ++i) {
       if (stream->reply[i].count <= wire::kMostElements) continue;
       end.status = GRAVITAS_FAILED;
@@ -307,8 +317,8 @@ void StreamLoop::answer(Stream* stream, const Call& call) {
   Outcome outcome = services.head();
   outcome.set_compute_nanoseconds(end.compute_ns);
   outcome.set_digest(wire::columns_digest(method.reply, reply));
-  const std::lock_guard lock(io_);
-  write(stream, wire::to_byte_buffer({method.reply, reply, &outcome}));
+  outcome.set_text(end.text);
+  write_reply(stream, method.reply, reply, &outcome, fault);
 }
 
 void StreamLoop::write_outcome(Stream* stream, const Call& call, std::int32_t status, const std::string& text) {
@@ -317,8 +327,29 @@ void StreamLoop::write_outcome(Stream* stream, const Call& call, std::int32_t st
   outcome.set_sequence(call.sequence());
   outcome.set_status(static_cast<Outcome::Status>(status));
   outcome.set_text(text);
+  write_reply(stream, {}, {}, &outcome, nullptr);
+}
+
+void StreamLoop::write_reply(Stream* stream, std::span<const ColumnInfo> infos,
+                             std::span<const gravitas_column> columns, Outcome* outcome, const FaultInjection* fault) {
   const std::lock_guard lock(io_);
-  write(stream, wire::to_byte_buffer({{}, {}, &outcome}));
+  if (fault == nullptr) {
+    write(stream, wire::to_byte_buffer({infos, columns, outcome}));
+    return;
+  }
+  outcome->set_epoch(fault->epoch(outcome->epoch()));
+  outcome->set_sequence(fault->sequence(outcome->sequence()));
+  const grpc::ByteBuffer right = wire::to_byte_buffer({infos, columns, outcome});
+  const wire::FlatMessage flat(right);
+  std::string message(reinterpret_cast<const char*>(flat.bytes().data()), flat.bytes().size());
+  fault->spoil_message(&message, wire::columns_size(infos, columns));
+  fault->pass(Moment::kWrite);
+  const grpc::Slice slice(message);
+  for (int i = 0; i < fault->copies(); ++i)
+    write(stream, grpc::ByteBuffer(&slice, 1), grpc::WriteOptions().set_write_through());
+  // out of this process, as far as gRPC tells
+  while (stream->open && stream->writing) pump(kIdleMilliseconds);
+  fault->pass(Moment::kReply);
 }
 
 }  // namespace gravitas::host

@@ -49,12 +49,14 @@ class StreamLoop {
   void accept();
   bool pump(int milliseconds);
   void read(Stream* stream);
-  bool write(Stream* stream, const grpc::ByteBuffer& message);
+  bool write(Stream* stream, const grpc::ByteBuffer& message, grpc::WriteOptions options = {});
   void handle(Stream* stream);
   std::string take_asset(std::span<const std::byte> bytes);
   std::string read_request(Stream* stream, const wire::ColumnsReader& reader, stage::v1::Call* call);
-  void answer(Stream* stream, const stage::v1::Call& call);
+  void answer(Stream* stream, const stage::v1::Call& call, FaultInjection* fault);
   void write_outcome(Stream* stream, const stage::v1::Call& call, std::int32_t status, const std::string& text);
+  void write_reply(Stream* stream, std::span<const stage::ColumnInfo> infos, std::span<const gravitas_column> columns,
+                   stage::v1::Outcome* outcome, const FaultInjection* fault);
 
   HostedPlugins* plugins_ = nullptr;
   grpc::AsyncGenericService service_;

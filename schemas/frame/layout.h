@@ -78,8 +78,8 @@ typedef struct gravitas_frame_header {
   uint32_t target;    // which of the worker's plugins
   int32_t status;     // gravitas_status, in a reply
   uint32_t column_count;
-  uint32_t reply_count;  // columns of the reply that room is described for
-  uint32_t reserved;
+  uint32_t reply_count;          // columns of the reply that room is described for
+  uint32_t fault;                // 1 in a request whose sender's text orders a fault to be injected
   uint64_t state_generation;     // which state segment the offsets mean
   uint64_t response_generation;  // which response segment
   uint64_t deadline_ns;          // CLOCK_MONOTONIC

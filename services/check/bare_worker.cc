@@ -1,57 +1,23 @@
 #include "services/check/bare_worker.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <grpcpp/create_channel_posix.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
-#include <cstring>
-#include <filesystem>
 #include <stdexcept>
 #include <system_error>
-#include <thread>
 
 #include "gravitas/control/v1/control.grpc.pb.h"
 #include "kernel/carrier/carrier.h"
+#include "kernel/carrier/worker_link.h"
 
 namespace gravitas::check {
 namespace {
 
 // How long a process may take to have ended once its stream has.
 constexpr int kReapMilliseconds = 200;
-
-int connect_to(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  path.copy(address.sun_path, sizeof address.sun_path - 1);
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (descriptor < 0 || connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-    return descriptor;
-  close(descriptor);
-  return -1;
-}
-
-// A folder of its own for a socket, gone with this object.
-class SocketFolder {
- public:
-  SocketFolder() : path_((std::filesystem::temp_directory_path() / "gravitas-XXXXXX").string()) {
-    if (mkdtemp(path_.data()) == nullptr) throw std::system_error(errno, std::generic_category(), path_);
-  }
-  ~SocketFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  SocketFolder(const SocketFolder&) = delete;
-  SocketFolder& operator=(const SocketFolder&) = delete;
-  std::string socket() const { return path_ + "/worker"; }
-
- private:
-  std::string path_;
-};
 
 std::chrono::microseconds duration(double seconds) {
   return std::chrono::microseconds(static_cast<std::int64_t>(seconds * 1e6));
@@ -80,33 +46,18 @@ void BareWorker::start_library(const std::string& library) {
   process_ =
       kernel::Supervisor::instance().spawn({kernel::worker_program(), "--control-fd", "3", library}, {ends[1]}, {});
   close(ends[1]);
-  use_socket(ends[0]);
+  channel_ = kernel::worker_channel(ends[0]);
 }
 
 void BareWorker::start_command(const std::string& command, double seconds) {
-  const SocketFolder folder;
-  process_ = kernel::Supervisor::instance().spawn(
-      {"/bin/sh", "-c", "exec " + command + " --listen unix:" + folder.socket()}, {}, {});
-  const auto until = std::chrono::steady_clock::now() + duration(seconds);
-  int descriptor = -1;
-  while ((descriptor = connect_to(folder.socket())) < 0) {
-    const bool has_ended = process_->has_ended();
-    if (!has_ended && std::chrono::steady_clock::now() < until) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      continue;
-    }
-    process_->kill();
-    process_->wait(kReapMilliseconds);
-    throw std::runtime_error(has_ended
-                                 ? fmt::format("it was {} before it listened", process_->ending())
-                                 : fmt::format("it did not listen at its --listen address within {:g} s", seconds));
+  try {
+    const kernel::ListeningCommand started = kernel::start_listening_command(
+        command, std::chrono::duration_cast<std::chrono::milliseconds>(duration(seconds)), {});
+    process_ = started.process;
+    channel_ = kernel::worker_channel(started.descriptor);
+  } catch (const kernel::StageFault& fault) {
+    throw std::runtime_error(fault.text);
   }
-  use_socket(descriptor);
-}
-
-void BareWorker::use_socket(int descriptor) {
-  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-  channel_ = grpc::CreateInsecureChannelFromFd("worker", descriptor);
 }
 
 Greeted BareWorker::greet(const control::v1::Hello& hello, double seconds) {

@@ -38,7 +38,6 @@ class BareWorker {
  private:
   void start_library(const std::string& library);
   void start_command(const std::string& command, double seconds);
-  void use_socket(int descriptor);
 
   std::shared_ptr<kernel::WorkerProcess> process_;
   std::shared_ptr<grpc::Channel> channel_;

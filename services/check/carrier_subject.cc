@@ -117,8 +117,7 @@ void CarrierSubject::start() {
   if (carrier_) return;
   const kernel::SlotDescription slot = examinee_.slot(hosting_, patience_.deadline);
   carrier_ = (hosting_ == kernel::Hosting::kGrpc ? kernel::start_grpc_carrier(slot, threads_)
-                                                 : kernel::start_shared_memory_carrier(slot, threads_))
-                 ->finish();
+                                                 : kernel::start_shared_memory_carrier(slot, threads_));
   const std::lock_guard lock(mutex_);
   pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, carrier_->process_id(), 0));
 }

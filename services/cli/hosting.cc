@@ -3,17 +3,12 @@
 #include <fmt/format.h>
 
 #include "plugin_sdk/channel/address.h"
+#include "services/run/exchange_spec.h"
 
 namespace gravitas::cli {
 namespace {
 
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
-
 HostingChoice parse_mode(const std::string& word, std::optional<Slot> slot, const std::string& mode) {
-  if (mode == "direct") return {slot, kernel::Hosting::kDirect, ""};
-  if (mode == "shm") return {slot, kernel::Hosting::kSharedMemory, ""};
-  if (mode == "grpc") return {slot, kernel::Hosting::kGrpc, ""};
   if (mode.starts_with("grpc:")) {
     const std::string address = mode.substr(5);
     if (!slot)
@@ -25,7 +20,7 @@ HostingChoice parse_mode(const std::string& word, std::optional<Slot> slot, cons
                       word, address));
     return {slot, kernel::Hosting::kGrpc, address};
   }
-  throw BadInput(fmt::format("--hosting {}: unknown mode '{}'; allowed: direct, shm, grpc, grpc:ADDRESS", word, mode));
+  return {slot, parse_hosting_mode("--hosting", word, mode), ""};
 }
 
 }  // namespace
@@ -38,16 +33,7 @@ std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words) 
       choices.push_back(parse_mode(word, std::nullopt, word));
       continue;
     }
-    const std::string name = word.substr(0, equals);
-    std::optional<Slot> found;
-    for (const Slot slot : kSlots)
-      if (name == slot_name(slot)) found = slot;
-    if (!found)
-      throw BadInput(
-          fmt::format("--hosting {}: unknown slot '{}'; allowed: space, collision, constraint, force, solver, "
-                      "integrator",
-                      word, name));
-    choices.push_back(parse_mode(word, found, word.substr(equals + 1)));
+    choices.push_back(parse_mode(word, parse_slot("--hosting", word, word.substr(0, equals)), word.substr(equals + 1)));
   }
   return choices;
 }

@@ -8,9 +8,11 @@
 #include <limits>
 #include <memory>
 
+#include "kernel/carrier/carrier.h"
 #include "services/cli/commands.h"
 #include "services/cli/hosting.h"
 #include "services/recorder/json.h"
+#include "services/run/report.h"
 #include "services/run/session.h"
 
 namespace gravitas::cli {
@@ -27,7 +29,7 @@ void request_interrupt(int number) {
 struct CommandLine {
   RunOptions options;
   std::vector<std::string> hosting;
-  bool progress = false, quiet = false, json = false;
+  bool progress = false, quiet = false, json = false, no_sandbox = false;
 };
 
 void add_scene_options(CLI::App* command, CommandLine* line) {
@@ -109,6 +111,7 @@ void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warni
 
 int run_scene(CommandLine* line) {
   line->options.hosting = parse_hosting(line->hosting);
+  kernel::set_worker_sandbox(!line->no_sandbox);
   std::signal(SIGINT, request_interrupt);
   std::signal(SIGTERM, request_interrupt);
   // a file beyond the limit of its size is an error of that write, as a full disk is
@@ -185,9 +188,20 @@ void add_run(CLI::App* app, Action* action) {
       ->needs(checkpoint);
   command->add_option("--resume", options.resume,
                       "Go on from this checkpoint; --steps and --duration count from t = 0");
+  const auto add_list = [&](const char* name, std::vector<std::string>* values, const char* text) {
+    command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
+  };
+  add_list("--swap", &options.swaps,
+           "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N; repeatable");
+  add_list("--compare", &options.comparisons,
+           "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
+  add_list("--rerun", &options.reruns,
+           "Ask another process the same at every N-th call and take the majority's bytes: SLOT=N; repeatable");
+  add_list("--fault", &options.faults, "Inject a fault: SLOT:KIND@step=N[,arg=...]; repeatable");
   command->add_flag("--json", line->json, "Print the report instead of the summary");
   command->add_flag("--progress", line->progress, "Show progress from the start");
   command->add_flag("--quiet", line->quiet, "Print nothing but errors");
+  command->add_flag("--no-sandbox", line->no_sandbox, "Let worker processes do what they like: for debuggers");
   command->callback([=] { *action = [=] { return run_scene(line.get()); }; });
 }
 

@@ -93,7 +93,7 @@ bool is_possible(const recorder::v1::Tally& tally) {
 }  // namespace
 
 Checkpoint make_checkpoint(const kernel::Environment& environment, const recorder::v1::Identity& identity,
-                           const recorder::v1::Tally& tally) {
+                           const recorder::v1::Tally& tally, std::span<const recorder::v1::Decision> decisions) {
   const kernel::SavedState saved = environment.saved_state();
   Checkpoint checkpoint;
   checkpoint.set_build(GRAVITAS_BUILD_ID);
@@ -113,6 +113,7 @@ Checkpoint make_checkpoint(const kernel::Environment& environment, const recorde
     column->Add(numbers.begin(), numbers.end());
   });
   *checkpoint.mutable_tally() = tally;
+  for (const recorder::v1::Decision& decision : decisions) *checkpoint.add_decisions() = decision;
   return checkpoint;
 }
 

@@ -21,9 +21,11 @@
 
 namespace gravitas {
 
-// The message of an environment's committed state. `identity` and `tally` are the caller's.
+// The message of an environment's committed state. `identity`, `tally` and the decisions in force are the
+// caller's.
 recorder::v1::Checkpoint make_checkpoint(const kernel::Environment& environment, const recorder::v1::Identity& identity,
-                                         const recorder::v1::Tally& tally);
+                                         const recorder::v1::Tally& tally,
+                                         std::span<const recorder::v1::Decision> decisions = {});
 
 // The bytes of the file. Throws std::length_error beyond 2 GiB, which a message cannot hold.
 std::vector<std::byte> serialize_checkpoint(const recorder::v1::Checkpoint& checkpoint);

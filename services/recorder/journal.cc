@@ -10,6 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "services/recorder/durable_file.h"
 
@@ -31,19 +32,22 @@ struct Header {
 };
 static_assert(sizeof(Header) == 40);
 
-enum class Kind : std::uint8_t { kCommit = 1 };
+constexpr std::uint8_t kCommit = 1, kDecision = 2;
 
-// Head and payload of a commit; a check of eight bytes follows.
-struct CommitRecord {
-  Kind kind;
+struct RecordHead {
+  std::uint8_t kind;
   std::array<std::uint8_t, 3> zero;
-  std::uint32_t size;
+  std::uint32_t size;  // of the payload
+};
+static_assert(sizeof(RecordHead) == 8);
+constexpr std::size_t kCheckSize = sizeof(std::uint64_t);
+constexpr std::uint32_t kLargestPayload = 1 << 20;
+
+struct CommitPayload {
   std::uint32_t step;
   std::array<std::uint32_t, 4> chain;  // two numbers of 64 bits, their lower halves first
 };
-static_assert(sizeof(CommitRecord) == 28);
-constexpr std::uint32_t kCommitSize = 20;
-constexpr std::size_t kRecordSize = sizeof(CommitRecord) + sizeof(std::uint64_t);
+static_assert(sizeof(CommitPayload) == 20);
 
 constexpr std::uint32_t low(std::uint64_t value) { return static_cast<std::uint32_t>(value); }
 constexpr std::uint32_t high(std::uint64_t value) { return static_cast<std::uint32_t>(value >> 32); }
@@ -57,8 +61,21 @@ Header header_of(const kernel::Hash& run) {
   return header;
 }
 
-std::uint64_t check_of(const CommitRecord& record, std::uint64_t previous) {
-  return XXH3_64bits_withSeed(&record, sizeof record, previous);
+// False if the content is impossible.
+bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uint32_t after, JournalReading* reading) {
+  if (kind == kDecision) {
+    recorder::v1::Decision decision;
+    if (!decision.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) return false;
+    if (decision.step() > after) reading->decisions.push_back(std::move(decision));
+    return true;
+  }
+  CommitPayload commit;
+  if (kind != kCommit || payload.size() != sizeof commit) return false;
+  std::memcpy(&commit, payload.data(), sizeof commit);
+  if (commit.step <= reading->last_step) return false;
+  reading->last_step = commit.step;
+  if (commit.step > after) reading->commits.push_back({commit.step, {word(commit.chain, 0), word(commit.chain, 2)}});
+  return true;
 }
 
 }  // namespace
@@ -82,18 +99,19 @@ JournalReading read_journal(std::span<const std::byte> bytes, const kernel::Hash
   }
   reading.end = sizeof header;
   reading.check = header.check;
-  while (bytes.size() - reading.end >= kRecordSize) {
-    CommitRecord record;
+  for (;;) {
+    const std::span<const std::byte> rest = bytes.subspan(reading.end);
+    RecordHead head;
+    if (rest.size() < sizeof head) break;
+    std::memcpy(&head, rest.data(), sizeof head);
+    const std::size_t whole = sizeof head + std::size_t{head.size} + kCheckSize;
+    if (head.zero != RecordHead{}.zero || head.size > kLargestPayload || rest.size() < whole) break;
     std::uint64_t check = 0;
-    std::memcpy(&record, bytes.data() + reading.end, sizeof record);
-    std::memcpy(&check, bytes.data() + reading.end + sizeof record, sizeof check);
-    if (record.kind != Kind::kCommit || record.size != kCommitSize || check != check_of(record, reading.check) ||
-        record.step <= reading.last_step)
-      break;
-    reading.end += kRecordSize;
+    std::memcpy(&check, &rest[whole - kCheckSize], kCheckSize);
+    if (check != XXH3_64bits_withSeed(rest.data(), whole - kCheckSize, reading.check)) break;
+    if (!take_record(head.kind, rest.subspan(sizeof head, head.size), after, &reading)) break;
+    reading.end += whole;
     reading.check = check;
-    reading.last_step = record.step;
-    if (record.step > after) reading.commits.push_back({record.step, {word(record.chain, 0), word(record.chain, 2)}});
   }
   if (reading.end < bytes.size())
     reading.note = fmt::format("its last {} bytes are no whole record", bytes.size() - reading.end);
@@ -132,20 +150,26 @@ JournalWriter::~JournalWriter() { close(file_); }
 void JournalWriter::append(const JournalEntry& commit) {
   if (commit.step <= last_step_) return;
   last_step_ = commit.step;
-  const CommitRecord record{
-      Kind::kCommit,
-      {},
-      kCommitSize,
-      commit.step,
-      {low(commit.chain.low), high(commit.chain.low), low(commit.chain.high), high(commit.chain.high)}};
-  check_ = check_of(record, check_);
-  const auto put = [&](const auto& value) {
-    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
-    buffer_.insert(buffer_.end(), bytes, bytes + sizeof value);
-  };
-  put(record);
-  put(check_);
+  const CommitPayload payload{
+      commit.step, {low(commit.chain.low), high(commit.chain.low), low(commit.chain.high), high(commit.chain.high)}};
+  put(kCommit, std::as_bytes(std::span(&payload, 1)));
   if (buffer_.size() >= kLargestBuffer || Clock::now() - last_flush_ >= kLongestWait) flush();
+}
+
+void JournalWriter::append(const recorder::v1::Decision& decision) {
+  const std::string payload = decision.SerializeAsString();
+  put(kDecision, std::as_bytes(std::span(payload)));
+  flush();
+}
+
+void JournalWriter::put(std::uint8_t kind, std::span<const std::byte> payload) {
+  const RecordHead head{kind, {}, static_cast<std::uint32_t>(payload.size())};
+  const std::size_t begin = buffer_.size();
+  const auto add = [&](std::span<const std::byte> bytes) { buffer_.insert(buffer_.end(), bytes.begin(), bytes.end()); };
+  add(std::as_bytes(std::span(&head, 1)));
+  add(payload);
+  check_ = XXH3_64bits_withSeed(&buffer_[begin], buffer_.size() - begin, check_);
+  add(std::as_bytes(std::span(&check_, 1)));
 }
 
 void JournalWriter::flush() {

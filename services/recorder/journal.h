@@ -4,11 +4,12 @@
 //   header: magic 8 | version 4 | 0 4 | run 16 | check 8                                   little-endian
 //   record: kind 1 | 0 3 | size 4 | payload | check 8
 //   kinds:  1 commit: step 4, chain hash 16 (36 bytes a step in all)
+//           2 decision: a message recorder.v1.Decision; who answers from its step on
 //
 // A check is XXH3-64 of the record, seeded with the check before it, so that records can neither be changed nor
 // exchanged. `run` is the digest of the scene's identity and the build. A record that is not whole (a crash tears the
-// last one) ends the journal. Decisions that change what the next commit is made of get kinds of their own, and are
-// written before that commit; commits may be buffered, since the journal only vouches for them.
+// last one) ends the journal. Decisions change what the next commit is made of, and are written before that commit;
+// commits may be buffered, since the journal only vouches for them.
 #pragma once
 
 #include <chrono>
@@ -18,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "kernel/hash.h"
 
 namespace gravitas {
@@ -29,11 +31,12 @@ struct JournalEntry {
 
 // What could be read of a journal.
 struct JournalReading {
-  std::vector<JournalEntry> commits;  // beyond the step asked for, ascending
-  std::uint64_t end = 0;              // offset behind the last whole record; 0: not a journal of this run
-  std::uint64_t check = 0;            // of that record
-  std::uint32_t last_step = 0;        // of all commits
-  std::string note;                   // what was left aside and why; empty: nothing
+  std::vector<JournalEntry> commits;              // beyond the step asked for, ascending
+  std::vector<recorder::v1::Decision> decisions;  // for steps beyond it
+  std::uint64_t end = 0;                          // offset behind the last whole record; 0: not a journal of this run
+  std::uint64_t check = 0;                        // of that record
+  std::uint32_t last_step = 0;                    // of all commits
+  std::string note;                               // what was left aside and why; empty: nothing
 };
 
 // Reads any bytes. `after`: the step that is already known.
@@ -51,10 +54,14 @@ class JournalWriter {
   // Steps that the journal knows are not written again. Throws std::system_error when what is buffered cannot be
   // written; it is then lost.
   void append(const JournalEntry& commit);
+  // Written at once.
+  void append(const recorder::v1::Decision& decision);
   void flush();
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  void put(std::uint8_t kind, std::span<const std::byte> payload);
 
   std::string path_;
   int file_ = -1;

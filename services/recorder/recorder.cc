@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "services/recorder/checkpoint.h"
+#include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/identity.h"
 
@@ -49,6 +50,12 @@ void Recorder::on_commit(const kernel::Environment& environment) {
   if (every_ != 0 && commit.step % every_ == 0) save(environment);
 }
 
+void Recorder::on_decision(const kernel::Environment&, const kernel::Decision& decision) {
+  const recorder::v1::Decision message = message_of(decision);
+  put_in_force(message, &decisions_);
+  if (journal_) journal_->append(message);
+}
+
 void Recorder::check(const JournalEntry& commit) {
   while (next_expected_ < expected_.size() && expected_[next_expected_].step < commit.step) ++next_expected_;
   if (next_expected_ == expected_.size()) return;
@@ -68,7 +75,7 @@ void Recorder::save(const kernel::Environment& environment) {
 }
 
 void Recorder::save_to(const std::string& path, const kernel::Environment& environment) const {
-  const recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_());
+  const recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
   try {
     replace_file(path, serialize_checkpoint(checkpoint));
   } catch (const std::system_error& error) {

@@ -35,6 +35,9 @@ class Recorder final : public kernel::CommitListener {
   // `tally` says what the report has counted so far.
   Recorder(recorder::v1::Identity identity, std::function<recorder::v1::Tally()> tally);
 
+  // Who answers instead of the scene's own plugins, when the run begins.
+  void set_decisions(std::vector<recorder::v1::Decision> decisions) { decisions_ = std::move(decisions); }
+
   // The next steps must have the chain hashes of this journal.
   void expect(const std::string& journal, std::vector<JournalEntry> commits);
 
@@ -45,6 +48,7 @@ class Recorder final : public kernel::CommitListener {
 
   // Throws NotRepeatable, std::system_error.
   void on_commit(const kernel::Environment& environment) override;
+  void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
 
   // Brings file and journal to the committed state. Throws std::system_error.
   void save(const kernel::Environment& environment);
@@ -63,6 +67,7 @@ class Recorder final : public kernel::CommitListener {
   recorder::v1::Identity identity_;
   std::function<recorder::v1::Tally()> tally_;
 
+  std::vector<recorder::v1::Decision> decisions_;  // the last for each plugin of a slot
   std::string expected_journal_;
   std::vector<JournalEntry> expected_;
   std::size_t next_expected_ = 0;

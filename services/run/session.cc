@@ -12,12 +12,16 @@
 #include "kernel/carrier/carrier.h"
 #include "services/catalog/catalog.h"
 #include "services/recorder/checkpoint.h"
+#include "services/recorder/decision.h"
 #include "services/recorder/event_log.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/json.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
+#include "services/run/exchange_spec.h"
+#include "services/run/fault_spec.h"
 #include "services/run/figures.h"
+#include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
 #include "services/scene/build.h"
@@ -50,37 +54,6 @@ void apply_hosting(const std::vector<HostingChoice>& choices, kernel::Environmen
   }
 }
 
-void write_stages(const kernel::Environment& environment, report::v1::Report* report) {
-  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(kernel::Stage::kCount); ++i) {
-    const auto stage = static_cast<kernel::Stage>(i);
-    const kernel::DurationHistogram& time = environment.stage_time(stage);
-    if (time.count() == 0) continue;
-    report::v1::StageTiming* timing = report->add_stages();
-    timing->set_stage(kernel::stage_name(stage));
-    timing->set_calls(static_cast<std::uint32_t>(time.count()));
-    timing->set_median_us(time.quantile_us(0.5));
-    timing->set_p99_us(time.quantile_us(0.99));
-    timing->set_transport_median_us(environment.transport_time(stage).quantile_us(0.5));
-    timing->set_validation_median_us(environment.validation_time(stage).quantile_us(0.5));
-  }
-  const kernel::DurationHistogram& steps = environment.step_time();
-  report::v1::Durations* durations = report->mutable_microseconds_per_step();
-  durations->set_mean(steps.mean_us());
-  durations->set_median(steps.quantile_us(0.5));
-  durations->set_p99(steps.quantile_us(0.99));
-  durations->set_max(steps.max_us());
-}
-
-void write_fault(const kernel::FaultRecord& record, report::v1::Report* report) {
-  report::v1::FaultRecord* fault = report->add_faults();
-  fault->set_step(record.step);
-  fault->set_slot(slot_name(record.fault.slot));
-  fault->set_kind(kernel::fault_kind_name(record.fault.kind));
-  fault->set_detected_by(record.fault.detected_by);
-  fault->set_recovered_by("none: paused");
-  fault->set_text(record.fault.text);
-}
-
 std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
   return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
                      fault.text, kernel::fault_kind_name(fault.kind));
@@ -103,7 +76,7 @@ std::string installed_plugins() {
   return (bin.parent_path() / "lib" / "gravitas").string();
 }
 
-kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings) {
+kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings, Catalog* plugins) {
   const auto require_positive = [](const char* option, double value) {
     if (!std::isfinite(value) || value <= 0.0)
       throw BadInput(fmt::format("{} {:g}: it must be a finite number of seconds > 0", option, value));
@@ -122,7 +95,9 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
   for (const std::string& one : overrides) scene::apply_override(&document.scene(), one, &problems);
   require(problems);
 
-  Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
+  Catalog own;
+  Catalog& catalog = plugins != nullptr ? *plugins : own;
+  catalog = Catalog::installed(installed_worker(), installed_plugins());
   std::optional<kernel::EnvironmentDescription> description = scene::build(document.scene(), &catalog, &problems);
   require(problems);
   for (const scene::SceneError& warning : problems.warnings) warnings->push_back(scene::to_string(warning));
@@ -143,25 +118,6 @@ std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription&
   } catch (const std::invalid_argument& problem) {
     throw BadInput(problem.what());
   }
-}
-
-report::v1::Plan plan_message(const kernel::Environment& environment) {
-  report::v1::Plan message;
-  for (const kernel::PlannedSlot& planned : environment.plan().slots) {
-    for (const std::string& plugin : planned.plugins) {
-      report::v1::PlannedSlot* slot = message.add_slots();
-      slot->set_slot(slot_name(planned.slot));
-      slot->set_plugin(plugin);
-      slot->set_hosting(kernel::hosting_name(planned.hosting));
-      slot->set_pid(planned.process_id);
-    }
-  }
-  for (const kernel::LeftOut& left_out : environment.plan().left_out) {
-    report::v1::LeftOut* out = message.add_left_out();
-    out->set_what(left_out.what);
-    out->set_why(left_out.why);
-  }
-  return message;
 }
 
 namespace {
@@ -187,19 +143,24 @@ bool is_full(const std::error_code& code) {
 }
 
 // A run in its phases. What fails on the way ends the stepping and is kept; the phases after it still do what they can.
-class Run {
+class Run final : private kernel::CommitListener {
  public:
-  explicit Run(const RunOptions& options) : options_(options), description_(load(options, &warnings_)) {}
+  explicit Run(const RunOptions& options) : options_(options), description_(load(options, &warnings_, &catalog_)) {}
 
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
     std::optional<Resumption> resumed;
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
-    environment_ = start(description_);
+    read_orders();
+    kernel::EnvironmentDescription begun = description_;
+    if (resumed) apply_decisions(*resumed, &begun);
+    environment_ = start(begun);
+    environment_->set_commit_listener(this);
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed);
+    give_orders();
     if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
   }
 
@@ -275,12 +236,74 @@ class Run {
     guard([&] { figures_->follow(environment_.get()); });
   }
 
+  // Faults, swaps and comparisons of the command line, with the plugins they name.
+  void read_orders() {
+    for (const std::string& text : options_.swaps)
+      swaps_.push_back(resolve_swap(parse_swap(text), description_, &catalog_));
+    for (const std::string& text : options_.comparisons)
+      comparisons_.push_back(resolve_swap(parse_compare(text), description_, &catalog_));
+    for (const std::string& text : options_.faults) faults_.push_back(parse_fault(text));
+    for (const std::string& text : options_.reruns) reruns_.push_back(parse_rerun(text));
+  }
+
+  // Whoever answered when the checkpoint was made answers again; what the journal knows of later steps is ordered for
+  // them. Swaps of the command line up to the checkpoint are done, or were refused.
+  void apply_decisions(const Resumption& resumed, kernel::EnvironmentDescription* begun) {
+    const std::uint32_t step = resumed.checkpoint.step();
+    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
+    try {
+      for (const recorder::v1::Decision& decision : resumed.checkpoint.decisions()) {
+        decisions_.push_back(decision);
+        const kernel::SwapOrder order = order_of(decision, catalog_);
+        kernel::SlotDescription& slot = begun->slot(order.slot);
+        if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
+        const auto fallback = slot.plugins[decision.target()].fallback;
+        slot.plugins[decision.target()] = order.plugin;
+        slot.plugins[decision.target()].fallback = fallback;
+        slot.hosting = *order.hosting;
+      }
+      for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
+        kernel::SwapOrder order = order_of(decision, catalog_);
+        const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
+          return one.slot == order.slot && one.step == order.step &&
+                 one.plugin.declaration.name == order.plugin.declaration.name;
+        });
+        if (!is_ordered) swaps_.push_back(std::move(order));
+      }
+    } catch (const std::runtime_error& problem) {
+      throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem.what()));
+    }
+    // how far hosting may differ is for the command line to say
+    apply_hosting(options_.hosting, begun);
+  }
+
+  void give_orders() {
+    try {
+      for (kernel::SwapOrder& order : swaps_) environment_->order_swap(std::move(order));
+      for (kernel::SwapOrder& order : comparisons_) environment_->compare(std::move(order));
+      for (kernel::FaultInjection& fault : faults_)
+        if (fault.step > environment_->step_count()) environment_->inject(std::move(fault));
+      for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
+    } catch (const std::invalid_argument& problem) {
+      throw BadInput(problem.what());
+    }
+  }
+
+  void on_commit(const kernel::Environment& environment) override {
+    if (recorder_) recorder_->on_commit(environment);
+  }
+  void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
+    if (recorder_) recorder_->on_decision(environment, decision);
+  }
+
   // Where no recorder keeps a checkpoint.
   void keep_paused_state() {
     std::string path = checkpoint_path_;
     if (path.empty())
       path = checkpoint_target(std::filesystem::path(options_.scenes[0]).stem().string() + ".paused.checkpoint");
-    Recorder(identity_of(description_), [this] { return tally(); }).save_to(path, *environment_);
+    Recorder recorder(identity_of(description_), [this] { return tally(); });
+    recorder.set_decisions(decisions_);
+    recorder.save_to(path, *environment_);
     result_.checkpoint = path;
     result_.checkpoint_step = environment_->step_count();
   }
@@ -308,7 +331,6 @@ class Run {
   void pause(const kernel::FaultRecord& record) {
     result_.outcome = RunOutcome::kPaused;
     result_.fault = fault_text(record.step, record.fault);
-    write_fault(record, &result_.report);
   }
 
   void fail(const std::string& why) {
@@ -329,7 +351,7 @@ class Run {
     if (checkpoint_path_.empty() && journal_.commits.empty()) return;
     recorder_.emplace(identity_of(description_), [this] { return tally(); });
     recorder_->expect(journal_of(options_.resume), journal_.commits);
-    environment_->set_commit_listener(&*recorder_);
+    recorder_->set_decisions(decisions_);
     if (checkpoint_path_.empty()) return;
     // the journal of another file starts anew
     const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == checkpoint_path_;
@@ -348,9 +370,14 @@ class Run {
 
   const RunOptions& options_;
   std::vector<std::string> warnings_;
+  Catalog catalog_;
   const kernel::EnvironmentDescription description_;
   std::string checkpoint_path_;
   RunResult result_;
+  std::vector<kernel::SwapOrder> swaps_, comparisons_;
+  std::vector<kernel::FaultInjection> faults_;
+  std::vector<RerunSpec> reruns_;
+  std::vector<recorder::v1::Decision> decisions_;  // in force where the run begins
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
@@ -378,8 +405,10 @@ void Run::write_report() {
   *report.mutable_events() = events_->counts();
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   for (std::string& warning : environment_->warnings()) report.add_warnings(std::move(warning));
-  figures_->write(&report);
+  write_faults(*environment_, &report);
+  write_swaps(*environment_, &report);
   write_stages(*environment_, &report);
+  figures_->write(&report);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
+#include "services/catalog/catalog.h"
 #include "services/scene/problem.h"
 
 namespace gravitas {
@@ -32,6 +33,7 @@ struct RunOptions {
   std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
   std::string resume;                  // checkpoint to go on from
   std::uint32_t threads = 1;
+  std::vector<std::string> faults, swaps, comparisons, reruns;  // as on the command line
 };
 
 // The caller's mistake, with a text that says where and what: exit code 2.
@@ -58,14 +60,13 @@ struct RunResult {
   std::uint32_t checkpoint_step = 0;
 };
 
-// The scene as the kernel's description. Throws BadInput. `warnings` gets the reader's warnings.
-kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings);
+// The scene as the kernel's description. Throws BadInput. `warnings` gets the reader's warnings, `plugins` the plugins
+// that there are.
+kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings,
+                                    Catalog* plugins = nullptr);
 
 // Starts the environment of a description. A plugin that cannot be used is BadInput.
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description);
-
-// The plan as the report shows it; process ids are those of the workers.
-report::v1::Plan plan_message(const kernel::Environment& environment);
 
 // Called now and then while a run goes on.
 struct Progress {

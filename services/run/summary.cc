@@ -38,6 +38,27 @@ std::string hosts(const report::v1::Plan& plan) {
                            : fmt::format("{} worker processes: {}", processes.size(), names);
 }
 
+// Faults that were survived, and swaps; a line each for the first ones.
+std::string exchanges(const report::v1::Report& report) {
+  std::string text;
+  int survived = 0;
+  for (const report::v1::FaultRecord& fault : report.faults()) {
+    if (fault.recovered_by().starts_with("none")) continue;
+    if (++survived <= static_cast<int>(kMostNamed))
+      text += fmt::format("  survived: step {}, {} {}: {}; {} took over in {:.3g} ms\n", fault.step(), fault.slot(),
+                          fault.plugin(), fault.kind(), fault.recovered_by(), 1e-3 * fault.recovery_us());
+  }
+  if (survived > static_cast<int>(kMostNamed))
+    text += fmt::format("  survived: {} more faults\n", survived - static_cast<int>(kMostNamed));
+  for (const report::v1::SwapRecord& swap : report.swaps())
+    text += fmt::format("  swap before step {}: {} {} -> {}, {}{}\n", swap.step(), swap.slot(), swap.from(), swap.to(),
+                        swap.outcome(), swap.reason().empty() ? "" : ": " + swap.reason());
+  for (const report::v1::SwapRecord& one : report.comparisons())
+    text += fmt::format("  compared: {} {} with {}: {} of {} answers differ\n", one.slot(), one.from(), one.to(),
+                        one.shadow().differing_calls(), one.shadow().calls());
+  return text;
+}
+
 }  // namespace
 
 std::string summarize(const report::v1::Report& report, const std::vector<EventLog::Meeting>& meetings) {
@@ -49,6 +70,7 @@ std::string summarize(const report::v1::Report& report, const std::vector<EventL
   text += fmt::format("  energy {:.6g} -> {:.6g} J, penetration <= {:.2g} m, joint error <= {:.2g} m\n",
                       report.energy().initial(), report.energy().final(), report.max_penetration(),
                       report.max_joint_error());
+  text += exchanges(report);
   text += fmt::format("  {}\n  chain hash {}\n", hosts(report.plan()), report.chain_hash());
   return text;
 }

@@ -69,6 +69,12 @@ void PluginSelection::read_block(const Plugin& message) {
                                 "CustomProperties of an unnamed plugin; required: Name or Library, since the slot " +
                                     quoted(message.slot()) + " may hold several");
   }
+  if (is_list(slot) && !has_name && is_written(message, Plugin::kFallbackFieldNumber) &&
+      !is_written(message, Plugin::kLibraryFieldNumber) && !is_written(message, Plugin::kCommandFieldNumber)) {
+    context_.diagnostics->error(place_of(message, Plugin::kFallbackFieldNumber),
+                                "Fallback of an unnamed plugin; required: Name, Library or Command, since the slot " +
+                                    quoted(message.slot()) + " may hold several");
+  }
   read_hosting(slot, message);
   check_place(message);
   of_slot.push_back({&message, nullptr, false});
@@ -84,17 +90,22 @@ void PluginSelection::read_hosting(Slot slot, const Plugin& message) {
                                  other.message->hosting() != message.hosting();
     const bool deadline_differs =
         other.message->has_deadline() && message.has_deadline() && other.message->deadline() != message.deadline();
-    if (!hosting_differs && !deadline_differs) continue;
-    context_.diagnostics->error(
-        place_of(message, hosting_differs ? Plugin::kHostingFieldNumber : Plugin::kDeadlineFieldNumber),
-        std::string(hosting_differs ? "Hosting" : "Deadline") + " differs from that at " +
-            context_.diagnostics->place_text(place_of(other.message->location())) +
-            "; allowed: one for the whole slot " + quoted(message.slot()));
+    const bool standby_differs =
+        other.message->has_standby() && message.has_standby() && other.message->standby() != message.standby();
+    if (!hosting_differs && !deadline_differs && !standby_differs) continue;
+    const auto [field, name] = hosting_differs    ? std::pair{Plugin::kHostingFieldNumber, "Hosting"}
+                               : deadline_differs ? std::pair{Plugin::kDeadlineFieldNumber, "Deadline"}
+                                                  : std::pair{Plugin::kStandbyFieldNumber, "Standby"};
+    context_.diagnostics->error(place_of(message, field),
+                                std::string(name) + " differs from that at " +
+                                    context_.diagnostics->place_text(place_of(other.message->location())) +
+                                    "; allowed: one for the whole slot " + quoted(message.slot()));
   }
   if (message.hosting() == "direct") description.hosting = kernel::Hosting::kDirect;
   if (message.hosting() == "shm") description.hosting = kernel::Hosting::kSharedMemory;
   if (message.hosting() == "grpc") description.hosting = kernel::Hosting::kGrpc;
   if (message.has_deadline()) description.deadline = message.deadline();
+  if (message.has_standby()) description.standbys = message.standby();
 }
 
 void PluginSelection::check_place(const Plugin& message) const {
@@ -245,7 +256,26 @@ void PluginSelection::add_choice(const InstalledPlugin& plugin, const v1::Proper
   context_.flatten_properties(plugin.declaration.properties,
                               settings == nullptr ? v1::Properties::default_instance() : *settings, place, what,
                               &choice.settings);
+  for (const Block& block : blocks(slot))
+    if (is_written(*block.message, Plugin::kFallbackFieldNumber) &&
+        (!is_list(slot) || block.library == &plugin || block.message->name() == plugin.declaration.name))
+      choice.fallback = find_fallback(slot, *block.message);
   context_.description.slot(slot).plugins.push_back(std::move(choice));
+}
+
+// What takes over when nothing else helps, with its default settings. That it serves the scene's types is judged when
+// the environment is made.
+std::shared_ptr<const kernel::PluginChoice> PluginSelection::find_fallback(Slot slot, const Plugin& message) {
+  const TextPosition place = place_of(message, Plugin::kFallbackFieldNumber);
+  const InstalledPlugin* plugin = context_.catalog->find_plugin(slot, message.fallback());
+  if (plugin == nullptr) {
+    missing(slot, message.fallback(), place);
+    return nullptr;
+  }
+  kernel::PluginChoice choice{plugin->declaration, plugin->library, {}, plugin->command};
+  context_.flatten_properties(plugin->declaration.properties, v1::Properties::default_instance(), place,
+                              "fallback " + quoted(plugin->declaration.name), &choice.settings);
+  return std::make_shared<const kernel::PluginChoice>(std::move(choice));
 }
 
 void PluginSelection::report_unused() const {

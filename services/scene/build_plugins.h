@@ -53,6 +53,7 @@ class PluginSelection {
   // Appends the plugin to its slot. `settings` may be null: then they are looked up in the Plugins
   // blocks.
   void add_choice(const InstalledPlugin& plugin, const v1::Properties* settings, const TextPosition& position);
+  std::shared_ptr<const kernel::PluginChoice> find_fallback(Slot slot, const v1::Plugin& message);
   std::vector<Block>& blocks(Slot slot) { return blocks_[slot]; }
 
   BuildContext& context_;

@@ -23,8 +23,7 @@ std::unique_ptr<kernel::Carrier> make_carrier(Hosting hosting, const std::string
   std::string problem;
   slot.plugins = {{load_plugin_library(library, &problem).declaration, library, {}}};
   if (hosting == Hosting::kDirect) return make_direct_carrier(slot.plugins, 1);
-  return (hosting == Hosting::kSharedMemory ? start_shared_memory_carrier(slot, 1) : start_grpc_carrier(slot, 1))
-      ->finish();
+  return (hosting == Hosting::kSharedMemory ? start_shared_memory_carrier(slot, 1) : start_grpc_carrier(slot, 1));
 }
 
 // A request of `rows` rows in every column that counts bodies, and room for the reply.

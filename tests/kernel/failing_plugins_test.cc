@@ -1,5 +1,5 @@
-// What a step does when a plugin fails: nothing. The environment pauses at its last commit and says which slot,
-// which plugin, what happened and how it was noticed.
+// What becomes of a plugin that fails: it is replaced, and the record says which slot, which plugin, what happened and
+// how it was noticed. Where it fails on, the environment pauses at its last commit.
 #include <dirent.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -32,45 +32,52 @@ void PrintTo(const Expected& expected, std::ostream* out) { *out << expected.lib
 
 WorldBuilder ball_on_ground(Hosting hosting) {
   WorldBuilder builder(hosting);
-  builder.steps(10, 0.01).ground().sphere(0.5, 1.0, Vector3(0, 0.5, 0)).gravity(Vector3(0, -10, 0));
+  builder.steps(20, 0.01).ground().sphere(0.5, 1.0, Vector3(0, 0.5, 0)).gravity(Vector3(0, -10, 0));
   return builder;
 }
 
-// Runs a world whose integrator misbehaves in its third call and checks that it stopped after two steps.
-void expect_pause_at_third_step(const WorldBuilder& builder, const Expected& expected) {
+// Runs a world whose integrator misbehaves in the third call of each of its lives: a fresh one makes the step, until the
+// budget of five failures is spent at step 11.
+void expect_failures_and_pause(const WorldBuilder& builder, const Expected& expected) {
   Environment world(builder.description());
-  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
-  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  while (world.step_count() < 10) ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text;
   const kernel::Hash state = world.state_hash(), chain = world.chain_hash();
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
   ASSERT_TRUE(world.fault().has_value());
-  const kernel::StageFault& fault = world.fault()->fault;
-  EXPECT_EQ(world.fault()->step, 3U);
-  EXPECT_EQ(fault.kind, expected.kind) << fault.text;
-  EXPECT_EQ(fault.detected_by, expected.detected_by);
-  EXPECT_EQ(fault.slot, Slot::kIntegrator);
-  EXPECT_EQ(fault.plugin, "Faulty");
-  EXPECT_NE(fault.text.find(expected.text), std::string::npos) << fault.text;
+  ASSERT_EQ(world.faults().size(), 5U);
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const kernel::FaultRecord& record = world.faults()[i];
+    EXPECT_EQ(record.step, 3 + 2 * i);
+    EXPECT_EQ(record.fault.kind, expected.kind) << record.fault.text;
+    EXPECT_EQ(record.fault.detected_by, expected.detected_by);
+    EXPECT_EQ(record.fault.slot, Slot::kIntegrator);
+    EXPECT_EQ(record.fault.plugin, "Faulty");
+    EXPECT_NE(record.fault.text.find(expected.text), std::string::npos) << record.fault.text;
+    EXPECT_EQ(record.recovered_by.empty(), i == 4) << record.recovered_by;
+    EXPECT_EQ(record.recovery_us > 0.0, i != 4);
+  }
+  EXPECT_EQ(world.fault()->step, 11U);
+  EXPECT_EQ(world.fault()->fault.kind, expected.kind);
   // the committed state is untouched, and stays so
   EXPECT_EQ(world.step(), StepOutcome::kPaused);
-  EXPECT_EQ(world.step_count(), 2U);
+  EXPECT_EQ(world.step_count(), 10U);
   EXPECT_EQ(world.state_hash(), state);
   EXPECT_EQ(world.chain_hash(), chain);
 }
 
-void expect_pause_in_worker(Hosting hosting, const Expected& expected) {
+void expect_failures_in_worker(Hosting hosting, const Expected& expected) {
   WorldBuilder builder = ball_on_ground(hosting);
   builder.plugin(Slot::kIntegrator, faulty_plugin_path(expected.library));
   // short only where it is waited for: a busy machine is slow, and a sanitizer's last words are
   builder.description().integrator.deadline = expected.kind == FaultKind::kDeadline ? 0.1 : 10.0;
-  expect_pause_at_third_step(builder, expected);
+  expect_failures_and_pause(builder, expected);
 }
 
 class InWorker : public ::testing::TestWithParam<Expected> {};
-TEST_P(InWorker, PausesAtTheLastCommit) { expect_pause_in_worker(Hosting::kSharedMemory, GetParam()); }
+TEST_P(InWorker, IsReplacedUntilTheBudgetIsSpent) { expect_failures_in_worker(Hosting::kSharedMemory, GetParam()); }
 
 class InGrpcWorker : public ::testing::TestWithParam<Expected> {};
-TEST_P(InGrpcWorker, PausesAtTheLastCommit) { expect_pause_in_worker(Hosting::kGrpc, GetParam()); }
+TEST_P(InGrpcWorker, IsReplacedUntilTheBudgetIsSpent) { expect_failures_in_worker(Hosting::kGrpc, GetParam()); }
 
 // Ends the process, or never answers: only a worker's failure can be survived.
 const Expected kFatal[] = {
@@ -107,10 +114,10 @@ INSTANTIATE_TEST_SUITE_P(Greedy, InGrpcWorker, ::testing::ValuesIn(kGreedyInMess
 
 class InProcess : public ::testing::TestWithParam<Expected> {};
 
-TEST_P(InProcess, PausesAtTheLastCommit) {
+TEST_P(InProcess, IsReplacedUntilTheBudgetIsSpent) {
   WorldBuilder builder = ball_on_ground(Hosting::kDirect);
   builder.plugin(Slot::kIntegrator, faulty_plugin_path(GetParam().library));
-  expect_pause_at_third_step(builder, GetParam());
+  expect_failures_and_pause(builder, GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Wrong, InProcess, ::testing::ValuesIn(kWrong), name_of);
@@ -152,13 +159,13 @@ TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
 TEST(FailingPlugins, AFailureInOneEnvironmentLeavesAnotherAlone) {
   WorldBuilder quiet = ball_on_ground(Hosting::kSharedMemory);
   Environment alone(quiet.description());
-  while (alone.step_count() < 10) ASSERT_EQ(alone.step(), StepOutcome::kCommitted);
+  while (alone.step_count() < 15) ASSERT_EQ(alone.step(), StepOutcome::kCommitted);
 
   WorldBuilder bad = ball_on_ground(Hosting::kSharedMemory);
   bad.plugin(Slot::kIntegrator, faulty_plugin_path("integrator_killed"));
   Environment failing(bad.description());
   Environment other(quiet.description());
-  while (other.step_count() < 10) {
+  while (other.step_count() < 15) {
     failing.step();
     ASSERT_EQ(other.step(), StepOutcome::kCommitted);
   }
@@ -180,7 +187,7 @@ TEST(FailingPlugins, NothingIsLeftBehind) {
     if (library != nullptr) builder.plugin(Slot::kIntegrator, faulty_plugin_path(library));
     builder.description().integrator.deadline = 0.1;
     Environment world(builder.description());
-    while (world.step_count() < 10 && world.step() == StepOutcome::kCommitted) {
+    while (world.step_count() < 13 && world.step() == StepOutcome::kCommitted) {
     }
   };
   // what is made once per process (the supervisor, gRPC, the declarations of libraries) is made by the first round

@@ -7,11 +7,13 @@
 
 #include <cstdio>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <string>
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
+#include "tests/kernel/one_call.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas {
@@ -23,7 +25,9 @@ using kernel::Hosting;
 using kernel::StageFault;
 using kernel::StepOutcome;
 using ::testing::HasSubstr;
+using testing::OneCall;
 using testing::plugin_path;
+using testing::start_worker;
 using testing::WorldBuilder;
 
 WorldBuilder balls(std::uint32_t count) {
@@ -127,8 +131,10 @@ TEST(GrpcCarrier, TheEndOfAListeningWorkerPausesTheEnvironment) {
   ASSERT_EQ(world.step(), StepOutcome::kCommitted);
   worker.end();
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
-  EXPECT_EQ(world.fault()->fault.kind, FaultKind::kDeath);
-  EXPECT_THAT(world.fault()->fault.text, HasSubstr(worker.address() + " is gone"));
+  // nobody listens there any more
+  EXPECT_EQ(world.faults()[0].fault.kind, FaultKind::kDeath);
+  EXPECT_THAT(world.faults()[0].fault.text, HasSubstr(worker.address() + " is gone"));
+  EXPECT_EQ(world.fault()->fault.kind, FaultKind::kHandshake);
   EXPECT_EQ(world.step_count(), 1U);
 }
 
@@ -173,6 +179,65 @@ TEST(GrpcCarrier, LargeColumnsTravelAsAssets) {
   const std::string direct = chain_of(builder);
   builder.hosting(Slot::kCollision, Hosting::kGrpc);
   EXPECT_EQ(chain_of(builder), direct);
+}
+
+// A worker that listens keeps nothing of the kernel before: the same asset is sent, and taken, again.
+TEST(GrpcCarrier, AListeningWorkerTakesTheAssetsOfEveryKernel) {
+  const ListeningWorker worker(plugin_path("collision_standard"));
+  WorldBuilder builder = balls(9000);
+  builder.steps(1, 0.01);
+  const std::string direct = chain_of(builder);
+  builder.description().collision.plugins[0].address = worker.address();
+  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_of(builder), direct);
+}
+
+// Takes three of the asker's deadlines to answer.
+class SlowForces final : public kernel::DerivativeSource {
+ public:
+  SlowForces(const OneCall& call, double deadline) : call_(call), nanoseconds_(static_cast<long>(3e9 * deadline)) {}
+  std::span<const kernel::ColumnId> trial_columns() const override { return call_.trial; }
+  kernel::ColumnId wrench_column() const override { return call_.wrench; }
+  void evaluate() override {
+    const timespec pause = {nanoseconds_ / 1'000'000'000, nanoseconds_ % 1'000'000'000};
+    nanosleep(&pause, nullptr);
+    ++asked;
+  }
+  int asked = 0;
+
+ private:
+  const OneCall& call_;
+  long nanoseconds_;
+};
+
+class WorkerCarrier : public ::testing::TestWithParam<Hosting> {};
+INSTANTIATE_TEST_SUITE_P(Of, WorkerCarrier, ::testing::Values(Hosting::kSharedMemory, Hosting::kGrpc),
+                         [](const auto& one) { return std::string(kernel::hosting_name(one.param)); });
+
+TEST_P(WorkerCarrier, TheAskersDeadlineStandsStillWhileItsDerivativeIsEvaluated) {
+  using Request = stage::IntegratorIntegrateRequest;
+  constexpr double kDeadline = 0.3;
+  OneCall call(stage::Method::kIntegratorIntegrate);
+  *call.f64(Request::kTimeStep) = 0.01;
+  *call.u32(Request::kFlags) = kMovable;
+  *call.f64(Request::kInverseMass) = 1.0;
+  *call.f64(Request::kOrientation) = 1.0;
+  const std::unique_ptr<kernel::Carrier> carrier = start_worker(GetParam(), "integrator_euler", kDeadline);
+  SlowForces forces(call, kDeadline);
+  EXPECT_EQ(call.make(carrier.get(), &forces).status, GRAVITAS_OK);
+  EXPECT_EQ(forces.asked, 1);
+}
+
+TEST(GrpcCarrier, AMethodThatTheWorkerDoesNotServeIsNamed) {
+  OneCall call(stage::Method::kIntegratorDerivative);
+  const std::unique_ptr<kernel::Carrier> carrier = start_worker(Hosting::kGrpc, "integrator_euler", 2.0);
+  try {
+    call.make(carrier.get());
+    FAIL() << "it was answered";
+  } catch (const StageFault& fault) {
+    EXPECT_EQ(fault.kind, FaultKind::kFailure);
+    EXPECT_THAT(fault.text, HasSubstr("no method of a stage: /gravitas.stage.v1.Integrator/Derivative"));
+  }
 }
 
 }  // namespace

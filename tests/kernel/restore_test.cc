@@ -21,6 +21,7 @@ using kernel::Hosting;
 using kernel::SavedColumn;
 using kernel::SavedState;
 using kernel::StepOutcome;
+using testing::busy_world;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::WorldBuilder;
@@ -72,22 +73,6 @@ class OwnedState {
   std::vector<std::string> names_;
   std::vector<std::variant<std::vector<double>, std::vector<std::uint32_t>, std::vector<std::uint64_t>>> numbers_;
 };
-
-// A box that slides and topples on the ground, two balls on a joint that can break when they land, a force that is asked
-// in every step and one that acts once.
-WorldBuilder busy_world(Hosting hosting, double breaking_force = 0.0) {
-  WorldBuilder builder(hosting);
-  builder.steps(kSteps, 1.0 / 120.0).material({.restitution = 0.3}).ground();
-  builder.box(Vector3(0.5, 0.4, 0.3), 2.0, Vector3(0, 0.4, 0), Vector3(2, 0, 0.5))
-      .sphere(0.5, 1.0, Vector3(3, 0.6, 0))
-      .sphere(0.5, 1.0, Vector3(4.5, 0.9, 0), Vector3(0, 0, 1));
-  builder.gravity(Vector3(0, -9.81, 0));
-  builder.force("Basic", "force_basic", {0.1, 0, 0, 0, 0.1, 0, 0, 0, 0, 1, 0, 0});
-  builder.force("Basic", "force_basic", {0.5, 0.2, 0, 0, 0, 0.1, 0, 0, 0, 0, 0, 1});
-  builder.joint("Spherical", "constraint_spherical", 2, 3, {3.75, 0.75, 0});
-  builder.description().constraints[0].breaking_force = breaking_force;
-  return builder;
-}
 
 void steps(Environment* world, std::uint32_t count) {
   for (std::uint32_t i = 0; i < count; ++i)

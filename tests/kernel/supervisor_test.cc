@@ -1,17 +1,24 @@
 #include "kernel/supervisor.h"
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <string>
 #include <system_error>
+#include <vector>
 
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kLongMs = 10'000;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+constexpr int kLongMs = 60'000;
 
 std::shared_ptr<WorkerProcess> shell(const std::string& command, const std::vector<int>& descriptors = {},
                                      std::function<void()> on_end = {}) {
@@ -62,6 +69,93 @@ TEST(Supervisor, AWorkerInheritsItsOwnDescriptorsAndNoOthers) {
 
 TEST(Supervisor, AProgramThatDoesNotExistIsAnError) {
   EXPECT_THROW(Supervisor::instance().spawn({"/nonexistent/program"}, {}, {}), std::system_error);
+}
+
+TEST(Supervisor, ReadsWhatAProcessWritesAndTellsTheStreamsApart) {
+  const auto process = shell("echo result; echo trouble >&2; printf 'no line end'");
+  wait_for_end(*process);
+  EXPECT_THAT(process->take_output(), UnorderedElementsAre("stdout: result", "stdout: no line end", "stderr: trouble"));
+  EXPECT_THAT(process->take_output(), IsEmpty());
+  EXPECT_EQ(process->last_words(), "trouble");
+}
+
+TEST(Supervisor, OutputIsThereWhileTheProcessRuns) {
+  const auto process = shell("echo ready; while :; do :; done");
+  std::vector<std::string> lines;
+  while (lines.empty()) lines = process->take_output();
+  EXPECT_THAT(lines, ElementsAre("stdout: ready"));
+  EXPECT_FALSE(process->has_ended());
+  process->kill();
+  wait_for_end(*process);
+}
+
+TEST(Supervisor, AllOutputIsReadBeforeTheListenerHearsOfTheEnd) {
+  for (int i = 0; i < 20; ++i) {
+    std::shared_ptr<WorkerProcess> process;
+    std::atomic<bool> known{false}, heard{false};
+    std::vector<std::string> lines;
+    process = shell("echo last words >&2; kill -9 $$", {}, [&] {
+      while (!known) {
+      }
+      lines = process->take_output();
+      heard = true;
+    });
+    known = true;
+    while (!heard) {
+    }
+    EXPECT_THAT(lines, ElementsAre("stderr: last words"));
+  }
+}
+
+// 1 GB without a line end, and as much in lines: it must neither wait for us nor be kept.
+TEST(Supervisor, AFloodIsReadAndCountedAndNotKept) {
+  constexpr std::uint64_t kFlood = 1'000'000'000;
+  for (const std::string command : {"head -c 1000000000 /dev/zero", "yes 0123456789 | head -c 1000000000"}) {
+    const auto process = shell(command + "; echo survived >&2");
+    wait_for_end(*process);
+    EXPECT_EQ(process->ending(), "ended by itself with exit code 0");
+    std::uint64_t held = 0;
+    const std::vector<std::string> lines = process->take_output();
+    for (const std::string& line : lines) held += line.size();
+    EXPECT_LT(held, 2 * ProcessOutput::kMostBytes);
+    EXPECT_EQ(process->last_words(), "survived");
+    // what was kept and what was dropped is all of it, but for line ends and prefixes
+    ASSERT_FALSE(lines.empty());
+    const std::string note = lines.back();
+    ASSERT_TRUE(note.starts_with("stdout: ... and ") && note.ends_with(" more bytes dropped")) << note;
+    const std::uint64_t dropped = std::stoull(note.substr(16));
+    EXPECT_GT(dropped, kFlood - 2 * ProcessOutput::kMostBytes);
+  }
+}
+
+TEST(Supervisor, OutputThatNobodyTookIsNotLost) {
+  ::testing::internal::CaptureStderr();
+  const int forgotten = [] {
+    const auto process = shell("echo forgotten");
+    wait_for_end(*process);
+    return process->process_id();
+  }();
+  // the supervisor's thread, which may have held it last, is past it once another has ended
+  wait_for_end(*shell(":"));
+  wait_for_end(*shell(":"));
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "process " + std::to_string(forgotten) + ", stdout: forgotten\n");
+}
+
+TEST(Supervisor, AChildThatKeepsWritingDoesNotHoldUpTheEnd) {
+  const auto process = shell("yes & exit 3");
+  wait_for_end(*process);
+  EXPECT_EQ(process->ending(), "ended by itself with exit code 3");
+  process->take_output();
+}
+
+TEST(Supervisor, ADyingProcessInAFloodIsNoticed) {
+  const auto process = shell("yes");
+  while (process->take_output().empty()) {
+  }
+  process->kill();
+  wait_for_end(*process);
+  EXPECT_EQ(process->ending(), "killed by signal 9 (Killed)");
+  process->take_output();
 }
 
 }  // namespace

@@ -166,4 +166,18 @@ WorldBuilder& WorldBuilder::joint(const std::string& type, const std::string& li
   return *this;
 }
 
+WorldBuilder busy_world(kernel::Hosting hosting, double breaking_force) {
+  WorldBuilder builder(hosting);
+  builder.steps(60, 1.0 / 120.0).material({.restitution = 0.3}).ground();
+  builder.box(Vector3(0.5, 0.4, 0.3), 2.0, Vector3(0, 0.4, 0), Vector3(2, 0, 0.5))
+      .sphere(0.5, 1.0, Vector3(3, 0.6, 0))
+      .sphere(0.5, 1.0, Vector3(4.5, 0.9, 0), Vector3(0, 0, 1));
+  builder.gravity(Vector3(0, -9.81, 0));
+  builder.force("Basic", "force_basic", {0.1, 0, 0, 0, 0.1, 0, 0, 0, 0, 1, 0, 0});
+  builder.force("Basic", "force_basic", {0.5, 0.2, 0, 0, 0, 0.1, 0, 0, 0, 0, 0, 1});
+  builder.joint("Spherical", "constraint_spherical", 2, 3, {3.75, 0.75, 0});
+  builder.description().constraints[0].breaking_force = breaking_force;
+  return builder;
+}
+
 }  // namespace gravitas::testing

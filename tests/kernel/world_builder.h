@@ -59,4 +59,8 @@ class WorldBuilder {
   kernel::EnvironmentDescription description_;
 };
 
+// A box that slides and topples on the ground, two balls on a joint that can break when they land, a force that is asked
+// in every step and one that acts once.
+WorldBuilder busy_world(kernel::Hosting hosting, double breaking_force = 0.0);
+
 }  // namespace gravitas::testing

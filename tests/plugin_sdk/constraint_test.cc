@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 
 namespace gravitas {
 namespace {
@@ -168,7 +168,7 @@ TEST(JointLoops, RefuseNumbersThatAreNotFinite) {
 }
 
 TEST(PointDiscrepancy, HoldsTwoAnchorsTogether) {
-  test::Random random(1);
+  conformance::Draw random(1);
   const JointBodies bodies{random.pose(3.0), random.pose(3.0)};
   const Vector3 anchor1 = random.vector(1.0), anchor2 = random.vector(1.0);
   const Discrepancy d = point_discrepancy(anchor1, anchor2, bodies);

@@ -7,19 +7,19 @@
 #include <cmath>
 #include <vector>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/constraint.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 
 namespace gravitas {
 namespace {
 
-using test::Random;
+using conformance::Draw;
 
 // Two moving bodies and a discrepancy between them.
 struct Pair {
-  explicit Pair(Random* random, double reach)
+  explicit Pair(Draw* random, double reach)
       : pose1(random->pose(3.0)),
         pose2(random->pose(3.0)),
         twist1{random->vector(2.0), random->vector(2.0)},
@@ -53,7 +53,7 @@ constexpr double kDifferenceTolerance = 1e-7;
 // ---- Jacobian -----------------------------------------------------------------------------------
 
 TEST(DiscrepancyJacobian, IsTheRateOfAVanishingError) {
-  Random random(1);
+  Draw random(1);
   for (int i = 0; i < 500; ++i) {
     const Pair pair(&random, 0.0);
     const Vector3 axis = random.direction();
@@ -64,7 +64,7 @@ TEST(DiscrepancyJacobian, IsTheRateOfAVanishingError) {
 // With arms to the point midway the row leaves out a.((w1 + w2)/2 x e), which is first order in the
 // error e, and nothing else.
 TEST(DiscrepancyJacobian, DiffersFromTheRateByTheMeanTurnOfTheError) {
-  Random random(2);
+  Draw random(2);
   for (int i = 0; i < 500; ++i) {
     const Pair pair(&random, 0.5);
     const Vector3 axis = random.direction();
@@ -87,7 +87,7 @@ TEST(DiscrepancyJacobian, GivesTheVelocityOfThePointOnBody2RelativeToBody1) {
 }
 
 TEST(DiscrepancyJacobian, AnImpulseAlongARowChangesNoMomentum) {
-  Random random(3);
+  Draw random(3);
   for (int i = 0; i < 200; ++i) {
     const Pair pair(&random, 1.0);
     const Vector3 axis = random.direction();
@@ -101,7 +101,7 @@ TEST(DiscrepancyJacobian, AnImpulseAlongARowChangesNoMomentum) {
 }
 
 TEST(DiscrepancyJacobian, OfTheAngularTwinIsTheRateOfItsError) {
-  Random random(4);
+  Draw random(4);
   for (int i = 0; i < 500; ++i) {
     Pair pair(&random, 0.5);
     pair.d.modes |= kAngularDiscrepancy;
@@ -117,7 +117,7 @@ TEST(DiscrepancyJacobian, OfTheAngularTwinIsTheRateOfItsError) {
 // ---- error at other poses -----------------------------------------------------------------------
 
 TEST(DiscrepancyError, IsWhatWasWrittenAtTheSamePoses) {
-  Random random(5);
+  Draw random(5);
   for (int i = 0; i < 200; ++i) {
     const Pair pair(&random, 1.0);
     // a rotation and its inverse of vectors of size ten
@@ -126,7 +126,7 @@ TEST(DiscrepancyError, IsWhatWasWrittenAtTheSamePoses) {
 }
 
 TEST(DiscrepancyError, TurnsWithBothBodies) {
-  Random random(6);
+  Draw random(6);
   for (int i = 0; i < 200; ++i) {
     const Pair pair(&random, 1.0);
     const Pose moved = random.pose(5.0);
@@ -152,7 +152,7 @@ TEST(DiscrepancyError, OfTheAngularTwinCountsTheTurnsOfBothBodies) {
 }
 
 TEST(CarriedPoint, StaysWithItsBody) {
-  Random random(7);
+  Draw random(7);
   for (int i = 0; i < 200; ++i) {
     const Pose from = random.pose(3.0), to = random.pose(3.0);
     const Vector3 in_body = random.vector(2.0);
@@ -168,7 +168,7 @@ TEST(CarriedPoint, StaysWithItsBody) {
 
 // Joint error of an error of (0.3, -0.4, 0.5) along the axes, the modes given one by one.
 double joint_error_of(AxisMode x, AxisMode y, AxisMode z) {
-  Random random(8);
+  Draw random(8);
   Discrepancy d;
   d.axes = random.rotation();
   d.modes = pack_modes(x, y, z);
@@ -213,7 +213,7 @@ TEST(JointError, KnowsNoErrorOfVelocityRows) {
 // ---- contacts -----------------------------------------------------------------------------------
 
 TEST(ContactDiscrepancy, PutsThePointsWhereTheSurfacesAre) {
-  Random random(9);
+  Draw random(9);
   for (int i = 0; i < 200; ++i) {
     const Vector3 point = random.vector(3.0), normal = random.direction();
     const double depth = random.uniform(-0.5, 0.5);
@@ -285,7 +285,7 @@ TEST(AxisModes, OtherCodesAreInvalid) {
 // ---- columns ------------------------------------------------------------------------------------
 
 TEST(DiscrepancyColumns, GiveBackWhatWasPushed) {
-  Random random(10);
+  Draw random(10);
   std::vector<Discrepancy> given(3);
   for (Discrepancy& d : given) {
     d.point1 = random.vector(1.0), d.point2 = random.vector(1.0), d.velocity = random.vector(1.0);

@@ -5,16 +5,16 @@
 
 #include <cstring>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 
 namespace gravitas {
 namespace {
 
-using test::Random;
+using conformance::Draw;
 
 struct Rotor {
-  explicit Rotor(Random* random) : inertia(), q(random->rotation()), w(random->vector(3.0)) {
+  explicit Rotor(Draw* random) : inertia(), q(random->rotation()), w(random->vector(3.0)) {
     for (int k = 0; k < 3; ++k) inertia[k] = random->uniform(0.2, 3.0);
   }
   Vector3 acceleration(const Vector3& torque) const {
@@ -35,7 +35,7 @@ bool same_bits(const Pose& a, const Pose& b) {
 // d/dt (I_w w) = tau, by central differences of the momentum along the motion: exact to h^2 times
 // its third derivative (below 1e4 here) and to 1e-15 / h.
 TEST(AngularAcceleration, MakesTheTorqueTheRateOfAngularMomentum) {
-  Random random(1);
+  Draw random(1);
   constexpr double h = 1e-5;
   for (int i = 0; i < 500; ++i) {
     const Rotor rotor(&random);
@@ -54,7 +54,7 @@ TEST(AngularAcceleration, MakesTheTorqueTheRateOfAngularMomentum) {
 
 // The gyroscopic term does no work: dE/dt = tau.w.
 TEST(AngularAcceleration, MakesTheTorquesPowerTheRateOfEnergy) {
-  Random random(2);
+  Draw random(2);
   for (int i = 0; i < 500; ++i) {
     const Rotor rotor(&random);
     const Vector3 torque = random.vector(5.0);
@@ -85,7 +85,7 @@ TEST(AngularAcceleration, DoesNotTurnWhatCannotBeTurned) {
 // ---- displacement -------------------------------------------------------------------------------
 
 TEST(Displaced, ByNothingIsTheSamePoseBitForBit) {
-  Random random(3);
+  Draw random(3);
   for (int i = 0; i < 200; ++i) {
     Pose pose = random.pose(5.0);
     pose.orientation.coeffs() *= 1.0 + random.uniform(-1e-6, 1e-6);  // not even renormalised
@@ -109,14 +109,14 @@ TEST(Displaced, MovesAndTurnsInWorldAxes) {
 }
 
 TEST(Displaced, KeepsAttitudesUnit) {
-  Random random(4);
+  Draw random(4);
   Pose pose = random.pose(1.0);
   for (int i = 0; i < 10000; ++i) pose = displaced(pose, random.vector(1.0), random.vector(2.0));
   EXPECT_NEAR(pose.orientation.norm(), 1.0, 1e-15);
 }
 
 TEST(Displaced, ATranslationAloneLeavesTheAttitudeAlone) {
-  Random random(5);
+  Draw random(5);
   const Pose pose = random.pose(5.0);
   Pose expected = pose;
   expected.position += Vector3(1, 0, 0);
@@ -126,7 +126,7 @@ TEST(Displaced, ATranslationAloneLeavesTheAttitudeAlone) {
 // ---- impulses, energy, momentum -----------------------------------------------------------------
 
 TEST(AfterImpulse, ChangesMomentumByTheImpulse) {
-  Random random(6);
+  Draw random(6);
   for (int i = 0; i < 500; ++i) {
     const Rotor rotor(&random);
     const double mass = random.uniform(0.5, 4.0);
@@ -175,7 +175,7 @@ TEST(AngularMomentum, CountsTheOrbitAndTheSpin) {
 constexpr double kBoundsRounding = 1e-14;
 
 TEST(BoxBounds, ContainEveryPointAndTouchACornerOnEachSide) {
-  Random random(7);
+  Draw random(7);
   for (int i = 0; i < 300; ++i) {
     const Pose body = random.pose(3.0);
     const Vector3 centre = random.vector(1.0);
@@ -209,7 +209,7 @@ TEST(BoxBounds, OfAnUprightBoxAreItself) {
 }
 
 TEST(SphereBounds, ContainEveryPointAndTouchIt) {
-  Random random(8);
+  Draw random(8);
   for (int i = 0; i < 300; ++i) {
     const Pose body = random.pose(3.0);
     const Vector3 centre = random.vector(1.0);

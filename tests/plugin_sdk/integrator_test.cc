@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 
 namespace gravitas {
 namespace {
 
-using test::Random;
+using conformance::Draw;
 using Request = stage::IntegratorIntegrateRequest;
 using Reply = stage::IntegratorIntegrateReply;
 
@@ -30,7 +30,7 @@ gravitas_column column_of(const std::vector<T>& numbers) {
 class Step {
  public:
   explicit Step(std::vector<std::uint32_t> body_flags, std::uint64_t seed = 1) : flags(std::move(body_flags)) {
-    Random random(seed);
+    Draw random(seed);
     const std::size_t n = flags.size();
     state.resize(n);
     for (std::size_t i = 0; i < n; ++i) state.set(i, {random.pose(3.0), {random.vector(2.0), random.vector(2.0)}});
@@ -99,7 +99,7 @@ bool same_bits(const BodyState& a, const BodyState& b) {
 }
 
 TEST(TrialColumns, GiveBackEachBodysState) {
-  Random random(1);
+  Draw random(1);
   TrialColumns columns;
   columns.resize(4);
   EXPECT_EQ(columns.position.size(), 12U);

@@ -36,7 +36,7 @@ TEST(FrameLayout, HeaderFieldsAreWhereVersionOnePutThem) {
   EXPECT_EQ(offsetof(gravitas_frame_header, status), 48U);
   EXPECT_EQ(offsetof(gravitas_frame_header, column_count), 52U);
   EXPECT_EQ(offsetof(gravitas_frame_header, reply_count), 56U);
-  EXPECT_EQ(offsetof(gravitas_frame_header, reserved), 60U);
+  EXPECT_EQ(offsetof(gravitas_frame_header, fault), 60U);
   EXPECT_EQ(offsetof(gravitas_frame_header, state_generation), 64U);
   EXPECT_EQ(offsetof(gravitas_frame_header, response_generation), 72U);
   EXPECT_EQ(offsetof(gravitas_frame_header, deadline_ns), 80U);

@@ -57,14 +57,14 @@ TEST(Checkpoints, APausedRunNamesTheOneItWroteAndTheCommandThatGoesOn) {
   const ProgramResult result = run_program(
       {"run", kSample, plugins, "--set", "Integrator=Faulty", "--checkpoint", kept, "--duration", "1.5"}, folder);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step 2; to go on: gravitas run " + kSample + " " +
+  EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step 10; to go on: gravitas run " + kSample + " " +
                                     plugins + " --duration 1.5 --set Integrator=Faulty --resume '" + kept + "'"));
-  // it resumes: the same plugin dies again, three calls later
+  // it resumes: the same plugin dies again, and uses up a budget of its own
   const ProgramResult again = run_program(
       {"run", kSample, plugins, "--set", "Integrator=Faulty", "--resume", kept, "--checkpoint", kept}, folder);
   EXPECT_EQ(again.exit_code, 3);
-  EXPECT_THAT(again.err, HasSubstr("paused at step 5"));
-  EXPECT_THAT(again.err, HasSubstr("holds step 4"));
+  EXPECT_THAT(again.err, HasSubstr("paused at step 21"));
+  EXPECT_THAT(again.err, HasSubstr("holds step 20"));
 }
 
 TEST(Checkpoints, AnInterruptedRunGoesOn) {

@@ -1,6 +1,8 @@
 #include "tests/services/cli/program.h"
 
 #include <fcntl.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
@@ -40,6 +42,12 @@ std::string read_file(const std::string& path) {
   std::stringstream text;
   text << file.rdbuf();
   return text.str();
+}
+
+report::v1::Report read_report(const std::string& text) {
+  report::v1::Report report;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(text, &report).ok()) << text;
+  return report;
 }
 
 pid_t start_program(const std::vector<std::string>& arguments, const ScratchFolder& folder) {

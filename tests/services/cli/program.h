@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/report/v1/report.pb.h"
+
 namespace gravitas::testing {
 
 struct ProgramResult {
@@ -30,6 +32,8 @@ class ScratchFolder {
 };
 
 std::string read_file(const std::string& path);
+// The file of --report, or what --json prints.
+report::v1::Report read_report(const std::string& text);
 
 // Starts `gravitas` with its standard streams in files of `folder`; returns its process id.
 pid_t start_program(const std::vector<std::string>& arguments, const ScratchFolder& folder);

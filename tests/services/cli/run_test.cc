@@ -1,6 +1,5 @@
 // `gravitas run` from outside: what it prints, what it writes, how it ends.
 #include <gmock/gmock.h>
-#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -20,18 +19,13 @@ namespace {
 using ::testing::HasSubstr;
 using testing::ProgramResult;
 using testing::read_file;
+using testing::read_report;
 using testing::run_program;
 using testing::ScratchFolder;
 using testing::shipped_scene;
 using ::testing::StartsWith;
 
 const std::string kSample = shipped_scene("two_spheres_motor");
-
-report::v1::Report read_report(const std::string& text) {
-  report::v1::Report report;
-  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(text, &report).ok()) << text;
-  return report;
-}
 
 std::vector<std::vector<std::string>> read_csv(const std::string& path) {
   std::vector<std::vector<std::string>> rows;
@@ -238,28 +232,31 @@ ProgramResult run_with_bad_integrator(const std::string& library, const ScratchF
                      folder);
 }
 
-TEST(Run, AWorkerThatDiesEndsTheRunWithSlotCauseAndStep) {
+// In every third call: each time it is replaced, until five failures are too many.
+TEST(Run, AWorkerThatDiesAgainAndAgainPausesTheRunWithSlotCauseAndStep) {
   const ScratchFolder folder;
   const ProgramResult result = run_with_bad_integrator("integrator_killed", folder);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err, HasSubstr("paused at step 3: slot integrator, plugin Faulty"));
+  EXPECT_THAT(result.err, HasSubstr("paused at step 11: slot integrator, plugin Faulty"));
   EXPECT_THAT(result.err, HasSubstr("killed by signal 9"));
   const report::v1::Report report = read_report(read_file(folder.path("report.json")));
   EXPECT_EQ(report.outcome(), "paused");
-  EXPECT_EQ(report.steps(), 2U);
-  ASSERT_EQ(report.faults_size(), 1);
+  EXPECT_EQ(report.steps(), 10U);
+  ASSERT_EQ(report.faults_size(), 5);
   EXPECT_EQ(report.faults(0).step(), 3U);
   EXPECT_EQ(report.faults(0).slot(), "integrator");
   EXPECT_EQ(report.faults(0).kind(), "death");
-  // initial state and two steps of two bodies are kept
-  EXPECT_EQ(read_csv(folder.path("motion.csv")).size(), 1U + 3 * 2);
+  EXPECT_GT(report.faults(0).recovery_us(), 0.0);
+  EXPECT_EQ(report.faults(4).recovered_by(), "none: paused");
+  // initial state and ten steps of two bodies are kept
+  EXPECT_EQ(read_csv(folder.path("motion.csv")).size(), 1U + 11 * 2);
 }
 
-TEST(Run, AWorkerThatHangsEndsTheRunAtItsDeadline) {
+TEST(Run, AWorkerThatHangsIsReplacedAtItsDeadline) {
   const ScratchFolder folder;
   const ProgramResult result = run_with_bad_integrator("integrator_hangs", folder);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err, HasSubstr("paused at step 3: slot integrator"));
+  EXPECT_THAT(result.err, HasSubstr("paused at step 11: slot integrator"));
   EXPECT_THAT(result.err, HasSubstr("within its deadline of 200 ms"));
 }
 

@@ -227,10 +227,8 @@ TEST(Reader, RefusesWhatThisVersionDoesNotSupport) {
               ElementsAre("scene:1:50: error: Motion is not supported by this version; allowed: leave it out"));
   EXPECT_THAT(errors_of("Environment { CollisionFilter { Rules { Rule { Allow = false Body = \"A\" } } } }"),
               ElementsAre("scene:1:41: error: Rule is not supported by this version; allowed: leave it out"));
-  for (const char* name : {"Fallback", "Process"})
-    EXPECT_THAT(errors_of("Plugins { Plugin { Slot = \"solver\"\n" + std::string(name) + " = \"x\" } }"),
-                ElementsAre("scene:2:1: error: " + std::string(name) +
-                            " is not supported by this version; allowed: leave it out"));
+  EXPECT_THAT(errors_of("Plugins { Plugin { Slot = \"solver\"\nProcess = \"x\" } }"),
+              ElementsAre("scene:2:1: error: Process is not supported by this version; allowed: leave it out"));
 }
 
 TEST(Reader, TrimsBlanksAroundIds) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 #include "tests/workers/constraint/joint_problem.h"
 
 namespace gravitas::test {
@@ -42,7 +42,7 @@ class AngularMotor : public testing::Test {
 
   PluginUnderTest plugin_{"constraint_angular_motor"};
   JointProblem joint_{&plugin_, "AngularMotor"};
-  Random random_{1};
+  conformance::Draw random_{1};
   Vector3 point1_, point2_;
 };
 

@@ -1,8 +1,8 @@
 // Constraint `Spherical`: one point of both bodies, three locked axes, and nothing else.
 #include <gtest/gtest.h>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 #include "tests/workers/constraint/joint_problem.h"
 
 namespace gravitas::test {
@@ -13,7 +13,7 @@ constexpr double kRounding = 1e-14;
 
 class Spherical : public testing::Test {
  protected:
-  // Random bodies, joined at a random point.
+  // conformance::Draw bodies, joined at a random point.
   explicit Spherical(std::uint64_t seed = 1) : random_(seed) {
     for (JointedBody& body : joint_.bodies) body = {random_.pose(3.0), {random_.vector(2.0), random_.vector(2.0)}};
     point_ = random_.vector(3.0);
@@ -27,7 +27,7 @@ class Spherical : public testing::Test {
 
   PluginUnderTest plugin_{"constraint_spherical"};
   JointProblem joint_{&plugin_, "Spherical"};
-  Random random_;
+  conformance::Draw random_;
   Vector3 point_;
 };
 

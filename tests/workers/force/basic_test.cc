@@ -1,8 +1,8 @@
 // Force `Basic`: a force at a point, in world or body axes, over time, or as an impulse.
 #include <gtest/gtest.h>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 #include "tests/workers/force/force_problem.h"
 
 namespace gravitas::test {
@@ -77,7 +77,7 @@ TEST_F(BasicForce, InBodyAxesTurnsWithTheGeometry) {
 
 // Turning the whole world turns the answer.
 TEST_F(BasicForce, InBodyAxesIsTheSameInATurnedWorld) {
-  Random random(1);
+  conformance::Draw random(1);
   for (int i = 0; i < 100; ++i) {
     const BasicProperties properties = {
         .force = random.vector(5.0), .point = random.vector(1.0), .torque = random.vector(5.0), .in_body = true};
@@ -160,7 +160,7 @@ TEST_F(BasicForce, PromisesAConstantWrenchOnlyWhereItIsOne) {
 }
 
 TEST_F(BasicForce, KeepsThePromise) {
-  Random random(2);
+  conformance::Draw random(2);
   for (int i = 0; i < 50; ++i) {
     const BasicProperties properties = {.force = random.vector(5.0), .torque = random.vector(5.0)};
     ForcedBody first, second;

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "tests/plugin_sdk/random.h"
+#include "plugin_sdk/conformance/draw.h"
 #include "tests/workers/force/force_problem.h"
 
 namespace gravitas::test {
@@ -45,7 +45,7 @@ TEST_F(Gravity, RefusesWhatIsNotFinite) {
 
 // What a constant wrench with a potential promises: U(x) = U(x0) - f.(x - x0), f the same.
 TEST_F(Gravity, KeepsItsPromises) {
-  Random random(1);
+  conformance::Draw random(1);
   for (int i = 0; i < 100; ++i) {
     const Vector3 g = random.vector(10.0);
     ForcedBody here, there;

@@ -6,8 +6,8 @@
 #include <limits>
 #include <string>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/plugin_sdk/random.h"
 #include "tests/workers/integrator/integrator_problem.h"
 
 namespace gravitas::test {
@@ -20,7 +20,7 @@ class FirstOrderLaws : public testing::TestWithParam<const char*> {
 
 // At any angle of a step: the seed's sum would turn by 2 atan(h w / 2).
 TEST_P(FirstOrderLaws, AFreeBodyTurnsExactlyAboutAPrincipalAxis) {
-  Random random(1);
+  conformance::Draw random(1);
   for (const double speed : {0.1, 10.0, 25.0, 100.0}) {
     for (int axis = 0; axis < 3; ++axis) {
       const Quaternion start = random.rotation();
@@ -134,7 +134,7 @@ TEST_P(FirstOrderLaws, OfNoBodiesIsNothing) {
 
 // What was integrated before must not matter.
 TEST_P(FirstOrderLaws, GivesTheSameBytesForTheSameRequest) {
-  Random random(2);
+  conformance::Draw random(2);
   for (int i = 0; i < 20; ++i) {
     FreeBody body{.damping = 0.1, .wrench = {random.vector(3.0), random.vector(3.0)}};
     body.state = {random.pose(3.0), {random.vector(2.0), random.vector(2.0)}};

@@ -1,7 +1,7 @@
 // Space `Basic` against the contract: who is a pair, and in which order.
 #include <gtest/gtest.h>
 
-#include "tests/plugin_sdk/random.h"
+#include "plugin_sdk/conformance/draw.h"
 #include "tests/workers/space/space_problem.h"
 
 namespace gravitas::test {
@@ -70,7 +70,7 @@ TEST_F(BasicSpace, AnswersInOrder) {
 }
 
 TEST_F(BasicSpace, IsTheContractOnRandomBodies) {
-  Random random(1);
+  conformance::Draw random(1);
   for (int round = 0; round < 200; ++round) {
     std::vector<BoundedBody> bodies;
     for (int i = 0; i < 30; ++i) {

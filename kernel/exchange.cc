@@ -1,0 +1,188 @@
+// Others in a slot of a running environment: what may take whose place, and what that means for the state.
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+
+#include "kernel/environment.h"
+
+namespace gravitas::kernel {
+namespace {
+
+[[noreturn]] void impossible(const SwapOrder& order, const std::string& why) {
+  throw std::invalid_argument(std::string("swap ") + slot_name(order.slot) + "=" + order.plugin.declaration.name +
+                              ": " + why);
+}
+
+// Types of the scene that the slot's plugins serve.
+std::vector<std::string> types_in_use(const EnvironmentDescription& description, Slot slot) {
+  std::vector<std::string> types;
+  const auto add = [&](const auto& items) {
+    for (const auto& item : items) types.push_back(item.type);
+  };
+  if (slot == Slot::kForce) add(description.forces);
+  if (slot == Slot::kConstraint) add(description.constraints);
+  if (slot == Slot::kCollision) add(description.shapes);
+  return types;
+}
+
+const TypeDeclaration* find_type(const PluginDeclaration& plugin, const std::string& name) {
+  const auto found = std::ranges::find(plugin.types, name, &TypeDeclaration::name);
+  return found == plugin.types.end() ? nullptr : &*found;
+}
+
+// Empty, or why `next` cannot take the place of `now`: parameters lie flattened in the model.
+std::string misfit(const PluginDeclaration& now, const PluginDeclaration& next,
+                   const std::vector<std::string>& in_use) {
+  for (const TypeDeclaration& type : now.types) {
+    if (std::ranges::find(in_use, type.name) == in_use.end()) continue;
+    const TypeDeclaration* other = find_type(next, type.name);
+    if (other == nullptr) return "it does not serve the type '" + type.name + "'";
+    const bool same = std::ranges::equal(type.properties, other->properties, [](const Property& a, const Property& b) {
+      return a.name == b.name && a.kind == b.kind && a.columns == b.columns;
+    });
+    if (!same) return "its type '" + type.name + "' has other properties than that of " + now.name;
+  }
+  return {};
+}
+
+}  // namespace
+
+StageSlot& Environment::slot_of(Slot slot) {
+  switch (slot) {
+    case Slot::kSpace:
+      return space_;
+    case Slot::kCollision:
+      return collision_;
+    case Slot::kConstraint:
+      return constraint_;
+    case Slot::kForce:
+      return force_;
+    case Slot::kSolver:
+      return solver_;
+    case Slot::kIntegrator:
+      break;
+  }
+  return integrator_;
+}
+
+Plan Environment::plan() const {
+  Plan plan = plan_;
+  plan.slots.clear();
+  for (const PlannedSlot& planned : plan_.slots)
+    for (const StageSlot* slot : {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_})
+      if (slot->which() == planned.slot) std::ranges::move(slot->hosts(), std::back_inserter(plan.slots));
+  return plan;
+}
+
+// Row of the plugin whose place is taken.
+std::uint32_t Environment::place_of(const SwapOrder& order) {
+  const StageSlot& slot = slot_of(order.slot);
+  if (order.plugin.declaration.slot != order.slot)
+    impossible(order, std::string("it is a plugin of slot ") + slot_name(order.plugin.declaration.slot));
+  if (!slot.is_running()) {
+    for (const LeftOut& left_out : plan_.left_out)
+      if (left_out.what == slot_name(order.slot)) impossible(order, "the plan leaves the slot out: " + left_out.why);
+    impossible(order, "the plan leaves the slot out");
+  }
+  const std::vector<PluginChoice>& plugins = slot.description().plugins;
+  const std::vector<std::string> in_use = types_in_use(description_, order.slot);
+  std::string why;
+  for (std::uint32_t row = 0; row < plugins.size(); ++row) {
+    const std::string misfit_here = misfit(plugins[row].declaration, order.plugin.declaration, in_use);
+    if (misfit_here.empty()) return row;
+    if (why.empty()) why = misfit_here;
+  }
+  impossible(order, why);
+}
+
+void Environment::check_fallbacks() const {
+  for (const StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
+    for (const PluginChoice& plugin : slot->description().plugins) {
+      if (!plugin.fallback) continue;
+      const PluginDeclaration& fallback = plugin.fallback->declaration;
+      std::string why = misfit(plugin.declaration, fallback, types_in_use(description_, slot->which()));
+      if (fallback.slot != slot->which()) why = std::string("it is a plugin of slot ") + slot_name(fallback.slot);
+      if (!why.empty())
+        throw std::invalid_argument("fallback " + fallback.name + " of " + plugin.declaration.name + ": " + why);
+    }
+}
+
+void Environment::order_swap(SwapOrder order) {
+  const std::uint32_t row = place_of(order);
+  slot_of(order.slot).order_swap(std::move(order), row);
+}
+
+void Environment::compare(SwapOrder order) {
+  const std::uint32_t row = place_of(order);
+  slot_of(order.slot).order_swap(std::move(order), row, true);
+}
+
+std::vector<SwapRecord> Environment::swaps() const {
+  std::vector<SwapRecord> all;
+  for (const StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
+    std::ranges::move(slot->swaps(), std::back_inserter(all));
+  std::ranges::stable_sort(all, {}, &SwapRecord::step);
+  return all;
+}
+
+void Environment::inject(FaultInjection fault) {
+  StageSlot& slot = slot_of(fault.slot);
+  const auto refuse = [&](const std::string& why) {
+    throw std::invalid_argument("fault " + fault.order + " in slot " + slot_name(fault.slot) + ": " + why);
+  };
+  if (!slot.is_running()) {
+    for (const LeftOut& left_out : plan_.left_out)
+      if (left_out.what == slot_name(fault.slot)) refuse("the plan leaves the slot out: " + left_out.why);
+    refuse("the plan leaves the slot out");
+  }
+  if (slot.description().hosting == Hosting::kDirect)
+    refuse("it is hosted in the kernel's own process (direct), which the fault would hit");
+  slot.inject(std::move(fault));
+}
+
+// What only the plugin before understands is dropped; another build or instance of it goes on with it.
+void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) {
+  const PluginDeclaration& now = slot.description().plugins[target].declaration;
+  if (slot.which() == Slot::kConstraint) bind_again(target);
+  if (now.name == before.declaration.name) return;
+  if (slot.which() == Slot::kIntegrator) {
+    data_.theta[0] = now.theta;
+    front().plugin_state.resize(0);
+    std::ranges::fill(front().state_changed.span(), 1U);
+  }
+  if (slot.which() == Slot::kCollision) {
+    // its features have other numbers
+    for (const Column<std::uint32_t>* column : {&front().contact_body, &front().contact_feature}) column->resize(0);
+    for (const Column<double>* column : {&front().contact_impulse, &front().contact_correction}) column->resize(0);
+    front().contact_key.resize(0);
+  }
+}
+
+// Joints are bound in the initial state; the trial state's columns lend themselves, and get back what they hold.
+void Environment::bind_again(std::uint32_t target) {
+  const std::span<double> position = data_.trial_position.span(), orientation = data_.trial_orientation.span();
+  const std::vector<double> held_position(position.begin(), position.end());
+  const std::vector<double> held_orientation(orientation.begin(), orientation.end());
+  data_.trial_position.resize(3ULL * model_.body_count);
+  data_.trial_orientation.resize(4ULL * model_.body_count);
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    set_vector(data_.trial_position.span(), i, description_.bodies[i].pose.position);
+    set_quaternion(data_.trial_orientation.span(), i, description_.bodies[i].pose.orientation);
+  }
+  for (double& value : data_.trial_position.span()) value += 0.0;
+  for (double& value : data_.trial_orientation.span()) value += 0.0;
+  for (const ConstraintGroup& group : model_.constraint_groups)
+    if (group.target == target) bind(group, data_.trial_position, data_.trial_orientation);
+  data_.trial_position.assign(held_position);
+  data_.trial_orientation.assign(held_orientation);
+}
+
+void Environment::on_decision(const Decision& decision) {
+  if (commit_listener_ != nullptr) commit_listener_->on_decision(*this, decision);
+}
+
+void Environment::on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) {
+  if (commit_listener_ != nullptr) commit_listener_->on_poison(*this, {call, arena_, plugin, fault});
+}
+
+}  // namespace gravitas::kernel

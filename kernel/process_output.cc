@@ -1,0 +1,86 @@
+#include "kernel/process_output.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr std::array<const char*, 2> kPrefix = {"stdout: ", "stderr: "};
+constexpr std::size_t kPrefixSize = 8;
+
+// Length of the UTF-8 character that begins here; 0 if none does.
+std::size_t character_size(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  if (first < 0x80) return first >= 0x20 || first == '\t' ? (first != 0x7f ? 1 : 0) : 0;
+  const std::size_t size = first >= 0xc2 && first < 0xe0 ? 2 : first >= 0xe0 && first < 0xf0 ? 3 : 4;
+  if (first < 0xc2 || first > 0xf4 || text.size() < size) return 0;
+  for (std::size_t i = 1; i < size; ++i)
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  // overlong forms, surrogates, beyond the last character
+  const bool is_wrong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) > 0x9f) ||
+                        (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) > 0x8f);
+  return is_wrong ? 0 : size;
+}
+
+std::string printable(std::string_view text) {
+  std::string shown;
+  while (!text.empty()) {
+    const std::size_t size = character_size(text);
+    if (size == 0) {
+      shown += '?';
+    } else {
+      shown += text.substr(0, size);
+    }
+    text.remove_prefix(std::max<std::size_t>(size, 1));
+  }
+  return shown;
+}
+
+bool is_blank(std::string_view text) { return text.find_first_not_of(" \t\r") == std::string_view::npos; }
+
+}  // namespace
+
+void ProcessOutput::add(OutputStream stream, std::string_view bytes) {
+  std::string& begun = streams_[static_cast<std::size_t>(stream)].begun;
+  while (!bytes.empty()) {
+    const std::string_view part = bytes.substr(0, std::min(bytes.find('\n'), kLongestLine - begun.size()));
+    begun += part;
+    bytes.remove_prefix(part.size());
+    const bool is_whole = !bytes.empty() && bytes.front() == '\n';
+    if (is_whole) bytes.remove_prefix(1);
+    if (is_whole || begun.size() == kLongestLine) add_line(stream);
+  }
+}
+
+void ProcessOutput::end(OutputStream stream) {
+  if (!streams_[static_cast<std::size_t>(stream)].begun.empty()) add_line(stream);
+}
+
+void ProcessOutput::add_line(OutputStream stream) {
+  const auto which = static_cast<std::size_t>(stream);
+  auto& [text, held, dropped] = streams_[which];
+  if (stream == OutputStream::kStderr && !is_blank(text) && !last_words_.starts_with("SUMMARY: ")) last_words_ = text;
+  const std::size_t cost = text.size() + kPrefixSize + sizeof(std::string);
+  if (dropped > 0 || held + cost > kMostBytes / streams_.size()) {
+    dropped += text.size() + 1;
+  } else {
+    held += cost;
+    lines_.push_back(kPrefix[which] + printable(text));
+  }
+  text.clear();
+}
+
+std::string ProcessOutput::last_words() const { return printable(last_words_); }
+
+std::vector<std::string> ProcessOutput::take() {
+  for (std::size_t i = 0; i < streams_.size(); ++i) {
+    streams_[i].held = 0;
+    if (const std::uint64_t dropped = std::exchange(streams_[i].dropped, 0); dropped > 0)
+      lines_.push_back(kPrefix[i] + ("... and " + std::to_string(dropped) + " more bytes dropped"));
+  }
+  return std::exchange(lines_, {});
+}
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,61 @@
+// A second host that is asked what the first one has answered: its answers are checked, compared and not used. What a
+// swap cuts over to runs so for some steps; two plugins compared in lock-step run so for as long as the run lasts.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "kernel/arena.h"
+#include "kernel/carrier/carrier.h"
+
+namespace gravitas::kernel {
+
+// How the two answers differ in one column, over all calls.
+struct Disagreement {
+  stage::Method method;
+  const stage::ColumnInfo* column;
+  double largest = 0.0;            // |difference| of a number, in the column's unit; integers count 1
+  std::uint64_t largest_row = 0;   // where that was
+  std::uint64_t rows = 0;          // that differed in any bit
+  std::uint64_t other_counts = 0;  // answers with another number of rows, which are not compared further
+};
+
+struct Comparison {
+  std::uint64_t calls = 0;
+  std::uint64_t differing_calls = 0;  // whose answers were not the same bytes
+  std::vector<Disagreement> disagreements;
+};
+
+class Shadow {
+ public:
+  // The answer of the first host, which stands in the call's reply columns, is put aside; then run() writes the
+  // second's there and may throw; whatever happens, the first answer is back at the end.
+  template <typename Run>
+  void compare(const StageCall& call, Arena* arena, Run&& run) {
+    keep(call, *arena);
+    try {
+      run();
+      note(call, *arena);
+    } catch (...) {
+      put_back(call, arena);
+      throw;
+    }
+    put_back(call, arena);
+  }
+
+  bool last_differed() const { return last_differed_; }
+  const Comparison& result() const { return result_; }
+
+ private:
+  void keep(const StageCall& call, const Arena& arena);
+  void put_back(const StageCall& call, Arena* arena) const;
+  void note(const StageCall& call, const Arena& arena);
+  Disagreement& of(stage::Method method, const stage::ColumnInfo* column);
+
+  std::vector<std::vector<std::byte>> kept_;  // per reply column
+  bool last_differed_ = false;
+  Comparison result_;
+};
+
+}  // namespace gravitas::kernel

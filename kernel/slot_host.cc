@@ -1,0 +1,176 @@
+#include "kernel/slot_host.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr std::chrono::milliseconds kFirstBackOff{1}, kLongestBackOff{100};
+
+}  // namespace
+
+SlotHost::SlotHost(SlotDescription description, std::uint32_t threads, const HostStarter& start)
+    : description_(std::move(description)), threads_(threads), start_(start) {}
+
+SlotHost::~SlotHost() = default;
+
+void SlotHost::begin_start() { standbys_.push_back(prepare(description_)); }
+
+void SlotHost::finish_start() {
+  const std::unique_ptr<Spare> first = std::move(standbys_.front());
+  standbys_.clear();
+  carrier_ = first->take();
+}
+
+std::unique_ptr<Spare> SlotHost::prepare(const SlotDescription& description) const {
+  return std::make_unique<Spare>(description, threads_, start_);
+}
+
+std::uint32_t SlotHost::wanted_standbys() const {
+  const bool is_ours = description_.hosting != Hosting::kDirect && description_.plugins[0].address.empty();
+  return is_ours ? description_.standbys : 0;
+}
+
+void SlotHost::keep_standbys() {
+  std::erase_if(standbys_, [](const std::unique_ptr<Spare>& spare) { return spare->has_died(); });
+  while (standbys_.size() < wanted_standbys()) standbys_.push_back(prepare(description_));
+}
+
+void SlotHost::drain() {
+  for (const std::unique_ptr<Spare>& standby : standbys_) standby->give_up();
+  for (const std::unique_ptr<Carrier>* carrier : {&carrier_, &old_})
+    if (*carrier) (*carrier)->drain();
+}
+
+void SlotHost::retire(std::unique_ptr<Carrier> carrier) {
+  std::erase_if(retired_, [](const std::future<void>& one) {
+    return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  });
+  if (!carrier) return;
+  carrier->drain();
+  for (std::string& one : carrier->take_complaints()) complaints_.push_back(std::move(one));
+  retired_.push_back(std::async(std::launch::async, [carrier = std::move(carrier)]() mutable { carrier.reset(); }));
+}
+
+void SlotHost::retire(std::vector<std::unique_ptr<Spare>> spares) {
+  if (spares.empty()) return;
+  for (const std::unique_ptr<Spare>& spare : spares) spare->give_up();
+  retired_.push_back(std::async(std::launch::async, [spares = std::move(spares)]() mutable { spares.clear(); }));
+}
+
+std::vector<std::string> SlotHost::take_complaints() {
+  std::vector<std::string> all = std::exchange(complaints_, {});
+  if (!carrier_) return all;
+  for (std::string& one : carrier_->take_complaints()) all.push_back(std::move(one));
+  return all;
+}
+
+// A standby that is not ready yet is still ahead of a cold start.
+std::string SlotHost::take_host() {
+  while (!standbys_.empty()) {
+    const std::unique_ptr<Spare> spare = std::move(standbys_.front());
+    standbys_.erase(standbys_.begin());
+    const bool was_ready = spare->is_done();
+    try {
+      carrier_ = spare->take();
+    } catch (const StageFault&) {
+      continue;
+    }
+    if (carrier_->is_alive()) return was_ready ? "standby" : "standby, still starting";
+    carrier_->kill();
+    retire(std::move(carrier_));
+  }
+  carrier_ = start_(description_, threads_, {});
+  return description_.hosting == Hosting::kDirect ? "new instance" : "cold start";
+}
+
+void SlotHost::replace_description(SlotDescription description) {
+  description_ = std::move(description);
+  retire(std::exchange(standbys_, {}));
+  failures_ = failures_in_a_row_ = 0;
+}
+
+std::string SlotHost::next_rung() {
+  if (rung_ == Rung::kOwn && previous_) {
+    rung_ = Rung::kPrevious;
+    replace_description(std::move(*previous_));
+    previous_.reset();
+    return "previous build";
+  }
+  const bool has_fallback =
+      std::ranges::any_of(description_.plugins, [](const PluginChoice& one) { return one.fallback != nullptr; });
+  if (rung_ == Rung::kFallback || !has_fallback) return {};
+  rung_ = Rung::kFallback;
+  SlotDescription next = description_;
+  // what nobody vouches for does not come into this process
+  if (next.hosting == Hosting::kDirect) next.hosting = Hosting::kSharedMemory;
+  std::string names;
+  for (PluginChoice& plugin : next.plugins) {
+    if (!plugin.fallback) continue;
+    plugin = PluginChoice(*plugin.fallback);
+    names += (names.empty() ? "" : ", ") + plugin.declaration.name;
+  }
+  replace_description(std::move(next));
+  return "fallback " + names;
+}
+
+Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* poison) {
+  if (carrier_) carrier_->kill();
+  retire(std::move(carrier_));
+  if (good_answers_ >= kGoodAnswers) failures_ = 0;
+  failures_in_a_row_ = good_answers_ == 0 ? failures_in_a_row_ + 1 : 1;
+  good_answers_ = 0;
+  ++failures_;
+  ++attempts->made;
+  if (old_) {
+    carrier_ = std::move(old_);
+    replace_description(std::move(*previous_));
+    previous_.reset();
+    return {"rollback", true};
+  }
+  if (fault.kind != FaultKind::kDeadline) ++attempts->rejections;
+
+  Recovery recovery;
+  StageFault last = fault;
+  for (;;) {
+    std::string rung;
+    if (attempts->rejections >= 2 || failures_ >= kBudget) {
+      const bool is_to_blame = attempts->rejections >= 2;
+      rung = next_rung();
+      *poison = is_to_blame && rung != "previous build";
+      if (rung.empty()) throw StageFault(last);
+      recovery.plugins_changed = true;
+      // one chance there
+      attempts->rejections = 1;
+    }
+    if (failures_in_a_row_ >= 2)
+      std::this_thread::sleep_for(
+          std::min(kLongestBackOff, kFirstBackOff * (1 << std::min(failures_in_a_row_ - 2, 10U))));
+    try {
+      const std::string host = take_host();
+      recovery.how = !rung.empty() ? rung : recovery.how.empty() ? host : recovery.how;
+      return recovery;
+    } catch (const StageFault& not_started) {
+      if (!rung.empty()) recovery.how = rung;
+      last = not_started;
+      ++failures_;
+      ++failures_in_a_row_;
+    }
+  }
+}
+
+void SlotHost::cut_over(std::unique_ptr<Carrier> carrier, SlotDescription description) {
+  end_probation();
+  old_ = std::exchange(carrier_, std::move(carrier));
+  previous_ = description_;
+  replace_description(std::move(description));
+  rung_ = Rung::kOwn;
+  good_answers_ = 0;
+}
+
+void SlotHost::end_probation() { retire(std::move(old_)); }
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,52 @@
+#include "kernel/spare.h"
+
+#include <utility>
+
+namespace gravitas::kernel {
+
+Spare::Spare(SlotDescription host, std::uint32_t threads, const HostStarter& start)
+    : thread_([this, host = std::move(host), threads, start](const std::stop_token& stop) {
+        std::unique_ptr<Carrier> carrier;
+        std::optional<StageFault> fault;
+        try {
+          carrier = start(host, threads, stop);
+        } catch (const StageFault& failed) {
+          fault = failed;
+        }
+        const std::lock_guard lock(mutex_);
+        carrier_ = std::move(carrier);
+        fault_ = std::move(fault);
+        done_ = true;
+        changed_.notify_all();
+      }) {}
+
+Spare::~Spare() {
+  give_up();
+  thread_.join();
+  if (carrier_) carrier_->kill();
+}
+
+void Spare::give_up() {
+  thread_.request_stop();
+  const std::lock_guard lock(mutex_);
+  if (carrier_) carrier_->kill();
+}
+
+bool Spare::is_done() const {
+  const std::lock_guard lock(mutex_);
+  return done_;
+}
+
+bool Spare::has_died() const {
+  const std::lock_guard lock(mutex_);
+  return carrier_ != nullptr && !carrier_->is_alive();
+}
+
+std::unique_ptr<Carrier> Spare::take() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return done_; });
+  if (fault_) throw StageFault(*fault_);
+  return std::move(carrier_);
+}
+
+}  // namespace gravitas::kernel

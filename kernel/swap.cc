@@ -1,0 +1,264 @@
+// What swaps make of a slot between two steps, and of the calls that are watched.
+#include "kernel/swap.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "kernel/slot.h"
+#include "plugin_sdk/channel/mailbox.h"
+
+namespace gravitas::kernel {
+namespace {
+
+// A candidate in shadow gets this many times the longest call of the slot so far, and this at least, so that one that
+// hangs holds up the run no longer than that, once.
+constexpr std::uint64_t kShadowFactor = 10, kShadowNs = 20'000'000;
+
+double microseconds(std::uint64_t since) { return 1e-3 * static_cast<double>(channel::now_ns() - since); }
+
+std::string shown(const PluginChoice& plugin, const SlotDescription& host) {
+  return plugin.declaration.name + " (" + hosting_name(host.hosting) + ")";
+}
+
+}  // namespace
+
+const char* swap_state_name(SwapState state) {
+  static constexpr const char* kNames[] = {"preparing", "shadow", "probation", "committed", "rolled back", "refused"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+void StageSlot::order_swap(SwapOrder order, std::uint32_t target, bool only_compare) {
+  const std::size_t host = routes_[target].host;
+  PendingSwap& swap = pending_.emplace_back();
+  swap.host = host;
+  swap.target = target;
+  swap.only_compare = only_compare;
+  swap.record = swaps_.size();
+  SwapRecord& record = swaps_.emplace_back();
+  record.slot = which_;
+  record.step = order.step;
+  record.only_compared = only_compare;
+  record.to = order.plugin.declaration.name;
+  swap.order = std::move(order);
+  std::ranges::stable_sort(pending_, {}, [](const PendingSwap& one) { return one.order.step; });
+  needs_attention_ = true;
+  // before the first step there is time
+  if (step_ == 0) prepare_swaps();
+}
+
+std::vector<SwapRecord> StageSlot::swaps() const {
+  std::vector<SwapRecord> records = swaps_;
+  for (const PendingSwap& swap : pending_) records[swap.record].shadow = swap.shadow.result();
+  return records;
+}
+
+void StageSlot::set_rerun_every(std::uint32_t calls) {
+  rerun_.every = calls;
+  update_watch();
+}
+
+void StageSlot::attend() {
+  // the first step is not held up by what it does not need
+  if (step_ > 1)
+    for (SlotHost& host : hosts_) host.keep_standbys();
+  if (!pending_.empty() || !probation_.empty()) advance_swaps();
+}
+
+// A host's next swap is prepared as soon as the one before it has cut over, since it starts from there.
+void StageSlot::prepare_swaps() {
+  std::vector<std::size_t> busy;
+  for (PendingSwap& swap : pending_) {
+    if (std::ranges::find(busy, swap.host) != busy.end()) continue;
+    if (!swap.only_compare) busy.push_back(swap.host);
+    if (swap.spare || swap.candidate) continue;
+    const SlotDescription& now = hosts_[swap.host].description();
+    const std::uint32_t row = routes_[swap.target].target;
+    swap.next = now;
+    swap.next.plugins[row] = swap.order.plugin;
+    swap.next.plugins[row].fallback = now.plugins[row].fallback;
+    if (swap.order.hosting) swap.next.hosting = *swap.order.hosting;
+    if (!swap.order.plugin.command.empty() || !swap.order.plugin.address.empty()) swap.next.hosting = Hosting::kGrpc;
+    const bool shows_hosting = swap.next.hosting != now.hosting;
+    swaps_[swap.record].from = shows_hosting ? shown(now.plugins[row], now) : now.plugins[row].declaration.name;
+    if (shows_hosting) swaps_[swap.record].to = shown(swap.order.plugin, swap.next);
+    swap.spare = hosts_[swap.host].prepare(swap.next);
+  }
+}
+
+void StageSlot::advance_swaps() {
+  std::vector<Probation> over;
+  for (const Probation& probation : probation_)
+    if (step_ >= swaps_[probation.record].step + SlotHost::kProbation) over.push_back(probation);
+  for (const Probation& probation : over) close_probation(probation.host, SwapState::kCommitted, {});
+  // a cut-over makes room for the preparation of the next
+  for (bool again = true; again;) {
+    prepare_swaps();
+    again = false;
+    for (std::size_t i = 0; i < pending_.size() && !again; ++i) {
+      if (!advance_swap(&pending_[i])) continue;
+      pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
+      again = true;
+    }
+  }
+  update_watch();
+}
+
+// True when it is done with: cut over, or refused.
+bool StageSlot::advance_swap(PendingSwap* swap) {
+  if (!swap->spare && !swap->candidate) return false;
+  const bool is_due = !swap->only_compare && step_ >= swap->order.step;
+  SwapRecord& record = swaps_[swap->record];
+  if (swap->spare && (is_due || swap->only_compare || swap->spare->is_done())) {
+    const std::uint64_t start = channel::now_ns();
+    const std::unique_ptr<Spare> spare = std::move(swap->spare);
+    try {
+      swap->candidate = spare->take();
+    } catch (const StageFault& fault) {
+      refuse(swap, "it could not be prepared: " + fault.text);
+      return true;
+    }
+    if (!swap->only_compare) record.wait_us += microseconds(start);
+    record.state = SwapState::kShadow;
+  }
+  if (!is_due) return false;
+  if (!swap->candidate->is_alive()) {
+    refuse(swap, "its process ended before the cut-over");
+    return true;
+  }
+  cut_over(swap);
+  return true;
+}
+
+void StageSlot::cut_over(PendingSwap* swap) {
+  const std::uint64_t start = channel::now_ns();
+  SlotHost& host = hosts_[swap->host];
+  if (host.is_on_probation()) close_probation(swap->host, SwapState::kCommitted, {});
+  SwapRecord& record = swaps_[swap->record];
+  record.state = SwapState::kProbation;
+  record.step = step_;
+  swap->is_in_shadow = false;
+  record.shadow = swap->shadow.result();
+  host.cut_over(std::move(swap->candidate), std::move(swap->next));
+  probation_.push_back({swap->host, swap->record});
+  adopt(swap->host, "swap");
+  swaps_[swap->record].pause_us = microseconds(start);
+}
+
+void StageSlot::refuse(PendingSwap* swap, const std::string& reason) {
+  SwapRecord& record = swaps_[swap->record];
+  record.state = SwapState::kRefused;
+  record.reason = reason;
+  record.shadow = swap->shadow.result();
+  if (swap->candidate) {
+    swap->candidate->kill();
+    hosts_[swap->host].retire(std::move(swap->candidate));
+  }
+}
+
+void StageSlot::close_probation(std::size_t host, SwapState state, const std::string& reason) {
+  std::erase_if(probation_, [&](const Probation& one) {
+    if (one.host != host) return false;
+    swaps_[one.record].state = state;
+    swaps_[one.record].reason = reason;
+    return true;
+  });
+  if (state == SwapState::kCommitted) hosts_[host].end_probation();
+}
+
+void StageSlot::update_watch() {
+  const auto is_in_shadow = [&](const PendingSwap& swap) {
+    return swap.candidate && swap.may_shadow && (swap.only_compare || step_ + kShadowSteps >= swap.order.step);
+  };
+  is_watched_ = rerun_.every > 0;
+  for (PendingSwap& swap : pending_) is_watched_ |= swap.is_in_shadow = is_in_shadow(swap);
+}
+
+void StageSlot::watch(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+                      const std::function<void()>& recheck) {
+  for (std::size_t i = 0; i < pending_.size();) {
+    const bool is_lost = pending_[i].is_in_shadow && pending_[i].target == call.target &&
+                         !watch_swap(&pending_[i], call, arena, derivatives, recheck);
+    if (is_lost) {
+      pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
+    } else {
+      ++i;
+    }
+  }
+  if (rerun_.every > 0 && ++rerun_.calls % rerun_.every == 0) rerun(call, arena, derivatives, recheck);
+}
+
+// False if the swap is refused.
+bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+                           const std::function<void()>& recheck) {
+  StageCall routed = call;
+  routed.target = routes_[call.target].target;
+  routed.deadline_ns = swap->only_compare ? 0 : std::max(kShadowNs, kShadowFactor * longest_call_ns_);
+  try {
+    swap->shadow.compare(call, arena, [&] {
+      CallTimes times;
+      if (derivatives != nullptr) derivatives->begin_attempt(false);
+      call_with_room(swap->candidate.get(), routed, arena, derivatives, &times);
+      recheck();
+    });
+    return true;
+  } catch (const StageFault& fault) {
+    if (!fault.plugin.empty()) throw;
+    if (fault.kind != FaultKind::kDeadline || swap->only_compare) {
+      refuse(swap, "in shadow: " + fault.text);
+      return false;
+    }
+    // slow is no reason to refuse; it was ended all the same, and goes on unseen until the cut-over
+    complaints_.push_back("the swap to " + swap->order.plugin.declaration.name +
+                          " goes on without a shadow: it takes over ten times as long");
+    hosts_[swap->host].retire(std::move(swap->candidate));
+    swap->spare = hosts_[swap->host].prepare(swap->next);
+    swap->may_shadow = swap->is_in_shadow = false;
+    return true;
+  }
+}
+
+// The same request to another process of the same plugins: other bytes mean that one of the two is wrong, and a third
+// says which.
+void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+                      const std::function<void()>& recheck) {
+  const std::size_t host = routes_[call.target].host;
+  StageCall routed = call;
+  routed.target = routes_[call.target].target;
+  // whether another host gave other bytes
+  const auto differs = [&](std::unique_ptr<Carrier>* carrier) {
+    if (!*carrier) *carrier = hosts_[host].prepare(hosts_[host].description())->take();
+    Shadow shadow;
+    shadow.compare(call, arena, [&] {
+      CallTimes times;
+      if (derivatives != nullptr) derivatives->begin_attempt(false);
+      call_with_room(carrier->get(), routed, arena, derivatives, &times);
+      recheck();
+    });
+    return shadow.last_differed();
+  };
+  rerun_.checkers.resize(hosts_.size());
+  std::unique_ptr<Carrier>& checker = rerun_.checkers[host];
+  const auto is_doubted = [&](std::unique_ptr<Carrier>* carrier) {
+    try {
+      return differs(carrier);
+    } catch (const StageFault& fault) {
+      if (!fault.plugin.empty()) throw;
+      (*carrier)->kill();
+      hosts_[host].retire(std::move(*carrier));
+      return true;
+    }
+  };
+  if (!is_doubted(&checker)) return;
+  std::unique_ptr<Carrier> third;
+  const bool is_outvoted = is_doubted(&third);
+  if (checker) {
+    checker->kill();
+    hosts_[host].retire(std::move(checker));
+  }
+  checker = std::move(third);
+  if (is_outvoted)
+    throw StageFault(FaultKind::kDisagreement, "re-run", "two other processes answered the same request otherwise");
+  complaints_.emplace_back("another process answered the same request otherwise; a third agreed with the first");
+}
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,121 @@
+#include "plugin_sdk/host/listener.h"
+
+#include <grpcpp/server_posix.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <thread>
+
+#include "plugin_sdk/channel/address.h"
+
+namespace gravitas::host {
+namespace {
+
+// Pause when no connection can be taken, as for want of descriptors.
+constexpr std::chrono::milliseconds kPause{50};
+
+// A socket of the family, listening at the address; -1 with errno.
+int listen_on(const sockaddr* address, socklen_t size) {
+  const int listening = socket(address->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (listening < 0) return -1;
+  const int yes = 1;
+  if (address->sa_family != AF_UNIX) {
+    setsockopt(listening, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+    // connections inherit it
+    setsockopt(listening, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+  }
+  if (bind(listening, address, size) == 0 && listen(listening, SOMAXCONN) == 0) return listening;
+  const int problem = errno;
+  close(listening);
+  errno = problem;
+  return -1;
+}
+
+bool nobody_listens(const sockaddr* address, socklen_t size) {
+  const int asking = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool refused = asking >= 0 && connect(asking, address, size) != 0 && errno == ECONNREFUSED;
+  if (asking >= 0) close(asking);
+  return refused;
+}
+
+int listen_unix(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof address.sun_path) {
+    errno = ENAMETOOLONG;
+    return -1;
+  }
+  path.copy(address.sun_path, path.size());
+  const auto* plain = reinterpret_cast<const sockaddr*>(&address);
+  const int listening = listen_on(plain, sizeof address);
+  if (listening >= 0 || errno != EADDRINUSE) return listening;
+  // left behind by a worker that was killed
+  if (nobody_listens(plain, sizeof address)) unlink(path.c_str());
+  return listen_on(plain, sizeof address);
+}
+
+int listen_tcp(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  std::string host = address.substr(0, colon);
+  if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  if (getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &hints, &found) != 0) {
+    errno = EADDRNOTAVAIL;
+    return -1;
+  }
+  int listening = -1;
+  for (const addrinfo* one = found; one != nullptr && listening < 0; one = one->ai_next)
+    listening = listen_on(one->ai_addr, one->ai_addrlen);
+  const int problem = errno;
+  freeaddrinfo(found);
+  errno = problem;
+  return listening;
+}
+
+}  // namespace
+
+int listen_at(const std::string& address, std::string* problem) {
+  if (!channel::is_local_address(address)) {
+    *problem = "--listen " + address +
+               ": the connection is not encrypted, so only this machine is allowed: 127.0.0.1:PORT, [::1]:PORT or "
+               "unix:PATH";
+    return -1;
+  }
+  const int listening = address.starts_with("unix:") ? listen_unix(address.substr(5)) : listen_tcp(address);
+  if (listening < 0)
+    *problem = "cannot listen at " + address + ": " + std::strerror(errno) + ": is it a free address of this machine?";
+  return listening;
+}
+
+std::string address_of(int listening, const std::string& address) {
+  if (address.starts_with("unix:")) return address;
+  sockaddr_storage bound{};
+  socklen_t size = sizeof bound;
+  getsockname(listening, reinterpret_cast<sockaddr*>(&bound), &size);
+  const std::uint16_t port = bound.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6*>(&bound)->sin6_port
+                                                         : reinterpret_cast<const sockaddr_in*>(&bound)->sin_port;
+  return address.substr(0, address.rfind(':') + 1) + std::to_string(ntohs(port));
+}
+
+void take_connections(int listening, grpc::Server* server) {
+  std::thread([=] {
+    for (;;) {
+      const int connection = accept4(listening, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+      if (connection >= 0) {
+        grpc::AddInsecureChannelFromFd(server, connection);
+      } else {
+        std::this_thread::sleep_for(kPause);
+      }
+    }
+  }).detach();
+}
+
+}  // namespace gravitas::host

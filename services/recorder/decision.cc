@@ -1,0 +1,82 @@
+#include "services/recorder/decision.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+
+#include "plugin_sdk/channel/address.h"
+#include "plugin_sdk/property_value.h"
+
+namespace gravitas {
+namespace {
+
+std::optional<Slot> find_slot(const std::string& name) {
+  for (const Slot slot :
+       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+    if (name == slot_name(slot)) return slot;
+  return std::nullopt;
+}
+
+std::optional<kernel::Hosting> find_hosting(const std::string& name) {
+  for (const auto hosting : {kernel::Hosting::kDirect, kernel::Hosting::kSharedMemory, kernel::Hosting::kGrpc})
+    if (name == kernel::hosting_name(hosting)) return hosting;
+  return std::nullopt;
+}
+
+}  // namespace
+
+recorder::v1::Decision message_of(const kernel::Decision& decision) {
+  recorder::v1::Decision message;
+  message.set_step(decision.step);
+  message.set_slot(slot_name(decision.slot));
+  message.set_target(decision.target);
+  message.set_why(decision.why);
+  message.set_plugin(decision.plugin->declaration.name);
+  message.set_library(decision.plugin->library);
+  message.set_command(decision.plugin->command);
+  message.set_address(decision.plugin->address);
+  message.mutable_settings()->Add(decision.plugin->settings.begin(), decision.plugin->settings.end());
+  message.set_hosting(kernel::hosting_name(decision.host->hosting));
+  return message;
+}
+
+void put_in_force(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* in_force) {
+  std::erase_if(*in_force, [&](const recorder::v1::Decision& one) {
+    return one.slot() == decision.slot() && one.target() == decision.target();
+  });
+  in_force->push_back(decision);
+}
+
+kernel::SwapOrder order_of(const recorder::v1::Decision& decision, const Catalog& catalog) {
+  const auto fail = [&](const std::string& why) {
+    throw std::runtime_error(fmt::format("from step {} on plugin '{}' answered in slot '{}': {}", decision.step(),
+                                         decision.plugin(), decision.slot(), why));
+  };
+  const std::optional<Slot> slot = find_slot(decision.slot());
+  const std::optional<kernel::Hosting> hosting = find_hosting(decision.hosting());
+  if (!slot) fail("there is no such slot");
+  if (!hosting) fail(fmt::format("there is no hosting '{}'", decision.hosting()));
+  if (!decision.address().empty() && !channel::is_local_address(decision.address()))
+    fail(fmt::format("'{}' is no address of this machine", decision.address()));
+  const auto plugin = std::ranges::find_if(catalog.plugins(), [&](const InstalledPlugin& one) {
+    return one.library == decision.library() && one.command == decision.command();
+  });
+  if (plugin == catalog.plugins().end())
+    fail(fmt::format("'{}' is neither installed nor named by the scene or the command line",
+                     decision.command().empty() ? decision.library() : decision.command()));
+  if (plugin->declaration.name != decision.plugin())
+    fail(fmt::format("'{}' is now plugin '{}'", decision.library(), plugin->declaration.name));
+  kernel::SwapOrder order;
+  order.slot = *slot;
+  order.hosting = hosting;
+  order.step = decision.step();
+  order.plugin = {plugin->declaration, plugin->library, {}, plugin->command, decision.address()};
+  order.plugin.settings.assign(decision.settings().begin(), decision.settings().end());
+  const std::string problem = check_flattened(plugin->declaration.properties, order.plugin.settings);
+  if (!problem.empty()) fail(problem);
+  return order;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,42 @@
+// What a command line says about exchanging plugins while the simulation runs.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "kernel/environment.h"
+#include "services/catalog/catalog.h"
+
+namespace gravitas {
+
+// `SLOT=PLUGIN@step=N[,hosting=direct|shm|grpc]`: before step N, PLUGIN (a name, or the path of a library) takes over.
+struct SwapSpec {
+  std::string text;  // as it was given
+  Slot slot = Slot::kSolver;
+  std::string plugin;
+  std::uint32_t step = 0;
+  std::optional<kernel::Hosting> hosting;
+};
+
+// Throws BadInput with what is wrong and what is allowed.
+SwapSpec parse_swap(const std::string& text);
+// `SLOT=PLUGIN[,hosting=…]`: it is asked the same as the slot's plugin, and compared.
+SwapSpec parse_compare(const std::string& text);
+
+struct RerunSpec {
+  Slot slot = Slot::kSolver;
+  std::uint32_t every = 1;  // calls
+};
+// `SLOT=N`.
+RerunSpec parse_rerun(const std::string& text);
+
+// The plugin with the settings that the scene gives it, if it is the scene's own, else with their defaults. Throws
+// BadInput if there is none of that name.
+kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDescription& scene, Catalog* catalog);
+
+// "space" …; throws BadInput with `option` and `text` before it.
+Slot parse_slot(const std::string& option, const std::string& text, const std::string& name);
+kernel::Hosting parse_hosting_mode(const std::string& option, const std::string& text, const std::string& mode);
+
+}  // namespace gravitas

@@ -1,0 +1,108 @@
+#include "services/run/fault_spec.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "plugin_sdk/host/fault_kinds.h"
+#include "plugin_sdk/near_miss.h"
+#include "services/run/session.h"
+
+namespace gravitas {
+namespace {
+
+constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
+                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
+constexpr char kForm[] = "SLOT:KIND@step=N[,ARGUMENT=VALUE]...";
+
+[[noreturn]] void refuse(const std::string& specification, const std::string& why) {
+  throw BadInput(fmt::format("--fault {}: {}", specification, why));
+}
+
+Slot slot_of(const std::string& name, const std::string& specification) {
+  std::vector<std::string> names;
+  for (const Slot slot : kSlots) {
+    if (name == slot_name(slot)) return slot;
+    names.emplace_back(slot_name(slot));
+  }
+  refuse(specification, fmt::format("there is no slot '{}': {}", name, allowed_names(name, names)));
+}
+
+std::vector<std::string_view> split(std::string_view text) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t comma = text.find(',');
+    parts.push_back(text.substr(0, comma));
+    if (comma == std::string_view::npos) return parts;
+    text.remove_prefix(comma + 1);
+  }
+}
+
+// Takes `name=N` out of the arguments, once at most.
+std::optional<std::uint32_t> take_count(std::vector<std::string_view>* arguments, std::string_view name,
+                                        const std::string& specification) {
+  std::optional<std::uint32_t> found;
+  const std::string key = std::string(name) + "=";
+  for (const std::string_view argument : *arguments) {
+    if (argument != name && !argument.starts_with(key)) continue;
+    if (found) refuse(specification, fmt::format("'{}' is given twice", name));
+    const std::string_view text = argument.substr(std::min(key.size(), argument.size()));
+    std::uint32_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || end != text.data() + text.size() || number < 1)
+      refuse(specification, fmt::format("'{}': allowed for {}: a whole number from 1 to 4294967295", argument, name));
+    found = number;
+  }
+  std::erase_if(*arguments, [&](std::string_view one) { return one.starts_with(key); });
+  return found;
+}
+
+}  // namespace
+
+kernel::FaultInjection parse_fault(const std::string& specification) {
+  const std::size_t colon = specification.find(':');
+  if (colon == std::string::npos) refuse(specification, fmt::format("no ':' behind the slot; the form is {}", kForm));
+  kernel::FaultInjection fault;
+  fault.slot = slot_of(specification.substr(0, colon), specification);
+
+  const std::string_view rest = std::string_view(specification).substr(colon + 1);
+  const std::size_t at = rest.find('@');
+  if (at == std::string_view::npos)
+    refuse(specification, fmt::format("no '@step=N' behind the kind; the form is {}", kForm));
+  std::vector<std::string_view> order = split(rest.substr(0, at));
+  for (const std::string_view argument : split(rest.substr(at + 1))) order.push_back(argument);
+
+  const std::optional<std::uint32_t> step = take_count(&order, "step", specification);
+  if (!step) refuse(specification, fmt::format("no step=N behind '@'; the form is {}", kForm));
+  fault.times = take_count(&order, "times", specification).value_or(1);
+  for (const std::string_view part : order) fault.order += (fault.order.empty() ? "" : ",") + std::string(part);
+  std::string problem;
+  if (!host::parse_fault_order(fault.order, &problem)) refuse(specification, problem);
+  fault.step = *step;
+  return fault;
+}
+
+std::string fault_help() {
+  std::string text;
+  std::string_view group;
+  for (const host::FaultInfo& kind : host::fault_kinds()) {
+    if (kind.group != group) text += fmt::format("{}\n", kind.group);
+    group = kind.group;
+    text += fmt::format("  {:<12} {}\n", kind.name, kind.meaning);
+    for (const host::FaultArgument& argument : kind.arguments) {
+      text += fmt::format("    {}: {}", argument.name, argument.meaning);
+      std::string words;
+      for (const std::string_view word : argument.words) words += (words.empty() ? "" : "|") + std::string(word);
+      if (!words.empty()) text += fmt::format(", {}", words);
+      if (!argument.standard.empty()) text += fmt::format(" [{}]", argument.standard);
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,98 @@
+#include "services/run/report.h"
+
+#include <fmt/format.h>
+
+#include <string_view>
+
+namespace gravitas {
+namespace {
+
+void write_comparison(const kernel::Comparison& from, const kernel::Environment& environment,
+                      report::v1::Comparison* to) {
+  to->set_calls(from.calls);
+  to->set_differing_calls(from.differing_calls);
+  for (const kernel::Disagreement& one : from.disagreements) {
+    report::v1::Disagreement* disagreement = to->add_disagreements();
+    disagreement->set_quantity(fmt::format("{} {}", stage::method_info(one.method).name, one.column->name));
+    disagreement->set_largest(one.largest);
+    disagreement->set_row(one.largest_row);
+    disagreement->set_unit(one.column->unit);
+    if (std::string_view(one.column->rows) == "body" && one.largest_row < environment.model().body_count)
+      disagreement->set_body(environment.model().body_id[one.largest_row]);
+    disagreement->set_rows(one.rows);
+    disagreement->set_other_counts(one.other_counts);
+  }
+}
+
+}  // namespace
+
+void write_stages(const kernel::Environment& environment, report::v1::Report* report) {
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(kernel::Stage::kCount); ++i) {
+    const auto stage = static_cast<kernel::Stage>(i);
+    const kernel::DurationHistogram& time = environment.stage_time(stage);
+    if (time.count() == 0) continue;
+    report::v1::StageTiming* timing = report->add_stages();
+    timing->set_stage(kernel::stage_name(stage));
+    timing->set_calls(static_cast<std::uint32_t>(time.count()));
+    timing->set_median_us(time.quantile_us(0.5));
+    timing->set_p99_us(time.quantile_us(0.99));
+    timing->set_transport_median_us(environment.transport_time(stage).quantile_us(0.5));
+    timing->set_validation_median_us(environment.validation_time(stage).quantile_us(0.5));
+  }
+  const kernel::DurationHistogram& steps = environment.step_time();
+  report::v1::Durations* durations = report->mutable_microseconds_per_step();
+  durations->set_mean(steps.mean_us());
+  durations->set_median(steps.quantile_us(0.5));
+  durations->set_p99(steps.quantile_us(0.99));
+  durations->set_max(steps.max_us());
+}
+
+void write_faults(const kernel::Environment& environment, report::v1::Report* report) {
+  for (const kernel::FaultRecord& record : environment.faults()) {
+    report::v1::FaultRecord* fault = report->add_faults();
+    fault->set_step(record.step);
+    fault->set_slot(slot_name(record.fault.slot));
+    fault->set_kind(record.injected.empty() ? kernel::fault_kind_name(record.fault.kind) : record.injected);
+    fault->set_detected_by(record.fault.detected_by);
+    fault->set_recovered_by(record.recovered_by.empty() ? "none: paused" : record.recovered_by);
+    fault->set_recovery_us(record.recovery_us);
+    fault->set_plugin(record.fault.plugin);
+    fault->set_text(record.fault.text);
+  }
+}
+
+void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {
+  for (const kernel::SwapRecord& one : environment.swaps()) {
+    report::v1::SwapRecord* swap = one.only_compared ? report->add_comparisons() : report->add_swaps();
+    swap->set_step(one.step);
+    swap->set_slot(slot_name(one.slot));
+    swap->set_from(one.from);
+    swap->set_to(one.to);
+    swap->set_pause_us(one.pause_us);
+    swap->set_wait_us(one.wait_us);
+    swap->set_outcome(kernel::swap_state_name(one.state));
+    swap->set_reason(one.reason);
+    write_comparison(one.shadow, environment, swap->mutable_shadow());
+  }
+}
+
+report::v1::Plan plan_message(const kernel::Environment& environment) {
+  report::v1::Plan message;
+  for (const kernel::PlannedSlot& planned : environment.plan().slots) {
+    for (const std::string& plugin : planned.plugins) {
+      report::v1::PlannedSlot* slot = message.add_slots();
+      slot->set_slot(slot_name(planned.slot));
+      slot->set_plugin(plugin);
+      slot->set_hosting(kernel::hosting_name(planned.hosting));
+      slot->set_pid(planned.process_id);
+    }
+  }
+  for (const kernel::LeftOut& left_out : environment.plan().left_out) {
+    report::v1::LeftOut* out = message.add_left_out();
+    out->set_what(left_out.what);
+    out->set_why(left_out.why);
+  }
+  return message;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,17 @@
+// What the report of a run takes from its environment.
+#pragma once
+
+#include "gravitas/report/v1/report.pb.h"
+#include "kernel/environment.h"
+
+namespace gravitas {
+
+// The plan as the report shows it; process ids are those of the workers.
+report::v1::Plan plan_message(const kernel::Environment& environment);
+
+// Each adds its part.
+void write_stages(const kernel::Environment& environment, report::v1::Report* report);
+void write_faults(const kernel::Environment& environment, report::v1::Report* report);
+void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
+
+}  // namespace gravitas

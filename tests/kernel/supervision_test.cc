@@ -1,0 +1,214 @@
+// A run whose workers die, hang and lie ends bit for bit where the quiet run ends; what cannot be survived pauses it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <string>
+#include <vector>
+
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::FaultKind;
+using kernel::Hosting;
+using kernel::StepOutcome;
+using testing::busy_world;
+using testing::faulty_plugin_path;
+using ::testing::HasSubstr;
+using testing::plugin_path;
+using testing::WorldBuilder;
+
+constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
+                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
+constexpr std::uint32_t kSteps = 20;
+
+void run_to_end(Environment* world) {
+  while (world->step_count() < kSteps) ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+}
+
+const kernel::Hash& quiet_chain() {
+  static const kernel::Hash chain = [] {
+    Environment world(busy_world(Hosting::kDirect).steps(kSteps, 0.01).description());
+    run_to_end(&world);
+    return world.chain_hash();
+  }();
+  return chain;
+}
+
+class Supervised : public ::testing::TestWithParam<Hosting> {
+ protected:
+  WorldBuilder builder() const { return busy_world(GetParam()).steps(kSteps, 0.01); }
+};
+INSTANTIATE_TEST_SUITE_P(Of, Supervised, ::testing::Values(Hosting::kSharedMemory, Hosting::kGrpc),
+                         [](const auto& one) { return std::string(kernel::hosting_name(one.param)); });
+
+TEST_P(Supervised, AKillInEverySlotChangesNoBit) {
+  Environment world(builder().description());
+  std::uint32_t step = 1;
+  for (const Slot slot : kSlots) world.inject({slot, "kill", step += 2});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.faults().size(), std::size(kSlots));
+  for (std::size_t i = 0; i < std::size(kSlots); ++i) {
+    EXPECT_EQ(world.faults()[i].fault.slot, kSlots[i]);
+    EXPECT_EQ(world.faults()[i].step, 3 + 2 * i);
+    EXPECT_EQ(world.faults()[i].fault.kind, FaultKind::kDeath);
+    EXPECT_THAT(world.faults()[i].recovered_by, HasSubstr("standby"));
+  }
+}
+
+TEST_P(Supervised, WithoutAStandbyANewWorkerIsStarted) {
+  WorldBuilder cold = builder();
+  cold.description().solver.standbys = 0;
+  Environment world(cold.description());
+  world.inject({Slot::kSolver, "abort", 5});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.faults().size(), 1U);
+  EXPECT_EQ(world.faults()[0].recovered_by, "cold start");
+}
+
+TEST_P(Supervised, AHangingWorkerIsReplacedAtItsDeadline) {
+  WorldBuilder hanging = builder();
+  hanging.description().collision.deadline = 0.2;
+  Environment world(hanging.description());
+  world.inject({Slot::kCollision, "hang", 4});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.faults().size(), 1U);
+  EXPECT_EQ(world.faults()[0].fault.kind, FaultKind::kDeadline);
+}
+
+TEST_P(Supervised, WrongAnswersAreNotUsed) {
+  Environment world(builder().description());
+  world.inject({Slot::kSolver, "nan", 3});
+  world.inject({Slot::kIntegrator, "inf", 5});
+  world.inject({Slot::kSpace, "double", 7});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.faults().size(), 3U);
+  EXPECT_EQ(world.faults()[0].fault.kind, FaultKind::kBadNumbers);
+  EXPECT_EQ(world.faults()[1].fault.kind, FaultKind::kBadNumbers);
+  EXPECT_EQ(world.faults()[2].fault.kind, FaultKind::kBadStructure);
+}
+
+// The asker and whom it asks, at once and one after the other.
+TEST_P(Supervised, DeathsInsideANestedCallAreRecoveredThere) {
+  Environment world(builder().description());
+  world.inject({Slot::kForce, "kill", 4});
+  world.inject({Slot::kIntegrator, "kill", 4});
+  world.inject({Slot::kForce, "kill,at=read", 8});
+  world.inject({Slot::kIntegrator, "kill,at=read", 12});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.faults().size(), 4U);
+  for (const kernel::FaultRecord& record : world.faults()) EXPECT_FALSE(record.recovered_by.empty());
+}
+
+TEST_P(Supervised, ActiveAndStandbyMayDieTogether) {
+  Environment world(builder().description());
+  world.inject({Slot::kSolver, "kill", 6, 2});
+  // the same request kills two workers: it is to blame, and no fallback is named
+  while (world.step_count() < 5) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  EXPECT_EQ(world.step(), StepOutcome::kPaused);
+  ASSERT_EQ(world.faults().size(), 2U);
+  EXPECT_THAT(world.faults()[0].recovered_by, HasSubstr("standby"));
+  EXPECT_EQ(world.faults()[1].recovered_by, "");
+  EXPECT_EQ(world.step_count(), 5U);
+}
+
+TEST_P(Supervised, ADeadlineAloneNeverMakesARequestPoison) {
+  WorldBuilder slow = builder();
+  slow.description().solver.deadline = 0.2;
+  Environment world(slow.description());
+  world.inject({Slot::kSolver, "hang", 6, 3});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.faults().size(), 3U);
+}
+
+// Hears of what a recorder keeps.
+class Witness final : public kernel::CommitListener {
+ public:
+  void on_commit(const Environment&) override {}
+  void on_decision(const Environment&, const kernel::Decision& decision) override {
+    decisions.push_back(decision.why + " at " + std::to_string(decision.step));
+  }
+  void on_poison(const Environment&, const kernel::PoisonedCall& poisoned) override {
+    poison.push_back(poisoned.plugin.declaration.name + ": " + poisoned.call.info().name);
+  }
+  std::vector<std::string> decisions, poison;
+};
+
+// Its body is above 0 after step 6: -0.055 + 6 * 0.01.
+WorldBuilder poisoned_world(Hosting hosting) {
+  WorldBuilder builder(hosting);
+  builder.steps(kSteps, 0.1).sphere(0.5, 1.0, Vector3(0, -0.055, 0), Vector3(0, 0.1, 0));
+  builder.plugin(Slot::kIntegrator, faulty_plugin_path("integrator_poisoned"));
+  return builder;
+}
+
+TEST_P(Supervised, ARequestThatKillsTwoWorkersPausesTheEnvironment) {
+  WorldBuilder builder = poisoned_world(GetParam());
+  Environment world(builder.description());
+  Witness witness;
+  world.set_commit_listener(&witness);
+  while (world.step() == StepOutcome::kCommitted) {
+  }
+  EXPECT_EQ(world.step_count(), 6U);
+  EXPECT_EQ(world.fault()->fault.kind, FaultKind::kDeath);
+  EXPECT_THAT(witness.poison, ::testing::ElementsAre("Poisoned: Integrator.Integrate"));
+  EXPECT_TRUE(witness.decisions.empty());
+}
+
+TEST_P(Supervised, TheDeclaredFallbackTakesOverFromPoison) {
+  WorldBuilder builder = poisoned_world(GetParam());
+  WorldBuilder other(GetParam());
+  builder.description().integrator.plugins[0].fallback =
+      std::make_shared<const kernel::PluginChoice>(other.description().integrator.plugins[0]);
+  Environment world(builder.description());
+  Witness witness;
+  world.set_commit_listener(&witness);
+  run_to_end(&world);
+  EXPECT_EQ(witness.decisions, std::vector<std::string>{"fallback SemiImplicitEuler at 7"});
+  EXPECT_EQ(witness.poison.size(), 1U);
+  EXPECT_EQ(world.faults().back().recovered_by, "fallback SemiImplicitEuler");
+  EXPECT_EQ(world.plan().slots[0].plugins[0], "SemiImplicitEuler");
+  EXPECT_NEAR(world.state().position[1], -0.055 + kSteps * 0.01, 1e-12);
+}
+
+TEST(Supervision, AFallbackThatDoesNotServeTheSceneIsRefused) {
+  WorldBuilder builder = busy_world(Hosting::kDirect);
+  WorldBuilder other(Hosting::kDirect);
+  builder.description().solver.plugins[0].fallback =
+      std::make_shared<const kernel::PluginChoice>(other.description().integrator.plugins[0]);
+  EXPECT_THROW(Environment world(builder.description()), std::invalid_argument);
+}
+
+TEST(Supervision, FaultsAreRefusedWhereTheyWouldHitTheKernelOrNobody) {
+  Environment direct(busy_world(Hosting::kDirect).description());
+  EXPECT_THROW(direct.inject({Slot::kSolver, "kill", 3}), std::invalid_argument);
+  WorldBuilder free(Hosting::kSharedMemory);
+  free.point(1.0, Vector3::Ones(), Vector3::Zero());
+  Environment alone(free.description());
+  EXPECT_THROW(alone.inject({Slot::kSolver, "kill", 3}), std::invalid_argument);
+}
+
+// Whoever kills from outside, whenever: idle actives and standbys too.
+TEST_P(Supervised, WorkersKilledBetweenStepsAreReplaced) {
+  Environment world(builder().description());
+  while (world.step_count() < kSteps) {
+    ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text;
+    if (world.step_count() % 5 != 0 || world.step_count() == kSteps) continue;
+    for (const kernel::PlannedSlot& slot : world.plan().slots) kill(slot.process_id, SIGKILL);
+  }
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.faults().size(), 3 * std::size(kSlots));
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,220 @@
+// Others in a slot while the simulation runs: the same plugin elsewhere changes no bit, another one loses no step, and
+// one that fails leaves the run as it was.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::Hosting;
+using kernel::StepOutcome;
+using kernel::SwapOrder;
+using kernel::SwapRecord;
+using kernel::SwapState;
+using testing::busy_world;
+using testing::faulty_plugin_path;
+using ::testing::HasSubstr;
+using testing::plugin_path;
+using testing::WorldBuilder;
+
+constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
+                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
+constexpr std::uint32_t kSteps = 40;
+
+void run_to_end(Environment* world) {
+  while (world->step_count() < kSteps) ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+}
+
+kernel::Hash quiet_chain() {
+  Environment world(busy_world(Hosting::kDirect).steps(kSteps, 1.0 / 120.0).description());
+  run_to_end(&world);
+  return world.chain_hash();
+}
+
+// Another plugin of the slot, as the builder would choose it.
+kernel::PluginChoice other(Slot slot, const std::string& path) {
+  WorldBuilder builder(Hosting::kDirect);
+  builder.plugin(slot, path, slot == Slot::kSolver ? std::vector<double>{200.0, 1.0} : std::vector<double>{});
+  return builder.description().slot(slot).plugins[0];
+}
+
+// What answers in the slot of the busy world.
+kernel::PluginChoice plugin_of(Slot slot) { return busy_world(Hosting::kDirect).description().slot(slot).plugins[0]; }
+
+class Swapped : public ::testing::TestWithParam<Hosting> {
+ protected:
+  WorldBuilder builder() const { return busy_world(GetParam()).steps(kSteps, 1.0 / 120.0); }
+};
+INSTANTIATE_TEST_SUITE_P(In, Swapped, ::testing::Values(Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc),
+                         [](const auto& one) { return std::string(kernel::hosting_name(one.param)); });
+
+TEST_P(Swapped, AnotherInstanceInEverySlotChangesNoBit) {
+  Environment world(builder().description());
+  std::uint32_t step = 2;
+  for (const Slot slot : kSlots) world.order_swap({slot, plugin_of(slot), std::nullopt, step += 3});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.swaps().size(), std::size(kSlots));
+  for (const SwapRecord& swap : world.swaps()) {
+    EXPECT_EQ(swap.state, SwapState::kCommitted) << swap.reason;
+    EXPECT_EQ(swap.from, swap.to);
+    EXPECT_EQ(swap.shadow.differing_calls, 0U);
+    EXPECT_GT(swap.pause_us, 0.0);
+  }
+}
+
+TEST_P(Swapped, AnotherHostingChangesNoBit) {
+  Environment world(builder().description());
+  const Hosting next = GetParam() == Hosting::kDirect ? Hosting::kGrpc : Hosting::kDirect;
+  world.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), next, 5});
+  world.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), GetParam(), 25});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.swaps().size(), 2U);
+  EXPECT_EQ(world.swaps()[0].to, std::string("Sequential (") + kernel::hosting_name(next) + ")");
+  EXPECT_EQ(world.swaps()[1].state, SwapState::kCommitted);
+}
+
+TEST_P(Swapped, AnotherIntegratorGoesOnFromTheSameState) {
+  Environment world(builder().description());
+  world.order_swap({Slot::kIntegrator, other(Slot::kIntegrator, plugin_path("integrator_euler")), std::nullopt, 11});
+  while (world.step_count() < 10) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  Environment quiet(builder().description());
+  while (quiet.step_count() < 10) ASSERT_EQ(quiet.step(), StepOutcome::kCommitted);
+  EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
+  run_to_end(&world);
+  ASSERT_EQ(world.swaps().size(), 1U);
+  const SwapRecord swap = world.swaps()[0];
+  EXPECT_EQ(swap.step, 11U);
+  EXPECT_EQ(swap.from, "SemiImplicitEuler");
+  EXPECT_EQ(swap.to, "Euler");
+  EXPECT_EQ(swap.state, SwapState::kCommitted);
+  // the shadow says how they differ: Euler moves by the old velocity
+  EXPECT_EQ(swap.shadow.differing_calls, swap.shadow.calls);
+  // as many as the preparation left time for
+  EXPECT_LE(swap.shadow.calls, 8U);
+  EXPECT_EQ(world.plan().slots[0].plugins[0], "Euler");
+}
+
+// It dies in the third call: in shadow.
+TEST_P(Swapped, APluginThatFailsInShadowIsRefused) {
+  if (GetParam() == Hosting::kDirect) GTEST_SKIP() << "it would end this process";
+  Environment world(builder().description());
+  world.order_swap(
+      {Slot::kIntegrator, other(Slot::kIntegrator, faulty_plugin_path("integrator_killed")), std::nullopt, 20});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.swaps().size(), 1U);
+  EXPECT_EQ(world.swaps()[0].state, SwapState::kRefused);
+  EXPECT_THAT(world.swaps()[0].reason, HasSubstr("in shadow: its worker process"));
+  EXPECT_TRUE(world.faults().empty());
+}
+
+TEST_P(Swapped, APluginThatCannotBePreparedIsRefused) {
+  Environment world(builder().description());
+  kernel::PluginChoice missing = plugin_of(Slot::kSolver);
+  missing.library = GRAVITAS_SOURCE_DIR "/README.md";
+  world.order_swap({Slot::kSolver, missing, std::nullopt, 7});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.swaps()[0].state, SwapState::kRefused);
+  EXPECT_THAT(world.swaps()[0].reason, HasSubstr("README.md"));
+}
+
+// Without time for a shadow it fails on probation, and the old worker answers.
+TEST_P(Swapped, APluginThatFailsOnProbationIsRolledBack) {
+  if (GetParam() == Hosting::kDirect) GTEST_SKIP() << "it would end this process";
+  Environment world(builder().description());
+  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  world.order_swap(
+      {Slot::kIntegrator, other(Slot::kIntegrator, faulty_plugin_path("integrator_killed")), std::nullopt, 2});
+  run_to_end(&world);
+  ASSERT_EQ(world.swaps().size(), 1U);
+  EXPECT_EQ(world.swaps()[0].state, SwapState::kRolledBack);
+  EXPECT_EQ(world.swaps()[0].step, 2U);
+  ASSERT_EQ(world.faults().size(), 1U);
+  EXPECT_EQ(world.faults()[0].step, 4U);
+  EXPECT_EQ(world.faults()[0].recovered_by, "rollback");
+  EXPECT_EQ(world.plan().slots[0].plugins[0], "SemiImplicitEuler");
+}
+
+TEST_P(Swapped, ALaterSwapEndsProbationAsCommitted) {
+  Environment world(builder().description());
+  for (std::uint32_t step = 3; step < 13; ++step)
+    world.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), std::nullopt, step});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.swaps().size(), 10U);
+  for (std::uint32_t i = 0; i < 10; ++i) {
+    EXPECT_EQ(world.swaps()[i].step, 3 + i);
+    EXPECT_EQ(world.swaps()[i].state, SwapState::kCommitted) << world.swaps()[i].reason;
+  }
+}
+
+TEST_P(Swapped, TheSolverGetsOtherSettings) {
+  Environment world(builder().description());
+  kernel::PluginChoice weaker = plugin_of(Slot::kSolver);
+  weaker.settings = {1.0, 0.5};
+  world.order_swap({Slot::kSolver, weaker, std::nullopt, 10});
+  run_to_end(&world);
+  EXPECT_NE(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.swaps()[0].state, SwapState::kCommitted);
+}
+
+TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
+  Environment world(builder().description());
+  world.compare({Slot::kIntegrator, other(Slot::kIntegrator, plugin_path("integrator_euler")), std::nullopt, 0});
+  world.set_rerun_every(Slot::kSolver, 4);
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.swaps().size(), 1U);
+  EXPECT_TRUE(world.swaps()[0].only_compared);
+  const kernel::Comparison compared = world.swaps()[0].shadow;
+  EXPECT_EQ(compared.calls, kSteps);
+  EXPECT_EQ(compared.differing_calls, kSteps);
+  ASSERT_FALSE(compared.disagreements.empty());
+  EXPECT_STREQ(compared.disagreements[0].column->name, "position");
+  EXPECT_EQ(world.plan().slots[0].plugins[0], "SemiImplicitEuler");
+  EXPECT_TRUE(world.faults().empty());
+}
+
+TEST(Swap, WhatCannotTakeThePlaceIsRefusedAtOnce) {
+  Environment world(busy_world(Hosting::kDirect).description());
+  const auto why = [&](Slot slot, const kernel::PluginChoice& plugin) -> std::string {
+    try {
+      world.order_swap({slot, plugin, std::nullopt, 5});
+    } catch (const std::invalid_argument& problem) {
+      return problem.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(why(Slot::kSolver, other(Slot::kIntegrator, plugin_path("integrator_euler"))),
+              HasSubstr("it is a plugin of slot integrator"));
+  EXPECT_THAT(why(Slot::kForce, other(Slot::kForce, plugin_path("hello"))), HasSubstr("does not serve the type"));
+  WorldBuilder free(Hosting::kDirect);
+  free.point(1.0, Vector3::Ones(), Vector3::Zero());
+  Environment alone(free.description());
+  EXPECT_THROW(alone.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), std::nullopt, 5}), std::invalid_argument);
+}
+
+// One process of three answers otherwise: it is outvoted, whichever it is.
+TEST(Rerun, AWrongAnswerThatLooksRightIsOutvoted) {
+  Environment world(busy_world(Hosting::kSharedMemory).steps(kSteps, 1.0 / 120.0).description());
+  world.set_rerun_every(Slot::kSolver, 1);
+  world.inject({Slot::kSolver, "ulp", 9});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.faults().size(), 1U);
+  EXPECT_EQ(world.faults()[0].fault.kind, kernel::FaultKind::kDisagreement);
+  EXPECT_EQ(world.faults()[0].step, 9U);
+}
+
+}  // namespace
+}  // namespace gravitas

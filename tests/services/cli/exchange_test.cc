@@ -1,0 +1,135 @@
+// Faults, swaps and comparisons from the command line: the report tells the story, and the bits are those of the quiet
+// run.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ProgramResult;
+using testing::read_file;
+using testing::read_report;
+using testing::run_program;
+using testing::ScratchFolder;
+
+const std::string kSample = testing::shipped_scene("two_spheres_motor");
+
+struct Outcome {
+  ProgramResult program;
+  report::v1::Report report;
+};
+
+Outcome run_sample(std::vector<std::string> words) {
+  const ScratchFolder folder;
+  words.insert(words.begin(), {"run", kSample, "--steps", "120", "--report", folder.path("report.json")});
+  Outcome outcome{run_program(words, folder), {}};
+  if (outcome.program.exit_code == 0) outcome.report = read_report(read_file(folder.path("report.json")));
+  return outcome;
+}
+
+const std::string& quiet_chain() {
+  static const std::string chain = run_sample({}).report.chain_hash();
+  return chain;
+}
+
+TEST(Exchange, AFaultInEverySlotIsSurvivedBitForBit) {
+  const Outcome run =
+      run_sample({"--fault", "solver:kill@step=10", "--fault", "integrator:segv@step=20", "--fault",
+                  "integrator:nan@step=30", "--fault", "space:flip@step=40", "--fault", "constraint:exit@step=50"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  ASSERT_EQ(run.report.faults_size(), 5);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_EQ(run.report.faults(i).step(), 10U * static_cast<unsigned>(i + 1));
+    EXPECT_GT(run.report.faults(i).recovery_us(), 0.0);
+  }
+  EXPECT_EQ(run.report.faults(1).slot(), "integrator");
+  EXPECT_EQ(run.report.faults(1).kind(), "segv");
+  EXPECT_EQ(run.report.faults(1).detected_by(), "pidfd");
+  EXPECT_EQ(run.report.faults(2).kind(), "nan");
+  EXPECT_EQ(run.report.faults(2).detected_by(), "numbers");
+  EXPECT_THAT(run.program.out, HasSubstr("survived: step 10, solver Sequential: kill; standby"));
+}
+
+TEST(Exchange, ASwapToTheSamePluginOrAnotherHostingChangesNoBit) {
+  const Outcome run = run_sample({"--swap", "solver=Sequential@step=10", "--swap", "collision=Standard@step=20",
+                                  "--swap", "solver=Sequential@step=60,hosting=direct"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  ASSERT_EQ(run.report.swaps_size(), 3);
+  EXPECT_EQ(run.report.swaps(0).step(), 10U);
+  EXPECT_EQ(run.report.swaps(0).slot(), "solver");
+  EXPECT_EQ(run.report.swaps(2).to(), "Sequential (direct)");
+  for (const report::v1::SwapRecord& swap : run.report.swaps()) {
+    EXPECT_EQ(swap.outcome(), "committed");
+    EXPECT_GT(swap.pause_us(), 0.0);
+  }
+}
+
+TEST(Exchange, ASwapToAnotherPluginLosesNoStep) {
+  const Outcome run = run_sample({"--swap", "integrator=SemiImplicitEuler@step=60"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.steps(), 120U);
+  EXPECT_NE(run.report.chain_hash(), quiet_chain());
+  EXPECT_EQ(run.report.swaps(0).from(), "Euler");
+  // after the swap the run is that of the other plugin, not a mixture
+  EXPECT_EQ(run.report.chain_hash(),
+            run_sample({"--swap", "integrator=SemiImplicitEuler@step=60", "--hosting", "direct"}).report.chain_hash());
+}
+
+TEST(Exchange, ComparisonAndRerunChangeNoBit) {
+  const Outcome run = run_sample({"--compare", "integrator=SemiImplicitEuler", "--rerun", "solver=10"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  ASSERT_EQ(run.report.comparisons_size(), 1);
+  EXPECT_EQ(run.report.comparisons(0).shadow().calls(), 120U);
+  EXPECT_GT(run.report.comparisons(0).shadow().disagreements_size(), 0);
+  EXPECT_EQ(run.report.comparisons(0).shadow().disagreements(0).quantity(), "Integrator.Integrate position");
+}
+
+// A resumed run knows who answered, and that a swap of the past is done.
+TEST(Exchange, AResumedRunGoesOnWithWhoeverAnswered) {
+  const ScratchFolder folder;
+  const std::string kept = folder.path("kept"), report = folder.path("report.json");
+  const std::vector<std::string> swap = {"--swap", "integrator=SemiImplicitEuler@step=60"};
+  const auto go = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"run", kSample, "--quiet", "--report", report});
+    words.insert(words.end(), swap.begin(), swap.end());
+    const ProgramResult result = run_program(words, folder);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return read_report(read_file(report)).chain_hash();
+  };
+  const std::string whole = go({"--steps", "120"});
+  for (const char* steps : {"40", "59", "60", "90"}) {
+    go({"--steps", steps, "--checkpoint", kept});
+    EXPECT_EQ(go({"--steps", "120", "--resume", kept}), whole) << steps;
+    EXPECT_EQ(go({"--steps", "120", "--resume", kept, "--hosting", "direct"}), whole) << steps;
+  }
+}
+
+TEST(Exchange, WhatCannotBeIsRefusedWithWhatIsAllowed) {
+  const auto refusal = [](std::vector<std::string> words) {
+    const Outcome run = run_sample(std::move(words));
+    EXPECT_EQ(run.program.exit_code, 2);
+    return run.program.err;
+  };
+  EXPECT_THAT(refusal({"--swap", "solver=Sequentail@step=5"}), HasSubstr("did you mean \"Sequential\"?"));
+  EXPECT_THAT(refusal({"--swap", "solver=Sequential"}), HasSubstr("SLOT=PLUGIN@step=N"));
+  EXPECT_THAT(refusal({"--swap", "solver=Sequential@step=0"}), HasSubstr("a whole number from 1"));
+  EXPECT_THAT(refusal({"--swap", "sovler=Sequential@step=5"}), HasSubstr("unknown slot 'sovler'; allowed: space"));
+  EXPECT_THAT(refusal({"--swap", "force=Gravity@step=5"}), HasSubstr("the plan leaves the slot out"));
+  EXPECT_THAT(refusal({"--fault", "force:kill@step=5"}), HasSubstr("the plan leaves the slot out"));
+  EXPECT_THAT(refusal({"--fault", "solver:kill@step=5", "--hosting", "direct"}), HasSubstr("direct"));
+  EXPECT_THAT(refusal({"--fault", "solver:kil@step=5"}), HasSubstr("kill"));
+  EXPECT_THAT(refusal({"--compare", "solver=Euler"}), HasSubstr("no solver plugin 'Euler' is installed"));
+  EXPECT_THAT(refusal({"--rerun", "solver"}), HasSubstr("SLOT=N"));
+}
+
+}  // namespace
+}  // namespace gravitas
