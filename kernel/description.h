@@ -38,11 +38,23 @@ struct PluginChoice {
   std::shared_ptr<const PluginChoice> fallback = nullptr;
 };
 
+// Deadline of a worker that stops in a debugger, s.
+inline constexpr double kAttachedDeadline = 1e8;
+
+// What stands between a failing worker and the truth; each can be missing, for a campaign's self-test only.
+struct Defences {
+  bool structure = true, numbers = true, physics = true;  // checks of the answers
+  bool replay = true;                                     // a failed call is answered by somebody else
+  bool digest = true, epoch = true, deadline = true;      // shm alone: of frames; late answers; answers that never come
+};
+
 struct SlotDescription {
   Hosting hosting = Hosting::kSharedMemory;
   double deadline = 2.0;              // s, for one call, counted from the last mark of progress
+  bool attached = false;              // a worker that somebody started by hand; see kAttachedDeadline
   std::uint32_t standbys = 1;         // workers that wait, warm, to take over from one that fails; none if direct
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
+  Defences defences = {};
 };
 
 // What the broad phase sees of a body's shape, fixed in the body's frame.
@@ -112,6 +124,9 @@ struct EnvironmentDescription {
   SlotDescription space, collision, constraint, force, solver, integrator;
   std::uint32_t threads = 1;  // of each host's parallel_for
   bool events = false;        // somebody listens to collision events
+  // Steps from one whose answers are held against laws of physics (plugin_sdk/physics_checks.h) to the next; 1: each,
+  // 0: none.
+  std::uint32_t check_physics_every = 0;
 
   SlotDescription& slot(Slot which);
   const SlotDescription& slot(Slot which) const;

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/stand_in.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -23,26 +24,6 @@ std::vector<std::string> types_in_use(const EnvironmentDescription& description,
   if (slot == Slot::kConstraint) add(description.constraints);
   if (slot == Slot::kCollision) add(description.shapes);
   return types;
-}
-
-const TypeDeclaration* find_type(const PluginDeclaration& plugin, const std::string& name) {
-  const auto found = std::ranges::find(plugin.types, name, &TypeDeclaration::name);
-  return found == plugin.types.end() ? nullptr : &*found;
-}
-
-// Empty, or why `next` cannot take the place of `now`: parameters lie flattened in the model.
-std::string misfit(const PluginDeclaration& now, const PluginDeclaration& next,
-                   const std::vector<std::string>& in_use) {
-  for (const TypeDeclaration& type : now.types) {
-    if (std::ranges::find(in_use, type.name) == in_use.end()) continue;
-    const TypeDeclaration* other = find_type(next, type.name);
-    if (other == nullptr) return "it does not serve the type '" + type.name + "'";
-    const bool same = std::ranges::equal(type.properties, other->properties, [](const Property& a, const Property& b) {
-      return a.name == b.name && a.kind == b.kind && a.columns == b.columns;
-    });
-    if (!same) return "its type '" + type.name + "' has other properties than that of " + now.name;
-  }
-  return {};
 }
 
 }  // namespace
@@ -88,7 +69,7 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
   const std::vector<std::string> in_use = types_in_use(description_, order.slot);
   std::string why;
   for (std::uint32_t row = 0; row < plugins.size(); ++row) {
-    const std::string misfit_here = misfit(plugins[row].declaration, order.plugin.declaration, in_use);
+    const std::string misfit_here = why_no_stand_in(plugins[row].declaration, order.plugin.declaration, in_use);
     if (misfit_here.empty()) return row;
     if (why.empty()) why = misfit_here;
   }
@@ -100,8 +81,7 @@ void Environment::check_fallbacks() const {
     for (const PluginChoice& plugin : slot->description().plugins) {
       if (!plugin.fallback) continue;
       const PluginDeclaration& fallback = plugin.fallback->declaration;
-      std::string why = misfit(plugin.declaration, fallback, types_in_use(description_, slot->which()));
-      if (fallback.slot != slot->which()) why = std::string("it is a plugin of slot ") + slot_name(fallback.slot);
+      const std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));
       if (!why.empty())
         throw std::invalid_argument("fallback " + fallback.name + " of " + plugin.declaration.name + ": " + why);
     }

@@ -1,5 +1,7 @@
 #include "kernel/fault.h"
 
+#include "kernel/description.h"
+
 namespace gravitas::kernel {
 
 const char* fault_kind_name(FaultKind kind) {
@@ -26,6 +28,11 @@ const char* fault_kind_name(FaultKind kind) {
       return "handshake";
   }
   return "unknown";
+}
+
+bool is_off(const Defences& defences, FaultKind kind) {
+  return (kind == FaultKind::kBadStructure && !defences.structure) ||
+         (kind == FaultKind::kBadNumbers && !defences.numbers) || (kind == FaultKind::kBadPhysics && !defences.physics);
 }
 
 }  // namespace gravitas::kernel

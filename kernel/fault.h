@@ -27,6 +27,10 @@ enum class FaultKind : std::uint32_t {
 // "death", "deadline", …
 const char* fault_kind_name(FaultKind kind);
 
+struct Defences;
+// Whether the check that finds this is off.
+bool is_off(const Defences& defences, FaultKind kind);
+
 class StageFault : public std::exception {
  public:
   StageFault(FaultKind what_failed, std::string how_noticed, std::string why)
@@ -49,6 +53,14 @@ struct FaultRecord {
       {};                     // "standby", "cold start", "rollback", "previous build", "fallback NAME"; empty: paused
   std::string injected = {};  // kind of the fault that was ordered; empty: it came by itself
   double recovery_us = 0.0;   // from when it was noticed to the good answer
+};
+
+// A fault that a worker is ordered to commit, to test who calls it.
+struct FaultInjection {
+  Slot slot = Slot::kSolver;
+  std::string order;        // "slow,factor=10": kinds and arguments are those of plugin_sdk/host/fault_kinds.h
+  std::uint32_t step = 1;   // that is being made when it happens
+  std::uint32_t times = 1;  // attempts at the first call of that step which are hit
 };
 
 }  // namespace gravitas::kernel

@@ -56,6 +56,7 @@ void Environment::sum_wrenches() {
 
 void Environment::begin_attempt(bool counts) {
   attempt_counts_ = counts;
+  validator_.begin_integration();
   if (counts) start_wrench_known_ = false;
 }
 
@@ -63,6 +64,7 @@ void Environment::evaluate() {
   validator_.derivative_request(data_);
   ask_forces(trial_columns_);
   sum_wrenches();
+  validator_.note_wrench(data_);
   if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
   std::ranges::copy(data_.wrench.span(), data_.start_wrench.data());
   start_wrench_known_ = true;

@@ -20,6 +20,9 @@ struct PlannedSlot {
   std::vector<std::string> plugins;
   Hosting hosting = Hosting::kSharedMemory;
   int process_id = 0;
+  std::uint32_t standbys = 0;
+  bool is_attached = false;          // started by hand; nothing has a deadline
+  std::vector<std::string> sandbox;  // what keeps the process from harm, as it is enforced
 };
 
 struct Plan {

@@ -23,7 +23,7 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       model_(&arena_, description_),
       states_{State(&arena_, description_), State(&arena_, description_)},
       data_(&arena_, model_, description_),
-      validator_(arena_, model_),
+      validator_(arena_, model_, description_.check_physics_every),
       margin_(contact_margin(description_)),
       space_(Slot::kSpace, description_.space),
       collision_(Slot::kCollision, description_.collision),

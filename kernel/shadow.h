@@ -8,24 +8,9 @@
 
 #include "kernel/arena.h"
 #include "kernel/carrier/carrier.h"
+#include "plugin_sdk/column_comparison.h"
 
 namespace gravitas::kernel {
-
-// How the two answers differ in one column, over all calls.
-struct Disagreement {
-  stage::Method method;
-  const stage::ColumnInfo* column;
-  double largest = 0.0;            // |difference| of a number, in the column's unit; integers count 1
-  std::uint64_t largest_row = 0;   // where that was
-  std::uint64_t rows = 0;          // that differed in any bit
-  std::uint64_t other_counts = 0;  // answers with another number of rows, which are not compared further
-};
-
-struct Comparison {
-  std::uint64_t calls = 0;
-  std::uint64_t differing_calls = 0;  // whose answers were not the same bytes
-  std::vector<Disagreement> disagreements;
-};
 
 class Shadow {
  public:
@@ -51,7 +36,6 @@ class Shadow {
   void keep(const StageCall& call, const Arena& arena);
   void put_back(const StageCall& call, Arena* arena) const;
   void note(const StageCall& call, const Arena& arena);
-  Disagreement& of(stage::Method method, const stage::ColumnInfo* column);
 
   std::vector<std::vector<std::byte>> kept_;  // per reply column
   bool last_differed_ = false;

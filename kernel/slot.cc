@@ -68,6 +68,10 @@ void StageSlot::drain() {
 
 std::vector<std::string> StageSlot::take_complaints() {
   std::vector<std::string> all = std::exchange(complaints_, {});
+  if (slow_calls_ > 0)
+    all.push_back("it was slow " + std::to_string(std::exchange(slow_calls_, 0)) + " times: up to " +
+                  std::to_string(slowest_call_ns_ / 1'000'000) + " ms, over " + std::to_string(kSlowFactor) +
+                  " times as long as it usually takes");
   for (SlotHost& host : hosts_)
     for (std::string& one : host.take_complaints()) all.push_back(std::move(one));
   return all;
@@ -80,6 +84,9 @@ std::vector<PlannedSlot> StageSlot::hosts() const {
     one.slot = which_;
     one.hosting = host.description().hosting;
     one.process_id = host.process_id();
+    one.is_attached = host.description().attached;
+    one.standbys = host.wanted_standbys();
+    one.sandbox = host.sandbox();
     for (const PluginChoice& plugin : host.description().plugins) one.plugins.push_back(plugin.declaration.name);
   }
   return planned;
@@ -141,6 +148,10 @@ void StageSlot::name(StageFault* fault, std::uint32_t target) const {
 void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attempts) {
   // a nested call's ladder is at its end: nobody here is to blame
   if (!fault.plugin.empty()) throw StageFault(fault);
+  if (!description_.defences.replay) {
+    name(&fault, call.target);
+    throw StageFault(fault);
+  }
   attempts->noticed_ns.push_back(channel::now_ns());
   name(&fault, call.target);
   const std::size_t host = routes_[call.target].host;

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "kernel/carrier/carrier.h"
-#include "kernel/fault_injection.h"
+#include "kernel/fault.h"
 #include "kernel/plan.h"
 #include "kernel/slot_host.h"
 #include "kernel/swap.h"
@@ -92,8 +92,16 @@ class StageSlot {
     }
   }
 
-  // How long a call took in all.
-  void note_duration(std::uint64_t nanoseconds) { longest_call_ns_ = std::max(longest_call_ns_, nanoseconds); }
+  // How long a call took in all. One that takes far longer than the calls before is counted as slow.
+  void note_duration(std::uint64_t nanoseconds) {
+    longest_call_ns_ = std::max(longest_call_ns_, nanoseconds);
+    if (nanoseconds > kSlowNs && nanoseconds > kSlowFactor * usual_call_ns_ && usual_call_ns_ > 0) {
+      ++slow_calls_;
+      slowest_call_ns_ = std::max(slowest_call_ns_, nanoseconds);
+      return;
+    }
+    usual_call_ns_ = usual_call_ns_ == 0 ? nanoseconds : (15 * usual_call_ns_ + nanoseconds) / 16;
+  }
 
   // A worker commits a fault; consumed by the first attempts at that step.
   void inject(FaultInjection fault) { armed_.push_back(std::move(fault)); }
@@ -163,7 +171,8 @@ class StageSlot {
   std::vector<PendingSwap> pending_;
   std::vector<SwapRecord> swaps_;
   std::vector<Probation> probation_;
-  std::uint64_t longest_call_ns_ = 0;
+  static constexpr std::uint64_t kSlowNs = 20'000'000, kSlowFactor = 10;
+  std::uint64_t longest_call_ns_ = 0, usual_call_ns_ = 0, slow_calls_ = 0, slowest_call_ns_ = 0;
   Rerun rerun_;
   std::vector<std::string> complaints_;
 };

@@ -53,6 +53,8 @@ class SlotHost {
   const SlotDescription& description() const { return description_; }
   Carrier& carrier() const { return *carrier_; }
   int process_id() const { return carrier_ ? carrier_->process_id() : 0; }
+  std::vector<std::string> sandbox() const { return carrier_ ? carrier_->sandbox() : std::vector<std::string>(); }
+  std::uint32_t wanted_standbys() const;
   // What its processes, past ones included, said went wrong besides their answers; taken out.
   std::vector<std::string> take_complaints();
   void count_good_answer() { ++good_answers_; }
@@ -77,7 +79,6 @@ class SlotHost {
   // Empty: there is none.
   std::string next_rung();
   void replace_description(SlotDescription description);
-  std::uint32_t wanted_standbys() const;
 
   SlotDescription description_;
   std::uint32_t threads_;

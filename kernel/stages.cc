@@ -67,6 +67,7 @@ const Column<double>& Environment::start_angular_velocity() const {
 }
 
 void Environment::begin_step() {
+  validator_.begin_step(step_count_ + 1);
   data_.time[0] = time();
   data_.time_step[0] = step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
   data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;

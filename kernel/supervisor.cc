@@ -240,7 +240,7 @@ bool Supervisor::read_output(WorkerProcess* process, std::size_t stream) {
     return false;
   }
   const std::lock_guard lock(process->mutex_);
-  process->output_.add(static_cast<OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
+  process->output_.add(static_cast<channel::OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
   return true;
 }
 
@@ -251,7 +251,7 @@ void Supervisor::close_output(WorkerProcess* process, std::size_t stream) {
   close(pipe);
   pipe = -1;
   const std::lock_guard lock(process->mutex_);
-  process->output_.end(static_cast<OutputStream>(stream));
+  process->output_.end(static_cast<channel::OutputStream>(stream));
 }
 
 void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "kernel/process_output.h"
+#include "plugin_sdk/channel/process_output.h"
 
 namespace gravitas::kernel {
 
@@ -45,7 +45,7 @@ class WorkerProcess {
   mutable std::condition_variable reaped_;
   std::atomic<bool> ended_{false};
   std::string ending_;
-  ProcessOutput output_;
+  channel::ProcessOutput output_;
   std::function<void()> on_end_;
 };
 

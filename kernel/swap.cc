@@ -12,7 +12,7 @@ namespace {
 
 // A candidate in shadow gets this many times the longest call of the slot so far, and this at least, so that one that
 // hangs holds up the run no longer than that, once.
-constexpr std::uint64_t kShadowFactor = 10, kShadowNs = 20'000'000;
+constexpr std::uint64_t kShadowFactor = 10, kShadowNs = 100'000'000;
 
 double microseconds(std::uint64_t since) { return 1e-3 * static_cast<double>(channel::now_ns() - since); }
 
@@ -226,7 +226,6 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   routed.target = routes_[call.target].target;
   // whether another host gave other bytes
   const auto differs = [&](std::unique_ptr<Carrier>* carrier) {
-    if (!*carrier) *carrier = hosts_[host].prepare(hosts_[host].description())->take();
     Shadow shadow;
     shadow.compare(call, arena, [&] {
       CallTimes times;
@@ -238,7 +237,16 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   };
   rerun_.checkers.resize(hosts_.size());
   std::unique_ptr<Carrier>& checker = rerun_.checkers[host];
-  const auto is_doubted = [&](std::unique_ptr<Carrier>* carrier) {
+  // `unknown` is what holds where nobody else can be asked
+  const auto is_doubted = [&](std::unique_ptr<Carrier>* carrier, bool unknown) {
+    for (int tries = 0; !*carrier && tries < 2; ++tries) {
+      try {
+        *carrier = hosts_[host].prepare(hosts_[host].description())->take();
+      } catch (const StageFault& fault) {
+        complaints_.push_back("no other process for a re-run: " + fault.text);
+      }
+    }
+    if (!*carrier) return unknown;
     try {
       return differs(carrier);
     } catch (const StageFault& fault) {
@@ -248,9 +256,9 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
       return true;
     }
   };
-  if (!is_doubted(&checker)) return;
+  if (!is_doubted(&checker, false)) return;
   std::unique_ptr<Carrier> third;
-  const bool is_outvoted = is_doubted(&third);
+  const bool is_outvoted = is_doubted(&third, true);
   if (checker) {
     checker->kill();
     hosts_[host].retire(std::move(checker));

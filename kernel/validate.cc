@@ -8,6 +8,7 @@
 
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/physics_checks.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
@@ -20,6 +21,24 @@ namespace {
 [[noreturn]] void bad_numbers(const std::string& text) {
   throw StageFault(FaultKind::kBadNumbers, "numbers", "its answer is wrong: " + text);
 }
+
+// Throws if the check of the physics has found something.
+void require_physics(const std::string& problem) {
+  if (!problem.empty()) throw StageFault(FaultKind::kBadPhysics, "physics", "its answer breaks a law: " + problem);
+}
+
+// The columns of a request as its view takes them.
+class RequestColumns {
+ public:
+  RequestColumns(const Arena& arena, const StageCall& call) {
+    for (std::size_t i = 0; i < call.request.size(); ++i)
+      columns_[i] = {arena.data(call.request[i]), arena.count(call.request[i])};
+  }
+  const gravitas_column* data() const { return columns_.data(); }
+
+ private:
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns_;
+};
 
 std::string at_row(const char* what, std::size_t row) { return std::string(what) + " of row " + std::to_string(row); }
 
@@ -70,6 +89,13 @@ Trusted<TrialState> Validator::trial_state(const Untrusted<StageCall>& answer, c
         !same_row(data.trial_angular_velocity.span(), start.angular_velocity.span(), i, 3))
       bad_numbers("it moved the immovable body '" + model_.body_id[i] + "'");
   }
+  if (samples_physics_) {
+    const RequestColumns columns(arena_, answer.value_);
+    require_physics(check_integration(stage::IntegratorIntegrateRequest(columns.data()),
+                                      {data.trial_position.span(), data.trial_orientation.span(),
+                                       data.trial_linear_velocity.span(), data.trial_angular_velocity.span()},
+                                      told_));
+  }
   return Trusted<TrialState>({});
 }
 
@@ -91,6 +117,10 @@ Trusted<Pairs> Validator::pairs(const Untrusted<StageCall>& answer, const StepDa
     if (i > 0 && !(std::make_pair(pair[2 * i - 2], pair[2 * i - 1]) < std::make_pair(a, b)))
       bad_structure(at_row("pair", i) + " is not in ascending order, or stands twice");
   }
+  if (samples_physics_) {
+    const RequestColumns columns(arena_, answer.value_);
+    require_physics(pair_check_.check(stage::SpacePairsRequest(columns.data()), pair));
+  }
   return Trusted<Pairs>({});
 }
 
@@ -104,6 +134,12 @@ Trusted<Contacts> Validator::contacts(const Untrusted<StageCall>& answer, const 
       bad_structure(at_row("contact", i) + " is not in ascending order of pair and feature, or stands twice");
   }
   require_unit(data.contact_normal.span(), 3, "normal");
+  if (samples_physics_) {
+    const RequestColumns columns(arena_, answer.value_);
+    require_physics(check_contacts(stage::CollisionManifoldsRequest(columns.data()),
+                                   {data.contact_pair.span(), data.contact_normal.span(), data.contact_point.span(),
+                                    data.contact_depth.span(), data.contact_relative_velocity.span()}));
+  }
   return Trusted<Contacts>({});
 }
 
@@ -167,6 +203,14 @@ Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const 
           (data.discrepancy_impulse[k] < 0.0 || data.discrepancy_correction[k] < 0.0))
         bad_numbers(at_row("discrepancy_impulse", i) + " pulls along a one-sided axis");
     }
+  }
+  if (samples_physics_) {
+    const RequestColumns columns(arena_, answer.value_);
+    require_physics(solution_check_.check(
+        stage::SolverSolveRequest(columns.data()),
+        {data.solved_linear_velocity.span(), data.solved_angular_velocity.span(), data.pose_change.span(),
+         data.discrepancy_impulse.span(), data.discrepancy_correction.span(), data.contact_impulse.span(),
+         data.contact_correction.span(), data.contact_direction.span(), data.stop_reason[0]}));
   }
   return Trusted<Solution>({});
 }

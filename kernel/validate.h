@@ -1,8 +1,9 @@
 // Nothing a plugin answers is used before it has been checked: an answer arrives as Untrusted<StageCall>, and
 // only these functions make a Trusted<...> of it, which is what the next stage takes.
 //
-// Three layers, always: wire (the carrier's: sizes, epoch, digest), structure (rows, ids, order, uniqueness),
-// numbers (finite, unit, signs, friction cone). A violation throws StageFault.
+// Four layers: wire (the carrier's: sizes, epoch, digest), structure (rows, ids, order, uniqueness), numbers (finite,
+// unit, signs, friction cone), always; and in every so many steps physics (plugin_sdk/physics_checks.h). A violation
+// throws StageFault.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include "kernel/model.h"
 #include "kernel/state.h"
 #include "kernel/step_data.h"
+#include "plugin_sdk/physics_checks.h"
 
 namespace gravitas::kernel {
 
@@ -54,7 +56,20 @@ struct Solution {};       // solved_*, pose_change, multipliers
 
 class Validator {
  public:
-  Validator(const Arena& arena, const Model& model) : arena_(arena), model_(model) {}
+  // For a campaign's self-test only: what a missing defence would say.
+  template <typename Checked>
+  static Checked unchecked() {
+    return Checked({});
+  }
+
+  // `check_physics_every` as in the description.
+  Validator(const Arena& arena, const Model& model, std::uint32_t check_physics_every)
+      : arena_(arena), model_(model), check_physics_every_(check_physics_every) {}
+
+  // Answers are of this step from now on: whether their physics is looked at depends on it alone.
+  void begin_step(std::uint32_t step) {
+    samples_physics_ = check_physics_every_ > 0 && step % check_physics_every_ == 0;
+  }
 
   Trusted<Wrenches> wrenches(const Untrusted<StageCall>& answer, const ForceAnswer& columns) const;
   Trusted<TrialState> trial_state(const Untrusted<StageCall>& answer, const StepData& data, const State& start) const;
@@ -67,11 +82,23 @@ class Validator {
   // The trial state of a derivative request, which comes from a plugin too.
   void derivative_request(const StepData& data) const;
 
+  // What an integrator is told while it is asked, against which its answer is held.
+  void begin_integration() { told_.clear(); }
+  void note_wrench(const StepData& data) {
+    if (samples_physics_) told_.add(data.wrench.span());
+  }
+
  private:
   void check_structure_and_finiteness(const StageCall& call) const;
 
   const Arena& arena_;
   const Model& model_;
+  std::uint32_t check_physics_every_;
+  bool samples_physics_ = false;
+  WrenchRange told_;
+  // scratch
+  mutable PairCheck pair_check_;
+  mutable SolutionCheck solution_check_;
 };
 
 }  // namespace gravitas::kernel

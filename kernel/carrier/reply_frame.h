@@ -22,6 +22,6 @@ struct Room {
 // ("its answer has …"), or empty. Precondition: every room lies in `response`; as many rooms and targets as `infos`.
 std::string read_reply_frame(const gravitas_frame_header& header, std::span<const gravitas_frame_column> columns,
                              std::span<const stage::ColumnInfo> infos, std::span<const Room> rooms,
-                             const std::byte* response, std::span<std::byte* const> targets);
+                             const std::byte* response, std::span<std::byte* const> targets, bool check_digest = true);
 
 }  // namespace gravitas::kernel

@@ -2,18 +2,13 @@
 
 #include <fcntl.h>
 #include <grpcpp/create_channel_posix.h>
-#include <netdb.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <filesystem>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -21,6 +16,7 @@
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/private_folder.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -72,70 +68,6 @@ std::shared_ptr<WorkerProcess> spawn(const std::vector<std::string>& arguments, 
   }
 }
 
-// Connects to a "unix:PATH"; -1 with errno.
-int connect_unix(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) {
-    errno = ENAMETOOLONG;
-    return -1;
-  }
-  path.copy(address.sun_path, path.size());
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (descriptor >= 0 && connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-    return descriptor;
-  const int problem = errno;
-  if (descriptor >= 0) close(descriptor);
-  errno = problem;
-  return -1;
-}
-
-// Connects to a "HOST:PORT" of this machine; -1 with errno.
-int connect_tcp(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  std::string host = address.substr(0, colon);
-  if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
-  addrinfo hints{}, *found = nullptr;
-  hints.ai_socktype = SOCK_STREAM;
-  if (getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &hints, &found) != 0) {
-    errno = EADDRNOTAVAIL;
-    return -1;
-  }
-  int descriptor = -1, problem = EADDRNOTAVAIL;
-  for (const addrinfo* one = found; one != nullptr && descriptor < 0; one = one->ai_next) {
-    descriptor = socket(one->ai_family, one->ai_socktype | SOCK_CLOEXEC, one->ai_protocol);
-    if (descriptor >= 0 && connect(descriptor, one->ai_addr, one->ai_addrlen) != 0) {
-      problem = errno;
-      close(descriptor);
-      descriptor = -1;
-    }
-  }
-  freeaddrinfo(found);
-  const int yes = 1;
-  if (descriptor >= 0) setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-  errno = problem;
-  return descriptor;
-}
-
-// A folder that only we can enter, for the socket of a command; gone with this object.
-class PrivateFolder {
- public:
-  PrivateFolder() {
-    path_ = (std::filesystem::temp_directory_path() / "gravitas-XXXXXX").string();
-    if (mkdtemp(path_.data()) == nullptr) fail_start("no folder for its socket: " + std::string(std::strerror(errno)));
-  }
-  ~PrivateFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  PrivateFolder(const PrivateFolder&) = delete;
-  PrivateFolder& operator=(const PrivateFolder&) = delete;
-  std::string socket() const { return path_ + "/worker"; }
-
- private:
-  std::string path_;
-};
-
 }  // namespace
 
 void set_worker_program(std::string path) { program = std::move(path); }
@@ -152,12 +84,14 @@ std::unique_ptr<Carrier> start_host(const SlotDescription& slot, std::uint32_t t
 
 ListeningCommand start_listening_command(const std::string& command, std::chrono::milliseconds limit,
                                          std::function<void()> on_end, const std::stop_token& stop) {
-  const PrivateFolder folder;
+  const channel::PrivateFolder folder;
+  if (folder.path().empty()) fail_start("no folder for its socket: " + std::string(std::strerror(errno)));
+  const std::string socket = folder.path() + "/worker";
   std::vector<std::string> words = worker_words();
-  words.insert(words.end(), {"--exec", "/bin/sh", "-c", "exec " + command + " --listen unix:" + folder.socket()});
+  words.insert(words.end(), {"--exec", "/bin/sh", "-c", "exec " + command + " --listen unix:" + socket});
   ListeningCommand started{spawn(words, {}, std::move(on_end)), -1};
   const auto until = std::chrono::steady_clock::now() + limit;
-  while ((started.descriptor = connect_unix(folder.socket())) < 0) {
+  while ((started.descriptor = channel::connect_to("unix:" + socket)) < 0) {
     if (started.process->has_ended())
       fail_start("'" + command + "' was " + started.process->ending() + " before it listened" +
                  last_words(*started.process));
@@ -198,7 +132,7 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
   }
   if (!address_.empty()) {
     if (!channel::is_local_address(address_)) fail_start("'" + address_ + "' is no address of this machine");
-    const int descriptor = address_.starts_with("unix:") ? connect_unix(address_.substr(5)) : connect_tcp(address_);
+    const int descriptor = channel::connect_to(address_);
     if (descriptor < 0) fail_start("no worker answers at " + address_ + ": " + std::strerror(errno));
     channel_ = worker_channel(descriptor);
   } else if (!slot.plugins[0].command.empty()) {

@@ -17,5 +17,8 @@ void add_plan(CLI::App* app, Action* action);
 void add_plugins(CLI::App* app, Action* action);
 void add_describe(CLI::App* app, Action* action);
 void add_check(CLI::App* app, Action* action);
+void add_campaign(CLI::App* app, Action* action);
+void add_serve(CLI::App* app, Action* action);
+void add_ctl(CLI::App* app, Action* action);
 
 }  // namespace gravitas::cli

@@ -25,7 +25,8 @@ HostingChoice parse_mode(const std::string& word, std::optional<Slot> slot, cons
 
 }  // namespace
 
-std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words) {
+std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words,
+                                         const std::vector<std::string>& attached) {
   std::vector<HostingChoice> choices;
   for (const std::string& word : words) {
     const std::size_t equals = word.find('=');
@@ -34,6 +35,16 @@ std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words) 
       continue;
     }
     choices.push_back(parse_mode(word, parse_slot("--hosting", word, word.substr(0, equals)), word.substr(equals + 1)));
+  }
+  for (const std::string& word : attached) {
+    const std::size_t equals = word.find('=');
+    const std::string address = equals == std::string::npos ? "" : word.substr(equals + 1);
+    if (!channel::is_local_address(address))
+      throw BadInput(
+          fmt::format("--attach {}: allowed: SLOT=ADDRESS of a worker of this machine that listens: "
+                      "127.0.0.1:PORT, [::1]:PORT or unix:PATH",
+                      word));
+    choices.push_back({parse_slot("--attach", word, word.substr(0, equals)), kernel::Hosting::kGrpc, address, true});
   }
   return choices;
 }

@@ -9,6 +9,7 @@
 namespace gravitas::cli {
 
 // Throws BadInput, naming what is allowed.
-std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words);
+std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words,
+                                         const std::vector<std::string>& attached = {});
 
 }  // namespace gravitas::cli

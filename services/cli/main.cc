@@ -24,6 +24,9 @@ int main(int argc, char** argv) {
   cli::add_plugins(&app, &action);
   cli::add_describe(&app, &action);
   cli::add_check(&app, &action);
+  cli::add_campaign(&app, &action);
+  cli::add_serve(&app, &action);
+  cli::add_ctl(&app, &action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

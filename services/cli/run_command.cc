@@ -12,6 +12,7 @@
 #include "services/cli/commands.h"
 #include "services/cli/hosting.h"
 #include "services/recorder/json.h"
+#include "services/run/fault_spec.h"
 #include "services/run/report.h"
 #include "services/run/session.h"
 
@@ -28,7 +29,7 @@ void request_interrupt(int number) {
 
 struct CommandLine {
   RunOptions options;
-  std::vector<std::string> hosting;
+  std::vector<std::string> hosting, attached;
   bool progress = false, quiet = false, json = false, no_sandbox = false;
 };
 
@@ -45,6 +46,12 @@ void add_scene_options(CLI::App* command, CommandLine* line) {
       ->add_option("--hosting", line->hosting,
                    "direct, shm or grpc, for all slots or for one: solver=direct; SLOT=grpc:ADDRESS: a worker of this "
                    "machine that listens")
+      ->take_all()
+      ->allow_extra_args(false);
+  command
+      ->add_option("--attach", line->attached,
+                   "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "
+                   "SLOT=ADDRESS, where `gravitas-worker --listen ADDRESS LIBRARY` listens")
       ->take_all()
       ->allow_extra_args(false);
   command->add_option("--threads", options.threads, "Threads of each host")->check(CLI::Range(1, 1024));
@@ -110,7 +117,7 @@ void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warni
 }
 
 int run_scene(CommandLine* line) {
-  line->options.hosting = parse_hosting(line->hosting);
+  line->options.hosting = parse_hosting(line->hosting, line->attached);
   kernel::set_worker_sandbox(!line->no_sandbox);
   std::signal(SIGINT, request_interrupt);
   std::signal(SIGTERM, request_interrupt);
@@ -147,7 +154,7 @@ int run_scene(CommandLine* line) {
 }
 
 int plan_scene(CommandLine* line) {
-  line->options.hosting = parse_hosting(line->hosting);
+  line->options.hosting = parse_hosting(line->hosting, line->attached);
   std::vector<std::string> warnings;
   const kernel::EnvironmentDescription description = load(line->options, &warnings);
   for (const std::string& warning : warnings) std::cerr << warning << '\n';
@@ -171,7 +178,8 @@ int plan_scene(CommandLine* line) {
 void add_run(CLI::App* app, Action* action) {
   const auto line = std::make_shared<CommandLine>();
   CLI::App* command = app->add_subcommand("run", "Simulate a scene");
-  command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json");
+  command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n\nFaults:\n" +
+                  fault_help());
   add_scene_options(command, line.get());
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "kernel/fault_injection.h"
+#include "kernel/fault.h"
 
 namespace gravitas {
 

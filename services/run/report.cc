@@ -7,11 +7,10 @@
 namespace gravitas {
 namespace {
 
-void write_comparison(const kernel::Comparison& from, const kernel::Environment& environment,
-                      report::v1::Comparison* to) {
+void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to) {
   to->set_calls(from.calls);
   to->set_differing_calls(from.differing_calls);
-  for (const kernel::Disagreement& one : from.disagreements) {
+  for (const Disagreement& one : from.disagreements) {
     report::v1::Disagreement* disagreement = to->add_disagreements();
     disagreement->set_quantity(fmt::format("{} {}", stage::method_info(one.method).name, one.column->name));
     disagreement->set_largest(one.largest);
@@ -29,7 +28,7 @@ void write_comparison(const kernel::Comparison& from, const kernel::Environment&
 void write_stages(const kernel::Environment& environment, report::v1::Report* report) {
   for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(kernel::Stage::kCount); ++i) {
     const auto stage = static_cast<kernel::Stage>(i);
-    const kernel::DurationHistogram& time = environment.stage_time(stage);
+    const DurationHistogram& time = environment.stage_time(stage);
     if (time.count() == 0) continue;
     report::v1::StageTiming* timing = report->add_stages();
     timing->set_stage(kernel::stage_name(stage));
@@ -39,7 +38,7 @@ void write_stages(const kernel::Environment& environment, report::v1::Report* re
     timing->set_transport_median_us(environment.transport_time(stage).quantile_us(0.5));
     timing->set_validation_median_us(environment.validation_time(stage).quantile_us(0.5));
   }
-  const kernel::DurationHistogram& steps = environment.step_time();
+  const DurationHistogram& steps = environment.step_time();
   report::v1::Durations* durations = report->mutable_microseconds_per_step();
   durations->set_mean(steps.mean_us());
   durations->set_median(steps.quantile_us(0.5));
@@ -85,6 +84,9 @@ report::v1::Plan plan_message(const kernel::Environment& environment) {
       slot->set_plugin(plugin);
       slot->set_hosting(kernel::hosting_name(planned.hosting));
       slot->set_pid(planned.process_id);
+      slot->set_standby(planned.standbys);
+      slot->set_attached(planned.is_attached);
+      for (const std::string& one : planned.sandbox) slot->add_sandbox(one);
     }
   }
   for (const kernel::LeftOut& left_out : environment.plan().left_out) {

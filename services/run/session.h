@@ -18,6 +18,7 @@ struct HostingChoice {
   std::optional<Slot> slot;  // none: all
   kernel::Hosting hosting;
   std::string address = {};  // with kGrpc: of a worker that somebody else started
+  bool attached = false;     // that runs in a debugger, say: nothing has a deadline
 };
 
 struct RunOptions {

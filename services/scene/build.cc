@@ -65,6 +65,7 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
                                 "Substeps is " + std::to_string(properties.substeps()) +
                                     ", which is not supported by this version; allowed: 1");
   }
+  context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
 }
 

@@ -102,7 +102,7 @@ void pile_in_workers(benchmark::State& state) {
   const auto checked = [&] {
     double sum = 0.0;
     for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(kernel::Stage::kCount); ++i) {
-      const kernel::DurationHistogram& time = world->validation_time(static_cast<kernel::Stage>(i));
+      const DurationHistogram& time = world->validation_time(static_cast<kernel::Stage>(i));
       sum += time.mean_us() * static_cast<double>(time.count());
     }
     return sum;

@@ -176,7 +176,7 @@ TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
   EXPECT_EQ(world.chain_hash(), quiet_chain());
   ASSERT_EQ(world.swaps().size(), 1U);
   EXPECT_TRUE(world.swaps()[0].only_compared);
-  const kernel::Comparison compared = world.swaps()[0].shadow;
+  const Comparison compared = world.swaps()[0].shadow;
   EXPECT_EQ(compared.calls, kSteps);
   EXPECT_EQ(compared.differing_calls, kSteps);
   ASSERT_FALSE(compared.disagreements.empty());

@@ -2,7 +2,10 @@
 // run.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
 
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -113,6 +116,46 @@ TEST(Exchange, AResumedRunGoesOnWithWhoeverAnswered) {
   }
 }
 
+TEST(Exchange, ASlowWorkerIsFlaggedAndChangesNoBit) {
+  const Outcome run = run_sample({"--fault", "solver:slow,seconds=0.1@step=50"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  EXPECT_EQ(run.report.faults_size(), 0);
+  EXPECT_THAT(run.program.err, HasSubstr("worker of slot solver: it was slow"));
+}
+
+TEST(Exchange, TheReportSaysWhatIsEnforcedOnEveryWorker) {
+  const Outcome run = run_sample({});
+  for (const report::v1::PlannedSlot& slot : run.report.plan().slots()) {
+    EXPECT_GT(slot.sandbox_size(), 2) << slot.slot();
+    EXPECT_EQ(slot.standby(), 1U);
+    EXPECT_FALSE(slot.attached());
+  }
+  const Outcome open = run_sample({"--no-sandbox"});
+  EXPECT_EQ(open.report.plan().slots(0).sandbox_size(), 0);
+}
+
+// A worker of somebody's own, stopped for longer than any deadline.
+TEST(Exchange, AnAttachedWorkerHasNoDeadline) {
+  const ScratchFolder folder;
+  const std::string address = "unix:" + folder.path("worker");
+  const std::string command = GRAVITAS_BINARY_DIR "/bin/gravitas-worker --listen " + address +
+                              " " GRAVITAS_BINARY_DIR "/lib/gravitas/solver_sequential.so >/dev/null 2>&1 & echo $!";
+  FILE* const shell = popen(command.c_str(), "r");
+  int process = 0;
+  ASSERT_EQ(fscanf(shell, "%d", &process), 1);
+  pclose(shell);
+  for (int i = 0; i < 500 && access(folder.path("worker").c_str(), F_OK) != 0; ++i) usleep(10'000);
+  const Outcome run = run_sample({"--attach", "solver=" + address, "--fault", "solver:slow,seconds=3@step=50"});
+  kill(process, SIGKILL);
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+  EXPECT_EQ(run.report.faults_size(), 0);
+  int attached = 0;
+  for (const report::v1::PlannedSlot& slot : run.report.plan().slots()) attached += slot.attached() ? 1 : 0;
+  EXPECT_EQ(attached, 1);
+}
+
 TEST(Exchange, WhatCannotBeIsRefusedWithWhatIsAllowed) {
   const auto refusal = [](std::vector<std::string> words) {
     const Outcome run = run_sample(std::move(words));
@@ -129,6 +172,7 @@ TEST(Exchange, WhatCannotBeIsRefusedWithWhatIsAllowed) {
   EXPECT_THAT(refusal({"--fault", "solver:kil@step=5"}), HasSubstr("kill"));
   EXPECT_THAT(refusal({"--compare", "solver=Euler"}), HasSubstr("no solver plugin 'Euler' is installed"));
   EXPECT_THAT(refusal({"--rerun", "solver"}), HasSubstr("SLOT=N"));
+  EXPECT_THAT(refusal({"--attach", "solver=10.0.0.1:1"}), HasSubstr("a worker of this machine"));
 }
 
 }  // namespace

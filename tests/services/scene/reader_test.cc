@@ -116,9 +116,11 @@ TEST(Reader, SuggestsNamesForUnknownOnes) {
               ElementsAre("scene:1:1: error: unknown block \"Environmnt\"; did you mean \"Environment\"? Allowed: "
                           "\"Geometries\", \"Materials\", \"Forces\", \"Simulator\", \"Environment\", "
                           "\"Plugins\""));
-  EXPECT_THAT(errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
-              ElementsAre("scene:1:32: error: unknown property \"TimeStp\" in CustomProperties; did you mean "
-                          "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\""));
+  EXPECT_THAT(
+      errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
+      ElementsAre(
+          "scene:1:32: error: unknown property \"TimeStp\" in CustomProperties; did you mean "
+          "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\", \"CheckPhysicsEvery\""));
 }
 
 TEST(Reader, SaysWhereANameBelongs) {

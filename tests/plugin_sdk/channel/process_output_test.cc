@@ -1,11 +1,11 @@
-#include "kernel/process_output.h"
+#include "plugin_sdk/channel/process_output.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <string>
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 namespace {
 
 using ::testing::ElementsAre;
@@ -86,4 +86,4 @@ TEST(ProcessOutput, LastWordsAreTheLastOfStandardErrorThatSaysSomething) {
 }
 
 }  // namespace
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

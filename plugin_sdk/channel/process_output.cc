@@ -1,9 +1,9 @@
-#include "kernel/process_output.h"
+#include "plugin_sdk/channel/process_output.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 namespace {
 
 constexpr std::array<const char*, 2> kPrefix = {"stdout: ", "stderr: "};
@@ -83,4 +83,4 @@ std::vector<std::string> ProcessOutput::take() {
   return std::exchange(lines_, {});
 }
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

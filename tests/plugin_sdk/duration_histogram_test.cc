@@ -1,8 +1,8 @@
-#include "kernel/profile.h"
+#include "plugin_sdk/duration_histogram.h"
 
 #include <gtest/gtest.h>
 
-namespace gravitas::kernel {
+namespace gravitas {
 namespace {
 
 TEST(DurationHistogram, KnowsQuantilesToFourPerCent) {
@@ -25,4 +25,4 @@ TEST(DurationHistogram, IsExactForSmallAndKeepsLargeDurations) {
 }
 
 }  // namespace
-}  // namespace gravitas::kernel
+}  // namespace gravitas

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 
 enum class OutputStream : std::size_t { kStdout, kStderr };
 
@@ -45,4 +45,4 @@ class ProcessOutput {
   std::string last_words_;
 };
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

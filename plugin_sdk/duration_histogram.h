@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstdint>
 
-namespace gravitas::kernel {
+namespace gravitas {
 
 class DurationHistogram {
  public:
@@ -54,4 +54,4 @@ class DurationHistogram {
   std::uint64_t count_ = 0, sum_ns_ = 0, max_ns_ = 0;
 };
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas

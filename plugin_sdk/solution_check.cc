@@ -1,0 +1,246 @@
+// SolutionCheck of physics_checks.h: sums of what joints and contacts do to each body, and what the body did.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/physics_checks.h"
+#include "plugin_sdk/solver.h"
+
+namespace gravitas {
+namespace {
+
+// Of the sum of magnitudes that cancel in a balance.
+constexpr double kRelative = 1e-10;
+// Of the momenta and energies themselves.
+constexpr double kRounding = 1e-13;
+
+using Push = SolutionCheck::Push;
+using Pushes = SolutionCheck::Pushes;
+
+void push_at(const Vector3& arm, const Vector3& impulse, Push* push) {
+  push->linear += impulse;
+  push->angular += arm.cross(impulse);
+  push->size += impulse.norm();
+  push->moment += arm.norm() * impulse.norm();
+}
+
+void push_couple(const Vector3& impulse, Push* push) {
+  push->angular += impulse;
+  push->moment += impulse.norm();
+}
+
+class Balance {
+ public:
+  Balance(const stage::SolverSolveRequest& request, const SolutionColumns& answer, std::vector<Pushes>* pushes)
+      : request_(request), answer_(answer), bodies_(request.flags().size()), pushes_(*pushes) {
+    pushes_.assign(bodies_, Pushes{});
+  }
+
+  std::string check() {
+    add_contacts();
+    add_discrepancies();
+    for (std::size_t i = 0; i < bodies_; ++i) {
+      if ((request_.flags()[i] & kMovable) == 0 || (request_.flags()[i] & kKinematic) != 0) continue;
+      if (std::string wrong = check_body(i); !wrong.empty()) return wrong;
+    }
+    if (std::string wrong = check_energy(); !wrong.empty()) return wrong;
+    return check_separation();
+  }
+
+ private:
+  // Calls push(pushes of the body, arm, sign) for both bodies of a row that acts at a point.
+  template <typename Apply>
+  void for_both(std::span<const std::uint32_t> pair, std::size_t row, const Vector3& point, Apply&& apply) {
+    for (const std::size_t end : {0U, 1U}) {
+      const std::uint32_t body = pair[2 * row + end];
+      if (body == kNone) continue;
+      apply(pushes_[body], point - vector_at(request_.trial_position(), body), end == 0 ? -1.0 : 1.0);
+    }
+  }
+
+  void add_contacts() {
+    const double share = request_.theta() * request_.time_step();
+    for (std::size_t i = 0; i < request_.contact_key().size(); ++i) {
+      const Vector3 impulse = vector_at(answer_.contact_impulse, i);
+      const Vector3 direction = vector_at(answer_.contact_direction, i);
+      const double along = direction.dot(impulse), correction = answer_.contact_correction[i];
+      const Vector3 friction = impulse - along * direction;
+      const Vector3 normal = vector_at(request_.contact_normal(), i);
+      const double* material = &request_.contact_material()[kMaterialColumns * i];
+      const double turning = std::max(0.0, along) * (material[kRollingFriction] + material[kSpinningFriction]);
+      for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i),
+               [&](Pushes& body, const Vector3& arm, double sign) {
+                 push_at(arm, sign * impulse, &body.velocity);
+                 body.velocity.unreported += turning;
+                 push_at(arm, sign * correction * normal, &body.pose);
+                 push_at(arm, sign * share * friction, &body.pose);
+                 // of an impulse that is taken apart, rounding stays
+                 body.pose.size += share * impulse.norm();
+                 body.pose.moment += share * impulse.norm() * arm.norm();
+                 body.pose.unreported += share * turning;
+               });
+    }
+  }
+
+  void add_discrepancies() {
+    const DiscrepancyColumns columns{request_.point1(),     request_.point2(),       request_.velocity(),
+                                     request_.correction(), request_.axes(),         request_.mode(),
+                                     request_.lower(),      request_.upper(),        request_.compliance(),
+                                     request_.damping(),    request_.maximum_force()};
+    const double share = request_.theta() * request_.time_step();
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const Discrepancy d = columns.at(i);
+      const Matrix3 axes = d.axes.toRotationMatrix();
+      is_driven_ = is_driven_ || !d.velocity.isZero(0.0);
+      for (int axis = 0; axis < 3; ++axis) {
+        const AxisMode mode = axis_mode(d.modes, axis);
+        // a compliance is read where an error is held
+        const bool is_held = mode == AxisMode::kLocked || mode == AxisMode::kLimited || mode == AxisMode::kUnilateral;
+        const bool is_soft = is_held && d.compliance[axis] > 0.0;
+        is_driven_ = is_driven_ || is_soft;
+        const bool on_velocity = is_soft || mode == AxisMode::kDriven || mode == AxisMode::kFriction;
+        const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
+        const Vector3 impulse = answer_.discrepancy_impulse[k] * axes.col(axis);
+        const Vector3 correction = answer_.discrepancy_correction[k] * axes.col(axis);
+        for_both(request_.discrepancy_body(), i, 0.5 * (d.point1 + d.point2),
+                 [&](Pushes& body, const Vector3& arm, double sign) {
+                   add(d, arm, sign * impulse, &body.velocity);
+                   add(d, arm, sign * correction, &body.pose);
+                   if (on_velocity) add(d, arm, sign * share * impulse, &body.pose);
+                 });
+      }
+    }
+  }
+
+  static void add(const Discrepancy& d, const Vector3& arm, const Vector3& impulse, Push* push) {
+    if (d.is_angular()) {
+      push_couple(impulse, push);
+    } else {
+      push_at(arm, impulse, push);
+    }
+  }
+
+  Matrix3 inertia_of(std::size_t i) const {
+    Vector3 inertia = vector_at(request_.inverse_inertia(), i);
+    for (double& moment : inertia) moment = moment > 0.0 ? 1.0 / moment : 0.0;
+    return world_inertia(quaternion_at(request_.trial_orientation(), i), inertia);
+  }
+
+  std::string check_body(std::size_t i) const {
+    const double inverse_mass = request_.inverse_mass()[i];
+    const double mass = inverse_mass > 0.0 ? 1.0 / inverse_mass : 0.0;
+    const Matrix3 inertia = inertia_of(i);
+    const Twist before{vector_at(request_.trial_linear_velocity(), i), vector_at(request_.trial_angular_velocity(), i)};
+    const Twist after{vector_at(answer_.linear_velocity, i), vector_at(answer_.angular_velocity, i)};
+    const Twist change{vector_at(answer_.pose_change, 2 * i), vector_at(answer_.pose_change, 2 * i + 1)};
+    const double moved = change.linear.norm(), turned = change.angular.norm();
+    const auto& [velocity, pose] = pushes_[i];
+
+    std::string wrong =
+        off_by("linear_velocity", i, (mass * (after.linear - before.linear) - velocity.linear).norm(),
+               kRelative * velocity.size + kRounding * mass * (before.linear.norm() + after.linear.norm()),
+               "m (v - v*) is the sum of the impulses, N s");
+    if (!wrong.empty()) return wrong;
+    wrong = off_by("pose_change", i, (mass * change.linear - pose.linear).norm(),
+                   kRelative * pose.size + kRounding * mass * moved, "m delta is the sum of the corrections, kg m");
+    if (!wrong.empty()) return wrong;
+
+    // arms and inertia at the end of the step are as good
+    const Vector3 turning = inertia * (after.angular - before.angular);
+    const auto arms = [&](const Push& push, double made) {
+      return kRelative * push.moment + 2.0 * (push.size * moved + (push.moment + made) * turned) +
+             1.001 * push.unreported;
+    };
+    const double spin = (inertia * before.angular).norm() + (inertia * after.angular).norm();
+    wrong = off_by("angular_velocity", i, (turning - velocity.angular).norm(),
+                   arms(velocity, turning.norm()) + kRounding * spin, "I (w - w*) is the sum of the moments, N m s");
+    if (!wrong.empty()) return wrong;
+    const Vector3 displaced = inertia * change.angular;
+    return off_by("pose_change", i, (displaced - pose.angular).norm(),
+                  arms(pose, displaced.norm()) + kRounding * displaced.norm(),
+                  "I delta is the sum of the corrections' moments, kg m^2");
+  }
+
+  std::string check_energy() const {
+    double before = 0.0, after = 0.0;
+    for (std::size_t i = 0; i < bodies_; ++i) {
+      const bool moves = !vector_at(request_.trial_linear_velocity(), i).isZero(0.0) ||
+                         !vector_at(request_.trial_angular_velocity(), i).isZero(0.0);
+      if (is_driven_ || ((request_.flags()[i] & kKinematic) != 0 && moves)) return {};
+      if ((request_.flags()[i] & kMovable) == 0) continue;
+      const double inverse_mass = request_.inverse_mass()[i];
+      const double mass = inverse_mass > 0.0 ? 1.0 / inverse_mass : 0.0;
+      const Matrix3 inertia = inertia_of(i);
+      const auto energy = [&](std::span<const double> linear, std::span<const double> angular) {
+        const Vector3 w = vector_at(angular, i);
+        return 0.5 * (mass * vector_at(linear, i).squaredNorm() + w.dot(inertia * w));
+      };
+      before += energy(request_.trial_linear_velocity(), request_.trial_angular_velocity());
+      after += energy(answer_.linear_velocity, answer_.angular_velocity);
+    }
+    if (after <= before * (1.0 + 1e-9)) return {};
+    char text[160];
+    std::snprintf(text, sizeof text, "kinetic energy grows from %.6g J to %.6g J, and nothing drives", before, after);
+    return text;
+  }
+
+  std::string check_separation() const {
+    if (answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kIterations)) return {};
+    for (std::size_t i = 0; i < request_.contact_key().size(); ++i) {
+      const Vector3 direction = vector_at(answer_.contact_direction, i);
+      const Vector3 impulse = vector_at(answer_.contact_impulse, i), point = vector_at(request_.contact_point(), i);
+      if (!(direction.dot(impulse) > 0.0)) continue;
+      double sizes = 0.0;
+      const auto speed = [&](std::span<const double> linear, std::span<const double> angular,
+                             std::span<const double> position) {
+        Vector3 relative = Vector3::Zero();
+        for (const std::size_t end : {0U, 1U}) {
+          const std::uint32_t body = request_.contact_body()[2 * i + end];
+          const Vector3 turned = vector_at(angular, body).cross(point - vector_at(position, body));
+          relative += (end == 0 ? -1.0 : 1.0) * (vector_at(linear, body) + turned);
+          sizes += vector_at(linear, body).norm() + turned.norm();
+        }
+        return direction.dot(relative);
+      };
+      const double start = speed(request_.linear_velocity(), request_.angular_velocity(), request_.trial_position());
+      const double trial =
+          speed(request_.trial_linear_velocity(), request_.trial_angular_velocity(), request_.trial_position());
+      const double after = speed(answer_.linear_velocity, answer_.angular_velocity, request_.trial_position());
+      // s^2 <= u^2 + 2 |a| gap, and the gap was crossed within the step
+      const double arrival = 2.0 * (std::fabs(start) + std::fabs(trial));
+      const double allowed = request_.contact_material()[kMaterialColumns * i + kRestitution] * arrival + 1e-3 * sizes;
+      if (after <= allowed) continue;
+      char text[160];
+      std::snprintf(text, sizeof text, "contact_impulse of row %zu pushes what separates at %.3g m/s, allowed %.3g", i,
+                    after, allowed);
+      return text;
+    }
+    return {};
+  }
+
+  static std::string off_by(const char* what, std::size_t body, double residual, double bound, const char* law) {
+    if (residual <= bound) return {};
+    char text[256];
+    std::snprintf(text, sizeof text, "%s of body %zu breaks a balance by %.3g, allowed %.3g (%s)", what, body, residual,
+                  bound, law);
+    return text;
+  }
+
+  const stage::SolverSolveRequest& request_;
+  const SolutionColumns& answer_;
+  std::size_t bodies_;
+  std::vector<Pushes>& pushes_;
+  bool is_driven_ = false;
+};
+
+}  // namespace
+
+std::string SolutionCheck::check(const stage::SolverSolveRequest& request, const SolutionColumns& answer) {
+  return Balance(request, answer, &pushes_).check();
+}
+
+}  // namespace gravitas

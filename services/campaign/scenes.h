@@ -1,0 +1,29 @@
+// The scenes of a campaign: each with its quiet run, against which every faulty one is judged.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kernel/description.h"
+#include "kernel/hash.h"
+
+namespace gravitas::campaign {
+
+// Longest run of a trial.
+inline constexpr std::uint32_t kMostSteps = 60;
+
+struct Scene {
+  std::string name;
+  kernel::EnvironmentDescription description;
+  std::vector<Slot> slots;           // that the plan does not leave out
+  std::vector<kernel::Hash> chains;  // of the quiet run, hosted direct: [n] after n steps
+};
+
+// Names of the scenes that are built in: contacts without and with joints, and all slots at work.
+std::vector<std::string> built_in_scenes();
+
+// Scenes by name or file; the built-in ones if there is none. Makes `steps` steps of each for its quiet run. Throws
+// BadInput.
+std::vector<Scene> load_scenes(const std::vector<std::string>& names, std::uint32_t steps = kMostSteps);
+
+}  // namespace gravitas::campaign

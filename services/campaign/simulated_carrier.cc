@@ -1,0 +1,302 @@
+#include "services/campaign/simulated_carrier.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "kernel/carrier/reply_frame.h"
+#include "kernel/fault.h"
+#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/host/fault_injection.h"
+#include "plugin_sdk/host/faulty_reply.h"
+#include "plugin_sdk/host/hosted_plugins.h"
+
+namespace gravitas::campaign {
+namespace {
+
+using host::InjectedFault;
+using kernel::FaultKind;
+using kernel::StageFault;
+
+// Loading makes a private copy of a file, so each is loaded once.
+PluginLibrary load_once(const std::string& path) {
+  static std::mutex mutex;
+  static std::map<std::string, PluginLibrary> loaded;
+  const std::lock_guard lock(mutex);
+  PluginLibrary& library = loaded[path];
+  std::string problem;
+  if (library.table == nullptr) library = load_plugin_library(path, &problem);
+  if (library.table == nullptr) throw StageFault(FaultKind::kHandshake, "handshake", problem);
+  return library;
+}
+
+std::vector<PluginLibrary> load_all(const std::vector<kernel::PluginChoice>& plugins) {
+  std::vector<PluginLibrary> libraries;
+  for (const kernel::PluginChoice& plugin : plugins) libraries.push_back(load_once(plugin.library));
+  return libraries;
+}
+
+// What a worker process writes and the kernel reads: a segment's worth.
+struct Reply {
+  gravitas_frame_header header{};
+  std::array<gravitas_frame_column, GRAVITAS_MAX_COLUMNS> columns{};
+  std::vector<std::uint64_t> data;
+
+  std::byte* bytes() { return reinterpret_cast<std::byte*>(data.data()); }
+};
+
+class SimulatedCarrier final : public kernel::Carrier {
+ public:
+  SimulatedCarrier(const kernel::SlotDescription& slot, std::uint32_t threads)
+      : hosting_(slot.hosting), deadline_(slot.deadline), defences_(slot.defences), plugins_(load_all(slot.plugins)) {
+    static std::atomic<std::uint64_t> epochs{0};
+    epoch_ = ++epochs;
+    std::vector<std::vector<double>> settings;
+    for (const kernel::PluginChoice& plugin : slot.plugins) settings.push_back(plugin.settings);
+    const std::string problem = plugins_.create(settings, threads);
+    if (!problem.empty()) throw StageFault(FaultKind::kHandshake, "handshake", problem);
+  }
+
+  kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
+                          kernel::DerivativeSource* derivatives) override;
+  void kill() override { dead_ = true; }
+  bool is_alive() const override { return !dead_; }
+  int process_id() const override { return getpid(); }
+  kernel::Hosting hosting() const override { return hosting_; }
+
+ private:
+  class Derivatives;
+
+  [[noreturn]] void die(const char* when) {
+    dead_ = true;
+    throw StageFault(FaultKind::kDeath, "pidfd", std::string("it died ") + when);
+  }
+  [[noreturn]] void be_overdue() {
+    // without a deadline whoever waits for it waits for ever
+    while (!defences_.deadline) std::this_thread::sleep_for(std::chrono::hours(1));
+    dead_ = true;
+    throw StageFault(FaultKind::kDeadline, "deadline", "it did not answer within its deadline");
+  }
+  [[noreturn]] void reject(const std::string& why) {
+    dead_ = true;
+    throw StageFault(FaultKind::kBadFrame, "wire", "its answer has " + why);
+  }
+  bool is_too_slow(const host::FaultOrder& order) const;
+  std::int32_t misbehave(const host::FaultOrder& order, const stage::MethodInfo& method, const gravitas_column* request,
+                         gravitas_reply_column* reply, std::string* text);
+  kernel::CallResult take(Reply* reply, const kernel::StageCall& call, std::string text, kernel::Arena* arena);
+
+  const kernel::Hosting hosting_;
+  const double deadline_;
+  const kernel::Defences defences_;
+  host::HostedPlugins plugins_;
+  std::uint64_t epoch_ = 0, sequence_ = 0;
+  std::atomic<bool> dead_{false};
+  std::array<kernel::Room, GRAVITAS_MAX_COLUMNS> rooms_{};
+  Reply reply_, before_;  // of this call and of the one before
+};
+
+// Answers the plugin's questions as the kernel's side of a carrier does.
+class SimulatedCarrier::Derivatives final : public host::CallServices {
+ public:
+  Derivatives(kernel::Arena* arena, kernel::DerivativeSource* source) : arena_(arena), source_(source) {}
+  void mark_progress() override {}
+  std::int32_t derivative(const gravitas_column* request, gravitas_reply_column* reply) override {
+    if (source_ == nullptr) return GRAVITAS_CALLBACK_FAILED;
+    const std::span<const kernel::ColumnId> trial = source_->trial_columns();
+    for (std::size_t i = 0; i < trial.size(); ++i) {
+      if (request[i].count != arena_->count(trial[i])) return GRAVITAS_CALLBACK_FAILED;
+      std::memcpy(arena_->data(trial[i]), request[i].data, request[i].count * sizeof(double));
+    }
+    try {
+      source_->evaluate();
+    } catch (...) {
+      nested_ = std::current_exception();
+      return GRAVITAS_CALLBACK_FAILED;
+    }
+    const kernel::ColumnId wrench = source_->wrench_column();
+    reply[0].count = arena_->count(wrench);
+    if (reply[0].count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
+    std::memcpy(reply[0].data, arena_->data(wrench), reply[0].count * sizeof(double));
+    return GRAVITAS_OK;
+  }
+  void rethrow() const {
+    if (nested_) std::rethrow_exception(nested_);
+  }
+
+ private:
+  kernel::Arena* arena_;
+  kernel::DerivativeSource* source_;
+  std::exception_ptr nested_;
+};
+
+bool SimulatedCarrier::is_too_slow(const host::FaultOrder& order) const {
+  switch (order.fault()) {
+    case InjectedFault::kHang:
+    case InjectedFault::kDeadlock:
+    case InjectedFault::kStop:
+    case InjectedFault::kDrop:
+      return true;
+    case InjectedFault::kSlow:
+    case InjectedFault::kDelay:
+    case InjectedFault::kJitter:
+      return (order.gives("seconds") && order.number("seconds") > deadline_) ||
+             (order.fault() == InjectedFault::kSlow && order.number("factor") * 1e-3 > deadline_);
+    default:
+      return false;
+  }
+}
+
+// What a worker does between the plugin's answer and the frame of it. Returns the status that holds.
+std::int32_t SimulatedCarrier::misbehave(const host::FaultOrder& order, const stage::MethodInfo& method,
+                                         const gravitas_column* request, gravitas_reply_column* reply,
+                                         std::string* text) {
+  const bool is_process = order.info().group == "process";
+  if (is_process && order.moment() == host::Moment::kCompute) die("computing");
+  if (is_too_slow(order)) be_overdue();
+  if (order.fault() == InjectedFault::kMemory) *text = "not enough memory";
+  if (order.fault() == InjectedFault::kRounding) *text = "the plugin changed the floating-point environment";
+  if (host::changes_reply(order.fault())) *text = host::change_reply(order, method, request, reply);
+  const bool needs_payload = order.fault() == InjectedFault::kTruncate || order.fault() == InjectedFault::kFlip;
+  for (std::size_t i = 0; i < method.reply.size(); ++i)
+    if (text->empty() && reply[i].count > reply[i].capacity) return GRAVITAS_NEEDS_CAPACITY;
+  if (needs_payload && host::payload_bits(method.reply, reply) == 0) *text = "there is nothing to damage";
+  return text->empty() ? GRAVITAS_OK : GRAVITAS_FAILED;
+}
+
+kernel::CallResult SimulatedCarrier::call(const kernel::StageCall& call, kernel::Arena* arena,
+                                          kernel::DerivativeSource* derivatives) {
+  if (dead_) die("between two calls");
+  const stage::MethodInfo& method = call.info();
+  std::optional<host::FaultOrder> order;
+  std::string text;
+  if (!call.fault.empty()) order = host::parse_fault_order(call.fault, &text);
+  const bool is_process = order && order->info().group == "process";
+  if (is_process && order->moment() == host::Moment::kRead) die("with the request read");
+  ++sequence_;
+
+  // rooms and columns, as in a response segment
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> request;
+  std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply;
+  std::uint64_t words = 0;
+  for (std::size_t i = 0; i < call.request.size(); ++i)
+    request[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
+  for (std::size_t i = 0; i < call.reply.size(); ++i) {
+    rooms_[i] = {8 * words, arena->capacity(call.reply[i])};
+    words += (rooms_[i].capacity + 7) / 8 * 8;
+  }
+  if (!defences_.epoch) before_ = reply_;
+  if (reply_.data.size() < words) reply_.data.resize(words);
+  for (std::size_t i = 0; i < call.reply.size(); ++i)
+    reply[i] = {reply_.bytes() + rooms_[i].offset, rooms_[i].capacity, 0};
+
+  Derivatives services(arena, derivatives);
+  host::CallEnd end = plugins_.call(call.target, call.method, request.data(), reply.data(), &services);
+  services.rethrow();
+  if (end.status == GRAVITAS_OK && order)
+    end.status = misbehave(*order, method, request.data(), reply.data(), &end.text);
+
+  // the frame
+  gravitas_frame_header& header = reply_.header;
+  header = {};
+  header.magic = GRAVITAS_MAGIC;
+  header.epoch = epoch_;
+  header.sequence = sequence_;
+  header.kind = GRAVITAS_FRAME_REPLY;
+  header.method = static_cast<std::uint32_t>(call.method);
+  header.target = call.target;
+  header.status = end.status;
+  header.column_count = static_cast<std::uint32_t>(call.reply.size());
+  const std::span columns = std::span(reply_.columns).first(call.reply.size());
+  std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    columns[i] = {rooms_[i].offset, reply[i].count, rooms_[i].capacity};
+    data[i] = reply[i].data;
+  }
+  const bool is_spoilt = order && end.status == GRAVITAS_OK;
+  std::optional<host::FaultInjection> injection;
+  if (is_spoilt) {
+    injection.emplace(*order);
+    header.epoch = injection->epoch(epoch_);
+    header.sequence = injection->sequence(sequence_);
+  }
+  header.digest =
+      channel::frame_digest(header, columns, method.reply, end.status == GRAVITAS_OK ? data.data() : nullptr);
+  if (is_spoilt) injection->spoil_frame(&header, columns, method.reply, reply.data());
+  if (is_process && order->moment() == host::Moment::kWrite) die("with its reply half written");
+  kernel::CallResult result = take(&reply_, call, std::move(end.text), arena);
+  // who waits for it sees the reply first
+  if (is_process && end.status == GRAVITAS_OK) dead_ = true;
+  return result;
+}
+
+// The kernel's side: what is late is dropped, the rest copied and checked.
+kernel::CallResult SimulatedCarrier::take(Reply* reply, const kernel::StageCall& call, std::string text,
+                                          kernel::Arena* arena) {
+  const gravitas_frame_header& header = reply->header;
+  const bool is_late = header.epoch != epoch_ || header.sequence != sequence_;
+  if (header.epoch == epoch_ && header.magic != GRAVITAS_MAGIC) reject("a header without the magic");
+  if (header.magic != GRAVITAS_MAGIC || (is_late && defences_.epoch)) be_overdue();
+  // an answer to the call before, taken for one to this
+  Reply* taken =
+      is_late && before_.header.method == header.method && before_.data.size() == reply->data.size() ? &before_ : reply;
+  if (taken->header.kind != GRAVITAS_FRAME_REPLY || taken->header.method != static_cast<std::uint32_t>(call.method))
+    reject("another message");
+  std::array<std::byte*, GRAVITAS_MAX_COLUMNS> targets;
+  for (std::size_t i = 0; i < call.reply.size(); ++i) targets[i] = arena->data(call.reply[i]);
+  const std::string problem =
+      kernel::read_reply_frame(taken->header, std::span(taken->columns).first(call.reply.size()), call.info().reply,
+                               std::span(rooms_).first(call.reply.size()), taken->bytes(),
+                               std::span(targets).first(call.reply.size()), defences_.digest);
+  if (!problem.empty()) reject(problem);
+  kernel::CallResult result;
+  result.status = taken->header.status;
+  if (result.status == GRAVITAS_OK || result.status == GRAVITAS_NEEDS_CAPACITY)
+    for (std::size_t i = 0; i < call.reply.size(); ++i) arena->set_count(call.reply[i], taken->columns[i].count);
+  result.text = std::move(text);
+  return result;
+}
+
+// One slot in so many has a start that fails.
+constexpr std::uint64_t kFailingSlots = 6;
+
+}  // namespace
+
+SimulatedHosts::SimulatedHosts(std::uint64_t seed) : starts_(std::make_shared<std::array<Starts, kSlotCount>>()) {
+  host::RandomNumbers numbers(~seed);
+  for (Starts& starts : *starts_) {
+    if (numbers.next() % kFailingSlots == 0) starts.fails = static_cast<std::uint32_t>(2 + numbers.next() % 3);
+    starts.dies = numbers.next() % 2 == 0;
+  }
+}
+
+kernel::HostStarter SimulatedHosts::starter() const {
+  return [starts = starts_](const kernel::SlotDescription& slot, std::uint32_t threads,
+                            const std::stop_token&) -> std::unique_ptr<kernel::Carrier> {
+    Starts& here = (*starts)[static_cast<std::size_t>(slot.plugins[0].declaration.slot)];
+    const bool fails = ++here.made == here.fails;
+    if (fails && !here.dies) throw StageFault(FaultKind::kHandshake, "handshake", "it refused to serve");
+    auto carrier = std::make_unique<SimulatedCarrier>(slot, threads);
+    if (fails) carrier->kill();
+    return carrier;
+  };
+}
+
+std::vector<SimulatedHosts::FailedStart> SimulatedHosts::failed_starts() const {
+  std::vector<FailedStart> failed;
+  for (std::size_t i = 1; i < kSlotCount; ++i) {
+    const Starts& starts = (*starts_)[i];
+    if (starts.fails > 0 && starts.made >= starts.fails)
+      failed.push_back({static_cast<Slot>(i), starts.dies ? "dies after its handshake" : "refused in the handshake"});
+  }
+  return failed;
+}
+
+}  // namespace gravitas::campaign

@@ -1,0 +1,105 @@
+#include "services/campaign/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace gravitas::campaign {
+namespace {
+
+constexpr std::size_t kShownFailures = 20;
+
+v1::Quantiles quantiles(std::vector<double> values) {
+  v1::Quantiles result;
+  if (values.empty()) return result;
+  std::ranges::sort(values);
+  result.set_count(values.size());
+  result.set_median(values[values.size() / 2]);
+  result.set_p99(values[values.size() * 99 / 100]);
+  result.set_max(values.back());
+  return result;
+}
+
+void count(const v1::Fault& fault, v1::Row* row) {
+  row->set_injected(row->injected() + 1);
+  const std::string& outcome = fault.outcome();
+  if (outcome == "M") return row->set_masked(row->masked() + 1);
+  if (outcome == "B") return row->set_recovered(row->recovered() + 1);
+  if (outcome == "F") return row->set_fallback(row->fallback() + 1);
+  if (outcome == "Q") return row->set_paused(row->paused() + 1);
+  if (outcome == "needs re-run") return row->set_needs_rerun(row->needs_rerun() + 1);
+  if (outcome == "not caught") return row->set_not_caught(row->not_caught() + 1);
+  row->set_forbidden(row->forbidden() + 1);
+}
+
+std::string quantile_line(const char* what, const v1::Quantiles& one) {
+  return fmt::format("{:<34} {:>8}   median {:>9.1f} us   p99 {:>9.1f} us   max {:>9.1f} us\n", what, one.count(),
+                     one.median(), one.p99(), one.max());
+}
+
+}  // namespace
+
+void Tally::add(const v1::Trial& trial, const std::string& command) {
+  ++trials_;
+  unprovoked_ += trial.unprovoked();
+  for (const v1::Fault& fault : trial.faults()) {
+    ++injected_;
+    manifested_ += fault.outcome() != "M";
+    v1::Row& row = rows_[fault.group()];
+    row.set_group(fault.group());
+    count(fault, &row);
+  }
+  standby_.insert(standby_.end(), trial.standby_us().begin(), trial.standby_us().end());
+  cold_start_.insert(cold_start_.end(), trial.cold_start_us().begin(), trial.cold_start_us().end());
+  swap_pause_.insert(swap_pause_.end(), trial.swap_pause_us().begin(), trial.swap_pause_us().end());
+  if (trial.forbidden().empty()) return;
+  ++forbidden_;
+  if (failures_.size() < kShownFailures) failures_.push_back(fmt::format("{}: {}", command, trial.forbidden(0)));
+}
+
+v1::Table Tally::table() const {
+  v1::Table table;
+  table.set_injected(injected_);
+  table.set_manifested(manifested_);
+  table.set_trials(trials_);
+  table.set_forbidden(forbidden_);
+  table.set_unprovoked(unprovoked_);
+  if (manifested_ > 0)
+    table.set_forbidden_bound(std::min(
+        1.0, (forbidden_ > 0 ? 3.0 * static_cast<double>(forbidden_) + 1.0 : 3.0) / static_cast<double>(manifested_)));
+  for (const auto& [group, row] : rows_) *table.add_rows() = row;
+  *table.mutable_standby() = quantiles(standby_);
+  *table.mutable_cold_start() = quantiles(cold_start_);
+  *table.mutable_swap_pause() = quantiles(swap_pause_);
+  for (const std::string& failure : failures_) table.add_failures(failure);
+  return table;
+}
+
+std::string table_text(const v1::Table& table) {
+  std::string text =
+      fmt::format("{:<10} {:>9} {:>9} {:>10} {:>9} {:>7} {:>13} {:>11} {:>10}\n", "group", "injected", "M masked",
+                  "B bit same", "F fallbk", "Q pause", "needs re-run", "not caught", "forbidden");
+  for (const v1::Row& row : table.rows())
+    text += fmt::format("{:<10} {:>9} {:>9} {:>10} {:>9} {:>7} {:>13} {:>11} {:>10}\n", row.group(), row.injected(),
+                        row.masked(), row.recovered(), row.fallback(), row.paused(), row.needs_rerun(),
+                        row.not_caught(), row.forbidden());
+  text +=
+      fmt::format("\n{} faults injected, {} manifested, in {} trials ({} tier, seed {}) and {:.1f} s\n",
+                  table.injected(), table.manifested(), table.trials(), table.tier(), table.seed(), table.seconds());
+  text += table.forbidden() == 0
+              ? fmt::format("nothing forbidden happened: with 95 % confidence at most {:.2g} of faults\n",
+                            table.forbidden_bound())
+              : fmt::format("{} trials with something forbidden\n", table.forbidden());
+  if (table.unprovoked() > 0)
+    text += fmt::format("{} failed calls besides, which no fault explains (a busy machine's deadlines)\n",
+                        table.unprovoked());
+  if (table.tier() == "real") {
+    text += quantile_line("noticed -> answered by a standby", table.standby());
+    text += quantile_line("noticed -> answered, after a start", table.cold_start());
+    text += quantile_line("swap: pause of the simulation", table.swap_pause());
+  }
+  for (const std::string& failure : table.failures()) text += failure + "\n";
+  return text;
+}
+
+}  // namespace gravitas::campaign

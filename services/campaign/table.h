@@ -1,0 +1,37 @@
+// What a campaign counts: outcomes by group of kinds, and how long recoveries took.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gravitas/campaign/v1/campaign.pb.h"
+
+namespace gravitas::campaign {
+
+class Tally {
+ public:
+  // `command` shows the trial again.
+  void add(const v1::Trial& trial, const std::string& command);
+
+  std::uint64_t injected() const { return injected_; }
+  // Trials with something forbidden.
+  std::uint64_t forbidden() const { return forbidden_; }
+  // Recovery times, us.
+  const std::vector<double>& standby() const { return standby_; }
+  const std::vector<double>& cold_start() const { return cold_start_; }
+
+  v1::Table table() const;
+
+ private:
+  std::uint64_t injected_ = 0, manifested_ = 0, trials_ = 0, forbidden_ = 0, unprovoked_ = 0;
+  std::map<std::string, v1::Row> rows_;
+  std::vector<double> standby_, cold_start_, swap_pause_;
+  std::vector<std::string> failures_;
+};
+
+// For a person.
+std::string table_text(const v1::Table& table);
+
+}  // namespace gravitas::campaign

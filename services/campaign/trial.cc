@@ -1,0 +1,393 @@
+#include "services/campaign/trial.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <thread>
+
+#include "kernel/environment.h"
+#include "plugin_sdk/near_miss.h"
+#include "services/campaign/leftovers.h"
+#include "services/campaign/simulated_carrier.h"
+#include "services/run/session.h"
+
+namespace gravitas::campaign {
+namespace {
+
+using kernel::Environment;
+using kernel::FaultRecord;
+using kernel::StepOutcome;
+
+constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
+                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
+
+struct NamedDefence {
+  const char* name;
+  bool kernel::Defences::*member;
+};
+constexpr NamedDefence kDefences[] = {
+    {"structure", &kernel::Defences::structure}, {"numbers", &kernel::Defences::numbers},
+    {"physics", &kernel::Defences::physics},     {"replay", &kernel::Defences::replay},
+    {"digest", &kernel::Defences::digest},       {"epoch", &kernel::Defences::epoch},
+    {"deadline", &kernel::Defences::deadline}};
+
+// Counts commits: none may be lost or made twice.
+class CommitCount final : public kernel::CommitListener {
+ public:
+  void on_commit(const Environment& environment) override {
+    ++commits_;
+    is_in_order_ &= environment.step_count() == commits_;
+  }
+  bool is(std::uint32_t steps) const { return is_in_order_ && commits_ == steps; }
+
+ private:
+  std::uint32_t commits_ = 0;
+  bool is_in_order_ = true;
+};
+
+// The plugins themselves: a fallback is then judged by the bits, too.
+kernel::EnvironmentDescription with_fallbacks(kernel::EnvironmentDescription description) {
+  for (const Slot slot : kSlots)
+    for (kernel::PluginChoice& plugin : description.slot(slot).plugins)
+      plugin.fallback = std::make_shared<const kernel::PluginChoice>(plugin);
+  return description;
+}
+
+kernel::EnvironmentDescription description_of(const TrialPlan& plan, const Scene& scene, const TrialOptions& options) {
+  kernel::EnvironmentDescription description = scene.description;
+  description.steps = plan.steps;
+  description.check_physics_every = 1;
+  for (const Slot slot : kSlots) {
+    kernel::SlotDescription& one = description.slot(slot);
+    one.hosting = plan.hosting;
+    one.deadline = options.deadline;
+    one.standbys = 1;
+    one.defences = options.defences;
+  }
+  return plan.has_fallbacks ? with_fallbacks(std::move(description)) : description;
+}
+
+bool is_finite(const Environment& world) {
+  const kernel::StateView state = world.state();
+  const auto finite = [](std::span<const double> numbers) {
+    return std::ranges::all_of(numbers, [](double number) { return std::isfinite(number); });
+  };
+  return finite(state.position) && finite(state.orientation) && finite(state.linear_velocity) &&
+         finite(state.angular_velocity);
+}
+
+class Run {
+ public:
+  Run(const TrialPlan& plan, const Scene& scene, const TrialOptions& options)
+      : plan_(plan), scene_(scene), options_(options), hosts_(plan.seed) {
+    trial_.set_seed(plan.seed);
+    trial_.set_scene(scene.name);
+    trial_.set_carrier(options.tier == Tier::kSimulated ? "simulated" : kernel::hosting_name(plan.hosting));
+    trial_.set_steps(plan.steps);
+    for (const PlannedFault& fault : plan.faults) faults_.push_back({&fault});
+  }
+
+  v1::Trial make() {
+    try {
+      go();
+    } catch (const std::exception& problem) {
+      forbid(fmt::format("an exception came out of the kernel: {}", problem.what()));
+    }
+    world_.reset();
+    return std::move(trial_);
+  }
+
+ private:
+  // A planned fault and what is known of it.
+  struct Injected {
+    const PlannedFault* plan;
+    bool happened = false;
+    std::vector<FaultRecord> records = {};
+    std::string outcome = {};
+  };
+
+  void go();
+  void begin(std::uint32_t step);
+  void attack_from_outside(const PlannedFault& fault);
+  void order_swap(const PlannedFault& fault);
+  void stop_rerun(std::uint32_t step);
+  // The step is not what it was in the quiet run.
+  void judge_divergence(std::uint32_t step);
+  void judge_pause(std::uint32_t step);
+  void attribute_records();
+  void judge_swaps();
+  void write();
+  // A standby was killed then, unseen: who asks it next sees a second death of the same request, as poison does.
+  Injected* killed_standby(std::uint32_t step);
+  int process_of(Slot slot) const;
+  void forbid(std::string what) { trial_.add_forbidden(std::move(what)); }
+  Injected* find(const FaultRecord& record);
+
+  const TrialPlan& plan_;
+  const Scene& scene_;
+  const TrialOptions& options_;
+  SimulatedHosts hosts_;
+  kernel::EnvironmentDescription description_;
+  std::unique_ptr<Environment> world_;
+  std::vector<Injected> faults_;
+  bool is_over_ = false, has_other_plugin_ = false;
+  v1::Trial trial_;
+};
+
+int Run::process_of(Slot slot) const {
+  for (const kernel::PlannedSlot& planned : world_->plan().slots)
+    if (planned.slot == slot) return planned.process_id;
+  return 0;
+}
+
+void Run::order_swap(const PlannedFault& fault) {
+  kernel::SwapOrder order;
+  order.slot = fault.slot;
+  const std::vector<kernel::PluginChoice>& own = description_.slot(fault.slot).plugins;
+  order.plugin = own[0];
+  order.step = fault.step;
+  world_->order_swap(std::move(order));
+}
+
+void Run::attack_from_outside(const PlannedFault& fault) {
+  const auto send = [](int process, int signal) {
+    if (process > 0) ::kill(process, signal);
+  };
+  switch (fault.means) {
+    case Means::kKill:
+      return send(process_of(fault.slot), SIGKILL);
+    case Means::kStop:
+      return send(process_of(fault.slot), SIGSTOP);
+    case Means::kSwapKilled:
+      order_swap(fault);
+      [[fallthrough]];
+    case Means::kKillStandby: {
+      std::vector<int> waiting = child_processes();
+      for (const kernel::PlannedSlot& planned : world_->plan().slots) std::erase(waiting, planned.process_id);
+      if (waiting.empty()) return;
+      // the youngest is what is being prepared
+      const std::size_t which = fault.means == Means::kSwapKilled ? waiting.size() - 1 : plan_.seed % waiting.size();
+      return send(waiting[which], SIGKILL);
+    }
+    default:
+      return;
+  }
+}
+
+void Run::begin(std::uint32_t step) {
+  for (Injected& fault : faults_) {
+    if (fault.plan->step != step) continue;
+    fault.happened = true;
+    if (fault.plan->rerun) world_->set_rerun_every(fault.plan->slot, 1);
+    attack_from_outside(*fault.plan);
+  }
+}
+
+void Run::stop_rerun(std::uint32_t step) {
+  for (const Injected& fault : faults_)
+    if (fault.plan->step == step && fault.plan->rerun) world_->set_rerun_every(fault.plan->slot, 0);
+}
+
+void Run::go() {
+  description_ = description_of(plan_, scene_, options_);
+  world_ = options_.tier == Tier::kReal ? std::make_unique<Environment>(description_)
+                                        : std::make_unique<Environment>(description_, hosts_.starter());
+  CommitCount commits;
+  world_->set_commit_listener(&commits);
+  for (const PlannedFault& fault : plan_.faults) {
+    if (fault.means == Means::kSwapFaulty) order_swap(fault);
+    if (fault.means == Means::kOrder || fault.means == Means::kSwapFaulty)
+      world_->inject({fault.slot, fault.order, fault.step, fault.times});
+  }
+  for (std::uint32_t step = 1; step <= plan_.steps && !is_over_; ++step) {
+    begin(step);
+    const StepOutcome outcome = world_->step();
+    const std::uint32_t expected = outcome == StepOutcome::kCommitted ? step : step - 1;
+    if (world_->step_count() != expected || !commits.is(expected))
+      forbid(fmt::format("step {} was lost or made twice: {} are counted", step, world_->step_count()));
+    if (outcome == StepOutcome::kPaused) {
+      judge_pause(step);
+    } else if (!(world_->chain_hash() == scene_.chains[step]) && !has_other_plugin_) {
+      judge_divergence(step);
+    }
+    stop_rerun(step);
+  }
+  attribute_records();
+  judge_swaps();
+  write();
+}
+
+Run::Injected* Run::find(const FaultRecord& record) {
+  Injected* later = nullptr;
+  for (Injected& fault : faults_) {
+    if (!fault.happened || fault.plan->slot != record.fault.slot || fault.records.size() >= fault.plan->times) continue;
+    if (fault.plan->step == record.step) return &fault;
+    // one that is seen in the next call
+    if (fault.plan->step + 1 == record.step) later = &fault;
+  }
+  return later;
+}
+
+Run::Injected* Run::killed_standby(std::uint32_t step) {
+  for (Injected& fault : faults_) {
+    const bool kills = fault.plan->means == Means::kKillStandby || fault.plan->means == Means::kSwapKilled;
+    if (kills && fault.happened && fault.plan->step <= step && step <= fault.plan->step + 1) return &fault;
+  }
+  return nullptr;
+}
+
+void Run::judge_divergence(std::uint32_t step) {
+  for (const FaultRecord& record : world_->faults()) has_other_plugin_ |= record.recovered_by.starts_with("fallback");
+  if (has_other_plugin_) {
+    if (!is_finite(*world_)) forbid(fmt::format("the fallback's step {} is not finite", step));
+    return;
+  }
+  is_over_ = true;
+  for (Injected& fault : faults_) {
+    const bool may_be_wrong = fault.plan->duty == Duty::kWrong || fault.plan->duty == Duty::kInTolerance;
+    // what it changed may have slept in the warm start for a step
+    if (!fault.happened || !may_be_wrong || fault.plan->rerun) continue;
+    fault.outcome = fault.plan->duty == Duty::kWrong ? "not caught" : "needs re-run";
+    return;
+  }
+  for (Injected& fault : faults_)
+    if (fault.plan->step == step) fault.outcome = "forbidden";
+  forbid(fmt::format("step {} was committed with other bits than in the quiet run, and nobody said so", step));
+}
+
+// A pause is right after poison that no fallback takes over; what it leaves must go on as the quiet run does.
+void Run::judge_pause(std::uint32_t step) {
+  is_over_ = true;
+  const kernel::StageFault& last = world_->fault()->fault;
+  Injected* poison = nullptr;
+  for (Injected& fault : faults_)
+    if (fault.plan->duty == Duty::kPoison && fault.plan->step == step && fault.plan->slot == last.slot) poison = &fault;
+  if (poison == nullptr && last.kind == kernel::FaultKind::kDeath) poison = killed_standby(step);
+  // a fallback has one chance, which a failed start uses up
+  const bool had_fallback = plan_.has_fallbacks &&
+                            std::ranges::none_of(hosts_.failed_starts(), [&](const SimulatedHosts::FailedStart& start) {
+                              return start.slot == last.slot;
+                            });
+  if (poison == nullptr || had_fallback) {
+    for (Injected& fault : faults_)
+      if (fault.plan->step == step) fault.outcome = "forbidden";
+    forbid(
+        fmt::format("paused at step {} where it had to recover: slot {}: {}", step, slot_name(last.slot), last.text));
+    return;
+  }
+  poison->outcome = "Q";
+  kernel::EnvironmentDescription again = scene_.description;
+  again.steps = plan_.steps;
+  for (const Slot slot : kSlots) again.slot(slot).hosting = kernel::Hosting::kDirect;
+  Environment resumed(again);
+  const std::string problem = resumed.restore(world_->saved_state());
+  if (!problem.empty()) return forbid(fmt::format("the state of the pause cannot be resumed: {}", problem));
+  while (resumed.step_count() < plan_.steps && resumed.step() == StepOutcome::kCommitted) {
+  }
+  if (!(resumed.chain_hash() == scene_.chains[plan_.steps]))
+    forbid("what the pause left does not go on as the quiet run does");
+}
+
+void Run::attribute_records() {
+  std::uint32_t unprovoked = 0;
+  for (const FaultRecord& record : world_->faults()) {
+    const bool is_cold = record.recovered_by == "cold start" || record.recovered_by == "standby, still starting";
+    if (record.recovery_us > 0.0 && record.recovered_by == "standby") trial_.add_standby_us(record.recovery_us);
+    if (record.recovery_us > 0.0 && is_cold) trial_.add_cold_start_us(record.recovery_us);
+    if (Injected* fault = find(record); fault != nullptr) {
+      fault->records.push_back(record);
+    } else {
+      ++unprovoked;
+    }
+  }
+  trial_.set_unprovoked(unprovoked);
+}
+
+void Run::judge_swaps() {
+  for (const kernel::SwapRecord& swap : world_->swaps())
+    if (swap.pause_us > 0.0) trial_.add_swap_pause_us(swap.pause_us);
+}
+
+void Run::write() {
+  for (const Injected& fault : faults_) {
+    if (!fault.happened) continue;
+    v1::Fault* line = trial_.add_faults();
+    line->set_step(fault.plan->step);
+    line->set_slot(slot_name(fault.plan->slot));
+    line->set_order(fault.plan->means == Means::kSwapFaulty ? "a swap, " + fault.plan->order : fault.plan->order);
+    line->set_group(fault.plan->group);
+    line->set_times(fault.plan->times);
+    line->set_rerun(fault.plan->rerun);
+    std::string outcome = fault.outcome;
+    if (outcome.empty()) outcome = fault.records.empty() ? "M" : "B";
+    for (const FaultRecord& record : fault.records) {
+      line->set_detected_by(record.fault.detected_by);
+      line->set_recovered_by(record.recovered_by);
+      if (record.recovered_by.starts_with("fallback") && fault.outcome.empty()) outcome = "F";
+    }
+    if (outcome == "F" && fault.plan->duty != Duty::kPoison && killed_standby(fault.plan->step) == nullptr) {
+      outcome = "forbidden";
+      forbid(fmt::format("the fallback took over at step {} from {}, which had to be recovered", fault.plan->step,
+                         fault.plan->order));
+    }
+    line->set_outcome(outcome);
+  }
+  if (options_.tier == Tier::kReal) return;
+  for (const SimulatedHosts::FailedStart& start : hosts_.failed_starts()) {
+    v1::Fault* line = trial_.add_faults();
+    line->set_slot(slot_name(start.slot));
+    line->set_order(fmt::format("a start {}", start.how));
+    line->set_group("start");
+    line->set_times(1);
+    line->set_outcome("M");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> defence_names() {
+  std::vector<std::string> names;
+  for (const NamedDefence& one : kDefences) names.emplace_back(one.name);
+  return names;
+}
+
+kernel::Defences without_defence(const std::string& name) {
+  kernel::Defences defences;
+  for (const NamedDefence& one : kDefences) {
+    if (name != one.name) continue;
+    defences.*one.member = false;
+    return defences;
+  }
+  throw BadInput(fmt::format("--without {}: there is no such defence; {}", name, allowed_names(name, defence_names())));
+}
+
+v1::Trial run_trial(const TrialPlan& plan, const Scene& scene, const TrialOptions& options) {
+  // libraries and gRPC keep some of what the first trials open
+  constexpr std::uint32_t kWarmUp = 4;
+  constexpr std::size_t kSlack = 16;
+  static std::uint32_t trials = 0;
+  static std::size_t most_descriptors = 0;
+  v1::Trial trial = Run(plan, scene, options).make();
+  if (options.tier == Tier::kSimulated) return trial;
+  // the supervisor's thread lets go of a process a moment after its end
+  std::vector<std::string> leftovers = find_leftovers();
+  for (int tries = 0; !leftovers.empty() && tries < 200; ++tries) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    leftovers = find_leftovers();
+  }
+  for (std::string& left : leftovers) trial.add_forbidden(std::move(left));
+  const std::size_t descriptors = open_descriptors();
+  if (++trials <= kWarmUp) {
+    most_descriptors = std::max(most_descriptors, descriptors);
+  } else if (descriptors > most_descriptors + kSlack) {
+    trial.add_forbidden(
+        fmt::format("{} descriptors are open, {} were after the first trials", descriptors, most_descriptors));
+  }
+  return trial;
+}
+
+}  // namespace gravitas::campaign

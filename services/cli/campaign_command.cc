@@ -1,0 +1,182 @@
+// `gravitas campaign`.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "services/campaign/campaign.h"
+#include "services/campaign/endurance.h"
+#include "services/campaign/table.h"
+#include "services/cli/commands.h"
+#include "services/recorder/json.h"
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupt_requested = 0;
+
+void request_interrupt(int) { interrupt_requested = 1; }
+
+struct Arguments {
+  campaign::Options options;
+  std::string tier = "real", hosting = "both", shard = "1/1";
+  double endurance = 0.0;
+  std::optional<std::uint64_t> trial;
+  bool json = false, serve = false;
+};
+
+// I/K, 1 to K.
+void read_shard(Arguments* arguments) {
+  unsigned first = 0, all = 0;
+  char rest = 0;
+  const bool is_read = std::sscanf(arguments->shard.c_str(), "%u/%u%c", &first, &all, &rest) == 2;
+  if (!is_read || first < 1 || first > all)
+    throw BadInput(fmt::format("--shard {}: allowed: I/K with I from 1 to K, such as 2/8", arguments->shard));
+  arguments->options.shard = first;
+  arguments->options.shards = all;
+}
+
+// A line on a person's terminal, ten times a second.
+class ProgressLine {
+ public:
+  void show(const std::string& text) {
+    const auto now = std::chrono::steady_clock::now();
+    if (isatty(STDERR_FILENO) != 1 || now - last_ < std::chrono::milliseconds(100)) return;
+    last_ = now;
+    std::cerr << fmt::format("\r{:<78}", text) << std::flush;
+    is_shown_ = true;
+  }
+  ~ProgressLine() {
+    if (is_shown_) std::cerr << fmt::format("\r{:<78}\r", "");
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_{};
+  bool is_shown_ = false;
+};
+
+int endure(const Arguments& arguments) {
+  campaign::EnduranceResult result;
+  {
+    ProgressLine line;
+    result = campaign::endure(
+        arguments.options.scenes.empty() ? "" : arguments.options.scenes[0], arguments.endurance,
+        [] { return interrupt_requested != 0; },
+        [&](double seconds) { line.show(fmt::format("{:.0f} of {:.0f} s", seconds, arguments.endurance)); });
+  }
+  if (arguments.json) {
+    std::cout << fmt::format(
+        "{{\"steps\": {}, \"kills\": {}, \"failures\": {}, \"seconds\": {:.3f}, \"median_step_us\": {:.1f}, "
+        "\"p99_step_us\": {:.1f}, \"max_step_us\": {:.1f}, \"survived\": {}}}\n",
+        result.steps, result.kills, result.failures, result.seconds, result.median_step_us, result.p99_step_us,
+        result.max_step_us, result.problem.empty());
+  } else {
+    std::cout << fmt::format(
+        "{} steps at 1 kHz with {} kills ({} failed calls) in {:.1f} s; a step: median {:.0f} us, p99 {:.0f} us, "
+        "max {:.0f} us\n{}\n",
+        result.steps, result.kills, result.failures, result.seconds, result.median_step_us, result.p99_step_us,
+        result.max_step_us,
+        result.problem.empty() ? "the chain of hashes is that of the quiet run" : "failed: " + result.problem);
+  }
+  if (!result.problem.empty()) return kExaminedFailed;
+  return interrupt_requested != 0 ? kInterrupted : kDone;
+}
+
+int run_campaign(Arguments* arguments) {
+  campaign::Options& options = arguments->options;
+  options.draw.tier = arguments->tier == "real" ? campaign::Tier::kReal : campaign::Tier::kSimulated;
+  if (arguments->hosting == "shm" || options.draw.tier == campaign::Tier::kSimulated)
+    options.draw.hostings = {kernel::Hosting::kSharedMemory};
+  if (arguments->hosting == "grpc" && options.draw.tier == campaign::Tier::kReal)
+    options.draw.hostings = {kernel::Hosting::kGrpc};
+  read_shard(arguments);
+  if (arguments->serve) {
+    // Ctrl-C is for the parent, which lets its processes end their trials
+    std::signal(SIGINT, SIG_IGN);
+    return campaign::serve_trials(options);
+  }
+  std::signal(SIGINT, request_interrupt);
+  std::signal(SIGTERM, request_interrupt);
+  if (arguments->endurance > 0.0) return endure(*arguments);
+  if (arguments->trial) {
+    const campaign::v1::Trial trial = campaign::repeat_trial(options, *arguments->trial);
+    std::cout << to_json(trial, JsonForm::kPage);
+    return trial.forbidden().empty() ? kDone : kExaminedFailed;
+  }
+  campaign::v1::Table table;
+  {
+    ProgressLine line;
+    table = campaign::run(
+        options, [] { return interrupt_requested != 0; },
+        [&](const campaign::Progress& now) {
+          line.show(fmt::format("{} of {} faults, {:.0f} a second, {} forbidden", now.injected, now.wanted,
+                                static_cast<double>(now.injected) / now.seconds, now.forbidden));
+        });
+  }
+  std::cout << (arguments->json ? to_json(table, JsonForm::kPage) : campaign::table_text(table));
+  if (table.forbidden() > 0) return kExaminedFailed;
+  return interrupt_requested != 0 ? kInterrupted : kDone;
+}
+
+}  // namespace
+
+void add_campaign(CLI::App* app, Action* action) {
+  const auto arguments = std::make_shared<Arguments>();
+  campaign::Options& options = arguments->options;
+  CLI::App* command =
+      app->add_subcommand("campaign", "Inject faults into many short runs and judge each by the bits of the quiet run");
+  command->footer(
+      "Outcomes: M masked, B recovered bit for bit, F declared fallback, Q paused with a state that resumes; all else "
+      "is "
+      "forbidden. Exit code 0: nothing forbidden happened, 4: something did; a line names the command that shows it "
+      "again.\n"
+      "Example: gravitas campaign --faults 2000 --seed 1 --out campaign\n"
+      "         gravitas campaign --tier simulated --faults 1000000 --seed 1\n"
+      "         gravitas campaign --endurance 600");
+  command->add_option("SCENE", options.scenes,
+                      "Scene files, or built-in scenes: contacts, joints, all (all three if absent)");
+  command->add_option("--faults", options.faults, "How many, at least, over all shards")
+      ->check(CLI::Range(1ULL, 1'000'000'000'000ULL))
+      ->capture_default_str();
+  command->add_option("--seed", options.seed, "All that is drawn comes from it")->capture_default_str();
+  command->add_option("--shard", arguments->shard, "I/K: the I-th of K parts")->capture_default_str();
+  command
+      ->add_option("--tier", arguments->tier,
+                   "real: worker processes; simulated: one process, virtual time, the same plugins and checks")
+      ->check(CLI::IsMember({"real", "simulated"}))
+      ->capture_default_str();
+  command->add_option("--hosting", arguments->hosting, "Of the real tier: shm, grpc or both")
+      ->check(CLI::IsMember({"shm", "grpc", "both"}))
+      ->capture_default_str();
+  command->add_option("--out", options.out, "Folder for trials.jsonl, table.txt, table.json and index.html");
+  command->add_option("--per-trial", options.draw.faults_per_trial, "Faults in one run, at most")
+      ->check(CLI::Range(1U, 24U))
+      ->capture_default_str();
+  command->add_option("--jobs", options.jobs, "Processes that make trials; 0: one for each core")
+      ->capture_default_str();
+  command->add_option("--deadline", options.deadline, "Of a call in the trials, s")
+      ->check(CLI::Range(0.01, 100.0))
+      ->capture_default_str();
+  command->add_option("--patience", options.patience, "A trial that is silent for longer has hung, s")
+      ->check(CLI::Range(1.0, 1e6))
+      ->capture_default_str();
+  command->add_option(
+      "--without", options.without,
+      "Switch a defence off, to see the campaign fail: structure, numbers, replay, digest, epoch or deadline; "
+      "physics shows in the counts of what is not caught alone");
+  command->add_option("--trial", arguments->trial, "Only the trial with this seed, in this process; prints it");
+  command
+      ->add_option("--endurance", arguments->endurance,
+                   "Instead: 1 kHz for so many seconds, a kill in every slot every second, s")
+      ->check(CLI::Range(0.1, 1e6));
+  command->add_flag("--json", arguments->json, "Print JSON");
+  command->add_flag("--serve-trials", arguments->serve)->group("");
+  command->callback([=] { *action = [=] { return run_campaign(arguments.get()); }; });
+}
+
+}  // namespace gravitas::cli

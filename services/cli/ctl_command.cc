@@ -1,0 +1,185 @@
+// `gravitas ctl`: talks to the control API of `gravitas serve`.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+
+#include "services/cli/commands.h"
+#include "services/control/client.h"
+#include "services/control/server_socket.h"
+#include "services/control/status_text.h"
+#include "services/recorder/json.h"
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+namespace {
+
+namespace api = control_api::v1;
+using control::ControlClient;
+
+struct CommandLine {
+  std::string socket;
+  bool json = false, no_wait = false;
+  std::uint32_t steps = 1;
+  std::string text;  // what a swap, a setting or a fault is
+};
+
+using Order = std::function<int(const CommandLine&, ControlClient*)>;
+
+std::string socket_of(const CommandLine& line) {
+  if (!line.socket.empty()) return line.socket;
+  const std::vector<std::string> found = control::find_servers();
+  if (found.size() == 1) return found[0];
+  if (found.empty()) throw BadInput("gravitas ctl: no server is running; start one: gravitas serve SCENE --headless");
+  std::string text = "gravitas ctl: several servers are running; choose one:";
+  for (const std::string& path : found) text += "\n  --socket " + path;
+  throw BadInput(text);
+}
+
+int perform(const CommandLine& line, const Order& order) {
+  try {
+    ControlClient client(socket_of(line));
+    return order(line, &client);
+  } catch (const control::ControlError& error) {
+    using Kind = control::ControlError::Kind;
+    const char* advice = error.kind == Kind::kNoServer ? "; start one: gravitas serve SCENE --headless" : "";
+    std::cerr << "gravitas ctl: " << error.what() << advice << '\n';
+    return error.kind == Kind::kOther ? kOurFault : kBadInput;
+  }
+}
+
+void print_line(const CommandLine& line, const api::Status& status) {
+  std::cout << (line.json ? to_json(status, JsonForm::kPage) : control::status_line(status) + "\n");
+}
+
+int show_status(const CommandLine& line, ControlClient* client) {
+  const api::Status status = client->status();
+  std::cout << (line.json ? to_json(status, JsonForm::kPage) : control::status_page(status));
+  return kDone;
+}
+
+int make_steps(const CommandLine& line, ControlClient* client) {
+  const api::Status status = client->step(line.steps);
+  print_line(line, status);
+  if (status.state() != "faulted") return kDone;
+  std::cerr << "gravitas ctl: " << status.fault() << '\n';
+  return kPaused;
+}
+
+// Waits for the end of a swap, and says what became of it.
+int follow_swap(const CommandLine& line, ControlClient* client, const api::SwapOrdered& ordered) {
+  if (line.no_wait) {
+    if (line.json) {
+      std::cout << to_json(ordered, JsonForm::kPage);
+    } else {
+      std::cout << fmt::format("ordered: swap {}, before step {}\n", ordered.number(), ordered.step());
+    }
+    return kDone;
+  }
+  api::Status status;
+  const std::optional<api::ServedSwap> swap = control::wait_for_swap(client, ordered.number(), &status);
+  if (!swap) {
+    std::cerr << "gravitas ctl: the swap is not known any more: the run was reset, or has ended\n";
+    return kExaminedFailed;
+  }
+  std::cout << (line.json ? to_json(*swap, JsonForm::kPage) : control::swap_line(*swap) + "\n");
+  if (swap->outcome() == "refused" || swap->outcome() == "rolled back") return kExaminedFailed;
+  if (swap->outcome() == "committed" || status.state() == "running") return kDone;
+  std::cerr << fmt::format("gravitas ctl: the run is {} at step {}{}\n", status.state(), status.step(),
+                           status.state() == "paused" ? ": the swap goes on with the next steps" : "");
+  if (status.state() == "faulted") std::cerr << "gravitas ctl: " << status.fault() << '\n';
+  return status.state() == "faulted" ? kPaused : kDone;
+}
+
+int swap(const CommandLine& line, ControlClient* client) {
+  return follow_swap(line, client, client->swap(control::parse_swap_request(line.text)));
+}
+
+int set_property(const CommandLine& line, ControlClient* client) {
+  return follow_swap(line, client, client->set_property(control::parse_set_request(line.text)));
+}
+
+int inject(const CommandLine& line, ControlClient* client) {
+  const api::InjectOrdered ordered = client->inject(line.text);
+  if (line.json) {
+    std::cout << to_json(ordered, JsonForm::kPage);
+  } else {
+    std::cout << fmt::format("ordered: {} at step {}; gravitas ctl status shows what became of it\n", line.text,
+                             ordered.step());
+  }
+  return kDone;
+}
+
+// A page that is rewritten in place on a terminal, a line per second elsewhere.
+int watch(const CommandLine& line, ControlClient* client) {
+  const bool is_terminal = isatty(STDOUT_FILENO) == 1 && !line.json;
+  std::ptrdiff_t rows = 0;
+  client->watch(is_terminal ? 250 : 1000, [&](const api::Status& status) {
+    if (line.json) {
+      std::cout << to_json(status, JsonForm::kLine) << std::flush;
+    } else if (!is_terminal) {
+      std::cout << control::status_line(status) << std::endl;
+    } else {
+      const std::string page = control::status_page(status);
+      // up to the first row of the last page, and clear from there; long rows are cut, not wrapped
+      std::cout << "\x1b[?7l" << (rows > 0 ? fmt::format("\x1b[{}F", rows) : "") << "\x1b[J" << page << "\x1b[?7h"
+                << std::flush;
+      rows = std::ranges::count(page, '\n');
+    }
+    return std::cout.good();
+  });
+  std::cerr << "gravitas ctl: the server has ended\n";
+  return kDone;
+}
+
+}  // namespace
+
+void add_ctl(CLI::App* app, Action* action) {
+  const auto line = std::make_shared<CommandLine>();
+  CLI::App* ctl = app->add_subcommand("ctl", "Watch and control a run of `gravitas serve`");
+  ctl->require_subcommand(1);
+  ctl->footer("Example: gravitas ctl status");
+  ctl->add_option("--socket", line->socket, "Socket of the server; the one that is running if absent");
+  const auto add = [&](const char* name, const char* meaning, const char* example, Order order) {
+    CLI::App* command = ctl->add_subcommand(name, meaning);
+    command->footer(fmt::format("Example: gravitas ctl {}", example));
+    // options of ctl may stand behind the sub-command
+    command->fallthrough();
+    command->add_flag("--json", line->json, "Print JSON");
+    command->callback([=] { *action = [=] { return perform(*line, order); }; });
+    return command;
+  };
+  const auto then_line = [](api::Status (ControlClient::*call)()) {
+    return [call](const CommandLine& now, ControlClient* client) {
+      print_line(now, (client->*call)());
+      return kDone;
+    };
+  };
+  add("status", "Where the run is, who serves it, swaps and faults", "status --json", show_status);
+  add("pause", "Pause after the step that is being made", "pause", then_line(&ControlClient::pause));
+  add("resume", "Go on", "resume", then_line(&ControlClient::resume));
+  add("step", "Make steps of a paused run; Ctrl-C ends them", "step 10", make_steps)
+      ->add_option("N", line->steps, "Number of steps [1]");
+  add("reset", "Back to t = 0, with the plugins of the scene", "reset", then_line(&ControlClient::reset));
+  const auto add_order = [&](const char* name, const char* meaning, const char* example, Order order, const char* word,
+                             const char* form) {
+    CLI::App* command = add(name, meaning, example, std::move(order));
+    command->add_option(word, line->text, form)->required();
+    return command;
+  };
+  const char* no_wait = "Do not wait until it is committed, rolled back or refused";
+  add_order("swap", "Exchange a plugin while the run goes on; exit code 4 if it is refused or rolled back",
+            "swap solver=Sequential@step=500,hosting=grpc", swap, "SPEC",
+            "SLOT=PLUGIN[@step=N][,hosting=direct|shm|grpc]: before step N, or the next")
+      ->add_flag("--no-wait", line->no_wait, no_wait);
+  add_order("set", "Change a live property of a plugin", "set Solver.Iterations=50", set_property, "SPEC",
+            "Slot.Property=VALUE")
+      ->add_flag("--no-wait", line->no_wait, no_wait);
+  add_order("inject", "Have a worker commit a fault", "inject solver:kill", inject, "SPEC",
+            "SLOT:KIND[@step=N][,ARGUMENT=VALUE]...: at step N, or the next");
+  add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
+}
+
+}  // namespace gravitas::cli

@@ -1,0 +1,57 @@
+// The other side of the control API: calls to a served run.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "gravitas/control_api/v1/control_api.pb.h"
+
+namespace gravitas::control {
+
+namespace api = control_api::v1;
+
+class ControlError : public std::runtime_error {
+ public:
+  enum class Kind : std::uint32_t { kRefused, kNoServer, kOther };
+  ControlError(Kind what, const std::string& text) : std::runtime_error(text), kind(what) {}
+  Kind kind;
+};
+
+// All functions throw ControlError: kRefused with the server's reason, kNoServer if nobody answers on the socket.
+class ControlClient {
+ public:
+  explicit ControlClient(const std::string& socket);
+  ~ControlClient();
+  ControlClient(const ControlClient&) = delete;
+  ControlClient& operator=(const ControlClient&) = delete;
+
+  api::Status status();
+  api::Status pause();
+  api::Status resume();
+  api::Status step(std::uint32_t steps);
+  api::Status reset();
+  api::SwapOrdered swap(const api::SwapRequest& request);
+  api::SwapOrdered set_property(const api::SetPropertyRequest& request);
+  api::InjectOrdered inject(const std::string& fault);
+  // Until `show` returns false, or the server ends.
+  void watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show);
+
+ private:
+  struct Connection;
+  std::unique_ptr<Connection> connection_;
+};
+
+// Reads `SLOT=PLUGIN[@step=N][,hosting=MODE]`, a relative path of a library made absolute, and
+// `Slot.Property=VALUE`. Throw BadInput; names are for the server to judge.
+api::SwapRequest parse_swap_request(const std::string& text);
+api::SetPropertyRequest parse_set_request(const std::string& text);
+
+// Waits, while the run goes on, until the swap of that number is committed, rolled back or refused, and returns it as
+// it stands then. Nothing if it is not known any more.
+std::optional<api::ServedSwap> wait_for_swap(ControlClient* client, std::uint32_t number, api::Status* last);
+
+}  // namespace gravitas::control

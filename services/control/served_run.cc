@@ -1,0 +1,326 @@
+// How a served run steps, and what is done between its steps. What it tells about itself: served_run_status.cc.
+#include "services/control/served_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "plugin_sdk/near_miss.h"
+#include "plugin_sdk/property_value.h"
+#include "services/run/exchange_spec.h"
+#include "services/run/fault_spec.h"
+#include "services/scene/parser.h"
+
+namespace gravitas::control {
+namespace {
+
+// A run that is later than this gives up what it lost, instead of hurrying after it.
+constexpr std::chrono::milliseconds kLatest{250};
+constexpr std::chrono::milliseconds kRateWindow{500};
+
+double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
+
+kernel::EnvironmentDescription slots_of(const kernel::EnvironmentDescription& whole) {
+  kernel::EnvironmentDescription slots;
+  for (const Slot slot :
+       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+    slots.slot(slot) = whole.slot(slot);
+  return slots;
+}
+
+bool is_pending(kernel::SwapState state) {
+  return state == kernel::SwapState::kPreparing || state == kernel::SwapState::kShadow;
+}
+
+// Where the numbers of a property begin among the flattened ones, and how many they are.
+std::pair<std::size_t, std::size_t> place_of(const kernel::PluginChoice& plugin, const Property& wanted) {
+  std::size_t begin = 0;
+  for (const Property& property : plugin.declaration.properties) {
+    std::size_t size = property.flat_size();
+    if (property.kind == PropertyKind::kTable)
+      size += static_cast<std::size_t>(plugin.settings.at(begin)) * property.columns;
+    if (&property == &wanted) return {begin, size};
+    begin += size;
+  }
+  throw std::logic_error("a property of another plugin");
+}
+
+const Property* find_property(const kernel::PluginChoice& plugin, const std::string& name) {
+  const auto found = std::ranges::find(plugin.declaration.properties, name, &Property::name);
+  return found == plugin.declaration.properties.end() ? nullptr : &*found;
+}
+
+PropertyValue parse_value(const std::string& what, const std::string& text) {
+  try {
+    scene::Parser parser(text, 0, scene::Parser::Words::kBare);
+    PropertyValue value = parser.value(0);
+    if (parser.current().kind == scene::TokenKind::kEnd) return value;
+    throw BadInput(
+        fmt::format("{}: after the value comes {}; allowed: one value", what, scene::shown(parser.current())));
+  } catch (const scene::SyntaxError& error) {
+    throw BadInput(fmt::format("{}: {}", what, error.text));
+  }
+}
+
+}  // namespace
+
+ServedRun::ServedRun(const ServeOptions& options)
+    : speed_(options.speed), description_(load(options.run, &scene_warnings_, &catalog_)), timer_(loop_) {
+  for (const std::string& path : options.run.scenes) scene_ += (scene_.empty() ? "" : " ") + path;
+  begin_environment();
+  if (!options.is_paused && state_ == State::kPaused) go();
+  thread_ = std::jthread([this] {
+    const auto work = boost::asio::make_work_guard(loop_);
+    loop_.run();
+  });
+}
+
+ServedRun::~ServedRun() { loop_.stop(); }
+
+void ServedRun::begin_environment() {
+  // where the new one cannot be made the old one stays
+  environment_ = start(description_);
+  environment_->set_commit_listener(this);
+  active_ = slots_of(description_);
+  forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
+  orders_.clear();
+  warnings_ = scene_warnings_;
+  fault_.clear();
+  stand(environment_->total_steps() == 0 ? State::kFinished : State::kPaused);
+}
+
+// ---- the steps
+
+void ServedRun::go() {
+  state_ = State::kRunning;
+  anchor_ = rate_begin_ = Clock::now();
+  anchor_step_ = rate_step_ = environment_->step_count();
+  rate_ = 0.0;
+  schedule();
+}
+
+void ServedRun::stand(State state) {
+  state_ = state;
+  timer_.cancel();
+  if (!steps_left_) return;
+  steps_left_.reset();
+  step_order_.set_value();
+}
+
+ServedRun::Clock::time_point ServedRun::due() const {
+  const double steps = environment_->step_count() + 1 - anchor_step_;
+  return anchor_ + std::chrono::duration_cast<Clock::duration>(
+                       std::chrono::duration<double>(steps * environment_->time_step() / speed_));
+}
+
+void ServedRun::schedule() {
+  if (is_scheduled_) return;
+  is_scheduled_ = true;
+  // orders that wait in the loop come before the next step
+  if (speed_ == 0.0 || steps_left_) {
+    boost::asio::post(loop_, [this] { on_turn(); });
+  } else {
+    timer_.expires_at(due());
+    timer_.async_wait([this](const boost::system::error_code&) { on_turn(); });
+  }
+}
+
+void ServedRun::on_turn() {
+  is_scheduled_ = false;
+  if (state_ != State::kRunning) return;
+  const bool is_paced = speed_ > 0.0 && !steps_left_;
+  const Clock::time_point now = Clock::now();
+  // a timer that was cancelled comes early
+  if (!is_paced || now >= due()) make_step();
+  if (state_ != State::kRunning) return;
+  if (is_paced && now > due() + kLatest) {
+    anchor_ = now;
+    anchor_step_ = environment_->step_count();
+  }
+  schedule();
+}
+
+void ServedRun::make_step() {
+  try {
+    if (environment_->step() == kernel::StepOutcome::kPaused) {
+      const kernel::FaultRecord& record = *environment_->fault();
+      fault_ = fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(record.fault.slot),
+                           record.fault.plugin, record.fault.text, kernel::fault_kind_name(record.fault.kind));
+      return stand(State::kFaulted);
+    }
+  } catch (const std::exception& problem) {
+    fault_ = problem.what();
+    return stand(State::kFaulted);
+  }
+  const Clock::time_point now = Clock::now();
+  if (now - rate_begin_ >= kRateWindow) {
+    rate_ = (environment_->step_count() - rate_step_) / seconds(now - rate_begin_);
+    rate_begin_ = now;
+    rate_step_ = environment_->step_count();
+  }
+  if (environment_->step_count() >= environment_->total_steps()) return stand(State::kFinished);
+  if (steps_left_ && --*steps_left_ == 0) stand(State::kPaused);
+}
+
+// ---- orders
+
+void ServedRun::require_steps_left(const std::string& what) const {
+  if (state_ == State::kFinished) throw NotNow(what + ": the run has made its last step; reset begins it again");
+  if (state_ == State::kFaulted)
+    throw NotNow(what + ": the run stands by a fault (" + fault_ + "); reset begins it again");
+}
+
+// The step that is meant by `wanted`, 0 being the next.
+std::uint32_t ServedRun::next_step(const std::string& what, std::uint32_t wanted) const {
+  require_steps_left(what);
+  const std::uint32_t next = environment_->step_count() + 1;
+  if (wanted == 0) return next;
+  if (wanted < next || wanted > environment_->total_steps())
+    throw BadInput(fmt::format("{}: there is no step {} to come; allowed: {} (the next) to {}", what, wanted, next,
+                               environment_->total_steps()));
+  return wanted;
+}
+
+void ServedRun::pause() {
+  between_steps([this] {
+    if (state_ == State::kRunning) stand(State::kPaused);
+  });
+}
+
+void ServedRun::resume() {
+  between_steps([this] {
+    require_steps_left("resume");
+    if (state_ == State::kRunning && steps_left_) throw NotNow("resume: steps are being made; pause ends them");
+    if (state_ != State::kRunning) go();
+  });
+}
+
+void ServedRun::reset() {
+  between_steps([this] {
+    const bool goes_on = state_ == State::kRunning && !steps_left_;
+    begin_environment();
+    if (goes_on && state_ == State::kPaused) go();
+  });
+}
+
+std::future<void> ServedRun::step(std::uint32_t steps) {
+  return between_steps([this, steps] {
+    if (steps == 0) throw BadInput("step 0: allowed: a number of steps from 1");
+    require_steps_left("step");
+    if (state_ == State::kRunning) throw NotNow("step: the run goes on; pause it first");
+    step_order_ = {};
+    steps_left_ = steps;
+    go();
+    return step_order_.get_future();
+  });
+}
+
+api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
+  SwapSpec spec;
+  const std::string word = request.slot() + "=" + request.plugin();
+  spec.text = "swap " + word;
+  spec.slot = parse_slot("swap", word, request.slot());
+  spec.plugin = request.plugin();
+  if (spec.plugin.empty()) throw BadInput(spec.text + ": allowed: the name of a plugin, or the path of a library");
+  if (!request.hosting().empty()) spec.hosting = parse_hosting_mode("swap", word, request.hosting());
+  // the settings of the moment, else those of the scene
+  const kernel::EnvironmentDescription active = between_steps([this] { return active_; });
+  const bool is_active = std::ranges::any_of(active.slot(spec.slot).plugins, [&](const kernel::PluginChoice& one) {
+    return one.declaration.name == spec.plugin;
+  });
+  // a library is asked in a process, which the steps do not wait for; the copy keeps its name from staying known
+  Catalog catalog = catalog_;
+  kernel::SwapOrder found = resolve_swap(spec, is_active ? active : description_, &catalog);
+  return between_steps([&] {
+    found.step = next_step(spec.text, request.step());
+    return order(std::move(found));
+  });
+}
+
+api::SwapOrdered ServedRun::set_property(const api::SetPropertyRequest& request) {
+  const std::string word = request.slot() + "." + request.property() + "=" + request.value();
+  const std::string what = "set " + word;
+  std::string name = request.slot();
+  if (!name.empty()) name[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
+  const Slot slot = parse_slot("set", word, name);
+  const PropertyValue value = parse_value(what, request.value());
+  return between_steps([&] {
+    kernel::SwapOrder exchange;
+    exchange.slot = slot;
+    exchange.plugin = choice_with(what, slot, request.property(), environment_->swaps());
+    const Property& property = *find_property(exchange.plugin, request.property());
+    if (!property.is_live)
+      throw BadInput(what + ": it cannot be changed while the run goes on; start it with --set " + word);
+    std::vector<double> numbers;
+    std::vector<PropertyProblem> problems;
+    if (!flatten_value(property, value, &numbers, &problems)) throw BadInput(what + ": " + problems.at(0).text);
+    std::vector<double>& settings = exchange.plugin.settings;
+    const auto [begin, size] = place_of(exchange.plugin, property);
+    const auto place = settings.begin() + static_cast<std::ptrdiff_t>(begin);
+    settings.insert(settings.erase(place, place + static_cast<std::ptrdiff_t>(size)), numbers.begin(), numbers.end());
+    exchange.step = next_step(what, 0);
+    return order(std::move(exchange));
+  });
+}
+
+// The plugin of the slot that has the property: the one that is on its way, else the one that answers.
+const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot slot, const std::string& property,
+                                                   const std::vector<kernel::SwapRecord>& records) const {
+  for (std::size_t i = orders_.size(); i-- > 0;)
+    if (orders_[i].slot == slot && find_property(orders_[i].plugin, property) != nullptr &&
+        is_pending(record_of(orders_[i], records).state))
+      return orders_[i].plugin;
+  std::vector<std::string> names;
+  for (const kernel::PluginChoice& plugin : active_.slot(slot).plugins) {
+    if (find_property(plugin, property) != nullptr) return plugin;
+    for (const Property& other : plugin.declaration.properties) names.push_back(other.name);
+  }
+  throw BadInput(fmt::format("{}: no plugin of slot {} has a property '{}'; {}", what, slot_name(slot), property,
+                             allowed_names(property, names)));
+}
+
+const kernel::SwapRecord& ServedRun::record_of(const Order& order, const std::vector<kernel::SwapRecord>& records) {
+  std::uint32_t rank = 0;
+  for (const kernel::SwapRecord& record : records)
+    if (record.slot == order.slot && record.step == order.step && rank++ == order.rank) return record;
+  throw std::logic_error("a swap that was ordered is not known");
+}
+
+api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
+  Order kept{order.slot, order.step, 0, order.plugin};
+  for (const Order& other : orders_) kept.rank += other.slot == kept.slot && other.step == kept.step ? 1U : 0U;
+  try {
+    environment_->order_swap(std::move(order));
+  } catch (const std::invalid_argument& problem) {
+    throw BadInput(problem.what());
+  }
+  orders_.push_back(std::move(kept));
+  api::SwapOrdered ordered;
+  ordered.set_number(forgotten_orders_ + static_cast<std::uint32_t>(orders_.size()));
+  ordered.set_step(orders_.back().step);
+  return ordered;
+}
+
+api::InjectOrdered ServedRun::inject(const api::InjectRequest& request) {
+  return between_steps([&] {
+    const std::string what = "inject " + request.fault();
+    const bool has_step = request.fault().find('@') != std::string::npos;
+    kernel::FaultInjection fault = parse_fault(request.fault() + (has_step ? "" : "@step=1"));
+    fault.step = next_step(what, has_step ? fault.step : 0);
+    api::InjectOrdered ordered;
+    ordered.set_step(fault.step);
+    try {
+      environment_->inject(std::move(fault));
+    } catch (const std::invalid_argument& problem) {
+      throw BadInput(problem.what());
+    }
+    return ordered;
+  });
+}
+
+void ServedRun::on_decision(const kernel::Environment&, const kernel::Decision& decision) {
+  active_.slot(decision.slot).plugins.at(decision.target) = *decision.plugin;
+}
+
+}  // namespace gravitas::control

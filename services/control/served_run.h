@@ -1,0 +1,139 @@
+// A run that is controlled while it goes on: one thread makes the steps, paced by the wall clock, and carries out
+// orders between them. Functions may be called from any other thread; each waits for the step that is being made.
+//
+//   run = ServedRun(options)      starts the workers; paused if so asked, else it steps
+//   paused --resume--> running --pause--> paused --step(n)--> running --n steps--> paused
+//   running --last step--> finished, running --fault that nobody survives--> faulted, any --reset--> paused or running
+//
+// What can never be throws BadInput, what cannot be now NotNow; both say what is allowed.
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gravitas/control_api/v1/control_api.pb.h"
+#include "kernel/environment.h"
+#include "services/catalog/catalog.h"
+#include "services/run/session.h"
+
+namespace gravitas::control {
+
+namespace api = control_api::v1;
+
+struct ServeOptions {
+  RunOptions run;      // the scene and its overrides; what writes files has no meaning here
+  double speed = 1.0;  // simulated seconds per second of wall time; 0: as fast as possible
+  bool is_paused = false;
+};
+
+class NotNow : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class ServedRun final : private kernel::CommitListener {
+ public:
+  explicit ServedRun(const ServeOptions& options);
+  // Ends after the step that is being made.
+  ~ServedRun() override;
+  ServedRun(const ServedRun&) = delete;
+  ServedRun& operator=(const ServedRun&) = delete;
+
+  const std::string& scene() const { return scene_; }
+  // Of the reader, for whoever started it.
+  const std::vector<std::string>& scene_warnings() const { return scene_warnings_; }
+
+  api::Status status();
+  void pause();
+  void resume();
+  void reset();
+  // Begins so many steps. The future is ready when they are made, or the run stands for another reason.
+  std::future<void> step(std::uint32_t steps);
+
+  api::SwapOrdered swap(const api::SwapRequest& request);
+  api::SwapOrdered set_property(const api::SetPropertyRequest& request);
+  api::InjectOrdered inject(const api::InjectRequest& request);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  enum class State : std::uint32_t { kRunning, kPaused, kFinished, kFaulted };
+  // A swap, and what to find its record by: the rank among the slot's swaps at that step.
+  struct Order {
+    Slot slot;
+    std::uint32_t step, rank;
+    kernel::PluginChoice plugin;
+  };
+
+  // Has the stepping thread do it between two steps, and waits.
+  template <typename Action>
+  auto between_steps(Action action) {
+    std::packaged_task<decltype(action())()> task(std::move(action));
+    auto done = task.get_future();
+    boost::asio::post(loop_, std::move(task));
+    return done.get();
+  }
+
+  // All of these in the stepping thread.
+  void begin_environment();
+  void go();
+  void stand(State state);
+  void schedule();
+  void on_turn();
+  void make_step();
+  Clock::time_point due() const;
+  void require_steps_left(const std::string& what) const;
+  std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
+  api::SwapOrdered order(kernel::SwapOrder order);
+  const kernel::PluginChoice& choice_with(const std::string& what, Slot slot, const std::string& property,
+                                          const std::vector<kernel::SwapRecord>& records) const;
+  // Precondition: of this order, among records of all swaps.
+  static const kernel::SwapRecord& record_of(const Order& order, const std::vector<kernel::SwapRecord>& records);
+  void collect_warnings();
+  void write_plan(api::Plan* plan) const;
+  void write_swaps(api::Status* status) const;
+  std::string state_name() const;
+
+  void on_commit(const kernel::Environment&) override {}
+  void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
+
+  std::string scene_;
+  double speed_;
+  std::vector<std::string> scene_warnings_;
+  Catalog catalog_;  // never changes, so any thread may read it
+  const kernel::EnvironmentDescription description_;
+  kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
+
+  std::unique_ptr<kernel::Environment> environment_;
+  State state_ = State::kPaused;
+  std::string fault_;
+  std::vector<Order> orders_;
+  std::uint32_t forgotten_orders_ = 0;  // of before the last reset: numbers go on
+  std::vector<std::string> warnings_;   // different ones
+  Clock::time_point next_collection_;
+
+  std::optional<std::uint32_t> steps_left_;  // of a step order
+  std::promise<void> step_order_;
+  Clock::time_point anchor_, rate_begin_;  // where pacing began, where counting did
+  std::uint32_t anchor_step_ = 0, rate_step_ = 0;
+  double rate_ = 0.0;  // 1/s
+
+  boost::asio::io_context loop_;
+  boost::asio::steady_timer timer_;
+  bool is_scheduled_ = false;
+  std::jthread thread_;
+};
+
+// A plugin's settings as a scene would write them.
+std::vector<api::Setting> setting_messages(const kernel::PluginChoice& plugin);
+
+}  // namespace gravitas::control

@@ -1,0 +1,144 @@
+// What a served run tells about itself.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/property_value.h"
+#include "services/control/served_run.h"
+#include "services/run/report.h"
+
+namespace gravitas::control {
+namespace {
+
+// Swaps, faults and different warnings that are kept for a status.
+constexpr std::size_t kMostShown = 32, kMostWarnings = 1000;
+constexpr std::chrono::seconds kCollection{5};
+
+std::string value_text(const Property& property, std::span<const double> numbers) {
+  if (property.kind == PropertyKind::kTable) return fmt::format("{} rows", numbers[0]);
+  if (std::isnan(numbers[0])) return "absent";
+  if (property.kind == PropertyKind::kFlag) return numbers[0] != 0.0 ? "true" : "false";
+  if (property.kind == PropertyKind::kChoice) return property.choices.at(static_cast<std::size_t>(numbers[0]));
+  if (numbers.size() == 1) return number_text(numbers[0]);
+  std::string text;
+  for (const double number : numbers) text += (text.empty() ? "{" : ", ") + number_text(number);
+  return text + "}";
+}
+
+// Of a list that may grow for ever.
+template <typename Rows>
+void keep_last(Rows* rows) {
+  const int surplus = std::max(0, rows->size() - static_cast<int>(kMostShown));
+  rows->DeleteSubrange(0, surplus);
+}
+
+}  // namespace
+
+std::vector<api::Setting> setting_messages(const kernel::PluginChoice& plugin) {
+  std::vector<api::Setting> settings;
+  std::span<const double> rest = plugin.settings;
+  for (const Property& property : plugin.declaration.properties) {
+    std::size_t size = property.flat_size();
+    if (property.kind == PropertyKind::kTable && !rest.empty())
+      size += static_cast<std::size_t>(rest[0]) * property.columns;
+    if (size > rest.size()) break;
+    api::Setting& setting = settings.emplace_back();
+    setting.set_name(property.name);
+    setting.set_value(value_text(property, rest.first(size)));
+    rest = rest.subspan(size);
+  }
+  return settings;
+}
+
+std::string ServedRun::state_name() const {
+  switch (state_) {
+    case State::kRunning:
+      return "running";
+    case State::kPaused:
+      return "paused";
+    case State::kFinished:
+      return "finished";
+    case State::kFaulted:
+      break;
+  }
+  return "faulted";
+}
+
+api::Status ServedRun::status() {
+  return between_steps([this] {
+    api::Status status;
+    status.set_scene(scene_);
+    status.set_state(state_name());
+    status.set_fault(fault_);
+    status.set_time(environment_->time());
+    status.set_time_step(environment_->time_step());
+    status.set_step(environment_->step_count());
+    status.set_total_steps(environment_->total_steps());
+    const double counted = std::chrono::duration<double>(Clock::now() - rate_begin_).count();
+    const double rate = rate_ > 0.0 ? rate_ : (environment_->step_count() - rate_step_) / std::max(counted, 1e-6);
+    status.set_steps_per_second(state_ == State::kRunning ? rate : 0.0);
+    status.set_speed(speed_);
+    status.set_state_hash(environment_->state_hash().text());
+    status.set_chain_hash(environment_->chain_hash().text());
+    write_plan(status.mutable_plan());
+    write_swaps(&status);
+    report::v1::Report report;
+    write_faults(*environment_, &report);
+    status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
+    status.mutable_faults()->Swap(report.mutable_faults());
+    keep_last(status.mutable_faults());
+    collect_warnings();
+    status.set_warning_count(static_cast<std::uint32_t>(warnings_.size()));
+    if (!warnings_.empty()) status.set_last_warning(warnings_.back());
+    return status;
+  });
+}
+
+void ServedRun::write_plan(api::Plan* plan) const {
+  const report::v1::Plan planned = plan_message(*environment_);
+  for (const report::v1::PlannedSlot& one : planned.slots()) {
+    api::PlannedSlot* slot = plan->add_slots();
+    slot->set_slot(one.slot());
+    slot->set_plugin(one.plugin());
+    slot->set_hosting(one.hosting());
+    slot->set_pid(one.pid());
+    for (const Slot which :
+         {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+      for (const kernel::PluginChoice& plugin : active_.slot(which).plugins)
+        if (one.slot() == slot_name(which) && one.plugin() == plugin.declaration.name && slot->settings_size() == 0)
+          for (api::Setting& setting : setting_messages(plugin)) *slot->add_settings() = std::move(setting);
+  }
+  *plan->mutable_left_out() = planned.left_out();
+}
+
+void ServedRun::write_swaps(api::Status* status) const {
+  const std::vector<kernel::SwapRecord> records = environment_->swaps();
+  for (std::size_t i = 0; i < orders_.size(); ++i) {
+    const kernel::SwapRecord& record = record_of(orders_[i], records);
+    api::ServedSwap* swap = status->add_swaps();
+    swap->set_number(forgotten_orders_ + static_cast<std::uint32_t>(i) + 1);
+    swap->set_slot(slot_name(record.slot));
+    swap->set_step(record.step);
+    swap->set_from(record.from);
+    swap->set_to(record.to);
+    swap->set_outcome(kernel::swap_state_name(record.state));
+    swap->set_reason(record.reason);
+    swap->set_pause_us(record.pause_us);
+    swap->set_wait_us(record.wait_us);
+  }
+  status->set_swap_count(static_cast<std::uint32_t>(orders_.size()));
+  keep_last(status->mutable_swaps());
+}
+
+// Now and then: what is counted over a while is one line then.
+void ServedRun::collect_warnings() {
+  const Clock::time_point now = Clock::now();
+  if (now < next_collection_) return;
+  next_collection_ = now + kCollection;
+  for (std::string& line : environment_->warnings())
+    if (warnings_.size() < kMostWarnings && std::ranges::find(warnings_, line) == warnings_.end())
+      warnings_.push_back(std::move(line));
+}
+
+}  // namespace gravitas::control

@@ -1,0 +1,118 @@
+#include "services/control/server.h"
+
+#include <fmt/format.h>
+#include <grpcpp/grpcpp.h>
+#include <sys/stat.h>
+
+#include <stdexcept>
+
+#include "gravitas/control_api/v1/control_api.grpc.pb.h"
+
+namespace gravitas::control {
+namespace {
+
+// How soon a call that waits notices that it was cancelled.
+constexpr std::chrono::milliseconds kGlance{20};
+
+template <typename Action>
+grpc::Status answered(Action&& action) {
+  try {
+    action();
+    return grpc::Status::OK;
+  } catch (const BadInput& problem) {
+    return {grpc::StatusCode::INVALID_ARGUMENT, problem.what()};
+  } catch (const NotNow& problem) {
+    return {grpc::StatusCode::FAILED_PRECONDITION, problem.what()};
+  } catch (const std::exception& problem) {
+    return {grpc::StatusCode::INTERNAL, problem.what()};
+  }
+}
+
+}  // namespace
+
+class ControlServer::Service final : public api::Control::Service {
+ public:
+  Service(ServedRun* run, const std::string& socket) : run_(*run) {
+    grpc::ServerBuilder builder;
+    int bound = 0;
+    builder.AddListeningPort("unix:" + socket, grpc::InsecureServerCredentials(), &bound);
+    builder.RegisterService(this);
+    // nobody else may connect, wherever --socket puts it
+    const mode_t before = umask(0177);
+    server_ = builder.BuildAndStart();
+    umask(before);
+    if (server_ == nullptr || bound == 0) throw std::runtime_error(fmt::format("cannot listen on {}", socket));
+  }
+
+  void end() {
+    server_->Shutdown(std::chrono::system_clock::now());
+    server_->Wait();
+  }
+
+  grpc::Status GetStatus(grpc::ServerContext*, const api::StatusRequest*, api::Status* reply) override {
+    return answered([&] { *reply = run_.status(); });
+  }
+  grpc::Status Pause(grpc::ServerContext*, const api::PauseRequest*, api::Status* reply) override {
+    return then_status([&] { run_.pause(); }, reply);
+  }
+  grpc::Status Resume(grpc::ServerContext*, const api::ResumeRequest*, api::Status* reply) override {
+    return then_status([&] { run_.resume(); }, reply);
+  }
+  grpc::Status Reset(grpc::ServerContext*, const api::ResetRequest*, api::Status* reply) override {
+    return then_status([&] { run_.reset(); }, reply);
+  }
+  grpc::Status Step(grpc::ServerContext* context, const api::StepRequest* request, api::Status* reply) override {
+    return then_status(
+        [&] {
+          const std::future<void> made = run_.step(request->steps());
+          while (made.wait_for(kGlance) == std::future_status::timeout)
+            if (context->IsCancelled()) run_.pause();
+        },
+        reply);
+  }
+  grpc::Status Swap(grpc::ServerContext*, const api::SwapRequest* request, api::SwapOrdered* reply) override {
+    return answered([&] { *reply = run_.swap(*request); });
+  }
+  grpc::Status SetProperty(grpc::ServerContext*, const api::SetPropertyRequest* request,
+                           api::SwapOrdered* reply) override {
+    return answered([&] { *reply = run_.set_property(*request); });
+  }
+  grpc::Status Inject(grpc::ServerContext*, const api::InjectRequest* request, api::InjectOrdered* reply) override {
+    return answered([&] { *reply = run_.inject(*request); });
+  }
+  grpc::Status Watch(grpc::ServerContext* context, const api::WatchRequest* request,
+                     grpc::ServerWriter<api::Status>* writer) override {
+    return answered([&] {
+      const std::uint32_t wanted = request->interval_ms() == 0 ? 1000 : request->interval_ms();
+      if (wanted < 10 || wanted > 60000)
+        throw BadInput(fmt::format("watch: an interval of {} ms; allowed: 10 to 60000, 0 for 1000", wanted));
+      for (bool goes_on = true; goes_on && writer->Write(run_.status());) {
+        const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(wanted);
+        while (goes_on && std::chrono::steady_clock::now() < end) {
+          std::this_thread::sleep_for(std::min<std::chrono::steady_clock::duration>(
+              kGlance, std::max(end - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration::zero())));
+          goes_on = !context->IsCancelled();
+        }
+      }
+    });
+  }
+
+ private:
+  template <typename Action>
+  grpc::Status then_status(Action&& action, api::Status* reply) {
+    return answered([&] {
+      action();
+      *reply = run_.status();
+    });
+  }
+
+  ServedRun& run_;
+  std::unique_ptr<grpc::Server> server_;
+};
+
+ControlServer::ControlServer(ServedRun* run, const std::string& socket)
+    : service_(std::make_unique<Service>(run, socket)) {}
+
+ControlServer::~ControlServer() { service_->end(); }
+
+}  // namespace gravitas::control

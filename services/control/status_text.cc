@@ -1,0 +1,73 @@
+#include "services/control/status_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace gravitas::control {
+namespace {
+
+namespace api = control_api::v1;
+
+// Swaps and faults that a page shows.
+constexpr int kMostShown = 5;
+
+std::string duration_text(double microseconds) {
+  return microseconds < 1000.0 ? fmt::format("{:.1f} us", microseconds) : fmt::format("{:.1f} ms", 1e-3 * microseconds);
+}
+
+std::string plan_table(const api::Plan& plan) {
+  std::string text = fmt::format("{:<12} {:<20} {:<8} {:<8} {}\n", "slot", "plugin", "hosting", "pid", "settings");
+  for (const api::PlannedSlot& slot : plan.slots()) {
+    std::string settings;
+    for (const api::Setting& one : slot.settings())
+      settings += fmt::format("{}{}={}", settings.empty() ? "" : " ", one.name(), one.value());
+    text +=
+        fmt::format("{:<12} {:<20} {:<8} {:<8} {}\n", slot.slot(), slot.plugin(), slot.hosting(), slot.pid(), settings);
+  }
+  for (const report::v1::LeftOut& out : plan.left_out())
+    text += fmt::format("{:<12} left out: {}\n", out.what(), out.why());
+  return text;
+}
+
+}  // namespace
+
+std::string status_line(const api::Status& status) {
+  const bool is_running = status.state() == "running";
+  return fmt::format("step {} of {}, t = {:.6g} of {:.6g} s, {}{}", status.step(), status.total_steps(), status.time(),
+                     status.time_step() * status.total_steps(), status.state(),
+                     is_running ? fmt::format(", {:.0f} steps/s", status.steps_per_second()) : "");
+}
+
+std::string swap_line(const api::ServedSwap& swap) {
+  std::string text =
+      fmt::format("{}: {} {} -> {}, before step {}", swap.outcome(), swap.slot(), swap.from(), swap.to(), swap.step());
+  if (swap.pause_us() > 0.0)
+    text += fmt::format("; pause {}, wait {}", duration_text(swap.pause_us()), duration_text(swap.wait_us()));
+  return text + (swap.reason().empty() ? "" : "; " + swap.reason());
+}
+
+std::string status_page(const api::Status& status) {
+  const std::string speed = status.speed() == 0.0 ? "as fast as possible" : fmt::format("speed {:g}", status.speed());
+  std::string text = fmt::format("{}, {}\n  {}\n", status.scene(), speed, status_line(status));
+  if (!status.fault().empty()) text += fmt::format("  fault: {}\n", status.fault());
+  text += fmt::format("  state hash {}\n  chain hash {}\n", status.state_hash(), status.chain_hash());
+  text += plan_table(status.plan());
+  const auto heading = [&](const char* what, std::uint32_t count) {
+    if (count > 0) text += fmt::format("{}: {}{}\n", what, count, count > kMostShown ? ", the last ones" : "");
+  };
+  heading("swaps", status.swap_count());
+  for (int i = std::max(0, status.swaps_size() - kMostShown); i < status.swaps_size(); ++i)
+    text += fmt::format("  {}\n", swap_line(status.swaps(i)));
+  heading("faults", status.fault_count());
+  for (int i = std::max(0, status.faults_size() - kMostShown); i < status.faults_size(); ++i) {
+    const report::v1::FaultRecord& fault = status.faults(i);
+    text += fmt::format("  step {}, {} {}: {}; {}, {}\n", fault.step(), fault.slot(), fault.plugin(), fault.kind(),
+                        fault.recovered_by(), duration_text(fault.recovery_us()));
+  }
+  if (status.warning_count() > 0)
+    text += fmt::format("warnings: {}, the last: {}\n", status.warning_count(), status.last_warning());
+  return text;
+}
+
+}  // namespace gravitas::control

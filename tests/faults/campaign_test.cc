@@ -1,0 +1,185 @@
+// The fault campaign, in short: over both process carriers, in virtual time, and with each defence off, which it has to
+// notice.
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "gravitas/campaign/v1/campaign.pb.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using campaign::v1::Table;
+using campaign::v1::Trial;
+using ::testing::HasSubstr;
+using testing::ProgramResult;
+using testing::read_file;
+using testing::run_program;
+using testing::ScratchFolder;
+
+struct Outcome {
+  ProgramResult program;
+  Table table;
+};
+
+Outcome campaign_of(std::vector<std::string> words, const ScratchFolder& folder) {
+  words.insert(words.begin(), {"campaign", "--json"});
+  Outcome outcome{run_program(words, folder), {}};
+  const auto status = google::protobuf::util::JsonStringToMessage(outcome.program.out, &outcome.table);
+  EXPECT_TRUE(status.ok()) << outcome.program.out << outcome.program.err;
+  return outcome;
+}
+
+std::string failures(const Table& table) {
+  std::string text;
+  for (const std::string& one : table.failures()) text += one + "\n";
+  return text;
+}
+
+const campaign::v1::Row* find_row(const Table& table, const std::string& group) {
+  for (const campaign::v1::Row& row : table.rows())
+    if (row.group() == group) return &row;
+  return nullptr;
+}
+
+// Real worker processes: part N of 4, 500 faults each.
+class RealFaults : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Part, RealFaults, ::testing::Range(1, 5));
+
+TEST_P(RealFaults, AreSurvivedBitForBit) {
+  const ScratchFolder folder;
+  const Outcome outcome =
+      campaign_of({"--faults", "2000", "--seed", "2026", "--shard", std::to_string(GetParam()) + "/4", "--per-trial",
+                   "20", "--jobs", "2", "--deadline", "0.5"},
+                  folder);
+  EXPECT_EQ(outcome.program.exit_code, 0) << outcome.program.err << failures(outcome.table);
+  EXPECT_GE(outcome.table.injected(), 500U);
+  EXPECT_GT(outcome.table.manifested(), outcome.table.injected() / 2);
+  EXPECT_GT(outcome.table.standby().count(), 0U);
+}
+
+TEST(SimulatedFaults, AreSurvivedBitForBit) {
+  const ScratchFolder folder;
+  const Outcome outcome = campaign_of({"--tier", "simulated", "--faults", "20000", "--seed", "2026"}, folder);
+  EXPECT_EQ(outcome.program.exit_code, 0) << outcome.program.err << failures(outcome.table);
+  EXPECT_GE(outcome.table.injected(), 20000U);
+  EXPECT_EQ(outcome.table.forbidden(), 0U);
+  EXPECT_LT(outcome.table.forbidden_bound(), 3e-4);
+  for (const char* group : {"process", "hang", "wire", "values", "re-run", "start", "poison", "swap"}) {
+    const campaign::v1::Row* row = find_row(outcome.table, group);
+    ASSERT_NE(row, nullptr) << group;
+    EXPECT_GT(row->injected(), 50U) << group;
+  }
+}
+
+// All that a trial does comes from its seed.
+TEST(SimulatedFaults, AreTheSameAgain) {
+  const ScratchFolder folder;
+  const std::vector<std::string> words = {"campaign", "--tier", "simulated", "--trial", "12345"};
+  const ProgramResult first = run_program(words, folder), second = run_program(words, folder);
+  EXPECT_EQ(first.exit_code, 0) << first.err;
+  Trial trials[2];
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(first.out, &trials[0]).ok());
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(second.out, &trials[1]).ok());
+  ASSERT_GT(trials[0].faults_size(), 0);
+  for (Trial& trial : trials) {
+    // times, and whether a standby was ready yet, are the machine's
+    trial.clear_standby_us();
+    trial.clear_cold_start_us();
+    trial.clear_swap_pause_us();
+    for (campaign::v1::Fault& fault : *trial.mutable_faults()) fault.clear_recovered_by();
+  }
+  EXPECT_EQ(trials[0].SerializeAsString(), trials[1].SerializeAsString());
+}
+
+// A campaign that cannot fail would prove nothing.
+class WithoutADefence : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Of, WithoutADefence,
+                         ::testing::Values("structure", "numbers", "replay", "digest", "epoch", "deadline"),
+                         [](const auto& one) { return std::string(one.param); });
+
+TEST_P(WithoutADefence, TheCampaignFails) {
+  const ScratchFolder folder;
+  const Outcome outcome = campaign_of(
+      {"--tier", "simulated", "--faults", "1000", "--seed", "7", "--patience", "2", "--without", GetParam()}, folder);
+  EXPECT_EQ(outcome.program.exit_code, 4) << outcome.program.err;
+  EXPECT_GT(outcome.table.forbidden(), 0U);
+  ASSERT_GT(outcome.table.failures_size(), 0);
+  EXPECT_THAT(outcome.table.failures(0), HasSubstr(std::string("--without ") + GetParam() + " --trial "));
+}
+
+// The switches reach the real carrier, too.
+class WithoutADefenceOfSharedMemory : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Of, WithoutADefenceOfSharedMemory, ::testing::Values("numbers", "replay"),
+                         [](const auto& one) { return std::string(one.param); });
+
+TEST_P(WithoutADefenceOfSharedMemory, TheCampaignFails) {
+  const ScratchFolder folder;
+  const Outcome outcome = campaign_of(
+      {"--hosting", "shm", "--faults", "400", "--seed", "7", "--jobs", "2", "--without", GetParam()}, folder);
+  EXPECT_EQ(outcome.program.exit_code, 4) << outcome.program.err;
+  EXPECT_GT(outcome.table.forbidden(), 0U);
+}
+
+TEST(CampaignFiles, TellTheSameStory) {
+  const ScratchFolder folder;
+  const std::string out = folder.path("out");
+  const Outcome outcome = campaign_of({"--faults", "40", "--seed", "3", "--hosting", "shm", "--out", out}, folder);
+  EXPECT_EQ(outcome.program.exit_code, 0) << outcome.program.err << failures(outcome.table);
+  std::uint64_t trials = 0, injected = 0;
+  std::istringstream log(read_file(out + "/trials.jsonl"));
+  for (std::string line; std::getline(log, line); ++trials) {
+    Trial trial;
+    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &trial).ok()) << line;
+    EXPECT_NE(trial.seed(), 0U);
+    EXPECT_EQ(trial.carrier(), "shm");
+    injected += static_cast<std::uint64_t>(trial.faults_size());
+    for (const campaign::v1::Fault& fault : trial.faults()) {
+      EXPECT_FALSE(fault.outcome().empty());
+      EXPECT_FALSE(fault.group().empty());
+    }
+  }
+  EXPECT_EQ(trials, outcome.table.trials());
+  EXPECT_EQ(injected, outcome.table.injected());
+  Table table;
+  EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(read_file(out + "/table.json"), &table).ok());
+  EXPECT_EQ(table.SerializeAsString(), outcome.table.SerializeAsString());
+  EXPECT_THAT(read_file(out + "/table.txt"), HasSubstr("nothing forbidden happened"));
+  const std::string page = read_file(out + "/index.html");
+  EXPECT_THAT(page, HasSubstr("<svg"));
+  EXPECT_THAT(page, HasSubstr("</html>"));
+  // needs nothing else
+  EXPECT_EQ(page.find("http"), std::string::npos);
+  EXPECT_EQ(page.find("<script"), std::string::npos);
+}
+
+TEST(CampaignInput, IsCheckedFirst) {
+  const ScratchFolder folder;
+  const auto refusal = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "campaign");
+    const ProgramResult result = run_program(words, folder);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    return result.err;
+  };
+  EXPECT_THAT(refusal({"--without", "digst"}), HasSubstr("digest"));
+  EXPECT_THAT(refusal({"nowhere"}), HasSubstr("there is no scene 'nowhere'"));
+  EXPECT_THAT(refusal({"--shard", "3/2"}), HasSubstr("I from 1 to K"));
+  EXPECT_THAT(refusal({"--tier", "unreal"}), HasSubstr("unreal"));
+}
+
+TEST(Endurance, ThreeSecondsAtOneKilohertzWithAKillInEverySlotEverySecond) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program({"campaign", "--endurance", "3"}, folder);
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("3000 steps at 1 kHz with 18 kills"));
+  EXPECT_THAT(result.out, HasSubstr("the chain of hashes is that of the quiet run"));
+}
+
+}  // namespace
+}  // namespace gravitas

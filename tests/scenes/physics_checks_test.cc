@@ -1,0 +1,76 @@
+// No honest answer is taken for a wrong one: every scene, with every shipped method, the physics of each step checked.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "services/run/session.h"
+
+namespace gravitas {
+namespace {
+
+// Steps of one run: of the large scenes the fall and the first heap.
+constexpr std::uint32_t kMostSteps = 600, kMostStepsOfLarge = 150;
+
+std::vector<std::string> scenes() {
+  std::vector<std::string> paths;
+  for (const char* folder : {"/deploy/scenes", "/tests/determinism", "/tests/scenes"})
+    for (const auto& entry : std::filesystem::directory_iterator(std::string(GRAVITAS_SOURCE_DIR) + folder))
+      if (entry.path().extension() == ".gravitas") paths.push_back(entry.path());
+  std::ranges::sort(paths);
+  return paths;
+}
+
+struct Methods {
+  const char* name;
+  std::vector<std::string> overrides;
+};
+
+const Methods kMethods[] = {
+    {"Euler", {"Integrator=Euler"}},
+    {"SemiImplicitEuler", {"Integrator=SemiImplicitEuler"}},
+    {"EulerOneSweep", {"Integrator=Euler", "Solver.Iterations=1"}},
+    {"OneSweep", {"Integrator=SemiImplicitEuler", "Solver.Iterations=1"}},
+    {"HalfCorrected", {"Integrator=SemiImplicitEuler", "Solver.CorrectionFactor=0.5"}},
+    {"Grid", {"Space=Grid"}},
+    {"LongSteps", {"Simulator.TimeStep=0.05"}},
+};
+
+class HonestAnswers : public ::testing::TestWithParam<Methods> {};
+
+INSTANTIATE_TEST_SUITE_P(Of, HonestAnswers, ::testing::ValuesIn(kMethods),
+                         [](const auto& one) { return std::string(one.param.name); });
+
+TEST_P(HonestAnswers, PassTheChecksOfTheirPhysicsInEveryStep) {
+  ASSERT_GE(scenes().size(), 20U);
+  for (const std::string& scene : scenes()) {
+    SCOPED_TRACE(scene);
+    RunOptions options;
+    options.scenes = {scene};
+    options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+    options.overrides = GetParam().overrides;
+    options.overrides.push_back("Simulator.CheckPhysicsEvery=1");
+    std::vector<std::string> warnings;
+    kernel::EnvironmentDescription description;
+    try {
+      description = load(options, &warnings);
+    } catch (const BadInput&) {
+      // a scene without the part that is overridden
+      options.overrides = {"Simulator.CheckPhysicsEvery=1"};
+      description = load(options, &warnings);
+    }
+    ASSERT_EQ(description.check_physics_every, 1U);
+    const auto environment = start(description);
+    const std::uint32_t most = description.bodies.size() > 300 ? kMostStepsOfLarge : kMostSteps;
+    while (environment->step_count() < std::min(most, environment->total_steps())) {
+      if (environment->step() == kernel::StepOutcome::kCommitted) continue;
+      ADD_FAILURE() << "step " << environment->fault()->step << ": " << environment->fault()->fault.text;
+      break;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace gravitas

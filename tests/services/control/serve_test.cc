@@ -1,0 +1,181 @@
+// The real programs: `gravitas serve` beside `gravitas ctl`.
+#include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gravitas/control_api/v1/control_api.pb.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ProgramResult;
+using testing::read_file;
+using testing::ScratchFolder;
+
+const std::string kSample = testing::shipped_scene("two_spheres_motor");
+
+// A server whose socket is found in a folder of this test's own.
+class Served {
+ public:
+  explicit Served(const std::vector<std::string>& options) {
+    std::vector<std::string> words = {"serve", kSample, "--headless"};
+    words.insert(words.end(), options.begin(), options.end());
+    process_ = testing::start_program(words, folder_);
+    // it says so when it listens
+    for (int i = 0; i < 3000 && said().empty() && kill(process_, 0) == 0; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const std::string mark = " at unix:";
+    const std::size_t at = said().find(mark);
+    if (at != std::string::npos) socket_ = said().substr(at + mark.size(), said().find('\n') - at - mark.size());
+  }
+  ~Served() {
+    if (process_ > 0) end(SIGTERM);
+  }
+  Served(const Served&) = delete;
+  Served& operator=(const Served&) = delete;
+
+  const std::string& socket() const { return socket_; }
+  std::string said() const {
+    const std::string text = read_file(folder_.path("stdout"));
+    return text.find('\n') == std::string::npos ? "" : text;
+  }
+  ProgramResult ctl(std::vector<std::string> words) const {
+    words.insert(words.begin(), {"ctl", "--socket", socket_});
+    const ScratchFolder own;
+    return testing::run_program(words, own);
+  }
+  control_api::v1::Status status() const {
+    control_api::v1::Status status;
+    const ProgramResult result = ctl({"status", "--json"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(result.out, &status).ok()) << result.out;
+    return status;
+  }
+  ProgramResult end(int number) {
+    kill(process_, number);
+    const ProgramResult result = testing::finish_program(process_, folder_);
+    process_ = -1;
+    return result;
+  }
+
+ private:
+  ScratchFolder folder_;
+  pid_t process_ = -1;
+  std::string socket_;
+};
+
+class EndedBy : public ::testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Each, EndedBy, ::testing::Values(SIGINT, SIGTERM),
+                         [](const auto& which) { return std::string(which.param == SIGINT ? "SIGINT" : "SIGTERM"); });
+
+TEST_P(EndedBy, NothingIsLeft) {
+  Served served({"--duration", "3600"});
+  ASSERT_FALSE(served.socket().empty());
+  const control_api::v1::Status status = served.status();
+  EXPECT_EQ(status.scene(), kSample);
+  EXPECT_EQ(status.state(), "running");
+  ASSERT_GE(status.plan().slots_size(), 5);
+  std::vector<int> workers;
+  for (const control_api::v1::PlannedSlot& slot : status.plan().slots()) workers.push_back(slot.pid());
+  const ProgramResult result = served.end(GetParam());
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("chain hash"));
+  EXPECT_FALSE(std::filesystem::exists(served.socket()));
+  EXPECT_FALSE(std::filesystem::exists(std::filesystem::path(served.socket()).parent_path()));
+  for (const int worker : workers) EXPECT_NE(kill(worker, 0), 0);
+}
+
+TEST(Serve, CtlControlsIt) {
+  Served served({"--steps", "200", "--speed", "0", "--paused"});
+  ASSERT_FALSE(served.socket().empty());
+  const auto said = [&](const std::vector<std::string>& words) {
+    const ProgramResult result = served.ctl(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  };
+  EXPECT_THAT(said({"status"}), HasSubstr("Sequential"));
+  EXPECT_THAT(said({"step", "10"}), HasSubstr("step 10 of 200"));
+  EXPECT_THAT(said({"swap", "solver=Sequential,hosting=direct"}), HasSubstr("solver"));
+  EXPECT_THAT(said({"step", "20"}), HasSubstr("step 30 of 200"));
+  EXPECT_THAT(said({"status"}), HasSubstr("committed: solver Sequential (shm) -> Sequential (direct), before step 11"));
+  EXPECT_THAT(said({"set", "Solver.Iterations=50", "--no-wait"}), HasSubstr("ordered: swap 2, before step 31"));
+  EXPECT_THAT(said({"inject", "integrator:kill"}), HasSubstr("at step 31"));
+  EXPECT_THAT(said({"step", "200"}), HasSubstr("finished"));
+  const control_api::v1::Status status = served.status();
+  EXPECT_EQ(status.state(), "finished");
+  EXPECT_EQ(status.fault_count(), 1U);
+  EXPECT_EQ(served.ctl({"step"}).exit_code, 2);
+  EXPECT_THAT(said({"reset"}), HasSubstr("step 0 of 200"));
+  EXPECT_THAT(said({"resume"}), HasSubstr("of 200"));
+  EXPECT_THAT(said({"pause"}), HasSubstr("of 200"));
+
+  ProgramResult refused = served.ctl({"swap", "solver=Sequentail"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("did you mean \"Sequential\"?"));
+  EXPECT_EQ(served.end(SIGTERM).exit_code, 0);
+  refused = served.ctl({"status"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("start one: gravitas serve SCENE --headless"));
+}
+
+// A plugin that answers nonsense is gone again before it has harmed the run; ctl says so with its exit code.
+TEST(Serve, ASwapThatIsRolledBackIsExitCode4) {
+  Served served({"--duration", "3600"});
+  ASSERT_FALSE(served.socket().empty());
+  const std::string plugin = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/integrator_nan.so";
+  const ProgramResult result = served.ctl({"swap", "integrator=" + plugin});
+  EXPECT_EQ(result.exit_code, 4) << result.out << result.err;
+  EXPECT_THAT(result.out, HasSubstr("rolled back: integrator Euler -> "));
+  EXPECT_EQ(served.status().state(), "running");
+}
+
+TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
+  Served served({"--duration", "3600"});
+  ASSERT_FALSE(served.socket().empty());
+  const ScratchFolder own;
+  const pid_t watch = testing::start_program({"ctl", "watch", "--socket", served.socket()}, own);
+  for (int i = 0; i < 3000 && read_file(own.path("stdout")).empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(served.end(SIGTERM).exit_code, 0);
+  const ProgramResult result = testing::finish_program(watch, own);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::StartsWith("step "));
+  EXPECT_THAT(result.out, HasSubstr("running"));
+  EXPECT_THAT(result.err, HasSubstr("the server has ended"));
+}
+
+TEST(Serve, WhatCannotBeIsExitCode2) {
+  const ScratchFolder folder;
+  ProgramResult result = testing::run_program({"serve", kSample}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("the page comes later; allowed: --headless"));
+  result = testing::run_program({"serve", kSample, "--headless", "--speed", "-1"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--speed -1"));
+  result = testing::run_program({"serve", folder.path("none.gravitas"), "--headless"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  result = testing::run_program({"ctl", "--socket", folder.path("none.sock"), "status"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("no server answers"));
+  EXPECT_EQ(testing::run_program({"ctl"}, folder).exit_code, 2);
+  for (const char* command : {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "watch"}) {
+    result = testing::run_program({"ctl", command, "--help"}, folder);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ctl ") + command));
+  }
+}
+
+}  // namespace
+}  // namespace gravitas

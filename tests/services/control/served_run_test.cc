@@ -1,0 +1,353 @@
+// A served run through its API: server and client in this process, workers in theirs.
+#include "services/control/served_run.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "services/control/client.h"
+#include "services/control/server.h"
+#include "services/control/server_socket.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas::control {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::uint32_t kSteps = 120;
+
+ServeOptions sample(const std::string& hosting = "shm") {
+  ServeOptions options;
+  options.run.scenes = {gravitas::testing::shipped_scene("two_spheres_motor")};
+  options.run.steps = kSteps;
+  options.run.hosting = {
+      {std::nullopt, hosting == "direct" ? kernel::Hosting::kDirect : kernel::Hosting::kSharedMemory}};
+  options.speed = 0.0;
+  options.is_paused = true;
+  return options;
+}
+
+// A server and a client of it.
+struct Served {
+  gravitas::testing::ScratchFolder folder;
+  ServedRun run;
+  ServerSocket socket{folder.path("control.sock")};
+  ControlServer server{&run, socket.path()};
+  ControlClient client{socket.path()};
+
+  explicit Served(const ServeOptions& options = sample()) : run(options) {}
+
+  api::ServedSwap swap(const std::string& text) {
+    const api::SwapOrdered ordered = client.swap(parse_swap_request(text));
+    client.step(20);  // over its probation
+    return last_swap(ordered);
+  }
+  api::ServedSwap set(const std::string& text) {
+    const api::SwapOrdered ordered = client.set_property(parse_set_request(text));
+    client.step(20);
+    return last_swap(ordered);
+  }
+  api::ServedSwap last_swap(const api::SwapOrdered& ordered) {
+    const api::Status status = client.status();
+    EXPECT_EQ(status.swaps(status.swaps_size() - 1).number(), ordered.number());
+    return status.swaps(status.swaps_size() - 1);
+  }
+  api::Status to_the_end() { return client.step(kSteps); }
+};
+
+// Where the run is when nobody touches it.
+const std::string& quiet_chain() {
+  static const std::string chain = [] {
+    Served served(sample("direct"));
+    return served.to_the_end().chain_hash();
+  }();
+  return chain;
+}
+
+api::PlannedSlot planned(const api::Status& status, const std::string& name) {
+  for (const api::PlannedSlot& slot : status.plan().slots())
+    if (slot.slot() == name) return slot;
+  return {};
+}
+
+// Why the server refuses it.
+template <typename Action>
+std::string refusal(Action&& action) {
+  try {
+    action();
+  } catch (const ControlError& error) {
+    EXPECT_EQ(error.kind, ControlError::Kind::kRefused) << error.what();
+    return error.what();
+  }
+  ADD_FAILURE() << "it was not refused";
+  return {};
+}
+
+TEST(ServedRun, StepsAreCountedAndTheEndIsAState) {
+  Served served;
+  EXPECT_EQ(served.client.status().state(), "paused");
+  EXPECT_EQ(served.client.status().step(), 0U);
+  EXPECT_EQ(served.client.step(1).step(), 1U);
+  api::Status status = served.client.step(9);
+  EXPECT_EQ(status.step(), 10U);
+  EXPECT_EQ(status.state(), "paused");
+  EXPECT_DOUBLE_EQ(status.time(), 10 * status.time_step());
+  EXPECT_EQ(status.total_steps(), kSteps);
+  EXPECT_EQ(status.steps_per_second(), 0.0);
+
+  status = served.client.step(1000);
+  EXPECT_EQ(status.step(), kSteps);
+  EXPECT_EQ(status.state(), "finished");
+  EXPECT_EQ(status.chain_hash(), quiet_chain());
+  EXPECT_THAT(refusal([&] { served.client.resume(); }), HasSubstr("reset begins it again"));
+  EXPECT_EQ(served.client.pause().state(), "finished");
+
+  status = served.client.reset();
+  EXPECT_EQ(status.step(), 0U);
+  EXPECT_EQ(status.state(), "paused");
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+TEST(ServedRun, ResumedItGoesOnAndPausedItStands) {
+  ServeOptions options = sample();
+  options.run.steps = 100'000'000;
+  Served served(options);
+  EXPECT_EQ(served.client.resume().state(), "running");
+  std::uint32_t seen = 0;
+  served.client.watch(10, [&](const api::Status& status) {
+    EXPECT_EQ(status.state(), "running");
+    EXPECT_GE(status.step(), seen);
+    seen = status.step();
+    return seen < 100;
+  });
+  EXPECT_THAT(refusal([&] { served.client.step(1); }), HasSubstr("pause it first"));
+  const api::Status paused = served.client.pause();
+  EXPECT_EQ(paused.state(), "paused");
+  EXPECT_EQ(served.client.status().step(), paused.step());
+  EXPECT_EQ(served.client.resume().state(), "running");
+  EXPECT_EQ(served.client.reset().state(), "running");
+  EXPECT_EQ(served.client.pause().state(), "paused");
+}
+
+// At the pace of the wall clock a run of 0.1 s takes so long; how much longer is for the machine to say.
+TEST(ServedRun, ItIsPacedByTheWallClock) {
+  ServeOptions options = sample("direct");
+  options.speed = 1.0;
+  options.run.steps = 10;
+  options.run.time_step = 0.01;
+  Served served(options);
+  const auto begin = std::chrono::steady_clock::now();
+  served.client.resume();
+  served.client.watch(10, [](const api::Status& status) { return status.state() == "running"; });
+  EXPECT_EQ(served.client.status().state(), "finished");
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(100));
+}
+
+TEST(ServedRun, ASwapChangesNoBit) {
+  Served served;
+  served.client.step(10);
+  const api::ServedSwap swap = served.swap("solver=Sequential");
+  EXPECT_EQ(swap.outcome(), "committed") << swap.reason();
+  EXPECT_EQ(swap.step(), 11U);
+  EXPECT_GT(swap.pause_us(), 0.0);
+  const int before = planned(served.client.status(), "integrator").pid();
+  EXPECT_THAT(served.swap("integrator=Euler@step=100").outcome(), ::testing::AnyOf("preparing", "shadow"));
+  served.client.step(60);
+  EXPECT_EQ(served.client.status().swaps(1).outcome(), "committed");
+  EXPECT_EQ(served.client.status().swaps(1).step(), 100U);
+  EXPECT_NE(planned(served.client.status(), "integrator").pid(), before);
+  const api::Status end = served.to_the_end();
+  EXPECT_EQ(end.step(), kSteps);
+  EXPECT_EQ(end.chain_hash(), quiet_chain());
+}
+
+TEST(ServedRun, HostingIsExchangedThereAndBack) {
+  Served served;
+  served.client.step(5);
+  for (const char* hosting : {"grpc", "direct", "grpc", "shm"}) {
+    const api::ServedSwap swap = served.swap(std::string("solver=Sequential,hosting=") + hosting);
+    EXPECT_EQ(swap.outcome(), "committed") << swap.reason();
+    EXPECT_EQ(planned(served.client.status(), "solver").hosting(), hosting);
+    const int pid = planned(served.client.status(), "solver").pid();
+    EXPECT_EQ(pid == getpid(), std::string(hosting) == "direct");
+  }
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+TEST(ServedRun, ASwapIsFollowedWhileTheRunGoesOn) {
+  ServeOptions options = sample();
+  options.run.steps = 100'000'000;
+  Served served(options);
+  served.client.resume();
+  api::Status status;
+  const auto ordered = served.client.swap(parse_swap_request("collision=Standard,hosting=direct"));
+  const std::optional<api::ServedSwap> swap = wait_for_swap(&served.client, ordered.number(), &status);
+  ASSERT_TRUE(swap);
+  EXPECT_EQ(swap->outcome(), "committed") << swap->reason();
+  EXPECT_EQ(swap->step(), ordered.step());
+  EXPECT_GE(status.step(), swap->step());
+  // numbers go on after a reset, where nothing is known of the swap any more
+  served.client.pause();
+  served.client.reset();
+  EXPECT_EQ(planned(served.client.status(), "collision").hosting(), "shm");
+  EXPECT_FALSE(wait_for_swap(&served.client, ordered.number(), &status));
+  EXPECT_EQ(served.client.swap(parse_swap_request("collision=Standard")).number(), ordered.number() + 1);
+}
+
+TEST(ServedRun, APropertyIsChangedAndKeptBySwapsToTheSamePlugin) {
+  Served served;
+  const auto setting = [&](int row) { return planned(served.client.status(), "solver").settings(row).value(); };
+  const std::string correction = setting(1);
+  EXPECT_EQ(planned(served.client.status(), "solver").settings(0).name(), "Iterations");
+  EXPECT_EQ(served.set("Solver.Iterations=3").outcome(), "committed");
+  EXPECT_EQ(setting(0), "3");
+  EXPECT_EQ(setting(1), correction);
+  // two at one step: the second builds on the first
+  served.client.set_property(parse_set_request("solver.Iterations=4"));
+  served.set("solver.CorrectionFactor=0.25");
+  EXPECT_EQ(setting(0), "4");
+  EXPECT_EQ(setting(1), "0.25");
+  EXPECT_EQ(served.swap("solver=Sequential,hosting=direct").outcome(), "committed");
+  EXPECT_EQ(setting(0), "4");
+  EXPECT_EQ(setting(1), "0.25");
+  EXPECT_NE(served.to_the_end().chain_hash(), quiet_chain());
+
+  served.client.reset();
+  EXPECT_EQ(setting(1), correction);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+TEST(ServedRun, AnInjectedFaultIsSurvived) {
+  Served served;
+  served.client.step(10);
+  EXPECT_EQ(served.client.inject("solver:kill").step(), 11U);
+  EXPECT_EQ(served.client.inject("integrator:nan@step=30").step(), 30U);
+  const api::Status end = served.to_the_end();
+  EXPECT_EQ(end.chain_hash(), quiet_chain());
+  ASSERT_EQ(end.faults_size(), 2);
+  EXPECT_EQ(end.fault_count(), 2U);
+  EXPECT_EQ(end.faults(0).step(), 11U);
+  EXPECT_EQ(end.faults(0).kind(), "kill");
+  EXPECT_GT(end.faults(0).recovery_us(), 0.0);
+  EXPECT_EQ(end.faults(1).slot(), "integrator");
+}
+
+TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
+  Served served;
+  served.client.inject("solver:kill@step=5,times=100");
+  const api::Status status = served.to_the_end();
+  EXPECT_EQ(status.state(), "faulted");
+  EXPECT_EQ(status.step(), 4U);
+  EXPECT_THAT(status.fault(), HasSubstr("step 5: slot solver, plugin Sequential"));
+  EXPECT_THAT(refusal([&] { served.client.step(1); }), HasSubstr("reset begins it again"));
+  EXPECT_EQ(served.client.reset().state(), "paused");
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
+  Served served;
+  const auto swap = [&](const std::string& text) {
+    return refusal([&] { served.client.swap(parse_swap_request(text)); });
+  };
+  const auto set = [&](const std::string& text) {
+    return refusal([&] { served.client.set_property(parse_set_request(text)); });
+  };
+  EXPECT_THAT(swap("sovler=Sequential"), HasSubstr("unknown slot 'sovler'; allowed: space"));
+  EXPECT_THAT(swap("solver=Sequentail"), HasSubstr("did you mean \"Sequential\"?"));
+  EXPECT_THAT(swap("solver=Sequential,hosting=shn"), HasSubstr("allowed: direct, shm, grpc"));
+  EXPECT_THAT(swap("solver=/nowhere/plugin.so"), HasSubstr("cannot be used"));
+  EXPECT_THAT(swap("force=Gravity"), HasSubstr("the plan leaves the slot out"));
+  EXPECT_THAT(swap("solver=Sequential@step=121"), HasSubstr("allowed: 1 (the next) to 120"));
+  EXPECT_THAT(set("Solver.Iteration=5"), HasSubstr("did you mean \"Iterations\"?"));
+  EXPECT_THAT(set("Solver.Iterations=0"), HasSubstr("a whole number in [1,"));
+  EXPECT_THAT(set("Solver.Iterations=many"), HasSubstr("many"));
+  EXPECT_THAT(set("Solver.Iterations=5 6"), HasSubstr("one value"));
+  EXPECT_THAT(set("Solvr.Iterations=5"), HasSubstr("unknown slot"));
+  const auto inject = [&](const std::string& text) { return refusal([&] { served.client.inject(text); }); };
+  EXPECT_THAT(inject("solver:kil"), HasSubstr("kill"));
+  EXPECT_THAT(inject("solver"), HasSubstr("SLOT:KIND"));
+  EXPECT_THAT(inject("force:kill"), HasSubstr("the plan leaves the slot out"));
+  EXPECT_THAT(inject("solver:kill@step=121"), HasSubstr("1 (the next) to 120"));
+  EXPECT_THAT(refusal([&] { served.client.step(0); }), HasSubstr("from 1"));
+  EXPECT_THAT(refusal([&] { served.client.watch(1, [](const api::Status&) { return true; }); }), HasSubstr("10 to"));
+  // none of it has touched the run
+  EXPECT_EQ(served.client.status().swap_count(), 0U);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+  EXPECT_EQ(served.client.status().fault_count(), 0U);
+}
+
+TEST(ServedRun, WhatIsNoSpecificationIsRefusedAtHome) {
+  for (const char* text : {"", "solver", "=Sequential", "solver=", "solver=Sequential@5", "solver=S@step=x",
+                           "solver=S@step=5,more", "solver=S,hosting=shm,hosting=shm"})
+    EXPECT_THROW(parse_swap_request(text), BadInput) << text;
+  for (const char* text : {"", "Solver", "Solver=5", "Solver.Iterations", "Solver.=5", ".Iterations=5", "Solver.I="})
+    EXPECT_THROW(parse_set_request(text), BadInput) << text;
+  const api::SwapRequest whole = parse_swap_request("solver=Sequential@step=7,hosting=grpc");
+  EXPECT_EQ(whole.slot(), "solver");
+  EXPECT_EQ(whole.plugin(), "Sequential");
+  EXPECT_EQ(whole.step(), 7U);
+  EXPECT_EQ(whole.hosting(), "grpc");
+  EXPECT_EQ(parse_swap_request("solver=some/p.so").plugin().front(), '/');
+}
+
+// Watching and a long step order must not hold up the end.
+TEST(ServedRun, TheServerEndsCallsThatWait) {
+  ServeOptions options = sample("direct");
+  options.run.steps = 100'000'000;
+  const gravitas::testing::ScratchFolder folder;
+  ServedRun run(options);
+  const ServerSocket socket(folder.path("control.sock"));
+  auto server = std::make_optional<ControlServer>(&run, socket.path());
+  ControlClient stepping(socket.path()), watching(socket.path());
+  std::thread steps([&] { EXPECT_THROW(stepping.step(100'000'000), ControlError); });
+  std::promise<void> both;
+  std::thread watch([&] {
+    bool told = false;
+    watching.watch(10, [&](const api::Status& status) {
+      if (status.step() > 0 && !told) both.set_value();
+      told |= status.step() > 0;
+      return true;
+    });
+  });
+  both.get_future().wait();
+  server.reset();
+  steps.join();
+  watch.join();
+  EXPECT_EQ(run.status().state(), "paused");
+}
+
+TEST(ServerSocket, IsPrivateAndRemovesWhatItMade) {
+  std::string path;
+  {
+    const ServerSocket socket("");
+    path = socket.path();
+    struct stat about {};
+    ASSERT_EQ(stat(path.substr(0, path.rfind('/')).c_str(), &about), 0);
+    EXPECT_EQ(about.st_mode & 0777, 0700U);
+    // nobody listens yet
+    EXPECT_THAT(find_servers(), ::testing::Not(::testing::Contains(path)));
+    ServedRun run(sample("direct"));
+    const ControlServer server(&run, path);
+    ASSERT_EQ(stat(path.c_str(), &about), 0);
+    EXPECT_EQ(about.st_mode & 0077, 0U);
+    EXPECT_THAT(find_servers(), ::testing::Contains(path));
+    EXPECT_THROW(ServerSocket second(path), BadInput);
+  }
+  EXPECT_NE(access(path.substr(0, path.rfind('/')).c_str(), F_OK), 0);
+  const gravitas::testing::ScratchFolder folder;
+  EXPECT_THROW(ServerSocket(folder.write("file", "kept")), BadInput);
+  EXPECT_EQ(gravitas::testing::read_file(folder.path("file")), "kept");
+  EXPECT_THROW(ServerSocket(folder.path(std::string(120, 'x'))), BadInput);
+  EXPECT_THROW(ServerSocket(folder.path("none/control.sock")), BadInput);
+}
+
+}  // namespace
+}  // namespace gravitas::control
