@@ -89,12 +89,14 @@ void Environment::check_fallbacks() const {
 
 void Environment::order_swap(SwapOrder order) {
   const std::uint32_t row = place_of(order);
-  slot_of(order.slot).order_swap(std::move(order), row);
+  StageSlot& slot = slot_of(order.slot);
+  slot.order_swap(std::move(order), row);
 }
 
 void Environment::compare(SwapOrder order) {
   const std::uint32_t row = place_of(order);
-  slot_of(order.slot).order_swap(std::move(order), row, true);
+  StageSlot& slot = slot_of(order.slot);
+  slot.order_swap(std::move(order), row, true);
 }
 
 std::vector<SwapRecord> Environment::swaps() const {

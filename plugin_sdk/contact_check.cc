@@ -37,7 +37,8 @@ struct Solid {
     if (form == Form::kSphere) return p.norm() - size.x();
     if (form == Form::kHalfspace) return p.y();
     Vector3 q = p.cwiseAbs() - size;
-    if (form == Form::kCylinder) q = Vector3(std::hypot(p.x(), p.z()) - size.x(), std::fabs(p.y()) - size.y(), -1e300);
+    if (form == Form::kCylinder)
+      q = Vector3(Eigen::Vector2d(p.x(), p.z()).norm() - size.x(), std::fabs(p.y()) - size.y(), -1e300);
     return q.cwiseMax(0.0).norm() + std::min(0.0, q.maxCoeff());
   }
 
@@ -46,7 +47,7 @@ struct Solid {
     const Vector3 d = local(direction);
     if (form == Form::kSphere) return size.x();
     if (form == Form::kHalfspace) return 0.0;
-    if (form == Form::kCylinder) return size.x() * std::hypot(d.x(), d.z()) + size.y() * std::fabs(d.y());
+    if (form == Form::kCylinder) return size.x() * Eigen::Vector2d(d.x(), d.z()).norm() + size.y() * std::fabs(d.y());
     return size.dot(d.cwiseAbs());
   }
 
