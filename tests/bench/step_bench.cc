@@ -15,6 +15,7 @@
 #include "kernel/environment.h"
 #include "services/run/session.h"
 #include "tests/kernel/world_builder.h"
+#include "tests/paths.h"
 
 extern char** environ;
 
@@ -66,7 +67,7 @@ void four_derivatives(benchmark::State& state, Hosting hosting) {
   WorldBuilder builder(hosting);
   builder.steps(kEndless, 1e-6);
   for (int i = 0; i < state.range(0); ++i) builder.point(1.0, Vector3(1, 2, 3), Vector3(i, 0, 0));
-  builder.plugin(Slot::kIntegrator, GRAVITAS_BINARY_DIR "/lib/gravitas-bench/four_derivatives.so");
+  builder.plugin(Slot::kIntegrator, in_build("/lib/gravitas-bench/four_derivatives.so"));
   // in the body's frame: not constant
   builder.force("Basic", "force_basic", {0.1, 0, 0, 0, 0.1, 0, 0, 0, 0, 1, 0, 0});
   Environment world(builder.description());
@@ -76,8 +77,8 @@ void four_derivatives(benchmark::State& state, Hosting hosting) {
 
 // From exec to the end of a run of one step, every worker started: more than exec to the first commit.
 void start_to_first_step(benchmark::State& state) {
-  const std::string program = GRAVITAS_BINARY_DIR "/bin/gravitas";
-  const std::string scene = GRAVITAS_SOURCE_DIR "/deploy/scenes/two_spheres_motor.gravitas";
+  const std::string program = in_build("/bin/gravitas");
+  const std::string scene = in_source("/deploy/scenes/two_spheres_motor.gravitas");
   for (auto _ : state) {
     const char* arguments[] = {program.c_str(), "run", scene.c_str(), "--steps", "1", "--quiet", nullptr};
     pid_t process = 0;
@@ -92,7 +93,7 @@ void start_to_first_step(benchmark::State& state) {
 // checked (wire, structure, numbers).
 void pile_in_workers(benchmark::State& state) {
   RunOptions options;
-  options.scenes = {GRAVITAS_SOURCE_DIR "/deploy/scenes/pile1000.gravitas"};
+  options.scenes = {in_source("/deploy/scenes/pile1000.gravitas")};
   options.hosting = {{std::nullopt, Hosting::kSharedMemory, ""}};
   options.steps = kEndless;
   std::vector<std::string> warnings;

@@ -11,14 +11,15 @@
 #include "kernel/carrier/carrier.h"
 #include "services/check/describe.h"
 #include "services/check/examination.h"
+#include "tests/paths.h"
 
 namespace gravitas::check {
 namespace {
 
 namespace files = std::filesystem;
 
-const std::string kPlugins = GRAVITAS_BINARY_DIR "/lib/gravitas";
-const std::string kFaulty = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty";
+const std::string kPlugins = in_build("/lib/gravitas");
+const std::string kFaulty = in_build("/lib/gravitas-faulty");
 // Fewer calls than a full check makes, which takes minutes: `gravitas check PLUGIN` by hand makes them all.
 constexpr std::uint32_t kFewCalls = 1000;
 
@@ -32,7 +33,7 @@ std::vector<std::string> libraries_of(const std::string& folder) {
 }
 
 report::v1::CheckReport check_library(const std::string& path, const Options& options) {
-  kernel::set_worker_program(GRAVITAS_BINARY_DIR "/bin/gravitas-worker");
+  kernel::set_worker_program(in_build("/bin/gravitas-worker"));
   Examinee examinee = find_examinee(path);
   complete(&examinee, options.quick);
   return examine(
@@ -47,7 +48,7 @@ bool fails(const report::v1::CheckReport& report, const std::string& level) {
 
 // The level at which a bad plugin fails, as its folder says.
 std::string level_of(const std::string& name) {
-  std::ifstream file(GRAVITAS_SOURCE_DIR "/tests/faulty/" + name + "/level");
+  std::ifstream file(in_source("/tests/faulty/") + name + "/level");
   std::string level;
   file >> level;
   return level;
@@ -57,6 +58,9 @@ void expect_failure(const report::v1::CheckReport& report, const std::string& le
   EXPECT_FALSE(report.conforms());
   ASSERT_FALSE(level.empty()) << "there is no file `level` beside its plugin.cc";
   EXPECT_TRUE(fails(report, level)) << report.DebugString();
+  // and at no level before: the time of a quick check ends with the first finding
+  ASSERT_GT(report.findings_size(), 0);
+  EXPECT_EQ(report.findings(0).level(), level) << report.DebugString();
   // a finding says how to see it again
   for (const report::v1::CheckFinding& finding : report.findings()) {
     EXPECT_FALSE(finding.text().empty());
@@ -105,7 +109,7 @@ INSTANTIATE_TEST_SUITE_P(All, CheckOfSlowFaults, ::testing::ValuesIn(libraries_o
 TEST(CheckOfACommand, ThatServesAGoodPluginConforms) {
   const std::vector<std::string> good = libraries_of(kPlugins);
   ASSERT_FALSE(good.empty());
-  std::string command = GRAVITAS_BINARY_DIR "/bin/gravitas-worker " + kPlugins + "/" + good.front() + ".so";
+  std::string command = in_build("/bin/gravitas-worker ") + kPlugins + "/" + good.front() + ".so";
   const auto report = check_library(command, {.quick = true, .level = {}, .only_case = {}});
   EXPECT_TRUE(report.conforms()) << report.DebugString();
   EXPECT_EQ(report.command(), command);

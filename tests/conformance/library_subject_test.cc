@@ -7,14 +7,15 @@
 #include <set>
 
 #include "plugin_sdk/conformance/free_bodies.h"
+#include "tests/paths.h"
 
 namespace gravitas::conformance {
 namespace {
 
 using testing::HasSubstr;
 
-std::string shipped(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas/" + name + ".so"; }
-std::string faulty(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + name + ".so"; }
+std::string shipped(const std::string& name) { return in_build("/lib/gravitas/") + name + ".so"; }
+std::string faulty(const std::string& name) { return in_build("/lib/gravitas-faulty/") + name + ".so"; }
 
 // Its third answer: these plugins misbehave from then on.
 Answer third_answer(const std::string& library) {

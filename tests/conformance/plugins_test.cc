@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "plugin_sdk/conformance/library_subject.h"
+#include "tests/paths.h"
 
 namespace gravitas::conformance {
 namespace {
@@ -17,7 +18,7 @@ using testing::HasSubstr;
 
 std::vector<std::string> shipped_plugins() {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(GRAVITAS_BINARY_DIR "/lib/gravitas"))
+  for (const auto& entry : std::filesystem::directory_iterator(in_build("/lib/gravitas")))
     if (entry.path().extension() == ".so") names.push_back(entry.path().stem().string());
   std::sort(names.begin(), names.end());
   return names;
@@ -25,7 +26,7 @@ std::vector<std::string> shipped_plugins() {
 
 class ShippedPlugin : public testing::TestWithParam<std::string> {
  protected:
-  LibrarySubject subject_{GRAVITAS_BINARY_DIR "/lib/gravitas/" + GetParam() + ".so"};
+  LibrarySubject subject_{in_build("/lib/gravitas/") + GetParam() + ".so"};
 };
 
 TEST_P(ShippedPlugin, KeepsEveryClaimOfItsSlot) {
@@ -65,7 +66,7 @@ struct Wrong {
 class WrongPlugin : public testing::TestWithParam<Wrong> {};
 
 TEST_P(WrongPlugin, FailsAtTheClaimThatItBreaks) {
-  LibrarySubject subject(GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + std::string(GetParam().library) + ".so");
+  LibrarySubject subject(in_build("/lib/gravitas-faulty/") + std::string(GetParam().library) + ".so");
   std::vector<std::string> failed;
   std::string first;
   for (const Case& one : number_cases(subject.declaration())) {

@@ -8,6 +8,8 @@
 #include <sstream>
 #include <string>
 
+#include "tests/paths.h"
+
 namespace gravitas {
 namespace {
 
@@ -31,8 +33,8 @@ class Machine {
     chmod(path(program).c_str(), 0755);
   }
   int install(const std::string& what) const {
-    const std::string command = "PATH=" + folder_ + ":$PATH " GRAVITAS_SOURCE_DIR "/deploy/install_dependencies " +
-                                what + " >" + path("out") + " 2>&1";
+    const std::string command = "PATH=" + folder_ + ":$PATH " + in_source("/deploy/install_dependencies ") + what +
+                                " >" + path("out") + " 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));
   }
   std::string text(const std::string& name) const {

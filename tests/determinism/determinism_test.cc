@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "services/run/session.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -20,7 +21,7 @@ namespace {
 using kernel::Environment;
 using kernel::Hosting;
 
-constexpr const char* kHashes = GRAVITAS_SOURCE_DIR "/tests/determinism/hashes.json";
+const std::string kHashes = in_source("/tests/determinism/hashes.json");
 constexpr const char* kScenes[] = {"two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack",
                                    "thruster",          "pile",   "callbacks"};
 constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
@@ -35,7 +36,7 @@ void PrintTo(const Hashes& hashes, std::ostream* out) { *out << hashes.state << 
 
 std::string path_of(const std::string& scene) {
   const bool is_ours = scene == "pile" || scene == "callbacks";
-  return GRAVITAS_SOURCE_DIR + std::string(is_ours ? "/tests/determinism/" : "/deploy/scenes/") + scene + ".gravitas";
+  return in_source(is_ours ? "/tests/determinism/" : "/deploy/scenes/") + scene + ".gravitas";
 }
 
 Hashes hashes_of(const std::string& scene, std::vector<HostingChoice> hosting, std::uint32_t threads = 1,

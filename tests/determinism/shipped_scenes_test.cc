@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "services/run/session.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
 
-const std::string kFolder = std::string(GRAVITAS_SOURCE_DIR) + "/deploy/scenes";
+const std::string kFolder = in_source("/deploy/scenes");
 
 std::vector<std::string> shipped_scenes() {
   std::vector<std::string> names;

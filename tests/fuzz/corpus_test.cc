@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -17,7 +18,7 @@ using Bytes = std::vector<std::byte>;
 
 std::vector<std::pair<std::string, Bytes>> corpus(const std::string& target) {
   std::vector<std::pair<std::string, Bytes>> entries;
-  for (const auto& file : std::filesystem::directory_iterator(GRAVITAS_SOURCE_DIR "/tests/fuzz/corpus/" + target)) {
+  for (const auto& file : std::filesystem::directory_iterator(in_source("/tests/fuzz/corpus/") + target)) {
     std::ifstream in(file.path(), std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(in), {}};
     const auto bytes = std::as_bytes(std::span(text));

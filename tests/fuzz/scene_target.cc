@@ -8,6 +8,7 @@
 #include "services/scene/overrides.h"
 #include "services/scene/reader.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/paths.h"
 
 namespace gravitas::fuzz {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 // The shipped plugins; it asks no worker, so a scene that names a library or a command starts nothing.
 std::vector<InstalledPlugin> shipped_plugins() {
   std::vector<InstalledPlugin> plugins;
-  for (const auto& entry : std::filesystem::directory_iterator(GRAVITAS_BINARY_DIR "/lib/gravitas")) {
+  for (const auto& entry : std::filesystem::directory_iterator(in_build("/lib/gravitas"))) {
     std::string problem;
     if (entry.path().extension() == ".so")
       plugins.push_back({entry.path().string(), load_plugin_library(entry.path().string(), &problem).declaration});

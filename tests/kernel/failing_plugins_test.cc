@@ -10,6 +10,7 @@
 
 #include "kernel/environment.h"
 #include "tests/kernel/world_builder.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -144,7 +145,7 @@ TEST(FailingPlugins, ContactsThatPullAreRefused) {
 TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
   for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc}) {
     WorldBuilder builder = ball_on_ground(hosting);
-    builder.description().solver.plugins[0].library = GRAVITAS_SOURCE_DIR "/README.md";
+    builder.description().solver.plugins[0].library = in_source("/README.md");
     try {
       Environment world(builder.description());
       FAIL() << "it started";

@@ -19,6 +19,7 @@
 #include "kernel/fault.h"
 #include "plugin_sdk/host/fault_kinds.h"
 #include "tests/kernel/one_call.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -379,7 +380,7 @@ TEST_P(InjectedFaults, AFaultThatAnEmptyReplyHasNoRowsForIsAFailure) {
 // The tests above know every kind there is.
 TEST(InjectedFaultKinds, AreAllTested) {
   std::string source;
-  std::getline(std::ifstream(GRAVITAS_SOURCE_DIR "/tests/kernel/fault_injection_test.cc"), source, '\0');
+  std::getline(std::ifstream(in_source("/tests/kernel/fault_injection_test.cc")), source, '\0');
   for (const host::FaultInfo& kind : host::fault_kinds())
     EXPECT_THAT(source, ::testing::ContainsRegex("\"" + std::string(kind.name) + "[\",]"));
 }

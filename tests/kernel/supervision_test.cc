@@ -74,7 +74,7 @@ TEST_P(Supervised, WithoutAStandbyANewWorkerIsStarted) {
 
 TEST_P(Supervised, AHangingWorkerIsReplacedAtItsDeadline) {
   WorldBuilder hanging = builder();
-  hanging.description().collision.deadline = 0.2;
+  hanging.description().collision.deadline = 0.5;
   Environment world(hanging.description());
   world.inject({Slot::kCollision, "hang", 4});
   run_to_end(&world);
@@ -123,7 +123,7 @@ TEST_P(Supervised, ActiveAndStandbyMayDieTogether) {
 
 TEST_P(Supervised, ADeadlineAloneNeverMakesARequestPoison) {
   WorldBuilder slow = builder();
-  slow.description().solver.deadline = 0.2;
+  slow.description().solver.deadline = 0.5;
   Environment world(slow.description());
   world.inject({Slot::kSolver, "hang", 6, 3});
   run_to_end(&world);

@@ -8,6 +8,7 @@
 
 #include "kernel/environment.h"
 #include "tests/kernel/world_builder.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -120,7 +121,7 @@ TEST_P(Swapped, APluginThatFailsInShadowIsRefused) {
 TEST_P(Swapped, APluginThatCannotBePreparedIsRefused) {
   Environment world(builder().description());
   kernel::PluginChoice missing = plugin_of(Slot::kSolver);
-  missing.library = GRAVITAS_SOURCE_DIR "/README.md";
+  missing.library = in_source("/README.md");
   world.order_swap({Slot::kSolver, missing, std::nullopt, 7});
   run_to_end(&world);
   EXPECT_EQ(world.chain_hash(), quiet_chain());

@@ -5,6 +5,7 @@
 
 #include "plugin_sdk/geometry/mass_properties.h"
 #include "plugin_sdk/library.h"
+#include "tests/paths.h"
 
 namespace gravitas::testing {
 namespace {
@@ -23,11 +24,9 @@ kernel::PluginChoice choice(const std::string& path, std::vector<double> setting
 
 }  // namespace
 
-std::string plugin_path(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas/" + name + ".so"; }
+std::string plugin_path(const std::string& name) { return in_build("/lib/gravitas/") + name + ".so"; }
 
-std::string faulty_plugin_path(const std::string& name) {
-  return GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + name + ".so";
-}
+std::string faulty_plugin_path(const std::string& name) { return in_build("/lib/gravitas-faulty/") + name + ".so"; }
 
 WorldBuilder::WorldBuilder(kernel::Hosting mode) {
   for (const Slot slot :

@@ -11,6 +11,8 @@
 #include <fstream>
 #include <string>
 
+#include "tests/paths.h"
+
 namespace gravitas {
 namespace {
 
@@ -18,9 +20,9 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-const std::string kHello = GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so";
+const std::string kHello = in_build("/lib/gravitas/hello.so");
 
-std::string faulty(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + name + ".so"; }
+std::string faulty(const std::string& name) { return in_build("/lib/gravitas-faulty/") + name + ".so"; }
 
 // Why the library cannot be loaded.
 std::string problem_of(const std::string& path) {

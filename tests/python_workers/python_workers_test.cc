@@ -16,6 +16,7 @@
 #include "plugin_sdk/body.h"
 #include "services/run/figures.h"
 #include "services/run/session.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -24,14 +25,14 @@ using kernel::Hosting;
 using testing::Contains;
 using testing::HasSubstr;
 
-const std::string kFolder = GRAVITAS_SOURCE_DIR "/tests/python_workers/";
-const std::string kScenes = GRAVITAS_SOURCE_DIR "/tests/scenes/";
-const std::string kPython = "PYTHONPATH=" GRAVITAS_BINARY_DIR "/lib/python";
+const std::string kFolder = in_source("/tests/python_workers/");
+const std::string kScenes = in_source("/tests/scenes/");
+const std::string kPython = "PYTHONPATH=" + in_build("/lib/python");
 
 // What the workers inherit.
 class PythonPath : public ::testing::Environment {
  public:
-  void SetUp() override { setenv("PYTHONPATH", GRAVITAS_BINARY_DIR "/lib/python", 1); }
+  void SetUp() override { setenv("PYTHONPATH", in_build("/lib/python").c_str(), 1); }
 };
 const ::testing::Environment* const kEnvironment = ::testing::AddGlobalTestEnvironment(new PythonPath);
 
@@ -262,8 +263,7 @@ INSTANTIATE_TEST_SUITE_P(Both, PythonWorker, ::testing::Values("force_drag", "so
 // With a thousand calls, so that a solver in Python does not take a minute for them.
 TEST_P(PythonWorker, ConformsSaysTheKit) {
   const std::string command = "/usr/bin/python3 " + kFolder + GetParam() + ".py";
-  const Ended check =
-      ended(kPython + " " GRAVITAS_BINARY_DIR "/bin/gravitas check '" + command + "' --quick --calls 1000");
+  const Ended check = ended(kPython + " " + in_build("/bin/gravitas check '") + command + "' --quick --calls 1000");
   EXPECT_EQ(check.code, 0) << check.words;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "services/run/session.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -17,7 +18,7 @@ constexpr std::uint32_t kMostSteps = 600, kMostStepsOfLarge = 150;
 std::vector<std::string> scenes() {
   std::vector<std::string> paths;
   for (const char* folder : {"/deploy/scenes", "/tests/determinism", "/tests/scenes"})
-    for (const auto& entry : std::filesystem::directory_iterator(std::string(GRAVITAS_SOURCE_DIR) + folder))
+    for (const auto& entry : std::filesystem::directory_iterator(in_source(folder)))
       if (entry.path().extension() == ".gravitas") paths.push_back(entry.path());
   std::ranges::sort(paths);
   return paths;

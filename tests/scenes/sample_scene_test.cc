@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "tests/paths.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
@@ -15,7 +16,7 @@ using ::testing::HasSubstr;
 using testing::SceneRun;
 using testing::set;
 
-const std::string kSample = std::string(GRAVITAS_SOURCE_DIR) + "/deploy/scenes/two_spheres_motor.gravitas";
+const std::string kSample = in_source("/deploy/scenes/two_spheres_motor.gravitas");
 
 bool has_met_ground(const SceneRun& run, std::uint32_t ball) {
   return std::ranges::any_of(run.events(), [&](const kernel::Event& event) {

@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "tests/paths.h"
+
 namespace gravitas::testing {
 namespace {
 
@@ -38,7 +40,7 @@ kernel::EnvironmentDescription load_scene(const std::string& scene, std::vector<
     text = std::make_unique<NamedText>(scene);
     options.scenes = {text->path()};
   } else {
-    options.scenes = {scene.starts_with('/') ? scene : std::string(GRAVITAS_SOURCE_DIR) + "/tests/scenes/" + scene};
+    options.scenes = {scene.starts_with('/') ? scene : in_source("/tests/scenes/") + scene};
   }
   return load(options, warnings);
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "schemas/stage_frames.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -25,7 +26,7 @@ using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-const fs::path kSchemas = GRAVITAS_SOURCE_DIR "/schemas";
+const fs::path kSchemas = in_source("/schemas");
 
 std::string read_file(const fs::path& path) {
   std::ostringstream text;
@@ -44,7 +45,7 @@ struct Outcome {
 };
 
 Outcome frame_compiler(const std::string& arguments) {
-  FILE* pipe = popen((std::string(GRAVITAS_BINARY_DIR "/bin/frame_compiler ") + arguments + " 2>&1").c_str(), "r");
+  FILE* pipe = popen((in_build("/bin/frame_compiler ") + arguments + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return {-1, "popen failed"};
   Outcome outcome{0, ""};
   for (int c = fgetc(pipe); c != EOF; c = fgetc(pipe)) outcome.words += static_cast<char>(c);
@@ -184,7 +185,7 @@ TEST_F(FrameCompiler, GeneratesTheHeaderOfThisBuild) {
   const Outcome outcome = generate();
   EXPECT_EQ(outcome.words, "");
   ASSERT_EQ(outcome.exit_code, 0);
-  EXPECT_EQ(read_file(header()), read_file(GRAVITAS_BINARY_DIR "/generated/schemas/stage_frames.h"));
+  EXPECT_EQ(read_file(header()), read_file(in_build("/generated/schemas/stage_frames.h")));
   std::ostringstream hash;
   hash << "0x" << std::hex << stage::kSchemaHash;
   EXPECT_EQ(generated_hash(), hash.str());

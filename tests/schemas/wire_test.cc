@@ -32,6 +32,7 @@
 #include "plugin_sdk/message_columns.h"
 #include "schemas/stage_frames.h"
 #include "schemas/wire/columns.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -42,7 +43,7 @@ using stage::ColumnInfo;
 using stage::ElementType;
 using Infos = std::span<const ColumnInfo>;
 
-const fs::path kGolden = GRAVITAS_SOURCE_DIR "/schemas/golden";
+const fs::path kGolden = in_source("/schemas/golden");
 
 // ---- protobuf's own view of the schemas
 
@@ -57,7 +58,7 @@ class NoErrors : public pb::compiler::MultiFileErrorCollector {
 class Schemas {
  public:
   Schemas() {
-    tree_.MapPath("", GRAVITAS_SOURCE_DIR "/schemas");
+    tree_.MapPath("", in_source("/schemas"));
     tree_.MapPath("", "/usr/include");
     for (const char* file : {"stage/v1/space", "stage/v1/collision", "stage/v1/constraint", "stage/v1/force",
                              "stage/v1/integrator", "stage/v1/solver", "control/v1/control"})
@@ -312,8 +313,7 @@ TEST(Wire, RefusesWhatIsNoMessageAndSaysWhy) {
 
 // What a worker in another language asks the compiler for is what the kernel compares.
 TEST(Wire, TheSchemaHashIsPrintedAsTheKernelHasIt) {
-  FILE* pipe =
-      popen(GRAVITAS_BINARY_DIR "/bin/frame_compiler --proto-root " GRAVITAS_SOURCE_DIR "/schemas --hash", "r");
+  FILE* pipe = popen((in_build("/bin/frame_compiler --proto-root ") + in_source("/schemas --hash")).c_str(), "r");
   ASSERT_NE(pipe, nullptr);
   std::uint64_t printed = 0;
   EXPECT_EQ(fscanf(pipe, "0x%" SCNx64, &printed), 1);

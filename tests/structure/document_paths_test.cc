@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/paths.h"
 #include "tests/structure/sample_tree.h"
 
 namespace gravitas::structure {
@@ -20,8 +21,7 @@ std::string dead_paths(const std::string& path, const std::string& text) {
 }
 
 TEST(DocumentPaths, OfThisRepositoryExist) {
-  EXPECT_EQ(report(find_dead_paths(tree_of_repository(GRAVITAS_SOURCE_DIR),
-                                   std::filesystem::path(GRAVITAS_BINARY_DIR) / "generated")),
+  EXPECT_EQ(report(find_dead_paths(tree_of_repository(in_source()), std::filesystem::path(in_build()) / "generated")),
             "");
 }
 

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "tests/paths.h"
 #include "tests/structure/sample_tree.h"
 
 namespace gravitas::structure {
@@ -16,7 +17,7 @@ std::string objections(const std::string& path, const std::string& line) {
 }
 
 TEST(IncludeArrows, HoldInThisRepository) {
-  EXPECT_EQ(report(find_wrong_includes(tree_of_repository(GRAVITAS_SOURCE_DIR))), "");
+  EXPECT_EQ(report(find_wrong_includes(tree_of_repository(in_source()))), "");
 }
 
 TEST(IncludeArrows, AllowedOnesPass) {

@@ -5,12 +5,13 @@
 #include <map>
 #include <string>
 
+#include "tests/paths.h"
 #include "tests/structure/sample_tree.h"
 
 namespace gravitas::structure {
 namespace {
 
-SourceTree this_repository() { return tree_of_repository(GRAVITAS_SOURCE_DIR); }
+SourceTree this_repository() { return tree_of_repository(in_source()); }
 
 std::string lines(int count) {
   std::string text;

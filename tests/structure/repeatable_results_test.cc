@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string>
 
+#include "tests/paths.h"
 #include "tests/structure/sample_tree.h"
 
 namespace gravitas::structure {
@@ -16,7 +17,7 @@ std::size_t findings_in(const std::string& path, const std::string& line) {
 }
 
 TEST(RepeatableResults, HoldInThisRepository) {
-  EXPECT_EQ(report(find_unrepeatable(tree_of_repository(GRAVITAS_SOURCE_DIR))), "");
+  EXPECT_EQ(report(find_unrepeatable(tree_of_repository(in_source()))), "");
 }
 
 class Unrepeatable : public testing::TestWithParam<std::string> {};

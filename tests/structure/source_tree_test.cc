@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/paths.h"
 #include "tests/structure/sample_tree.h"
 
 namespace gravitas::structure {
@@ -14,7 +15,7 @@ namespace {
 using Lines = std::vector<std::string>;
 
 TEST(SourceTree, OfThisRepositoryHoldsThisFileAndNoBuild) {
-  const SourceTree tree = tree_of_repository(GRAVITAS_SOURCE_DIR);
+  const SourceTree tree = tree_of_repository(in_source());
   EXPECT_EQ(std::count(tree.files.begin(), tree.files.end(), "tests/structure/source_tree_test.cc"), 1);
   EXPECT_TRUE(std::none_of(tree.files.begin(), tree.files.end(),
                            [](const std::string& file) { return file.starts_with("build/"); }));

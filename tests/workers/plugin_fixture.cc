@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "plugin_sdk/checks.h"
+#include "tests/paths.h"
 
 namespace gravitas::test {
 namespace {
@@ -15,7 +16,7 @@ const stage::MethodInfo& info(stage::Method method) { return stage::method_info(
 
 PluginUnderTest::PluginUnderTest(const std::string& name, const std::vector<double>& settings) {
   std::string problem;
-  library_ = load_plugin_library(GRAVITAS_BINARY_DIR "/lib/gravitas/" + name + ".so", &problem);
+  library_ = load_plugin_library(in_build("/lib/gravitas/") + name + ".so", &problem);
   if (library_.table == nullptr) throw std::runtime_error(problem);
   gravitas_error error{};
   if (library_.table->create(settings.data(), settings.size(), &instance_, &error) != GRAVITAS_OK)

@@ -2,13 +2,12 @@
 // and the bodies spin away with energy they did not have.
 #include "plugin_sdk/plugin.h"
 
-#include <string>
 #include <vector>
 
 #include "plugin_sdk/body.h"
-#include "plugin_sdk/checks.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/solver.h"
+#include "tests/faulty/faulty_solver.h"
 
 namespace {
 
@@ -26,7 +25,7 @@ class GainsEnergy final : public SolverPlugin {
   explicit GainsEnergy(PropertyCursor) {}
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host&) override {
-    check(request);
+    refuse_bad_input(request);
     std::vector<Twist> twists;
     for (std::size_t i = 0; i < request.flags().size(); ++i)
       twists.push_back({vector_at(request.trial_linear_velocity(), i), vector_at(request.trial_angular_velocity(), i)});
@@ -53,20 +52,6 @@ class GainsEnergy final : public SolverPlugin {
 
  private:
   static void push(const stage::ReplyColumn<double>& column, const Vector3& v) { column.push(v.x(), v.y(), v.z()); }
-
-  static void check(const stage::SolverSolveRequest& request) {
-    for (const std::span<const double> column :
-         {request.inverse_mass(), request.inverse_inertia(), request.trial_position(), request.trial_orientation(),
-          request.trial_linear_velocity(), request.trial_angular_velocity(), request.contact_normal(),
-          request.contact_point(), request.contact_depth(), request.contact_material()})
-      if (first_not_finite(column) != kNoRow) throw Refusal("a number is not finite");
-    const std::size_t bodies = request.flags().size();
-    for (const std::uint32_t body : request.contact_body())
-      if (body >= bodies) throw Refusal("a contact names body " + std::to_string(body) + ", which does not exist");
-    for (const std::uint32_t body : request.discrepancy_body())
-      if (body >= bodies && body != kNone)
-        throw Refusal("a joint names body " + std::to_string(body) + ", which does not exist");
-  }
 
   // The impulse on body 2, which both get.
   static Vector3 push_apart(const stage::SolverSolveRequest& request, std::size_t contact, std::vector<Twist>* twists) {

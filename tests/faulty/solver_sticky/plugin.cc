@@ -2,6 +2,7 @@
 #include "plugin_sdk/plugin.h"
 
 #include "plugin_sdk/body.h"
+#include "tests/faulty/faulty_solver.h"
 
 namespace {
 
@@ -15,6 +16,7 @@ class StickySolver final : public SolverPlugin {
   explicit StickySolver(PropertyCursor) {}
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host&) override {
+    refuse_bad_input(request);
     const auto copy = [](std::span<const double> from, const stage::ReplyColumn<double>& to) {
       for (const double number : from) to.push(number);
     };

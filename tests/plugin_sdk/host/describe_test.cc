@@ -12,6 +12,7 @@
 
 #include "plugin_sdk/host/description_message.h"
 #include "schemas/stage_frames.h"
+#include "tests/paths.h"
 
 namespace gravitas::host {
 namespace {
@@ -21,8 +22,8 @@ using testing::HasSubstr;
 // Far more than a library takes to load, even under a sanitizer on a busy machine.
 constexpr double kLongSeconds = 30.0;
 
-std::string good(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas/" + name + ".so"; }
-std::string faulty(const std::string& name) { return GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/" + name + ".so"; }
+std::string good(const std::string& name) { return in_build("/lib/gravitas/") + name + ".so"; }
+std::string faulty(const std::string& name) { return in_build("/lib/gravitas-faulty/") + name + ".so"; }
 
 TEST(DescribeLibraries, DescribesEachInOrder) {
   const std::vector<std::string> libraries = {good("hello"), good("integrator_euler"), good("space_grid")};

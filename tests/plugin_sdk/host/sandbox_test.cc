@@ -32,6 +32,7 @@
 #include <vector>
 
 #include "plugin_sdk/library.h"
+#include "tests/paths.h"
 
 extern char** environ;
 
@@ -42,7 +43,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
 
-const std::string kPlugin = GRAVITAS_BINARY_DIR "/lib/gravitas/solver_sequential.so";
+const std::string kPlugin = in_build("/lib/gravitas/solver_sequential.so");
 constexpr std::uint64_t kTerabyte = std::uint64_t{1} << 40;
 constexpr int kAnything = -1;
 

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas::check {
@@ -13,16 +14,16 @@ namespace {
 
 using testing::ScratchFolder;
 
-const std::string kLibrary = GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so";
+const std::string kLibrary = in_build("/lib/gravitas/hello.so");
 
 TEST(PluginFile, IsTellingPluginsFromOtherFiles) {
   const ScratchFolder folder;
   EXPECT_EQ(kind_of_file(kLibrary), FileKind::kPlugin);
-  EXPECT_EQ(kind_of_file(GRAVITAS_BINARY_DIR "/bin/gravitas-worker"), FileKind::kProgram);
+  EXPECT_EQ(kind_of_file(in_build("/bin/gravitas-worker")), FileKind::kProgram);
   EXPECT_EQ(kind_of_file(folder.write("text", "a text about plugins")), FileKind::kOther);
   EXPECT_EQ(kind_of_file(folder.write("empty", "")), FileKind::kOther);
   EXPECT_EQ(kind_of_file(folder.path("missing")), FileKind::kMissing);
-  EXPECT_EQ(kind_of_file(GRAVITAS_BINARY_DIR), FileKind::kMissing);
+  EXPECT_EQ(kind_of_file(in_build()), FileKind::kMissing);
 
   // a script is a program only if it may be run
   const std::string script = folder.write("script", "#!/bin/sh\n");

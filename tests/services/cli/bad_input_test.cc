@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -121,7 +122,7 @@ ProgramResult run_with_solver_library(const std::string& library, const ScratchF
 
 TEST(BadInput, LibrariesThatAreNoPluginsOrOfAnotherSchema) {
   const ScratchFolder folder;
-  const std::string faulty = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/";
+  const std::string faulty = in_build("/lib/gravitas-faulty/");
   for (const auto& [library, expected] :
        std::vector<std::pair<std::string, std::string>>{{folder.path("missing.so"), "No such file"},
                                                         {folder.write("text.so", "not a library"), "shared library"},

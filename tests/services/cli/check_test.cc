@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "gravitas/report/v1/check.pb.h"
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -14,8 +15,8 @@ using testing::ProgramResult;
 using testing::run_program;
 using testing::ScratchFolder;
 
-const std::string kGood = GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so";
-const std::string kBad = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/wrong_magic.so";
+const std::string kGood = in_build("/lib/gravitas/hello.so");
+const std::string kBad = in_build("/lib/gravitas-faulty/wrong_magic.so");
 
 TEST(Check, WhatIsNoPluginIsBadInput) {
   const ScratchFolder folder;

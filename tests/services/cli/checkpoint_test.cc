@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "gravitas/report/v1/report.pb.h"
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -51,8 +52,8 @@ std::string chain_after(std::vector<std::string> words, const ScratchFolder& fol
 TEST(Checkpoints, APausedRunNamesTheOneItWroteAndTheCommandThatGoesOn) {
   const ScratchFolder folder;
   const std::string plugins =
-      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Library = \"" GRAVITAS_BINARY_DIR
-                                       "/lib/gravitas-faulty/integrator_killed.so\" } }");
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Library = \"" +
+                                           in_build("/lib/gravitas-faulty/integrator_killed.so") + "\" } }");
   const std::string kept = folder.path("kept file");
   const ProgramResult result = run_program(
       {"run", kSample, plugins, "--set", "Integrator=Faulty", "--checkpoint", kept, "--duration", "1.5"}, folder);
@@ -139,7 +140,7 @@ TEST_P(Kills, AtAnyMomentLeaveWhatResumesToTheSameChain) {
   const char* wanted = std::getenv("GRAVITAS_KILLS");
   const int kills = wanted == nullptr ? kUsual : std::atoi(wanted);
   const ScratchFolder folder;
-  const std::string scene = GRAVITAS_SOURCE_DIR "/tests/determinism/pile.gravitas", kept = folder.path("kept");
+  const std::string scene = in_source("/tests/determinism/pile.gravitas"), kept = folder.path("kept");
   const std::vector<std::string> words = {"run",          scene, "--hosting",          GetParam(), "--steps", "120",
                                           "--checkpoint", kept,  "--checkpoint-every", "3",        "--quiet"};
   const auto with_resume = [&] {

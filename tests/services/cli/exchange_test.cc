@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -139,8 +140,8 @@ TEST(Exchange, TheReportSaysWhatIsEnforcedOnEveryWorker) {
 TEST(Exchange, AnAttachedWorkerHasNoDeadline) {
   const ScratchFolder folder;
   const std::string address = "unix:" + folder.path("worker");
-  const std::string command = GRAVITAS_BINARY_DIR "/bin/gravitas-worker --listen " + address +
-                              " " GRAVITAS_BINARY_DIR "/lib/gravitas/solver_sequential.so >/dev/null 2>&1 & echo $!";
+  const std::string command = in_build("/bin/gravitas-worker --listen ") + address + " " +
+                              in_build("/lib/gravitas/solver_sequential.so >/dev/null 2>&1 & echo $!");
   FILE* const shell = popen(command.c_str(), "r");
   int process = 0;
   ASSERT_EQ(fscanf(shell, "%d", &process), 1);

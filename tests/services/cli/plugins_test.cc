@@ -5,6 +5,7 @@
 
 #include "gravitas/plugin/v1/description.pb.h"
 #include "gravitas/report/v1/report.pb.h"
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -51,8 +52,7 @@ TEST(Describe, ShowsPropertiesWithUnitRangeDefaultAndMeaning) {
   EXPECT_THAT(solver.out, HasSubstr("live"));
   // a type's name stands for the plugin that serves it, a path for the library
   EXPECT_THAT(run_program({"describe", "Sphere"}, folder).out, HasSubstr("Radius"));
-  const ProgramResult library =
-      run_program({"describe", GRAVITAS_BINARY_DIR "/lib/gravitas/hello.so", "--json"}, folder);
+  const ProgramResult library = run_program({"describe", in_build("/lib/gravitas/hello.so"), "--json"}, folder);
   plugin::v1::Description description;
   ASSERT_TRUE(JsonStringToMessage(library.out, &description).ok());
   EXPECT_EQ(description.name(), "Hello");

@@ -15,6 +15,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "tests/paths.h"
+
 extern char** environ;
 
 namespace gravitas::testing {
@@ -51,7 +53,7 @@ report::v1::Report read_report(const std::string& text) {
 }
 
 pid_t start_program(const std::vector<std::string>& arguments, const ScratchFolder& folder) {
-  std::vector<std::string> words = {GRAVITAS_BINARY_DIR "/bin/gravitas"};
+  std::vector<std::string> words = {in_build("/bin/gravitas")};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
@@ -87,8 +89,6 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Scrat
   return finish_program(start_program(arguments, folder), folder);
 }
 
-std::string shipped_scene(const std::string& name) {
-  return GRAVITAS_SOURCE_DIR "/deploy/scenes/" + name + ".gravitas";
-}
+std::string shipped_scene(const std::string& name) { return in_source("/deploy/scenes/") + name + ".gravitas"; }
 
 }  // namespace gravitas::testing

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "gravitas/report/v1/report.pb.h"
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -223,10 +224,9 @@ TEST(Run, AnInterruptKeepsWhatWasComputed) {
 
 // A scene whose integrator is one of the deliberately bad plugins.
 ProgramResult run_with_bad_integrator(const std::string& library, const ScratchFolder& folder) {
-  const std::string plugins = folder.write(
-      "plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Deadline = 0.2 Library = \"" GRAVITAS_BINARY_DIR
-                          "/lib/gravitas-faulty/" +
-                              library + ".so\" } }");
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Deadline = 0.2 Library = \"" +
+                                           in_build("/lib/gravitas-faulty/") + library + ".so\" } }");
   return run_program({"run", kSample, plugins, "--set", "Integrator=Faulty", "--report", folder.path("report.json"),
                       "--trajectory", folder.path("motion.csv"), "--checkpoint", folder.path("kept")},
                      folder);

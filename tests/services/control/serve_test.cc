@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "gravitas/control_api/v1/control_api.pb.h"
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -134,7 +135,7 @@ TEST(Serve, CtlControlsIt) {
 TEST(Serve, ASwapThatIsRolledBackIsExitCode4) {
   Served served({"--duration", "3600"});
   ASSERT_FALSE(served.socket().empty());
-  const std::string plugin = GRAVITAS_BINARY_DIR "/lib/gravitas-faulty/integrator_nan.so";
+  const std::string plugin = in_build("/lib/gravitas-faulty/integrator_nan.so");
   const ProgramResult result = served.ctl({"swap", "integrator=" + plugin});
   EXPECT_EQ(result.exit_code, 4) << result.out << result.err;
   EXPECT_THAT(result.out, HasSubstr("rolled back: integrator Euler -> "));

@@ -14,6 +14,7 @@
 #include "services/recorder/journal.h"
 #include "services/recorder/recorder.h"
 #include "services/run/session.h"
+#include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -44,8 +45,8 @@ RunResult run_quietly(const RunOptions& options) {
       options, [] { return false; }, [](const Progress&) {});
 }
 
-const std::string kCallbacks = GRAVITAS_SOURCE_DIR "/tests/determinism/callbacks.gravitas";
-const std::string kPile = GRAVITAS_SOURCE_DIR "/tests/determinism/pile.gravitas";
+const std::string kCallbacks = in_source("/tests/determinism/callbacks.gravitas");
+const std::string kPile = in_source("/tests/determinism/pile.gravitas");
 
 class Resume : public ::testing::TestWithParam<Case> {};
 

@@ -5,13 +5,14 @@
 #include <fstream>
 #include <sstream>
 
+#include "tests/paths.h"
+
 namespace gravitas::scene {
 namespace {
 
 TEST(Reference, TheCommittedPageIsThatOfTheGrammarAndThePlugins) {
-  const Catalog catalog =
-      Catalog::installed(GRAVITAS_BINARY_DIR "/bin/gravitas-worker", GRAVITAS_BINARY_DIR "/lib/gravitas");
-  std::ifstream file(GRAVITAS_SOURCE_DIR "/services/scene/REFERENCE.md");
+  const Catalog catalog = Catalog::installed(in_build("/bin/gravitas-worker"), in_build("/lib/gravitas"));
+  std::ifstream file(in_source("/services/scene/REFERENCE.md"));
   std::stringstream committed;
   committed << file.rdbuf();
   EXPECT_EQ(committed.str(), reference_page(catalog))

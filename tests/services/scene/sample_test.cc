@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/paths.h"
 #include "tests/services/scene/scene_fixture.h"
 
 namespace gravitas::scene {
@@ -16,7 +17,7 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-const std::string kSample = std::string(GRAVITAS_SOURCE_DIR) + "/deploy/scenes/two_spheres_motor.gravitas";
+const std::string kSample = in_source("/deploy/scenes/two_spheres_motor.gravitas");
 
 std::string sample_text() {
   std::ifstream file(kSample, std::ios::binary);
