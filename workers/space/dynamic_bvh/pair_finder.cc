@@ -13,8 +13,9 @@ constexpr double kMargin = 0.08;
 constexpr double kCallsAhead = 10.0;
 // As far as this, in extents: a body that is set elsewhere has no velocity.
 constexpr double kFarthestAhead = 0.5;
-// If a greater share of the bodies left their fat boxes, all get new ones.
-constexpr std::size_t kMovedShare = 3;
+// If more than this share of the bodies left their fat boxes, all that moved get new ones: finding the pairs of many costs
+// little more than those of some, and the calls that follow are free of it.
+constexpr std::size_t kRenewedShare = 16;
 constexpr double kGrowth = 2.0;
 constexpr std::uint32_t kBodiesOfProgress = 4096;
 
@@ -52,6 +53,7 @@ void PairFinder::find(const stage::SpacePairsRequest& request, const stage::Spac
     host.mark_progress();
     find_pairs(request, rule, host);
   }
+  host.mark_progress();
   const std::span<std::uint32_t> out = reply.pair().resize(pair_end_);
   std::copy_n(pairs_.begin(), out.size(), out.begin());
 }
@@ -65,7 +67,13 @@ bool PairFinder::look_for_moved(const stage::SpacePairsRequest& request, const P
   moved_.clear();
   for (std::uint32_t i = 0; i < rule.bodies(); ++i)
     if (!contains(fat_[i], box_at(request.lower(), request.upper(), i))) moved_.push_back(i);
-  if (moved_.size() > rule.bodies() / kMovedShare) return true;
+  if (std::ranges::any_of(moved_, [&](std::uint32_t body) { return !rule.is_regular(body); })) return true;
+  if (moved_.size() <= members_.size() / kRenewedShare) return false;
+  moved_.clear();
+  for (const std::uint32_t i : members_) {
+    const Box bounds = box_at(request.lower(), request.upper(), i);
+    if (!contains(birth_[i].bounds, bounds)) moved_.push_back(i);
+  }
   return std::ranges::any_of(moved_, [&](std::uint32_t body) { return !rule.is_regular(body); });
 }
 
@@ -154,18 +162,18 @@ void PairFinder::merge_found() {
   std::uint64_t k = 0;
   for (std::uint32_t a = 0; a < bodies; ++a) {
     next_begin_[a] = k;
-    const std::uint64_t begin = k;
-    if (has_moved_[a] == 0) {
-      for (std::uint64_t i = begin_[a]; i < begin_[a + 1]; ++i) {
+    std::uint64_t i = has_moved_[a] != 0 ? begin_[a + 1] : begin_[a];
+    for (const std::uint32_t b : found_.partners(a)) {
+      for (; i < begin_[a + 1] && partner_[i] < b; ++i) {
         out[k] = partner_[i];
         k += has_moved_[partner_[i]] == 0;
       }
+      out[k++] = b;
     }
-    const std::span<const std::uint32_t> found = found_.partners(a);
-    if (found.empty()) continue;
-    const std::uint64_t middle = k;
-    for (const std::uint32_t b : found) out[k++] = b;
-    if (middle > begin && out[middle - 1] > out[middle]) std::inplace_merge(out + begin, out + middle, out + k);
+    for (; i < begin_[a + 1]; ++i) {
+      out[k] = partner_[i];
+      k += has_moved_[partner_[i]] == 0;
+    }
   }
   next_begin_[bodies] = k;
   next_partner_.resize(k);

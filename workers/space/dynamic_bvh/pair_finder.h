@@ -16,9 +16,9 @@
 #include <span>
 #include <vector>
 
-#include "plugin_sdk/pair_list.h"
 #include "plugin_sdk/pair_rule.h"
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/space.h"
 #include "workers/space/dynamic_bvh/bounding_tree.h"
 
 namespace gravitas::dynamic_bvh {

@@ -20,8 +20,8 @@
 #include <numeric>
 #include <vector>
 
-#include "plugin_sdk/pair_list.h"
 #include "plugin_sdk/pair_rule.h"
+#include "plugin_sdk/space.h"
 
 namespace gravitas {
 namespace {
@@ -40,7 +40,7 @@ class SweepAndPruneSpace final : public SpacePlugin {
                 "How many of x, y, z it may sweep along: in each call the one of these along which bodies spread "
                 "most.")}};
   }
-  explicit SweepAndPruneSpace(PropertyCursor settings) : axes_(static_cast<std::size_t>(settings.number())) {}
+  explicit SweepAndPruneSpace(PropertyCursor settings) : axes_(static_cast<std::size_t>(settings.integer())) {}
 
   void pairs(const stage::SpacePairsRequest& request, const stage::SpacePairsReply& reply, Host& host) override {
     const PairRule rule(request);
@@ -52,12 +52,7 @@ class SweepAndPruneSpace final : public SpacePlugin {
 
     found_.clear();
     sweep(request, rule, axis, order, host);
-    for (std::size_t o = 0; o < outsiders_.size(); ++o) {
-      for (const std::uint32_t i : members_)
-        if (rule(outsiders_[o], i)) found_.add(outsiders_[o], i);
-      for (std::size_t p = o + 1; p < outsiders_.size(); ++p)
-        if (rule(outsiders_[o], outsiders_[p])) found_.add(outsiders_[o], outsiders_[p]);
-    }
+    test_against_all(outsiders_, rule, &found_);
     host.mark_progress();
     found_.sort(rule.bodies());
     found_.write(reply.pair());

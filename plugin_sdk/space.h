@@ -1,25 +1,26 @@
-// The pairs that a space finds, in whatever order, brought into the order of the answer.
+// What spaces do alike, whatever their structure: sort the pairs they found, and test bodies that the structure does not
+// hold.
 //
-//   PairList found;
-//   found.add(7, 3);
+//   const PairRule rule(request);
+//   found.clear();
+//   found.add(7, 3);                            in any order
+//   test_against_all(outsiders, rule, &found);
 //   found.sort(bodies);
-//   found.partners(3)      -> {7}
 //   found.write(reply.pair());
-//
-// Sorted by counting: rows of the smaller index, each put in order by itself. O(bodies + pairs) for rows that are
-// short, whatever their number.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <span>
 #include <vector>
 
+#include "plugin_sdk/pair_rule.h"
 #include "schemas/stage_frames.h"
 
 namespace gravitas {
 
+// Sorts by counting: rows of the smaller index, each put in order by itself. O(bodies + pairs) for rows that are short,
+// whatever their number.
 class PairList {
  public:
   void clear() { first_.clear(), second_.clear(); }
@@ -67,5 +68,18 @@ class PairList {
   std::vector<std::uint64_t> begin_;
   std::vector<std::uint32_t> partner_;
 };
+
+// Adds all pairs of the bodies in `outsiders`, which ascend.
+inline void test_against_all(std::span<const std::uint32_t> outsiders, const PairRule& rule, PairList* found) {
+  for (const std::uint32_t a : outsiders) {
+    // two of them meet once
+    std::size_t next = 0;
+    for (std::uint32_t b = 0; b < rule.bodies(); ++b) {
+      const bool is_outsider = next < outsiders.size() && outsiders[next] == b;
+      next += is_outsider ? 1 : 0;
+      if ((!is_outsider || b > a) && rule(a, b)) found->add(a, b);
+    }
+  }
+}
 
 }  // namespace gravitas
