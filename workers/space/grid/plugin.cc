@@ -17,6 +17,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -61,26 +62,37 @@ struct Cell {
   std::vector<std::uint32_t> bodies;
 };
 
-// Cells by their place. Open addressing with linear probing; a cell's number stays until remove_empty().
+// Cells by their place. Open addressing with linear probing; a cell's number stays until remove_empty(). The room of removed
+// cells serves later ones.
 class CellMap {
  public:
-  std::vector<Cell>& cells() { return cells_; }
+  std::span<const Cell> cells() const { return {cells_.data(), count_}; }
 
-  void clear() { cells_.clear(), numbers_.assign(16, kNone); }
+  // With room for about as many cells before the next growth.
+  void clear(std::size_t cells) {
+    count_ = 0;
+    rehash(std::bit_ceil(std::max<std::size_t>(16, 2 * cells)));
+  }
 
   // The cell at a place, made if there is none.
   Cell& at(const CellPlace& place) {
-    if (2 * cells_.size() >= numbers_.size()) rehash(2 * numbers_.size());
+    if (2 * count_ >= numbers_.size()) rehash(2 * numbers_.size());
     std::uint32_t& number = slot(place);
     if (number == kNone) {
-      number = static_cast<std::uint32_t>(cells_.size());
-      cells_.push_back({place, {}});
+      number = count_++;
+      if (number == cells_.size()) cells_.emplace_back();
+      cells_[number].place = place;
+      cells_[number].bodies.clear();
     }
     return cells_[number];
   }
 
   void remove_empty() {
-    if (std::erase_if(cells_, [](const Cell& cell) { return cell.bodies.empty(); }) > 0) rehash(numbers_.size());
+    const auto end = cells_.begin() + count_;
+    const auto live_end = std::partition(cells_.begin(), end, [](const Cell& cell) { return !cell.bodies.empty(); });
+    if (live_end == end) return;
+    count_ = static_cast<std::uint32_t>(live_end - cells_.begin());
+    rehash(numbers_.size());
   }
 
  private:
@@ -93,9 +105,10 @@ class CellMap {
 
   void rehash(std::size_t size) {
     numbers_.assign(size, kNone);
-    for (std::uint32_t i = 0; i < cells_.size(); ++i) slot(cells_[i].place) = i;
+    for (std::uint32_t i = 0; i < count_; ++i) slot(cells_[i].place) = i;
   }
 
+  std::uint32_t count_ = 0;  // of the cells in use, which are the first
   std::vector<Cell> cells_;
   std::vector<std::uint32_t> numbers_;  // a power of two of them
 };
@@ -154,7 +167,7 @@ class GridSpace final : public SpacePlugin {
     }
     if (size == cell_size_ && range_.size() == rule.bodies()) return;
     cell_size_ = size;
-    map_.clear();
+    map_.clear(rule.bodies());
     range_.assign(rule.bodies(), {});
   }
 
