@@ -1,11 +1,13 @@
 // What finding the pairs costs in every space, and in Bullet's two where it is there, on the same bodies.
 //
-//   space/<space>/<sparse|dense>/<still|moving>/<bodies>
+//   space/<space>/<sparse|dense|mixed>/<still|few|moving>/<bodies>
 //
-// Balls of radius 0.3 to 0.6 m, evenly drawn in a cube: with `sparse` a body in 30 is in a pair, with `dense` a body is
-// in some eight. `moving` ones keep their velocities, up to 2 m/s, in steps of 1/60 s, and turn back at the walls. A call is
-// given the bounds of all bodies and answers the pairs, ours exact and sorted; Bullet is given them with
-// setAabb, and answers with its pair cache, neither exact nor sorted.
+// Balls of radius 0.3 to 0.6 m, evenly drawn in a cube: with `sparse` one in thirty overlaps another, with `dense` each
+// overlaps some seven. With `mixed` the largest of 100,000 is some 300 times as large as the smallest: radius 0.1 m / sqrt(u),
+// u even in 0 to 1. `still` ones keep their bounds to the bit, with `few` every hundredth moves, with `moving` all do:
+// they keep their velocities, up to 2 m/s along each axis, in steps of 1/60 s, and turn back at the walls. A call is given
+// the bounds of all bodies and answers the pairs, ours exact and sorted; Bullet is given them with setAabb, and answers
+// with its pair cache, neither exact nor sorted.
 #include <benchmark/benchmark.h>
 
 #include <ctime>
@@ -34,17 +36,30 @@ constexpr double kTimeStep = 1.0 / 60.0;
 struct Layout {
   const char* name;
   double bodies_per_cubic_metre;
+  double (*radius)(conformance::Draw* draw);  // m
 };
-constexpr Layout kLayouts[] = {{"sparse", 0.005}, {"dense", 1.1}};
+
+double even_radius(conformance::Draw* draw) { return draw->uniform(0.3, 0.6); }
+double mixed_radius(conformance::Draw* draw) { return 0.1 / std::sqrt(draw->uniform(1e-5, 1.0)); }
+
+constexpr Layout kLayouts[] = {
+    {"sparse", 0.005, even_radius}, {"dense", 1.1, even_radius}, {"mixed", 1.1, mixed_radius}};
+
+// Every how many bodies one moves; 0: none does.
+struct Motion {
+  const char* name;
+  std::size_t every;
+};
+constexpr Motion kMotions[] = {{"still", 0}, {"few", 100}, {"moving", 1}};
 
 // The bodies of one benchmark: bounds as columns.
 class Crowd {
  public:
-  Crowd(std::uint32_t count, const Layout& layout, bool is_moving) : is_moving_(is_moving) {
+  Crowd(std::uint32_t count, const Layout& layout, const Motion& motion) : every_(motion.every) {
     conformance::Draw draw(count);
     half_edge_ = 0.5 * std::cbrt(count / layout.bodies_per_cubic_metre);
     for (std::uint32_t i = 0; i < count; ++i) {
-      radius_.push_back(draw.uniform(0.3, 0.6));
+      radius_.push_back(layout.radius(&draw));
       centre_.push_back(draw.vector(half_edge_));
       velocity_.push_back(draw.vector(2.0));
     }
@@ -57,8 +72,8 @@ class Crowd {
   }
 
   void step() {
-    if (!is_moving_) return;
-    for (std::size_t i = 0; i < centre_.size(); ++i) {
+    if (every_ == 0) return;
+    for (std::size_t i = 0; i < centre_.size(); i += every_) {
       for (int k = 0; k < 3; ++k) {
         if (std::abs(centre_[i][k]) > half_edge_) velocity_[i][k] = -std::copysign(velocity_[i][k], centre_[i][k]);
         centre_[i][k] += kTimeStep * velocity_[i][k];
@@ -81,7 +96,7 @@ class Crowd {
     }
   }
 
-  bool is_moving_;
+  std::size_t every_;
   double half_edge_;
   std::vector<double> radius_;
   std::vector<Vector3> centre_, velocity_;
@@ -198,8 +213,8 @@ double processor_seconds() {
 }
 
 template <typename Space>
-void find_pairs(benchmark::State& state, const std::string& name, const Layout& layout, bool is_moving) {
-  Crowd crowd(static_cast<std::uint32_t>(state.range(0)), layout, is_moving);
+void find_pairs(benchmark::State& state, const std::string& name, const Layout& layout, const Motion& motion) {
+  Crowd crowd(static_cast<std::uint32_t>(state.range(0)), layout, motion);
   Space space(name, crowd);
   std::size_t pairs = 0;
   const auto timed_call = [&] {
@@ -218,10 +233,10 @@ void find_pairs(benchmark::State& state, const std::string& name, const Layout& 
 template <typename Space>
 void add(const std::string& name, const std::string& library, std::int64_t most) {
   for (const Layout& layout : kLayouts) {
-    for (const bool is_moving : {false, true}) {
-      const std::string title = "space/" + name + "/" + layout.name + (is_moving ? "/moving" : "/still");
+    for (const Motion& motion : kMotions) {
+      const std::string title = "space/" + name + "/" + layout.name + "/" + motion.name;
       benchmark::internal::Benchmark* const bench = benchmark::RegisterBenchmark(
-          title.c_str(), [=](benchmark::State& state) { find_pairs<Space>(state, library, layout, is_moving); });
+          title.c_str(), [=](benchmark::State& state) { find_pairs<Space>(state, library, layout, motion); });
       bench->RangeMultiplier(10)->Range(100, most)->UseManualTime()->MinTime(0.2)->Unit(benchmark::kMicrosecond);
     }
   }
