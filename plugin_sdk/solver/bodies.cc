@@ -33,6 +33,13 @@ void SolverBodies::load(const stage::SolverSolveRequest& request) {
   }
 }
 
+SolverBodies SolverBodies::subset(const std::vector<std::uint32_t>& rows) const {
+  SolverBodies some;
+  some.bodies_.reserve(rows.size());
+  for (const std::uint32_t row : rows) some.bodies_.push_back(bodies_[row]);
+  return some;
+}
+
 ConstraintDirection ConstraintDirection::through(const Vector3& point, const Vector3& axis, const SolverBody& body1,
                                                  const SolverBody& body2) {
   ConstraintDirection d;

@@ -37,6 +37,9 @@ class SolverBodies {
   // kinematic, get inverse mass and moments 0 whatever the columns say.
   void load(const stage::SolverSolveRequest& request);
 
+  // Some of them, in the order of their rows; the last row must be the world's.
+  SolverBodies subset(const std::vector<std::uint32_t>& rows) const;
+
   // Without the world.
   std::size_t count() const { return bodies_.size() - 1; }
   // The row itself, or that of the world for kNone.

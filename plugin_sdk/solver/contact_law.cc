@@ -19,7 +19,8 @@ Matrix3 frame_of(const Vector3& normal) {
 
 }  // namespace
 
-ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBodies& bodies) {
+ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
+                       const SolverBody& two) {
   const double* material = &request.contact_material()[kMaterialColumns * i];
   ContactLaw law;
   law.dynamic_friction = material[kDynamicFriction];
@@ -27,8 +28,6 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
   law.rolling_friction = material[kRollingFriction];
   law.spinning_friction = material[kSpinningFriction];
 
-  const SolverBody& one = bodies[request.contact_body()[2 * i]];
-  const SolverBody& two = bodies[request.contact_body()[2 * i + 1]];
   const Vector3 normal = vector_at(request.contact_normal(), i);
   const Vector3 point = vector_at(request.contact_point(), i);
   const auto through = ConstraintDirection::through(point, normal, one, two);

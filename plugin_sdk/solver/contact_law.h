@@ -16,7 +16,8 @@ struct ContactLaw {
   double rolling_friction = 0.0, spinning_friction = 0.0;  // m
 };
 
-// Of contact `i` of the request.
-ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBodies& bodies);
+// Of contact `i` of the request, between two bodies.
+ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
+                       const SolverBody& two);
 
 }  // namespace gravitas

@@ -24,7 +24,7 @@ void ContactImpulses::build(const SolverBodies& bodies, const stage::SolverSolve
     const Vector3 point = vector_at(request.contact_point(), i);
     row.arm1 = point - bodies[row.body1].trial.position;
     row.arm2 = point - bodies[row.body2].trial.position;
-    const ContactLaw law = contact_law(request, i, bodies);
+    const ContactLaw law = contact_law(request, i, bodies[row.body1], bodies[row.body2]);
     row.frame = law.frame;
     row.target = law.target;
     row.dynamic_friction = law.dynamic_friction;
