@@ -28,6 +28,7 @@ DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
 struct EndBody {
   Pose pose;
   Matrix3 inverse_inertia;
+  Matrix3 stiffened;  // inverse of inertia and geometric stiffness, for a step of the pose change
 };
 
 // What is written: every island to the rows of its own bodies, discrepancies and contacts.
@@ -47,6 +48,7 @@ struct EndJoint {
   std::array<JointLaw, 3> pose_laws, velocity_laws;
   // at the end of the step
   std::array<ConstraintDirection, 3> directions;
+  Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
   Vector3 errors;  // along the axes
 };
 
@@ -60,24 +62,38 @@ struct EndContact {
   std::uint32_t lowered = 0;
 };
 
-ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2, const Matrix3& inverse1,
-                                 const Matrix3& inverse2) {
+ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2) {
   ConstraintDirection d;
   d.linear = axis;
   d.angular1 = axis.cross(arm1);
   d.angular2 = arm2.cross(axis);
+  return d;
+}
+
+ConstraintDirection turning_about(const Vector3& axis) {
+  ConstraintDirection d;
+  d.angular1 = -axis;
+  d.angular2 = axis;
+  return d;
+}
+
+// The row with what a unit of its multiplier turns the bodies by.
+ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2) {
   d.turn1 = inverse1 * d.angular1;
   d.turn2 = inverse2 * d.angular2;
   return d;
 }
 
-ConstraintDirection turning_at(const Vector3& axis, const Matrix3& inverse1, const Matrix3& inverse2) {
-  ConstraintDirection d;
-  d.angular1 = -axis;
-  d.angular2 = axis;
-  d.turn1 = inverse1 * d.angular1;
-  d.turn2 = inverse2 * d.angular2;
-  return d;
+// (I + K)^-1 of a body with inverse moments D in its principal axes R: R D^1/2 (1 + D^1/2 R^T K R D^1/2)^-1 D^1/2 R^T.
+// Directions in which K would take away more than half of the inertia count as half.
+Matrix3 stiffened_inverse(const Quaternion& orientation, const Vector3& inverse_moments, const Matrix3& stiffness) {
+  const Matrix3 rotation = to_rotation_matrix(orientation);
+  const Matrix3 root = rotation * inverse_moments.cwiseSqrt().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix3> modes(root.transpose() * stiffness * root);
+  if (modes.info() != Eigen::Success) return world_inverse_inertia(orientation, inverse_moments);
+  const Vector3 share = (1.0 + modes.eigenvalues().array().max(-0.5)).inverse();
+  const Matrix3 base = root * modes.eigenvectors();
+  return base * share.asDiagonal() * base.transpose();
 }
 
 class IslandSolver {
@@ -122,7 +138,8 @@ class IslandSolver {
     velocity_ = start_motion(&SolverBody::trial_velocity);
     displacement_ = offset_ = start_motion(nullptr);
     end_.resize(bodies_.count() + 1);
-    for (std::uint32_t i = 0; i <= bodies_.count(); ++i) end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia};
+    for (std::uint32_t i = 0; i <= bodies_.count(); ++i)
+      end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
     for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
     const DiscrepancyColumns columns = columns_of(request_);
     for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
@@ -207,6 +224,45 @@ class IslandSolver {
     for (EndJoint& joint : joints_) move_to_end(&joint);
   }
 
+  // What a turn of a body adds to the moments that the corrections mu exert on it: the arm r of a push p turns along, so
+  // K = (p.r) 1 - (p r^T + r p^T)/2. Under tension this holds a light link between heavy ones more than its inertia does,
+  // and without it steps that take the directions anew each time run away (T h^2/(m l) > 1).
+  void stiffen() {
+    std::vector<Matrix3> stiffness(bodies_.count() + 1, Matrix3::Zero());
+    for (const EndJoint& joint : joints_) {
+      if (joint.discrepancy.is_angular()) continue;
+      Vector3 push = Vector3::Zero();
+      for (std::size_t k = 0; k < 3; ++k)
+        push += answer_.joint_correction[3 * joint.row + k] * joint.directions[k].linear;
+      const auto add = [&](std::uint32_t body, const Vector3& arm, const Vector3& p) {
+        const Matrix3 product = p * arm.transpose();
+        stiffness[body] += p.dot(arm) * Matrix3::Identity() - 0.5 * (product + product.transpose());
+      };
+      add(joint.body1, joint.arm1, -push);
+      add(joint.body2, joint.arm2, push);
+    }
+    for (const std::uint32_t i : pushed_) {
+      end_[i].stiffened = stiffness[i].isZero(0.0)
+                              ? end_[i].inverse_inertia
+                              : stiffened_inverse(end_[i].pose.orientation,
+                                                  vector_at(request_.inverse_inertia(), rows_[i]), stiffness[i]);
+    }
+  }
+
+  // Newton's step for delta = offset + M^-1 J^T mu with the stiffness: x0 = delta_k + (M + K)^-1 M (offset - delta_k).
+  BodyMotion start_of_step() const {
+    BodyMotion x0 = offset_;
+    for (const std::uint32_t i : pushed_) {
+      const Vector3 missing = offset_[i].angular - displacement_[i].angular;
+      if (missing.isZero(0.0) || end_[i].stiffened == end_[i].inverse_inertia) continue;
+      Vector3 moments = vector_at(request_.inverse_inertia(), rows_[i]);
+      for (double& moment : moments) moment = moment > 0.0 ? 1.0 / moment : 0.0;
+      x0[i].angular =
+          displacement_[i].angular + end_[i].stiffened * (world_inertia(end_[i].pose.orientation, moments) * missing);
+    }
+    return x0;
+  }
+
   void move_to_end(EndJoint* joint) const {
     const Discrepancy& d = joint->discrepancy;
     const SolverBody &one = bodies_[joint->body1], &two = bodies_[joint->body2];
@@ -215,8 +271,7 @@ class IslandSolver {
       const Vector3 error =
           d.point2 - d.point1 + displacement_[joint->body2].angular - displacement_[joint->body1].angular;
       for (int k = 0; k < 3; ++k) {
-        joint->directions[static_cast<std::size_t>(k)] =
-            turning_at(joint->axes.col(k), end1.inverse_inertia, end2.inverse_inertia);
+        joint->directions[static_cast<std::size_t>(k)] = turning_about(joint->axes.col(k));
         joint->errors[k] = joint->axes.col(k).dot(error);
       }
       return;
@@ -231,8 +286,9 @@ class IslandSolver {
       const double length = error.norm();
       const bool is_radial = d.is_radial() && k == 0 && length > 0.0;
       if (is_radial) axis = error / length;
-      joint->directions[static_cast<std::size_t>(k)] = direction_at(
-          axis, middle - end1.pose.position, middle - end2.pose.position, end1.inverse_inertia, end2.inverse_inertia);
+      joint->directions[static_cast<std::size_t>(k)] =
+          direction_at(axis, middle - end1.pose.position, middle - end2.pose.position);
+      joint->arm1 = middle - end1.pose.position, joint->arm2 = middle - end2.pose.position;
       joint->errors[k] = is_radial ? length : axis.dot(error);
     }
   }
@@ -243,12 +299,14 @@ class IslandSolver {
     double last = std::numeric_limits<double>::infinity();
     for (int step = 0; step < kPoseSteps; ++step) {
       move_to_end();
+      stiffen();
       build_pose();
       const double representable = 0.25 * kRounding * coordinates_;
-      const ConeSummary solved = cone_.solve(bodies_, offset_, representable, settings_.cone);
+      const BodyMotion x0 = start_of_step();
+      const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_.cone);
       note(solved);
       has_pose_ = solved.has_converged;
-      BodyMotion next = offset_;
+      BodyMotion next = x0;
       cone_.push(bodies_, &next);
       const double change = largest_change(next, displacement_), size = largest(next);
       displacement_ = std::move(next);
@@ -269,7 +327,7 @@ class IslandSolver {
         if (!joint.pose_laws[k].is_active()) continue;
         ConeRow& row = cone_.rows.emplace_back();
         row.body1 = joint.body1, row.body2 = joint.body2;
-        row.direction = joint.directions[k];
+        row.direction = with_turns(joint.directions[k], end_[joint.body1].stiffened, end_[joint.body2].stiffened);
         row.length = joint.length;
         row.law = joint.pose_laws[k];
         row.multiplier = answer_.joint_correction[3 * joint.row + k];
@@ -281,7 +339,7 @@ class IslandSolver {
     for (const EndContact& contact : contacts_) {
       ConeRow& row = cone_.rows.emplace_back();
       row.body1 = contact.body1, row.body2 = contact.body2;
-      row.direction = contact.gap_row;
+      row.direction = with_turns(contact.gap_row, end_[contact.body1].stiffened, end_[contact.body2].stiffened);
       row.law.has_lower = true;
       row.law.lower_target = contact.gap_target;
       row.multiplier = answer_.contact_correction[contact.row];
@@ -341,7 +399,8 @@ class IslandSolver {
         if (!joint.velocity_laws[k].is_active()) continue;
         ConeRow& row = cone_.rows.emplace_back();
         row.body1 = joint.body1, row.body2 = joint.body2;
-        row.direction = joint.directions[k];
+        row.direction =
+            with_turns(joint.directions[k], end_[joint.body1].inverse_inertia, end_[joint.body2].inverse_inertia);
         row.length = joint.length;
         row.law = joint.velocity_laws[k];
         row.multiplier = answer_.joint_impulse[3 * joint.row + k];
@@ -371,10 +430,10 @@ class IslandSolver {
       row.multiplier = multiplier;
     };
     for (int k = 0; k < (cone.has_friction ? 3 : 1); ++k)
-      add(direction_at(law.frame.col(k), contact.arm1, contact.arm2, inverse1, inverse2), 1.0, impulse[k]);
+      add(with_turns(direction_at(law.frame.col(k), contact.arm1, contact.arm2), inverse1, inverse2), 1.0, impulse[k]);
     const double length = std::max(bodies_[contact.body1].gyration(), bodies_[contact.body2].gyration());
     for (int k = 0; k < (cone.has_turning ? 3 : 0); ++k)
-      add(turning_at(law.frame.col(k), inverse1, inverse2), length, 0.0);
+      add(with_turns(turning_about(law.frame.col(k)), inverse1, inverse2), length, 0.0);
   }
 
   void keep_impulses() {
