@@ -252,7 +252,9 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     Eigen::VectorXd best_lambda = lambda, best_y = y;
     int without = 0;
     std::uint32_t done = 0;
-    while (best > tolerance && done < settings.iterations) {
+    // what rounding leaves of sums of large terms is no violation
+    double enough = tolerance;
+    while (best > enough && done < settings.iterations) {
       ++done;
       if (is_newton && without < kPatience && newton_step(&lambda, &y)) {
         ++without;
@@ -267,20 +269,32 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       if (!(residual < best)) continue;
       if (residual < 0.5 * best) without = 0;
       best = residual, best_lambda = lambda, best_y = y;
+      enough = std::max(tolerance, 16.0 * kRounding * largest_sum(lambda));
     }
     // one step more costs little and ends at rounding
-    if (is_newton && best <= tolerance && done > 0 && newton_step(&lambda, &y)) {
+    if (is_newton && best <= enough && done > 0 && newton_step(&lambda, &y)) {
       residual = residual_of(lambda, y);
       if (residual < best) best = residual, best_lambda = lambda, best_y = y;
     }
     summary->iterations += done;
     summary->residual = best;
-    summary->has_converged = best <= tolerance;
+    summary->has_converged = best <= enough;
     lambda_ = best_lambda;
     if (let_slide(best_lambda, best_y, kSlip * std::max(best, tolerance))) continue;
     into_cones(&lambda_);
     return;
   }
+}
+
+// Largest of what a row's value is summed from, m/s.
+double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
+  double most = 0.0;
+  for (Eigen::Index i = 0; i < lambda.size(); ++i) {
+    const std::uint32_t r = other_[static_cast<std::size_t>(i)];
+    const double sum = std::fabs(start_others_[i]) + response_.row(i).cwiseAbs().dot(lambda.cwiseAbs().transpose());
+    most = std::max(most, sum * scale_[r] * rows[r].length);
+  }
+  return most;
 }
 
 // Held rows and the others in turn.

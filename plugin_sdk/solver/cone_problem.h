@@ -105,6 +105,7 @@ class ConeProblem {
   // Of a block with scaled multipliers and values: where the law puts them.
   void project(const Block& block, const double* lambda, const double* y, double* projected) const;
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
+  double largest_sum(const Eigen::VectorXd& lambda) const;
   void linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, Eigen::MatrixXd* matrix,
                  Eigen::VectorXd* side) const;
   bool newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
