@@ -1,7 +1,7 @@
 // How fast two surfaces arrive at each other within a step, and the restitution that follows.
 #pragma once
 
-#include "workers/solver/sequential/relaxation_bodies.h"
+#include "plugin_sdk/solver/bodies.h"
 
 namespace gravitas {
 
@@ -18,7 +18,6 @@ double arrival_speed(double start_velocity, double trial_velocity, double gap_at
 // displaced as rigid bodies with the arms they have at S*. Turning round the normal or about a
 // sphere's own centre changes no gap; the surface points themselves carried back would open one of
 // r(1 - cos w h), and a ball that rolls fast would bounce on the flat.
-double gap_before(double gap, const RelaxationDirection& direction, const RelaxationBody& body1,
-                  const RelaxationBody& body2);
+double gap_before(double gap, const ConstraintDirection& direction, const SolverBody& body1, const SolverBody& body2);
 
 }  // namespace gravitas

@@ -1,5 +1,5 @@
 // The three cases of a frictional contact, and the search for the direction of a slide.
-#include "workers/solver/sequential/coulomb_contact.h"
+#include "plugin_sdk/solver/coulomb_contact.h"
 
 #include <array>
 #include <cmath>

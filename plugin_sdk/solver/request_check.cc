@@ -1,5 +1,5 @@
 // The checks of a request, column by column in the order of the message.
-#include "workers/solver/sequential/solver_request_check.h"
+#include "plugin_sdk/solver/request_check.h"
 
 #include <cmath>
 #include <cstdint>

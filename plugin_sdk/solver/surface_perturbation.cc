@@ -1,5 +1,5 @@
 // Philox as published, and the tilt of a normal.
-#include "workers/solver/sequential/surface_perturbation.h"
+#include "plugin_sdk/solver/surface_perturbation.h"
 
 namespace gravitas {
 namespace {

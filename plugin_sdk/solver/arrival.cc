@@ -1,5 +1,5 @@
 // Arrival speeds: one square root and the rules that make a resting contact rest.
-#include "workers/solver/sequential/arrival.h"
+#include "plugin_sdk/solver/arrival.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 namespace gravitas {
 namespace {
 
-Twist displacement_of(const RelaxationBody& body) {
+Twist displacement_of(const SolverBody& body) {
   const Quaternion turn = body.trial.orientation * body.start.orientation.conjugate();
   return {body.trial.position - body.start.position, log_rotation(turn)};
 }
@@ -24,8 +24,7 @@ double arrival_speed(double start_velocity, double trial_velocity, double gap_at
   return speed < 2.0 * std::fabs(gained) ? 0.0 : speed;
 }
 
-double gap_before(double gap, const RelaxationDirection& direction, const RelaxationBody& body1,
-                  const RelaxationBody& body2) {
+double gap_before(double gap, const ConstraintDirection& direction, const SolverBody& body1, const SolverBody& body2) {
   return gap - direction.along(displacement_of(body1), displacement_of(body2));
 }
 

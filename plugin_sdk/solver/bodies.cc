@@ -1,5 +1,5 @@
 // Reading the bodies of a request, and the rows that push two of them.
-#include "workers/solver/sequential/relaxation_bodies.h"
+#include "plugin_sdk/solver/bodies.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,18 +9,18 @@
 
 namespace gravitas {
 
-double RelaxationBody::gyration() const {
+double SolverBody::gyration() const {
   const double turning = inverse_inertia.trace() / 3.0;
   if (!(turning > 0.0)) return 0.0;
   return inverse_mass > 0.0 ? std::sqrt(inverse_mass / turning) : 1.0;
 }
 
-void RelaxationBodies::load(const stage::SolverSolveRequest& request) {
+void SolverBodies::load(const stage::SolverSolveRequest& request) {
   const std::size_t rows = request.flags().size();
   bodies_.clear();
   bodies_.resize(rows + 1);
   for (std::size_t i = 0; i < rows; ++i) {
-    RelaxationBody& body = bodies_[i];
+    SolverBody& body = bodies_[i];
     body.start = {vector_at(request.position(), i), quaternion_at(request.orientation(), i)};
     body.trial = {vector_at(request.trial_position(), i), quaternion_at(request.trial_orientation(), i)};
     body.start_velocity = {vector_at(request.linear_velocity(), i), vector_at(request.angular_velocity(), i)};
@@ -33,9 +33,16 @@ void RelaxationBodies::load(const stage::SolverSolveRequest& request) {
   }
 }
 
-RelaxationDirection RelaxationDirection::through(const Vector3& point, const Vector3& axis, const RelaxationBody& body1,
-                                                 const RelaxationBody& body2) {
-  RelaxationDirection d;
+SolverBodies SolverBodies::subset(const std::vector<std::uint32_t>& rows) const {
+  SolverBodies some;
+  some.bodies_.reserve(rows.size());
+  for (const std::uint32_t row : rows) some.bodies_.push_back(bodies_[row]);
+  return some;
+}
+
+ConstraintDirection ConstraintDirection::through(const Vector3& point, const Vector3& axis, const SolverBody& body1,
+                                                 const SolverBody& body2) {
+  ConstraintDirection d;
   d.linear = axis;
   d.angular1 = axis.cross(point - body1.trial.position);
   d.angular2 = (point - body2.trial.position).cross(axis);
@@ -44,9 +51,8 @@ RelaxationDirection RelaxationDirection::through(const Vector3& point, const Vec
   return d;
 }
 
-RelaxationDirection RelaxationDirection::about(const Vector3& axis, const RelaxationBody& body1,
-                                               const RelaxationBody& body2) {
-  RelaxationDirection d;
+ConstraintDirection ConstraintDirection::about(const Vector3& axis, const SolverBody& body1, const SolverBody& body2) {
+  ConstraintDirection d;
   d.angular1 = -axis;
   d.angular2 = axis;
   d.turn1 = body1.inverse_inertia * d.angular1;
@@ -54,7 +60,7 @@ RelaxationDirection RelaxationDirection::about(const Vector3& axis, const Relaxa
   return d;
 }
 
-void RelaxationDirection::subtract(double share, const RelaxationDirection& other) {
+void ConstraintDirection::subtract(double share, const ConstraintDirection& other) {
   linear -= share * other.linear;
   angular1 -= share * other.angular1;
   angular2 -= share * other.angular2;
@@ -62,14 +68,14 @@ void RelaxationDirection::subtract(double share, const RelaxationDirection& othe
   turn2 -= share * other.turn2;
 }
 
-Matrix3 point_response(const RelaxationBody& body, const Vector3& at, const Vector3& from) {
+Matrix3 point_response(const SolverBody& body, const Vector3& at, const Vector3& from) {
   return body.inverse_mass * Matrix3::Identity() - skew(at) * body.inverse_inertia * skew(from);
 }
 
-double closing_slop(const Vector3& point, const RelaxationBody& body1, const RelaxationBody& body2) {
+double closing_slop(const Vector3& point, const SolverBody& body1, const SolverBody& body2) {
   double arm = 0.0;
   double coordinates = point.cwiseAbs().maxCoeff();
-  for (const RelaxationBody* body : {&body1, &body2}) {
+  for (const SolverBody* body : {&body1, &body2}) {
     if (!body->is_pushed()) continue;
     arm = std::max(arm, (point - body->trial.position).norm());
     coordinates = std::max(coordinates, body->trial.position.cwiseAbs().maxCoeff());

@@ -1,5 +1,5 @@
 // The table of joint_laws.h, line by line.
-#include "workers/solver/sequential/joint_laws.h"
+#include "plugin_sdk/solver/joint_laws.h"
 
 #include <algorithm>
 
