@@ -172,7 +172,13 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   }
 
   void newton() {
-    for (std::size_t b = 0; b < bodies_.size(); ++b) start_from(b);
+    find_groups();
+    // linear around the start's positions first, where a stiff force has its meaning
+    if (newton_from(0.0, 1.0) || newton_from(1.0, 1.0) || newton_from(0.0, 0.0)) return;
+    throw Refusal("the equations of the midpoint have no solution that can be found; allowed: a shorter time step");
+  }
+
+  void find_groups() {
     groups_.clear();
     std::vector<std::size_t> place(derivatives_->size());
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
@@ -184,21 +190,30 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       Group& group = groups_.emplace_back();
       for (const std::size_t row : rows) group.body.push_back(place[row]);
     }
+  }
+
+  // From shares of the velocities at the start; false where it does not converge.
+  bool newton_from(double linear, double angular) {
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      start_from(b);
+      at(unknown_, b).head<3>() *= linear;
+      at(unknown_, b).tail<3>() *= angular;
+    }
     double last = HUGE_VAL;
     for (int step = 0; step < kMostNewtonSteps; ++step) {
       host_->mark_progress();
+      if (!unknown_.allFinite()) return false;
       const Eigen::VectorXd left = residual(unknown_);
-      if (!left.allFinite()) break;
+      if (!left.allFinite()) return false;
       // the matrix of a step that gained two digits serves the next
       if (!(last < 1e-2)) factor(left);
       const Eigen::VectorXd change = solved(left);
-      if (!change.allFinite()) break;
       unknown_ -= change;
       const double size = size_of(change);
-      if (size <= kConverged || (size <= kStagnant && size >= 0.5 * last)) return;
+      if (size <= kConverged || (size <= kStagnant && size >= 0.5 * last)) return true;
       last = size;
     }
-    throw Refusal("the equations of the midpoint have no solution that can be found; allowed: a shorter time step");
+    return false;
   }
 
   // The matrix of the residual by differences at the unknown, group by group.

@@ -141,11 +141,12 @@ class SymplecticSplitting final : public IntegratorPlugin {
     } else if (!(inverse_moments.minCoeff() > 0.0)) {
       throw Refusal("body " + std::to_string(body) + " can be turned about some of its axes alone");
     } else {
-      const Vector3 momentum =
-          vector_at(request_->inertia(), body).cwiseProduct(state.pose.orientation.conjugate() * w);
+      const Vector3 moments = vector_at(request_->inertia(), body);
+      const Vector3 momentum = moments.cwiseProduct(state.pose.orientation.conjugate() * w);
       const RotorMotion moved = free_rotor(inverse_moments, momentum, slowed);
       state.pose.orientation = normalized(state.pose.orientation * moved.turn);
-      w = state.pose.orientation * inverse_moments.cwiseProduct(moved.momentum);
+      // divided, for moments times rounded inverses would gather the same error in each step
+      w = state.pose.orientation * moved.momentum.cwiseQuotient(moments);
     }
     state.twist = {kept * state.twist.linear, kept * w};
     trial_.set(body, state);
