@@ -11,7 +11,7 @@ void Environment::ask_forces(const std::array<ColumnId, 5>& state) {
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     const ForceAnswer& answer = data_.force_answers[g];
-    const std::array<ColumnId, 12> request = {state[0],
+    const std::array<ColumnId, 16> request = {state[0],
                                               group.type.id(),
                                               group.parameter_begin.id(),
                                               group.parameter.id(),
@@ -22,7 +22,11 @@ void Environment::ask_forces(const std::array<ColumnId, 5>& state) {
                                               state[1],
                                               state[2],
                                               state[3],
-                                              state[4]};
+                                              state[4],
+                                              model_.body_shape.id(),
+                                              model_.shape_type.id(),
+                                              model_.shape_parameter_begin.id(),
+                                              model_.shape_parameter.id()};
     const std::array<ColumnId, 4> reply = {answer.wrench.id(), answer.impulse.id(), answer.potential.id(),
                                            answer.flags.id()};
     const StageCall call{stage::Method::kForceWrenches, group.target, request, reply};

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
 
@@ -40,6 +41,10 @@ std::span<const double> Derivatives::wrenches_at_start() {
 
 std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial) {
   if (request_.wrench_is_constant() != 0) return request_.wrench();
+  require_finite(trial.position, 3, "trial position");
+  require_finite(trial.orientation, 4, "trial attitude");
+  require_finite(trial.linear_velocity, 3, "trial velocity");
+  require_finite(trial.angular_velocity, 3, "trial angular velocity");
   return ask(time, {trial.position, trial.orientation, trial.linear_velocity, trial.angular_velocity});
 }
 
@@ -50,7 +55,15 @@ std::span<const double> Derivatives::ask(double time, const std::array<std::span
   gravitas_reply_column answer = {answer_.data(), answer_.size(), 0};
   host_.derivative(question.data(), &answer);
   if (answer.count != answer_.size()) throw std::runtime_error("the derivative has the wrong size");
+  require_finite(answer_, 6, "wrench");
   return answer_;
+}
+
+void Derivatives::require_finite(std::span<const double> column, std::size_t components, const char* what) const {
+  const std::size_t index = first_not_finite(column);
+  if (index != kNoRow)
+    throw Refusal("the " + std::string(what) + " of body " + std::to_string(index / components) +
+                  " is not finite: its state, forces, inertia, damping or the time step overflow");
 }
 
 Acceleration Derivatives::acceleration(std::size_t body, const BodyState& state,
@@ -71,6 +84,10 @@ Twist accelerated(const Twist& twist, const Acceleration& acceleration, double d
 
 double damping_factor(double damping, double time_step) {
   return damping == 0.0 ? 1.0 : math::exp(-damping * time_step);
+}
+
+double damped_time(double damping, double time_step) {
+  return damping == 0.0 ? time_step : -math::expm1(-damping * time_step) / damping;
 }
 
 namespace detail {

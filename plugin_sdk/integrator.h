@@ -35,7 +35,8 @@ class Derivatives {
   // `room` is kept by the plugin from call to call, so that a step allocates nothing.
   Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host, std::vector<double>* room);
 
-  // Wrenches of all bodies (six numbers each) in the initial state of the step, or in a trial state.
+  // Wrenches of all bodies (six numbers each) in the initial state of the step, or in a trial state. Throws Refusal,
+  // naming the body, for a trial state that is not finite, and for wrenches that are not.
   std::span<const double> wrenches_at_start();
   std::span<const double> wrenches(double time, const TrialColumns& trial);
 
@@ -46,6 +47,7 @@ class Derivatives {
   std::size_t size() const { return request_.flags().size(); }
 
  private:
+  void require_finite(std::span<const double> column, std::size_t components, const char* what) const;
   std::span<const double> ask(double time, const std::array<std::span<const double>, 4>& state);
 
   const stage::IntegratorIntegrateRequest& request_;
@@ -65,6 +67,9 @@ Twist accelerated(const Twist& twist, const Acceleration& acceleration, double d
 
 // Factor by which damping slows a body in time h: exp(-c h) for any c >= 0, never a change of sign.
 double damping_factor(double damping, double time_step);
+
+// The time (s) in which an undamped body goes as far as a damped one in h: (1 - exp(-c h)) / c.
+double damped_time(double damping, double time_step);
 
 namespace detail {
 BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body);

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "schemas/frame/layout.h"
+
 namespace gravitas {
 namespace {
 
@@ -45,6 +47,8 @@ Property Property::table(std::string name, std::uint32_t columns, std::string un
   property.columns = columns;
   return property;
 }
+
+Property Property::body(std::string name) { return make(PropertyKind::kBody, std::move(name), "", ""); }
 
 Property Property::at_least(double bound) && {
   minimum = bound;
@@ -114,6 +118,14 @@ std::uint32_t PropertyCursor::choice() {
   if (position < 0 || position > std::numeric_limits<std::uint32_t>::max())
     throw std::out_of_range("not the position of a choice");
   return static_cast<std::uint32_t>(position);
+}
+
+std::uint32_t PropertyCursor::body() {
+  const double value = number();
+  if (std::isnan(value)) return GRAVITAS_NONE;
+  if (!(value >= 0.0 && value < GRAVITAS_NONE) || value != std::floor(value))
+    throw std::out_of_range("not the row of a body");
+  return static_cast<std::uint32_t>(value);
 }
 
 Vector3 PropertyCursor::vector() {

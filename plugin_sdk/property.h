@@ -5,7 +5,7 @@
 //
 // A plugin receives the values of its properties as plain numbers, flattened in the order of declaration:
 // a number, integer, flag (1 or 0) or choice (its position) takes one, a vector three, a quaternion four
-// (w, x, y, z), a table its row count followed by its rows. A property that may be absent and is, is NaN
+// (w, x, y, z), a table its row count followed by its rows, a body its row in the columns of bodies. A property that may be absent and is, is NaN
 // (a table: zero rows). PropertyCursor reads them back in the same order.
 #pragma once
 
@@ -26,7 +26,8 @@ enum class PropertyKind : std::uint32_t {
   kChoice = 4,
   kVector = 5,
   kQuaternion = 6,
-  kTable = 7
+  kTable = 7,
+  kBody = 8  // named by its id in a scene
 };
 
 struct Property {
@@ -53,6 +54,8 @@ struct Property {
   static Property vector(std::string name, std::string unit, std::string frame);
   static Property quaternion(std::string name, std::string frame);
   static Property table(std::string name, std::uint32_t columns, std::string unit, std::string frame);
+  // May be absent. Of forces only.
+  static Property body(std::string name);
 
   Property at_least(double bound) &&;
   Property above(double bound) &&;
@@ -81,6 +84,8 @@ class PropertyCursor {
   Quaternion quaternion();
   // Rows of `columns` numbers each.
   std::span<const double> table(std::uint32_t columns);
+  // Row of a body, or GRAVITAS_NONE where none is named.
+  std::uint32_t body();
   // True when every number has been read.
   bool at_end() const { return position_ == numbers_.size(); }
 

@@ -21,7 +21,8 @@ bool takes(const Property& p, double number) {
   if (p.kind == PropertyKind::kFlag) return number == 0.0 || number == 1.0;
   if (p.kind == PropertyKind::kChoice && (number < 0.0 || number >= static_cast<double>(p.choices.size())))
     return false;
-  const bool is_whole = p.kind == PropertyKind::kInteger || p.kind == PropertyKind::kChoice;
+  const bool is_whole =
+      p.kind == PropertyKind::kInteger || p.kind == PropertyKind::kChoice || p.kind == PropertyKind::kBody;
   return !is_whole || number == std::floor(number);
 }
 
@@ -151,6 +152,10 @@ bool take(const Property& declared, const PropertyValue& given, std::vector<doub
       if (given.kind != Kind::kNumber || !in_bounds(declared, given.number) ||
           given.number != std::floor(given.number) || std::fabs(given.number) > kLargestInteger)
         return refuse(declared, given, problems);
+      out->push_back(given.number);
+      return true;
+    case PropertyKind::kBody:  // whoever knows the bodies has put the row in the id's place
+      if (given.kind != Kind::kNumber || !(given.number >= 0.0)) return refuse(declared, given, problems);
       out->push_back(given.number);
       return true;
     case PropertyKind::kFlag:
@@ -313,6 +318,8 @@ std::string allowed_values(const Property& declared) {
       return "a list of 4 numbers (w, x, y, z)" + each;
     case PropertyKind::kTable:
       return "a list of rows of " + std::to_string(declared.columns) + " numbers" + each;
+    case PropertyKind::kBody:
+      return "the id of a body";
   }
   return "nothing";
 }

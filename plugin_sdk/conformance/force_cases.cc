@@ -59,7 +59,12 @@ class Forces {
       append(&columns.f64("orientation"), body.pose.orientation);
       append(&columns.f64("linear_velocity"), body.twist.linear);
       append(&columns.f64("angular_velocity"), body.twist.angular);
+      columns.u32("body_shape").push_back(static_cast<std::uint32_t>(columns.u32("body_shape").size() % 2));
     }
+    // a ball and a box, in turn
+    columns.u64("shape_type") = {type_id("Sphere"), type_id("Box")};
+    columns.u32("shape_parameter_begin") = {0, 1, 4};
+    columns.f64("shape_parameter") = {0.5, 0.3, 0.4, 0.5};
     return columns;
   }
 };

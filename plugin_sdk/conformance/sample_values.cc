@@ -31,6 +31,7 @@ void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* 
       break;
     case PropertyKind::kFlag:
     case PropertyKind::kChoice:
+    case PropertyKind::kBody:
       out->push_back(0.0);
       break;
     case PropertyKind::kVector:

@@ -31,7 +31,7 @@ std::string judge_default(const Property& p) {
 }
 
 std::string judge_property(const Property& p) {
-  if (p.kind < PropertyKind::kNumber || p.kind > PropertyKind::kTable) return "is of no kind that exists";
+  if (p.kind < PropertyKind::kNumber || p.kind > PropertyKind::kBody) return "is of no kind that exists";
   if (p.meaning.empty()) return "has no meaning";
   if (!(p.minimum <= p.maximum)) return "has bounds between which there is no number";
   if (p.kind == PropertyKind::kChoice && p.choices.empty()) return "is a choice between nothing";

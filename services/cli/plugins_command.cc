@@ -32,6 +32,8 @@ std::string kind_name(PropertyKind kind) {
       return "{w, x, y, z}";
     case PropertyKind::kTable:
       return "table";
+    case PropertyKind::kBody:
+      return "text";
   }
   return "?";
 }

@@ -12,6 +12,7 @@
 #include "services/scene/build_materials.h"
 #include "services/scene/build_plugins.h"
 #include "services/scene/build_shapes.h"
+#include "services/scene/force_bodies.h"
 
 namespace gravitas::scene {
 namespace {
@@ -70,7 +71,7 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
   build_steps(properties, context);
 }
 
-void build_forces(PluginSelection* plugins, BuildContext* context) {
+void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
   for (const v1::Force& force : context->scene.forces().force()) {
     kernel::ForceDescription& description = context->description.forces.emplace_back();
     description.id = force.id();
@@ -79,8 +80,7 @@ void build_forces(PluginSelection* plugins, BuildContext* context) {
     const TextPosition place = place_of(force, v1::Force::kTypeFieldNumber);
     description.plugin = plugins->serve(Slot::kForce, force.type(), place, &type);
     if (type == nullptr) continue;
-    context->flatten_properties(type->properties, force.custom_properties(), place_of(force.location()),
-                                force.type() + " \"" + force.id() + '"', &description.parameters);
+    flatten_force(*type, force, bodies, context, &description.parameters);
   }
 }
 
@@ -160,8 +160,9 @@ void build_world(BuildContext* context) {
   PluginSelection plugins(context);
   plugins.choose(Slot::kSpace, environment.space(), has_shapes);
   const std::vector<Solid> solids = build_shapes(plugins.choose_collision(has_shapes), context);
-  build_forces(&plugins, context);
+  build_forces(bodies, &plugins, context);
   build_bodies({geometries, materials, forces, solids}, context);
+  if (diagnostics->ok()) complete_forces(context);
   // rows of bodies are complete unless there were too many errors to go on
   if (!diagnostics->full()) build_constraints(bodies, &plugins, context);
   if (!diagnostics->full()) build_filter(bodies, context);

@@ -69,6 +69,10 @@ class Property:
     def table(name, columns, unit, frame, **more):
         return Property(name, _KINDS.KIND_TABLE, 1, columns=columns, unit=unit, frame=frame, **more)
 
+    @staticmethod
+    def body(name, **more):
+        return Property(name, _KINDS.KIND_BODY, 1, **more)
+
     def read(self, numbers):
         """The value at the front of flattened numbers, and how many it takes. Raises Refusal."""
         if len(numbers) < self.size:

@@ -47,6 +47,7 @@ TEST(DescriptionMessage, NamesEveryKindAsTheSchemaDoes) {
   EXPECT_EQ(code(PropertyKind::kVector), Message::KIND_VECTOR);
   EXPECT_EQ(code(PropertyKind::kQuaternion), Message::KIND_QUATERNION);
   EXPECT_EQ(code(PropertyKind::kTable), Message::KIND_TABLE);
+  EXPECT_EQ(code(PropertyKind::kBody), Message::KIND_BODY);
 }
 
 // From a worker of a later version.

@@ -16,6 +16,12 @@ struct ForcedBody {
   Pose pose = {};      // of the centre of mass
   Pose geometry = {};  // of the geometry's frame in the body's
   Twist twist = {};
+  std::uint32_t shape = kNone;  // row of the problem's shapes
+};
+
+struct ForceShape {
+  std::uint64_t type;
+  std::vector<double> parameters;
 };
 
 struct ForceAnswer {
@@ -31,6 +37,7 @@ struct ForceProblem {
   std::vector<std::vector<double>> properties;
   std::vector<ForcedBody> bodies;
   std::vector<std::uint32_t> applications;
+  std::vector<ForceShape> shapes = {};
 
   MessageColumns request() const {
     MessageColumns columns = PluginUnderTest::request_of(stage::Method::kForceWrenches);
@@ -59,6 +66,14 @@ struct ForceProblem {
       append_rotation("orientation", body.pose.orientation);
       append("linear_velocity", body.twist.linear);
       append("angular_velocity", body.twist.angular);
+      columns.u32("body_shape").push_back(body.shape);
+    }
+    columns.u32("shape_parameter_begin") = {0};
+    for (const ForceShape& shape : shapes) {
+      columns.u64("shape_type").push_back(shape.type);
+      std::vector<double>& all = columns.f64("shape_parameter");
+      all.insert(all.end(), shape.parameters.begin(), shape.parameters.end());
+      columns.u32("shape_parameter_begin").push_back(static_cast<std::uint32_t>(all.size()));
     }
     return columns;
   }

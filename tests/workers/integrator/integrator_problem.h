@@ -28,12 +28,16 @@ struct FreeBody {
 
 class IntegratorProblem {
  public:
-  explicit IntegratorProblem(const std::string& library) : plugin(library) {}
+  explicit IntegratorProblem(const std::string& library, const std::vector<double>& settings = {})
+      : plugin(library, settings) {}
 
   double time = 0.0;
   double time_step = 0.1;
   bool wrench_is_constant = true;
   std::vector<FreeBody> bodies;
+  std::vector<double> plugin_state;    // as answered last
+  std::vector<std::uint32_t> changed;  // of the next step; empty: nothing was
+  double error_estimate = 0.0;         // of the last step
   PluginUnderTest plugin;
 
   MessageColumns request() const {
@@ -62,6 +66,8 @@ class IntegratorProblem {
       append("angular_velocity", body.state.twist.angular);
       columns.u32("state_changed").push_back(0);
     }
+    if (!changed.empty()) columns.u32("state_changed") = changed;
+    columns.f64("plugin_state") = plugin_state;
     return columns;
   }
 
@@ -72,6 +78,9 @@ class IntegratorProblem {
       bodies[i].state = {{vector_at(reply.f64("position"), i), quaternion_at(reply.f64("orientation"), i)},
                          {vector_at(reply.f64("linear_velocity"), i), vector_at(reply.f64("angular_velocity"), i)}};
     }
+    plugin_state = reply.f64("plugin_state");
+    error_estimate = reply.f64("error_estimate").at(0);
+    changed.clear();
     time += time_step;
   }
   void steps(int count) {

@@ -1,0 +1,47 @@
+#include "plugin_sdk/interaction_groups.h"
+
+#include <cstring>
+
+namespace gravitas {
+namespace {
+
+constexpr double kMoved = 1e-3;
+
+BodyState moved(const BodyState& state) {
+  const Vector3 by = Vector3::Constant(kMoved);
+  return {displaced(state.pose, by, by), {state.twist.linear + by, state.twist.angular + by}};
+}
+
+}  // namespace
+
+std::vector<std::vector<std::size_t>> interaction_groups(const stage::IntegratorIntegrateRequest& request,
+                                                         Derivatives* derivatives, double time,
+                                                         const TrialColumns& trial) {
+  std::vector<std::size_t> movable;
+  for (std::size_t i = 0; i < derivatives->size(); ++i)
+    if ((request.flags()[i] & kMovable) != 0) movable.push_back(i);
+
+  bool interact = false;
+  if (request.wrench_is_constant() == 0 && movable.size() > 1) {
+    const std::span<const double> answer = derivatives->wrenches(time, trial);
+    const std::vector<double> before(answer.begin(), answer.end());
+    TrialColumns shifted = trial;
+    for (std::size_t bit = 1; bit < movable.size() && !interact; bit *= 2) {
+      for (const std::size_t side : {std::size_t{0}, bit}) {
+        for (std::size_t k = 0; k < movable.size(); ++k)
+          shifted.set(movable[k], (k & bit) == side ? moved(trial.at(movable[k])) : trial.at(movable[k]));
+        const std::span<const double> after = derivatives->wrenches(time, shifted);
+        for (std::size_t k = 0; k < movable.size(); ++k)
+          if ((k & bit) != side)
+            interact =
+                interact || std::memcmp(&after[6 * movable[k]], &before[6 * movable[k]], 6 * sizeof(double)) != 0;
+      }
+    }
+  }
+  if (interact) return {movable};
+  std::vector<std::vector<std::size_t>> groups;
+  for (const std::size_t row : movable) groups.push_back({row});
+  return groups;
+}
+
+}  // namespace gravitas

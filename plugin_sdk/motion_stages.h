@@ -1,0 +1,179 @@
+// For authors of integrators: the stages of an explicit Runge-Kutta step of free bodies.
+//
+// In a step from (x0, q0, v0, w0) at t0 over h, with nodes 0 = c_1 <= c_2 <= ... <= 1 and weights a_ij, stage i is at
+//
+//   x_i = x0 + h sum_j a_ij v_j                q_i = chart(q0, h sum_j a_ij r_j)
+//   v_i = e^(-d c_i h) v0 + h sum_j a_ij e^(-d (c_i - c_j) h) a_j      (w_i likewise, with alpha_j)
+//
+// r is the rate of the attitude's coordinates in a chart (below), a and alpha are the accelerations of the stage's
+// state, without damping. Damping d is an integrating factor (Lawson 1967): it slows free bodies by e^(-d h) exactly at
+// any step and leaves the method its order; with d h >> 1 the balance of damping against a force is not met.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "plugin_sdk/integrator.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+
+// Rate of the rotation vector r with exp(r) q0 = q, at the angular velocity w (world): the inverse of dexp,
+//   dexp_r^-1 w = w - r x w / 2 + (1 - (|r|/2) cot(|r|/2)) / |r|^2  r x (r x w).
+// Singular at |r| = 2 pi k, k > 0. Source: Iserles, Munthe-Kaas, Norsett, Zanna, "Lie-group methods", Acta Numerica
+// 2000, (B.11).
+Vector3 rotation_vector_rate(const Vector3& rotation_vector, const Vector3& angular_velocity);
+
+// Attitudes by rotation vectors from q0 (Munthe-Kaas 1999): every stage is a rotation.
+struct GroupChart {
+  using Coordinates = Vector3;
+  static Coordinates zero() { return Vector3::Zero(); }
+  static Quaternion at(const Quaternion& q0, const Coordinates& r) { return rotate_by(q0, r); }
+  static Coordinates rate(const Quaternion&, const Coordinates& r, const Vector3& w) {
+    return rotation_vector_rate(r, w);
+  }
+};
+
+// Attitudes as four numbers with q' = (0, w) q / 2, renormalised where they are used.
+struct QuaternionChart {
+  using Coordinates = Eigen::Vector4d;  // (x, y, z, w), as Eigen keeps a quaternion
+  static Coordinates zero() { return Coordinates::Zero(); }
+  static Quaternion at(const Quaternion& q0, const Coordinates& change) {
+    return change.isZero(0.0) ? q0 : normalized(Quaternion(Coordinates(q0.coeffs() + change)));
+  }
+  static Coordinates rate(const Quaternion& q0, const Coordinates& change, const Vector3& w) {
+    const Quaternion q(Coordinates(q0.coeffs() + change));
+    return 0.5 * (Quaternion(0.0, w.x(), w.y(), w.z()) * q).coeffs();
+  }
+};
+
+template <typename Chart>
+class MotionStages {
+ public:
+  struct Rate {
+    Vector3 velocity, linear, angular;
+    typename Chart::Coordinates turn;
+  };
+
+  // Starts at the request's state. `derivatives` must live as long as the steps from here.
+  void begin(const stage::IntegratorIntegrateRequest& request, Derivatives* derivatives, std::size_t stages) {
+    request_ = &request;
+    derivatives_ = derivatives;
+    time_ = request.time();
+    const std::size_t bodies = derivatives->size();
+    start_.resize(bodies), rates_.resize(stages * bodies), trial_.resize(bodies);
+    for (std::size_t i = 0; i < bodies; ++i) start_[i] = derivatives->start(i);
+  }
+
+  // Evaluates stage `stage` at node c[stage] with the row a of weights of the earlier ones. False, having asked nothing,
+  // where its state is not finite.
+  bool evaluate(std::size_t stage, std::span<const double> a, std::span<const double> c, double h) {
+    bool finite = true;
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      const BodyState state = is_movable(i) ? combined(i, a.first(stage), c, c[stage], h) : carried(i, c[stage] * h);
+      finite = finite && is_finite(state);
+      trial_.set(i, state);
+    }
+    if (!finite) return false;
+    const std::span<const double> wrenches = derivatives_->wrenches(time_ + c[stage] * h, trial_);
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      if (!is_movable(i)) continue;
+      const BodyState state = trial_.at(i);
+      const Acceleration acceleration = derivatives_->acceleration(i, state, wrenches);
+      rate(stage, i) = {state.twist.linear, acceleration.linear, acceleration.angular,
+                        Chart::rate(start_[i].pose.orientation, turned(i, a.first(stage), h), state.twist.angular)};
+    }
+    return true;
+  }
+
+  // State of a movable body at node `end` with the weights of the first stages.
+  BodyState combined(std::size_t body, std::span<const double> weights, std::span<const double> c, double end,
+                     double h) const {
+    const BodyState& s = start_[body];
+    const double damping = request_->damping()[body];
+    Vector3 moved = Vector3::Zero(), linear = Vector3::Zero(), angular = Vector3::Zero();
+    for (std::size_t j = 0; j < weights.size(); ++j) {
+      if (weights[j] == 0.0) continue;
+      const Rate& r = rate(j, body);
+      const double slowed = h * weights[j] * damping_factor(damping, (end - c[j]) * h);
+      moved += h * weights[j] * r.velocity;
+      linear += slowed * r.linear;
+      angular += slowed * r.angular;
+    }
+    const double kept = damping_factor(damping, end * h);
+    BodyState state;
+    state.pose.position = moved.isZero(0.0) ? s.pose.position : Vector3(s.pose.position + moved);
+    state.pose.orientation = Chart::at(s.pose.orientation, turned(body, weights, h));
+    state.twist = {kept * s.twist.linear + linear, kept * s.twist.angular + angular};
+    return state;
+  }
+
+  // The sum of a body's rates with weights, for error estimates.
+  Rate weighted(std::size_t body, std::span<const double> weights, double h) const {
+    Rate sum{Vector3::Zero(), Vector3::Zero(), Vector3::Zero(), turned(body, weights, h)};
+    for (std::size_t j = 0; j < weights.size(); ++j) {
+      sum.velocity += h * weights[j] * rate(j, body).velocity;
+      sum.linear += h * weights[j] * rate(j, body).linear;
+      sum.angular += h * weights[j] * rate(j, body).angular;
+    }
+    return sum;
+  }
+
+  // Goes on from the end of a step whose last stage, `last`, was evaluated there: it becomes the first stage.
+  void advance(std::size_t last, double h) {
+    time_ += h;
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      start_[i] = trial_.at(i);
+      if (!is_movable(i)) continue;
+      rate(0, i) = rate(last, i);
+      rate(0, i).turn = Chart::rate(start_[i].pose.orientation, Chart::zero(), start_[i].twist.angular);
+    }
+  }
+
+  const BodyState& start(std::size_t body) const { return start_[body]; }
+  bool is_movable(std::size_t body) const { return (request_->flags()[body] & kMovable) != 0; }
+  std::size_t size() const { return start_.size(); }
+
+ private:
+  static bool is_finite(const BodyState& s) {
+    return s.pose.position.allFinite() && s.pose.orientation.coeffs().allFinite() && s.twist.linear.allFinite() &&
+           s.twist.angular.allFinite();
+  }
+  BodyState carried(std::size_t body, double elapsed) const {
+    const bool moves = (request_->flags()[body] & kKinematic) != 0;
+    return moves ? detail::keep_moving(start_[body], elapsed) : start_[body];
+  }
+  typename Chart::Coordinates turned(std::size_t body, std::span<const double> weights, double h) const {
+    typename Chart::Coordinates sum = Chart::zero();
+    for (std::size_t j = 0; j < weights.size(); ++j)
+      if (weights[j] != 0.0) sum += h * weights[j] * rate(j, body).turn;
+    return sum;
+  }
+  Rate& rate(std::size_t stage, std::size_t body) { return rates_[stage * start_.size() + body]; }
+  const Rate& rate(std::size_t stage, std::size_t body) const { return rates_[stage * start_.size() + body]; }
+
+  const stage::IntegratorIntegrateRequest* request_ = nullptr;
+  Derivatives* derivatives_ = nullptr;
+  double time_ = 0.0;
+  std::vector<BodyState> start_;
+  std::vector<Rate> rates_;
+  TrialColumns trial_;
+};
+
+// One step of the classical Runge-Kutta method in a chart: nodes 0, 1/2, 1/2, 1, weights 1/6, 1/3, 1/3, 1/6.
+template <typename Chart>
+void integrate_rk4(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
+                   Host& host, MotionStages<Chart>* stages, std::vector<double>* room) {
+  static constexpr double kNodes[] = {0.0, 0.5, 0.5, 1.0};
+  static constexpr double kWeights[4][3] = {{0, 0, 0}, {0.5, 0, 0}, {0, 0.5, 0}, {0, 0, 1}};
+  static constexpr double kEnd[] = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0};
+  Derivatives derivatives(request, host, room);
+  const double h = request.time_step();
+  stages->begin(request, &derivatives, 4);
+  for (std::size_t i = 0; i < 4; ++i)
+    if (!stages->evaluate(i, kWeights[i], kNodes, h)) throw Refusal("a stage comes to a state that is not finite");
+  for_each_body(request, reply,
+                [&](std::size_t body, const BodyState&) { return stages->combined(body, kEnd, kNodes, 1.0, h); });
+}
+
+}  // namespace gravitas

@@ -1,0 +1,113 @@
+#include "services/scene/force_bodies.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace gravitas::scene {
+namespace {
+
+constexpr const char* kGravity = "Gravity";
+
+// Calls visit(property, its numbers) for each property of flattened parameters.
+template <typename Visit>
+void for_each_property(const TypeDeclaration& type, std::vector<double>* parameters, Visit&& visit) {
+  double* next = parameters->data();
+  for (const Property& property : type.properties) {
+    visit(property, next);
+    const bool is_table = property.kind == PropertyKind::kTable;
+    next += is_table ? 1 + static_cast<std::size_t>(next[0]) * property.columns : property.flat_size();
+  }
+}
+
+const TypeDeclaration* type_of(const kernel::ForceDescription& force, const BuildContext& context) {
+  const InstalledPlugin* plugin = context.catalog->find_type(Slot::kForce, force.type);
+  const auto found = std::ranges::find(plugin->declaration.types, force.type, &TypeDeclaration::name);
+  return &*found;
+}
+
+// Applies a force to the body that it names, too.
+void add_reaction(std::uint32_t force, std::uint32_t row, BuildContext* context) {
+  kernel::BodyDescription& body = context->description.bodies[row];
+  if (std::ranges::find(body.forces, force) != body.forces.end()) {
+    const v1::Force& written = context->scene.forces().force(static_cast<int>(force));
+    context->diagnostics->error(place_of(written.location()), "Force \"" + written.id() + "\" acts between \"" +
+                                                                  body.id + "\" and itself; allowed: another body");
+    return;
+  }
+  if ((body.flags & kMovable) != 0) body.forces.push_back(force);
+}
+
+Vector3 gravity_of(const kernel::BodyDescription& body, const std::vector<kernel::ForceDescription>& forces) {
+  Vector3 sum = Vector3::Zero();
+  for (const std::uint32_t force : body.forces)
+    if (forces[force].type == kGravity) sum += Vector3(forces[force].parameters.data());
+  return sum;
+}
+
+// The three numbers of a `Gravity` that is absent, or null.
+double* absent_gravity(const TypeDeclaration& type, std::vector<double>* parameters) {
+  double* found = nullptr;
+  for_each_property(type, parameters, [&](const Property& property, double* numbers) {
+    if (property.kind == PropertyKind::kVector && property.name == kGravity && std::isnan(numbers[0])) found = numbers;
+  });
+  return found;
+}
+
+void float_bodies(std::uint32_t force, const TypeDeclaration& type, BuildContext* context) {
+  std::vector<kernel::ForceDescription>& forces = context->description.forces;
+  const kernel::ForceDescription written = forces[force];
+  std::vector<std::pair<Vector3, std::uint32_t>> splits;
+  for (kernel::BodyDescription& body : context->description.bodies) {
+    const auto applied = std::ranges::find(body.forces, force);
+    if (applied == body.forces.end()) continue;
+    const Vector3 gravity = gravity_of(body, forces);
+    auto split = std::ranges::find(splits, gravity, &std::pair<Vector3, std::uint32_t>::first);
+    if (split == splits.end()) {
+      const auto row = splits.empty() ? force : static_cast<std::uint32_t>(forces.size());
+      if (!splits.empty()) forces.push_back(written);
+      std::copy_n(gravity.data(), 3, absent_gravity(type, &forces[row].parameters));
+      split = splits.insert(splits.end(), {gravity, row});
+    }
+    *applied = split->second;
+  }
+  if (splits.empty()) std::fill_n(absent_gravity(type, &forces[force].parameters), 3, 0.0);
+}
+
+}  // namespace
+
+void flatten_force(const TypeDeclaration& type, const v1::Force& force, const IdIndex& bodies, BuildContext* context,
+                   std::vector<double>* parameters) {
+  std::vector<NamedValue> values = named_values(force.custom_properties());
+  for (NamedValue& value : values) {
+    const auto declared = std::ranges::find(type.properties, value.name, &Property::name);
+    if (declared == type.properties.end() || declared->kind != PropertyKind::kBody) continue;
+    if (value.value.kind != PropertyValue::Kind::kText) continue;
+    const std::uint32_t row = bodies.find(value.value.text, value.name, value.position, context->diagnostics);
+    if (row == kNone) return;
+    const TextPosition position = value.value.position;
+    value.value = PropertyValue::of(static_cast<double>(row));
+    value.value.position = position;
+  }
+  std::vector<PropertyProblem> problems;
+  flatten(type.properties, values, parameters, &problems);
+  const TextPosition written = place_of(force.custom_properties().location());
+  context->diagnostics->add(problems, written.known() ? written : place_of(force.location()),
+                            force.type() + " \"" + force.id() + "\": ");
+}
+
+void complete_forces(BuildContext* context) {
+  const auto written = static_cast<std::uint32_t>(context->description.forces.size());
+  for (std::uint32_t force = 0; force < written; ++force) {
+    const TypeDeclaration& type = *type_of(context->description.forces[force], *context);
+    for_each_property(type, &context->description.forces[force].parameters,
+                      [&](const Property& property, const double* numbers) {
+                        if (property.kind == PropertyKind::kBody && !std::isnan(numbers[0]))
+                          add_reaction(force, static_cast<std::uint32_t>(numbers[0]), context);
+                      });
+    if (absent_gravity(type, &context->description.forces[force].parameters) != nullptr)
+      float_bodies(force, type, context);
+  }
+}
+
+}  // namespace gravitas::scene
