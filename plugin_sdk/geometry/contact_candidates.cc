@@ -3,7 +3,7 @@
 // The reduction keeps extremes, by fixed rules (§ 4.3.2.19 samples at random, which would let a
 // resting body rock and make the answer depend on a generator). A reduced manifold can hold the
 // same wrenches as the full patch about as far as its four points span it.
-#include "workers/collision/standard/contact_candidates.h"
+#include "plugin_sdk/geometry/contact_candidates.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,8 +38,16 @@ double area(const ContactPoint& p, const ContactPoint& q, const ContactPoint& x)
   return (q.point - p.point).cross(x.point - p.point).dot(p.normal);
 }
 
-// writes the indices of the points to keep, returns how many
-int choose_extremes(Span contacts, int count, double deepest, double depth_tie, double merge_distance, int* chosen) {
+}  // namespace
+
+int choose_extremes(std::span<const ContactPoint> all, double depth_tie, double merge_distance,
+                    std::array<int, kManifoldCapacity>* out) {
+  const Span contacts = all.data();
+  const int count = static_cast<int>(all.size());
+  int* chosen = out->data();
+  const double deepest = std::max_element(all.begin(), all.end(), [](const ContactPoint& x, const ContactPoint& y) {
+                           return x.depth < y.depth;
+                         })->depth;
   int n = 0;
   for (int i = 0; i < count && n == 0; ++i) {
     if (contacts[i].depth >= deepest - depth_tie) chosen[n++] = i;
@@ -69,8 +77,6 @@ int choose_extremes(Span contacts, int count, double deepest, double depth_tie, 
   return n;
 }
 
-}  // namespace
-
 void ContactCandidates::add(const ContactPoint& contact) {
   if (!(contact.depth >= -margin_)) return;
   const double merge = merge_distance_ * merge_distance_;
@@ -99,24 +105,24 @@ double ContactCandidates::deepest() const {
 }
 
 void ContactCandidates::reduce_to(Manifold* out) const {
-  std::array<ContactPoint, kCapacity> sorted = contacts_;
+  std::array<ContactPoint, kCapacity> sorted;
+  std::copy_n(contacts_.begin(), count_, sorted.begin());
   const auto by_feature = [](const ContactPoint& x, const ContactPoint& y) { return x.feature < y.feature; };
   std::sort(sorted.begin(), sorted.begin() + count_, by_feature);
 
   out->count = 0;
   if (count_ == 0) return;
-  std::array<int, kCapacity> chosen{};
-  int n = count_;
+  std::array<bool, kCapacity> is_kept{};
   if (count_ <= kManifoldCapacity) {
-    for (int i = 0; i < n; ++i) chosen[static_cast<std::size_t>(i)] = i;
+    is_kept.fill(true);
   } else {
-    n = choose_extremes(sorted.data(), count_, deepest(), depth_tie_, merge_distance_, chosen.data());
-    std::sort(chosen.begin(), chosen.begin() + n);
+    std::array<int, kManifoldCapacity> chosen{};
+    const std::span<const ContactPoint> all(sorted.data(), static_cast<std::size_t>(count_));
+    const int n = choose_extremes(all, depth_tie_, merge_distance_, &chosen);
+    for (int i = 0; i < n; ++i) is_kept[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])] = true;
   }
-  for (int i = 0; i < n; ++i) {
-    out->contacts[static_cast<std::size_t>(i)] = sorted[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])];
-  }
-  out->count = n;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i)
+    if (is_kept[i]) out->contacts[static_cast<std::size_t>(out->count++)] = sorted[i];
 }
 
 }  // namespace gravitas::collision
