@@ -92,7 +92,7 @@ class FilterBuilder {
   bool are_two(const std::string& name, const google::protobuf::RepeatedPtrField<std::string>& ids,
                const TextPosition& place) {
     if (ids.size() == 2) return true;
-    diagnostics_.error(place, name + " has " + std::to_string(ids.size()) + " names; required: 2");
+    diagnostics_.error(place, name + " is a list of " + std::to_string(ids.size()) + "; required: 2 names");
     return false;
   }
 
@@ -150,16 +150,21 @@ class FilterBuilder {
       for (const std::uint32_t k : kinds_in(rule->first))
         for (const std::uint32_t m : second) allowed.set(k, m, rule->allow), allowed.set(m, k, rule->allow);
     }
-    // a body alone of its kind never meets it: no bit need keep them apart
-    for (std::uint32_t k = 0; k < kinds_.size(); ++k)
-      if (kinds_[k].bodies == 1) allowed.set(k, k, true);
     return allowed;
   }
 
   void set_bits() {
     find_kinds();
     std::vector<FilterBits> bits;
-    if (kinds_.size() <= kMostKinds) bits = find_filter_bits(allowed_kinds());
+    if (kinds_.size() <= kMostKinds) {
+      const KindRelation allowed = allowed_kinds();
+      KindRelation needed = allowed, harmless = allowed;
+      for (std::uint32_t k = 0; k < kinds_.size(); ++k) {
+        // a body alone of its kind never meets it
+        if (kinds_[k].bodies == 1) needed.set(k, k, false), harmless.set(k, k, true);
+      }
+      bits = find_filter_bits(needed, harmless);
+    }
     if (bits.empty() && !kinds_.empty()) {
       diagnostics_.error(place_of(filter_.location()),
                          "the CollisionFilter tells " + std::to_string(kinds_.size()) +

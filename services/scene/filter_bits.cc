@@ -30,13 +30,13 @@ struct Rectangle {
 };
 
 // Starts from the pairs of one kind and takes in others while that covers more of what is left to cover.
-Rectangle grow(std::size_t seed, const KindRelation& allowed, const KindRelation& left) {
-  Rectangle rectangle = {{seed}, Kinds(allowed.row(seed), allowed.row(seed) + allowed.words())};
+Rectangle grow(std::size_t seed, const KindRelation& harmless, const KindRelation& left) {
+  Rectangle rectangle = {{seed}, Kinds(harmless.row(seed), harmless.row(seed) + harmless.words())};
   std::size_t covered = common(left.row(seed), rectangle.mask);
-  Kinds narrower(allowed.words());
-  for (std::size_t kind = 0; kind < allowed.kinds(); ++kind) {
+  Kinds narrower(harmless.words());
+  for (std::size_t kind = 0; kind < harmless.kinds(); ++kind) {
     if (kind == seed) continue;
-    for (std::size_t w = 0; w < narrower.size(); ++w) narrower[w] = rectangle.mask[w] & allowed.row(kind)[w];
+    for (std::size_t w = 0; w < narrower.size(); ++w) narrower[w] = rectangle.mask[w] & harmless.row(kind)[w];
     std::size_t would_cover = common(left.row(kind), narrower);
     for (const std::size_t member : rectangle.group) would_cover += common(left.row(member), narrower);
     if (would_cover <= covered) continue;
@@ -49,23 +49,23 @@ Rectangle grow(std::size_t seed, const KindRelation& allowed, const KindRelation
 
 }  // namespace
 
-std::vector<FilterBits> find_filter_bits(const KindRelation& allowed) {
-  std::vector<FilterBits> bits(allowed.kinds());
-  if (allowed.kinds() <= kBits) {
-    for (std::size_t i = 0; i < allowed.kinds(); ++i) {
+std::vector<FilterBits> find_filter_bits(const KindRelation& needed, const KindRelation& harmless) {
+  std::vector<FilterBits> bits(needed.kinds());
+  if (needed.kinds() <= kBits) {
+    for (std::size_t i = 0; i < needed.kinds(); ++i) {
       bits[i].group = std::uint64_t{1} << i;
-      for (std::size_t k = 0; k < allowed.kinds(); ++k)
-        if (allowed.holds(i, k)) bits[i].mask |= std::uint64_t{1} << k;
+      for (std::size_t k = 0; k < needed.kinds(); ++k)
+        if (needed.holds(i, k)) bits[i].mask |= std::uint64_t{1} << k;
     }
     return bits;
   }
-  KindRelation left = allowed;
+  KindRelation left = needed;
   std::size_t seed = 0;
   for (std::size_t bit = 0;; ++bit) {
     while (seed < left.kinds() && !first_of(Kinds(left.row(seed), left.row(seed) + left.words()))) ++seed;
     if (seed == left.kinds()) return bits;
     if (bit == kBits) return {};
-    const Rectangle rectangle = grow(seed, allowed, left);
+    const Rectangle rectangle = grow(seed, harmless, left);
     for (const std::size_t member : rectangle.group) {
       bits[member].group |= std::uint64_t{1} << bit;
       for (std::size_t kind = 0; kind < left.kinds(); ++kind)

@@ -36,7 +36,8 @@ struct FilterBits {
   std::uint64_t group = 0, mask = 0;
 };
 
-// Bits by kind; empty if 64 bits were not enough. (i, i) says whether two bodies of kind i may touch.
-std::vector<FilterBits> find_filter_bits(const KindRelation& allowed);
+// Bits by kind that allow every pair in `needed` and none outside `harmless`, which holds `needed`; empty if 64 bits were
+// not enough. (i, i) is the pair of two bodies of kind i.
+std::vector<FilterBits> find_filter_bits(const KindRelation& needed, const KindRelation& harmless);
 
 }  // namespace gravitas::scene

@@ -252,11 +252,11 @@ TEST(BuildFilter, RefusesRulesThatNameNothing) {
       ElementsAre("scene:11:1: error: a Rule names its pairs by one of Body, Bodies, Group, Groups; here are 0"));
   EXPECT_THAT(errors_of("Rule { Allow = false Body = \"A\" Group = \"G\" }"), ElementsAre(HasSubstr("here are 2")));
   EXPECT_THAT(errors_of("Rule { Allow = false Bodies = {\"A\"} }"),
-              ElementsAre("scene:11:22: error: Bodies has 1 names; required: 2"));
+              ElementsAre("scene:11:31: error: Bodies is a list of 1; required: 2 names"));
   EXPECT_THAT(errors_of("Rule { Allow = false Groups = {\"G\", \"H\", \"G\"} }"),
-              ElementsAre("scene:11:22: error: Groups has 3 names; required: 2"));
+              ElementsAre("scene:11:31: error: Groups is a list of 3; required: 2 names"));
   EXPECT_THAT(errors_of("Rule { Allow = false Bodies = {\"A\", \"A\"} }"),
-              ElementsAre("scene:11:22: error: Bodies names \"A\" twice; required: two bodies"));
+              ElementsAre("scene:11:31: error: Bodies names \"A\" twice; required: two bodies"));
   EXPECT_THAT(errors_of("Rule { Body = \"A\" }"), ElementsAre(HasSubstr("Rule without Allow")));
 }
 
