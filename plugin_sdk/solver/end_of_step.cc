@@ -62,6 +62,14 @@ struct EndContact {
   std::uint32_t lowered = 0;
 };
 
+bool is_held(AxisMode mode) {
+  return mode == AxisMode::kLocked || mode == AxisMode::kLimited || mode == AxisMode::kUnilateral;
+}
+
+bool holds_pose(const Discrepancy& d) {
+  return is_held(axis_mode(d.modes, 0)) || is_held(axis_mode(d.modes, 1)) || is_held(axis_mode(d.modes, 2));
+}
+
 ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2) {
   ConstraintDirection d;
   d.linear = axis;
@@ -278,19 +286,23 @@ class IslandSolver {
     }
     const Vector3 point1 = carried(d.point1, one.trial, end1.pose);
     const Vector3 point2 = carried(d.point2, two.trial, end2.pose);
-    const Vector3 error = point2 - point1, middle = 0.5 * (point1 + point2);
+    const Vector3 error = point2 - point1;
+    const double length = error.norm();
+    const bool is_turned = !displacement_[joint->body1].angular.isZero(0.0);
     const Quaternion turn = exp_rotation(displacement_[joint->body1].angular);
-    for (int k = 0; k < 3; ++k) {
-      Vector3 axis = displacement_[joint->body1].angular.isZero(0.0) ? Vector3(joint->axes.col(k))
-                                                                     : turn * Vector3(joint->axes.col(k));
-      const double length = error.norm();
+    // axes fixed in body 1 push where body 2's point is, midway along what is held; a drive where it is in body 1
+    Vector3 at = holds_pose(d) ? point2 : point1;
+    std::array<Vector3, 3> axes;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3 axis = joint->axes.col(static_cast<Eigen::Index>(k));
       const bool is_radial = d.is_radial() && k == 0 && length > 0.0;
-      if (is_radial) axis = error / length;
-      joint->directions[static_cast<std::size_t>(k)] =
-          direction_at(axis, middle - end1.pose.position, middle - end2.pose.position);
-      joint->arm1 = middle - end1.pose.position, joint->arm2 = middle - end2.pose.position;
-      joint->errors[k] = is_radial ? length : axis.dot(error);
+      axes[k] = is_radial ? Vector3(error / length) : is_turned ? turn * axis : axis;
+      joint->errors[static_cast<Eigen::Index>(k)] = is_radial ? length : axes[k].dot(error);
+      if (is_held(axis_mode(d.modes, static_cast<int>(k))))
+        at -= 0.5 * joint->errors[static_cast<Eigen::Index>(k)] * axes[k];
     }
+    joint->arm1 = at - end1.pose.position, joint->arm2 = at - end2.pose.position;
+    for (std::size_t k = 0; k < 3; ++k) joint->directions[k] = direction_at(axes[k], joint->arm1, joint->arm2);
   }
 
   // ---- pose change

@@ -10,8 +10,8 @@
 // J, arms and world inertia are those at the end of the step, so that what holds is held where the body will be: a chain
 // under 1000 times its mass, linearised at S*, flies apart at 1/60 s. Joints. The pose change is found by Newton's method
 // on the errors themselves: points are carried as rigid bodies, axes turn with body 1, a radial axis with its points;
-// angular errors are carried to first order in delta's turn. Rows push both bodies midway between the two points, which
-// meet at the end. Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points
+// angular errors are carried to first order in delta's turn. Rows push both bodies at body 2's point, midway to body 1's
+// along what is held, which is one place at the end. Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points
 // is not known; a velocity row's arms end at each body's own surface point, which is where the two meet when the gap is
 // closed (a ball that sank by d rolls on its radius, not on a radius less d/2).
 //
