@@ -29,6 +29,9 @@ void for_each_application(const stage::ForceWrenchesRequest& request, const stag
     if (force + std::size_t{1} >= begin.size() || body >= request.mass().size() || begin[force] > begin[force + 1] ||
         begin[force + 1] > request.force_parameter().size())
       throw Refusal("application " + std::to_string(i / 2) + " names a force or body that does not exist");
+    const std::uint32_t shape = body < request.body_shape().size() ? request.body_shape()[body] : kNone;
+    if (shape != kNone && shape >= request.shape_type().size())
+      throw Refusal("body " + std::to_string(body) + " has a shape that does not exist");
     const ApplicationAnswer a =
         answer(request.force_type()[force],
                PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force])), body);

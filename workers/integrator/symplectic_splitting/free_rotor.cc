@@ -48,7 +48,9 @@ struct Polhode {
   int minor, major;                                           // axes that cn and dn belong to: 0 or 2
   double minor_amplitude, middle_amplitude, major_amplitude;  // the last with its sign
 
-  Vector3 at(double u) const {
+  Vector3 at(double u) const { return at_start + change(u); }
+
+  Vector3 change(double u) const {
     const auto [s, c, d] = functions.at(u);
     const auto& [s0, c0, d0] = start;
     // 1 - k^2 s0^2 s^2 without its cancellation
@@ -58,7 +60,7 @@ struct Polhode {
       n[minor] = minor_amplitude * (c0 * c - s0 * d0 * s * d) / denominator;
       n[1] = middle_amplitude * (s0 * c * d + s * c0 * d0) / denominator;
       n[major] = major_amplitude * (d0 * d - parameter * s0 * c0 * s * c) / denominator;
-      return n;
+      return n - at_start;
     }
     // the change alone, so that the rounding of a short step, the same in each, is as short
     const double one_less_c = s * s / (1.0 + c), one_less_d = parameter * s * s / (1.0 + d);
@@ -66,7 +68,7 @@ struct Polhode {
     n[minor] = minor_amplitude * (c0 * (less - one_less_c) - s0 * d0 * s * d) / denominator;
     n[1] = middle_amplitude * (s0 * (less - one_less_c - one_less_d * c) + s * c0 * d0) / denominator;
     n[major] = major_amplitude * (d0 * (less - one_less_d) - parameter * s0 * c0 * s * c) / denominator;
-    return n + at_start;
+    return n;
   }
 };
 
@@ -147,11 +149,11 @@ RotorMotion free_rotor(const Vector3& inverse_moments, const Vector3& momentum, 
   double angle = integrated(polhode, J, k, rest, direction);
   if (turns > 0.0) angle += turns * integrated(polhode, J, k, half_period, 1.0);
   angle *= size / rate * (time < 0.0 ? -1.0 : 1.0);
-  const Vector3 next = polhode.at(direction * std::fmod(end, 2.0 * half_period)).normalized();
+  const Vector3 change = polhode.change(direction * std::fmod(end, 2.0 * half_period)), next = n + change;
 
   const Quaternion turn = exp_rotation(angle * n) * to_quaternion(frame_of(n, k) * frame_of(next, k).transpose());
   const Vector3 axis = axes.restored(turn.vec());
-  return {size * axes.restored(next), Quaternion(turn.w(), axis.x(), axis.y(), axis.z())};
+  return {momentum + size * axes.restored(change), Quaternion(turn.w(), axis.x(), axis.y(), axis.z())};
 }
 
 }  // namespace gravitas

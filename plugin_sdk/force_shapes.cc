@@ -1,0 +1,68 @@
+#include "plugin_sdk/force_shapes.h"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/math/transcendental.h"
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+namespace {
+
+constexpr int kCapRings = 12;
+
+void require_sizes(const BodyShape& shape, std::size_t count) {
+  bool good = shape.parameters.size() == count;
+  for (const double size : shape.parameters) good = good && size > 0.0 && std::isfinite(size);
+  if (!good) throw Refusal("a shape's sizes are not " + std::to_string(count) + " numbers above 0");
+}
+
+Surface capsule_surface(double radius, double height) {
+  std::vector<MeridianPoint> meridian;
+  for (int i = 0; i <= kCapRings; ++i) {
+    const math::SinCos angle = math::sincos(0.5 * std::numbers::pi * i / kCapRings);
+    meridian.push_back({i == 0 ? 0.0 : radius * angle.sin, -0.5 * height - radius * angle.cos});
+  }
+  for (int i = kCapRings; i >= 0; --i) {
+    const MeridianPoint below = meridian[static_cast<std::size_t>(i)];
+    meridian.push_back({below.radius, -below.height});
+  }
+  return revolved_surface(meridian, kRoundSides);
+}
+
+}  // namespace
+
+BodyShape shape_of(const stage::ForceWrenchesRequest& request, std::uint32_t body) {
+  if (body >= request.body_shape().size()) throw Refusal("body_shape has no row for a body");
+  const std::uint32_t row = request.body_shape()[body];
+  if (row == kNone) throw Refusal("body " + std::to_string(body) + " has no geometry, which this force needs");
+  const std::span<const std::uint32_t> begin = request.shape_parameter_begin();
+  if (row >= request.shape_type().size() || row + std::size_t{1} >= begin.size() || begin[row] > begin[row + 1] ||
+      begin[row + 1] > request.shape_parameter().size())
+    throw Refusal("body " + std::to_string(body) + " has a shape that does not exist");
+  return {request.shape_type()[row], request.shape_parameter().subspan(begin[row], begin[row + 1] - begin[row])};
+}
+
+std::optional<Surface> surface_of(const BodyShape& shape) {
+  const std::span<const double> size = shape.parameters;
+  if (shape.type == type_id("Box")) {
+    require_sizes(shape, 3);
+    return box_surface({size[0], size[1], size[2]});
+  }
+  if (shape.type != type_id("Cylinder") && shape.type != type_id("Cone") && shape.type != type_id("Capsule"))
+    return std::nullopt;
+  require_sizes(shape, 2);
+  if (shape.type == type_id("Capsule")) return capsule_surface(size[0], size[1]);
+  const double top = shape.type == type_id("Cone") ? 0.0 : size[0];
+  return revolved_surface(std::initializer_list<MeridianPoint>{{size[0], -0.5 * size[1]}, {top, 0.5 * size[1]}},
+                          kRoundSides);
+}
+
+Pose geometry_pose(const stage::ForceWrenchesRequest& request, std::uint32_t body) {
+  const Pose in_body{vector_at(request.geometry_position(), body), quaternion_at(request.geometry_orientation(), body)};
+  return compose({vector_at(request.position(), body), quaternion_at(request.orientation(), body)}, in_body);
+}
+
+}  // namespace gravitas
