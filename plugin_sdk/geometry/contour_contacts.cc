@@ -9,7 +9,7 @@ namespace gravitas::collision {
 namespace {
 
 // Faces and lines within this of lying flat on each other touch as such (sine of the angle).
-constexpr double kFlat = 0.05;
+constexpr double kFlat = 0.03;
 // Faces whose normal may be preferred to the least (sine of the angle between).
 constexpr double kNear = 0.2;
 constexpr double kFacePreference = 0.01;
@@ -174,21 +174,21 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
     normal = face, depth = face_depth;
 
   ContactCandidates candidates = none;
+  const double equal = std::max(1e-6 * pair.thinnest(), tie);
   const auto try_normal = [&](const Vector3& n, double wanted) {
     candidates = none;
     contours(n, kFlat, &a, &b);
     add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
-    return candidates.deepest() >= wanted - shallower_by(pair, wanted);
+    return candidates.deepest() >= wanted - equal;
   };
   if (!try_normal(normal, depth) && (normal == least.normal || !try_normal(least.normal, least.depth))) {
-    // the features that touch there in a point
-    candidates = none;
+    // the deepest place lies beside the features: the points that touch there
     contours(least.normal, 0.0, &a, &b);
     const Vector3& n = least.normal;
     const Vector3 middle = 0.5 * (least.point_a + least.point_b);
-    const double off =
+    const double level =
         0.5 * (n.dot(pair.support_a(n)) + pair.a.rounding() + n.dot(pair.support_b(n)) - pair.b.rounding());
-    candidates.add({middle + n * (off - n.dot(middle)), n, least.depth, feature_of(a.code, b.code)});
+    candidates.add({middle + n * (level - n.dot(middle)), n, least.depth, feature_of(a.code, b.code)});
   }
   candidates.reduce_to(out);
 }

@@ -8,8 +8,10 @@
 namespace gravitas::collision {
 namespace {
 
-// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides.
+// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides. Of a
+// rounded core the point below its far end lies under the surface by half the square of the angle, times the radius.
 constexpr double kFacing = 0.2;
+constexpr double kFacingRounded = 0.03;
 
 SceneShape::Kind kind_of(ShapeType type) {
   switch (type) {
@@ -58,7 +60,7 @@ void collide_halfspace_general(const Shape&, const Shape& b, const Placement& pl
     candidates.add({x + (0.5 * depth) * up, up, depth, code});
   };
   Contour contour;
-  map.contour(down_B, kFacing, &contour);
+  map.contour(down_B, map.rounding() > 0.0 ? kFacingRounded : kFacing, &contour);
   // of a feature that does not lie flat the deepest point may be another
   double deepest = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < contour.count; ++i) deepest = std::fmax(deepest, down_B.dot(contour.points[i]));
