@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -14,6 +15,11 @@ constexpr double kFlat = 0.03;
 constexpr double kNear = 0.2;
 constexpr double kFacePreference = 0.01;
 constexpr double kFaceTie = 1e-7;
+
+// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides. Of a
+// rounded core the point below its far end lies under the surface by half the square of the angle, times the radius.
+constexpr double kFacing = 0.2;
+constexpr double kFacingRounded = 0.03;
 
 using Vector2 = Eigen::Vector2d;
 
@@ -190,6 +196,31 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
         0.5 * (n.dot(pair.support_a(n)) + pair.a.rounding() + n.dot(pair.support_b(n)) - pair.b.rounding());
     candidates.add({middle + n * (level - n.dot(middle)), n, least.depth, feature_of(a.code, b.code)});
   }
+  candidates.reduce_to(out);
+}
+
+void collide_halfspace_support_map(const Vector3& up, const SupportMap& map, const Matrix3& R, const Vector3& p,
+                                   double margin, Manifold* out) {
+  const Vector3 down = -(R.transpose() * up);
+  const double tie = 1e-9 * map.thinnest();
+  ContactCandidates candidates(margin, tie, tie);
+  const auto add = [&](const Vector3& point, std::uint32_t code) {
+    const Vector3 x = p + R * point - map.rounding() * up;
+    const double depth = -up.dot(x);
+    candidates.add({x + (0.5 * depth) * up, up, depth, code});
+  };
+  Contour contour;
+  map.contour(down, map.rounding() > 0.0 ? kFacingRounded : kFacing, &contour);
+  // of a feature that does not lie flat the deepest point may be another
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < contour.count; ++i) deepest = std::max(deepest, down.dot(contour.points[i]));
+  const Vector3 support = map.support(down);
+  if (down.dot(support) > deepest + tie) {
+    Contour point;
+    map.contour(down, 0.0, &point);
+    add(support, point.count == 1 ? point.codes[0] : 0x7FFFU);
+  }
+  for (std::size_t i = 0; i < contour.count; ++i) add(contour.points[i], contour.codes[i]);
   candidates.reduce_to(out);
 }
 
