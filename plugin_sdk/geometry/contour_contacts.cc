@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -9,11 +10,16 @@ namespace gravitas::collision {
 namespace {
 
 // Faces and lines within this of lying flat on each other touch as such (sine of the angle).
-constexpr double kFlat = 0.05;
+constexpr double kFlat = 0.03;
 // Faces whose normal may be preferred to the least (sine of the angle between).
 constexpr double kNear = 0.2;
 constexpr double kFacePreference = 0.01;
 constexpr double kFaceTie = 1e-7;
+
+// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides. Of a
+// rounded core the point below its far end lies under the surface by half the square of the angle, times the radius.
+constexpr double kFacing = 0.2;
+constexpr double kFacingRounded = 0.03;
 
 using Vector2 = Eigen::Vector2d;
 
@@ -174,22 +180,47 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
     normal = face, depth = face_depth;
 
   ContactCandidates candidates = none;
+  const double equal = std::max(1e-6 * pair.thinnest(), tie);
   const auto try_normal = [&](const Vector3& n, double wanted) {
     candidates = none;
     contours(n, kFlat, &a, &b);
     add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
-    return candidates.deepest() >= wanted - shallower_by(pair, wanted);
+    return candidates.deepest() >= wanted - equal;
   };
   if (!try_normal(normal, depth) && (normal == least.normal || !try_normal(least.normal, least.depth))) {
-    // the features that touch there in a point
-    candidates = none;
+    // the deepest place lies beside the features: the points that touch there
     contours(least.normal, 0.0, &a, &b);
     const Vector3& n = least.normal;
     const Vector3 middle = 0.5 * (least.point_a + least.point_b);
-    const double off =
+    const double level =
         0.5 * (n.dot(pair.support_a(n)) + pair.a.rounding() + n.dot(pair.support_b(n)) - pair.b.rounding());
-    candidates.add({middle + n * (off - n.dot(middle)), n, least.depth, feature_of(a.code, b.code)});
+    candidates.add({middle + n * (level - n.dot(middle)), n, least.depth, feature_of(a.code, b.code)});
   }
+  candidates.reduce_to(out);
+}
+
+void collide_halfspace_support_map(const Vector3& up, const SupportMap& map, const Matrix3& R, const Vector3& p,
+                                   double margin, Manifold* out) {
+  const Vector3 down = -(R.transpose() * up);
+  const double tie = 1e-9 * map.thinnest();
+  ContactCandidates candidates(margin, tie, tie);
+  const auto add = [&](const Vector3& point, std::uint32_t code) {
+    const Vector3 x = p + R * point - map.rounding() * up;
+    const double depth = -up.dot(x);
+    candidates.add({x + (0.5 * depth) * up, up, depth, code});
+  };
+  Contour contour;
+  map.contour(down, map.rounding() > 0.0 ? kFacingRounded : kFacing, &contour);
+  // of a feature that does not lie flat the deepest point may be another
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < contour.count; ++i) deepest = std::max(deepest, down.dot(contour.points[i]));
+  const Vector3 support = map.support(down);
+  if (down.dot(support) > deepest + tie) {
+    Contour point;
+    map.contour(down, 0.0, &point);
+    add(support, point.count == 1 ? point.codes[0] : 0x7FFFU);
+  }
+  for (std::size_t i = 0; i < contour.count; ++i) add(contour.points[i], contour.codes[i]);
   candidates.reduce_to(out);
 }
 

@@ -23,4 +23,9 @@ void place_contour(const Matrix3& R_AB, const Vector3& p_AB, Contour* contour);
 // No contact if the pair is further apart than `margin` (m).
 void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out);
 
+// The contacts of the half-space below the plane through the origin with the unit normal `up`, and a convex solid at
+// (R, p) in the same frame: of the face, line or point turned most towards it.
+void collide_halfspace_support_map(const Vector3& up, const SupportMap& map, const Matrix3& R, const Vector3& p,
+                                   double margin, Manifold* out);
+
 }  // namespace gravitas::collision

@@ -13,7 +13,7 @@ namespace {
 
 // Sines of angles within which features lie flat on each other; heights over a plane, of the triangle's edges, that
 // count as none.
-constexpr double kFlat = 0.05;
+constexpr double kFlat = 0.03;
 constexpr double kLevel = 1e-7;
 constexpr double kFacePreference = 0.01;
 

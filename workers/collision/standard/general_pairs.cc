@@ -1,15 +1,10 @@
 // Any two convex shapes by their support maps, and any against a half-space.
-#include <cmath>
-
 #include "plugin_sdk/geometry/contour_contacts.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
 #include "workers/collision/standard/pair_functions.h"
 
 namespace gravitas::collision {
 namespace {
-
-// Features within this angle (its sine) of the plane touch as such: at the far end of a tilted face the gap decides.
-constexpr double kFacing = 0.2;
 
 SceneShape::Kind kind_of(ShapeType type) {
   switch (type) {
@@ -47,29 +42,8 @@ void collide_general(const Shape& a, const Shape& b, const Placement& placement,
 
 void collide_halfspace_general(const Shape&, const Shape& b, const Placement& placement, double margin, Manifold* out) {
   SupportMapBuffer buffer;
-  const SupportMap& map = support_map_of(b, &buffer);
-  const Vector3 up = placement.R_WA.col(1);
-  const Vector3 down_B = -(placement.R_WB.transpose() * up);
-  const double tie = 1e-9 * map.thinnest();
-  ContactCandidates candidates(margin, tie, tie);
-  const auto add = [&](const Vector3& point, std::uint32_t code) {
-    const Vector3 x = placement.p_AB_W + placement.R_WB * point - map.rounding() * up;
-    const double depth = -up.dot(x);
-    candidates.add({x + (0.5 * depth) * up, up, depth, code});
-  };
-  Contour contour;
-  map.contour(down_B, kFacing, &contour);
-  // of a feature that does not lie flat the deepest point may be another
-  double deepest = -std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < contour.count; ++i) deepest = std::fmax(deepest, down_B.dot(contour.points[i]));
-  const Vector3 support = map.support(down_B);
-  if (down_B.dot(support) > deepest + tie) {
-    Contour point;
-    map.contour(down_B, 0.0, &point);
-    add(support, point.count == 1 ? point.codes[0] : 0x7FFFU);
-  }
-  for (std::size_t i = 0; i < contour.count; ++i) add(contour.points[i], contour.codes[i]);
-  candidates.reduce_to(out);
+  collide_halfspace_support_map(placement.R_WA.col(1), support_map_of(b, &buffer), placement.R_WB, placement.p_AB_W,
+                                margin, out);
 }
 
 }  // namespace gravitas::collision
