@@ -237,7 +237,7 @@ void add(const std::string& name, const std::string& library, std::int64_t most)
       const std::string title = "space/" + name + "/" + layout.name + "/" + motion.name;
       benchmark::internal::Benchmark* const bench = benchmark::RegisterBenchmark(
           title.c_str(), [=](benchmark::State& state) { find_pairs<Space>(state, library, layout, motion); });
-      bench->RangeMultiplier(10)->Range(100, most)->UseManualTime()->MinTime(0.2)->Unit(benchmark::kMicrosecond);
+      bench->RangeMultiplier(10)->Range(100, most)->UseManualTime()->MinTime(0.05)->Unit(benchmark::kMicrosecond);
     }
   }
 }

@@ -2,21 +2,22 @@
 
     tabulate_spaces.py build/bench.json FOLDER      writes FOLDER/SPACES.md and FOLDER/spaces.svg
 """
+import json
 import math
 import sys
 from pathlib import Path
 
-from tabulate import medians, microseconds, plt, shown
+from tabulate import microseconds, plt, shown
 
 LAYOUTS = [f"{layout}/{motion}" for layout in ("sparse", "dense", "mixed") for motion in ("still", "few", "moving")]
 
 
 def spaces(runs):
-    """Layout -> space -> number of bodies -> microseconds."""
+    """Layout -> space -> number of bodies -> microseconds; the median where there are several runs."""
     curves = {layout: {} for layout in LAYOUTS}
-    for name, run in runs.items():
-        parts = name.split("/")
-        if parts[0] == "space":
+    for run in runs:
+        parts = run["run_name"].split("/")
+        if parts[0] == "space" and run.get("aggregate_name", "median") == "median":
             curves[f"{parts[2]}/{parts[3]}"].setdefault(parts[1], {})[int(parts[4])] = microseconds(run)
     return curves
 
@@ -27,18 +28,19 @@ def growth(points):
     return math.log(points[last] / points[before]) / math.log(last / before)
 
 
-def tables(context, curves):
+def tables(context, repetitions, curves):
     """A table for each layout, and where DynamicBVH is not the fastest of all."""
     lines = [
         "# What finding pairs costs",
         "",
         f"Made by `deploy/bench` on {context['date'][:10]}: {context['num_cpus']} cores at "
-        f"{context['mhz_per_cpu']} MHz, load {context['load_avg'][0]:.1f} at the start. Medians of five: microseconds of "
-        "processor time a call, the mean of many calls in a row. `space_bench.cc` says what the bodies are. The last "
+        f"{context['mhz_per_cpu']} MHz, load {context['load_avg'][0]:.1f} at the start. Microseconds of processor time a call, "
+        f"the mean of calls in a row, {'measured once' if repetitions == 1 else f'the median of {repetitions}'}. "
+        "`space_bench.cc` says what the bodies are. The last "
         "column is the exponent of n between the last two numbers of bodies.",
         "",
-        "Bullet's two are beside ours where libbullet-dev is installed. What is not there takes too long: `Basic` with "
-        "100,000 bodies some 25 s a call, Bullet's sweep minutes to put them in.",
+        "Bullet's two are beside ours where libbullet-dev is installed. What is not there was left out of the run: it "
+        "takes too long (`Basic` with 100,000 bodies some 25 s a call, Bullet's sweep minutes to put them in).",
         "",
     ]
     for layout, by_space in curves.items():
@@ -74,10 +76,11 @@ def draw(curves, path):
 
 
 def main():
-    context, runs = medians(sys.argv[1])
-    curves = spaces(runs)
+    report = json.loads(Path(sys.argv[1]).read_text())
+    curves = spaces(report["benchmarks"])
+    repetitions = max(run["repetitions"] for run in report["benchmarks"] if run["run_name"].startswith("space/"))
     folder = Path(sys.argv[2])
-    (folder / "SPACES.md").write_text(tables(context, curves))
+    (folder / "SPACES.md").write_text(tables(report["context"], repetitions, curves))
     draw(curves, folder / "spaces.svg")
 
 

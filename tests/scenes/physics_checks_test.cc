@@ -35,10 +35,7 @@ const Methods kMethods[] = {
     {"EulerOneSweep", {"Integrator=Euler", "Solver.Iterations=1"}},
     {"OneSweep", {"Integrator=SemiImplicitEuler", "Solver.Iterations=1"}},
     {"HalfCorrected", {"Integrator=SemiImplicitEuler", "Solver.CorrectionFactor=0.5"}},
-    {"Basic", {"Space=Basic"}},
     {"Grid", {"Space=Grid"}},
-    {"KDTree", {"Space=KDTree"}},
-    {"SweepAndPrune", {"Space=SweepAndPrune"}},
     {"LongSteps", {"Simulator.TimeStep=0.05"}},
 };
 
