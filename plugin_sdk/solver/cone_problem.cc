@@ -250,19 +250,29 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
     double residual = residual_of(lambda, y), best = residual;
     Eigen::VectorXd best_lambda = lambda, best_y = y;
-    int without = 0;
+    int without = 0, mended = 0;
+    Eigen::VectorXd mended_lambda, mended_y;
     std::uint32_t done = 0;
     // what rounding leaves of sums of large terms is no violation
     double enough = tolerance;
     while (best > enough && done < settings.iterations) {
       ++done;
-      if (is_newton && without < kPatience && newton_step(&lambda, &y)) {
+      if (is_newton && without < kPatience && newton_step(nullptr, &lambda, &y)) {
         ++without;
+      } else if (is_newton && mended % 4 != 3) {
+        // from where the last mending ended: the loads go on settling
+        if (mended > 0) lambda = mended_lambda, y = mended_y;
+        tresca(enough, &lambda, &y);
+        mended_lambda = lambda, mended_y = y;
+        ++mended;
+        without = 0;
       } else {
         if (is_newton) lambda = best_lambda, y = best_y;
         const int sweeps = is_newton ? kSweeps : 1;
         for (int i = 0; i < sweeps; ++i) sweep(&lambda, &y);
         y = start_others_ + response_ * lambda;
+        mended_lambda = lambda, mended_y = y;
+        ++mended;
         without = 0;
       }
       residual = residual_of(lambda, y);
@@ -272,7 +282,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       enough = std::max(tolerance, 16.0 * kRounding * largest_sum(lambda));
     }
     // one step more costs little and ends at rounding
-    if (is_newton && best <= enough && done > 0 && newton_step(&lambda, &y)) {
+    if (is_newton && best <= enough && done > 0 && newton_step(nullptr, &lambda, &y)) {
       residual = residual_of(lambda, y);
       if (residual < best) best = residual, best_lambda = lambda, best_y = y;
     }
@@ -295,6 +305,17 @@ double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
     most = std::max(most, sum * scale_[r] * rows[r].length);
   }
   return most;
+}
+
+// Friction within radii that the present normal impulses give (Tresca): convex, so that steps end at its solution.
+bool ConeProblem::tresca(double tolerance, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
+  constexpr int kSteps = 15;
+  const Eigen::VectorXd loads = lambda->cwiseMax(0.0);
+  for (int step = 0; step < kSteps; ++step) {
+    if (residual_of(*lambda, *y, &loads) <= tolerance) return true;
+    if (!newton_step(&loads, lambda, y)) return false;
+  }
+  return false;
 }
 
 // Held rows and the others in turn.

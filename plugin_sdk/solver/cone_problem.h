@@ -103,12 +103,15 @@ class ConeProblem {
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
   // Of a block with scaled multipliers and values: where the law puts them.
-  void project(const Block& block, const double* lambda, const double* y, double* projected) const;
-  double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
+  // With `load` the radius of friction is that under this normal impulse, not under the projected one.
+  void project(const Block& block, const double* lambda, const double* y, const double* load, double* projected) const;
+  double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y,
+                     const Eigen::VectorXd* loads = nullptr) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
-  void linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, Eigen::MatrixXd* matrix,
-                 Eigen::VectorXd* side) const;
-  bool newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
+  void linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, const Eigen::VectorXd* loads,
+                 Eigen::MatrixXd* matrix, Eigen::VectorXd* side) const;
+  bool newton_step(const Eigen::VectorXd* loads, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
+  bool tresca(double tolerance, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
   void sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
   void relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const;
   bool let_slide(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double slip);

@@ -1,4 +1,5 @@
 // The laws of ConeProblem: projections, the linear equations of a Newton step, and a sweep.
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +26,8 @@ void into_disc(double radius, double* v) {
 
 }  // namespace
 
-void ConeProblem::project(const Block& block, const double* lambda, const double* y, double* projected) const {
+void ConeProblem::project(const Block& block, const double* lambda, const double* y, const double* load,
+                          double* projected) const {
   const std::uint32_t r = other_[block.first];
   if (block.contact < 0) {
     const JointLaw& law = rows[r].law;
@@ -43,25 +45,28 @@ void ConeProblem::project(const Block& block, const double* lambda, const double
   }
   const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
   projected[0] = std::max(0.0, lambda[0] + (contact.target / scale_[r] - y[0]));
+  const double pressed = load != nullptr ? *load : projected[0];
   std::uint32_t k = 1;
   if (contact.has_friction) {
     projected[1] = lambda[1] - y[1], projected[2] = lambda[2] - y[2];
-    into_disc((block.slides ? contact.dynamic_friction : contact.static_friction) * projected[0], projected + 1);
+    into_disc((block.slides ? contact.dynamic_friction : contact.static_friction) * pressed, projected + 1);
     k = 3;
   }
   if (!contact.has_turning) return;
   const double lever = scale_[r + k] / scale_[r];
-  const double spin = contact.spinning_friction * lever * projected[0];
+  const double spin = contact.spinning_friction * lever * pressed;
   projected[k] = std::clamp(lambda[k] - y[k], -spin, spin);
   projected[k + 1] = lambda[k + 1] - y[k + 1], projected[k + 2] = lambda[k + 2] - y[k + 2];
-  into_disc(contact.rolling_friction * lever * projected[0], projected + k + 1);
+  into_disc(contact.rolling_friction * lever * pressed, projected + k + 1);
 }
 
-double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const {
+double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y,
+                                const Eigen::VectorXd* loads) const {
   double worst = 0.0;
   for (const Block& block : blocks_) {
     double projected[6];
-    project(block, &lambda[block.first], &y[block.first], projected);
+    project(block, &lambda[block.first], &y[block.first], loads != nullptr ? &(*loads)[block.first] : nullptr,
+            projected);
     for (std::uint32_t k = 0; k < block.count; ++k) {
       const std::uint32_t r = other_[block.first + k];
       worst = std::max(worst, std::fabs(lambda[block.first + k] - projected[k]) * scale_[r] * rows[r].length);
@@ -72,8 +77,8 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
 
 // matrix d = side, d the change of lambda: every row that is held by its law as y + W' d = target, every other as where
 // its law puts it.
-void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, Eigen::MatrixXd* matrix,
-                            Eigen::VectorXd* side) const {
+void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, const Eigen::VectorXd* loads,
+                            Eigen::MatrixXd* matrix, Eigen::VectorXd* side) const {
   const auto hold = [&](Eigen::Index i, double missing) {
     matrix->row(i) = response_.row(i);
     (*matrix)(i, i) += kProximal;
@@ -95,8 +100,8 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     for (int a = 0; a < 2; ++a) {
       matrix->row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
       for (int b = 0; b < 2; ++b) (*matrix)(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - kProximal);
-      (*matrix)(i + a, normal) -= mu * direction[a];
-      (*side)[i + a] = mu * lambda[normal] * direction[a] - lambda[i + a];
+      if (loads == nullptr) (*matrix)(i + a, normal) -= mu * direction[a];
+      (*side)[i + a] = mu * (loads == nullptr ? lambda[normal] : (*loads)[normal]) * direction[a] - lambda[i + a];
     }
   };
   const auto disc = [&](Eigen::Index i, Eigen::Index normal, double mu, double normal_after) {
@@ -113,7 +118,7 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     const auto i = static_cast<Eigen::Index>(block.first);
     const std::uint32_t r = other_[block.first];
     double projected[6];
-    project(block, &lambda[i], &y[i], projected);
+    project(block, &lambda[i], &y[i], loads != nullptr ? &(*loads)[i] : nullptr, projected);
     if (block.contact < 0) {
       const JointLaw& law = rows[r].law;
       const double bound = law.bound * scale_[r];
@@ -126,37 +131,42 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
       continue;
     }
     const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
-    if (!(projected[0] > 0.0)) {
+    if (!(projected[0] > 0.0) && loads == nullptr) {
       for (std::uint32_t k = 0; k < block.count; ++k) put(i + k, 0.0);
       continue;
     }
-    hold(i, projected[0] - lambda[i]);
+    if (projected[0] > 0.0) {
+      hold(i, projected[0] - lambda[i]);
+    } else {
+      put(i, 0.0);
+    }
+    const double pressed = loads != nullptr ? (*loads)[i] : projected[0];
     Eigen::Index k = 1;
     if (contact.has_friction) {
-      disc(i + 1, i, block.slides ? contact.dynamic_friction : contact.static_friction, projected[0]);
+      disc(i + 1, i, block.slides ? contact.dynamic_friction : contact.static_friction, pressed);
       k = 3;
     }
     if (!contact.has_turning) continue;
     const double lever = scale_[r + static_cast<std::uint32_t>(k)] / scale_[r];
     const double spin = contact.spinning_friction * lever;
     const double wanted = lambda[i + k] - y[i + k];
-    if (std::fabs(wanted) <= spin * projected[0]) {
+    if (std::fabs(wanted) <= spin * pressed) {
       hold(i + k, -y[i + k]);
     } else {
       const double bound = std::copysign(spin, wanted);
-      put(i + k, bound * lambda[i]);
-      (*matrix)(i + k, i) -= bound;
+      put(i + k, bound * (loads == nullptr ? lambda[i] : pressed));
+      if (loads == nullptr) (*matrix)(i + k, i) -= bound;
     }
-    disc(i + k + 1, i, contact.rolling_friction * lever, projected[0]);
+    disc(i + k + 1, i, contact.rolling_friction * lever, pressed);
   }
 }
 
 // False, with nothing done, if the step is not finite.
-bool ConeProblem::newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
+bool ConeProblem::newton_step(const Eigen::VectorXd* loads, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
   const Eigen::Index count = lambda->size();
   Eigen::MatrixXd matrix(count, count);
   Eigen::VectorXd side(count);
-  linearise(*lambda, *y, &matrix, &side);
+  linearise(*lambda, *y, loads, &matrix, &side);
   // rows that stand by themselves go to the right
   std::vector<Eigen::Index> coupled;
   Eigen::VectorXd step = Eigen::VectorXd::Zero(count);

@@ -1,6 +1,7 @@
 // Rows of an island at the end of the step, and the loop that finds where it is.
 #include "plugin_sdk/solver/end_of_step.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
