@@ -79,10 +79,9 @@ class Column {
     if (count > arena_->capacity(id_)) arena_->grow(id_, count);
     arena_->set_count(id_, count);
   }
-  void assign(std::span<const T> values) const {
-    resize(values.size());
-    std::copy(values.begin(), values.end(), data());
-  }
+  void assign(std::span<const T> values) const { resize(values.size()), std::ranges::copy(values, data()); }
+  // Another column of the arena, which making room may move.
+  void assign(const Column& values) const { resize(values.size()), std::ranges::copy(values.span(), data()); }
 
  private:
   Arena* arena_ = nullptr;

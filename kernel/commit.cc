@@ -56,7 +56,7 @@ void Environment::commit_trial(const Trusted<TrialState>&) {
   copy(data_.trial_orientation, back().orientation);
   copy(data_.trial_linear_velocity, back().linear_velocity);
   copy(data_.trial_angular_velocity, back().angular_velocity);
-  back().plugin_state.assign(data_.next_plugin_state.span());
+  back().plugin_state.assign(data_.next_plugin_state);
   std::ranges::fill(back().state_changed.span(), 0U);
   finish_commit();
 }
@@ -79,7 +79,7 @@ void Environment::commit_solution(const Trusted<Solution>&) {
   }
   copy(back().position, back().position);
   copy(back().orientation, back().orientation);
-  back().plugin_state.assign(data_.next_plugin_state.span());
+  back().plugin_state.assign(data_.next_plugin_state);
   figures_ = {};
   remember_contacts();
   remember_joints();
@@ -102,17 +102,17 @@ void Environment::finish_commit() {
 }
 
 void Environment::remember_contacts() {
-  back().contact_body.assign(data_.contact_body.span());
-  back().contact_feature.assign(data_.contact_feature.span());
-  back().contact_key.assign(data_.contact_key.span());
-  back().contact_impulse.assign(data_.contact_impulse.span());
-  back().contact_correction.assign(data_.contact_correction.span());
+  back().contact_body.assign(data_.contact_body);
+  back().contact_feature.assign(data_.contact_feature);
+  back().contact_key.assign(data_.contact_key);
+  back().contact_impulse.assign(data_.contact_impulse);
+  back().contact_correction.assign(data_.contact_correction);
 }
 
 void Environment::remember_joints() {
-  back().discrepancy_constraint.assign(data_.discrepancies.constraint.span());
-  back().discrepancy_impulse.assign(data_.discrepancy_impulse.span());
-  back().discrepancy_correction.assign(data_.discrepancy_correction.span());
+  back().discrepancy_constraint.assign(data_.discrepancies.constraint);
+  back().discrepancy_impulse.assign(data_.discrepancy_impulse);
+  back().discrepancy_correction.assign(data_.discrepancy_correction);
 }
 
 // Joint errors at S_{n+1}; joints whose error or load is beyond what they bear end with this commit.

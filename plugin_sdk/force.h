@@ -18,6 +18,16 @@ struct ApplicationAnswer {
   std::uint32_t flags = 0;  // ApplicationFlag bits
 };
 
+// Throws Refusal if the body's shape is none of the request's.
+inline void require_shape(const stage::ForceWrenchesRequest& request, std::uint32_t body) {
+  const std::uint32_t shape = body < request.body_shape().size() ? request.body_shape()[body] : kNone;
+  if (shape == kNone) return;
+  const std::span<const std::uint32_t> begin = request.shape_parameter_begin();
+  if (shape >= request.shape_type().size() || shape + std::size_t{1} >= begin.size() ||
+      begin[shape] > begin[shape + 1] || begin[shape + 1] > request.shape_parameter().size())
+    throw Refusal("body " + std::to_string(body) + " has a shape that does not exist");
+}
+
 // Calls answer(type id, flattened properties of the force, body) for every application in order and writes what it
 // returns. Throws Refusal for an index outside the request, and for an answer that is not finite.
 template <typename Answer>
@@ -29,9 +39,7 @@ void for_each_application(const stage::ForceWrenchesRequest& request, const stag
     if (force + std::size_t{1} >= begin.size() || body >= request.mass().size() || begin[force] > begin[force + 1] ||
         begin[force + 1] > request.force_parameter().size())
       throw Refusal("application " + std::to_string(i / 2) + " names a force or body that does not exist");
-    const std::uint32_t shape = body < request.body_shape().size() ? request.body_shape()[body] : kNone;
-    if (shape != kNone && shape >= request.shape_type().size())
-      throw Refusal("body " + std::to_string(body) + " has a shape that does not exist");
+    require_shape(request, body);
     const ApplicationAnswer a =
         answer(request.force_type()[force],
                PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force])), body);

@@ -4,9 +4,8 @@
 #include <numbers>
 #include <string>
 
-#include "plugin_sdk/body.h"
+#include "plugin_sdk/force.h"
 #include "plugin_sdk/math/transcendental.h"
-#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 namespace {
@@ -35,13 +34,10 @@ Surface capsule_surface(double radius, double height) {
 }  // namespace
 
 BodyShape shape_of(const stage::ForceWrenchesRequest& request, std::uint32_t body) {
-  if (body >= request.body_shape().size()) throw Refusal("body_shape has no row for a body");
-  const std::uint32_t row = request.body_shape()[body];
+  require_shape(request, body);
+  const std::uint32_t row = body < request.body_shape().size() ? request.body_shape()[body] : kNone;
   if (row == kNone) throw Refusal("body " + std::to_string(body) + " has no geometry, which this force needs");
   const std::span<const std::uint32_t> begin = request.shape_parameter_begin();
-  if (row >= request.shape_type().size() || row + std::size_t{1} >= begin.size() || begin[row] > begin[row + 1] ||
-      begin[row + 1] > request.shape_parameter().size())
-    throw Refusal("body " + std::to_string(body) + " has a shape that does not exist");
   return {request.shape_type()[row], request.shape_parameter().subspan(begin[row], begin[row + 1] - begin[row])};
 }
 

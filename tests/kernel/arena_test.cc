@@ -43,6 +43,17 @@ TEST(Arena, GrowingKeepsEveryColumnAndCountsTheGeneration) {
   EXPECT_EQ(arena.generation(), generation + 1);
 }
 
+TEST(Arena, AColumnIsAssignedThoughRoomForItMovesBoth) {
+  Arena arena;
+  const Column<double> from(&arena, 3, 3), to(&arena, 0, 0);
+  arena.seal();
+  const std::uint64_t generation = arena.generation();
+  for (std::size_t i = 0; i < 3; ++i) from[i] = 1.0 + static_cast<double>(i);
+  to.assign(from);
+  EXPECT_EQ(arena.generation(), generation + 1);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(to[i], 1.0 + static_cast<double>(i));
+}
+
 TEST(Arena, NobodyElseCanWriteOrCutItsSegment) {
   Arena arena;
   const Column<double> a(&arena, 10, 0);

@@ -103,6 +103,8 @@ def forces_of(plugin, request):
     begin = request.force_parameter_begin.astype(numpy.int64)
     check_indices("application", request.application[:, 0], len(request.force_type))
     check_indices("application", request.application[:, 1], len(request.mass))
+    check_indices("body_shape", request.body_shape, len(request.shape_type), none_allowed=True)
+    check_indices("shape_parameter_begin", request.shape_parameter_begin, len(request.shape_parameter) + 1)
     check_indices("force_parameter_begin", begin, len(request.force_parameter) + 1)
     # the rows of force i are order[ends[i] … ends[i + 1])
     order = numpy.argsort(request.application[:, 0], kind="stable")

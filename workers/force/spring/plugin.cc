@@ -5,7 +5,8 @@
 //   f = -k d - c d'      where L_0 = 0: its smooth form
 //
 // at the attachment; -f at the anchor of another body, whose answer gathers those of all bodies on this spring. A spring
-// of length 0 with L_0 > 0 has no direction and gives no force. Stiff where k h^2 or c h is large against the masses:
+// of length 0 with L_0 > 0 has no direction and gives no force. The damping of the smooth form is not along d: between
+// two bodies it changes their angular momentum. Stiff where k h^2 or c h is large against the masses:
 // stability is the integrator's matter.
 #include "plugin_sdk/plugin.h"
 

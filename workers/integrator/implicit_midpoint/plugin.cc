@@ -49,7 +49,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
             .capabilities = {"order=2"},
             .theta = 0.5};
   }
-  explicit ImplicitMidpoint(PropertyCursor) {}
+  explicit ImplicitMidpoint(PropertyCursor) { fix_eigen_blocks(); }
 
   void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                  Host& host) override {

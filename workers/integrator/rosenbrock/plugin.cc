@@ -66,7 +66,7 @@ class Rosenbrock final : public IntegratorPlugin {
                                       "above 1 m/s, 1 rad/s.")},
             .theta = 0.5};
   }
-  explicit Rosenbrock(PropertyCursor settings) : accuracy_(settings.number()) {}
+  explicit Rosenbrock(PropertyCursor settings) : accuracy_(settings.number()) { fix_eigen_blocks(); }
 
   void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                  Host& host) override {
