@@ -291,7 +291,6 @@ void Run::judge_pause(std::uint32_t step) {
 }
 
 void Run::attribute_records() {
-  std::uint32_t unprovoked = 0;
   for (const FaultRecord& record : world_->faults()) {
     const bool is_cold = record.recovered_by == "cold start" || record.recovered_by == "standby, still starting";
     if (record.recovery_us > 0.0 && record.recovered_by == "standby") trial_.add_standby_us(record.recovery_us);
@@ -299,10 +298,10 @@ void Run::attribute_records() {
     if (Injected* fault = find(record); fault != nullptr) {
       fault->records.push_back(record);
     } else {
-      ++unprovoked;
+      trial_.add_unprovoked(fmt::format("step {}, slot {}: {}: {}", record.step, slot_name(record.fault.slot),
+                                        kernel::fault_kind_name(record.fault.kind), record.fault.text));
     }
   }
-  trial_.set_unprovoked(unprovoked);
 }
 
 void Run::judge_swaps() {
