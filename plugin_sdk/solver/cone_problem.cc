@@ -221,7 +221,11 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     double missing = 0.0;
     for (int repeat = 0; repeat < 3; ++repeat) missing = refine_held(bodies, x0);
     summary.residual = std::max(summary.residual, missing);
-    summary.has_converged = summary.has_converged && missing <= tolerance;
+    // what a row's own multiplier does to it is what rounding goes by
+    double summed = 0.0;
+    for (const std::uint32_t r : held_)
+      summed = std::max(summed, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
+    summary.has_converged = summary.has_converged && missing <= std::max(tolerance, 64.0 * kRounding * summed);
   }
   return summary;
 }

@@ -1,7 +1,6 @@
 // Rows of an island at the end of the step, and the loop that finds where it is.
 #include "plugin_sdk/solver/end_of_step.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +10,7 @@
 
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver.h"
-#include "plugin_sdk/solver/contact_law.h"
+#include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/request_check.h"
 
@@ -23,86 +22,6 @@ constexpr double kRounding = std::numeric_limits<double>::epsilon();
 DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
   return {r.point1(), r.point2(), r.velocity(),   r.correction(), r.axes(),         r.mode(),
           r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
-}
-
-// A body where the pose change leaves it.
-struct EndBody {
-  Pose pose;
-  Matrix3 inverse_inertia;
-  Matrix3 stiffened;  // inverse of inertia and geometric stiffness, for a step of the pose change
-};
-
-// What is written: every island to the rows of its own bodies, discrepancies and contacts.
-struct EndOfStep {
-  BodyMotion velocity, displacement;
-  std::vector<double> joint_impulse, joint_correction;
-  std::vector<double> contact_impulse, contact_correction, contact_direction;
-};
-
-// A joint's discrepancy and its laws.
-struct EndJoint {
-  std::uint32_t row = 0, body1 = 0, body2 = 0;
-  Discrepancy discrepancy;
-  Matrix3 axes;
-  double slop = 0.0, length = 1.0;
-  std::array<JointAxisState, 3> states;
-  std::array<JointLaw, 3> pose_laws, velocity_laws;
-  // at the end of the step
-  std::array<ConstraintDirection, 3> directions;
-  Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
-  Vector3 errors;  // along the axes
-};
-
-struct EndContact {
-  std::uint32_t row = 0, body1 = 0, body2 = 0;
-  ConstraintDirection gap_row;
-  double gap = 0.0, gap_target = 0.0, slop = 0.0;
-  ContactLaw law;
-  Vector3 arm1, arm2;  // to the surface points
-  bool is_closed = false;
-  std::uint32_t lowered = 0;
-};
-
-bool is_held(AxisMode mode) {
-  return mode == AxisMode::kLocked || mode == AxisMode::kLimited || mode == AxisMode::kUnilateral;
-}
-
-bool holds_pose(const Discrepancy& d) {
-  return is_held(axis_mode(d.modes, 0)) || is_held(axis_mode(d.modes, 1)) || is_held(axis_mode(d.modes, 2));
-}
-
-ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2) {
-  ConstraintDirection d;
-  d.linear = axis;
-  d.angular1 = axis.cross(arm1);
-  d.angular2 = arm2.cross(axis);
-  return d;
-}
-
-ConstraintDirection turning_about(const Vector3& axis) {
-  ConstraintDirection d;
-  d.angular1 = -axis;
-  d.angular2 = axis;
-  return d;
-}
-
-// The row with what a unit of its multiplier turns the bodies by.
-ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2) {
-  d.turn1 = inverse1 * d.angular1;
-  d.turn2 = inverse2 * d.angular2;
-  return d;
-}
-
-// (I + K)^-1 of a body with inverse moments D in its principal axes R: R D^1/2 (1 + D^1/2 R^T K R D^1/2)^-1 D^1/2 R^T.
-// Directions in which K would take away more than half of the inertia count as half.
-Matrix3 stiffened_inverse(const Quaternion& orientation, const Vector3& inverse_moments, const Matrix3& stiffness) {
-  const Matrix3 rotation = to_rotation_matrix(orientation);
-  const Matrix3 root = rotation * inverse_moments.cwiseSqrt().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix3> modes(root.transpose() * stiffness * root);
-  if (modes.info() != Eigen::Success) return world_inverse_inertia(orientation, inverse_moments);
-  const Vector3 share = (1.0 + modes.eigenvalues().array().max(-0.5)).inverse();
-  const Matrix3 base = root * modes.eigenvectors();
-  return base * share.asDiagonal() * base.transpose();
 }
 
 class IslandSolver {

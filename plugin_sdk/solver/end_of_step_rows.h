@@ -1,0 +1,66 @@
+// What the end-of-step solution keeps of bodies, joints and contacts, and the rows it makes of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/contact_law.h"
+#include "plugin_sdk/solver/joint_laws.h"
+
+namespace gravitas {
+
+// A body where the pose change leaves it.
+struct EndBody {
+  Pose pose;
+  Matrix3 inverse_inertia;
+  Matrix3 stiffened;  // inverse of inertia and geometric stiffness, for a step of the pose change
+};
+
+// What is written: every island to the rows of its own bodies, discrepancies and contacts.
+struct EndOfStep {
+  BodyMotion velocity, displacement;
+  std::vector<double> joint_impulse, joint_correction;
+  std::vector<double> contact_impulse, contact_correction, contact_direction;
+};
+
+// A joint's discrepancy and its laws.
+struct EndJoint {
+  std::uint32_t row = 0, body1 = 0, body2 = 0;
+  Discrepancy discrepancy;
+  Matrix3 axes;
+  double slop = 0.0, length = 1.0;
+  std::array<JointAxisState, 3> states;
+  std::array<JointLaw, 3> pose_laws, velocity_laws;
+  // at the end of the step
+  std::array<ConstraintDirection, 3> directions;
+  Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
+  Vector3 errors;  // along the axes
+};
+
+struct EndContact {
+  std::uint32_t row = 0, body1 = 0, body2 = 0;
+  ConstraintDirection gap_row;
+  double gap = 0.0, gap_target = 0.0, slop = 0.0;
+  ContactLaw law;
+  Vector3 arm1, arm2;  // to the surface points
+  bool is_closed = false;
+  std::uint32_t lowered = 0;
+};
+
+// True for modes that hold an error, of an axis or of any of a discrepancy's.
+bool is_held(AxisMode mode);
+bool holds_pose(const Discrepancy& d);
+
+// Rows along an axis with the arms of either body, and about one; what they turn the bodies by comes with with_turns().
+ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2);
+ConstraintDirection turning_about(const Vector3& axis);
+ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2);
+
+// (I + K)^-1 of a body with inverse moments D in its principal axes R: R D^1/2 (1 + D^1/2 R^T K R D^1/2)^-1 D^1/2 R^T.
+// Directions in which K would take away more than half of the inertia count as half.
+Matrix3 stiffened_inverse(const Quaternion& orientation, const Vector3& inverse_moments, const Matrix3& stiffness);
+
+}  // namespace gravitas
