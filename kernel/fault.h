@@ -43,6 +43,7 @@ class StageFault : public std::exception {
   std::string text;
   Slot slot = Slot::kSpace;  // filled where the slot is known
   std::string plugin;
+  bool is_unread = false;  // it died before it looked at the request, which is not to blame
 };
 
 // One failed call and what became of it, as the report shows it.

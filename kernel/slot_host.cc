@@ -35,8 +35,14 @@ std::uint32_t SlotHost::wanted_standbys() const {
 }
 
 void SlotHost::keep_standbys() {
-  std::erase_if(standbys_, [](const std::unique_ptr<Spare>& spare) { return spare->has_died(); });
-  while (standbys_.size() < wanted_standbys()) standbys_.push_back(prepare(description_));
+  std::erase_if(standbys_, [&](const std::unique_ptr<Spare>& spare) {
+    const std::string problem = spare->problem();
+    if (problem.empty()) return false;
+    complaints_.push_back("a standby " + problem);
+    ++lost_standbys_;
+    return true;
+  });
+  while (standbys_.size() < wanted_standbys() && lost_standbys_ < kBudget) standbys_.push_back(prepare(description_));
 }
 
 void SlotHost::drain() {
@@ -90,7 +96,7 @@ std::string SlotHost::take_host() {
 void SlotHost::replace_description(SlotDescription description) {
   description_ = std::move(description);
   retire(std::exchange(standbys_, {}));
-  failures_ = failures_in_a_row_ = 0;
+  failures_ = failures_in_a_row_ = lost_standbys_ = 0;
 }
 
 std::string SlotHost::next_rung() {
@@ -120,7 +126,7 @@ std::string SlotHost::next_rung() {
 Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* poison) {
   if (carrier_) carrier_->kill();
   retire(std::move(carrier_));
-  if (good_answers_ >= kGoodAnswers) failures_ = 0;
+  if (good_answers_ >= kGoodAnswers) failures_ = lost_standbys_ = 0;
   failures_in_a_row_ = good_answers_ == 0 ? failures_in_a_row_ + 1 : 1;
   good_answers_ = 0;
   ++failures_;
@@ -131,7 +137,7 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
     previous_.reset();
     return {"rollback", true};
   }
-  if (fault.kind != FaultKind::kDeadline) ++attempts->rejections;
+  if (fault.kind != FaultKind::kDeadline && !fault.is_unread) ++attempts->rejections;
 
   Recovery recovery;
   StageFault last = fault;

@@ -3,7 +3,8 @@
 //   replay on a standby -> cold start -> previous good build -> declared fallback -> the environment pauses
 //
 // A host that fails kBudget times with fewer than kGoodAnswers good answers between goes to the next rung, and so does
-// a request that two incarnations died of or answered wrongly (a deadline alone does not count there).
+// a request that two incarnations died of or answered wrongly (there a deadline alone does not count, nor a death
+// before the request was read, as far as the carrier can tell: in gRPC, before it was written).
 #pragma once
 
 #include <cstdint>
@@ -46,7 +47,7 @@ class SlotHost {
   // Starting is split so that the workers of all hosts start side by side. finish_start() throws StageFault.
   void begin_start();
   void finish_start();
-  // Begins the standbys that are missing.
+  // Begins the standbys that are missing, unless kBudget of them were lost.
   void keep_standbys();
   void drain();
 
@@ -89,7 +90,7 @@ class SlotHost {
   // During probation: what answered before. After it: what it was made of.
   std::unique_ptr<Carrier> old_;
   std::optional<SlotDescription> previous_;
-  std::uint32_t failures_ = 0, failures_in_a_row_ = 0;
+  std::uint32_t failures_ = 0, failures_in_a_row_ = 0, lost_standbys_ = 0;
   std::uint64_t good_answers_ = 0;       // since the last failure
   std::vector<std::string> complaints_;  // of those that are gone
   std::vector<std::future<void>> retired_;

@@ -37,9 +37,10 @@ bool Spare::is_done() const {
   return done_;
 }
 
-bool Spare::has_died() const {
+std::string Spare::problem() const {
   const std::lock_guard lock(mutex_);
-  return carrier_ != nullptr && !carrier_->is_alive();
+  if (fault_) return "could not be started: " + fault_->text;
+  return carrier_ && !carrier_->is_alive() ? "has died" : "";
 }
 
 std::unique_ptr<Carrier> Spare::take() {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "kernel/carrier/carrier.h"
@@ -27,8 +28,8 @@ class Spare {
 
   // Prepared, or failed to be.
   bool is_done() const;
-  // It was prepared, and its host has gone since.
-  bool has_died() const;
+  // Why nobody needs to take it any more: its start failed, or its host has gone since. Empty: it may be taken.
+  std::string problem() const;
   // Waits. Throws the StageFault of a failed start.
   std::unique_ptr<Carrier> take();
 

@@ -48,6 +48,12 @@ void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::siz
     throw Refusal("joint " + std::to_string(joint) +
                   " has a discrepancy that is not finite: its bound numbers or the poses of its bodies are not, or too "
                   "large");
+  if ((d.lower.array() > d.upper.array()).any() || d.compliance.minCoeff() < 0.0 || d.damping.minCoeff() < 0.0 ||
+      d.maximum_force.minCoeff() < 0.0 || std::fabs(d.axes.norm() - 1.0) > 1e-6)
+    throw Refusal(
+        "joint " + std::to_string(joint) +
+        " has a discrepancy with crossed limits, negative numbers or axes that are not unit: its bound numbers "
+        "are none of a joint of this type");
   reply.constraint().push(joint);
   push_vector(reply.point1(), d.point1);
   push_vector(reply.point2(), d.point2);

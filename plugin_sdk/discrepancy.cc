@@ -35,7 +35,8 @@ double joint_error(const Discrepancy& discrepancy, const Vector3& error) {
   const Matrix3 axes = discrepancy.axes.toRotationMatrix();
   double sum = 0.0;
   for (int i = 0; i < 3; ++i) {
-    const double along = axes.col(i).dot(error);
+    if (discrepancy.compliance[i] > 0.0) continue;
+    const double along = discrepancy.is_radial() && i == 0 ? error.norm() : axes.col(i).dot(error);
     double excess = 0.0;
     switch (axis_mode(discrepancy.modes, i)) {
       case AxisMode::kLocked:

@@ -33,8 +33,11 @@ enum class AxisMode : std::uint32_t {
   kDriven = 5       // velocity only; reaches the desired velocity within maximum_force
 };
 
-// Modes of the three axes, four bits each from the lowest, and a flag for the angular twin.
+// Modes of the three axes, four bits each from the lowest, and one of two flags at most: the angular twin, and the
+// radial one, whose first axis points from x1 to x2 and turns with them, so that the error along it is |x2 - x1| (a rod or
+// rope). All other axes turn with body 1.
 inline constexpr std::uint32_t kAngularDiscrepancy = 1U << 12;
+inline constexpr std::uint32_t kRadialDiscrepancy = 1U << 13;
 
 constexpr std::uint32_t pack_modes(AxisMode x, AxisMode y, AxisMode z, bool angular = false) {
   return static_cast<std::uint32_t>(x) | static_cast<std::uint32_t>(y) << 4 | static_cast<std::uint32_t>(z) << 8 |
@@ -47,7 +50,7 @@ constexpr AxisMode axis_mode(std::uint32_t modes, int axis) {
 
 // True if the value is one that pack_modes() makes.
 constexpr bool is_valid_mode(std::uint32_t modes) {
-  return modes < 2 * kAngularDiscrepancy && (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 &&
+  return modes <= (kRadialDiscrepancy | 0xFFFU) && (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 &&
          ((modes >> 8) & 0xFU) <= 5;
 }
 
@@ -68,6 +71,7 @@ struct Discrepancy {
   Vector3 maximum_force = Vector3::Constant(kUnlimited);  // N or N m
 
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
+  bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
 };
 
 // One row of the constraint Jacobian, with the arms to the point midway between the discrepancy's two.
@@ -93,7 +97,7 @@ Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& n
                  const Pose& then2);
 
 // Joint error of a discrepancy with error vector `error` (world): its norm over the axes that are locked, and
-// over the limits where they are exceeded. m, or rad for the angular twin.
+// over the limits where they are exceeded; what gives way (compliance) is no error. m, or rad for the angular twin.
 double joint_error(const Discrepancy& discrepancy, const Vector3& error);
 
 // A contact as a discrepancy (§ 2.7.5.1, with x1 and x2 as they must be: x2 - x1 along the normal is minus the

@@ -30,7 +30,19 @@ class PairRule {
 
   bool operator()(std::uint32_t a, std::uint32_t b) const { return may_touch(a, b) && bounds_overlap(a, b); }
 
+  std::uint32_t bodies() const { return static_cast<std::uint32_t>(flags_.size()); }
+  bool has_shape(std::uint32_t body) const { return (flags_[body] & kHasShape) != 0; }
+
+  // True if a structure may rely on the bounds: lower <= upper, and so far from the largest number that extents can be
+  // multiplied. The rest (unbounded, upside down, not a number) is for the rule alone: such a body is tested against all.
+  bool is_regular(std::uint32_t body) const {
+    for (std::size_t k = 3 * std::size_t{body}; k < 3 * std::size_t{body} + 3; ++k)
+      if (!(lower_[k] <= upper_[k] && lower_[k] >= -kFarthest && upper_[k] <= kFarthest)) return false;
+    return true;
+  }
+
  private:
+  static constexpr double kFarthest = 1e100;  // m
   std::span<const double> lower_, upper_;
   std::span<const std::uint32_t> flags_;
   std::span<const std::uint64_t> group_, mask_;

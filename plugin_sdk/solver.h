@@ -7,9 +7,10 @@ namespace gravitas {
 
 // Why a solver stopped: `stop_reason` of SolverSolveReply.
 enum class StopReason : std::uint32_t {
-  kNothingToDo = 0,  // no rows
-  kConverged = 1,    // the last sweep changed no velocity by more than rounding's size
-  kIterations = 2    // the allowed number of sweeps was used up
+  kNothingToDo = 0,   // no rows
+  kConverged = 1,     // the last sweep changed no velocity by more than rounding's size
+  kIterations = 2,    // the allowed number of sweeps or steps was used up
+  kContradiction = 3  // converged, but joints contradict each other: a least-squares compromise
 };
 
 // Columns of `contact_material`.

@@ -172,7 +172,7 @@ void GrpcCarrier::send_assets(Stream* stream, const MethodInfo& method, std::spa
 }
 
 CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
-  if (link_.has_ended()) link_.report_death();
+  if (link_.has_ended()) link_.report_death(true);
   const MethodInfo& method = call.info();
   std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns;
   for (std::size_t i = 0; i < call.request.size(); ++i)

@@ -61,6 +61,7 @@ class SharedMemoryCarrier final : public Carrier {
   const std::uint64_t slot_deadline_ns_;
   std::uint64_t deadline_ns_ = 0;  // of the call
   std::uint64_t sequence_ = 0;
+  std::uint64_t asked_at_mark_ = 0;  // the worker's progress when the request was posted
   std::uint32_t seen_ = 0;
   std::shared_ptr<Mailboxes> boxes_ = std::make_shared<Mailboxes>();
   std::unique_ptr<WorkerLink> link_;
@@ -142,7 +143,7 @@ void SharedMemoryCarrier::send_new_segments(const Arena& arena) {
                                  arena.segment().descriptor());
     sent_state_ = arena.generation();
   }
-  if (!sent) link_->report_death();
+  if (!sent) link_->report_death(true);
 }
 
 void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<const ColumnId> columns,
@@ -163,7 +164,7 @@ void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<con
 }
 
 CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
-  if (link_->has_ended()) link_->report_death();
+  if (link_->has_ended()) link_->report_death(true);
   deadline_ns_ = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   make_rooms(call, *arena, derivatives);
   send_new_segments(*arena);
@@ -180,6 +181,7 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
     request.fault = 1;
     boxes_->mine->text[call.fault.copy(boxes_->mine->text, sizeof Mailbox::text - 1)] = '\0';
   }
+  asked_at_mark_ = boxes_->theirs->progress.load(std::memory_order_relaxed);
   post_frame(request, call.request, *arena);
 
   std::uint64_t spent_ns = 0;
@@ -216,7 +218,8 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
   std::uint64_t marks = theirs->progress.load(std::memory_order_relaxed);
   for (;;) {
     // an end from here on counts the signal up; one before may have been seen together with the last message
-    if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_) link_->report_death();
+    if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_)
+      link_->report_death(theirs->progress.load(std::memory_order_relaxed) == asked_at_mark_);
     const std::uint64_t look = std::min(until, channel::now_ns() + kLookNs);
     if (channel::wait(mine, theirs, seen_, look) == channel::Waited::kMessage) {
       seen_ = theirs->signal.load(std::memory_order_acquire);

@@ -216,14 +216,16 @@ std::vector<std::string> WorkerLink::sandbox() const {
 
 int WorkerLink::process_id() const { return process_ ? process_->process_id() : control_->welcome().process_id(); }
 
-void WorkerLink::report_death() {
+void WorkerLink::report_death(bool is_unread) {
   if (!process_) throw StageFault(FaultKind::kDeath, "stream", "the worker at " + address_ + " is gone");
   const std::string who = "its worker process " + std::to_string(process_id());
   // the end may be known to the socket before it is to the watcher
-  if (process_->wait(kDrainMilliseconds))
-    throw StageFault(FaultKind::kDeath, "pidfd", who + " was " + process_->ending() + last_words(*process_));
+  const bool has_died = process_->wait(kDrainMilliseconds);
   kill();
-  throw StageFault(FaultKind::kFailure, "stream", who + " closed its stream" + last_words(*process_));
+  StageFault fault(has_died ? FaultKind::kDeath : FaultKind::kFailure, has_died ? "pidfd" : "stream",
+                   who + (has_died ? " was " + process_->ending() : " closed its stream") + last_words(*process_));
+  fault.is_unread = is_unread;
+  throw StageFault(fault);
 }
 
 void WorkerLink::report_overdue(bool at_cap, std::uint64_t deadline_ns) {

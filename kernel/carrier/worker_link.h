@@ -63,7 +63,7 @@ class WorkerLink {
   bool has_ended() const { return process_ && process_->has_ended(); }
   bool is_alive() const { return !has_ended() && control_->answers_heartbeats(); }
   // Each ends the worker, whatever it would say next, and throws the fault that says how it failed.
-  [[noreturn]] void report_death();
+  [[noreturn]] void report_death(bool is_unread = false);
   [[noreturn]] void report_overdue(bool at_cap, std::uint64_t deadline_ns);
   [[noreturn]] void report_bad_frame(const std::string& what);
 

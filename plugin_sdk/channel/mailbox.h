@@ -29,7 +29,7 @@ struct Mailbox {
   // Core on which the owner ran when it last looked.
   std::atomic<std::uint32_t> cpu;
   std::uint32_t reserved;
-  // Marks of progress of the code at work in a call.
+  // Marks of progress of the code at work in a call, the first when it has taken the request.
   std::atomic<std::uint64_t> progress;
   // Nanoseconds the plugin worked on the call that is answered.
   std::uint64_t compute_ns;

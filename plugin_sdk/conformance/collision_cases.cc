@@ -1,4 +1,4 @@
-// Slot collision: closed forms for the shapes of the scene language, and laws of any convex solids. The strongest
+// Slot collision: closed forms for shapes of the scene language, and laws of any convex solids. The strongest
 // needs no known answer: moved apart along the normal by the depth, two bodies touch no more, and by half of it they
 // still do.
 //
@@ -28,7 +28,7 @@ Pose at(const Vector3& position) { return {position, Quaternion::Identity()}; }
 std::string shown_pair(const Solids& world) { return world.solids[0].type + " and " + world.solids[1].type; }
 
 std::vector<TypeDeclaration> types_of(Subject& subject) {
-  constexpr const char* kKnown[] = {"Sphere", "Box", "Cylinder", "Halfspace"};
+  constexpr const char* kKnown[] = {"Sphere", "Box", "Cylinder", "Halfspace", "Capsule", "Cone"};
   return askable_types(subject.declaration(), kKnown, [&](const TypeDeclaration& type, Draw* draw) {
     const Solid solid = random_solid(subject.declaration(), type, draw);
     return subject.ask(kManifolds, Solids::two(solid, {}, solid, draw->pose(1.0)).request());

@@ -22,6 +22,76 @@ double between(double side, double cap) {
   return Vector3(std::max(side, 0.0), std::max(cap, 0.0), 0.0).norm() + std::min(std::max(side, cap), 0.0);
 }
 
+// Distance of (x, y), x >= 0, from the segment between two points of the half-plane.
+double from_segment(const Vector3& p, const Vector3& from, const Vector3& to) {
+  const Vector3 line = to - from;
+  const double t = std::clamp(line.dot(p - from) / line.squaredNorm(), 0.0, 1.0);
+  return (from + t * line - p).norm();
+}
+
+// The corners and faces of a tetrahedron that holds a ball of 0.2 m about the origin, each corner about a metre away.
+struct Tetrahedron {
+  std::vector<PropertyValue> vertices, faces;
+  double radius = 0.0;
+};
+
+Tetrahedron random_tetrahedron(Draw* draw) {
+  Tetrahedron made;
+  const double corners[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  for (const auto& corner : corners) {
+    const Vector3 vertex = draw->uniform(0.8, 1.0) * Vector3(corner[0], corner[1], corner[2]) + draw->vector(0.1);
+    made.vertices.push_back(PropertyValue::numbers({vertex.data(), 3}));
+    made.radius = std::max(made.radius, vertex.norm());
+  }
+  const double faces[4][3] = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+  for (const auto& face : faces) made.faces.push_back(PropertyValue::numbers(face));
+  return made;
+}
+
+// A polyhedron or a closed mesh.
+Solid make_tetrahedron(const TypeDeclaration& type, Draw* draw) {
+  Tetrahedron made = random_tetrahedron(draw);
+  return {type.name,
+          flattened(type, {{"Vertices", PropertyValue::of(std::move(made.vertices)), {}},
+                           {"Faces", PropertyValue::of(std::move(made.faces)), {}}}),
+          {},
+          made.radius,
+          0.0};
+}
+
+// Two balls as one, in the form in which a plugin receives them.
+Solid make_dumbbell(const TypeDeclaration& type, Draw* draw) {
+  const double radius = draw->uniform(0.3, 0.6), arm = draw->uniform(0.3, 0.6);
+  const auto sphere = type_id("Sphere");
+  std::vector<PropertyValue> children, parameters;
+  for (const double side : {-1.0, 1.0}) {
+    const double row[] = {static_cast<double>(sphere >> 32),
+                          static_cast<double>(sphere & 0xFFFFFFFFU),
+                          static_cast<double>(parameters.size()),
+                          side * arm,
+                          0,
+                          0,
+                          1,
+                          0,
+                          0,
+                          0,
+                          0};
+    children.push_back(PropertyValue::numbers(row));
+    parameters.push_back(PropertyValue::of(radius));
+  }
+  return {type.name,
+          flattened(type, {{"Children", PropertyValue::of(std::move(children)), {}},
+                           {"Parameters", PropertyValue::of(std::move(parameters)), {}}}),
+          {},
+          radius + arm,
+          0.0};
+}
+
+bool has_properties(const TypeDeclaration& type, const char* first, std::uint32_t columns, const char* second) {
+  return type.properties.size() >= 2 && type.properties[0].name == first && type.properties[0].columns == columns &&
+         type.properties[1].name == second;
+}
+
 }  // namespace
 
 Solid make_sphere(const PluginDeclaration& declaration, double radius) {
@@ -51,6 +121,27 @@ Solid make_halfspace(const PluginDeclaration& declaration) {
           0.0};
 }
 
+Solid make_capsule(const PluginDeclaration& declaration, double radius, double height) {
+  const double half = 0.5 * height;
+  return {"Capsule", flattened(type_named(declaration, "Capsule"), {given("Radius", radius), given("Height", height)}),
+          [=](const Vector3& p) { return (p - Vector3(0, std::clamp(p.y(), -half, half), 0)).norm() - radius; },
+          radius + half, radius};
+}
+
+Solid make_cone(const PluginDeclaration& declaration, double radius, double height) {
+  const double half = 0.5 * height, slant = std::sqrt(radius * radius + height * height);
+  // of the profile: the triangle of apex, rim and centre of the base
+  const auto distance = [=](const Vector3& p) {
+    const Vector3 flat(Vector3(p.x(), 0, p.z()).norm(), p.y(), 0);
+    const Vector3 apex(0, half, 0), rim(radius, -half, 0), base(0, -half, 0);
+    const double side = (height * flat.x() + radius * (flat.y() - half)) / slant;
+    const double away = std::min(from_segment(flat, apex, rim), from_segment(flat, rim, base));
+    return side <= 0.0 && flat.y() >= -half ? -away : away;
+  };
+  return {"Cone", flattened(type_named(declaration, "Cone"), {given("Radius", radius), given("Height", height)}),
+          distance, Vector3(radius, half, 0).norm(), -distance(Vector3::Zero())};
+}
+
 Solid random_solid(const PluginDeclaration& declaration, const TypeDeclaration& type, Draw* draw) {
   const auto size = [draw] { return draw->uniform(0.4, 1.2); };
   if (type.name == "Sphere") return make_sphere(declaration, size());
@@ -63,6 +154,14 @@ Solid random_solid(const PluginDeclaration& declaration, const TypeDeclaration& 
     const double radius = size();
     return make_cylinder(declaration, radius, 2.0 * size());
   }
+  if (type.name == "Capsule" || type.name == "Cone") {
+    const double radius = size(), height = 2.0 * size();
+    return type.name == "Cone" ? make_cone(declaration, radius, height) : make_capsule(declaration, radius, height);
+  }
+  const bool has_faces = has_properties(type, "Vertices", 3, "Faces");
+  if (has_faces && (type.name == "ConvexPolyhedron" || type.name == "TriangleMesh"))
+    return make_tetrahedron(type, draw);
+  if (type.name == "Compound" && has_properties(type, "Children", 11, "Parameters")) return make_dumbbell(type, draw);
   return {type.name, sample_values(type.properties, draw), {}, 1e3, 0.0};
 }
 

@@ -30,6 +30,8 @@ Solid make_sphere(const PluginDeclaration& declaration, double radius);
 Solid make_box(const PluginDeclaration& declaration, const Vector3& half_extents);
 Solid make_cylinder(const PluginDeclaration& declaration, double radius, double height);
 Solid make_halfspace(const PluginDeclaration& declaration);
+Solid make_capsule(const PluginDeclaration& declaration, double radius, double height);
+Solid make_cone(const PluginDeclaration& declaration, double radius, double height);
 // A solid of a declared type, with sizes about a metre.
 Solid random_solid(const PluginDeclaration& declaration, const TypeDeclaration& type, Draw* draw);
 

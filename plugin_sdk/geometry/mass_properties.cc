@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <sstream>
+#include <vector>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -85,6 +86,67 @@ MassProperties cylinder_mass_properties(double radius, double height, double den
   const double across = result.mass * (3.0 * radius * radius + height * height) / 12.0;
   result.inertia.diagonal() = Vector3(across, along, across);
   return result;
+}
+
+MassProperties capsule_mass_properties(double radius, double height, double density) {
+  const MassProperties middle = cylinder_mass_properties(radius, height, density);
+  MassProperties half;
+  half.mass = 2.0 / 3.0 * kPi * radius * radius * radius * density;
+  // about the centre of the ball 2/5 m r^2, so about the centroid 3/8 r away 83/320 m r^2 across the axis
+  const double across = 83.0 / 320.0 * half.mass * radius * radius;
+  half.inertia.diagonal() = Vector3(across, 0.4 * half.mass * radius * radius, across);
+  const double arm = 0.5 * height + 0.375 * radius;
+  MassProperties result;
+  result.mass = middle.mass + 2.0 * half.mass;
+  result.inertia = middle.inertia + 2.0 * translated_inertia(half.inertia, half.mass, arm * Vector3::UnitY());
+  return result;
+}
+
+MassProperties cone_mass_properties(double radius, double height, double density) {
+  MassProperties result;
+  result.mass = kPi * radius * radius * height / 3.0 * density;
+  result.centre_of_mass.y() = -0.25 * height;
+  const double across = result.mass * (0.15 * radius * radius + 0.0375 * height * height);
+  result.inertia.diagonal() = Vector3(across, 0.3 * result.mass * radius * radius, across);
+  return result;
+}
+
+MassProperties solid_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
+                                     double density) {
+  // a point within, so that far from the origin nothing cancels
+  Vector3 origin = Vector3::Zero();
+  for (const Vector3& v : vertices) origin += v / static_cast<double>(vertices.size());
+  double volume = 0.0;
+  Vector3 moment = Vector3::Zero();
+  Matrix3 second = Matrix3::Zero();
+  for (std::size_t i = 0; i + 2 < triangles.size(); i += 3) {
+    const Vector3 a = vertices[triangles[i]] - origin, b = vertices[triangles[i + 1]] - origin,
+                  c = vertices[triangles[i + 2]] - origin;
+    const Vector3 sum = a + b + c;
+    const double six_volumes = a.dot(b.cross(c));
+    volume += six_volumes / 6.0;
+    moment += six_volumes / 24.0 * sum;
+    second += six_volumes / 120.0 * (sum * sum.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
+  }
+  MassProperties result;
+  result.mass = volume * density;
+  const Vector3 centre = moment / volume;
+  result.centre_of_mass = origin + centre;
+  const Matrix3 central = density * symmetric_part(second - volume * (centre * centre.transpose()));
+  result.inertia = central.trace() * Matrix3::Identity() - central;
+  return result;
+}
+
+MassProperties shell_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
+                                     double density) {
+  std::vector<MassProperties> points;
+  for (std::size_t i = 0; i + 2 < triangles.size(); i += 3) {
+    const Vector3 &a = vertices[triangles[i]], &b = vertices[triangles[i + 1]], &c = vertices[triangles[i + 2]];
+    MassProperties& point = points.emplace_back();
+    point.mass = 0.5 * density * std::sqrt((b - a).cross(c - a).squaredNorm());
+    point.centre_of_mass = (a + b + c) / 3.0;
+  }
+  return combined(points);
 }
 
 MassProperties scaled_to_mass(const MassProperties& properties, double mass) {

@@ -9,6 +9,7 @@
 // meaningless or non-finite results, which validate() finds.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -42,6 +43,25 @@ MassProperties box_mass_properties(const Vector3& half_extents, double density);
 // A cylinder about the origin, its axis along y, of full height h: m = pi r^2 h rho,
 // I_y = m r^2/2, I_x = I_z = m (3 r^2 + h^2)/12. Source: (2.37c).
 MassProperties cylinder_mass_properties(double radius, double height, double density);
+
+// A capsule about the origin, its axis along y, h between the centres of its half balls: the cylinder of height h and the
+// two halves of a ball, whose centroids lie 3/8 r beyond the ends.
+MassProperties capsule_mass_properties(double radius, double height, double density);
+
+// A cone about the y axis, apex at +h/2, base at -h/2: m = pi r^2 h/3 rho, centroid at -h/4, about it
+// I_y = 3/10 m r^2, I_x = I_z = m (3/20 r^2 + 3/80 h^2).
+MassProperties cone_mass_properties(double radius, double height, double density);
+
+// The solid within a closed surface of triangles (three indices each, counter-clockwise from outside), exactly: the sum
+// over signed tetrahedra, which equals the surface integrals of B. Mirtich, "Fast and accurate computation of polyhedral
+// mass properties" (1996). (2.32) is the distribution tensor that it sums.
+MassProperties solid_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
+                                     double density);
+
+// An open surface as point masses at the centroids of its triangles, in proportion to their areas (§ 4.3.1.5); density
+// in kg/m^2.
+MassProperties shell_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
+                                     double density);
 
 // The same body with its density changed so that it has this mass (kg). Precondition: the given
 // mass is not zero.

@@ -104,6 +104,7 @@ int MailboxLoop::serve(std::uint64_t epoch, const std::atomic<bool>& stopping, s
       complain("dropped a frame of kind " + std::to_string(header.kind) + " and epoch " + std::to_string(header.epoch));
       continue;
     }
+    mine_->progress.fetch_add(1, std::memory_order_relaxed);
     if (!map_announced_segments(header)) return 1;
     leave_crowded_core();
     answer(header);

@@ -74,9 +74,11 @@ class SimulatedCarrier final : public kernel::Carrier {
  private:
   class Derivatives;
 
-  [[noreturn]] void die(const char* when) {
+  [[noreturn]] void die(const char* when, bool is_unread = false) {
     dead_ = true;
-    throw StageFault(FaultKind::kDeath, "pidfd", std::string("it died ") + when);
+    StageFault fault(FaultKind::kDeath, "pidfd", std::string("it died ") + when);
+    fault.is_unread = is_unread;
+    throw StageFault(fault);
   }
   [[noreturn]] void be_overdue() {
     // without a deadline whoever waits for it waits for ever
@@ -173,7 +175,7 @@ std::int32_t SimulatedCarrier::misbehave(const host::FaultOrder& order, const st
 
 kernel::CallResult SimulatedCarrier::call(const kernel::StageCall& call, kernel::Arena* arena,
                                           kernel::DerivativeSource* derivatives) {
-  if (dead_) die("between two calls");
+  if (dead_) die("between two calls", true);
   const stage::MethodInfo& method = call.info();
   std::optional<host::FaultOrder> order;
   std::string text;

@@ -41,7 +41,7 @@ std::string quantile_line(const char* what, const v1::Quantiles& one) {
 
 void Tally::add(const v1::Trial& trial, const std::string& command) {
   ++trials_;
-  unprovoked_ += trial.unprovoked();
+  unprovoked_ += static_cast<std::uint64_t>(trial.unprovoked_size());
   for (const v1::Fault& fault : trial.faults()) {
     ++injected_;
     manifested_ += fault.outcome() != "M";

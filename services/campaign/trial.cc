@@ -121,7 +121,8 @@ class Run {
   void attribute_records();
   void judge_swaps();
   void write();
-  // A standby was killed then, unseen: who asks it next sees a second death of the same request, as poison does.
+  // A standby was killed then, unseen: who asks it next may see a second death of the same request, as poison does,
+  // where the carrier cannot tell whether it was read.
   Injected* killed_standby(std::uint32_t step);
   int process_of(Slot slot) const;
   void forbid(std::string what) { trial_.add_forbidden(std::move(what)); }
@@ -235,6 +236,8 @@ Run::Injected* Run::find(const FaultRecord& record) {
 Run::Injected* Run::killed_standby(std::uint32_t step) {
   for (Injected& fault : faults_) {
     const bool kills = fault.plan->means == Means::kKillStandby || fault.plan->means == Means::kSwapKilled;
+    const bool is_told = description_.slot(fault.plan->slot).hosting != kernel::Hosting::kGrpc;
+    if (options_.tier != Tier::kReal || is_told) continue;
     if (kills && fault.happened && fault.plan->step <= step && step <= fault.plan->step + 1) return &fault;
   }
   return nullptr;
@@ -267,12 +270,7 @@ void Run::judge_pause(std::uint32_t step) {
   for (Injected& fault : faults_)
     if (fault.plan->duty == Duty::kPoison && fault.plan->step == step && fault.plan->slot == last.slot) poison = &fault;
   if (poison == nullptr && last.kind == kernel::FaultKind::kDeath) poison = killed_standby(step);
-  // a fallback has one chance, which a failed start uses up
-  const bool had_fallback = plan_.has_fallbacks &&
-                            std::ranges::none_of(hosts_.failed_starts(), [&](const SimulatedHosts::FailedStart& start) {
-                              return start.slot == last.slot;
-                            });
-  if (poison == nullptr || had_fallback) {
+  if (poison == nullptr || plan_.has_fallbacks) {
     for (Injected& fault : faults_)
       if (fault.plan->step == step) fault.outcome = "forbidden";
     forbid(
@@ -293,7 +291,6 @@ void Run::judge_pause(std::uint32_t step) {
 }
 
 void Run::attribute_records() {
-  std::uint32_t unprovoked = 0;
   for (const FaultRecord& record : world_->faults()) {
     const bool is_cold = record.recovered_by == "cold start" || record.recovered_by == "standby, still starting";
     if (record.recovery_us > 0.0 && record.recovered_by == "standby") trial_.add_standby_us(record.recovery_us);
@@ -301,10 +298,10 @@ void Run::attribute_records() {
     if (Injected* fault = find(record); fault != nullptr) {
       fault->records.push_back(record);
     } else {
-      ++unprovoked;
+      trial_.add_unprovoked(fmt::format("step {}, slot {}: {}: {}", record.step, slot_name(record.fault.slot),
+                                        kernel::fault_kind_name(record.fault.kind), record.fault.text));
     }
   }
-  trial_.set_unprovoked(unprovoked);
 }
 
 void Run::judge_swaps() {

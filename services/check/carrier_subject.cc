@@ -97,6 +97,7 @@ void CarrierSubject::watch() {
   while (!changed_.wait_for(lock, kLook, [&] { return stopping_; })) {
     if (armed_until_ == 0 || channel::now_ns() < armed_until_) continue;
     armed_until_ = 0;
+    if (pidfd_ < 0) continue;
     capped_ = true;
     syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0);
   }
@@ -116,8 +117,8 @@ void CarrierSubject::count_fault(const std::string& why) {
 void CarrierSubject::start() {
   if (carrier_) return;
   const kernel::SlotDescription slot = examinee_.slot(hosting_, patience_.deadline);
-  carrier_ = (hosting_ == kernel::Hosting::kGrpc ? kernel::start_grpc_carrier(slot, threads_)
-                                                 : kernel::start_shared_memory_carrier(slot, threads_));
+  carrier_ = kernel::start_host(slot, threads_, {});
+  if (hosting_ == kernel::Hosting::kDirect) return;
   const std::lock_guard lock(mutex_);
   pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, carrier_->process_id(), 0));
 }

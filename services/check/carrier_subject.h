@@ -1,5 +1,5 @@
 // A plugin in a worker process as the subject of the kit: what it is asked goes through the kernel's own carriers, and
-// the process may die of it. The next question then goes to a new one.
+// the process may die of it. The next question then goes to a new one. Hosted direct, it has no deadline.
 #pragma once
 
 #include <array>

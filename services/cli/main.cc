@@ -24,6 +24,9 @@ int main(int argc, char** argv) {
   cli::add_plugins(&app, &action);
   cli::add_describe(&app, &action);
   cli::add_check(&app, &action);
+  cli::add_capture(&app, &action);
+  cli::add_replay(&app, &action);
+  cli::add_bisect(&app, &action);
   cli::add_campaign(&app, &action);
   cli::add_serve(&app, &action);
   cli::add_ctl(&app, &action);

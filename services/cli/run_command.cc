@@ -8,9 +8,8 @@
 #include <limits>
 #include <memory>
 
-#include "kernel/carrier/carrier.h"
 #include "services/cli/commands.h"
-#include "services/cli/hosting.h"
+#include "services/cli/scene_options.h"
 #include "services/recorder/json.h"
 #include "services/run/fault_spec.h"
 #include "services/run/report.h"
@@ -29,33 +28,9 @@ void request_interrupt(int number) {
 
 struct CommandLine {
   RunOptions options;
-  std::vector<std::string> hosting, attached;
-  bool progress = false, quiet = false, json = false, no_sandbox = false;
+  SceneOptions scene{&options};
+  bool progress = false, quiet = false, json = false;
 };
-
-void add_scene_options(CLI::App* command, CommandLine* line) {
-  RunOptions& options = line->options;
-  command->add_option("SCENE", options.scenes, "Scene files; several are read as one scene")->required();
-  command->add_option("--duration", options.duration, "Simulated time, s");
-  command->add_option("--steps", options.steps, "Number of steps");
-  command->add_option("--dt", options.time_step, "Time step, s");
-  command->add_option("--set", options.overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50")
-      ->take_all()
-      ->allow_extra_args(false);
-  command
-      ->add_option("--hosting", line->hosting,
-                   "direct, shm or grpc, for all slots or for one: solver=direct; SLOT=grpc:ADDRESS: a worker of this "
-                   "machine that listens")
-      ->take_all()
-      ->allow_extra_args(false);
-  command
-      ->add_option("--attach", line->attached,
-                   "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "
-                   "SLOT=ADDRESS, where `gravitas-worker --listen ADDRESS LIBRARY` listens")
-      ->take_all()
-      ->allow_extra_args(false);
-  command->add_option("--threads", options.threads, "Threads of each host")->check(CLI::Range(1, 1024));
-}
 
 // One line that is rewritten in place on a terminal, or a line per second elsewhere.
 class ProgressLine {
@@ -117,8 +92,7 @@ void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warni
 }
 
 int run_scene(CommandLine* line) {
-  line->options.hosting = parse_hosting(line->hosting, line->attached);
-  kernel::set_worker_sandbox(!line->no_sandbox);
+  line->scene.apply();
   std::signal(SIGINT, request_interrupt);
   std::signal(SIGTERM, request_interrupt);
   // a file beyond the limit of its size is an error of that write, as a full disk is
@@ -154,7 +128,7 @@ int run_scene(CommandLine* line) {
 }
 
 int plan_scene(CommandLine* line) {
-  line->options.hosting = parse_hosting(line->hosting, line->attached);
+  line->scene.apply();
   std::vector<std::string> warnings;
   const kernel::EnvironmentDescription description = load(line->options, &warnings);
   for (const std::string& warning : warnings) std::cerr << warning << '\n';
@@ -180,7 +154,7 @@ void add_run(CLI::App* app, Action* action) {
   CLI::App* command = app->add_subcommand("run", "Simulate a scene");
   command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n\nFaults:\n" +
                   fault_help());
-  add_scene_options(command, line.get());
+  line->scene.add_to(command);
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
   command->add_option("--sample-every", options.sample_every,
@@ -196,20 +170,16 @@ void add_run(CLI::App* app, Action* action) {
       ->needs(checkpoint);
   command->add_option("--resume", options.resume,
                       "Go on from this checkpoint; --steps and --duration count from t = 0");
-  const auto add_list = [&](const char* name, std::vector<std::string>* values, const char* text) {
-    command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
-  };
-  add_list("--swap", &options.swaps,
+  add_list(command, "--swap", &options.swaps,
            "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N; repeatable");
-  add_list("--compare", &options.comparisons,
+  add_list(command, "--compare", &options.comparisons,
            "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
-  add_list("--rerun", &options.reruns,
+  add_list(command, "--rerun", &options.reruns,
            "Ask another process the same at every N-th call and take the majority's bytes: SLOT=N; repeatable");
-  add_list("--fault", &options.faults, "Inject a fault: SLOT:KIND@step=N[,arg=...]; repeatable");
+  add_list(command, "--fault", &options.faults, "Inject a fault: SLOT:KIND@step=N[,arg=...]; repeatable");
   command->add_flag("--json", line->json, "Print the report instead of the summary");
   command->add_flag("--progress", line->progress, "Show progress from the start");
   command->add_flag("--quiet", line->quiet, "Print nothing but errors");
-  command->add_flag("--no-sandbox", line->no_sandbox, "Let worker processes do what they like: for debuggers");
   command->callback([=] { *action = [=] { return run_scene(line.get()); }; });
 }
 
@@ -218,7 +188,7 @@ void add_plan(CLI::App* app, Action* action) {
   CLI::App* command =
       app->add_subcommand("plan", "Print the pipeline that a scene needs, and what is left out and why");
   command->footer("Example: gravitas plan deploy/scenes/two_spheres_motor.gravitas");
-  add_scene_options(command, line.get());
+  line->scene.add_to(command);
   command->add_flag("--json", line->json, "Print JSON");
   command->callback([=] { *action = [=] { return plan_scene(line.get()); }; });
 }

@@ -8,9 +8,8 @@
 #include <iostream>
 #include <memory>
 
-#include "kernel/carrier/carrier.h"
 #include "services/cli/commands.h"
-#include "services/cli/hosting.h"
+#include "services/cli/scene_options.h"
 #include "services/control/served_run.h"
 #include "services/control/server.h"
 #include "services/control/server_socket.h"
@@ -21,9 +20,9 @@ namespace {
 
 struct CommandLine {
   control::ServeOptions options;
-  std::vector<std::string> hosting;
+  SceneOptions scene{&options.run};
   std::string socket;
-  bool headless = false, no_sandbox = false;
+  bool headless = false;
 };
 
 int serve(CommandLine* line) {
@@ -31,8 +30,7 @@ int serve(CommandLine* line) {
   if (!std::isfinite(line->options.speed) || line->options.speed < 0.0)
     throw BadInput(
         fmt::format("--speed {:g}: allowed: a finite number > 0, or 0: as fast as possible", line->options.speed));
-  line->options.run.hosting = parse_hosting(line->hosting);
-  kernel::set_worker_sandbox(!line->no_sandbox);
+  line->scene.apply();
   // from here on a signal ends it in order
   boost::asio::io_context loop;
   boost::asio::signal_set signals(loop, SIGINT, SIGTERM, SIGHUP);
@@ -62,24 +60,13 @@ void add_serve(CLI::App* app, Action* action) {
       "Example: gravitas serve deploy/scenes/two_spheres_motor.gravitas --headless --duration 3600 &\n"
       "         gravitas ctl status; gravitas ctl swap solver=Sequential,hosting=direct\n"
       "Ends with Ctrl-C. The socket is the only guard: whoever may open it controls the run.");
-  RunOptions& options = line->options.run;
-  command->add_option("SCENE", options.scenes, "Scene files; several are read as one scene")->required();
+  line->scene.add_to(command);
   command->add_flag("--headless", line->headless, "The control API alone, without the page");
   command->add_option("--speed", line->options.speed,
                       "Simulated seconds per second; 0: as fast as possible [1: real time]");
   command->add_flag("--paused", line->options.is_paused, "Begin paused");
   command->add_option("--socket", line->socket,
                       "Listen at this path instead of a private folder in $XDG_RUNTIME_DIR or /tmp");
-  command->add_option("--duration", options.duration, "Simulated time, s");
-  command->add_option("--steps", options.steps, "Number of steps");
-  command->add_option("--dt", options.time_step, "Time step, s");
-  const auto add_list = [&](const char* name, std::vector<std::string>* values, const char* text) {
-    command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
-  };
-  add_list("--set", &options.overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50");
-  add_list("--hosting", &line->hosting, "direct, shm or grpc, for all slots or for one: solver=direct");
-  command->add_option("--threads", options.threads, "Threads of each host")->check(CLI::Range(1, 1024));
-  command->add_flag("--no-sandbox", line->no_sandbox, "Let worker processes do what they like: for debuggers");
   command->callback([=] { *action = [=] { return serve(line.get()); }; });
 }
 

@@ -1,6 +1,7 @@
 #include "services/run/session.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
+#include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
@@ -71,6 +73,15 @@ void write_report_file(const std::string& path, const report::v1::Report& report
 
 }  // namespace
 
+recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot) {
+  recorder::v1::CapsuleHeader header;
+  header.set_build(GRAVITAS_BUILD_ID);
+  header.set_scene(fmt::format("{}", fmt::join(options.scenes, " ")));
+  header.set_slot(slot_name(slot));
+  header.set_threads(options.threads);
+  return header;
+}
+
 std::string installed_worker() { return kernel::worker_program(); }
 
 std::string installed_plugins() {
@@ -112,9 +123,10 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
   return std::move(*description);
 }
 
-std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description) {
+std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
+                                           const kernel::HostStarter& starter) {
   try {
-    return std::make_unique<kernel::Environment>(description);
+    return std::make_unique<kernel::Environment>(description, starter);
   } catch (const kernel::StageFault& fault) {
     throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text));
   } catch (const std::invalid_argument& problem) {
@@ -157,7 +169,7 @@ class Run final : private kernel::CommitListener {
     read_orders();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
-    environment_ = start(begun);
+    environment_ = start(begun, options_.starter);
     environment_->set_commit_listener(this);
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
@@ -296,6 +308,30 @@ class Run final : private kernel::CommitListener {
   }
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
     if (recorder_) recorder_->on_decision(environment, decision);
+  }
+
+  // The request is kept, so that its plugin can be asked it alone.
+  void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override {
+    const std::uint32_t step = environment.step_count() + 1;
+    recorder::v1::CapsuleHeader header = capsule_header(options_, poisoned.plugin.declaration.slot);
+    header.set_poison(true);
+    recorder::v1::CapsuleCall call = capsule::begin_call(poisoned.call, poisoned.arena);
+    call.set_step(step);
+    call.set_fault(poisoned.fault.text);
+    const std::string path = fmt::format(
+        "{}.{}.step{}.capsule", std::filesystem::path(options_.scenes[0]).stem().string(), header.slot(), step);
+    try {
+      capsule::Writer writer(path, header);
+      writer.add_plugin(poisoned.plugin);
+      writer.add_call(call);
+      writer.close();
+      warnings_.push_back(fmt::format(
+          "slot {}, plugin {}: the request that it fails at in step {} is kept; to ask it alone: gravitas replay {}",
+          header.slot(), poisoned.plugin.declaration.name, step, path));
+    } catch (const std::system_error& problem) {
+      warnings_.push_back(fmt::format("the request that plugin {} fails at in step {} could not be kept: {}",
+                                      poisoned.plugin.declaration.name, step, problem.what()));
+    }
   }
 
   // Where no recorder keeps a checkpoint.

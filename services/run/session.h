@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/recorder/v1/capsule.pb.h"
 #include "gravitas/report/v1/report.pb.h"
+#include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
 #include "services/catalog/catalog.h"
 #include "services/scene/problem.h"
@@ -35,6 +37,7 @@ struct RunOptions {
   std::string resume;                  // checkpoint to go on from
   std::uint32_t threads = 1;
   std::vector<std::string> faults, swaps, comparisons, reruns;  // as on the command line
+  kernel::HostStarter starter = kernel::start_host;
 };
 
 // The caller's mistake, with a text that says where and what: exit code 2.
@@ -67,7 +70,8 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
                                     Catalog* plugins = nullptr);
 
 // Starts the environment of a description. A plugin that cannot be used is BadInput.
-std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description);
+std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
+                                           const kernel::HostStarter& starter = kernel::start_host);
 
 // Called now and then while a run goes on.
 struct Progress {
@@ -81,6 +85,9 @@ struct Progress {
 // Throws BadInput for input and files that cannot be used.
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress);
+
+// Of a capsule (services/capsule/capsule.h) of a run.
+recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot);
 
 // Folders of this installation.
 std::string installed_worker();

@@ -8,6 +8,7 @@
 
 #include "services/scene/build_bodies.h"
 #include "services/scene/build_context.h"
+#include "services/scene/build_filter.h"
 #include "services/scene/build_materials.h"
 #include "services/scene/build_plugins.h"
 #include "services/scene/build_shapes.h"
@@ -68,13 +69,6 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
   }
   context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
-}
-
-void check_filter(const v1::Environment& environment, Diagnostics* diagnostics) {
-  const v1::CollisionFilter& filter = environment.collision_filter();
-  if (!environment.has_collision_filter() || filter.default_allow()) return;
-  diagnostics->error(place_of(filter, v1::CollisionFilter::kDefaultAllowFieldNumber),
-                     "DefaultAllow = false is not supported by this version; allowed: true");
 }
 
 void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
@@ -171,6 +165,7 @@ void build_world(BuildContext* context) {
   if (diagnostics->ok()) complete_forces(context);
   // rows of bodies are complete unless there were too many errors to go on
   if (!diagnostics->full()) build_constraints(bodies, &plugins, context);
+  if (!diagnostics->full()) build_filter(bodies, context);
   plugins.choose(Slot::kSolver, environment.constraint_solver(), has_shapes || has_joints);
   plugins.choose(Slot::kIntegrator, environment.kinetic_integrator(), has_bodies);
   plugins.report_unused();
@@ -186,7 +181,6 @@ std::optional<kernel::EnvironmentDescription> build(const v1::Scene& scene, Cata
   BuildContext context{scene, *environment, catalog, &diagnostics, {}};
   context.description.id = environment->id();
   build_simulator(scene.simulator(), &context);
-  check_filter(*environment, &diagnostics);
   build_world(&context);
   if (!diagnostics.ok()) return std::nullopt;
   return std::move(context.description);

@@ -134,7 +134,12 @@ class BodyBuilder {
                                                          : " has neither MassDensity nor Mass") +
                                ": it gets 1000 kg/m^3");
     }
-    MassProperties properties = mass_properties(*solid_, body_.has_mass() ? kUnspecifiedDensity : density);
+    if (solid_->is_shell() && !body_.has_mass())
+      diagnostics_.warning(place(Body::kMassDensityFieldNumber),
+                           what() +
+                               " has a mesh that is not closed: it counts as a shell, its MassDensity as one of area "
+                               "(kg/m^2)");
+    MassProperties properties = mass_properties(*solid_->shape, body_.has_mass() ? kUnspecifiedDensity : density);
     if (body_.has_mass()) properties = scaled_to_mass(properties, body_.mass());
     return checked(properties, principal_axes(properties), Body::kMassDensityFieldNumber);
   }
@@ -166,7 +171,7 @@ class BodyBuilder {
   Vector3 centre_of_mass() const {
     if (body_.centre_of_mass_size() > 0) return vector_of(body_.centre_of_mass());
     const bool is_known = solid_ != nullptr && solid_->has_mass();
-    return is_known ? mass_properties(*solid_, kUnspecifiedDensity).centre_of_mass : Vector3::Zero();
+    return is_known ? mass_properties(*solid_->shape, kUnspecifiedDensity).centre_of_mass : Vector3::Zero();
   }
 
   // Of a body that nothing pushes: the frame counts, the mass does not.

@@ -1,137 +1,174 @@
 #include "services/scene/build_shapes.h"
 
-#include <cmath>
+#include <algorithm>
 #include <limits>
 #include <span>
+
+#include "plugin_sdk/body.h"
+#include "services/scene/shape_values.h"
 
 namespace gravitas::scene {
 namespace {
 
 using v1::Geometry;
 
-// The numbers of a property in a flattened list, or none where the plugin does not declare it.
-std::span<const double> numbers_of(const std::string& name, const std::vector<Property>& declared,
-                                   std::span<const double> flat) {
-  std::size_t begin = 0;
-  for (const Property& property : declared) {
-    std::size_t size = property.flat_size();
-    if (property.kind == PropertyKind::kTable) size += property.columns * static_cast<std::size_t>(flat[begin]);
-    if (property.name == name) return flat.subspan(begin, size);
-    begin += size;
-  }
-  return {};
-}
+class ShapeBuilder final : private SiblingShapes {
+ public:
+  ShapeBuilder(const InstalledPlugin* collision, BuildContext* context)
+      : collision_(collision), context_(*context), geometries_(context->scene.geometries().geometry()) {}
 
-// Shapes are known by the names of INTERFACE; a plugin that declares them otherwise is taken at its
-// word.
-Solid read_solid(const TypeDeclaration& type, std::span<const double> flat) {
-  const auto number = [&](const char* name) {
-    const std::span<const double> numbers = numbers_of(name, type.properties, flat);
-    return numbers.size() == 1 ? numbers[0] : 0.0;
-  };
-  Solid solid;
-  if (type.name == "Halfspace") {
-    solid.kind = Solid::Kind::kHalfspace;
-  } else if (type.name == "Sphere") {
-    solid.kind = Solid::Kind::kSphere;
-    solid.size.x() = number("Radius");
-  } else if (type.name == "Cylinder") {
-    solid.kind = Solid::Kind::kCylinder;
-    solid.size.x() = number("Radius"), solid.size.y() = number("Height");
-  } else if (type.name == "Box") {
-    const std::span<const double> half_extents = numbers_of("HalfExtents", type.properties, flat);
-    solid.kind = Solid::Kind::kBox;
-    if (half_extents.size() == 3) solid.size = {half_extents[0], half_extents[1], half_extents[2]};
+  std::vector<Solid> build() {
+    solids_.resize(static_cast<std::size_t>(geometries_.size()));
+    states_.resize(solids_.size(), State::kNew);
+    for (const Geometry& geometry : geometries_)
+      context_.description.shapes.push_back({geometry.id(), geometry.type(), {}});
+    for (std::size_t i = 0; i < solids_.size(); ++i) build_one(i);
+    return solids_;
   }
-  return solid;
-}
 
-bool has_size(const Solid& solid) {
-  switch (solid.kind) {
-    case Solid::Kind::kSphere:
-      return solid.size.x() > 0.0;
-    case Solid::Kind::kCylinder:
-      return solid.size.x() > 0.0 && solid.size.y() > 0.0;
-    case Solid::Kind::kBox:
-      return solid.size.minCoeff() > 0.0;
-    case Solid::Kind::kUnknown:
-    case Solid::Kind::kHalfspace:
-      break;
+ private:
+  enum class State : std::uint8_t { kNew, kBegun, kDone };
+
+  void build_one(std::size_t row) {
+    if (states_[row] != State::kNew) return;
+    states_[row] = State::kBegun;
+    solids_[row].is_good = collision_ != nullptr && build_shape(row);
+    states_[row] = State::kDone;
   }
-  return true;
-}
 
-Solid build_shape(const Geometry& geometry, const InstalledPlugin& collision, BuildContext* context) {
-  Solid bad;
-  bad.is_good = false;
-  const TypeDeclaration* type = find_type(collision.declaration, geometry.type());
-  if (type == nullptr) {
+  // A child of a compound; may come before it or after.
+  Found find(const std::string& id) override {
+    const auto found = std::find_if(geometries_.begin(), geometries_.end(),
+                                    [&](const Geometry& geometry) { return geometry.id() == id; });
+    std::vector<std::string> ids;
+    if (found == geometries_.end()) {
+      for (const Geometry& geometry : geometries_) ids.push_back(geometry.id());
+      return {nullptr, "names no Geometry: \"" + id + "\"; " + allowed_names(id, ids)};
+    }
+    const auto row = static_cast<std::size_t>(found - geometries_.begin());
+    if (states_[row] == State::kBegun) return {nullptr, "names \"" + id + "\", of which it is a part itself"};
+    build_one(row);
+    if (!solids_[row].is_good) return {nullptr, ""};
+    if (!solids_[row].shape) return {nullptr, "names \"" + id + "\", whose type only its plugin knows"};
+    return {solids_[row].shape, ""};
+  }
+
+  bool build_shape(std::size_t row) {
+    const Geometry& geometry = geometries_[static_cast<int>(row)];
+    const TypeDeclaration* type = find_type(collision_->declaration, geometry.type());
+    if (type == nullptr) return refuse_type(geometry);
+    const std::string what = geometry.type() + " \"" + geometry.id() + '"';
+    const TextPosition written = place_of(geometry.custom_properties().location());
+    const TextPosition block = written.known() ? written : place_of(geometry.location());
+    std::vector<NamedValue> values = named_values(geometry.custom_properties());
+    std::vector<PropertyProblem> problems;
+    ShapeExpansion expansion;
+    std::vector<double>& parameters = context_.description.shapes[row].parameters;
+    const bool good = expand_shape_values(*type, folder_of(geometry), this, &values, &expansion, &problems) &&
+                      flatten(type->properties, values, &parameters, &problems) &&
+                      read(type->name, expansion, &parameters, row, &problems);
+    context_.diagnostics->add(problems, block, what + ": ");
+    return good;
+  }
+
+  bool refuse_type(const Geometry& geometry) {
     std::vector<std::string> names;
-    for (const TypeDeclaration& known : collision.declaration.types) names.push_back(known.name);
-    const InstalledPlugin* other = context->catalog->find_type(Slot::kCollision, geometry.type());
+    for (const TypeDeclaration& known : collision_->declaration.types) names.push_back(known.name);
+    const InstalledPlugin* other = context_.catalog->find_type(Slot::kCollision, geometry.type());
     const std::string hint = other == nullptr ? ""
                                               : "; the plugin \"" + other->declaration.name +
                                                     "\" knows it: Plugin { Slot = \"collision\" Name = … }";
-    context->diagnostics->error(place_of(geometry, Geometry::kTypeFieldNumber),
-                                "the collision plugin \"" + collision.declaration.name + "\" knows no shape \"" +
+    context_.diagnostics->error(place_of(geometry, Geometry::kTypeFieldNumber),
+                                "the collision plugin \"" + collision_->declaration.name + "\" knows no shape \"" +
                                     geometry.type() + "\"; " + allowed_names(geometry.type(), names) + hint);
-    return bad;
+    return false;
   }
-  kernel::ShapeDescription& shape = context->description.shapes.back();
-  const std::string what = geometry.type() + " \"" + geometry.id() + '"';
-  if (!context->flatten_properties(type->properties, geometry.custom_properties(), place_of(geometry.location()), what,
-                                   &shape.parameters))
-    return bad;
-  const Solid solid = read_solid(*type, shape.parameters);
-  if (has_size(solid)) return solid;
-  context->diagnostics->error(place_of(geometry.location()), what + " has a size of zero or less; allowed: sizes > 0");
-  return bad;
-}
+
+  // Shapes are known by the names of INTERFACE; a plugin that declares them otherwise is taken at its word.
+  bool read(const std::string& type, const ShapeExpansion& expansion, std::vector<double>* parameters, std::size_t row,
+            std::vector<PropertyProblem>* problems) {
+    const auto& known = scene_shape_types();
+    const auto standard = std::find_if(known.begin(), known.end(), [&](const auto& t) { return t.name == type; });
+    const TypeDeclaration& declared = *find_type(collision_->declaration, type);
+    if (standard == known.end() || !has_same_properties(*standard, declared)) return true;
+    splice(declared.properties, expansion, parameters);
+    std::string why;
+    std::optional<SceneShape> shape;
+    try {
+      shape = read_scene_shape(type_id(type), *parameters, &why);
+    } catch (const std::out_of_range& missing) {
+      why = missing.what();
+    }
+    if (!shape) {
+      const bool is_size = why.starts_with("has a size");
+      problems->push_back(
+          {expansion.position, is_size ? "a size is zero or less; allowed: sizes > 0" : expansion.prefix + why, false});
+      return false;
+    }
+    if (shape->mesh && shape->mesh->dropped() > 0)
+      problems->push_back(
+          {expansion.position,
+           expansion.prefix + std::to_string(shape->mesh->dropped()) + " triangles without area were dropped", true});
+    // the faces of a hull are found here, once, and not by every worker
+    if (shape->polyhedron) *parameters = flattened_shape(*shape);
+    solids_[row].shape = std::make_shared<SceneShape>(std::move(*shape));
+    return true;
+  }
+
+  static bool has_same_properties(const TypeDeclaration& a, const TypeDeclaration& b) {
+    return std::equal(a.properties.begin(), a.properties.end(), b.properties.begin(), b.properties.end(),
+                      [](const Property& x, const Property& y) {
+                        return x.name == y.name && x.kind == y.kind && x.columns == y.columns;
+                      });
+  }
+
+  std::string folder_of(const Geometry& geometry) const {
+    const auto file = static_cast<int>(geometry.location().file());
+    if (file >= context_.scene.files_size()) return "";
+    const std::string& name = context_.scene.files(file);
+    const std::size_t slash = name.rfind('/');
+    return slash == std::string::npos ? "" : name.substr(0, slash + 1);
+  }
+
+  const InstalledPlugin* collision_;
+  BuildContext& context_;
+  const google::protobuf::RepeatedPtrField<Geometry>& geometries_;
+  std::vector<Solid> solids_;
+  std::vector<State> states_;
+};
 
 }  // namespace
-
-MassProperties mass_properties(const Solid& solid, double density) {
-  if (solid.kind == Solid::Kind::kSphere) return sphere_mass_properties(solid.size.x(), density);
-  if (solid.kind == Solid::Kind::kBox) return box_mass_properties(solid.size, density);
-  return cylinder_mass_properties(solid.size.x(), solid.size.y(), density);
-}
 
 kernel::LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG) {
   kernel::LocalBound bound;
   if (bounding_volume_type == "None" || !solid.has_mass()) return bound;
-  bound.centre = X_BG.position;
+  const SceneShape& shape = *solid.shape;
   bound.orientation = X_BG.orientation;
-  Vector3 half_extents = solid.size;
-  if (solid.kind == Solid::Kind::kCylinder) half_extents = {solid.size.x(), solid.size.y() / 2, solid.size.x()};
-  if (solid.kind == Solid::Kind::kSphere) {
+  // no corner outside by a rounding
+  const double widened = 1.0 + 4.0 * std::numeric_limits<double>::epsilon();
+  if (shape.kind == SceneShape::Kind::kSphere) {
     bound.kind = kernel::BoundKind::kSphere;
-    bound.half_extents = {solid.size.x(), 0.0, 0.0};
+    bound.centre = X_BG.position;
+    bound.half_extents = {shape.size.x(), 0.0, 0.0};
   } else if (bounding_volume_type == "Sphere") {
-    // of a cylinder: the rim, not the corner of its box
-    const double across = solid.kind == Solid::Kind::kBox ? half_extents.z() : 0.0;
+    const Ball ball = bounding_ball(shape);
     bound.kind = kernel::BoundKind::kSphere;
-    const double radius =
-        std::sqrt(half_extents.x() * half_extents.x() + half_extents.y() * half_extents.y() + across * across);
-    // no corner outside by a rounding
-    bound.half_extents = {radius * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()), 0.0, 0.0};
+    bound.centre = transform_point(X_BG, ball.centre);
+    bound.half_extents = {ball.radius * widened, 0.0, 0.0};
   } else {
+    const Box3 box = local_box(shape);
     bound.kind = kernel::BoundKind::kBox;
-    bound.half_extents = half_extents;
+    bound.centre = transform_point(X_BG, box.centre());
+    bound.half_extents = box.half_extents();
+    // the middle of two coordinates is rounded where they are not opposite
+    if (box.centre() != Vector3::Zero())
+      bound.half_extents += 4.0 * std::numeric_limits<double>::epsilon() * box.centre().cwiseAbs();
   }
   return bound;
 }
 
 std::vector<Solid> build_shapes(const InstalledPlugin* collision, BuildContext* context) {
-  std::vector<Solid> solids;
-  for (const Geometry& geometry : context->scene.geometries().geometry()) {
-    context->description.shapes.push_back({geometry.id(), geometry.type(), {}});
-    if (collision == nullptr) {
-      solids.emplace_back().is_good = false;
-    } else {
-      solids.push_back(build_shape(geometry, *collision, context));
-    }
-  }
-  return solids;
+  return ShapeBuilder(collision, context).build();
 }
 
 }  // namespace gravitas::scene

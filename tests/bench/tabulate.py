@@ -112,4 +112,5 @@ def main():
     draw(runs, folder / "cost_per_step.svg")
 
 
-main()
+if __name__ == "__main__":
+    main()

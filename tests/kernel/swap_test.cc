@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "kernel/environment.h"
@@ -107,9 +110,18 @@ TEST_P(Swapped, AnotherIntegratorGoesOnFromTheSameState) {
 // It dies in the third call: in shadow.
 TEST_P(Swapped, APluginThatFailsInShadowIsRefused) {
   if (GetParam() == Hosting::kDirect) GTEST_SKIP() << "it would end this process";
-  Environment world(builder().description());
-  world.order_swap(
-      {Slot::kIntegrator, other(Slot::kIntegrator, faulty_plugin_path("integrator_killed")), std::nullopt, 20});
+  const std::string library = faulty_plugin_path("integrator_killed");
+  std::atomic<bool> is_prepared = false;
+  const auto starter = [&](const kernel::SlotDescription& slot, std::uint32_t threads, std::stop_token stop) {
+    std::unique_ptr<kernel::Carrier> host = kernel::start_host(slot, threads, std::move(stop));
+    if (slot.plugins[0].library == library) is_prepared = true;
+    return host;
+  };
+  Environment world(builder().description(), starter);
+  world.order_swap({Slot::kIntegrator, other(Slot::kIntegrator, library), std::nullopt, 20});
+  // the run does not wait for a shadow, so the test waits for the preparation
+  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  while (!is_prepared) std::this_thread::yield();
   run_to_end(&world);
   EXPECT_EQ(world.chain_hash(), quiet_chain());
   ASSERT_EQ(world.swaps().size(), 1U);

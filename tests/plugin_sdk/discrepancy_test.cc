@@ -273,12 +273,13 @@ TEST(AxisModes, PackAndUnpack) {
   }
 }
 
-// Of all small codes exactly 2 * 6^3 are modes.
+// Of all small codes exactly 3 * 6^3 are modes: plain, angular, radial.
 TEST(AxisModes, OtherCodesAreInvalid) {
   int valid = 0;
   for (std::uint32_t code = 0; code < (1U << 16); ++code) valid += is_valid_mode(code) ? 1 : 0;
-  EXPECT_EQ(valid, 432);
-  for (int bit = 13; bit < 32; ++bit) EXPECT_FALSE(is_valid_mode(1U << bit)) << bit;
+  EXPECT_EQ(valid, 648);
+  for (int bit = 14; bit < 32; ++bit) EXPECT_FALSE(is_valid_mode(1U << bit)) << bit;
+  EXPECT_FALSE(is_valid_mode(kAngularDiscrepancy | kRadialDiscrepancy));
   EXPECT_FALSE(is_valid_mode(0x006) || is_valid_mode(0x060) || is_valid_mode(0x600));
 }
 
@@ -292,9 +293,9 @@ TEST(DiscrepancyColumns, GiveBackWhatWasPushed) {
     d.correction = random.uniform(0.0, 1.0);
     d.axes = random.rotation();
     d.modes = pack_modes(AxisMode::kDriven, AxisMode::kLimited, AxisMode::kFree, true);
-    d.lower = random.vector(1.0), d.upper = random.vector(1.0);
-    d.compliance = random.vector(1.0), d.damping = random.vector(1.0);
-    d.maximum_force = random.vector(1.0);
+    d.upper = random.vector(1.0), d.lower = d.upper - random.vector(1.0).cwiseAbs();
+    d.compliance = random.vector(1.0).cwiseAbs(), d.damping = random.vector(1.0).cwiseAbs();
+    d.maximum_force = random.vector(1.0).cwiseAbs();
   }
 
   using Reply = stage::ConstraintDiscrepanciesReply;

@@ -129,11 +129,24 @@ TEST(Checkpoints, AFullDiskUnderTheTrajectoryStopsTheRunAtACommitThatGoesOn) {
 }
 
 // Kills the program at moments left to chance, again and again, and resumes from what is there: every file can be read,
-// and every run ends with the same chain. GRAVITAS_KILLS sets how many kills each hosting gets.
-class Kills : public ::testing::TestWithParam<const char*> {};
+// and every run ends with the same chain. GRAVITAS_KILLS sets how many kills each variant gets.
+struct Variant {
+  const char* name;
+  const char* hosting;
+  std::vector<std::string> swaps;
+};
 
-INSTANTIATE_TEST_SUITE_P(Hosting, Kills, ::testing::Values("direct", "shm"),
-                         [](const auto& which) { return std::string(which.param); });
+class Kills : public ::testing::TestWithParam<Variant> {};
+
+// the swaps are in preparation, in shadow, on probation and done when the kernel dies
+INSTANTIATE_TEST_SUITE_P(
+    Hosting, Kills,
+    ::testing::Values(Variant{"direct", "direct", {}}, Variant{"shm", "shm", {}}, Variant{"grpc", "grpc", {}},
+                      Variant{"swaps",
+                              "shm",
+                              {"--swap", "solver=Sequential@step=30", "--swap", "integrator=Euler@step=60", "--swap",
+                               "integrator=SemiImplicitEuler@step=85", "--swap", "space=Basic@step=62"}}),
+    [](const auto& which) { return std::string(which.param.name); });
 
 TEST_P(Kills, AtAnyMomentLeaveWhatResumesToTheSameChain) {
   constexpr int kUsual = 10, kKillsPerRun = 5;
@@ -141,8 +154,10 @@ TEST_P(Kills, AtAnyMomentLeaveWhatResumesToTheSameChain) {
   const int kills = wanted == nullptr ? kUsual : std::atoi(wanted);
   const ScratchFolder folder;
   const std::string scene = in_source("/tests/determinism/pile.gravitas"), kept = folder.path("kept");
-  const std::vector<std::string> words = {"run",          scene, "--hosting",          GetParam(), "--steps", "120",
-                                          "--checkpoint", kept,  "--checkpoint-every", "3",        "--quiet"};
+  std::vector<std::string> quiet = {"run", scene, "--hosting", GetParam().hosting, "--steps", "120"};
+  quiet.insert(quiet.end(), GetParam().swaps.begin(), GetParam().swaps.end());
+  std::vector<std::string> words = quiet;
+  words.insert(words.end(), {"--checkpoint", kept, "--checkpoint-every", "3", "--quiet"});
   const auto with_resume = [&] {
     std::vector<std::string> all = words;
     if (std::filesystem::exists(kept)) all.insert(all.end(), {"--resume", kept});
@@ -150,7 +165,7 @@ TEST_P(Kills, AtAnyMomentLeaveWhatResumesToTheSameChain) {
   };
   // a moment is any within the time that a whole run takes here
   const auto start = std::chrono::steady_clock::now();
-  const std::string chain = chain_after({"run", scene, "--hosting", GetParam(), "--steps", "120"}, folder);
+  const std::string chain = chain_after(quiet, folder);
   const auto whole = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - start);
 
   std::mt19937 chance(20261120);

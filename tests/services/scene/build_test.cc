@@ -81,10 +81,6 @@ TEST(Build, RefusesWhatThisVersionLacks) {
                           "\"Basic\""));
   EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { Substeps = 4 } }"),
               ElementsAre("scene:1:59: error: Substeps is 4, which is not supported by this version; allowed: 1"));
-  EXPECT_THAT(errors_of("Environment { CollisionFilter { DefaultAllow = false } }"),
-              ElementsAre("scene:1:48: error: DefaultAllow = false is not supported by this "
-                          "version; allowed: true"));
-  EXPECT_THAT(errors_of("Environment { CollisionFilter { DefaultAllow = true Rules { } Exceptions { } } }"), IsEmpty());
 }
 
 TEST(Build, ChecksWhereAWorkerIs) {
@@ -114,9 +110,9 @@ TEST(Build, ChoosesPluginsWithTheirSettings) {
   EXPECT_THAT(description.constraint.plugins, IsEmpty());
 }
 
-TEST(Build, DefaultsToTheSeedsMethods) {
+TEST(Build, HasDefaultMethods) {
   const kernel::EnvironmentDescription description = built("Environment { }");
-  EXPECT_EQ(description.space.plugins.at(0).declaration.name, "Grid");
+  EXPECT_EQ(description.space.plugins.at(0).declaration.name, "DynamicBVH");
   EXPECT_EQ(description.solver.plugins.at(0).declaration.name, "Sequential");
   EXPECT_EQ(description.integrator.plugins.at(0).declaration.name, "SemiImplicitEuler");
 }

@@ -23,6 +23,7 @@ Property point(const char* name) { return Property::vector(name, "m", "world").r
 
 std::vector<InstalledPlugin> declared_plugins() {
   return {
+      plugin(Slot::kSpace, "DynamicBVH", {}),
       plugin(Slot::kSpace, "Grid", {}, {Property::number("CellSize", "m").above(0.0)}),
       plugin(Slot::kSpace, "KDTree", {}, {Property::integer("MaximumDepth").at_least(1.0).defaults_to({8.0})}),
       plugin(Slot::kCollision, "Standard",

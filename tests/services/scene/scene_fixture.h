@@ -15,7 +15,7 @@
 
 namespace gravitas::scene {
 
-// Space Grid, KDTree; collision Standard (Sphere, Box, Cylinder, Halfspace, Blob); force plugins
+// Space DynamicBVH, Grid, KDTree; collision Standard (Sphere, Box, Cylinder, Halfspace, Blob); force plugins
 // Gravity and Drag; constraint plugin Joints (Spherical, AngularMotor); solvers Sequential, LCP;
 // integrators Euler, SemiImplicitEuler, RK4.
 std::vector<InstalledPlugin> declared_plugins();

@@ -5,7 +5,7 @@
 
 #include "plugin_sdk/math/transcendental.h"
 #include "tests/workers/solver/solver_problem.h"
-#include "workers/solver/sequential/joint_laws.h"
+#include "plugin_sdk/solver/joint_laws.h"
 #include "workers/solver/sequential/sequential.h"
 
 namespace gravitas {

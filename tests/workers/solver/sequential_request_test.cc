@@ -9,10 +9,10 @@
 
 #include "plugin_sdk/plugin.h"
 #include "tests/workers/solver/solver_problem.h"
-#include "workers/solver/sequential/arrival.h"
-#include "workers/solver/sequential/coulomb_contact.h"
+#include "plugin_sdk/solver/arrival.h"
+#include "plugin_sdk/solver/coulomb_contact.h"
 #include "workers/solver/sequential/sequential.h"
-#include "workers/solver/sequential/surface_perturbation.h"
+#include "plugin_sdk/solver/surface_perturbation.h"
 
 namespace gravitas {
 namespace {

@@ -2,8 +2,8 @@
 // the points along it (patch_contacts.h).
 #include <algorithm>
 
+#include "plugin_sdk/geometry/contact_candidates.h"
 #include "workers/collision/standard/contact_axis.h"
-#include "workers/collision/standard/contact_candidates.h"
 #include "workers/collision/standard/convex_pair.h"
 #include "workers/collision/standard/pair_functions.h"
 #include "workers/collision/standard/patch_contacts.h"

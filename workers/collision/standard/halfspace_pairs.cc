@@ -5,7 +5,7 @@
 // plane: its depth is -s, and the touching point of the half-space is its foot on the plane.
 #include <cmath>
 
-#include "workers/collision/standard/contact_candidates.h"
+#include "plugin_sdk/geometry/contact_candidates.h"
 #include "workers/collision/standard/cylinder_rim.h"
 #include "workers/collision/standard/features.h"
 #include "workers/collision/standard/pair_functions.h"

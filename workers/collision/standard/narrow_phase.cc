@@ -4,20 +4,11 @@
 
 #include <utility>
 
-#include "workers/collision/standard/pair_functions.h"
+#include "workers/collision/standard/composite_pairs.h"
+#include "workers/collision/standard/detector_table.h"
 
 namespace gravitas::collision {
 namespace {
-
-void collide_nothing(const Shape&, const Shape&, const Placement&, double, Manifold* out) { out->count = 0; }
-
-// row: type of a, column: type of b; below the diagonal the order is swapped before the look-up
-constexpr PairFunction kPairFunctions[kShapeTypeCount][kShapeTypeCount] = {
-    {collide_sphere_sphere, collide_sphere_box, collide_sphere_cylinder, collide_sphere_halfspace},
-    {nullptr, collide_convex, collide_convex, collide_box_halfspace},
-    {nullptr, nullptr, collide_convex, collide_cylinder_halfspace},
-    {nullptr, nullptr, nullptr, collide_nothing},
-};
 
 // -1, 0 or 1 as the first difference of x from y is positive, absent or negative: larger goes first
 template <typename Vector>
@@ -56,9 +47,7 @@ void collide_in_order(const Shape& a, const Pose& X_WA, const Shape& b, const Po
                             X_WB.position - X_WA.position};
   out->count = 0;
   if (surely_apart(a, b, placement.p_AB_W, margin)) return;
-  const auto row = static_cast<std::size_t>(a.type);
-  const auto column = static_cast<std::size_t>(b.type);
-  kPairFunctions[row][column](a, b, placement, margin, out);
+  detector(a.type, b.type)(a, b, placement, margin, out);
   for (int i = 0; i < out->count; ++i) {
     out->contacts[static_cast<std::size_t>(i)].point += X_WA.position;
   }
@@ -78,10 +67,27 @@ void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB,
   }
 }
 
+void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, ContactList* out) {
+  out->clear();
+  if (!a.is_composite() && !b.is_composite()) {
+    Manifold manifold;
+    collide(a, X_WA, b, X_WB, margin, &manifold);
+    for (int i = 0; i < manifold.count; ++i) out->add(manifold.contacts[static_cast<std::size_t>(i)]);
+    return;
+  }
+  if (surely_apart(a, b, X_WB.position - X_WA.position, margin)) return;
+  const bool is_swapped = computed_swapped(a, X_WA, b, X_WB);
+  const Shape &first = is_swapped ? b : a, &second = is_swapped ? a : b;
+  const Pose &X_W1 = is_swapped ? X_WB : X_WA, &X_W2 = is_swapped ? X_WA : X_WB;
+  collide_composite(first, {Vector3::Zero(), X_W1.orientation}, second,
+                    {X_W2.position - X_W1.position, X_W2.orientation}, margin, out);
+  out->finish(X_W1.position, is_swapped);
+}
+
 bool intersects(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB) {
-  Manifold manifold;
-  collide(a, X_WA, b, X_WB, 0.0, &manifold);
-  return manifold.count > 0;
+  ContactList contacts;
+  collide(a, X_WA, b, X_WB, 0.0, &contacts);
+  return contacts.size() > 0;
 }
 
 }  // namespace gravitas::collision

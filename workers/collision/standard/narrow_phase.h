@@ -11,6 +11,10 @@
 //   box - cylinder,          separating axes and an exact search of    patch clipping: 3 or 4 on a face,
 //   cylinder - cylinder      the curved families (contact_axis.h)      2 on a line, else 1
 //   half-space - half-space  no contact
+//   capsule, cone,           distance or expanding polytope (plugin_sdk/geometry/penetration.h), the features that
+//   polyhedron - any convex  touch laid over each other: up to 4
+//   mesh - anything          triangle by triangle, through its tree (composite_pairs.h)
+//   compound - anything      child by child
 // For a gap between boxes and cylinders whose closest features own no separating axis, the normal
 // is that of the closest points (gjk.h).
 //
@@ -18,8 +22,9 @@
 // surface points) for every pair, also where §§ 2.5.3.2, 2.5.3.3 and 4.3.2.15 put it elsewhere.
 #pragma once
 
+#include "plugin_sdk/geometry/manifold.h"
 #include "plugin_sdk/math/pose.h"
-#include "workers/collision/standard/manifold.h"
+#include "workers/collision/standard/contact_list.h"
 #include "workers/collision/standard/shapes.h"
 
 namespace gravitas::collision {
@@ -43,6 +48,10 @@ namespace gravitas::collision {
 // opposite normals, bit for bit. (Two identical shapes with identical poses are the one exception:
 // their normal is a fixed direction whichever comes first.)
 void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, Manifold* out);
+
+// The same for all shapes, meshes and compounds too: at most four contacts for each normal. The first form is for pairs
+// of convex shapes and half-spaces.
+void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, ContactList* out);
 
 // Whether the solids have a point in common, touching included (within rounding). False for two
 // half-spaces, between which no contact is defined. Same preconditions.

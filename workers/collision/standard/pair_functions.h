@@ -2,8 +2,9 @@
 // type with the lower value first.
 #pragma once
 
+#include "plugin_sdk/geometry/manifold.h"
+#include "plugin_sdk/geometry/support_map_buffer.h"
 #include "plugin_sdk/math/types.h"
-#include "workers/collision/standard/manifold.h"
 #include "workers/collision/standard/shapes.h"
 
 namespace gravitas::collision {
@@ -33,5 +34,13 @@ void collide_cylinder_halfspace(const Shape& a, const Shape& b, const Placement&
 
 // convex_pairs.cc: box - box, box - cylinder, cylinder - cylinder
 void collide_convex(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+
+// general_pairs.cc: any two convex shapes; a half-space (a) and any bounded convex shape
+void collide_general(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+void collide_halfspace_general(const Shape& a, const Shape& b, const Placement& placement, double margin,
+                               Manifold* out);
+
+// The map of a convex shape: its own, or one made in the buffer.
+const SupportMap& support_map_of(const Shape& shape, SupportMapBuffer* buffer);
 
 }  // namespace gravitas::collision

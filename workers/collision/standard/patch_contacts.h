@@ -2,8 +2,8 @@
 // both are clipped against each other in the plane perpendicular to the normal.
 #pragma once
 
+#include "plugin_sdk/geometry/contact_candidates.h"
 #include "workers/collision/standard/contact_axis.h"
-#include "workers/collision/standard/contact_candidates.h"
 #include "workers/collision/standard/convex_pair.h"
 
 namespace gravitas::collision {

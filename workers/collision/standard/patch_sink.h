@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "plugin_sdk/geometry/contact_candidates.h"
 #include "plugin_sdk/math/types.h"
-#include "workers/collision/standard/contact_candidates.h"
 #include "workers/collision/standard/features.h"
 #include "workers/collision/standard/patches.h"
 #include "workers/collision/standard/polygon_clip.h"

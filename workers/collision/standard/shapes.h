@@ -1,33 +1,55 @@
-// The shapes that the standard collision plugin knows, with the two functions of a convex solid
-// that its narrow phase is built on: the support point and the support value.
+// The shapes that the standard collision plugin knows, with the two functions of a box or cylinder that the exact search
+// of its narrow phase is built on: the support point and the support value.
 //
-// Every bounded shape is centred on the origin of its own frame and symmetric under reflection in
-// that origin. The narrow phase uses the symmetry: for such a pair the two signs of an axis differ
-// only in the sign of the distance between the centres.
+// Spheres, boxes and cylinders are centred on the origin of their own frame and symmetric under reflection in
+// that origin. Their part of the narrow phase uses the symmetry: for such a pair the two signs of an axis differ
+// only in the sign of the distance between the centres. Other convex shapes bring a support map.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
+#include "plugin_sdk/geometry/support_map.h"
 #include "plugin_sdk/math/types.h"
 
 namespace gravitas::collision {
 
-// The order of the values is the order in which a pair is computed (see narrow_phase.h).
-enum class ShapeType : std::uint32_t { kSphere, kBox, kCylinder, kHalfspace };
+// The order of the values is the order in which a pair is computed (see narrow_phase.h). Types that register
+// themselves (detector_table.h) count on from kRegistered.
+enum class ShapeType : std::uint32_t {
+  kSphere,
+  kBox,
+  kCylinder,
+  kHalfspace,
+  kCapsule,
+  kCone,
+  kConvexPolyhedron,
+  kTriangleMesh,
+  kCompound,
+  kRegistered
+};
 
-inline constexpr int kShapeTypeCount = 4;
+struct CompoundShape;
 
 // A solid in its own frame S. `size` (m) means:
 //   sphere     x: radius
 //   box        x, y, z: half extents along the axes of S
 //   cylinder   x: radius, y: half height; the axis is the y axis of S
 //   half-space nothing; the solid is y <= 0
+//   capsule    x: radius, y: half the distance of the cap centres; axis y
+//   cone       x: radius, y: half height; axis y, apex at +y
+//   others     x: radius of a ball about the origin that holds it, y: least half extent
 // Precondition of every function on shapes: the sizes used are finite and > 0.
 struct Shape {
   ShapeType type = ShapeType::kSphere;
   Vector3 size = Vector3::Zero();
+  // Of a polyhedron or a registered type; null for primitives, which need none.
+  const SupportMap* map = nullptr;
+  const TriangleMesh* mesh = nullptr;
+  const CompoundShape* compound = nullptr;
+
+  bool is_composite() const { return mesh != nullptr || compound != nullptr; }
 };
 
 // Radius (m) of the smallest sphere about the origin of S that contains the shape; infinite for a
@@ -40,10 +62,15 @@ inline double bounding_radius(const Shape& shape) {
       return std::sqrt(shape.size.squaredNorm());
     case ShapeType::kCylinder:
       return std::sqrt(shape.size.x() * shape.size.x() + shape.size.y() * shape.size.y());
+    case ShapeType::kCapsule:
+      return shape.size.x() + shape.size.y();
+    case ShapeType::kCone:
+      return std::sqrt(shape.size.x() * shape.size.x() + shape.size.y() * shape.size.y());
     case ShapeType::kHalfspace:
-      break;
+      return std::numeric_limits<double>::infinity();
+    default:
+      return shape.size.x();
   }
-  return std::numeric_limits<double>::infinity();
 }
 
 // Smallest half extent (m) of a bounded shape.
@@ -52,9 +79,14 @@ inline double smallest_half_extent(const Shape& shape) {
     case ShapeType::kBox:
       return shape.size.minCoeff();
     case ShapeType::kCylinder:
+    case ShapeType::kCone:
       return std::fmin(shape.size.x(), shape.size.y());
-    default:
+    case ShapeType::kSphere:
+    case ShapeType::kCapsule:
+    case ShapeType::kHalfspace:
       return shape.size.x();
+    default:
+      return shape.size.y();
   }
 }
 

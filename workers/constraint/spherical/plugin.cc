@@ -1,32 +1,88 @@
-// Constraint `Spherical` (§ 2.7.5.2, 2.83): a ball-and-socket joint. One point, fixed in both bodies, stays one
-// point: p2 - p1 = 0. One discrepancy with three locked axes; takes three of the twelve freedoms, rank 3.
+// Constraint `Spherical` (§ 2.7.5.2, 2.83; § 2.7.5.6): a ball-and-socket joint, with a reach cone and twist limits if wanted.
 // (The seed's glossary calls it a minimum distance; the points coincide.)
-#include "plugin_sdk/constraint.h"
+//
+//        a1 ^   / a2          a1, a2: Axis as fixed in body 1 and in body 2; phi their angle, psi the
+//            \ /              azimuth of a2 round a1; phi <= c(psi), a cone that is regular or not
+//             o
+//
+// Freedoms. One point, fixed in both bodies, stays one point: three locked rows, rank 3. The cone is one one-sided row
+// along its normal, the twist one limited row: rank 4 at the cone, 5 where the twist is at its limit too; swing along the
+// cone stays free. (As printed, (2.87) locks swing and return: rank 5.)
+// Cone. With t the direction of a2 across a1, n = a1 x t, e = dA2/dphi = cos(phi) t - sin(phi) a1 and the relative turning
+// w, phi' = w.n and sin(phi) psi' = -w.e, so phi - c(psi) has the rate w.(n + c' e/sin(phi)). The row is that direction made
+// unit, with sin(c) for sin(phi), which is the same at the cone and finite at the axis. Of an irregular cone c is linear
+// between its points, round once; azimuths count right-handed about Axis from the first tangent of
+// plugin_sdk/math/rotation.h's orthonormal_basis(Axis).
+// Twist: twist_row() of plugin_sdk/joint_rows.h, undefined at a swing of 180 degrees.
+#include <cmath>
+#include <vector>
+
+#include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
 namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+// c and dc/dpsi of a cone of points (azimuth, angle).
+struct ConePoint {
+  double angle, slope;
+};
+ConePoint cone_at(std::span<const double> cone, double azimuth) {
+  const std::size_t count = cone.size() / 2;
+  // a point is enough for a regular cone
+  if (count == 1) return {cone[1], 0.0};
+  std::size_t next = 0;
+  while (next < count && cone[2 * next] <= azimuth) ++next;
+  const std::size_t last = next == 0 ? count - 1 : next - 1;
+  const double from = cone[2 * last] - (next == 0 ? 2.0 * kPi : 0.0);
+  const double to = next == count ? cone[0] + 2.0 * kPi : cone[2 * next];
+  const double end = cone[2 * (next == count ? 0 : next) + 1];
+  const double slope = (end - cone[2 * last + 1]) / (to - from);
+  return {cone[2 * last + 1] + slope * (azimuth - from), slope};
+}
 
 class Spherical final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {
         .name = "Spherical",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Ball-and-socket joint.",
-        .types = {{"Spherical",
-                   "Two bodies share a point about which they turn freely.",
-                   {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start.")}}}};
+        .types = {
+            {"Spherical",
+             "Two bodies share a point about which they turn, freely or within a reach cone and limits of twist.",
+             {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
+              Property::number("ReachConeAngle", "rad")
+                  .above(0.0)
+                  .at_most(kPi)
+                  .means("Largest angle of Axis in body 2 against Axis in body 1; none if absent."),
+              Property::table("ReachCone", 2, "rad", "world")
+                  .means("An irregular cone instead: azimuth about Axis, rising within 0 ... 2 pi, and largest angle "
+                         "there; three rows at least."),
+              Property::vector("Axis", "1", "world").means("Axis of cone and twist at the start, any length."),
+              Property::number("TwistLower", "rad")
+                  .at_least(-kPi)
+                  .at_most(0.0)
+                  .means("Smallest twist of body 2 about its axis, 0 at the start; none if absent."),
+              Property::number("TwistUpper", "rad")
+                  .at_least(0.0)
+                  .at_most(kPi)
+                  .means("Largest twist; none if absent.")}}}};
   }
   explicit Spherical(PropertyCursor) {}
 
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
     bind_each(request, reply,
               [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-                if (type != type_id("Spherical")) throw Refusal("a joint is of a type that this plugin does not know");
+                demand_type(type, "Spherical");
                 const Vector3 point = properties.vector();
                 out.vector(inverse_transform_point(bodies.pose1, point));
                 out.vector(inverse_transform_point(bodies.pose2, point));
+                // a request may end here: the joint without limits
+                if (!properties.at_end()) bind_limits(point, &properties, bodies, &out);
               });
   }
 
@@ -36,7 +92,77 @@ class Spherical final : public ConstraintPlugin {
       const Vector3 anchor1 = bound.vector();
       const Vector3 anchor2 = bound.vector();
       emit(point_discrepancy(anchor1, anchor2, bodies));
+      if (!bound.at_end()) describe_limits(bound, bodies, emit);
     });
+  }
+
+ private:
+  static void bind_limits(const Vector3& point, PropertyCursor* properties, const JointBodies& bodies,
+                          BoundWriter* out) {
+    const double angle = properties->number();
+    const std::span<const double> irregular = properties->table(2);
+    const Vector3 axis = properties->vector();
+    const double lower = properties->number(), upper = properties->number();
+    const JointLimits twist = JointLimits::of(lower, upper, "Spherical: TwistLower", "Spherical: TwistUpper");
+    const bool is_regular = !std::isnan(angle);
+    if (is_regular && !irregular.empty()) throw Refusal("Spherical: ReachConeAngle and ReachCone are both given");
+    if (is_regular && !(angle > 0.0 && angle <= kPi)) throw Refusal("Spherical: ReachConeAngle is outside 0 ... pi");
+    demand_cone(irregular);
+    if (!is_regular && irregular.empty() && twist.is_none()) return;
+    if (axis.array().isNaN().all())
+      throw Refusal("Spherical: Axis is missing, which reach cone and twist limits are measured from");
+    const Pose frame = frame_along(point, unit_axis(axis, "Spherical: Axis"));
+    write_frame(bodies.pose1, frame, out);
+    write_frame(bodies.pose2, frame, out);
+    out->number(twist.lower);
+    out->number(twist.upper);
+    out->number(is_regular ? 1.0 : static_cast<double>(irregular.size() / 2));
+    if (is_regular) out->number(0.0), out->number(angle);
+    for (const double number : irregular) out->number(number);
+  }
+
+  static void demand_cone(std::span<const double> cone) {
+    if (cone.empty()) return;
+    if (cone.size() < 6) throw Refusal("Spherical: ReachCone has fewer than three rows");
+    for (std::size_t i = 0; i < cone.size(); i += 2) {
+      if (!(cone[i] >= 0.0 && cone[i] < 2.0 * kPi) || (i > 0 && !(cone[i] > cone[i - 2])))
+        throw Refusal("Spherical: ReachCone has azimuths that do not rise within 0 ... 2 pi");
+      if (!(cone[i + 1] > 0.0 && cone[i + 1] <= kPi))
+        throw Refusal("Spherical: ReachCone has an angle outside 0 ... pi");
+    }
+  }
+
+  template <typename Emit>
+  static void describe_limits(PropertyCursor bound, const JointBodies& bodies, Emit&& emit) {
+    const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+    JointLimits twist;
+    twist.lower = bound.number();
+    twist.upper = bound.number();
+    const std::span<const double> cone = bound.table(2);
+    if (!cone.empty()) emit(cone_row(cone, one.orientation, two.orientation));
+    if (twist.is_none()) return;
+    double scale = 0.0;
+    Discrepancy row = twist_row(one.orientation, two.orientation, AxisMode::kLimited, &scale);
+    row.lower.x() = twist.lower > -kUnlimited ? scale * twist.lower : -kUnlimited;
+    row.upper.x() = twist.upper < kUnlimited ? scale * twist.upper : kUnlimited;
+    emit(row);
+  }
+
+  static Discrepancy cone_row(std::span<const double> cone, const Quaternion& one, const Quaternion& two) {
+    const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
+    const Swing swing = swing_between(a1, a2);
+    const Vector3 across = swing.axis.cross(a1);
+    double azimuth = math::atan2((one * Vector3::UnitZ()).dot(across), (one * Vector3::UnitY()).dot(across));
+    if (azimuth < 0.0) azimuth += 2.0 * kPi;
+    const ConePoint reach = cone_at(cone, azimuth);
+    const math::SinCos swung = math::sincos(swing.angle);
+    const Vector3 outward = swung.cos * across - swung.sin * a1;
+    const double steepness = reach.slope == 0.0 ? 0.0 : reach.slope / math::sin(reach.angle);
+    const Vector3 normal = swing.axis + steepness * outward;
+    const double length = normal.norm();
+    Discrepancy row = row_about(normal / length, (swing.angle - reach.angle) / length, AxisMode::kLimited);
+    row.lower.x() = -kUnlimited;
+    return row;
   }
 };
 

@@ -8,8 +8,8 @@
 
 namespace gravitas {
 
-void ContactGaps::build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request,
-                        double correction_factor, const std::vector<double>& warm) {
+void ContactGaps::build(const SolverBodies& bodies, const stage::SolverSolveRequest& request, double correction_factor,
+                        const std::vector<double>& warm) {
   rows_.clear();
   coordinates_ = 0.0;
   for (std::size_t i = 0; i < request.contact_key().size(); ++i) {
@@ -17,11 +17,11 @@ void ContactGaps::build(const RelaxationBodies& bodies, const stage::SolverSolve
     row.body1 = request.contact_body()[2 * i];
     row.body2 = request.contact_body()[2 * i + 1];
     row.contact = static_cast<std::uint32_t>(i);
-    const RelaxationBody& one = bodies[row.body1];
-    const RelaxationBody& two = bodies[row.body2];
+    const SolverBody& one = bodies[row.body1];
+    const SolverBody& two = bodies[row.body2];
     const Vector3 normal = vector_at(request.contact_normal(), i);
     const Vector3 point = vector_at(request.contact_point(), i);
-    row.direction = RelaxationDirection::through(point, normal, one, two);
+    row.direction = ConstraintDirection::through(point, normal, one, two);
     row.response = row.direction.product(row.direction, one.inverse_mass + two.inverse_mass);
     if (!(row.response > 0.0) || !std::isfinite(1.0 / row.response)) continue;
 
@@ -38,7 +38,7 @@ void ContactGaps::build(const RelaxationBodies& bodies, const stage::SolverSolve
   set_patches(bodies);
 }
 
-void ContactGaps::push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const {
+void ContactGaps::push_all(const SolverBodies& bodies, BodyMotion& x) const {
   for (const Row& row : rows_) {
     if (row.multiplier == 0.0) continue;
     row.direction.push(row.multiplier, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, x[row.body1],
@@ -46,14 +46,14 @@ void ContactGaps::push_all(const RelaxationBodies& bodies, RelaxationMotion& x) 
   }
 }
 
-double ContactGaps::largest_violation(const RelaxationMotion& x) const {
+double ContactGaps::largest_violation(const BodyMotion& x) const {
   double largest = 0.0;
   for (const Row& row : rows_)
     largest = std::max(largest, row.target - row.direction.along(x[row.body1], x[row.body2]));
   return largest;
 }
 
-double ContactGaps::largest_motion(const RelaxationMotion& x) const {
+double ContactGaps::largest_motion(const BodyMotion& x) const {
   double largest = 0.0;
   for (const Row& row : rows_) {
     const Twist& one = x[row.body1];
@@ -69,7 +69,7 @@ void ContactGaps::clear_multipliers() {
   for (Row& row : rows_) row.multiplier = 0.0;
 }
 
-double ContactGaps::sweep(const RelaxationBodies& bodies, RelaxationMotion& x) {
+double ContactGaps::sweep(const SolverBodies& bodies, BodyMotion& x) {
   double change = 0.0;
   for (const Patch& patch : patches_) {
     if (sweep_whole(patch, bodies, x, &change)) continue;
@@ -78,7 +78,7 @@ double ContactGaps::sweep(const RelaxationBodies& bodies, RelaxationMotion& x) {
   return change;
 }
 
-double ContactGaps::sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x) {
+double ContactGaps::sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x) {
   const double missing = row.target - row.direction.along(x[row.body1], x[row.body2]);
   const double relaxed = std::max(0.0, row.multiplier + missing / row.response);
   const double amount = relaxed - row.multiplier;
@@ -90,7 +90,7 @@ double ContactGaps::sweep_row(Row& row, const RelaxationBodies& bodies, Relaxati
 }
 
 // All rows of a patch as closed; false, with nothing done, if one would have to pull.
-bool ContactGaps::sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x, double* change) {
+bool ContactGaps::sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change) {
   if (!patch.has_whole) return false;
   const auto count = static_cast<int>(patch.end - patch.first);
   ContactPatch::Rows missing = ContactPatch::Rows::Zero();
@@ -114,7 +114,7 @@ bool ContactGaps::sweep_whole(const Patch& patch, const RelaxationBodies& bodies
   return true;
 }
 
-void ContactGaps::set_patches(const RelaxationBodies& bodies) {
+void ContactGaps::set_patches(const SolverBodies& bodies) {
   patches_.clear();
   for (std::size_t first = 0; first < rows_.size();) {
     std::size_t end = first + 1;
@@ -143,7 +143,7 @@ void ContactGaps::store(std::vector<double>& multipliers) const {
   for (const Row& row : rows_) multipliers[row.contact] = row.multiplier;
 }
 
-void ContactGaps::find_closed(const RelaxationMotion& x, std::vector<std::uint8_t>& closed) const {
+void ContactGaps::find_closed(const BodyMotion& x, std::vector<std::uint8_t>& closed) const {
   std::fill(closed.begin(), closed.end(), std::uint8_t{0});
   for (const Row& row : rows_) {
     const double gap = row.gap + row.direction.along(x[row.body1], x[row.body2]);

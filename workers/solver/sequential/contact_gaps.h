@@ -12,8 +12,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "plugin_sdk/solver/bodies.h"
 #include "workers/solver/sequential/contact_patch.h"
-#include "workers/solver/sequential/relaxation_bodies.h"
 
 namespace gravitas {
 
@@ -21,29 +21,29 @@ class ContactGaps {
  public:
   // Rows of all contacts with a body that can be pushed, starting from `warm` (one per contact of
   // the request).
-  void build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request, double correction_factor,
+  void build(const SolverBodies& bodies, const stage::SolverSolveRequest& request, double correction_factor,
              const std::vector<double>& warm);
 
   bool is_empty() const { return rows_.empty(); }
-  void push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const;
+  void push_all(const SolverBodies& bodies, BodyMotion& x) const;
   // Largest violation of a row by x, and largest sum of the magnitudes that J x is made of, m.
-  double largest_violation(const RelaxationMotion& x) const;
-  double largest_motion(const RelaxationMotion& x) const;
+  double largest_violation(const BodyMotion& x) const;
+  double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
   // One sweep. Returns the largest change of a gap, m.
-  double sweep(const RelaxationBodies& bodies, RelaxationMotion& x);
+  double sweep(const SolverBodies& bodies, BodyMotion& x);
   void store(std::vector<double>& multipliers) const;
 
   // Sets closed[i] to 1 for contacts whose gap after the displacement x is within closing_slop(),
   // else to 0.
-  void find_closed(const RelaxationMotion& x, std::vector<std::uint8_t>& closed) const;
+  void find_closed(const BodyMotion& x, std::vector<std::uint8_t>& closed) const;
 
   // Largest coordinate of a contact, m: the size that rounding of positions goes by.
   double coordinates() const { return coordinates_; }
 
  private:
   struct Row {
-    RelaxationDirection direction;
+    ConstraintDirection direction;
     std::uint32_t body1 = 0, body2 = 0, contact = 0;
     double response = 0.0;
     double gap = 0.0;     // gap*
@@ -58,9 +58,9 @@ class ContactGaps {
     ContactPatch whole;
   };
 
-  void set_patches(const RelaxationBodies& bodies);
-  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x, double* change);
-  double sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
+  void set_patches(const SolverBodies& bodies);
+  bool sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change);
+  double sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x);
 
   std::vector<Row> rows_;
   std::vector<Patch> patches_;

@@ -5,31 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plugin_sdk/math/rotation.h"
-#include "plugin_sdk/solver.h"
-#include "workers/solver/sequential/arrival.h"
-#include "workers/solver/sequential/coulomb_contact.h"
-#include "workers/solver/sequential/surface_perturbation.h"
+#include "plugin_sdk/solver/coulomb_contact.h"
 
 namespace gravitas {
-namespace {
-
-double material(const stage::SolverSolveRequest& request, std::size_t contact, MaterialColumn column) {
-  return request.contact_material()[kMaterialColumns * contact + column];
-}
-
-Matrix3 frame_of(const Vector3& normal) {
-  const auto [first, second] = orthonormal_basis(normal);
-  Matrix3 frame;
-  frame << normal, first, second;
-  return frame;
-}
-
-}  // namespace
 
 // ---- rows
 
-void ContactImpulses::build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request,
+void ContactImpulses::build(const SolverBodies& bodies, const stage::SolverSolveRequest& request,
                             const std::vector<std::uint8_t>& closed, const std::vector<double>& warm) {
   rows_.clear();
   rolling_.clear();
@@ -42,12 +24,14 @@ void ContactImpulses::build(const RelaxationBodies& bodies, const stage::SolverS
     const Vector3 point = vector_at(request.contact_point(), i);
     row.arm1 = point - bodies[row.body1].trial.position;
     row.arm2 = point - bodies[row.body2].trial.position;
-    row.dynamic_friction = material(request, i, kDynamicFriction);
-    row.static_friction = std::max(row.dynamic_friction, material(request, i, kStaticFriction));
+    const ContactLaw law = contact_law(request, i, bodies[row.body1], bodies[row.body2]);
+    row.frame = law.frame;
+    row.target = law.target;
+    row.dynamic_friction = law.dynamic_friction;
+    row.static_friction = law.static_friction;
     row.has_friction = row.static_friction > 0.0;
-    set_law(row, bodies, request);
     set_response(row, bodies);
-    set_rolling(row, bodies, material(request, i, kRollingFriction), material(request, i, kSpinningFriction));
+    set_rolling(row, bodies, law.rolling_friction, law.spinning_friction);
 
     row.impulse = row.frame.transpose() * vector_at(warm, i);
     row.impulse.x() = std::max(0.0, row.impulse.x());
@@ -58,36 +42,7 @@ void ContactImpulses::build(const RelaxationBodies& bodies, const stage::SolverS
   set_patches(bodies);
 }
 
-// The direction of the normal law and its target e s.
-void ContactImpulses::set_law(Row& row, const RelaxationBodies& bodies, const stage::SolverSolveRequest& request) {
-  const std::size_t i = row.contact;
-  const RelaxationBody& one = bodies[row.body1];
-  const RelaxationBody& two = bodies[row.body2];
-  const Vector3 normal = vector_at(request.contact_normal(), i);
-  const Vector3 point = vector_at(request.contact_point(), i);
-  const auto through = RelaxationDirection::through(point, normal, one, two);
-  const double gap = gap_before(-request.contact_depth()[i], through, one, two);
-  const double start = through.along(one.start_velocity, two.start_velocity);
-  const double trial = through.along(one.trial_velocity, two.trial_velocity);
-  const double speed = arrival_speed(start, trial, gap, request.time_step());
-  const double restitution = material(request, i, kRestitution);
-  row.frame = frame_of(normal);
-  row.target = restitution * speed;
-
-  const double epsilon = material(request, i, kSurfacePerturbation);
-  if (!(speed > 0.0) || !(epsilon > 0.0)) return;
-  const Vector3 tilted = perturbed_normal(normal, epsilon, request.contact_key()[i]);
-  const auto across = RelaxationDirection::through(point, tilted, one, two);
-  const double tilted_start = across.along(one.start_velocity, two.start_velocity);
-  const double tilted_trial = across.along(one.trial_velocity, two.trial_velocity);
-  const double tilted_speed = arrival_speed(tilted_start, tilted_trial, gap, request.time_step());
-  const bool keeps_signs = tilted_trial < 0.0 && (tilted_start < 0.0) == (start < 0.0);
-  if (!keeps_signs || !(tilted_speed > 0.0) || !(tilted.dot(normal) > 0.0)) return;
-  row.frame = frame_of(tilted);
-  row.target = restitution * tilted_speed;
-}
-
-void ContactImpulses::set_response(Row& row, const RelaxationBodies& bodies) {
+void ContactImpulses::set_response(Row& row, const SolverBodies& bodies) {
   const Matrix3 world =
       point_response(bodies[row.body1], row.arm1, row.arm1) + point_response(bodies[row.body2], row.arm2, row.arm2);
   const Matrix3 response = row.frame.transpose() * world * row.frame;
@@ -99,11 +54,11 @@ void ContactImpulses::set_response(Row& row, const RelaxationBodies& bodies) {
   if (row.has_inverse) row.inverse = row.response.inverse();
 }
 
-void ContactImpulses::set_rolling(Row& row, const RelaxationBodies& bodies, double rolling_friction,
+void ContactImpulses::set_rolling(Row& row, const SolverBodies& bodies, double rolling_friction,
                                   double spinning_friction) {
   if (!(rolling_friction > 0.0) && !(spinning_friction > 0.0)) return;
-  const RelaxationBody& one = bodies[row.body1];
-  const RelaxationBody& two = bodies[row.body2];
+  const SolverBody& one = bodies[row.body1];
+  const SolverBody& two = bodies[row.body2];
   const Matrix3 world = one.inverse_inertia + two.inverse_inertia;
   const Matrix3 response = row.frame.transpose() * world * row.frame;
   Rolling rolling;
@@ -119,35 +74,34 @@ void ContactImpulses::set_rolling(Row& row, const RelaxationBodies& bodies, doub
 // ---- velocities and impulses
 
 // Relative velocity of the contact's points, in its frame.
-Vector3 ContactImpulses::velocity_of(const Row& row, const RelaxationMotion& x) const {
+Vector3 ContactImpulses::velocity_of(const Row& row, const BodyMotion& x) const {
   const Twist& one = x[row.body1];
   const Twist& two = x[row.body2];
   return row.frame.transpose() * (two.linear + two.angular.cross(row.arm2) - one.linear - one.angular.cross(row.arm1));
 }
 
-Vector3 ContactImpulses::turning_of(const Row& row, const RelaxationMotion& x) const {
+Vector3 ContactImpulses::turning_of(const Row& row, const BodyMotion& x) const {
   return row.frame.transpose() * (x[row.body2].angular - x[row.body1].angular);
 }
 
-void ContactImpulses::push(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
-                           RelaxationMotion& x) const {
+void ContactImpulses::push(const Row& row, const Vector3& impulse, const SolverBodies& bodies, BodyMotion& x) const {
   const Vector3 world = row.frame * impulse;
-  const RelaxationBody& one = bodies[row.body1];
-  const RelaxationBody& two = bodies[row.body2];
+  const SolverBody& one = bodies[row.body1];
+  const SolverBody& two = bodies[row.body2];
   x[row.body1].linear -= one.inverse_mass * world;
   x[row.body1].angular -= one.inverse_inertia * row.arm1.cross(world);
   x[row.body2].linear += two.inverse_mass * world;
   x[row.body2].angular += two.inverse_inertia * row.arm2.cross(world);
 }
 
-void ContactImpulses::push_turning(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies,
-                                   RelaxationMotion& x) const {
+void ContactImpulses::push_turning(const Row& row, const Vector3& impulse, const SolverBodies& bodies,
+                                   BodyMotion& x) const {
   const Vector3 world = row.frame * impulse;
   x[row.body1].angular -= bodies[row.body1].inverse_inertia * world;
   x[row.body2].angular += bodies[row.body2].inverse_inertia * world;
 }
 
-void ContactImpulses::push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const {
+void ContactImpulses::push_all(const SolverBodies& bodies, BodyMotion& x) const {
   for (const Row& row : rows_) {
     if (!row.impulse.isZero(0.0)) push(row, row.impulse, bodies, x);
     if (row.rolling < 0) continue;
@@ -156,7 +110,7 @@ void ContactImpulses::push_all(const RelaxationBodies& bodies, RelaxationMotion&
   }
 }
 
-void ContactImpulses::push_friction(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const {
+void ContactImpulses::push_friction(const SolverBodies& bodies, double factor, BodyMotion& x) const {
   for (const Row& row : rows_) {
     const Vector3 tangent(0.0, factor * row.impulse.y(), factor * row.impulse.z());
     if (!tangent.isZero(0.0)) push(row, tangent, bodies, x);
@@ -173,13 +127,13 @@ bool ContactImpulses::has_friction_impulse() const {
                      [](const Rolling& rolling) { return !rolling.impulse.isZero(0.0); });
 }
 
-double ContactImpulses::largest_violation(const RelaxationMotion& x) const {
+double ContactImpulses::largest_violation(const BodyMotion& x) const {
   double largest = 0.0;
   for (const Row& row : rows_) largest = std::max(largest, row.target - velocity_of(row, x).x());
   return largest;
 }
 
-double ContactImpulses::largest_motion(const RelaxationMotion& x) const {
+double ContactImpulses::largest_motion(const BodyMotion& x) const {
   double largest = 0.0;
   for (const Row& row : rows_) {
     const Twist& one = x[row.body1];
@@ -197,7 +151,7 @@ void ContactImpulses::clear_multipliers() {
 
 // ---- relaxation
 
-double ContactImpulses::sweep(const RelaxationBodies& bodies, RelaxationMotion& x) {
+double ContactImpulses::sweep(const SolverBodies& bodies, BodyMotion& x) {
   double change = 0.0;
   for (const Patch& patch : patches_) {
     const bool solved = sweep_whole(patch, bodies, x, &change);
@@ -209,7 +163,7 @@ double ContactImpulses::sweep(const RelaxationBodies& bodies, RelaxationMotion& 
   return change;
 }
 
-double ContactImpulses::sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x) {
+double ContactImpulses::sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x) {
   const Vector3 velocity = velocity_of(row, x);
   // open and leaving: the commonest case costs no more than this
   if (velocity.x() >= row.target && row.impulse.isZero(0.0)) return 0.0;
@@ -238,7 +192,7 @@ Vector3 ContactImpulses::relaxed(const Row& row, const Vector3& velocity) const 
   return impulse;
 }
 
-double ContactImpulses::sweep_rolling(const Row& row, const RelaxationBodies& bodies, RelaxationMotion& x) {
+double ContactImpulses::sweep_rolling(const Row& row, const SolverBodies& bodies, BodyMotion& x) {
   Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
   const Vector3 turning = turning_of(row, x);
   Vector3 impulse = rolling.impulse;
@@ -256,7 +210,7 @@ double ContactImpulses::sweep_rolling(const Row& row, const RelaxationBodies& bo
   return response * amount.norm() * rolling.length;
 }
 
-bool ContactImpulses::let_slide(const RelaxationMotion& x, double slip) {
+bool ContactImpulses::let_slide(const BodyMotion& x, double slip) {
   bool any = false;
   for (Row& row : rows_) {
     if (row.slides || !(row.dynamic_friction < row.static_friction)) continue;
@@ -281,8 +235,7 @@ void ContactImpulses::store(std::vector<double>& impulses, std::vector<double>& 
 // ---- energy
 
 // Work of a contact's impulse and, in `size`, what it is large or small against.
-double ContactImpulses::work_of(const Row& row, const RelaxationMotion& before, const RelaxationMotion& after,
-                                double* size) const {
+double ContactImpulses::work_of(const Row& row, const BodyMotion& before, const BodyMotion& after, double* size) const {
   const Vector3 start = velocity_of(row, before);
   const Vector3 end = velocity_of(row, after);
   double work = 0.5 * row.impulse.dot(start + end);
@@ -294,9 +247,8 @@ double ContactImpulses::work_of(const Row& row, const RelaxationMotion& before, 
   return work;
 }
 
-void ContactImpulses::add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
-                               const RelaxationMotion& after, const std::vector<std::uint32_t>& group,
-                               std::vector<Gain>& gains) const {
+void ContactImpulses::add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
+                               const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const {
   for (const Row& row : rows_) {
     double size = 0.0;
     const double work = work_of(row, before, after, &size);
@@ -304,7 +256,7 @@ void ContactImpulses::add_work(const RelaxationBodies& bodies, const RelaxationM
   }
 }
 
-std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before, const RelaxationMotion& after) {
+std::uint32_t ContactImpulses::lower_restitution(const BodyMotion& before, const BodyMotion& after) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     if (!(row.target > 0.0)) continue;
@@ -317,7 +269,7 @@ std::uint32_t ContactImpulses::lower_restitution(const RelaxationMotion& before,
   return count;
 }
 
-std::uint32_t ContactImpulses::drop_restitution(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+std::uint32_t ContactImpulses::drop_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                                 const std::vector<Gain>& gains) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
@@ -328,7 +280,7 @@ std::uint32_t ContactImpulses::drop_restitution(const RelaxationBodies& bodies, 
   return count;
 }
 
-void ContactImpulses::scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+void ContactImpulses::scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                             const std::vector<double>& factor) {
   for (Row& row : rows_) {
     const double share = factor[group[owner_of(row, bodies)]];

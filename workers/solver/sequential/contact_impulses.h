@@ -6,11 +6,8 @@
 //   |tau_T| <= mu_r lambda_N, against rolling (relative turning across n);  |tau_N| <= mu_sp
 //   lambda_N, about n
 //
-// s is the arrival speed (arrival.h), mu_r and mu_sp are lengths (m). Both bodies are pushed at the
-// contact's own point, so momentum is conserved to rounding. Where the surface is perturbed and s >
-// 0, n is the perturbed normal (surface_perturbation.h) if it keeps the signs of n.v at S_n and at
-// S* and finds an arrival along it too, and friction acts across it. A resting contact uses the
-// true normal: a tilt that persists would roll a resting ball away for ever.
+// s is the arrival speed (arrival.h), mu_r and mu_sp are lengths (m), n, e s and the coefficients those of contact_law.h.
+// Both bodies are pushed at the contact's own point, so momentum is conserved to rounding.
 //
 // A visit to a pair of bodies first tries all their contacts at once, as sticking with n.v = e s
 // (contact_patch.h); that is taken if every impulse lies in its cone, of a flat patch also with its
@@ -28,9 +25,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/contact_law.h"
 #include "workers/solver/sequential/contact_patch.h"
 #include "workers/solver/sequential/friction_disc.h"
-#include "workers/solver/sequential/relaxation_bodies.h"
 
 namespace gravitas {
 
@@ -38,27 +36,27 @@ class ContactImpulses {
  public:
   // Rows of the contacts with closed[i] != 0, starting from the impulses `warm` (world, on the
   // second body; three numbers per contact).
-  void build(const RelaxationBodies& bodies, const stage::SolverSolveRequest& request,
+  void build(const SolverBodies& bodies, const stage::SolverSolveRequest& request,
              const std::vector<std::uint8_t>& closed, const std::vector<double>& warm);
 
   bool is_empty() const { return rows_.empty(); }
-  void push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const;
+  void push_all(const SolverBodies& bodies, BodyMotion& x) const;
   // The same for friction (all three kinds) alone, times `factor`.
-  void push_friction(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const;
+  void push_friction(const SolverBodies& bodies, double factor, BodyMotion& x) const;
   bool has_friction_impulse() const;
 
   // Largest violation of a normal law by velocities x, and largest sum of the speeds that meet at a
   // contact: what rounding goes by. m/s.
-  double largest_violation(const RelaxationMotion& x) const;
-  double largest_motion(const RelaxationMotion& x) const;
+  double largest_violation(const BodyMotion& x) const;
+  double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
 
   // One sweep. Returns the largest change of a contact's velocity, m/s.
-  double sweep(const RelaxationBodies& bodies, RelaxationMotion& x);
+  double sweep(const SolverBodies& bodies, BodyMotion& x);
 
   // Makes contacts that slip faster than `slip` (m/s) slide with mu_d in the following sweeps;
   // returns whether any changed.
-  bool let_slide(const RelaxationMotion& x, double slip);
+  bool let_slide(const BodyMotion& x, double slip);
   // All stick again, for a solution anew.
   void let_stick();
 
@@ -70,18 +68,17 @@ class ContactImpulses {
 
   // Work of each contact's impulse, added to that of its second body, or of the first where the
   // second is not pushed.
-  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before, const RelaxationMotion& after,
+  void add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
                 const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const;
   // Lowers e s of the contacts that arrive and whose impulse does positive work: to a half, a
   // quarter, then to zero. Returns how many were lowered.
-  std::uint32_t lower_restitution(const RelaxationMotion& before, const RelaxationMotion& after);
+  std::uint32_t lower_restitution(const BodyMotion& before, const BodyMotion& after);
   // Sets e s to zero for contacts of bodies in a group (by the number of its first body) that
   // gained. Returns how many changed.
-  std::uint32_t drop_restitution(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+  std::uint32_t drop_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                  const std::vector<Gain>& gains);
   // Multiplies all impulses by the factor of their bodies' group.
-  void scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
-             const std::vector<double>& factor);
+  void scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, const std::vector<double>& factor);
   bool has_restitution() const;
 
   // Pairs of the rows, for grouping bodies.
@@ -123,26 +120,25 @@ class ContactImpulses {
   };
   using PatchImpulses = std::array<Vector3, ContactPatch::kRows>;
 
-  static std::uint32_t owner_of(const Row& row, const RelaxationBodies& bodies) {
+  static std::uint32_t owner_of(const Row& row, const SolverBodies& bodies) {
     return bodies[row.body2].is_pushed() ? row.body2 : row.body1;
   }
-  Vector3 velocity_of(const Row& row, const RelaxationMotion& x) const;
-  Vector3 turning_of(const Row& row, const RelaxationMotion& x) const;
-  void push(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies, RelaxationMotion& x) const;
-  void push_turning(const Row& row, const Vector3& impulse, const RelaxationBodies& bodies, RelaxationMotion& x) const;
-  void set_law(Row& row, const RelaxationBodies& bodies, const stage::SolverSolveRequest& request);
-  void set_response(Row& row, const RelaxationBodies& bodies);
-  void set_rolling(Row& row, const RelaxationBodies& bodies, double rolling_friction, double spinning_friction);
-  void set_patches(const RelaxationBodies& bodies);
-  ContactPatch whole_of(const Patch& patch, const RelaxationBodies& bodies) const;
-  bool sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x, double* change);
+  Vector3 velocity_of(const Row& row, const BodyMotion& x) const;
+  Vector3 turning_of(const Row& row, const BodyMotion& x) const;
+  void push(const Row& row, const Vector3& impulse, const SolverBodies& bodies, BodyMotion& x) const;
+  void push_turning(const Row& row, const Vector3& impulse, const SolverBodies& bodies, BodyMotion& x) const;
+  void set_response(Row& row, const SolverBodies& bodies);
+  void set_rolling(Row& row, const SolverBodies& bodies, double rolling_friction, double spinning_friction);
+  void set_patches(const SolverBodies& bodies);
+  ContactPatch whole_of(const Patch& patch, const SolverBodies& bodies) const;
+  bool sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change);
   bool is_flat(const Patch& patch) const;
   bool is_in_cones(const Patch& patch, const PatchImpulses& impulses) const;
   bool spread_friction(const Patch& patch, PatchImpulses* impulses) const;
-  double sweep_row(Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
-  double sweep_rolling(const Row& row, const RelaxationBodies& bodies, RelaxationMotion& x);
+  double sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x);
+  double sweep_rolling(const Row& row, const SolverBodies& bodies, BodyMotion& x);
   Vector3 relaxed(const Row& row, const Vector3& velocity) const;
-  double work_of(const Row& row, const RelaxationMotion& before, const RelaxationMotion& after, double* size) const;
+  double work_of(const Row& row, const BodyMotion& before, const BodyMotion& after, double* size) const;
 
   std::vector<Row> rows_;
   std::vector<Rolling> rolling_;

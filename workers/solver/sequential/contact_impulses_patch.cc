@@ -7,7 +7,7 @@
 namespace gravitas {
 
 // Rows of the same two bodies, and the inverse of those that have one.
-void ContactImpulses::set_patches(const RelaxationBodies& bodies) {
+void ContactImpulses::set_patches(const SolverBodies& bodies) {
   patches_.clear();
   for (std::size_t first = 0; first < rows_.size();) {
     std::size_t end = first + 1;
@@ -44,7 +44,7 @@ bool ContactImpulses::is_flat(const Patch& patch) const {
   return height <= 0.01 * extent;
 }
 
-ContactPatch ContactImpulses::whole_of(const Patch& patch, const RelaxationBodies& bodies) const {
+ContactPatch ContactImpulses::whole_of(const Patch& patch, const SolverBodies& bodies) const {
   const int width = rows_[patch.first].has_friction ? 3 : 1;
   const auto count = static_cast<int>(patch.end - patch.first);
   ContactPatch::Response response = ContactPatch::Response::Zero();
@@ -63,8 +63,7 @@ ContactPatch ContactImpulses::whole_of(const Patch& patch, const RelaxationBodie
 
 // All contacts of a patch as sticking and arriving at e s; false, with nothing done, if an impulse
 // would leave its cone.
-bool ContactImpulses::sweep_whole(const Patch& patch, const RelaxationBodies& bodies, RelaxationMotion& x,
-                                  double* change) {
+bool ContactImpulses::sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change) {
   if (!patch.has_whole) return false;
   const int width = rows_[patch.first].has_friction ? 3 : 1;
   const std::size_t count = patch.end - patch.first;

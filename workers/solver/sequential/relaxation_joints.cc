@@ -12,20 +12,20 @@ namespace {
 // Share of a row that must be left of it beside the others, squared.
 constexpr double kIndependence = 1e-10;
 
-double inverse_masses_of(const RelaxationBodies& bodies, std::uint32_t body1, std::uint32_t body2) {
+double inverse_masses_of(const SolverBodies& bodies, std::uint32_t body1, std::uint32_t body2) {
   return bodies[body1].inverse_mass + bodies[body2].inverse_mass;
 }
 
 }  // namespace
 
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
-                                             const RelaxationBodies& bodies, double correction_factor) {
+                                             const SolverBodies& bodies, double correction_factor) {
   RelaxationDiscrepancy r;
   r.body1 = body1;
   r.body2 = body2;
   r.beta = correction_factor * discrepancy.correction;
-  const RelaxationBody& one = bodies[body1];
-  const RelaxationBody& two = bodies[body2];
+  const SolverBody& one = bodies[body1];
+  const SolverBody& two = bodies[body2];
   const Vector3 start_error = error_at(discrepancy, one.trial, two.trial, one.start, two.start);
   const Vector3 middle = 0.5 * (discrepancy.point1 + discrepancy.point2);
   const Matrix3 axes = to_rotation_matrix(discrepancy.axes);
@@ -37,12 +37,12 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
     const Vector3 axis = axes.col(i);
     r.axes[place] = joint_axis_state(discrepancy, i, axis, start_error);
     r.directions[place] =
-        angular ? RelaxationDirection::about(axis, one, two) : RelaxationDirection::through(middle, axis, one, two);
+        angular ? ConstraintDirection::about(axis, one, two) : ConstraintDirection::through(middle, axis, one, two);
   }
   return r;
 }
 
-void RelaxationJoints::build(const RelaxationBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies,
+void RelaxationJoints::build(const SolverBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies,
                              const Laws& laws, const Multipliers& warm) {
   rows_.clear();
   blocks_.clear();
@@ -202,7 +202,7 @@ double RelaxationJoints::sweep_others(const Block& block, double w1, double w2, 
   return change;
 }
 
-double RelaxationJoints::sweep(const RelaxationBodies& bodies, RelaxationMotion& x) {
+double RelaxationJoints::sweep(const SolverBodies& bodies, BodyMotion& x) {
   double change = 0.0;
   for (const Block& block : blocks_) {
     const double w1 = bodies[block.body1].inverse_mass;
@@ -215,7 +215,7 @@ double RelaxationJoints::sweep(const RelaxationBodies& bodies, RelaxationMotion&
   return change;
 }
 
-void RelaxationJoints::push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const {
+void RelaxationJoints::push_all(const SolverBodies& bodies, BodyMotion& x) const {
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {
       if (rows_[i].multiplier == 0.0) continue;
@@ -225,7 +225,7 @@ void RelaxationJoints::push_all(const RelaxationBodies& bodies, RelaxationMotion
   }
 }
 
-void RelaxationJoints::push_velocity_only(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const {
+void RelaxationJoints::push_velocity_only(const SolverBodies& bodies, double factor, BodyMotion& x) const {
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {
       const Row& row = rows_[i];
@@ -241,7 +241,7 @@ bool RelaxationJoints::has_velocity_only_impulse() const {
                      [](const Row& row) { return row.law.is_velocity_only && row.multiplier != 0.0; });
 }
 
-double RelaxationJoints::largest_violation(const RelaxationMotion& x) const {
+double RelaxationJoints::largest_violation(const BodyMotion& x) const {
   double largest = 0.0;
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {
@@ -256,13 +256,13 @@ double RelaxationJoints::largest_violation(const RelaxationMotion& x) const {
   return largest;
 }
 
-double RelaxationJoints::largest_motion(const RelaxationMotion& x) const {
+double RelaxationJoints::largest_motion(const BodyMotion& x) const {
   double largest = 0.0;
   for (const Block& block : blocks_) {
     const Twist& x1 = x[block.body1];
     const Twist& x2 = x[block.body2];
     for (std::size_t i = block.first; i < block.end; ++i) {
-      const RelaxationDirection& own = rows_[i].own;
+      const ConstraintDirection& own = rows_[i].own;
       const double motion = own.linear.norm() * (x1.linear.norm() + x2.linear.norm()) +
                             own.angular1.norm() * x1.angular.norm() + own.angular2.norm() * x2.angular.norm();
       largest = std::max(largest, motion * rows_[i].length);
@@ -280,9 +280,8 @@ void RelaxationJoints::store(Multipliers& multipliers) const {
   for (const Row& row : rows_) multipliers[row.place] = row.multiplier;
 }
 
-void RelaxationJoints::add_work(const RelaxationBodies& bodies, const RelaxationMotion& before,
-                                const RelaxationMotion& after, const std::vector<std::uint32_t>& group,
-                                std::vector<Gain>& gains) const {
+void RelaxationJoints::add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
+                                const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const {
   for (const Block& block : blocks_) {
     Gain& gain = gains[group[owner_of(block, bodies)]];
     for (std::size_t i = block.first; i < block.end; ++i) {
@@ -296,14 +295,14 @@ void RelaxationJoints::add_work(const RelaxationBodies& bodies, const Relaxation
   }
 }
 
-void RelaxationJoints::exempt_driven(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+void RelaxationJoints::exempt_driven(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                      std::vector<double>& factor) const {
   for (const Block& block : blocks_)
     for (std::size_t i = block.first; i < block.end; ++i)
       if (rows_[i].law.is_velocity_only && rows_[i].multiplier != 0.0) factor[group[owner_of(block, bodies)]] = 1.0;
 }
 
-void RelaxationJoints::scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+void RelaxationJoints::scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                              const std::vector<double>& factor) {
   for (const Block& block : blocks_)
     for (std::size_t i = block.first; i < block.end; ++i) rows_[i].multiplier *= factor[group[owner_of(block, bodies)]];

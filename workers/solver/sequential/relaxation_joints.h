@@ -30,24 +30,24 @@
 #include <cstdint>
 #include <vector>
 
-#include "workers/solver/sequential/joint_laws.h"
-#include "workers/solver/sequential/relaxation_bodies.h"
+#include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/joint_laws.h"
 
 namespace gravitas {
 
 // A discrepancy with all that the two problems need of it. The poses are those at S*.
 struct RelaxationDiscrepancy {
-  std::uint32_t body1 = 0, body2 = 0;  // rows of RelaxationBodies
+  std::uint32_t body1 = 0, body2 = 0;  // rows of SolverBodies
   double beta = 1.0;                   // of the pose change
   double slop = 0.0;                   // of a limit, m or rad
   double length = 1.0;                 // of a unit of the error, m: 1 for points, an arm for angles
-  std::array<RelaxationDirection, 3> directions;
+  std::array<ConstraintDirection, 3> directions;
   std::array<JointAxisState, 3> axes;
 };
 
 // Reads row `row` of the request. `correction_factor` multiplies the discrepancy's own.
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
-                                             const RelaxationBodies& bodies, double correction_factor);
+                                             const SolverBodies& bodies, double correction_factor);
 
 class RelaxationJoints {
  public:
@@ -56,24 +56,24 @@ class RelaxationJoints {
   using Laws = std::vector<JointLaw>;
 
   // Rows of all active laws (3 per discrepancy), starting from `warm`.
-  void build(const RelaxationBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
+  void build(const SolverBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws,
              const Multipliers& warm);
 
   bool is_empty() const { return rows_.empty(); }
 
   // x += M^-1 J^T lambda of all rows, or of the velocity-only ones times `factor`.
-  void push_all(const RelaxationBodies& bodies, RelaxationMotion& x) const;
-  void push_velocity_only(const RelaxationBodies& bodies, double factor, RelaxationMotion& x) const;
+  void push_all(const SolverBodies& bodies, BodyMotion& x) const;
+  void push_velocity_only(const SolverBodies& bodies, double factor, BodyMotion& x) const;
   bool has_velocity_only_impulse() const;
 
   // Largest violation of a row by x, and largest sum of the magnitudes that J x is made of: what
   // rounding goes by. m or m/s, angles times their length.
-  double largest_violation(const RelaxationMotion& x) const;
-  double largest_motion(const RelaxationMotion& x) const;
+  double largest_violation(const BodyMotion& x) const;
+  double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
 
   // One sweep over the blocks. Returns the largest change of J x in m or m/s.
-  double sweep(const RelaxationBodies& bodies, RelaxationMotion& x);
+  double sweep(const SolverBodies& bodies, BodyMotion& x);
 
   // Overwrites the multipliers of all discrepancies; those of rows that are not there with zero.
   void store(Multipliers& multipliers) const;
@@ -82,22 +82,21 @@ class RelaxationJoints {
 
   // Work of the rows that neither drive nor soften, lambda (J before + J after)/2, J, added to that
   // of body2, or of body1 where body2 is not pushed.
-  void add_work(const RelaxationBodies& bodies, const RelaxationMotion& before, const RelaxationMotion& after,
+  void add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
                 const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const;
   // Sets factor to 1 for the groups of bodies (by the number of their first) that a drive or a
   // spring acts on.
-  void exempt_driven(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
+  void exempt_driven(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                      std::vector<double>& factor) const;
   // Multiplies all multipliers by the factor of their bodies' group.
-  void scale(const RelaxationBodies& bodies, const std::vector<std::uint32_t>& group,
-             const std::vector<double>& factor);
+  void scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, const std::vector<double>& factor);
 
  private:
   static constexpr int kBlock = 6;
 
   struct Row {
-    RelaxationDirection own;     // J
-    RelaxationDirection solved;  // J', for rows outside the block
+    ConstraintDirection own;     // J
+    ConstraintDirection solved;  // J', for rows outside the block
     JointLaw law;
     double response = 0.0;  // J' M^-1 J'^T + gamma
     double length = 1.0;
@@ -112,7 +111,7 @@ class RelaxationJoints {
     Eigen::Matrix<double, kBlock, kBlock> inverse;
   };
 
-  static std::uint32_t owner_of(const Block& block, const RelaxationBodies& bodies) {
+  static std::uint32_t owner_of(const Block& block, const SolverBodies& bodies) {
     return bodies[block.body2].is_pushed() ? block.body2 : block.body1;
   }
   void collect(const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws, std::size_t first,

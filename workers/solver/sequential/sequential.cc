@@ -10,7 +10,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
-#include "workers/solver/sequential/solver_request_check.h"
+#include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
 namespace {
@@ -260,7 +260,7 @@ void SequentialSolver::bound_energy() {
 }
 
 // gains_: what each group's bodies gain by the impulses between v* and `after`.
-void SequentialSolver::add_up_gains(const RelaxationMotion& after) {
+void SequentialSolver::add_up_gains(const BodyMotion& after) {
   gains_.assign(bodies_.count() + 1, Gain{});
   impulses_.add_work(bodies_, trial_velocity_, after, group_, gains_);
   velocity_joints_.add_work(bodies_, trial_velocity_, after, group_, gains_);

@@ -84,7 +84,7 @@ class SequentialSolver {
  public:
   explicit SequentialSolver(const SequentialSettings& settings) : settings_(settings) {}
 
-  // Answers the request. Throws Refusal for an impossible one (solver_request_check.h), and where
+  // Answers the request. Throws Refusal for an impossible one (request_check.h), and where
   // the answer is not finite because the numbers overflow. What is kept between calls is room for
   // rows, nothing else.
   SequentialSummary solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply);
@@ -99,7 +99,7 @@ class SequentialSolver {
   bool sweep_velocity(double tolerance);
   void bound_energy();
   void group_bodies();
-  void add_up_gains(const RelaxationMotion& after);
+  void add_up_gains(const BodyMotion& after);
   void scale_back();
   void sum_velocity();
   bool acts_on_velocity_alone() const;
@@ -113,16 +113,16 @@ class SequentialSolver {
   double time_step_ = 0.0;
   double coordinates_ = 0.0;
 
-  RelaxationBodies bodies_;
+  SolverBodies bodies_;
   std::vector<RelaxationDiscrepancy> discrepancies_;
   RelaxationJoints::Laws pose_laws_, velocity_laws_;
   RelaxationJoints pose_joints_, velocity_joints_;
   ContactGaps gaps_;
   ContactImpulses impulses_;
 
-  RelaxationMotion trial_velocity_, velocity_;  // v*, v_{n+1}
-  RelaxationMotion offset_;                     // theta h M^-1 J^T lambda of rows on velocity alone
-  RelaxationMotion displacement_;               // delta
+  BodyMotion trial_velocity_, velocity_;  // v*, v_{n+1}
+  BodyMotion offset_;                     // theta h M^-1 J^T lambda of rows on velocity alone
+  BodyMotion displacement_;               // delta
   std::vector<std::uint8_t> closed_, closed_now_;
 
   std::vector<double> joint_correction_, joint_impulse_;

@@ -128,7 +128,7 @@ inline double distance_to_surface(const Shape& shape, const Vector3& p_S) {
       const double cap = std::fabs(p_S.y()) - shape.size.y();
       return std::hypot(std::max(side, 0.0), std::max(cap, 0.0)) + std::min(std::max(side, cap), 0.0);
     }
-    case ShapeType::kHalfspace:
+    default:
       break;
   }
   return p_S.y();

@@ -1,0 +1,114 @@
+#include "plugin_sdk/geometry/simplex.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gravitas {
+namespace {
+
+const SimplexPoint& nearer(const SimplexPoint& x, const SimplexPoint& y) {
+  return y.point.squaredNorm() < x.point.squaredNorm() ? y : x;
+}
+
+// A point of a side as one of the whole: `rows` says which corners the side has.
+template <std::size_t N>
+SimplexPoint of_whole(const SimplexPoint& side, const std::array<std::size_t, N>& rows) {
+  SimplexPoint whole{side.point, {}};
+  for (std::size_t i = 0; i < N; ++i) whole.weight[rows[i]] = side.weight[i];
+  return whole;
+}
+
+}  // namespace
+
+SimplexPoint closest_on_segment(const Vector3& a, const Vector3& b) {
+  const Vector3 ab = b - a;
+  const double along = -a.dot(ab), length = ab.squaredNorm();
+  if (!(along > 0.0)) return {a, {1.0}};
+  if (!(along < length)) return {b, {0.0, 1.0}};
+  const double t = along / length;
+  return {a + t * ab, {1.0 - t, t}};
+}
+
+SimplexPoint closest_on_triangle(const Vector3& a, const Vector3& b, const Vector3& c) {
+  const Vector3 normal = (b - a).cross(c - a);
+  const double area = normal.squaredNorm();
+  // signed doubled areas of the origin's projection with each edge, times |normal|
+  const double wa = normal.dot(b.cross(c)), wb = normal.dot(c.cross(a)), wc = normal.dot(a.cross(b));
+  const double sum = wa + wb + wc;
+  if (wa > 0.0 && wb > 0.0 && wc > 0.0 && area > 0.0 && sum > 0.0)
+    return {normal * (normal.dot(a) / area), {wa / sum, wb / sum, wc / sum}};
+  const SimplexPoint ab = of_whole<2>(closest_on_segment(a, b), {0, 1});
+  const SimplexPoint bc = of_whole<2>(closest_on_segment(b, c), {1, 2});
+  const SimplexPoint ca = of_whole<2>(closest_on_segment(c, a), {2, 0});
+  return nearer(nearer(ab, bc), ca);
+}
+
+SimplexPoint closest_on_tetrahedron(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
+  constexpr std::array<std::array<std::size_t, 4>, 4> kFaces = {
+      {{0, 1, 2, 3}, {0, 1, 3, 2}, {0, 2, 3, 1}, {1, 2, 3, 0}}};
+  const std::array<Vector3, 4> x = {a, b, c, d};
+  SimplexPoint best;
+  bool is_outside = false;
+  std::array<double, 4> inside{};
+  for (const auto& face : kFaces) {
+    const Vector3& p = x[face[0]];
+    const Vector3 normal = (x[face[1]] - p).cross(x[face[2]] - p);
+    const double side_of_origin = -normal.dot(p), side_of_fourth = normal.dot(x[face[3]] - p);
+    // a flat tetrahedron has no inside
+    if (side_of_origin * side_of_fourth > 0.0) {
+      inside[face[3]] = side_of_origin / side_of_fourth;
+      continue;
+    }
+    const SimplexPoint on_face =
+        of_whole<3>(closest_on_triangle(p, x[face[1]], x[face[2]]), {face[0], face[1], face[2]});
+    if (!is_outside || on_face.point.squaredNorm() < best.point.squaredNorm()) best = on_face;
+    is_outside = true;
+  }
+  if (is_outside) return best;
+  const double sum = inside[0] + inside[1] + inside[2] + inside[3];
+  for (std::size_t i = 0; i < 4; ++i) best.weight[i] = inside[i] / sum;
+  return best;
+}
+
+SimplexPoint closest_on_simplex(std::span<const Vector3> x) {
+  switch (x.size()) {
+    case 1:
+      return {x[0], {1.0}};
+    case 2:
+      return closest_on_segment(x[0], x[1]);
+    case 3:
+      return closest_on_triangle(x[0], x[1], x[2]);
+    default:
+      return closest_on_tetrahedron(x[0], x[1], x[2], x[3]);
+  }
+}
+
+SegmentParameters closest_on_segments(const Vector3& a0, const Vector3& a1, const Vector3& b0, const Vector3& b1) {
+  const Vector3 u = a1 - a0, v = b1 - b0, w = a0 - b0;
+  const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v), uw = u.dot(w), vw = v.dot(w);
+  const double determinant = uu * vv - uv * uv;
+  double s = determinant > 0.0 ? std::clamp((uv * vw - vv * uw) / determinant, 0.0, 1.0) : 0.0;
+  double t = vv > 0.0 ? (uv * s + vw) / vv : 0.0;
+  if (t < 0.0 || t > 1.0) {
+    t = std::clamp(t, 0.0, 1.0);
+    s = uu > 0.0 ? std::clamp((uv * t - uw) / uu, 0.0, 1.0) : 0.0;
+  }
+  return {s, t};
+}
+
+std::optional<double> ray_on_triangle(const Vector3& origin, const Vector3& direction,
+                                      const std::array<Vector3, 3>& corners) {
+  const Vector3 ab = corners[1] - corners[0], ac = corners[2] - corners[0];
+  const Vector3 p = direction.cross(ac);
+  const double determinant = ab.dot(p);
+  if (determinant == 0.0) return std::nullopt;
+  const Vector3 arm = origin - corners[0];
+  const Vector3 q = arm.cross(ab);
+  const double u = arm.dot(p) / determinant, v = direction.dot(q) / determinant, t = ac.dot(q) / determinant;
+  // neighbours both take their border, so that no ray slips through between them
+  constexpr double kBorder = 1e-14;
+  if (!(u >= -kBorder && v >= -kBorder && u + v <= 1.0 + kBorder && t >= 0.0)) return std::nullopt;
+  return t;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,125 @@
+#include "plugin_sdk/joint_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
+
+namespace gravitas {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Vector3 first_axis(const Quaternion& q) { return q * Vector3::UnitX(); }
+
+}  // namespace
+
+void demand_type(std::uint64_t type, std::string_view name) {
+  if (type != type_id(name)) throw Refusal("a joint is of a type that this plugin does not know");
+}
+
+Vector3 unit_axis(const Vector3& axis, std::string_view field) {
+  const double length = axis.stableNorm();
+  if (!(length > 0.0) || !std::isfinite(length)) throw Refusal(std::string(field) + " has no direction");
+  return axis / length;
+}
+
+JointLimits JointLimits::of(double lower, double upper, std::string_view lower_field, std::string_view upper_field) {
+  JointLimits limits;
+  if (!std::isnan(lower)) limits.lower = lower;
+  if (!std::isnan(upper)) limits.upper = upper;
+  if (limits.lower > limits.upper)
+    throw Refusal(std::string(lower_field) + " " + std::to_string(lower) + " lies above " + std::string(upper_field) +
+                  " " + std::to_string(upper));
+  if (limits.lower > 0.0)
+    throw Refusal(std::string(lower_field) + " " + std::to_string(lower) + " lies above 0, where the joint starts");
+  if (limits.upper < 0.0)
+    throw Refusal(std::string(upper_field) + " " + std::to_string(upper) + " lies below 0, where the joint starts");
+  return limits;
+}
+
+double JointLimits::turn(double angle) const {
+  if (lower == -kUnlimited || upper == kUnlimited) return angle;
+  const double middle = 0.5 * (lower + upper);
+  return angle - 2.0 * kPi * std::round((angle - middle) / (2.0 * kPi));
+}
+
+Pose frame_along(const Vector3& origin, const Vector3& first) {
+  const auto [second, third] = orthonormal_basis(first);
+  Matrix3 axes;
+  axes << first, second, third;
+  return {origin, to_quaternion(axes)};
+}
+
+void write_frame(const Pose& body, const Pose& frame, BoundWriter* out) {
+  const Pose in_body = relative(body, frame);
+  out->vector(in_body.position);
+  const Quaternion& q = in_body.orientation;
+  for (const double number : {q.w(), q.x(), q.y(), q.z()}) out->number(number);
+}
+
+Pose read_frame(PropertyCursor* bound, const Pose& body) {
+  const Vector3 position = bound->vector();
+  const Quaternion orientation = bound->quaternion();
+  Pose frame = compose(body, {position, orientation});
+  frame.orientation = normalized(frame.orientation);
+  return frame;
+}
+
+Discrepancy held_point(const Pose& frame1, const Vector3& point2, HeldAxes held, const Vector3& rest) {
+  Discrepancy d;
+  d.axes = frame1.orientation;
+  const Matrix3 axes = to_rotation_matrix(frame1.orientation);
+  d.point1 = d.point2 = point2;
+  const bool marked[] = {held.x, held.y, held.z};
+  AxisMode modes[3];
+  for (int k = 0; k < 3; ++k) {
+    modes[k] = marked[k] ? AxisMode::kLocked : AxisMode::kFree;
+    if (marked[k]) d.point1 -= (axes.col(k).dot(point2 - frame1.position) - rest[k]) * axes.col(k);
+  }
+  d.modes = pack_modes(modes[0], modes[1], modes[2]);
+  return d;
+}
+
+Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3& point2, AxisMode mode) {
+  Discrepancy d;
+  d.point1 = point1, d.point2 = point2;
+  d.axes = frame_along(point1, axis).orientation;
+  d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree);
+  return d;
+}
+
+Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode) {
+  Discrepancy d = row_along(axis, Vector3::Zero(), angle * axis, mode);
+  d.modes |= kAngularDiscrepancy;
+  return d;
+}
+
+Swing swing_between(const Vector3& first, const Vector3& second) {
+  const Vector3 across = first.cross(second);
+  const double sine = across.norm();
+  // below, the direction is rounding's
+  const Vector3 axis = sine > 1e-12 ? Vector3(across / sine) : orthonormal_basis(first).first;
+  return {math::atan2(sine, first.dot(second)), axis};
+}
+
+double twist_between(const Quaternion& frame1, const Quaternion& frame2) {
+  // relative turn q = swing * twist about x: the twist is the part of q about x
+  const Quaternion q = shorter_arc(frame1.conjugate() * frame2);
+  const double twist = 2.0 * math::atan2(q.x(), q.w());
+  if (twist > kPi) return twist - 2.0 * kPi;
+  return twist < -kPi ? twist + 2.0 * kPi : twist;
+}
+
+Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {
+  const Vector3 a1 = first_axis(frame1), a2 = first_axis(frame2);
+  const Vector3 sum = a1 + a2;
+  const double length = sum.norm();  // 2 cos(swing/2)
+  *scale = 0.5 * length;
+  const Vector3 bisector = length > 1e-9 ? Vector3(sum / length) : orthonormal_basis(a1).first;
+  return row_about(bisector, *scale * twist_between(frame1, frame2), mode);
+}
+
+}  // namespace gravitas

@@ -1,0 +1,67 @@
+// For authors of joints: the rows that the shipped joints are made of, in the form of discrepancy.h.
+//
+// A joint keeps a frame in each body. The frames coincide at the start; what the joint holds is said by where points of
+// body 2's frame are in body 1's. An orientation is held by points one metre from the origin, so that an angular error of
+// 1 rad is one of 1 m, and is exact for turns of any size, which an angular row (a rotation vector) is to first order only.
+#pragma once
+
+#include <string_view>
+
+#include "plugin_sdk/constraint.h"
+
+namespace gravitas {
+
+// Throws Refusal if a joint is not of the type.
+void demand_type(std::uint64_t type, std::string_view name);
+
+// The vector made unit. Throws Refusal naming the field if it has no direction.
+Vector3 unit_axis(const Vector3& axis, std::string_view field);
+
+// Refuses, with the field named, limits that cross, and limits without the 0 of the start between them. NaN: absent.
+struct JointLimits {
+  double lower = -kUnlimited, upper = kUnlimited;
+
+  static JointLimits of(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
+  bool is_none() const { return lower == -kUnlimited && upper == kUnlimited; }
+  // The turn among angle + k 2 pi that lies nearest to the middle of two limits; for one or none the one within pi.
+  double turn(double angle) const;
+};
+
+// A frame with its origin at `origin` and its first axis along a unit vector (world).
+Pose frame_along(const Vector3& origin, const Vector3& first);
+
+// Numbers of a frame in its body, and back; the orientation is made unit.
+void write_frame(const Pose& body, const Pose& frame, BoundWriter* out);
+Pose read_frame(PropertyCursor* bound, const Pose& body);
+
+// Point of body 2 held in the axes of a frame of body 1 that are marked: the marked components of (point - origin) are
+// `rest`. x2 is the point, x1 its projection along the unmarked axes, so that a long way along them is no error and the
+// rows are exact there.
+struct HeldAxes {
+  bool x = false, y = false, z = false;
+};
+Discrepancy held_point(const Pose& frame1, const Vector3& point2, HeldAxes held, const Vector3& rest = Vector3::Zero());
+
+// One row along a unit axis through two points, x and the others free; the error is axis.(x2 - x1).
+Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3& point2, AxisMode mode);
+
+// One row about a unit axis, with the angle (rad) as its error.
+Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
+
+// How the second of two unit directions is turned from the first: angle (0 ... pi) and unit axis; any axis across where
+// they are parallel.
+struct Swing {
+  double angle = 0.0;
+  Vector3 axis = Vector3::Zero();
+};
+Swing swing_between(const Vector3& first, const Vector3& second);
+
+// Twist of frame 2 about its first axis after the shortest turn that takes the first axis of frame 1 to it, -pi ... pi.
+// Its rate is w.(a1 + a2)/(1 + a1.a2), w the turning of frame 2 relative to frame 1, a1 and a2 the first axes.
+double twist_between(const Quaternion& frame1, const Quaternion& frame2);
+
+// The row whose error is the twist times cos(swing/2), about the unit bisector of the first axes: w.bisector is the rate
+// of just that while the twist is small. `scale` receives the cosine.
+Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale);
+
+}  // namespace gravitas

@@ -1,0 +1,108 @@
+// The bodies of a solver's request as a relaxation needs them: both states, inverse masses at the
+// trial pose, and one more body for the world, so that no row has to ask whether a body is there.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/pose.h"
+#include "schemas/stage_frames.h"
+
+namespace gravitas {
+
+struct SolverBody {
+  double inverse_mass = 0.0;                  // 1/kg; 0 where nothing pushes the body
+  Matrix3 inverse_inertia = Matrix3::Zero();  // world, at the trial pose, 1/(kg m^2)
+  Pose start;                                 // S_n
+  Pose trial;                                 // S*
+  Twist start_velocity;
+  Twist trial_velocity;
+
+  bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
+  // Radius of gyration, m: turns rad/s of this body into m/s where the two must be compared. 1 m
+  // for a body that only turns, 0 for one that does not turn.
+  double gyration() const;
+};
+
+// Displacement or velocity of every body, by the number of its row; the last is the world's, and
+// stays zero.
+using BodyMotion = std::vector<Twist>;
+
+class SolverBodies {
+ public:
+  // Precondition: the request passed check_solver_request(). Bodies that are not movable, or
+  // kinematic, get inverse mass and moments 0 whatever the columns say.
+  void load(const stage::SolverSolveRequest& request);
+
+  // Some of them, in the order of their rows; the last row must be the world's.
+  SolverBodies subset(const std::vector<std::uint32_t>& rows) const;
+
+  // Without the world.
+  std::size_t count() const { return bodies_.size() - 1; }
+  // The row itself, or that of the world for kNone.
+  std::uint32_t row(std::uint32_t body) const { return body == kNone ? static_cast<std::uint32_t>(count()) : body; }
+  const SolverBody& operator[](std::uint32_t row) const { return bodies_[row]; }
+
+ private:
+  std::vector<SolverBody> bodies_;
+};
+
+// One scalar row J = [-linear, angular1, linear, angular2] with M^-1 J^T for the two turns.
+struct ConstraintDirection {
+  Vector3 linear = Vector3::Zero();
+  Vector3 angular1 = Vector3::Zero();
+  Vector3 angular2 = Vector3::Zero();
+  Vector3 turn1 = Vector3::Zero();  // I1^-1 angular1
+  Vector3 turn2 = Vector3::Zero();  // I2^-1 angular2
+
+  // Along a unit axis through a point (world) that both bodies are pushed at.
+  static ConstraintDirection through(const Vector3& point, const Vector3& axis, const SolverBody& body1,
+                                     const SolverBody& body2);
+  // About a unit axis.
+  static ConstraintDirection about(const Vector3& axis, const SolverBody& body1, const SolverBody& body2);
+
+  // J x for velocities or displacements of the two bodies.
+  double along(const Twist& x1, const Twist& x2) const {
+    return linear.dot(x2.linear - x1.linear) + angular1.dot(x1.angular) + angular2.dot(x2.angular);
+  }
+  // this M^-1 other^T
+  double product(const ConstraintDirection& other, double inverse_masses) const {
+    return inverse_masses * linear.dot(other.linear) + angular1.dot(other.turn1) + angular2.dot(other.turn2);
+  }
+  // x += M^-1 J^T amount
+  void push(double amount, double inverse_mass1, double inverse_mass2, Twist& x1, Twist& x2) const {
+    x1.linear -= (inverse_mass1 * amount) * linear;
+    x1.angular += amount * turn1;
+    x2.linear += (inverse_mass2 * amount) * linear;
+    x2.angular += amount * turn2;
+  }
+  // this -= share * other
+  void subtract(double share, const ConstraintDirection& other);
+};
+
+// Velocity (of a point, world) that an impulse at the arm `from` of a body gives the end of its arm
+// `at`, per unit of the impulse: 1/m - [at] I^-1 [from].
+Matrix3 point_response(const SolverBody& body, const Vector3& at, const Vector3& from);
+
+// Gap up to which a contact or a limit counts as closed, m: 1e-9 of the longest arm at which it
+// holds a body that can be pushed, and eight units of rounding of the coordinates.
+double closing_slop(const Vector3& point, const SolverBody& body1, const SolverBody& body2);
+
+// What impulses gained or lost the bodies they act on, J. `size` sums the magnitudes of what cancels in `work`: an elastic
+// impact's work is the difference of two large numbers.
+struct Gain {
+  double work = 0.0;
+  double size = 0.0;
+
+  void add(double more_work, double more_size) {
+    work += more_work;
+    size += more_size;
+  }
+  // More than rounding.
+  bool is_real() const { return work > 1e-13 * size; }
+};
+
+}  // namespace gravitas

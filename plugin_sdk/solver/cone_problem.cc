@@ -1,0 +1,380 @@
+// Rows, their elimination, and the order of the solution; the laws' steps are in cone_steps.cc.
+#include "plugin_sdk/solver/cone_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+namespace {
+
+constexpr double kRounding = std::numeric_limits<double>::epsilon();
+
+// A contact slips if it does so this much faster than what counts as converged.
+constexpr double kSlip = 1e3;
+
+}  // namespace
+
+double ConeProblem::coupling(const SolverBodies& bodies, std::uint32_t r, std::uint32_t s) const {
+  const ConeRow &a = rows[r], &b = rows[s];
+  const double along = a.direction.linear.dot(b.direction.linear);
+  double sum = 0.0;
+  if (a.body1 == b.body1) sum += bodies[a.body1].inverse_mass * along + a.direction.angular1.dot(b.direction.turn1);
+  if (a.body1 == b.body2) sum += a.direction.angular1.dot(b.direction.turn2) - bodies[a.body1].inverse_mass * along;
+  if (a.body2 == b.body1) sum += a.direction.angular2.dot(b.direction.turn1) - bodies[a.body2].inverse_mass * along;
+  if (a.body2 == b.body2) sum += bodies[a.body2].inverse_mass * along + a.direction.angular2.dot(b.direction.turn2);
+  return sum;
+}
+
+double ConeProblem::value(const BodyMotion& x, std::uint32_t r) const {
+  const ConeRow& row = rows[r];
+  return row.start + row.direction.along(x[row.body1], x[row.body2]);
+}
+
+void ConeProblem::push(const SolverBodies& bodies, BodyMotion* x) const {
+  for (const ConeRow& row : rows) {
+    if (row.multiplier == 0.0) continue;
+    row.direction.push(row.multiplier, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, (*x)[row.body1],
+                       (*x)[row.body2]);
+  }
+}
+
+// Scales, free values, and who is held.
+void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
+  scale_.assign(rows.size(), 0.0);
+  free_.assign(rows.size(), 0.0);
+  held_.clear(), other_.clear(), blocks_.clear();
+  motion_ = 0.0;
+  const auto response = [&](std::uint32_t r) {
+    const double own = coupling(bodies, r, r) + rows[r].law.gamma;
+    return own > 0.0 && std::isfinite(own) && std::isfinite(1.0 / own) ? own : 0.0;
+  };
+  for (std::uint32_t r = 0; r < rows.size(); ++r) {
+    const ConeRow& row = rows[r];
+    free_[r] = value(x0, r);
+    const Twist &one = x0[row.body1], &two = x0[row.body2];
+    const double arms =
+        row.direction.angular1.norm() * one.angular.norm() + row.direction.angular2.norm() * two.angular.norm();
+    const double size =
+        std::fabs(row.start) + row.direction.linear.norm() * (one.linear.norm() + two.linear.norm()) + arms;
+    motion_ = std::max(motion_, size * row.length);
+    if (!std::isfinite(motion_))
+      throw Refusal("velocities, errors or arms so large that their products are not finite");
+  }
+
+  const std::uint32_t scalars = contacts.empty() ? static_cast<std::uint32_t>(rows.size()) : contacts.front().first;
+  for (std::uint32_t r = 0; r < scalars; ++r) {
+    const JointLaw& law = rows[r].law;
+    scale_[r] = std::sqrt(response(r));
+    if (scale_[r] == 0.0 || !law.is_active()) {
+      rows[r].multiplier = 0.0;
+      continue;
+    }
+    if (law.is_equality() && law.bound == std::numeric_limits<double>::infinity()) {
+      held_.push_back(r);
+      continue;
+    }
+    blocks_.push_back({.first = static_cast<std::uint32_t>(other_.size())});
+    other_.push_back(r);
+  }
+  for (std::size_t c = 0; c < contacts.size(); ++c) {
+    const ConeContact& contact = contacts[c];
+    const std::uint32_t slip = contact.has_friction ? 3 : 1;
+    double largest = 0.0, turning = 0.0;
+    for (std::uint32_t k = 0; k < slip; ++k) largest = std::max(largest, response(contact.first + k));
+    for (std::uint32_t k = slip; k < contact.count(); ++k) turning = std::max(turning, response(contact.first + k));
+    const bool is_pushed = response(contact.first) > 0.0 && (!contact.has_turning || turning > 0.0);
+    for (std::uint32_t k = 0; k < contact.count(); ++k) {
+      const std::uint32_t r = contact.first + k;
+      if (!is_pushed) rows[r].multiplier = 0.0;
+      scale_[r] = is_pushed ? std::sqrt(k < slip ? largest : turning) : 0.0;
+    }
+    if (!is_pushed) continue;
+    blocks_.push_back({.first = static_cast<std::uint32_t>(other_.size()),
+                       .contact = static_cast<std::int32_t>(c),
+                       .count = contact.count()});
+    for (std::uint32_t k = 0; k < contact.count(); ++k) other_.push_back(contact.first + k);
+  }
+}
+
+// W_EE = L D L^T, and the side of the held rows.
+void ConeProblem::factorise(const SolverBodies& bodies) {
+  held_of_body_.assign(bodies.count() + 1, {});
+  std::vector<std::size_t> first(held_.size());
+  side_.assign(held_.size(), 0.0);
+  for (std::uint32_t i = 0; i < held_.size(); ++i) {
+    first[i] = i;
+    for (const std::uint32_t body : {rows[held_[i]].body1, rows[held_[i]].body2}) {
+      if (!bodies[body].is_pushed()) continue;
+      std::vector<std::uint32_t>& list = held_of_body_[body];
+      if (!list.empty()) first[i] = std::min<std::size_t>(first[i], list.front());
+      list.push_back(i);
+    }
+    side_[i] = (rows[held_[i]].law.lower_target - free_[held_[i]]) / scale_[held_[i]];
+  }
+  factor_.start(first);
+  for (std::uint32_t i = 0; i < held_.size(); ++i) {
+    for (std::size_t j = first[i]; j <= i; ++j) {
+      double entry = coupling(bodies, held_[i], held_[j]);
+      if (i == j) entry += rows[held_[i]].law.gamma;
+      factor_.entry(i, j) = entry / (scale_[held_[i]] * scale_[held_[j]]);
+    }
+  }
+  factor_.factorise();
+}
+
+// What the other rows feel of each other while the held ones hold.
+void ConeProblem::reduce(const SolverBodies& bodies) {
+  const auto count = static_cast<Eigen::Index>(other_.size());
+  const auto held = static_cast<Eigen::Index>(held_.size());
+  to_held_.assign(other_.size(), {});
+  carried_.resize(held, count);
+  start_others_.resize(count);
+  std::vector<double> holding = side_;
+  factor_.solve(&holding);
+  std::vector<double> column(held_.size());
+  for (std::size_t o = 0; o < other_.size(); ++o) {
+    const ConeRow& row = rows[other_[o]];
+    std::fill(column.begin(), column.end(), 0.0);
+    for (const std::uint32_t body : {row.body1, row.body2}) {
+      for (const std::uint32_t i : held_of_body_[body]) {
+        if (column[i] != 0.0) continue;  // reached through the other body
+        column[i] = coupling(bodies, held_[i], other_[o]) / (scale_[held_[i]] * scale_[other_[o]]);
+        if (column[i] != 0.0) to_held_[o].emplace_back(i, column[i]);
+      }
+    }
+    double start = free_[other_[o]] / scale_[other_[o]];
+    for (const auto& [i, entry] : to_held_[o]) start += entry * holding[i];
+    start_others_[static_cast<Eigen::Index>(o)] = start;
+    if (held > 0) {
+      factor_.solve(&column);
+      for (Eigen::Index i = 0; i < held; ++i)
+        carried_(i, static_cast<Eigen::Index>(o)) = column[static_cast<std::size_t>(i)];
+    }
+  }
+  if (other_.size() > kDenseRows) return;
+  response_.resize(count, count);
+  for (Eigen::Index a = 0; a < count; ++a) {
+    const std::uint32_t r = other_[static_cast<std::size_t>(a)];
+    for (Eigen::Index b = 0; b <= a; ++b) {
+      const std::uint32_t s = other_[static_cast<std::size_t>(b)];
+      double entry = coupling(bodies, r, s);
+      if (a == b) entry += rows[r].law.gamma;
+      entry /= scale_[r] * scale_[s];
+      for (const auto& [i, share] : to_held_[static_cast<std::size_t>(a)]) entry -= share * carried_(i, b);
+      response_(a, b) = response_(b, a) = entry;
+    }
+  }
+}
+
+bool ConeProblem::is_solved_by_nothing(double smallest) const {
+  double worst = 0.0;
+  for (const std::uint32_t r : held_)
+    worst = std::max(worst, std::fabs(rows[r].law.lower_target - free_[r]) * rows[r].length);
+  const auto count = static_cast<Eigen::Index>(other_.size());
+  Eigen::VectorXd y(count);
+  for (Eigen::Index o = 0; o < count; ++o) {
+    const std::uint32_t r = other_[static_cast<std::size_t>(o)];
+    y[o] = free_[r] / scale_[r];
+  }
+  if (count > 0) worst = std::max(worst, residual_of(Eigen::VectorXd::Zero(count), y));
+  return worst <= std::max(smallest, kRounding * motion_);
+}
+
+ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
+                               const ConeSettings& settings) {
+  ConeSummary summary;
+  classify(bodies, x0);
+  if (is_solved_by_nothing(smallest)) {
+    for (ConeRow& row : rows) row.multiplier = 0.0;
+    return summary;
+  }
+  factorise(bodies);
+  double size = motion_;
+  for (const std::uint32_t r : held_) size = std::max(size, std::fabs(rows[r].law.lower_target) * rows[r].length);
+  if (factor_.dropped() > 0) {
+    double largest = 0.0;
+    for (const std::uint32_t r : held_) largest = std::max(largest, scale_[r] * rows[r].length);
+    const double distance = largest * factor_.make_consistent(&side_);
+    if (distance > std::max(smallest, 1e-9 * size)) summary.contradiction = distance;
+  }
+  const double tolerance = std::max(smallest, settings.tolerance * size);
+  lambda_.resize(static_cast<Eigen::Index>(other_.size()));
+  for (std::size_t o = 0; o < other_.size(); ++o)
+    lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
+  into_cones(&lambda_);
+
+  reduce(bodies);
+  if (other_.size() > kDenseRows) {
+    solve_large(bodies, x0, settings, tolerance, &summary);
+  } else if (!other_.empty()) {
+    solve_dense(settings, tolerance, &summary);
+  }
+  for (std::size_t o = 0; o < other_.size(); ++o)
+    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
+  if (!held_.empty()) {
+    for (const std::uint32_t r : held_) rows[r].multiplier = 0.0;
+    summary.iterations += 1;
+    // once for the answer, twice for what rounding left of it
+    double missing = 0.0;
+    for (int repeat = 0; repeat < 3; ++repeat) missing = refine_held(bodies, x0);
+    summary.residual = std::max(summary.residual, missing);
+    summary.has_converged = summary.has_converged && missing <= tolerance;
+  }
+  return summary;
+}
+
+double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
+  BodyMotion x = x0;
+  push(bodies, &x);
+  std::vector<double> missing(held_.size());
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    const ConeRow& row = rows[held_[i]];
+    missing[i] = (row.law.lower_target - value(x, held_[i]) - row.law.gamma * row.multiplier) / scale_[held_[i]];
+  }
+  if (factor_.dropped() > 0) factor_.make_consistent(&missing);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    largest = std::max(largest, std::fabs(missing[i]) * scale_[held_[i]] * rows[held_[i]].length);
+  factor_.solve(&missing);
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier += missing[i] / scale_[held_[i]];
+  return largest;
+}
+
+void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
+  constexpr int kPatience = 6, kSweeps = 20;
+  const bool is_newton = settings.method == ConeMethod::kNewton;
+  for (;;) {
+    Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
+    double residual = residual_of(lambda, y), best = residual;
+    Eigen::VectorXd best_lambda = lambda, best_y = y;
+    int without = 0, mended = 0;
+    Eigen::VectorXd mended_lambda, mended_y;
+    std::uint32_t done = 0;
+    // what rounding leaves of sums of large terms is no violation
+    double enough = tolerance;
+    while (best > enough && done < settings.iterations) {
+      ++done;
+      if (is_newton && without < kPatience && newton_step(nullptr, &lambda, &y)) {
+        ++without;
+      } else if (is_newton && mended % 4 != 3) {
+        // from where the last mending ended: the loads go on settling
+        if (mended > 0) lambda = mended_lambda, y = mended_y;
+        tresca(enough, &lambda, &y);
+        mended_lambda = lambda, mended_y = y;
+        ++mended;
+        without = 0;
+      } else {
+        if (is_newton) lambda = best_lambda, y = best_y;
+        const int sweeps = is_newton ? kSweeps : 1;
+        for (int i = 0; i < sweeps; ++i) sweep(&lambda, &y);
+        y = start_others_ + response_ * lambda;
+        mended_lambda = lambda, mended_y = y;
+        ++mended;
+        without = 0;
+      }
+      residual = residual_of(lambda, y);
+      if (!(residual < best)) continue;
+      if (residual < 0.5 * best) without = 0;
+      best = residual, best_lambda = lambda, best_y = y;
+      enough = std::max(tolerance, 16.0 * kRounding * largest_sum(lambda));
+    }
+    // one step more costs little and ends at rounding
+    if (is_newton && best <= enough && done > 0 && newton_step(nullptr, &lambda, &y)) {
+      residual = residual_of(lambda, y);
+      if (residual < best) best = residual, best_lambda = lambda, best_y = y;
+    }
+    summary->iterations += done;
+    summary->residual = best;
+    summary->has_converged = best <= enough;
+    lambda_ = best_lambda;
+    if (let_slide(best_lambda, best_y, kSlip * std::max(best, tolerance))) continue;
+    into_cones(&lambda_);
+    return;
+  }
+}
+
+// Largest of what a row's value is summed from, m/s.
+double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
+  double most = 0.0;
+  for (Eigen::Index i = 0; i < lambda.size(); ++i) {
+    const std::uint32_t r = other_[static_cast<std::size_t>(i)];
+    const double sum = std::fabs(start_others_[i]) + response_.row(i).cwiseAbs().dot(lambda.cwiseAbs().transpose());
+    most = std::max(most, sum * scale_[r] * rows[r].length);
+  }
+  return most;
+}
+
+// Friction within radii that the present normal impulses give (Tresca): convex, so that steps end at its solution.
+bool ConeProblem::tresca(double tolerance, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
+  constexpr int kSteps = 15;
+  const Eigen::VectorXd loads = lambda->cwiseMax(0.0);
+  for (int step = 0; step < kSteps; ++step) {
+    if (residual_of(*lambda, *y, &loads) <= tolerance) return true;
+    if (!newton_step(&loads, lambda, y)) return false;
+  }
+  return false;
+}
+
+// Held rows and the others in turn.
+void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings,
+                              double tolerance, ConeSummary* summary) {
+  const auto count = static_cast<Eigen::Index>(other_.size());
+  std::vector<Eigen::MatrixXd> own(blocks_.size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const Block& block = blocks_[b];
+    own[b].resize(block.count, block.count);
+    for (std::uint32_t i = 0; i < block.count; ++i) {
+      for (std::uint32_t j = 0; j < block.count; ++j) {
+        const std::uint32_t r = other_[block.first + i], s = other_[block.first + j];
+        const double gamma = i == j ? rows[r].law.gamma : 0.0;
+        own[b](i, j) = (coupling(bodies, r, s) + gamma) / (scale_[r] * scale_[s]);
+      }
+    }
+  }
+  for (std::size_t o = 0; o < other_.size(); ++o)
+    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
+  Eigen::VectorXd y(count);
+  BodyMotion x;
+  summary->has_converged = false;
+  const std::uint32_t sweeps = 10 * settings.iterations;
+  bool may_slide = true;
+  for (std::uint32_t done = 0; done < sweeps; ++done) {
+    ++summary->iterations;
+    if (!held_.empty()) refine_held(bodies, x0);
+    x = x0;
+    push(bodies, &x);
+    for (Eigen::Index o = 0; o < count; ++o) {
+      const std::uint32_t r = other_[static_cast<std::size_t>(o)];
+      y[o] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
+    }
+    summary->residual = residual_of(lambda_, y);
+    summary->has_converged = summary->residual <= tolerance;
+    if (may_slide && (summary->has_converged || done == sweeps / 2)) {
+      may_slide = false;
+      if (let_slide(lambda_, y, kSlip * std::max(summary->residual, tolerance))) continue;
+    }
+    if (summary->has_converged) break;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const Block& block = blocks_[b];
+      double at[6];
+      for (std::uint32_t k = 0; k < block.count; ++k) {
+        const std::uint32_t r = other_[block.first + k];
+        at[k] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
+      }
+      relax(block, own[b], &lambda_[block.first], at);
+      for (std::uint32_t k = 0; k < block.count; ++k) {
+        ConeRow& row = rows[other_[block.first + k]];
+        const double now = lambda_[block.first + k] / scale_[other_[block.first + k]];
+        row.direction.push(now - row.multiplier, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass,
+                           x[row.body1], x[row.body2]);
+        row.multiplier = now;
+      }
+    }
+  }
+  into_cones(&lambda_);
+}
+
+}  // namespace gravitas

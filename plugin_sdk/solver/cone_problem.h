@@ -1,0 +1,141 @@
+// Rows of joints and contacts of one island as one problem, solved to rounding.
+//
+//   y = q + (J M^-1 J^T + Gamma) lambda,     q = J x0 + start,   x = x0 + M^-1 J^T lambda
+//
+//   scalar rows (joint_laws.h):  equal, at least, at most, or between, with a largest |lambda|
+//   contacts:  0 <= lambda_N  _|_  y_N - e s >= 0,   |lambda_T| <= mu lambda_N against y_T,
+//              |tau_N| <= mu_sp lambda_N about the normal,  |tau_T| <= mu_r lambda_N across it
+//
+// All laws in one form: lambda = P(lambda - (y - target)/W_ii), P the projection to what each lambda may be, of friction
+// with the radius that the projected normal impulse gives (Alart and Curnier 1991). The residual of that equation, times
+// W_ii, is a velocity (in the pose problem a length); it is zero at solutions of Coulomb's law and only there, as that of
+// PROBLEMS' FCLIB measure.
+//
+// Method.
+//  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt, dependent rows
+//     left out, contradicting ones at their least-squares compromise. What the other rows then feel of each other is
+//     W' = W_OO - W_OE W_EE^-1 W_EO: a joint with its whole chain behind it is as good as a body.
+//  2. The others, dense:
+//     kNewton       semi-smooth Newton on the equation above. A row is held, free, or slides; with the states known the
+//                   equations are linear but for the direction of a slide, so that steps end at the solution itself once
+//                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-10 added to
+//                   the diagonal of the step's matrix, not of the equation: the answer is one of those that are right.
+//                   Steps that do not lower the residual are mended by sweeps of 3.
+//     kGaussSeidel  projected block Gauss-Seidel, each contact solved exactly (coulomb_contact.h).
+//  3. Static and dynamic friction: all stick within mu_s first; what slips then slides with mu_d.
+//
+// Scaled: every row by the root of its W_ii, a contact's three by one number, so that cones stay cones.
+// More than kDenseRows other rows: sweeps only, on W' as it is needed; the answer says if that did not do.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/joint_laws.h"
+#include "plugin_sdk/solver/profile_ldlt.h"
+
+namespace gravitas {
+
+struct ConeRow {
+  std::uint32_t body1 = 0, body2 = 0;
+  ConstraintDirection direction;
+  double start = 0.0;       // y - J x at lambda = 0
+  double length = 1.0;      // m per unit of y: an arm for rows about an axis
+  JointLaw law = {};        // scalar rows
+  double multiplier = 0.0;  // first guess, then the answer
+};
+
+// Rows first ... of a contact: normal, two tangents if it has friction, then normal and two tangents of turning if it rolls
+// or spins with friction.
+struct ConeContact {
+  std::uint32_t first = 0;
+  bool has_friction = false, has_turning = false;
+  double target = 0.0;
+  double static_friction = 0.0, dynamic_friction = 0.0;
+  double rolling_friction = 0.0, spinning_friction = 0.0;  // m
+
+  std::uint32_t count() const { return 1U + (has_friction ? 2U : 0U) + (has_turning ? 3U : 0U); }
+};
+
+enum class ConeMethod : std::uint8_t { kNewton, kGaussSeidel };
+
+struct ConeSettings {
+  ConeMethod method = ConeMethod::kNewton;
+  double tolerance = 1e-12;  // of the largest velocity (length) that meets in a row
+  std::uint32_t iterations = 100;
+};
+
+struct ConeSummary {
+  std::uint32_t iterations = 0;  // Newton steps or sweeps
+  double residual = 0.0;         // m/s, or m for poses
+  bool has_converged = true;
+  double contradiction = 0.0;  // of rows that hold always, m/s: what no motion can meet
+};
+
+class ConeProblem {
+ public:
+  static constexpr std::size_t kDenseRows = 900;
+
+  // Scalar rows first, then those of the contacts in turn.
+  std::vector<ConeRow> rows;
+  std::vector<ConeContact> contacts;
+
+  // Sets the multipliers. `smallest` is what counts as nothing in any case (m/s, m).
+  ConeSummary solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest, const ConeSettings& settings);
+
+  // x += M^-1 J^T lambda
+  void push(const SolverBodies& bodies, BodyMotion* x) const;
+
+ private:
+  // Rows that one law rules.
+  struct Block {
+    std::uint32_t first = 0;    // place among the other rows
+    std::int32_t contact = -1;  // of contacts; -1: one scalar row
+    std::uint32_t count = 1;
+    bool slides = false;
+  };
+
+  double coupling(const SolverBodies& bodies, std::uint32_t r, std::uint32_t s) const;
+  double value(const BodyMotion& x, std::uint32_t r) const;
+  void classify(const SolverBodies& bodies, const BodyMotion& x0);
+  void factorise(const SolverBodies& bodies);
+  void reduce(const SolverBodies& bodies);
+  bool is_solved_by_nothing(double smallest) const;
+  // Of a block with scaled multipliers and values: where the law puts them.
+  // With `load` the radius of friction is that under this normal impulse, not under the projected one.
+  void project(const Block& block, const double* lambda, const double* y, const double* load, double* projected) const;
+  double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y,
+                     const Eigen::VectorXd* loads = nullptr) const;
+  double largest_sum(const Eigen::VectorXd& lambda) const;
+  void linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, const Eigen::VectorXd* loads,
+                 Eigen::MatrixXd* matrix, Eigen::VectorXd* side) const;
+  bool newton_step(const Eigen::VectorXd* loads, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
+  bool tresca(double tolerance, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
+  void sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
+  void relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const;
+  bool let_slide(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double slip);
+  void into_cones(Eigen::VectorXd* lambda) const;
+  void solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary);
+  void solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings, double tolerance,
+                   ConeSummary* summary);
+  // Mends the held rows; returns by how much they were off (m/s, m).
+  double refine_held(const SolverBodies& bodies, const BodyMotion& x0);
+
+  std::vector<double> scale_;                // by row, root of W_ii; 0: pushes nothing
+  std::vector<std::uint32_t> held_, other_;  // rows
+  std::vector<Block> blocks_;
+  std::vector<double> free_;  // q by row
+  double motion_ = 0.0;       // largest sum of what meets in a row, m/s
+
+  ProfileLdlt factor_;
+  std::vector<std::vector<std::uint32_t>> held_of_body_;                // places among held_
+  std::vector<double> side_;                                            // (target - q)/scale of held rows
+  std::vector<std::vector<std::pair<std::uint32_t, double>>> to_held_;  // W_OE, scaled
+  Eigen::MatrixXd carried_;                                             // W_EE^-1 W_EO, scaled
+  Eigen::MatrixXd response_;                                            // W', scaled
+  Eigen::VectorXd start_others_;                                        // q', scaled
+  Eigen::VectorXd lambda_;                                              // of other rows, scaled
+};
+
+}  // namespace gravitas

@@ -1,0 +1,56 @@
+#include "plugin_sdk/solver/contact_law.h"
+
+#include <algorithm>
+
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/arrival.h"
+#include "plugin_sdk/solver/surface_perturbation.h"
+
+namespace gravitas {
+namespace {
+
+Matrix3 frame_of(const Vector3& normal) {
+  const auto [first, second] = orthonormal_basis(normal);
+  Matrix3 frame;
+  frame << normal, first, second;
+  return frame;
+}
+
+}  // namespace
+
+ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
+                       const SolverBody& two) {
+  const double* material = &request.contact_material()[kMaterialColumns * i];
+  ContactLaw law;
+  law.dynamic_friction = material[kDynamicFriction];
+  law.static_friction = std::max(law.dynamic_friction, material[kStaticFriction]);
+  law.rolling_friction = material[kRollingFriction];
+  law.spinning_friction = material[kSpinningFriction];
+
+  const Vector3 normal = vector_at(request.contact_normal(), i);
+  const Vector3 point = vector_at(request.contact_point(), i);
+  const auto through = ConstraintDirection::through(point, normal, one, two);
+  const double gap = gap_before(-request.contact_depth()[i], through, one, two);
+  const double start = through.along(one.start_velocity, two.start_velocity);
+  const double trial = through.along(one.trial_velocity, two.trial_velocity);
+  const double speed = arrival_speed(start, trial, gap, request.time_step());
+  const double restitution = material[kRestitution];
+  law.frame = frame_of(normal);
+  law.target = restitution * speed;
+
+  const double epsilon = material[kSurfacePerturbation];
+  if (!(speed > 0.0) || !(epsilon > 0.0)) return law;
+  const Vector3 tilted = perturbed_normal(normal, epsilon, request.contact_key()[i]);
+  const auto across = ConstraintDirection::through(point, tilted, one, two);
+  const double tilted_start = across.along(one.start_velocity, two.start_velocity);
+  const double tilted_trial = across.along(one.trial_velocity, two.trial_velocity);
+  const double tilted_speed = arrival_speed(tilted_start, tilted_trial, gap, request.time_step());
+  const bool keeps_signs = tilted_trial < 0.0 && (tilted_start < 0.0) == (start < 0.0);
+  if (!keeps_signs || !(tilted_speed > 0.0) || !(tilted.dot(normal) > 0.0)) return law;
+  law.frame = frame_of(tilted);
+  law.target = restitution * tilted_speed;
+  return law;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,648 @@
+// Rows of an island at the end of the step, and the loop that finds where it is.
+#include "plugin_sdk/solver/end_of_step.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <string>
+
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/contact_law.h"
+#include "plugin_sdk/solver/islands.h"
+#include "plugin_sdk/solver/request_check.h"
+
+namespace gravitas {
+namespace {
+
+constexpr double kRounding = std::numeric_limits<double>::epsilon();
+
+DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
+  return {r.point1(), r.point2(), r.velocity(),   r.correction(), r.axes(),         r.mode(),
+          r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
+}
+
+// A body where the pose change leaves it.
+struct EndBody {
+  Pose pose;
+  Matrix3 inverse_inertia;
+  Matrix3 stiffened;  // inverse of inertia and geometric stiffness, for a step of the pose change
+};
+
+// What is written: every island to the rows of its own bodies, discrepancies and contacts.
+struct EndOfStep {
+  BodyMotion velocity, displacement;
+  std::vector<double> joint_impulse, joint_correction;
+  std::vector<double> contact_impulse, contact_correction, contact_direction;
+};
+
+// A joint's discrepancy and its laws.
+struct EndJoint {
+  std::uint32_t row = 0, body1 = 0, body2 = 0;
+  Discrepancy discrepancy;
+  Matrix3 axes;
+  double slop = 0.0, length = 1.0;
+  std::array<JointAxisState, 3> states;
+  std::array<JointLaw, 3> pose_laws, velocity_laws;
+  // at the end of the step
+  std::array<ConstraintDirection, 3> directions;
+  Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
+  Vector3 errors;  // along the axes
+};
+
+struct EndContact {
+  std::uint32_t row = 0, body1 = 0, body2 = 0;
+  ConstraintDirection gap_row;
+  double gap = 0.0, gap_target = 0.0, slop = 0.0;
+  ContactLaw law;
+  Vector3 arm1, arm2;  // to the surface points
+  bool is_closed = false;
+  std::uint32_t lowered = 0;
+};
+
+bool is_held(AxisMode mode) {
+  return mode == AxisMode::kLocked || mode == AxisMode::kLimited || mode == AxisMode::kUnilateral;
+}
+
+bool holds_pose(const Discrepancy& d) {
+  return is_held(axis_mode(d.modes, 0)) || is_held(axis_mode(d.modes, 1)) || is_held(axis_mode(d.modes, 2));
+}
+
+ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2) {
+  ConstraintDirection d;
+  d.linear = axis;
+  d.angular1 = axis.cross(arm1);
+  d.angular2 = arm2.cross(axis);
+  return d;
+}
+
+ConstraintDirection turning_about(const Vector3& axis) {
+  ConstraintDirection d;
+  d.angular1 = -axis;
+  d.angular2 = axis;
+  return d;
+}
+
+// The row with what a unit of its multiplier turns the bodies by.
+ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2) {
+  d.turn1 = inverse1 * d.angular1;
+  d.turn2 = inverse2 * d.angular2;
+  return d;
+}
+
+// (I + K)^-1 of a body with inverse moments D in its principal axes R: R D^1/2 (1 + D^1/2 R^T K R D^1/2)^-1 D^1/2 R^T.
+// Directions in which K would take away more than half of the inertia count as half.
+Matrix3 stiffened_inverse(const Quaternion& orientation, const Vector3& inverse_moments, const Matrix3& stiffness) {
+  const Matrix3 rotation = to_rotation_matrix(orientation);
+  const Matrix3 root = rotation * inverse_moments.cwiseSqrt().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix3> modes(root.transpose() * stiffness * root);
+  if (modes.info() != Eigen::Success) return world_inverse_inertia(orientation, inverse_moments);
+  const Vector3 share = (1.0 + modes.eigenvalues().array().max(-0.5)).inverse();
+  const Matrix3 base = root * modes.eigenvectors();
+  return base * share.asDiagonal() * base.transpose();
+}
+
+class IslandSolver {
+ public:
+  IslandSolver(const stage::SolverSolveRequest& request, const SolverBodies& all, const Island& island,
+               const EndOfStepSettings& settings, EndOfStep* answer)
+      : request_(request), island_(island), settings_(settings), answer_(*answer) {
+    // its own bodies, and those that it is held by
+    rows_ = island.bodies;
+    for (const std::uint32_t row : island.discrepancies)
+      for (const std::size_t end : {0U, 1U}) rows_.push_back(all.row(request.discrepancy_body()[2 * row + end]));
+    for (const std::uint32_t row : island.contacts)
+      for (const std::size_t end : {0U, 1U}) rows_.push_back(request.contact_body()[2 * row + end]);
+    rows_.push_back(all.row(kNone));
+    std::sort(rows_.begin(), rows_.end());
+    rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
+    bodies_ = all.subset(rows_);
+  }
+
+  ConeSummary solve() {
+    load();
+    const double share = request_.theta() * request_.time_step();
+    for (int round = 0; round < kRounds; ++round) {
+      solve_pose();
+      find_closed();
+      solve_velocity();
+      has_settled_ = !(share > 0.0) || !set_offset(share);
+      if (has_settled_) break;
+    }
+    summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
+    store();
+    return summary_;
+  }
+
+ private:
+  static constexpr int kRounds = 12;
+  static constexpr int kPoseSteps = 30;
+
+  // ---- what does not change within the step
+
+  void load() {
+    velocity_ = start_motion(&SolverBody::trial_velocity);
+    displacement_ = offset_ = start_motion(nullptr);
+    end_.resize(bodies_.count() + 1);
+    for (std::uint32_t i = 0; i <= bodies_.count(); ++i)
+      end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
+    for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
+    const DiscrepancyColumns columns = columns_of(request_);
+    for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
+    for (const std::uint32_t row : island_.contacts) load_contact(row);
+  }
+
+  // Place of a row of the request (kNone: the world) among the island's bodies.
+  std::uint32_t place_of(std::uint32_t row) const {
+    if (row == kNone) return static_cast<std::uint32_t>(bodies_.count());
+    return static_cast<std::uint32_t>(std::lower_bound(rows_.begin(), rows_.end(), row) - rows_.begin());
+  }
+
+  BodyMotion start_motion(Twist SolverBody::*of) const {
+    BodyMotion motion(bodies_.count() + 1);
+    if (of != nullptr)
+      for (std::uint32_t i = 0; i < bodies_.count(); ++i) motion[i] = bodies_[i].*of;
+    return motion;
+  }
+
+  void load_joint(const DiscrepancyColumns& columns, std::uint32_t row) {
+    EndJoint& joint = joints_.emplace_back();
+    joint.row = row;
+    joint.body1 = place_of(request_.discrepancy_body()[2 * row]);
+    joint.body2 = place_of(request_.discrepancy_body()[2 * row + 1]);
+    joint.discrepancy = columns.at(row);
+    const Discrepancy& d = joint.discrepancy;
+    joint.axes = to_rotation_matrix(d.axes);
+    const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+    const Vector3 middle = 0.5 * (d.point1 + d.point2);
+    const Vector3 start_error = error_at(d, one.trial, two.trial, one.start, two.start);
+    joint.slop = d.is_angular() ? 1e-9 : closing_slop(middle, one, two);
+    joint.length = d.is_angular() ? std::max(one.gyration(), two.gyration()) : 1.0;
+    if (!d.is_angular()) coordinates_ = std::max(coordinates_, d.point2.cwiseAbs().maxCoeff());
+    for (int k = 0; k < 3; ++k) {
+      const auto place = static_cast<std::size_t>(k);
+      joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
+      if (d.is_radial() && k == 0) joint.states[0].error_at_start = start_error.norm();
+      joint.pose_laws[place] =
+          pose_law(joint.states[place], settings_.correction_factor * d.correction, request_.time_step());
+      const auto at = 3 * row + static_cast<std::uint32_t>(k);
+      answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at];
+      answer_.joint_impulse[at] = request_.discrepancy_warm_impulse()[at];
+    }
+  }
+
+  void load_contact(std::uint32_t row) {
+    EndContact& contact = contacts_.emplace_back();
+    contact.row = row;
+    contact.body1 = place_of(request_.contact_body()[2 * row]);
+    contact.body2 = place_of(request_.contact_body()[2 * row + 1]);
+    const SolverBody &one = bodies_[contact.body1], &two = bodies_[contact.body2];
+    const Vector3 normal = vector_at(request_.contact_normal(), row);
+    const Vector3 point = vector_at(request_.contact_point(), row);
+    contact.gap_row = ConstraintDirection::through(point, normal, one, two);
+    contact.gap = -request_.contact_depth()[row];
+    const Vector3 to_surface = (-0.5 * contact.gap) * normal;
+    const double gap_at_start = normal.dot(carried(point - to_surface, two.trial, two.start) -
+                                           carried(point + to_surface, one.trial, one.start));
+    contact.gap_target = std::min(0.0, (1.0 - settings_.correction_factor) * gap_at_start) - contact.gap;
+    contact.slop = closing_slop(point, one, two);
+    contact.law = contact_law(request_, row, one, two);
+    contact.arm1 = point + to_surface - one.trial.position;
+    contact.arm2 = point - to_surface - two.trial.position;
+    coordinates_ = std::max(coordinates_, point.cwiseAbs().maxCoeff());
+    answer_.contact_correction[row] = std::max(0.0, request_.contact_warm_correction()[row]);
+    set_vector(answer_.contact_impulse, row, vector_at(request_.contact_warm_impulse(), row));
+    set_vector(answer_.contact_direction, row, normal);
+  }
+
+  // ---- the end of the step
+
+  // Bodies, rows and errors at S* (+) displacement_.
+  void move_to_end() {
+    for (const std::uint32_t i : pushed_) {
+      const Twist& d = displacement_[i];
+      end_[i].pose = displaced(bodies_[i].trial, d.linear, d.angular);
+      end_[i].inverse_inertia =
+          d.angular.isZero(0.0)
+              ? bodies_[i].inverse_inertia
+              : world_inverse_inertia(end_[i].pose.orientation, vector_at(request_.inverse_inertia(), rows_[i]));
+    }
+    for (EndJoint& joint : joints_) move_to_end(&joint);
+  }
+
+  // What a turn of a body adds to the moments that the corrections mu exert on it: the arm r of a push p turns along, so
+  // K = (p.r) 1 - (p r^T + r p^T)/2. Under tension this holds a light link between heavy ones more than its inertia does,
+  // and without it steps that take the directions anew each time run away (T h^2/(m l) > 1).
+  void stiffen() {
+    std::vector<Matrix3> stiffness(bodies_.count() + 1, Matrix3::Zero());
+    for (const EndJoint& joint : joints_) {
+      if (joint.discrepancy.is_angular()) continue;
+      Vector3 push = Vector3::Zero();
+      for (std::size_t k = 0; k < 3; ++k)
+        push += answer_.joint_correction[3 * joint.row + k] * joint.directions[k].linear;
+      const auto add = [&](std::uint32_t body, const Vector3& arm, const Vector3& p) {
+        const Matrix3 product = p * arm.transpose();
+        stiffness[body] += p.dot(arm) * Matrix3::Identity() - 0.5 * (product + product.transpose());
+      };
+      add(joint.body1, joint.arm1, -push);
+      add(joint.body2, joint.arm2, push);
+    }
+    for (const std::uint32_t i : pushed_) {
+      end_[i].stiffened = stiffness[i].isZero(0.0)
+                              ? end_[i].inverse_inertia
+                              : stiffened_inverse(end_[i].pose.orientation,
+                                                  vector_at(request_.inverse_inertia(), rows_[i]), stiffness[i]);
+    }
+  }
+
+  // Newton's step for delta = offset + M^-1 J^T mu with the stiffness: x0 = delta_k + (M + K)^-1 M (offset - delta_k).
+  BodyMotion start_of_step() const {
+    BodyMotion x0 = offset_;
+    for (const std::uint32_t i : pushed_) {
+      const Vector3 missing = offset_[i].angular - displacement_[i].angular;
+      if (missing.isZero(0.0) || end_[i].stiffened == end_[i].inverse_inertia) continue;
+      Vector3 moments = vector_at(request_.inverse_inertia(), rows_[i]);
+      for (double& moment : moments) moment = moment > 0.0 ? 1.0 / moment : 0.0;
+      x0[i].angular =
+          displacement_[i].angular + end_[i].stiffened * (world_inertia(end_[i].pose.orientation, moments) * missing);
+    }
+    return x0;
+  }
+
+  void move_to_end(EndJoint* joint) const {
+    const Discrepancy& d = joint->discrepancy;
+    const SolverBody &one = bodies_[joint->body1], &two = bodies_[joint->body2];
+    const EndBody &end1 = end_[joint->body1], &end2 = end_[joint->body2];
+    if (d.is_angular()) {
+      const Vector3 error =
+          d.point2 - d.point1 + displacement_[joint->body2].angular - displacement_[joint->body1].angular;
+      for (int k = 0; k < 3; ++k) {
+        joint->directions[static_cast<std::size_t>(k)] = turning_about(joint->axes.col(k));
+        joint->errors[k] = joint->axes.col(k).dot(error);
+      }
+      return;
+    }
+    const Vector3 point1 = carried(d.point1, one.trial, end1.pose);
+    const Vector3 point2 = carried(d.point2, two.trial, end2.pose);
+    const Vector3 error = point2 - point1;
+    const double length = error.norm();
+    const bool is_turned = !displacement_[joint->body1].angular.isZero(0.0);
+    const Quaternion turn = exp_rotation(displacement_[joint->body1].angular);
+    // axes fixed in body 1 push where body 2's point is, midway along what is held; a drive where it is in body 1
+    Vector3 at = holds_pose(d) ? point2 : point1;
+    std::array<Vector3, 3> axes;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3 axis = joint->axes.col(static_cast<Eigen::Index>(k));
+      const bool is_radial = d.is_radial() && k == 0 && length > 0.0;
+      axes[k] = is_radial ? Vector3(error / length) : is_turned ? turn * axis : axis;
+      joint->errors[static_cast<Eigen::Index>(k)] = is_radial ? length : axes[k].dot(error);
+      if (is_held(axis_mode(d.modes, static_cast<int>(k))))
+        at -= 0.5 * joint->errors[static_cast<Eigen::Index>(k)] * axes[k];
+    }
+    joint->arm1 = at - end1.pose.position, joint->arm2 = at - end2.pose.position;
+    for (std::size_t k = 0; k < 3; ++k) joint->directions[k] = direction_at(axes[k], joint->arm1, joint->arm2);
+  }
+
+  // ---- pose change
+
+  void solve_pose() {
+    double last = std::numeric_limits<double>::infinity();
+    for (int step = 0; step < kPoseSteps; ++step) {
+      move_to_end();
+      stiffen();
+      build_pose();
+      const double representable = 0.25 * kRounding * coordinates_;
+      const BodyMotion x0 = start_of_step();
+      const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_.cone);
+      note(solved);
+      has_pose_ = solved.has_converged;
+      BodyMotion next = x0;
+      cone_.push(bodies_, &next);
+      const double change = largest_change(next, displacement_), size = largest(next);
+      displacement_ = std::move(next);
+      keep_corrections();
+      // Newton's steps shrink until rounding stops them
+      if (change <= std::max(4.0 * representable, 1e-14 * size) || joints_.empty()) break;
+      if (step > 3 && !(change < 0.9 * last) && change <= 1e-9 * size) break;
+      last = change;
+    }
+    move_to_end();
+  }
+
+  void build_pose() {
+    cone_.rows.clear();
+    cone_.contacts.clear();
+    for (const EndJoint& joint : joints_) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (!joint.pose_laws[k].is_active()) continue;
+        ConeRow& row = cone_.rows.emplace_back();
+        row.body1 = joint.body1, row.body2 = joint.body2;
+        row.direction = with_turns(joint.directions[k], end_[joint.body1].stiffened, end_[joint.body2].stiffened);
+        row.length = joint.length;
+        row.law = joint.pose_laws[k];
+        row.multiplier = answer_.joint_correction[3 * joint.row + k];
+        // e(delta_k) - e* + J (x - delta_k)
+        row.start = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial -
+                    row.direction.along(displacement_[joint.body1], displacement_[joint.body2]);
+      }
+    }
+    for (const EndContact& contact : contacts_) {
+      ConeRow& row = cone_.rows.emplace_back();
+      row.body1 = contact.body1, row.body2 = contact.body2;
+      row.direction = with_turns(contact.gap_row, end_[contact.body1].stiffened, end_[contact.body2].stiffened);
+      row.law.has_lower = true;
+      row.law.lower_target = contact.gap_target;
+      row.multiplier = answer_.contact_correction[contact.row];
+    }
+  }
+
+  void keep_corrections() {
+    std::size_t next = 0;
+    for (const EndJoint& joint : joints_)
+      for (std::size_t k = 0; k < 3; ++k)
+        answer_.joint_correction[3 * joint.row + k] =
+            joint.pose_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
+    for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = cone_.rows[next++].multiplier;
+  }
+
+  // Contacts and limits that the end of the step closes, beside those that were.
+  void find_closed() {
+    for (EndContact& contact : contacts_) {
+      const double gap =
+          contact.gap + contact.gap_row.along(displacement_[contact.body1], displacement_[contact.body2]);
+      contact.is_closed = contact.is_closed || gap <= contact.slop;
+    }
+    for (EndJoint& joint : joints_) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const JointLaw known = joint.velocity_laws[k];
+        JointLaw& law = joint.velocity_laws[k];
+        law =
+            velocity_law(joint.states[k], joint.errors[static_cast<Eigen::Index>(k)], joint.slop, request_.time_step());
+        law.has_lower = law.has_lower || known.has_lower;
+        law.has_upper = law.has_upper || known.has_upper;
+      }
+    }
+  }
+
+  // ---- velocity
+
+  void solve_velocity() {
+    for (int round = 0;; ++round) {
+      build_velocity();
+      const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
+      const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_.cone);
+      note(solved);
+      has_velocity_ = solved.has_converged;
+      summary_.residual = solved.residual;
+      velocity_ = trial;
+      cone_.push(bodies_, &velocity_);
+      keep_impulses();
+      if (!lower_restitution(trial, round)) return;
+    }
+  }
+
+  void build_velocity() {
+    cone_.rows.clear();
+    cone_.contacts.clear();
+    for (const EndJoint& joint : joints_) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (!joint.velocity_laws[k].is_active()) continue;
+        ConeRow& row = cone_.rows.emplace_back();
+        row.body1 = joint.body1, row.body2 = joint.body2;
+        row.direction =
+            with_turns(joint.directions[k], end_[joint.body1].inverse_inertia, end_[joint.body2].inverse_inertia);
+        row.length = joint.length;
+        row.law = joint.velocity_laws[k];
+        row.multiplier = answer_.joint_impulse[3 * joint.row + k];
+      }
+    }
+    for (const EndContact& contact : contacts_)
+      if (contact.is_closed) build_velocity(contact);
+  }
+
+  void build_velocity(const EndContact& contact) {
+    const Matrix3 &inverse1 = end_[contact.body1].inverse_inertia, &inverse2 = end_[contact.body2].inverse_inertia;
+    const ContactLaw& law = contact.law;
+    ConeContact& cone = cone_.contacts.emplace_back();
+    cone.first = static_cast<std::uint32_t>(cone_.rows.size());
+    cone.has_friction = law.static_friction > 0.0;
+    cone.has_turning =
+        (law.rolling_friction > 0.0 || law.spinning_friction > 0.0) && !(inverse1 + inverse2).isZero(0.0);
+    cone.target = law.target;
+    cone.static_friction = law.static_friction, cone.dynamic_friction = law.dynamic_friction;
+    cone.rolling_friction = law.rolling_friction, cone.spinning_friction = law.spinning_friction;
+    const Vector3 impulse = law.frame.transpose() * vector_at(answer_.contact_impulse, contact.row);
+    const auto add = [&](const ConstraintDirection& direction, double length, double multiplier) {
+      ConeRow& row = cone_.rows.emplace_back();
+      row.body1 = contact.body1, row.body2 = contact.body2;
+      row.direction = direction;
+      row.length = length;
+      row.multiplier = multiplier;
+    };
+    for (int k = 0; k < (cone.has_friction ? 3 : 1); ++k)
+      add(with_turns(direction_at(law.frame.col(k), contact.arm1, contact.arm2), inverse1, inverse2), 1.0, impulse[k]);
+    const double length = std::max(bodies_[contact.body1].gyration(), bodies_[contact.body2].gyration());
+    for (int k = 0; k < (cone.has_turning ? 3 : 0); ++k)
+      add(with_turns(turning_about(law.frame.col(k)), inverse1, inverse2), length, 0.0);
+  }
+
+  void keep_impulses() {
+    std::size_t next = 0;
+    for (const EndJoint& joint : joints_)
+      for (std::size_t k = 0; k < 3; ++k)
+        answer_.joint_impulse[3 * joint.row + k] =
+            joint.velocity_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
+    std::size_t cone = 0;
+    for (const EndContact& contact : contacts_) {
+      Vector3 impulse = Vector3::Zero();
+      if (contact.is_closed) {
+        const ConeContact& rows = cone_.contacts[cone++];
+        for (std::uint32_t k = 0; k < (rows.has_friction ? 3U : 1U); ++k)
+          impulse += cone_.rows[rows.first + k].multiplier * contact.law.frame.col(static_cast<int>(k));
+        set_vector(answer_.contact_direction, contact.row, contact.law.frame.col(0));
+      }
+      set_vector(answer_.contact_impulse, contact.row, impulse);
+    }
+  }
+
+  // ---- energy
+
+  // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy. Lowers e s where it is positive;
+  // true if anything was, and the velocities are to be found anew.
+  bool lower_restitution(const BodyMotion& before, int round) {
+    constexpr int kRoundsOfLowering = 4;
+    const bool arrives = std::any_of(contacts_.begin(), contacts_.end(),
+                                     [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; });
+    if (!arrives || round >= kRoundsOfLowering) return false;
+    const auto work_of = [&](std::size_t r, double* size) {
+      const ConeRow& row = cone_.rows[r];
+      const double start = row.direction.along(before[row.body1], before[row.body2]);
+      const double end = row.direction.along(velocity_[row.body1], velocity_[row.body2]);
+      *size += 0.5 * std::fabs(row.multiplier) * (std::fabs(start) + std::fabs(end));
+      return 0.5 * row.multiplier * (start + end);
+    };
+    double work = 0.0, size = 0.0;
+    const std::size_t scalars = cone_.contacts.front().first;
+    for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
+      // a drive's or spring's work is real
+      if (r < scalars && (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0)) continue;
+      work += work_of(r, &size);
+    }
+    if (!(work > 1e-13 * size)) return false;
+    bool any = false;
+    std::size_t cone = 0;
+    for (EndContact& contact : contacts_) {
+      if (!contact.is_closed) continue;
+      const ConeContact& rows = cone_.contacts[cone++];
+      double own = 0.0, own_size = 0.0;
+      for (std::uint32_t k = 0; k < rows.count(); ++k) own += work_of(rows.first + k, &own_size);
+      if (!(contact.law.target > 0.0) || !(own > 1e-10 * own_size)) continue;
+      contact.law.target = ++contact.lowered < 3 ? 0.5 * contact.law.target : 0.0;
+      any = true;
+    }
+    // no one contact is to blame, or lowering was not enough
+    if (!any || round + 1 == kRoundsOfLowering)
+      for (EndContact& contact : contacts_) contact.law.target = 0.0;
+    return true;
+  }
+
+  // ---- rows on velocity alone
+
+  // offset_ from the present impulses; false if it stays the same to rounding.
+  bool set_offset(double share) {
+    BodyMotion next = start_motion(nullptr);
+    const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
+    const auto push = [&](const ConeRow& row) {
+      if (row.multiplier == 0.0) return;
+      row.direction.push(share * row.multiplier, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
+                         next[row.body1], next[row.body2]);
+    };
+    for (std::size_t r = 0; r < scalars; ++r)
+      if (cone_.rows[r].law.is_velocity_only) push(cone_.rows[r]);
+    for (const ConeContact& contact : cone_.contacts)
+      for (std::uint32_t k = 1; k < contact.count(); ++k) push(cone_.rows[contact.first + k]);
+    const double change = largest_change(next, offset_);
+    const double size = std::max(largest(next), largest(displacement_));
+    offset_ = std::move(next);
+    return change > std::max(0.25 * kRounding * coordinates_, 1e-14 * size);
+  }
+
+  // ---- sizes, m
+
+  double largest_change(const BodyMotion& a, const BodyMotion& b) const {
+    double most = 0.0;
+    for (const std::uint32_t i : pushed_)
+      most = std::max(
+          most, (a[i].linear - b[i].linear).norm() + bodies_[i].gyration() * (a[i].angular - b[i].angular).norm());
+    return most;
+  }
+  double largest(const BodyMotion& a) const {
+    double most = 0.0;
+    for (const std::uint32_t i : pushed_)
+      most = std::max(most, a[i].linear.norm() + bodies_[i].gyration() * a[i].angular.norm());
+    return most;
+  }
+
+  void note(const ConeSummary& solved) {
+    summary_.iterations += solved.iterations;
+    summary_.contradiction = std::max(summary_.contradiction, solved.contradiction);
+  }
+
+  void store() {
+    for (const std::uint32_t i : pushed_) {
+      answer_.velocity[rows_[i]] = velocity_[i];
+      answer_.displacement[rows_[i]] = displacement_[i];
+    }
+  }
+
+  const stage::SolverSolveRequest& request_;
+  const Island& island_;
+  const EndOfStepSettings& settings_;
+  EndOfStep& answer_;
+
+  SolverBodies bodies_;                // the island's
+  std::vector<std::uint32_t> rows_;    // of the request, of each; rising, the world last
+  std::vector<std::uint32_t> pushed_;  // places of those that can be pushed
+  std::vector<EndJoint> joints_;
+  std::vector<EndContact> contacts_;
+  std::vector<EndBody> end_;
+  double coordinates_ = 0.0;
+  BodyMotion velocity_, displacement_, offset_;
+  ConeProblem cone_;
+  ConeSummary summary_;
+  bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
+};
+
+void write(const EndOfStep& answer, const ConeSummary& summary, bool has_rows, const stage::SolverSolveReply& reply) {
+  const std::size_t count = answer.velocity.size() - 1;
+  const std::span<double> linear = reply.linear_velocity().resize(3 * count);
+  const std::span<double> angular = reply.angular_velocity().resize(3 * count);
+  const std::span<double> change = reply.pose_change().resize(6 * count);
+  const bool has_room = linear.size() + angular.size() + change.size() == 12 * count;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Twist &v = answer.velocity[i], &d = answer.displacement[i];
+    if (!std::isfinite(v.linear.sum() + v.angular.sum() + d.linear.sum() + d.angular.sum()))
+      throw Refusal("the answer for body " + std::to_string(i) +
+                    " is not finite: masses, velocities or errors overflow");
+    if (!has_room) continue;
+    set_vector(linear, i, v.linear);
+    set_vector(angular, i, v.angular);
+    set_vector(change, 2 * i, d.linear);
+    set_vector(change, 2 * i + 1, d.angular);
+  }
+  const auto put = [](const stage::ReplyColumn<double>& column, const std::vector<double>& values) {
+    for (const double value : values)
+      if (!std::isfinite(value)) throw Refusal("a multiplier is not finite: masses, velocities or errors overflow");
+    const std::span<double> room = column.resize(values.size());
+    if (!room.empty()) std::copy(values.begin(), values.end(), room.begin());
+  };
+  put(reply.discrepancy_impulse(), answer.joint_impulse);
+  put(reply.discrepancy_correction(), answer.joint_correction);
+  put(reply.contact_impulse(), answer.contact_impulse);
+  put(reply.contact_correction(), answer.contact_correction);
+  put(reply.contact_direction(), answer.contact_direction);
+  StopReason reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
+  if (summary.contradiction > 0.0) reason = StopReason::kContradiction;
+  if (!summary.has_converged) reason = StopReason::kIterations;
+  reply.iterations().set(summary.iterations);
+  reply.residual().set(std::isfinite(summary.residual) ? summary.residual : kUnlimited);
+  reply.stop_reason().set(static_cast<std::uint32_t>(reason));
+}
+
+}  // namespace
+
+void solve_end_of_step(const stage::SolverSolveRequest& request, const EndOfStepSettings& settings,
+                       const stage::SolverSolveReply& reply, Host& host) {
+  check_solver_request(request);
+  SolverBodies bodies;
+  bodies.load(request);
+  EndOfStep answer;
+  answer.velocity.resize(bodies.count() + 1);
+  answer.displacement.resize(bodies.count() + 1);
+  for (std::uint32_t i = 0; i < bodies.count(); ++i) answer.velocity[i] = bodies[i].trial_velocity;
+  answer.joint_impulse.assign(3 * request.mode().size(), 0.0);
+  answer.joint_correction.assign(3 * request.mode().size(), 0.0);
+  answer.contact_impulse.assign(3 * request.contact_key().size(), 0.0);
+  answer.contact_correction.assign(request.contact_key().size(), 0.0);
+  answer.contact_direction.assign(request.contact_normal().begin(), request.contact_normal().end());
+
+  const std::vector<Island> islands = find_islands(request, bodies);
+  std::vector<ConeSummary> summaries(islands.size());
+  host.parallel_for(islands.size(), [&](std::uint64_t begin, std::uint64_t end) {
+    for (std::uint64_t i = begin; i < end; ++i)
+      summaries[i] = IslandSolver(request, bodies, islands[i], settings, &answer).solve();
+  });
+  ConeSummary all;
+  for (const ConeSummary& one : summaries) {
+    all.iterations += one.iterations;
+    all.residual = std::max(all.residual, one.residual);
+    all.has_converged = all.has_converged && one.has_converged;
+    all.contradiction = std::max(all.contradiction, one.contradiction);
+  }
+  write(answer, all, !islands.empty(), reply);
+}
+
+}  // namespace gravitas

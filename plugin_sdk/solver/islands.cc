@@ -1,0 +1,68 @@
+#include "plugin_sdk/solver/islands.h"
+
+#include <algorithm>
+#include <numeric>
+#include <span>
+
+namespace gravitas {
+namespace {
+
+class Union {
+ public:
+  explicit Union(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
+  std::uint32_t root(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(std::uint32_t a, std::uint32_t b) {
+    a = root(a), b = root(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+}  // namespace
+
+std::vector<Island> find_islands(const stage::SolverSolveRequest& request, const SolverBodies& bodies) {
+  const std::size_t count = bodies.count();
+  Union joined(count + 1);
+  std::vector<std::uint8_t> is_held(count + 1, 0);
+  const auto connect = [&](std::span<const std::uint32_t> pairs) {
+    for (std::size_t i = 0; i < pairs.size(); i += 2) {
+      const std::uint32_t one = bodies.row(pairs[i]), two = bodies.row(pairs[i + 1]);
+      const bool first = bodies[one].is_pushed(), second = bodies[two].is_pushed();
+      if (first) is_held[one] = 1;
+      if (second) is_held[two] = 1;
+      if (first && second) joined.join(one, two);
+    }
+  };
+  connect(request.discrepancy_body());
+  connect(request.contact_body());
+
+  std::vector<Island> islands;
+  std::vector<std::uint32_t> island_of(count + 1, 0);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (is_held[i] == 0) continue;
+    const std::uint32_t root = joined.root(i);
+    if (root == i) {
+      island_of[i] = static_cast<std::uint32_t>(islands.size());
+      islands.emplace_back();
+    }
+    islands[island_of[root]].bodies.push_back(i);
+  }
+  const auto distribute = [&](std::span<const std::uint32_t> pairs, std::vector<std::uint32_t> Island::*rows) {
+    for (std::size_t i = 0; i < pairs.size(); i += 2) {
+      const std::uint32_t one = bodies.row(pairs[i]), two = bodies.row(pairs[i + 1]);
+      if (!bodies[one].is_pushed() && !bodies[two].is_pushed()) continue;
+      const std::uint32_t root = joined.root(bodies[one].is_pushed() ? one : two);
+      (islands[island_of[root]].*rows).push_back(static_cast<std::uint32_t>(i / 2));
+    }
+  };
+  distribute(request.discrepancy_body(), &Island::discrepancies);
+  distribute(request.contact_body(), &Island::contacts);
+  return islands;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,127 @@
+// The table of joint_laws.h, line by line.
+#include "plugin_sdk/solver/joint_laws.h"
+
+#include <algorithm>
+
+namespace gravitas {
+namespace {
+
+bool is_limit(AxisMode mode) { return mode == AxisMode::kLimited || mode == AxisMode::kUnilateral; }
+
+double lower_of(const JointAxisState& a) { return a.mode == AxisMode::kLimited ? a.lower : 0.0; }
+
+bool has_lower_side(const JointAxisState& a) {
+  return a.mode == AxisMode::kUnilateral || (a.mode == AxisMode::kLimited && a.lower > -kUnlimited);
+}
+
+bool has_upper_side(const JointAxisState& a) { return a.mode == AxisMode::kLimited && a.upper < kUnlimited; }
+
+// A limit whose sides meet holds like a lock.
+bool is_held(const JointAxisState& a) {
+  return a.mode == AxisMode::kLocked || (a.mode == AxisMode::kLimited && a.lower == a.upper);
+}
+
+double rest_error(const JointAxisState& a) { return a.mode == AxisMode::kLocked ? 0.0 : a.lower; }
+
+double force_bound(double maximum_force, double factor) {
+  if (maximum_force >= kUnlimited) return std::numeric_limits<double>::infinity();
+  return maximum_force * factor;
+}
+
+bool is_soft(const JointAxisState& a) {
+  return a.compliance > 0.0 && (a.mode == AxisMode::kLocked || is_limit(a.mode));
+}
+
+void set_equality(JointLaw& law, double target) {
+  law.has_lower = law.has_upper = true;
+  law.lower_target = law.upper_target = target;
+}
+
+JointLaw soft_law(const JointAxisState& a, double h) {
+  JointLaw law;
+  const double softness = a.compliance * a.damping + h;
+  law.gamma = a.compliance / (h * softness);
+  law.is_velocity_only = true;
+  if (is_held(a)) {
+    set_equality(law, a.desired_velocity - (a.error_at_start - rest_error(a)) / softness);
+    return law;
+  }
+  if (has_lower_side(a) && std::min(a.error_at_start, a.error_at_trial) < lower_of(a)) {
+    law.has_lower = true;
+    law.lower_target = a.desired_velocity - (a.error_at_start - lower_of(a)) / softness;
+  }
+  if (has_upper_side(a) && std::max(a.error_at_start, a.error_at_trial) > a.upper) {
+    law.has_upper = true;
+    law.upper_target = a.desired_velocity - (a.error_at_start - a.upper) / softness;
+  }
+  return law;
+}
+
+}  // namespace
+
+JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
+                                const Vector3& start_error) {
+  JointAxisState a;
+  a.mode = axis_mode(discrepancy.modes, axis);
+  a.lower = discrepancy.lower[axis];
+  a.upper = discrepancy.upper[axis];
+  a.compliance = discrepancy.compliance[axis];
+  a.damping = discrepancy.damping[axis];
+  a.maximum_force = discrepancy.maximum_force[axis];
+  a.desired_velocity = direction.dot(discrepancy.velocity);
+  a.error_at_start = direction.dot(start_error);
+  a.error_at_trial = direction.dot(discrepancy.point2 - discrepancy.point1);
+  return a;
+}
+
+JointLaw pose_law(const JointAxisState& a, double beta, double h) {
+  JointLaw law;
+  if (is_soft(a)) return law;
+  law.bound = force_bound(a.maximum_force, h * h);
+  if (is_held(a)) {
+    const double rest = rest_error(a);
+    set_equality(law, rest + (1.0 - beta) * (a.error_at_start - rest) - a.error_at_trial);
+    return law;
+  }
+  if (!is_limit(a.mode)) return law;
+  if (has_lower_side(a)) {
+    const double lower = lower_of(a);
+    law.has_lower = true;
+    law.lower_target = lower + std::min(0.0, (1.0 - beta) * (a.error_at_start - lower)) - a.error_at_trial;
+  }
+  if (has_upper_side(a)) {
+    law.has_upper = true;
+    law.upper_target = a.upper + std::max(0.0, (1.0 - beta) * (a.error_at_start - a.upper)) - a.error_at_trial;
+  }
+  return law;
+}
+
+JointLaw velocity_law(const JointAxisState& a, double error_after, double slop, double h) {
+  JointLaw law = is_soft(a) ? soft_law(a, h) : JointLaw{};
+  law.bound = force_bound(a.maximum_force, h);
+  if (is_soft(a)) return law;
+  if (a.mode == AxisMode::kDriven || a.mode == AxisMode::kFriction) {
+    set_equality(law, a.desired_velocity);
+    law.is_velocity_only = true;
+    if (a.damping > 0.0) law.gamma = 1.0 / (h * a.damping);
+  }
+  if (is_held(a)) set_equality(law, a.desired_velocity);
+  if (!is_limit(a.mode) || is_held(a)) return law;
+  law.has_lower = has_lower_side(a) && error_after <= lower_of(a) + slop;
+  law.has_upper = has_upper_side(a) && error_after >= a.upper - slop;
+  law.lower_target = law.upper_target = a.desired_velocity;
+  return law;
+}
+
+double relaxed_multiplier(const JointLaw& law, double multiplier, double value, double response) {
+  const double to_lower = multiplier + (law.lower_target - value) / response;
+  const double to_upper = multiplier + (law.upper_target - value) / response;
+  double relaxed = 0.0;
+  if (law.has_lower && to_lower > 0.0)
+    relaxed = to_lower;
+  else if (law.has_upper && to_upper < 0.0)
+    relaxed = to_upper;
+  return std::clamp(relaxed, -law.bound, law.bound);
+}
+
+}  // namespace gravitas

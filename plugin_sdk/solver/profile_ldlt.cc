@@ -1,0 +1,108 @@
+#include "plugin_sdk/solver/profile_ldlt.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gravitas {
+namespace {
+
+constexpr double kDependent = 1e-12;
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+}  // namespace
+
+void ProfileLdlt::start(const std::vector<std::size_t>& first) {
+  first_ = first;
+  begin_.assign(first.size() + 1, 0);
+  for (std::size_t i = 0; i < first.size(); ++i) begin_[i + 1] = begin_[i] + (i - first[i] + 1);
+  values_.assign(begin_.back(), 0.0);
+  pivot_.assign(first.size(), 0.0);
+  dropped_.clear();
+  null_.clear();
+}
+
+void ProfileLdlt::factorise() {
+  for (std::size_t i = 0; i < size(); ++i) {
+    double* row = &values_[begin_[i]];
+    const std::size_t from = first_[i];
+    const double diagonal = row[i - from];
+    double pivot = diagonal;
+    // row[j] holds l_ij d_j until it is divided
+    for (std::size_t j = from; j < i; ++j) {
+      const double* other = &values_[begin_[j]];
+      double sum = row[j - from];
+      for (std::size_t k = std::max(from, first_[j]); k < j; ++k) sum -= row[k - from] * other[k - first_[j]];
+      row[j - from] = pivot_[j] > 0.0 ? sum : 0.0;
+    }
+    for (std::size_t j = from; j < i; ++j) {
+      if (!(pivot_[j] > 0.0)) continue;
+      const double scaled = row[j - from];
+      row[j - from] = scaled / pivot_[j];
+      pivot -= scaled * row[j - from];
+    }
+    if (pivot > kDependent * diagonal) {
+      pivot_[i] = pivot;
+    } else {
+      dropped_.push_back(i);
+    }
+  }
+  for (const std::size_t row : dropped_) {
+    // A z = 0: z is 1 at the row and minus its combination of the rows before
+    std::vector<double> z(size(), 0.0);
+    for (std::size_t j = first_[row]; j < row; ++j)
+      if (pivot_[j] > 0.0) z[j] = -values_[begin_[row] + j - first_[row]];
+    solve_transposed(&z);
+    z[row] = 1.0;
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      for (const std::vector<double>& other : null_) {
+        const double share = dot(other, z);
+        for (std::size_t i = 0; i < z.size(); ++i) z[i] -= share * other[i];
+      }
+    }
+    const double length = std::sqrt(dot(z, z));
+    for (double& number : z) number /= length;
+    null_.push_back(std::move(z));
+  }
+}
+
+void ProfileLdlt::solve_transposed(std::vector<double>* x) const {
+  for (std::size_t i = size(); i-- > 0;) {
+    if (!(pivot_[i] > 0.0)) continue;
+    const double known = (*x)[i];
+    if (known == 0.0) continue;
+    for (std::size_t j = first_[i]; j < i; ++j) (*x)[j] -= values_[begin_[i] + j - first_[i]] * known;
+  }
+}
+
+void ProfileLdlt::solve(std::vector<double>* b) const {
+  std::vector<double>& x = *b;
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (!(pivot_[i] > 0.0)) {
+      x[i] = 0.0;
+      continue;
+    }
+    for (std::size_t j = first_[i]; j < i; ++j)
+      if (pivot_[j] > 0.0) x[i] -= values_[begin_[i] + j - first_[i]] * x[j];
+  }
+  for (std::size_t i = 0; i < size(); ++i)
+    if (pivot_[i] > 0.0) x[i] /= pivot_[i];
+  solve_transposed(b);
+  for (const std::size_t row : dropped_) x[row] = 0.0;
+}
+
+double ProfileLdlt::make_consistent(std::vector<double>* b) const {
+  double square = 0.0;
+  for (const std::vector<double>& z : null_) {
+    const double share = dot(z, *b);
+    square += share * share;
+    for (std::size_t i = 0; i < z.size(); ++i) (*b)[i] -= share * z[i];
+  }
+  return std::sqrt(square);
+}
+
+}  // namespace gravitas

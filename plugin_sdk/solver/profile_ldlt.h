@@ -1,0 +1,42 @@
+// A symmetric positive semidefinite matrix, factorised as L D L^T within its profile, that bears dependent rows.
+//
+// Row i of L reaches from its first entry to the diagonal; nothing outside is stored or computed, so a chain of joints in
+// order costs what a band costs. A row whose pivot falls below 1e-12 of its diagonal is a combination of rows before it to
+// rounding and is left out: its unknown is 0. What it would have added is the same, if the right-hand side agrees; if not,
+// the side is first projected to the nearest one (least squares) that does.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "plugin_sdk/math/types.h"
+
+namespace gravitas {
+
+class ProfileLdlt {
+ public:
+  // Starts a matrix of zeros; first[i] <= i is the first column of row i that may have an entry.
+  void start(const std::vector<std::size_t>& first);
+  // Entry of the lower triangle, within the profile.
+  double& entry(std::size_t row, std::size_t column) { return values_[begin_[row] + column - first_[row]]; }
+
+  void factorise();
+
+  std::size_t size() const { return first_.size(); }
+  std::size_t dropped() const { return dropped_.size(); }
+  // x with A x = b; entries of dropped rows are 0 and not looked at.
+  void solve(std::vector<double>* b) const;
+  // The side nearest to b that A x can be. Returns the distance.
+  double make_consistent(std::vector<double>* b) const;
+
+ private:
+  // L^-T applied in place.
+  void solve_transposed(std::vector<double>* x) const;
+
+  std::vector<std::size_t> first_, begin_;
+  std::vector<double> values_, pivot_;  // 0: dropped
+  std::vector<std::size_t> dropped_;
+  std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range
+};
+
+}  // namespace gravitas

@@ -1,0 +1,230 @@
+#include "services/capsule/replay.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "services/capsule/capsule.h"
+#include "services/check/answer_text.h"
+#include "services/check/carrier_subject.h"
+#include "services/check/describe.h"
+#include "services/run/session.h"
+
+namespace gravitas::capsule {
+
+namespace v1 = recorder::v1;
+using conformance::Answer;
+
+namespace {
+
+// A call asked for a derivative that the run did not ask for.
+class OtherDerivative : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// One plugin of the capsule, or the one that takes its place.
+class Asked {
+ public:
+  Asked(const check::Examinee& examinee, const ReplayOptions& options, std::uint32_t threads)
+      : examinee_(examinee),
+        subject_(examinee_, examinee_.is_command() ? kernel::Hosting::kGrpc : options.hosting,
+                 {.deadline = options.deadline, .cap = 10.0 * options.deadline}, threads, &faults_) {}
+
+  Answer ask(const v1::CapsuleCall& call, bool is_poison);
+
+ private:
+  const check::Examinee examinee_;
+  std::uint32_t faults_ = 0;
+  check::CarrierSubject subject_;
+};
+
+stage::Method method_of(const v1::CapsuleCall& call) {
+  return static_cast<stage::Method>(method_named(call.method()) - stage::kMethods);
+}
+
+bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRequest& asked) {
+  const auto same = [](std::span<const double> a, std::span<const double> b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+  };
+  const std::vector<gravitas_column> plain = recorded.plain();
+  const stage::IntegratorDerivativeRequest was(plain.data());
+  return was.time() == asked.time() && same(was.position(), asked.position()) &&
+         same(was.orientation(), asked.orientation()) && same(was.linear_velocity(), asked.linear_velocity()) &&
+         same(was.angular_velocity(), asked.angular_velocity());
+}
+
+Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
+  const stage::MethodInfo& method = *method_named(call.method());
+  const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
+  int asked = 0;
+  const auto answer = [&](const stage::IntegratorDerivativeRequest& trial) {
+    if (is_poison) return std::vector<double>(2 * trial.position().size());
+    if (asked >= call.derivatives_size())
+      throw OtherDerivative(fmt::format("it asks for more than {} derivatives", call.derivatives_size()));
+    const v1::CapsuleDerivative& recorded = call.derivatives(asked);
+    ++asked;
+    if (!is_same(columns_of(recorded.trial(), derivative.request), trial))
+      throw OtherDerivative(fmt::format("derivative {} is asked at another state", asked));
+    return columns_of(recorded.answer(), derivative.reply).f64("wrench");
+  };
+  Answer came = subject_.ask(method_of(call), columns_of(call.request(), method.request), answer);
+  if (!is_poison && came.ok() && asked < call.derivatives_size())
+    throw OtherDerivative(fmt::format("it asks for {} of {} derivatives", asked, call.derivatives_size()));
+  return came;
+}
+
+Answer recorded_answer(const v1::CapsuleCall& call) {
+  const stage::MethodInfo& method = *method_named(call.method());
+  const bool has_answer = call.fault().empty() && call.status() == GRAVITAS_OK;
+  return {.status = call.status(),
+          .text = call.text(),
+          .fault = call.fault(),
+          .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
+}
+
+check::Examinee usable(const std::string& argument) {
+  check::Examinee examinee = check::find_examinee(argument);
+  check::complete(&examinee, false);
+  if (!examinee.problem.empty()) throw BadInput(fmt::format("'{}': {}", argument, examinee.problem));
+  return examinee;
+}
+
+// Asks the plugins of a capsule.
+class Player {
+ public:
+  Player(const Reader& capsule, const ReplayOptions& options, report::v1::ReplayReport* report)
+      : capsule_(capsule), options_(options), report_(report) {}
+
+  // `substitute`: instead of the capsule's own.
+  Answer ask(const v1::CapsuleCall& call, const std::optional<std::string>& substitute) {
+    const auto key = std::make_pair(call.plugin(), substitute);
+    std::unique_ptr<Asked>& asked = asked_[key];
+    if (!asked) asked = start(call, substitute);
+    return asked->ask(call, capsule_.header().poison());
+  }
+
+ private:
+  std::unique_ptr<Asked> start(const v1::CapsuleCall& call, const std::optional<std::string>& substitute) {
+    const v1::CapsulePlugin& plugin = capsule_.plugins()[call.plugin()];
+    const std::string own = plugin.command().empty() ? plugin.library() : plugin.command();
+    if (!substitute && own.empty())
+      throw BadInput(
+          fmt::format("plugin {} was somebody else's worker; --plugin says who takes its place", plugin.name()));
+    check::Examinee examinee = usable(substitute.value_or(own));
+    if (slot_name(examinee.declaration.slot) != capsule_.header().slot())
+      throw BadInput(fmt::format("'{}' is of slot {}, the capsule of slot {}", examinee.argument,
+                                 slot_name(examinee.declaration.slot), capsule_.header().slot()));
+    // what the run had set holds for a plugin of the same properties
+    if (examinee.declaration.name == plugin.name() &&
+        examinee.settings.size() == static_cast<std::size_t>(plugin.settings_size()))
+      examinee.settings.assign(plugin.settings().begin(), plugin.settings().end());
+    const std::string name = fmt::format("{} {} ({})", examinee.declaration.name, examinee.declaration.version,
+                                         examinee.is_command() ? examinee.command : examinee.library);
+    if (std::ranges::find(report_->plugins(), name) == report_->plugins().end()) report_->add_plugins(name);
+    return std::make_unique<Asked>(examinee, options_, capsule_.header().threads());
+  }
+
+  const Reader& capsule_;
+  const ReplayOptions& options_;
+  report::v1::ReplayReport* report_;
+  std::map<std::pair<std::uint32_t, std::optional<std::string>>, std::unique_ptr<Asked>> asked_;
+};
+
+void note_first(const v1::CapsuleCall& call, std::uint32_t number, const std::string& text,
+                report::v1::ReplayReport* report) {
+  if (report->has_first()) return;
+  report::v1::ReplayFinding& first = *report->mutable_first();
+  first.set_call(number);
+  first.set_step(call.step());
+  first.set_method(call.method());
+  first.set_text(text);
+}
+
+// Calls `judge` with each chosen call and its number, until it or `progress` says false.
+void for_each_call(Reader* capsule, const ReplayOptions& options, report::v1::ReplayReport* report,
+                   const std::function<bool(std::uint32_t)>& progress,
+                   const std::function<bool(const v1::CapsuleCall&, std::uint32_t)>& judge) {
+  const auto start = std::chrono::steady_clock::now();
+  v1::CapsuleCall call;
+  bool goes_on = true;
+  for (std::uint32_t number = 1; goes_on && capsule->next(&call); ++number) {
+    if (options.only != 0 && number != options.only) continue;
+    report->set_calls(report->calls() + 1);
+    goes_on = judge(call, number) && progress(number);
+  }
+  if (goes_on && options.only != 0 && report->calls() == 0)
+    throw BadInput(fmt::format("--call {}: '{}' has no such call", options.only, options.file));
+  report->set_note(capsule->note());
+  report->set_seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+}
+
+}  // namespace
+
+report::v1::ReplayReport replay(const ReplayOptions& options, const std::function<bool(std::uint32_t)>& progress) {
+  Reader capsule(options.file);
+  report::v1::ReplayReport report;
+  report.set_capsule(options.file);
+  Player player(capsule, options, &report);
+  for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
+    const Answer was = recorded_answer(call);
+    std::string text;
+    bool has_failed = false;
+    for (std::uint32_t i = 0; i < options.times && text.empty() && !has_failed; ++i) {
+      try {
+        const Answer came = player.ask(call, options.plugin);
+        has_failed = !came.fault.empty();
+        if (was.fault.empty() || has_failed)
+          text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
+      } catch (const OtherDerivative& other) {
+        text = other.what();
+      }
+    }
+    if (!was.fault.empty() && has_failed) {
+      report.set_failed_again(report.failed_again() + 1);
+    } else if (!was.fault.empty() && text.empty()) {
+      report.set_answered_now(report.answered_now() + 1);
+    } else if (text.empty()) {
+      report.set_same(report.same() + 1);
+    } else {
+      report.set_different(report.different() + 1);
+    }
+    if (!text.empty()) note_first(call, number, text, &report);
+    return true;
+  });
+  return report;
+}
+
+report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string& other,
+                                const std::function<bool(std::uint32_t)>& progress) {
+  Reader capsule(options.file);
+  report::v1::ReplayReport report;
+  report.set_capsule(options.file);
+  Player player(capsule, options, &report);
+  const auto ask = [&](const v1::CapsuleCall& call, const std::string& plugin) {
+    try {
+      return player.ask(call, plugin);
+    } catch (const OtherDerivative& problem) {
+      return Answer{.status = GRAVITAS_OK, .text = {}, .fault = problem.what(), .columns = {}};
+    }
+  };
+  for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
+    const std::string text = check::difference(method_of(call), ask(call, *options.plugin), ask(call, other));
+    if (text.empty()) {
+      report.set_same(report.same() + 1);
+      return true;
+    }
+    report.set_different(1);
+    note_first(call, number, text, &report);
+    return false;
+  });
+  return report;
+}
+
+}  // namespace gravitas::capsule

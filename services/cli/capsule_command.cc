@@ -1,0 +1,217 @@
+// `gravitas capture`, `gravitas replay` and `gravitas bisect`: a plugin's calls, kept and asked again.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <system_error>
+
+#include "services/capsule/capsule.h"
+#include "services/capsule/recording_host.h"
+#include "services/capsule/replay.h"
+#include "services/cli/commands.h"
+#include "services/cli/scene_options.h"
+#include "services/recorder/json.h"
+#include "services/run/exchange_spec.h"
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+namespace {
+
+volatile std::sig_atomic_t interrupt_requested = 0;
+
+void request_interrupt(int) { interrupt_requested = 1; }
+
+void listen_to_interrupts() {
+  std::signal(SIGINT, request_interrupt);
+  std::signal(SIGTERM, request_interrupt);
+}
+
+// A count that is rewritten in place on a person's terminal, for work longer than two seconds.
+class CountLine {
+ public:
+  void show(const std::string& text) {
+    const auto now = std::chrono::steady_clock::now();
+    if (isatty(STDERR_FILENO) != 1 || now - start_ < std::chrono::seconds(2) ||
+        now - last_ < std::chrono::milliseconds(100))
+      return;
+    last_ = now;
+    std::cerr << fmt::format("\r{:<60}", text) << std::flush;
+    is_shown_ = true;
+  }
+  ~CountLine() {
+    if (is_shown_) std::cerr << fmt::format("\r{:<60}\r", "");
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
+  bool is_shown_ = false;
+};
+
+struct CaptureLine {
+  RunOptions options;
+  SceneOptions scene{&options};
+  capsule::Selection selection;
+  std::string slot, out;
+};
+
+int capture(CaptureLine* line) {
+  line->scene.apply();
+  line->selection.slot = parse_slot("--slot", line->slot, line->slot);
+  listen_to_interrupts();
+  std::shared_ptr<capsule::Writer> writer;
+  try {
+    writer = std::make_shared<capsule::Writer>(line->out, capsule_header(line->options, line->selection.slot));
+  } catch (const std::system_error& problem) {
+    throw BadInput(problem.what());
+  }
+  const auto step = std::make_shared<std::atomic<std::uint32_t>>(1);
+  line->options.starter = capsule::recording(line->selection, writer, step);
+  CountLine count;
+  const RunResult result = run(
+      line->options, [&] { return interrupt_requested != 0 || writer->calls() >= line->selection.most_calls; },
+      [&](const Progress& now) {
+        step->store(now.step + 1);
+        count.show(fmt::format("step {} of {}, {} calls", now.step, now.steps, writer->calls()));
+      });
+  writer->close();
+  for (const std::string& warning : result.report.warnings()) std::cerr << warning << '\n';
+  const bool is_enough = writer->calls() >= line->selection.most_calls;
+  std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->out, writer->calls(), line->slot,
+                           result.report.steps());
+  if (writer->calls() == 0) {
+    std::cerr << fmt::format("gravitas: slot {} was not asked: `gravitas plan` says why\n", line->slot);
+    return kBadInput;
+  }
+  if (result.outcome == RunOutcome::kCompleted || is_enough) return kDone;
+  if (result.outcome == RunOutcome::kInterrupted) return kInterrupted;
+  std::cerr << fmt::format("gravitas: {}\n", result.fault);
+  return result.outcome == RunOutcome::kPaused ? kPaused : kOurFault;
+}
+
+struct ReplayLine {
+  capsule::ReplayOptions options;
+  std::string hosting = "shm", plugin, other;
+  bool json = false;
+};
+
+void print_first(const report::v1::ReplayReport& report) {
+  if (!report.note().empty()) std::cerr << fmt::format("capsule '{}': {}\n", report.capsule(), report.note());
+  if (!report.has_first()) return;
+  const report::v1::ReplayFinding& first = report.first();
+  std::cout << fmt::format("first: call {} ({}, step {}): {}\n", first.call(), first.method(), first.step(),
+                           first.text());
+}
+
+std::function<bool(std::uint32_t)> progress_of(CountLine* line) {
+  return [line](std::uint32_t number) {
+    line->show(fmt::format("call {}", number));
+    return interrupt_requested == 0;
+  };
+}
+
+int replay(ReplayLine* line) {
+  line->options.hosting = parse_hosting_mode("--hosting", line->hosting, line->hosting);
+  if (!line->plugin.empty()) line->options.plugin = line->plugin;
+  listen_to_interrupts();
+  report::v1::ReplayReport report;
+  {
+    CountLine count;
+    report = capsule::replay(line->options, progress_of(&count));
+  }
+  if (line->json) {
+    std::cout << to_json(report, JsonForm::kPage);
+  } else {
+    for (const std::string& plugin : report.plugins()) std::cout << plugin << '\n';
+    std::cout << fmt::format("{} calls: {} same, {} different", report.calls(), report.same(), report.different());
+    if (report.failed_again() > 0) std::cout << fmt::format(", {} failed again", report.failed_again());
+    if (report.answered_now() > 0)
+      std::cout << fmt::format(", {} failed then and are answered now", report.answered_now());
+    std::cout << '\n';
+    print_first(report);
+  }
+  if (interrupt_requested != 0) return kInterrupted;
+  return report.different() + report.failed_again() == 0 ? kDone : kExaminedFailed;
+}
+
+int bisect(ReplayLine* line) {
+  line->options.hosting = parse_hosting_mode("--hosting", line->hosting, line->hosting);
+  line->options.plugin = line->plugin;
+  listen_to_interrupts();
+  report::v1::ReplayReport report;
+  {
+    CountLine count;
+    report = capsule::bisect(line->options, line->other, progress_of(&count));
+  }
+  if (line->json) {
+    std::cout << to_json(report, JsonForm::kPage);
+  } else {
+    std::cout << fmt::format("{} calls answered alike{}\n", report.same(),
+                             report.different() == 0 ? "" : ", then a difference");
+    print_first(report);
+  }
+  if (interrupt_requested != 0) return kInterrupted;
+  return report.different() == 0 ? kDone : kExaminedFailed;
+}
+
+void add_replay_options(CLI::App* command, ReplayLine* line) {
+  command->add_option("FILE", line->options.file, "A capsule")->required();
+  command->add_option(
+      "--hosting", line->hosting,
+      "Where the plugin is asked: shm, grpc, or direct: in this process, for a debugger, a sanitizer or "
+      "a profiler [shm]");
+  command->add_option("--deadline", line->options.deadline, "Of a call, s [2]")->check(CLI::PositiveNumber);
+  command->add_option("--call", line->options.only, "That call alone, counted from 1")->check(CLI::PositiveNumber);
+  command->add_flag("--json", line->json, "Print JSON");
+}
+
+}  // namespace
+
+void add_capture(CLI::App* app, Action* action) {
+  const auto line = std::make_shared<CaptureLine>();
+  CLI::App* command = app->add_subcommand("capture", "Record the calls of a slot in a run");
+  command->footer(
+      "Example: gravitas capture deploy/scenes/two_spheres_motor.gravitas --slot solver --out solver.capsule\n"
+      "         gravitas replay solver.capsule");
+  line->scene.add_to(command);
+  command->add_option("--slot", line->slot, "space, collision, constraint, force, solver or integrator")->required();
+  command->add_option("--out", line->out, "The capsule's file")->required();
+  command->add_option("--from-step", line->selection.first_step, "First step whose calls are kept [1]")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--calls", line->selection.most_calls, "Stop after so many calls")->check(CLI::PositiveNumber);
+  command->callback([=] { *action = [=] { return capture(line.get()); }; });
+}
+
+void add_replay(CLI::App* app, Action* action) {
+  const auto line = std::make_shared<ReplayLine>();
+  CLI::App* command = app->add_subcommand("replay", "Ask a plugin alone what a capsule holds, and compare the answers");
+  command->footer(
+      "Example: gravitas replay solver.capsule --plugin build/mine/solver_mine.so\n"
+      "         gdb --args gravitas replay solver.capsule --hosting direct --call 17\n"
+      "Exits with 4 if an answer differs from the run's, or if there is none.");
+  add_replay_options(command, line.get());
+  command->add_option("--plugin", line->plugin,
+                      "A library, a command or the name of an installed plugin, instead of the one that answered");
+  command->add_option("--times", line->options.times, "Ask each call so often, for a profiler [1]")
+      ->check(CLI::PositiveNumber);
+  command->callback([=] { *action = [=] { return replay(line.get()); }; });
+}
+
+void add_bisect(CLI::App* app, Action* action) {
+  const auto line = std::make_shared<ReplayLine>();
+  CLI::App* command =
+      app->add_subcommand("bisect", "Find the first call of a capsule that two plugins answer differently");
+  command->footer(
+      "Example: gravitas bisect solver.capsule before/solver_mine.so after/solver_mine.so\n"
+      "Exits with 4 if there is one.");
+  add_replay_options(command, line.get());
+  command->add_option("A", line->plugin, "A library, a command or the name of an installed plugin")->required();
+  command->add_option("B", line->other, "Another")->required();
+  command->callback([=] { *action = [=] { return bisect(line.get()); }; });
+}
+
+}  // namespace gravitas::cli

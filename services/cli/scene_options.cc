@@ -1,0 +1,78 @@
+#include "services/cli/scene_options.h"
+
+#include <fmt/format.h>
+
+#include "kernel/carrier/carrier.h"
+#include "plugin_sdk/channel/address.h"
+#include "services/run/exchange_spec.h"
+
+namespace gravitas::cli {
+namespace {
+
+HostingChoice parse_mode(const std::string& word, std::optional<Slot> slot, const std::string& mode) {
+  if (mode.starts_with("grpc:")) {
+    const std::string address = mode.substr(5);
+    if (!slot)
+      throw BadInput(fmt::format("--hosting {}: a worker at an address serves one slot: SLOT=grpc:ADDRESS", word));
+    if (!channel::is_local_address(address))
+      throw BadInput(
+          fmt::format("--hosting {}: '{}' is no address of this machine; allowed, since the connection is "
+                      "not encrypted: 127.0.0.1:PORT, [::1]:PORT, unix:PATH",
+                      word, address));
+    return {slot, kernel::Hosting::kGrpc, address};
+  }
+  return {slot, parse_hosting_mode("--hosting", word, mode), ""};
+}
+
+}  // namespace
+
+std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words,
+                                         const std::vector<std::string>& attached) {
+  std::vector<HostingChoice> choices;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    if (equals == std::string::npos) {
+      choices.push_back(parse_mode(word, std::nullopt, word));
+      continue;
+    }
+    choices.push_back(parse_mode(word, parse_slot("--hosting", word, word.substr(0, equals)), word.substr(equals + 1)));
+  }
+  for (const std::string& word : attached) {
+    const std::size_t equals = word.find('=');
+    const std::string address = equals == std::string::npos ? "" : word.substr(equals + 1);
+    if (!channel::is_local_address(address))
+      throw BadInput(
+          fmt::format("--attach {}: allowed: SLOT=ADDRESS of a worker of this machine that listens: "
+                      "127.0.0.1:PORT, [::1]:PORT or unix:PATH",
+                      word));
+    choices.push_back({parse_slot("--attach", word, word.substr(0, equals)), kernel::Hosting::kGrpc, address, true});
+  }
+  return choices;
+}
+
+void add_list(CLI::App* command, const char* name, std::vector<std::string>* values, const char* text) {
+  command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
+}
+
+void SceneOptions::add_to(CLI::App* command) {
+  command->add_option("SCENE", run_->scenes, "Scene files; several are read as one scene")->required();
+  command->add_option("--duration", run_->duration, "Simulated time, s");
+  command->add_option("--steps", run_->steps, "Number of steps");
+  command->add_option("--dt", run_->time_step, "Time step, s");
+  add_list(command, "--set", &run_->overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50");
+  add_list(command, "--hosting", &hosting_,
+           "direct, shm or grpc, for all slots or for one: solver=direct; SLOT=grpc:ADDRESS: a worker of this machine "
+           "that listens");
+  add_list(command, "--attach", &attached_,
+           "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "
+           "SLOT=ADDRESS, where `gravitas-worker --listen ADDRESS LIBRARY` listens");
+  command->add_option("--threads", run_->threads, "Threads of each host")->check(CLI::Range(1, 1024));
+  command->add_flag("--no-sandbox", no_sandbox_, "Let worker processes do what they like: for debuggers");
+}
+
+void SceneOptions::apply() const {
+  run_->hosting = parse_hosting(hosting_, attached_);
+  kernel::set_worker_sandbox(!no_sandbox_);
+}
+
+}  // namespace gravitas::cli

@@ -1,0 +1,35 @@
+// The options of every sub-command that reads a scene: which files, how far, and where its plugins live.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "services/run/session.h"
+
+namespace gravitas::cli {
+
+class SceneOptions {
+ public:
+  explicit SceneOptions(RunOptions* run) : run_(run) {}
+  SceneOptions(const SceneOptions&) = delete;
+  SceneOptions& operator=(const SceneOptions&) = delete;
+
+  void add_to(CLI::App* command);
+  // What stands for itself is in the RunOptions already; this does the rest. Throws BadInput, naming what is allowed.
+  void apply() const;
+
+ private:
+  RunOptions* run_;
+  std::vector<std::string> hosting_, attached_;
+  bool no_sandbox_ = false;
+};
+
+// An option that may be repeated, with one value each time.
+void add_list(CLI::App* command, const char* name, std::vector<std::string>* values, const char* text);
+
+// The words of --hosting and --attach. Throws BadInput, naming what is allowed.
+std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words,
+                                         const std::vector<std::string>& attached = {});
+
+}  // namespace gravitas::cli

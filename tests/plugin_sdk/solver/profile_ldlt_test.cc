@@ -1,0 +1,92 @@
+// ProfileLdlt: chains, dependent rows, sides that no solution has.
+#include "plugin_sdk/solver/profile_ldlt.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "plugin_sdk/conformance/draw.h"
+
+namespace gravitas {
+namespace {
+
+using conformance::Draw;
+
+// J J^T of rows with entries within a band, some of them combinations of those before.
+struct Banded {
+  Eigen::MatrixXd rows, matrix;
+  ProfileLdlt factor;
+};
+
+Banded banded(std::uint64_t seed, int count, int dependent) {
+  Draw draw(seed);
+  Banded b;
+  const int columns = 3 * count;
+  b.rows = Eigen::MatrixXd::Zero(count + dependent, columns);
+  for (int i = 0; i < count; ++i)
+    for (int k = 0; k < 6 && 3 * i + k < columns; ++k) b.rows(i, 3 * i + k) = draw.uniform(-1, 1);
+  for (int i = 0; i < dependent; ++i)
+    b.rows.row(count + i) = draw.uniform(-1, 1) * b.rows.row(i) + draw.uniform(-1, 1) * b.rows.row(i + 1);
+  b.matrix = b.rows * b.rows.transpose();
+  std::vector<std::size_t> first;
+  for (Eigen::Index i = 0; i < b.matrix.rows(); ++i) {
+    Eigen::Index j = 0;
+    while (b.matrix(i, j) == 0.0) ++j;
+    first.push_back(static_cast<std::size_t>(j));
+  }
+  b.factor.start(first);
+  for (std::size_t i = 0; i < first.size(); ++i)
+    for (std::size_t j = first[i]; j <= i; ++j)
+      b.factor.entry(i, j) = b.matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  b.factor.factorise();
+  return b;
+}
+
+TEST(ProfileLdlt, SolvesAndDropsWhatDepends) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const int dependent : {0, 1, 4}) {
+      const Banded b = banded(seed, 12, dependent);
+      EXPECT_EQ(b.factor.dropped(), static_cast<std::size_t>(dependent));
+      Draw draw(seed);
+      // a side that has a solution
+      Eigen::VectorXd truth(b.rows.cols());
+      for (double& x : truth) x = draw.uniform(-1, 1);
+      const Eigen::VectorXd side = b.rows * truth;
+      std::vector<double> x(side.begin(), side.end());
+      EXPECT_LE(b.factor.make_consistent(&x), 1e-12);
+      b.factor.solve(&x);
+      const Eigen::VectorXd left =
+          b.matrix * Eigen::Map<Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size())) - side;
+      EXPECT_LE(left.norm(), 1e-10);
+    }
+  }
+}
+
+// The nearest side that has a solution is that of least squares.
+TEST(ProfileLdlt, ContradictionsEndAtLeastSquares) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Banded b = banded(seed, 10, 3);
+    Draw draw(seed + 100);
+    Eigen::VectorXd side(b.matrix.rows());
+    for (double& x : side) x = draw.uniform(-1, 1);
+    const Eigen::VectorXd best = b.rows * b.rows.completeOrthogonalDecomposition().solve(side);
+    std::vector<double> x(side.begin(), side.end());
+    EXPECT_NEAR(b.factor.make_consistent(&x), (side - best).norm(), 1e-10);
+    b.factor.solve(&x);
+    const Eigen::VectorXd reached =
+        b.matrix * Eigen::Map<Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
+    EXPECT_LE((reached - best).norm(), 1e-9);
+  }
+}
+
+TEST(ProfileLdlt, OfNothing) {
+  ProfileLdlt factor;
+  factor.start({});
+  factor.factorise();
+  std::vector<double> none;
+  factor.solve(&none);
+  EXPECT_EQ(factor.size(), 0U);
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,256 @@
+// What Newton and Direct are for: large mass ratios, loaded chains, stacks, friction at its limit.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/math/rotation.h"
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using testing::angle_between;
+using testing::literal;
+using testing::SceneRun;
+using testing::set;
+using testing::turned;
+
+constexpr double kG = 9.81;
+const double kPi = std::acos(-1.0);
+
+std::string scene(const std::string& declarations, const std::string& bodies, const std::string& joints,
+                  double time_step, double duration, const Vector3& gravity = {0, -kG, 0}) {
+  return declarations +
+         "\nForces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = " + literal(gravity) +
+         " } } PUSHES }\nSimulator { CustomProperties { TimeStep = " + literal(time_step) +
+         " Duration = " + literal(duration) + " } }\nEnvironment { Space { Bodies {\n" + bodies +
+         "} } Constraints {\n" + joints + "} }\n";
+}
+
+// With further forces.
+std::string with_pushes(std::string text, const std::string& pushes) {
+  const std::size_t at = text.find("PUSHES");
+  return text.replace(at, 6, pushes);
+}
+
+std::vector<std::string> solver(const std::string& name) { return {set("Solver", name)}; }
+
+const std::string kCubes =
+    "Geometries { Geometry { Type = \"Box\" Id = \"Cube\" CustomProperties { HalfExtents = {0.5, 0.5, 0.5} } } "
+    "Geometry { Type = \"Halfspace\" Id = \"Floor\" } }\n"
+    "Materials { Material { Id = \"Wood\" StaticFrictionCoefficient = 0.5 } }";
+const std::string kFloor = "Body { Id = \"Ground\" GeometryId = \"Floor\" Material = \"Wood\" Immovable = true }\n";
+
+std::string cube(int i, double mass) {
+  return "Body { Id = \"C" + std::to_string(i) +
+         "\" GeometryId = \"Cube\" Material = \"Wood\" Mass = " + literal(mass) +
+         " KineticProperties { Position = " + literal(Vector3(0, 0.5 + i, 0)) + " } Forces = { \"Down\" } }\n";
+}
+
+// ---- chains
+
+// Links 0.5 m along a direction from the origin, and a load half a metre beyond.
+std::string chain(int links, double load, const Vector3& along, double time_step, double duration) {
+  const Quaternion turn = Quaternion::FromTwoVectors(Vector3::UnitY(), along);
+  const Vector3 moments = Vector3(0.26, 0.02, 0.26) / 12.0;
+  std::string bodies, joints;
+  for (int i = 0; i < links; ++i)
+    bodies += "Body { Id = \"L" + std::to_string(i) + "\" Mass = 1 PrincipalMoments = " + literal(moments) +
+              " KineticProperties { Position = " + literal(Vector3((0.25 + 0.5 * i) * along)) +
+              " Orientation = " + literal(turn) + " } Forces = { \"Down\" } }\n";
+  bodies += "Body { Id = \"Load\" Mass = " + literal(load) +
+            " PrincipalMoments = " + literal(Vector3(Vector3::Constant(0.1 * load))) +
+            " KineticProperties { Position = " + literal(Vector3(0.5 * (links + 1) * along)) +
+            " } Forces = { \"Down\" } }\n";
+  for (int i = 0; i <= links; ++i)
+    joints += "Constraint { Type = \"Spherical\" Id = \"J" + std::to_string(i) + "\" " +
+              (i == 0 ? "" : "Body1 = \"L" + std::to_string(i - 1) + "\" ") + "Body2 = \"" +
+              (i == links ? "Load" : "L" + std::to_string(i)) +
+              "\" CustomProperties { BindPoint = " + literal(Vector3(0.5 * i * along)) + " } }\n";
+  return with_pushes(scene("", bodies, joints, time_step, duration), "");
+}
+
+class Accurate : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Each, Accurate, ::testing::Values("Newton", "Direct"),
+                         [](const auto& which) { return std::string(which.param); });
+
+// 20 links of 1 kg under 1000 kg from 45 degrees: closed at 1/60 s, and the tip converges to where it is at 5 s.
+TEST_P(Accurate, ALoadedChainStaysClosedAndConverges) {
+  const Vector3 along = Vector3(1, -1, 0).normalized();
+  const auto tip = [&](double h) {
+    SceneRun run(chain(20, 1000.0, along, h, 5), solver(GetParam()));
+    run.to_end();
+    EXPECT_LE(run.report().max_joint_error(), 1e-12) << "time step " << h;
+    return run.body("Load").pose.position;
+  };
+  const Vector3 exact(-0.49554864, -10.4881963, 0.0);
+  const double coarse = (tip(1.0 / 60) - exact).norm(), fine = (tip(1.0 / 240) - exact).norm();
+  // of first order, which Basic is
+  EXPECT_LE(coarse, 0.1);
+  EXPECT_NEAR(std::log2(coarse / fine), 2.0, 0.4);
+}
+
+// Hanging at rest, nothing moves whatever the load: the tension is exact.
+TEST_P(Accurate, AHangingChainCarriesAnyLoad) {
+  for (const double load : {1.0, 1e2, 1e4}) {
+    SceneRun run(chain(20, load, {0, -1, 0}, 1.0 / 60, 1), solver(GetParam()));
+    run.to_end();
+    EXPECT_LE(run.report().max_joint_error(), 1e-12) << load;
+    EXPECT_LE((run.body("Load").pose.position - Vector3(0, -10.5, 0)).norm(), 1e-12) << load;
+    EXPECT_LE(run.body("L9").twist.linear.norm(), 1e-10) << load;
+  }
+}
+
+// ---- stacks
+
+void expect_stands(const std::vector<double>& masses, double duration) {
+  std::string bodies = kFloor;
+  for (std::size_t i = 0; i < masses.size(); ++i) bodies += cube(static_cast<int>(i), masses[i]);
+  SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, duration), ""), solver("Newton"));
+  run.to_end();
+  EXPECT_LE(run.report().max_penetration(), 1e-10);
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    const Pose pose = run.body("C" + std::to_string(i)).pose;
+    EXPECT_LE((pose.position - Vector3(0, 0.5 + static_cast<double>(i), 0)).norm(), 1e-9) << i;
+    EXPECT_LE(angle_between(pose.orientation, Quaternion::Identity()), 1e-9) << i;
+  }
+}
+
+TEST(AccurateStack, TwoUnderAThousandTimesTheirMassStand) { expect_stands({1, 1000}, 5); }
+TEST(AccurateStack, TenUnderAThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1000}, 1); }
+TEST(AccurateStack, TwentyStand) { expect_stands(std::vector<double>(20, 1.0), 3); }
+TEST(AccurateStack, TenUnderTenThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1e4}, 0.5); }
+
+// ---- friction
+
+// Box on a slope of tan 0.5: at 1e-6 above the angle of friction it sticks for 25 s, below it slides as it must.
+TEST(AccurateFriction, ABoxSticksToTheLimit) {
+  const double slope = std::atan(0.5);
+  const auto text = [&](double mu) {
+    return with_pushes(
+        scene(
+            "Geometries { Geometry { Type = \"Box\" Id = \"Cube\" CustomProperties { HalfExtents = {0.1, 0.1, 0.1} } } "
+            "Geometry { Type = \"Halfspace\" Id = \"Floor\" } }\nMaterials { Material { Id = \"Wood\" "
+            "StaticFrictionCoefficient = " +
+                literal(mu) + " } }",
+            kFloor + "Body { Id = \"Box\" GeometryId = \"Cube\" Material = \"Wood\" Mass = 1 KineticProperties { "
+                     "Position = {0, 0.1, 0} } Forces = { \"Down\" } }\n",
+            "", 1.0 / 60, 25, kG * Vector3(std::sin(slope), -std::cos(slope), 0)),
+        "");
+  };
+  SceneRun sticks(text(0.5 + 1e-6), solver("Newton"));
+  sticks.to_end();
+  EXPECT_LE((sticks.body("Box").pose.position - Vector3(0, 0.1, 0)).norm(), 1e-9);
+  SceneRun slides(text(0.49), solver("Newton"));
+  slides.to_end();
+  EXPECT_NEAR(slides.body("Box").twist.linear.x(), 25.0 * kG * (std::sin(slope) - 0.49 * std::cos(slope)), 1e-10);
+}
+
+// A plate with 25 balls on it is pushed: the balls roll, and everything moves in the direction of the push.
+TEST(AccurateFriction, RollingIsTheSameInEveryDirection) {
+  for (const double degrees : {0.0, 60.0, 90.0}) {
+    const Vector3 push(std::cos(degrees * kPi / 180), 0, std::sin(degrees * kPi / 180));
+    std::string bodies =
+        "Body { Id = \"Ground\" GeometryId = \"Floor\" Material = \"Hard\" Immovable = true }\nBody { Id = \"Plate\" "
+        "GeometryId = \"Plate\" Material = \"Hard\" Mass = 10 KineticProperties { Position = {0, 0.5, 0} } Forces = { "
+        "\"Down\", \"Push\" } }\n";
+    for (int i = 0; i < 25; ++i)
+      bodies += "Body { Id = \"S" + std::to_string(i) +
+                "\" GeometryId = \"Ball\" Material = \"Rubber\" Mass = 1 KineticProperties { Position = " +
+                literal(Vector3(-4 + 2 * (i % 5), 1.5, -4 + 2 * (i / 5))) + " } Forces = { \"Down\" } }\n";
+    SceneRun run(
+        with_pushes(
+            scene("Geometries { Geometry { Type = \"Box\" Id = \"Plate\" CustomProperties { HalfExtents = {10, 0.5, "
+                  "10} } "
+                  "} Geometry { Type = \"Sphere\" Id = \"Ball\" CustomProperties { Radius = 0.5 } } Geometry { Type = "
+                  "\"Halfspace\" Id = \"Floor\" } }\nMaterials { Material { Id = \"Hard\" StaticFrictionCoefficient = "
+                  "0.4 "
+                  "} Material { Id = \"Rubber\" StaticFrictionCoefficient = 1.6 } }",
+                  bodies, "", 0.001, 0.4),
+            "Force { Type = \"Basic\" Id = \"Push\" CustomProperties { Force = " + literal(Vector3(150 * push)) +
+                " } }"),
+        solver("Newton"));
+    const double a = (150.0 - 0.4 * 35.0 * kG) / (10.0 + 2.0 / 7.0 * 25.0);
+    double sum = 0.0;
+    int count = 0;
+    while (!run.is_done()) {
+      run.step();
+      for (const std::string& id : run.movable_bodies()) {
+        const double expected = (id == "Plate" ? 1.0 : 2.0 / 7.0) * a * run.time();
+        sum += (run.body(id).twist.linear - expected * push).squaredNorm();
+        ++count;
+      }
+    }
+    EXPECT_LE(sum / count, 1e-20) << degrees;
+  }
+}
+
+// A frictionless block slides down a wedge that a guide lets go: both laws at once, joints and contacts.
+TEST(AccurateFriction, AMovableWedgeGivesWayAsItMust) {
+  const double angle = kPi / 6.0;
+  const Quaternion tilt = turned(Vector3::UnitZ(), -angle);
+  const Vector3 out = tilt * Vector3::UnitY();
+  const std::string declarations =
+      "Geometries { Geometry { Type = \"Box\" Id = \"Wedge\" CustomProperties { HalfExtents = {3, 0.5, 1} } } Geometry "
+      "{ "
+      "Type = \"Box\" Id = \"Block\" CustomProperties { HalfExtents = {0.2, 0.2, 0.2} } } }\nMaterials { Material { Id "
+      "= "
+      "\"Ice\" StaticFrictionCoefficient = 0 } }";
+  const std::string bodies =
+      "Body { Id = \"Wedge\" GeometryId = \"Wedge\" Material = \"Ice\" Mass = 2 KineticProperties { Orientation = " +
+      literal(tilt) +
+      " } Forces = { \"Down\" } }\nBody { Id = \"Block\" GeometryId = \"Block\" Material = \"Ice\" Mass = " +
+      "1 KineticProperties { Position = " + literal(Vector3(0.7 * out)) + " Orientation = " + literal(tilt) +
+      " } Forces = { \"Down\" } }\n";
+  SceneRun run(with_pushes(scene(declarations, bodies,
+                                 "Constraint { Type = \"Slider\" Id = \"Guide\" Body2 = \"Wedge\" CustomProperties { "
+                                 "BindPoint = {0, 0, 0} Axis = {1, 0, 0} } }\n",
+                                 1.0 / 240, 0.5),
+                           ""),
+               solver("Newton"));
+  while (!run.is_done()) {
+    run.step();
+    ASSERT_NEAR(run.body("Wedge").twist.linear.x(), -1.88793538025007615 * run.time(), 1e-10) << run.time();
+  }
+}
+
+// What two pads hold with 20 or 95 times the force it takes does not creep. (At 1/60 s the pads of a free step pass through
+// what they hold.)
+TEST(AccurateFriction, WhatIsHeldDoesNotCreep) {
+  for (const double share : {20.0, 95.0}) {
+    const double force = share * 0.045 * kG / (2.0 * 0.7);
+    const auto pad = [&](const char* id, double x, const char* push) {
+      return std::string("Body { Id = \"") + id +
+             "\" GeometryId = \"Pad\" Material = \"Rubber\" Mass = 0.1 KineticProperties { Position = " +
+             literal(Vector3(x, 0, 0)) + " } Forces = { \"" + push + "\" } }\n";
+    };
+    const auto guide = [](const char* id, const char* pad_id) {
+      return std::string("Constraint { Type = \"Slider\" Id = \"") + id + "\" Body2 = \"" + pad_id +
+             "\" CustomProperties { BindPoint = {0, 0, 0} Axis = {1, 0, 0} } }\n";
+    };
+    SceneRun run(
+        with_pushes(
+            scene(
+                "Geometries { Geometry { Type = \"Box\" Id = \"Pad\" CustomProperties { HalfExtents = {0.01, 0.02, "
+                "0.02} } } Geometry { Type = \"Box\" Id = \"Held\" CustomProperties { HalfExtents = {0.004, 0.01, "
+                "0.004} } } }\nMaterials { Material { Id = \"Rubber\" StaticFrictionCoefficient = 0.7 } }",
+                pad("Left", -0.014, "Right") + pad("Right", 0.014, "Left") +
+                    "Body { Id = \"Held\" GeometryId = \"Held\" Material = \"Rubber\" Mass = 0.045 KineticProperties { "
+                    "Position = {0, 0, 0} } Forces = { \"Down\" } }\n",
+                guide("G1", "Left") + guide("G2", "Right"), 0.001, 5),
+            "Force { Type = \"Basic\" Id = \"Right\" CustomProperties { Force = " + literal(Vector3(force, 0, 0)) +
+                " } } Force { Type = \"Basic\" Id = \"Left\" CustomProperties { Force = " +
+                literal(Vector3(-force, 0, 0)) + " } }"),
+        solver("Newton"));
+    run.to_end();
+    EXPECT_LE((run.body("Held").pose.position).norm(), 1e-9 * run.time()) << share;
+    EXPECT_LE(run.body("Held").twist.linear.norm(), 1e-9) << share;
+  }
+}
+
+}  // namespace
+}  // namespace gravitas

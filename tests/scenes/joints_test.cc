@@ -1,0 +1,318 @@
+// Every joint in motion: against closed forms, against the same joint made of other rows, with every solver.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/math/rotation.h"
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using testing::angle_between;
+using testing::literal;
+using testing::SceneRun;
+using testing::set;
+
+constexpr double kG = 9.81;
+
+std::string body(const std::string& id, const Vector3& at, const std::string& more = "", const std::string& motion = "",
+                 const Vector3& moments = {0.1, 0.2, 0.25}) {
+  return "Body { Id = \"" + id + "\" Mass = 1 PrincipalMoments = " + literal(moments) +
+         " KineticProperties { Position = " + literal(at) + motion + " } " + more + " }\n";
+}
+
+std::string joint(const std::string& type, const std::string& id, const std::string& body1, const std::string& body2,
+                  const std::string& properties) {
+  return "Constraint { Type = \"" + type + "\" Id = \"" + id + "\" Body1 = \"" + body1 + "\" Body2 = \"" + body2 +
+         "\" CustomProperties { " + properties + " } }\n";
+}
+
+std::string scene(const std::string& bodies, const std::string& joints, double time_step, double duration) {
+  return "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+         "Simulator { CustomProperties { TimeStep = " +
+         literal(time_step) + " Duration = " + literal(duration) + " } }\nEnvironment { Space { Bodies {\n" + bodies +
+         "} } Constraints {\n" + joints + "} }\n";
+}
+
+const std::string kFalls = "Forces = { \"Down\" }";
+
+class JointsInMotion : public ::testing::TestWithParam<const char*> {
+ protected:
+  std::vector<std::string> solver() const { return {set("Solver", std::string(GetParam()))}; }
+  bool is_end_of_step() const { return std::string(GetParam()) != "Sequential"; }
+  // What the joint's points may be apart at a committed state.
+  double gap(double otherwise) const { return is_end_of_step() ? 1e-12 : otherwise; }
+};
+
+INSTANTIATE_TEST_SUITE_P(Each, JointsInMotion, ::testing::Values("Sequential", "Newton", "Direct"),
+                         [](const auto& which) { return std::string(which.param); });
+
+// ---- closed forms
+
+// v = g sin t to rounding, and the way of SemiImplicitEuler: t (t + h)/2 of it. The force acts beside the guide.
+TEST_P(JointsInMotion, ASliderFallsAlongItsAxis) {
+  const double h = 1.0 / 60;
+  const Vector3 axis = Vector3(1, -1, 0.5).normalized();
+  SceneRun run(scene(body("Sled", {0.3, 0.2, 0.1}, kFalls),
+                     joint("Slider", "Guide", "", "Sled", "BindPoint = {0, 0, 0} Axis = {2, -2, 1}"), h, 3),
+               solver());
+  const Vector3 start = run.body("Sled").pose.position;
+  const double a = -kG * axis.y();
+  while (!run.is_done()) {
+    run.step();
+    const SceneRun::Motion sled = run.body("Sled");
+    const double t = run.time();
+    ASSERT_LE((sled.twist.linear - a * t * axis).norm(), 1e-11 * (1.0 + a * t)) << "at " << t;
+    ASSERT_LE((sled.pose.position - start - 0.5 * a * t * (t + h) * axis).norm(), 1e-10) << "at " << t;
+    ASSERT_LE(sled.twist.angular.norm(), 1e-11) << "at " << t;
+  }
+  EXPECT_LE(run.report().max_joint_error(), 1e-12);
+}
+
+// The drive gains F/m until it has its speed, and the limit stops it.
+TEST_P(JointsInMotion, ASlidersDriveHasItsForceSpeedAndLimit) {
+  const double h = 0.01;
+  SceneRun run(scene(body("Sled", {0.3, 0.2, 0.1}),
+                     joint("Slider", "Guide", "", "Sled",
+                           "BindPoint = {0, 0, 0} Axis = {1, 0, 0} UpperLimit = 1.5 Speed = 2 MaximumForce = 4"),
+                     h, 2),
+               solver());
+  while (!run.is_done()) {
+    run.step();
+    const SceneRun::Motion sled = run.body("Sled");
+    const double way = sled.pose.position.x() - 0.3;
+    ASSERT_LE(way, 1.5 + 1e-9) << "at " << run.time();
+    if (way < 1.45) {
+      ASSERT_NEAR(sled.twist.linear.x(), std::min(2.0, 4.0 * run.time()), 1e-9) << "at " << run.time();
+    }
+  }
+  EXPECT_NEAR(run.body("Sled").pose.position.x(), 1.8, 1e-9);
+  EXPECT_NEAR(run.body("Sled").twist.linear.x(), 0.0, 1e-9);
+}
+
+// Point pendulum, l = 1: T = 2.36784194757623745 s from the horizontal; of first order, so that two steps extrapolate.
+TEST_P(JointsInMotion, ARodIsAPointPendulum) {
+  const auto period = [&](double h) {
+    SceneRun run(scene(body("Bob", {-1, 0, 0}, kFalls),
+                       joint("Distance", "Rod", "", "Bob", "BindPoint1 = {0, 0, 0} BindPoint2 = {-1, 0, 0}"), h, 6),
+                 solver());
+    double first = 0.0;
+    for (;;) {
+      const double before = run.body("Bob").pose.position.x(), time = run.time();
+      run.step();
+      EXPECT_NEAR(run.body("Bob").pose.position.norm(), 1.0, gap(1e-4 * h / 0.004));
+      const double after = run.body("Bob").pose.position.x();
+      if (!(before < 0.0 && after >= 0.0)) continue;
+      const double crossing = time + h * before / (before - after);
+      if (first > 0.0) return crossing - first;
+      first = crossing;
+    }
+  };
+  const double exact = 2.36784194757623745;
+  const double coarse = period(0.002), fine = period(0.001);
+  EXPECT_NEAR(coarse / exact, 1.0, 8.0 * 0.002);
+  EXPECT_NEAR((2.0 * fine - coarse) / exact, 1.0, 400.0 * 1e-6);
+}
+
+TEST_P(JointsInMotion, ARopeIsSlackAndThenHolds) {
+  const double h = 1.0 / 240;
+  SceneRun run(scene(body("Load", {0.3, -0.4, 0}, kFalls),
+                     joint("Distance", "Rope", "", "Load",
+                           "BindPoint1 = {0, 0, 0} BindPoint2 = {0.3, -0.4, 0} MaximumDistance = 1"),
+                     h, 3),
+               solver());
+  while (!run.is_done()) {
+    run.step();
+    const SceneRun::Motion load = run.body("Load");
+    // free fall from (0.3, -0.4) until y = -sqrt(1 - 0.09)
+    if (0.5 * kG * run.time() * (run.time() + h) < std::sqrt(0.91) - 0.4) {
+      ASSERT_NEAR(load.twist.linear.y(), -kG * run.time(), 1e-12) << "at " << run.time();
+    }
+    ASSERT_LE(load.pose.position.norm(), 1.0 + gap(1e-3)) << "at " << run.time();
+  }
+  EXPECT_LT(run.energy(), 0.0);
+}
+
+// Two shafts held in bearings, the first driven: the bars p1 and p2 of the cross are across their shafts s1 and s2 and
+// across each other, so w1 s1.(p1 x p2) = w2 s2.(p1 x p2). Three of the four rows of the joint are redundant.
+TEST_P(JointsInMotion, HookesJointTurnsUnevenlyAsItsBarsSay) {
+  const double h = 1.0 / 240, bend = 0.6, speed = 3.0;
+  const Vector3 s1 = Vector3::UnitX(), s2(std::cos(bend), std::sin(bend), 0.0);
+  const auto text = [&](const std::string& type, const std::string& axes) {
+    return scene(body("Driving", {-1, 0, 0}) + body("Driven", 1.0 * s2),
+                 joint("AngularMotor", "Motor", "", "Driving",
+                       "BindAxisPoint1 = {-1.5, 0, 0} BindAxisPoint2 = {-0.5, 0, 0} AngularSpeed = " + literal(speed)) +
+                     joint("Revolute", "Bearing", "", "Driven",
+                           "BindAxisPoint1 = " + literal(Vector3(0.5 * s2)) +
+                               " BindAxisPoint2 = " + literal(Vector3(1.5 * s2))) +
+                     joint(type, "Cross", "Driving", "Driven", "BindPoint = {0, 0, 0} " + axes),
+                 h, 3);
+  };
+  const Vector3 p2(-std::sin(bend), std::cos(bend), 0.0);
+  SceneRun hooke(text("Universal", "Axis1 = {0, 0, 1} Axis2 = " + literal(p2)), solver());
+  while (!hooke.is_done()) {
+    hooke.step();
+    const Vector3 bar1 = hooke.body("Driving").pose.orientation * Vector3::UnitZ();
+    const Vector3 across = bar1.cross(s2.cross(bar1).normalized());
+    const double expected = speed * s1.dot(across) / s2.dot(across);
+    // the driving shaft's bearing is held at the end of the step by Newton and Direct alone
+    ASSERT_NEAR(hooke.body("Driven").twist.angular.dot(s2), expected, is_end_of_step() ? 1e-8 : 0.05 * speed)
+        << "at " << hooke.time();
+  }
+  // measured along the axes of the trial state, which the step still turns
+  EXPECT_LE(hooke.report().max_joint_error(), is_end_of_step() ? 1e-6 : 1e-3);
+
+  SceneRun even(text("ConstantVelocity", "Axis1 = {1, 0, 0} Axis2 = " + literal(s2)), solver());
+  while (!even.is_done()) {
+    even.step();
+    // the bisector of the shafts is that of the trial state with every solver
+    ASSERT_NEAR(even.body("Driven").twist.angular.dot(s2), speed, 1e-4 * speed) << "at " << even.time();
+  }
+}
+
+// A wheel hangs in its spring: m g/k deep, and it rolls on undisturbed.
+TEST_P(JointsInMotion, AnAxlesSpringCarriesAndItsWheelRolls) {
+  SceneRun run(scene(body("Wheel", {0, 0, 0}, kFalls, " AngularVelocity = {0, 0, 5}", {0.1, 0.1, 0.2}),
+                     joint("Axle", "Axle", "", "Wheel",
+                           "BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = {0, 0, 1} "
+                           "SuspensionStiffness = 500 SuspensionDamping = 40"),
+                     1.0 / 240, 3),
+               solver());
+  run.to_end();
+  EXPECT_NEAR(run.body("Wheel").pose.position.y(), -kG / 500.0, 1e-9);
+  EXPECT_NEAR(run.body("Wheel").twist.angular.z(), 5.0, 1e-9);
+  EXPECT_LE(run.body("Wheel").twist.linear.norm(), 1e-9);
+  EXPECT_LE(run.report().max_joint_error(), 1e-9);
+}
+
+// A pendulum in a socket: its axis stays within the cone, round or not, and its twist within the limits.
+TEST_P(JointsInMotion, ASocketHoldsItsReachConeAndTwist) {
+  for (const char* cone : {"ReachConeAngle = 0.5", "ReachCone = {{0, 0.5}, {1.5, 0.3}, {3.1, 0.5}, {4.6, 0.4}}"}) {
+    SceneRun run(
+        scene(body("Arm", {0, -1, 0}, kFalls, " LinearVelocity = {2, 0, 1.5} AngularVelocity = {-1.5, 3, 2}"),
+              joint("Spherical", "Socket", "", "Arm",
+                    std::string("BindPoint = {0, 0, 0} Axis = {0, -1, 0} TwistLower = -0.4 TwistUpper = 0.7 ") + cone),
+              1.0 / 240, 5),
+        solver());
+    double widest = 0.0;
+    while (!run.is_done()) {
+      run.step();
+      const Vector3 axis = run.body("Arm").pose.orientation * Vector3(0, -1, 0);
+      widest = std::max(widest, std::acos(std::clamp(-axis.y(), -1.0, 1.0)));
+    }
+    EXPECT_GT(widest, 0.25) << cone;
+    // an angle is closed to second order in the turn of a step, 0.02 rad
+    EXPECT_LE(widest, 0.5 + 1e-3) << cone;
+    EXPECT_LE(run.report().max_joint_error(), 1e-3) << cone;
+  }
+}
+
+TEST_P(JointsInMotion, AHingeStopsAtItsLimit) {
+  SceneRun run(scene(body("Flap", {1, 0, 0}, kFalls),
+                     joint("Revolute", "Hinge", "", "Flap",
+                           "BindAxisPoint1 = {0, 0, -1} BindAxisPoint2 = {0, 0, 1} LowerLimit = -0.8 UpperLimit = 0.1"),
+                     1.0 / 240, 3),
+               solver());
+  run.to_end();
+  EXPECT_NEAR(angle_between(run.body("Flap").pose.orientation, Quaternion::Identity()), 0.8, 1e-6);
+  EXPECT_LE(run.body("Flap").twist.angular.norm(), 1e-9);
+}
+
+// ---- the same joint of other rows
+
+// Two bodies that tumble in free space with a joint between them, and where they are after a second.
+std::vector<SceneRun::Motion> tumbled(const std::string& joints, const std::vector<std::string>& overrides) {
+  SceneRun run(scene(body("A", {-0.5, 0, 0}, "", " LinearVelocity = {0.2, 0, 0.4} AngularVelocity = {1, 2, -1}") +
+                         body("B", {0.6, 0.1, 0}, "", " LinearVelocity = {0, 0.3, 0} AngularVelocity = {-0.5, 2, 3}",
+                              {0.3, 0.15, 0.2}),
+                     joints, 1.0 / 240, 1),
+               overrides);
+  const Vector3 momentum = run.momentum();
+  run.to_end();
+  EXPECT_LE((run.momentum() - momentum).norm(), 1e-12);
+  return {run.body("A"), run.body("B")};
+}
+
+TEST_P(JointsInMotion, RedundantRowsMoveLikeThoseWithout) {
+  struct Pair {
+    const char* what;
+    std::string plain, redundant;
+  };
+  const std::string a = "{0.1, -0.2, 0}", b = "{0.3, 0.4, 0.5}", c = "{-0.4, 0.3, 0.1}";
+  const auto ball = [](const std::string& id, const std::string& at) {
+    return joint("Spherical", id, "A", "B", "BindPoint = " + at);
+  };
+  const std::string ends = "BindAxisPoint1 = " + a + " BindAxisPoint2 = " + b;
+  const std::vector<Pair> pairs = {
+      // 6 rows of rank 5, and the motor's 10 of rank 5 while it has no torque
+      {"hinge and motor without torque", joint("Revolute", "J", "A", "B", ends),
+       joint("AngularMotor", "J", "A", "B", ends + " AngularSpeed = 2 MaximumTorque = 0")},
+      {"hinge and two ball joints", joint("Revolute", "J", "A", "B", ends), ball("J", a) + ball("K", b)},
+      // 6 rows of rank 6, and the seed's 9
+      {"rigid and three ball joints", joint("Rigid", "J", "A", "B", "BindPoint = " + a),
+       ball("J", a) + ball("K", b) + ball("L", c)},
+      {"rigid and a slider that is held", joint("Rigid", "J", "A", "B", "BindPoint = " + a),
+       joint("Slider", "J", "A", "B", "BindPoint = " + a + " Axis = {1, 2, 3} LowerLimit = 0 UpperLimit = 0")},
+      {"ball joint and two of it", ball("J", a), ball("J", a) + ball("K", a)},
+  };
+  for (const Pair& pair : pairs) {
+    const std::vector<SceneRun::Motion> one = tumbled(pair.plain, solver()), other = tumbled(pair.redundant, solver());
+    for (std::size_t i = 0; i < 2; ++i) {
+      // Sequential leaves joint errors of fourth order, other ones for other rows
+      const double tolerance = is_end_of_step() ? 1e-9 : 1e-4;
+      EXPECT_LE((one[i].pose.position - other[i].pose.position).norm(), tolerance) << pair.what;
+      EXPECT_LE(angle_between(one[i].pose.orientation, other[i].pose.orientation), tolerance) << pair.what;
+      EXPECT_LE((one[i].twist.angular - other[i].twist.angular).norm(), 10.0 * tolerance) << pair.what;
+    }
+  }
+}
+
+// Bricard's mechanism (IFToMM A04): five rods, six hinges, 30 rows of hinges of rank 5 each on 30 freedoms, and it moves.
+TEST_P(JointsInMotion, BricardsMechanismMovesThoughItsRowsAreTooMany) {
+  const Vector3 point[] = {{0, 0, 0}, {1, 0, 0}, {1, -1, 0}, {1, -1, 1}, {0, -1, 1}, {0, 0, 1}};
+  const Vector3 axis[] = {Vector3::UnitY(), Vector3::UnitZ(), Vector3::UnitX(),
+                          Vector3::UnitY(), Vector3::UnitZ(), Vector3::UnitX()};
+  std::string bodies, joints;
+  for (int i = 0; i < 5; ++i) {
+    const Vector3 along = point[i + 1] - point[i];
+    const Vector3 moments = (Vector3::Ones() - along.cwiseAbs()) / 12.0 + 1e-5 * along.cwiseAbs();
+    bodies += body("R" + std::to_string(i), 0.5 * (point[i] + point[i + 1]), kFalls, "", moments);
+  }
+  for (int i = 0; i < 6; ++i)
+    joints += joint("Revolute", "H" + std::to_string(i), i == 0 ? "" : "R" + std::to_string(i - 1),
+                    i == 5 ? "" : "R" + std::to_string(i),
+                    "BindAxisPoint1 = " + literal(Vector3(point[i] - 0.5 * axis[i])) +
+                        " BindAxisPoint2 = " + literal(Vector3(point[i] + 0.5 * axis[i])));
+  SceneRun run(scene(bodies, joints, 1.0 / 240, 1), solver());
+  const Vector3 start = run.body("R2").pose.position;
+  run.to_end();
+  EXPECT_GT((run.body("R2").pose.position - start).norm(), 0.1);
+  // a loop is where sweeps converge worst: Sequential's run out, and the joints open by centimetres
+  EXPECT_LE(run.report().max_joint_error(), is_end_of_step() ? 1e-10 : 0.1);
+  EXPECT_LE(run.energy(), 5.0 * kG * (is_end_of_step() ? 1e-3 : 0.1));
+}
+
+// A body that two others, which move apart, both hold: no blow-up, and it stays midway.
+TEST_P(JointsInMotion, ContradictingJointsCompromise) {
+  SceneRun run(scene(body("Left", {-1, 0, 0}, "Kinematic = true", " LinearVelocity = {-0.1, 0, 0}") +
+                         body("Right", {1, 0, 0}, "Kinematic = true", " LinearVelocity = {0.1, 0, 0}") +
+                         body("Middle", {0, 0, 0}),
+                     joint("Spherical", "L", "Left", "Middle", "BindPoint = {0, 0, 0}") +
+                         joint("Spherical", "R", "Right", "Middle", "BindPoint = {0, 0, 0}"),
+                     0.01, 2),
+               solver());
+  while (!run.is_done()) {
+    run.step();
+    const SceneRun::Motion middle = run.body("Middle");
+    ASSERT_LE(middle.pose.position.norm(), is_end_of_step() ? 1e-9 : 0.1 * run.time() + 1e-9);
+    ASSERT_LE(middle.twist.linear.norm(), is_end_of_step() ? 1e-9 : 0.1 + 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,419 @@
+// Every joint: which freedoms its rows take and which they leave, at the start and after any motion that they leave, and
+// what it refuses. The properties are those of the scene language in the order of their declaration.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/conformance/draw.h"
+#include "plugin_sdk/math/rotation.h"
+#include "tests/workers/constraint/joint_problem.h"
+
+namespace gravitas::test {
+namespace {
+
+// Rounding of transforms of points within ten metres, some of them in a row.
+constexpr double kRounding = 2e-14;
+const double kAbsent = std::nan("");
+const Vector3 kPoint(0.3, -0.2, 0.5);
+const Vector3 kAxis = Vector3(1.0, 2.0, -0.5).normalized();
+const Vector3 kAcross = kAxis.cross(Vector3::UnitZ()).normalized();
+const Vector3 kBent = (kAxis + 0.8 * kAcross).normalized();
+
+std::vector<double> numbers(const std::vector<Vector3>& vectors, const std::vector<double>& rest = {}) {
+  std::vector<double> all;
+  for (const Vector3& v : vectors) all.insert(all.end(), {v.x(), v.y(), v.z()});
+  all.insert(all.end(), rest.begin(), rest.end());
+  return all;
+}
+
+// A motion of body 2 against body 1 about or along world axes of the start, applied in order: what is later is fixed in
+// body 1 if `in_body1`, else moves with body 2.
+struct Motion {
+  Vector3 axis;
+  bool turns = true;
+  bool in_body1 = true;
+};
+
+struct JointCase {
+  const char* type;
+  const char* plugin;
+  std::vector<double> properties;
+  long rows;
+  long rank;
+  // Freedoms left: rank + freedoms = 6.
+  std::vector<Motion> freedoms;
+};
+
+void PrintTo(const JointCase& joint, std::ostream* out) { *out << joint.type; }
+
+const std::vector<JointCase>& cases() {
+  static const std::vector<JointCase> all = {
+      {"Spherical",
+       "constraint_spherical",
+       numbers({kPoint}, {kAbsent, 0, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent}),
+       3,
+       3,
+       {{Vector3::UnitX()}, {Vector3::UnitY()}, {Vector3::UnitZ()}}},
+      {"Revolute", "constraint_revolute", numbers({kPoint, kPoint + 0.4 * kAxis}, {kAbsent, kAbsent}), 6, 5, {{kAxis}}},
+      {"Rigid", "constraint_rigid", numbers({kPoint}), 6, 6, {}},
+      {"Slider",
+       "constraint_slider",
+       numbers({kPoint, 3.0 * kAxis}, {kAbsent, kAbsent, kAbsent, kAbsent}),
+       5,
+       5,
+       {{kAxis, false}}},
+      {"Universal",
+       "constraint_universal",
+       numbers({kPoint, kAxis, kAcross}),
+       4,
+       4,
+       {{kAcross, true, false}, {kAxis, true, true}}},
+      {"Axle",
+       "constraint_axle",
+       numbers({kPoint, kAxis, kAcross}, {kAbsent, kAbsent}),
+       4,
+       4,
+       {{kAcross, true, false}, {kAxis, true, true}}},
+  };
+  return all;
+}
+
+class JointFreedoms : public testing::TestWithParam<JointCase> {
+ protected:
+  JointFreedoms() : plugin_(GetParam().plugin), joint_(&plugin_, GetParam().type) {
+    for (JointedBody& body : joint_.bodies) body.pose = random_.pose(3.0);
+    joint_.bind(GetParam().properties);
+    start_ = joint_.bodies;
+  }
+
+  // Moves body 2 by the freedoms from the start, and then both bodies as one.
+  void move(double size) {
+    joint_.bodies = start_;
+    Pose& pose = joint_.bodies[1].pose;
+    Pose moved = {};  // of body 2 since the start, world
+    for (const Motion& m : GetParam().freedoms) {
+      const double by = random_.uniform(-size, size);
+      Pose next;
+      if (m.turns) {
+        const Quaternion turn = exp_rotation(by * m.axis);
+        next = {kPoint - turn * kPoint, turn};
+      } else {
+        next = {by * m.axis, Quaternion::Identity()};
+      }
+      moved = m.in_body1 ? compose(next, moved) : compose(moved, next);
+    }
+    pose = compose(moved, pose);
+    pose.orientation = normalized(pose.orientation);
+    const Pose both = random_.pose(2.0);
+    for (JointedBody& body : joint_.bodies) {
+      body.pose = compose(both, body.pose);
+      body.pose.orientation = normalized(body.pose.orientation);
+    }
+  }
+
+  PluginUnderTest plugin_;
+  JointProblem joint_;
+  std::vector<JointedBody> start_;
+  conformance::Draw random_{7};
+};
+
+INSTANTIATE_TEST_SUITE_P(Each, JointFreedoms, testing::ValuesIn(cases()),
+                         [](const auto& which) { return std::string(which.param.type); });
+
+TEST_P(JointFreedoms, RowsHaveTheRankOfTheProof) {
+  ASSERT_EQ(GetParam().rank + static_cast<long>(GetParam().freedoms.size()), 6);
+  for (int i = 0; i < 20; ++i) {
+    const Eigen::MatrixXd rows = joint_.jacobian(joint_.describe());
+    EXPECT_EQ(rows.rows(), GetParam().rows);
+    EXPECT_EQ(rank(rows), GetParam().rank);
+    move(0.6);
+  }
+}
+
+TEST_P(JointFreedoms, WhatIsLeftFreeIsNoError) {
+  for (int i = 0; i < 20; ++i) {
+    move(1.0);
+    for (const Discrepancy& d : joint_.describe()) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kRounding);
+  }
+}
+
+// The rows are the derivative of the errors in every state that the joint allows, by central differences.
+TEST_P(JointFreedoms, RowsAreTheRatesOfTheErrors) {
+  constexpr double kTime = 1e-5;
+  for (int i = 0; i < 10; ++i) {
+    move(0.6);
+    for (JointedBody& body : joint_.bodies) body.twist = {random_.vector(1.0), random_.vector(1.0)};
+    const std::vector<JointedBody> now = joint_.bodies;
+    const std::vector<Discrepancy> all = joint_.describe();
+    std::vector<double> rates;
+    for (const Discrepancy& d : all) {
+      const Matrix3 axes = to_rotation_matrix(d.axes);
+      for (int k = 0; k < 3; ++k)
+        if (axis_mode(d.modes, k) == AxisMode::kLocked) rates.push_back(joint_.row_velocity(d, axes.col(k)));
+    }
+    const auto errors = [&](double time) {
+      for (std::size_t b = 0; b < 2; ++b)
+        joint_.bodies[b].pose = displaced(now[b].pose, time * now[b].twist.linear, time * now[b].twist.angular);
+      std::vector<double> along;
+      for (const Discrepancy& d : joint_.describe()) {
+        const Matrix3 axes = to_rotation_matrix(d.axes);
+        for (int k = 0; k < 3; ++k)
+          if (axis_mode(d.modes, k) == AxisMode::kLocked) along.push_back(axes.col(k).dot(d.point2 - d.point1));
+      }
+      return along;
+    };
+    const std::vector<double> before = errors(-kTime), after = errors(kTime);
+    joint_.bodies = now;
+    ASSERT_EQ(after.size(), rates.size());
+    // rounding over the time, and the next order but one
+    for (std::size_t k = 0; k < rates.size(); ++k)
+      EXPECT_NEAR((after[k] - before[k]) / (2.0 * kTime), rates[k], 1e-8) << "row " << k;
+  }
+}
+
+// ---- each by itself
+
+class JointPair : public testing::Test {
+ protected:
+  JointPair() {
+    for (JointedBody& body : bodies_) body.pose = random_.pose(3.0);
+  }
+  JointProblem joint(PluginUnderTest* plugin, const char* type, const std::vector<double>& properties) {
+    JointProblem made(plugin, type);
+    made.bodies = bodies_;
+    made.bind(properties);
+    return made;
+  }
+  std::string refused(PluginUnderTest* plugin, const char* type, const std::vector<double>& properties) {
+    JointProblem made(plugin, type);
+    made.bodies = bodies_;
+    return plugin->refusal(stage::Method::kConstraintBind, made.bind_request(properties));
+  }
+  // Turns body 2 of a joint about its point.
+  static void turn(JointProblem* joint, const Vector3& rotation) {
+    const Quaternion q = exp_rotation(rotation);
+    Pose& pose = joint->bodies[1].pose;
+    pose = {kPoint + q * (pose.position - kPoint), normalized(q * pose.orientation)};
+  }
+
+  conformance::Draw random_{11};
+  std::vector<JointedBody> bodies_ = std::vector<JointedBody>(2);
+};
+
+TEST_F(JointPair, ARevolutesAngleIsThatOfBody2AboutItsAxis) {
+  PluginUnderTest plugin("constraint_revolute");
+  for (const double angle : {-2.5, -0.4, 0.0, 1.3, 3.0, 4.0}) {
+    JointProblem hinge = joint(&plugin, "Revolute", numbers({kPoint, kPoint + 0.4 * kAxis}, {-1.0, 5.0}));
+    turn(&hinge, angle * kAxis);
+    const std::vector<Discrepancy> all = hinge.describe();
+    ASSERT_EQ(all.size(), 3U);
+    const Discrepancy& limit = all[2];
+    EXPECT_TRUE(limit.is_angular());
+    const Vector3 axis = to_rotation_matrix(limit.axes).col(0);
+    EXPECT_LT((axis - kAxis).norm(), kRounding);
+    // limits of -1 and 5 span 6 of 6.28 rad: the turn nearest to 2
+    const double seen = angle < 2.0 - 3.14159 ? angle + 6.283185307179586 : angle;
+    EXPECT_NEAR(axis.dot(limit.point2 - limit.point1), seen, kRounding);
+    EXPECT_EQ(limit.lower.x(), -1.0);
+    EXPECT_EQ(limit.upper.x(), 5.0);
+  }
+}
+
+TEST_F(JointPair, ASlidersWayLimitsAndDriveAreAlongItsAxis) {
+  PluginUnderTest plugin("constraint_slider");
+  JointProblem slider = joint(&plugin, "Slider", numbers({kPoint, 2.0 * kAxis}, {-0.5, 2.0, 0.7, 30.0}));
+  slider.bodies[1].pose.position += 1.25 * kAxis;
+  const std::vector<Discrepancy> all = slider.describe();
+  ASSERT_EQ(all.size(), 5U);
+  const Discrepancy &limit = all[3], &drive = all[4];
+  EXPECT_NEAR(to_rotation_matrix(limit.axes).col(0).dot(limit.point2 - limit.point1), 1.25, kRounding);
+  EXPECT_EQ(limit.lower.x(), -0.5);
+  EXPECT_EQ(limit.upper.x(), 2.0);
+  EXPECT_LT((drive.velocity - 0.7 * kAxis).norm(), kRounding);
+  EXPECT_EQ(drive.maximum_force.x(), 30.0);
+  EXPECT_EQ(rank(slider.jacobian(all)), 6);
+}
+
+TEST_F(JointPair, ADistancesRowIsTheRateOfTheDistance) {
+  PluginUnderTest plugin("constraint_distance");
+  const Vector3 other = kPoint + 1.7 * kBent;
+  JointProblem rod = joint(&plugin, "Distance", numbers({kPoint, other}, {kAbsent, kAbsent}));
+  ASSERT_EQ(rod.describe().size(), 1U);
+  EXPECT_NEAR(rod.describe()[0].lower.x(), 1.7, kRounding);
+  EXPECT_EQ(rod.describe()[0].lower.x(), rod.describe()[0].upper.x());
+  EXPECT_EQ(rank(rod.jacobian(rod.describe())), 1);
+  for (int i = 0; i < 20; ++i) {
+    for (JointedBody& body : rod.bodies)
+      body = {displaced(body.pose, random_.vector(0.1), random_.vector(0.3)),
+              {random_.vector(1.0), random_.vector(1.0)}};
+    const Discrepancy d = rod.describe()[0];
+    const Vector3 axis = to_rotation_matrix(d.axes).col(0);
+    EXPECT_NEAR(axis.dot(d.point2 - d.point1), (d.point2 - d.point1).norm(), kRounding);
+    EXPECT_NEAR(joint_error(d, d.point2 - d.point1), std::fabs((d.point2 - d.point1).norm() - 1.7), kRounding);
+    const auto distance_after = [&](double time) {
+      Vector3 point[2];
+      for (std::size_t b = 0; b < 2; ++b) {
+        const JointedBody& body = rod.bodies[b];
+        point[b] = carried(b == 0 ? d.point1 : d.point2, body.pose,
+                           displaced(body.pose, time * body.twist.linear, time * body.twist.angular));
+      }
+      return (point[1] - point[0]).norm();
+    };
+    EXPECT_NEAR((distance_after(1e-5) - distance_after(-1e-5)) / 2e-5, rod.row_velocity(d, axis), 1e-8);
+  }
+}
+
+TEST_F(JointPair, ARopeIsSlackWithinItsLength) {
+  PluginUnderTest plugin("constraint_distance");
+  const Discrepancy d = joint(&plugin, "Distance", numbers({kPoint, kPoint + kAxis}, {kAbsent, 2.5})).describe().at(0);
+  EXPECT_EQ(d.lower.x(), 0.0);
+  EXPECT_EQ(d.upper.x(), 2.5);
+  EXPECT_EQ(joint_error(d, d.point2 - d.point1), 0.0);
+  EXPECT_NEAR(joint_error(d, Vector3(0, 3.0, 0)), 0.5, kRounding);
+}
+
+TEST_F(JointPair, ConstantVelocityLeavesEveryBendFreeAndNoTwist) {
+  PluginUnderTest plugin("constraint_constant_velocity");
+  for (int i = 0; i < 30; ++i) {
+    JointProblem shafts = joint(&plugin, "ConstantVelocity", numbers({kPoint, kAxis, kAxis}));
+    // from straight, a bend to any direction
+    Vector3 across = random_.vector(1.0);
+    across -= across.dot(kAxis) * kAxis;
+    turn(&shafts, 1.2 * across);
+    const std::vector<Discrepancy> all = shafts.describe();
+    ASSERT_EQ(all.size(), 2U);
+    EXPECT_EQ(rank(shafts.jacobian(all)), 4);
+    for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kRounding);
+    // equal speeds about the shafts are what the row wants
+    const Vector3 shaft2 = exp_rotation(1.2 * across) * kAxis;
+    shafts.bodies[0].twist.angular = 3.0 * kAxis;
+    shafts.bodies[1].twist.angular = 3.0 * shaft2;
+    EXPECT_NEAR(shafts.row_velocity(all[1], to_rotation_matrix(all[1].axes).col(0)), 0.0, kRounding);
+    // a twist about the second shaft is seen as cos(bend/2) of it
+    turn(&shafts, 0.01 * shaft2);
+    const Discrepancy twisted = shafts.describe()[1];
+    EXPECT_NEAR(joint_error(twisted, twisted.point2 - twisted.point1), 0.01 * std::sqrt(0.5 * (1 + kAxis.dot(shaft2))),
+                kRounding);
+  }
+}
+
+TEST_F(JointPair, ASuspensionIsASpringAlongTheSteeringAxisAndNoError) {
+  PluginUnderTest plugin("constraint_axle");
+  JointProblem wheel = joint(&plugin, "Axle", numbers({kPoint, kAxis, kAcross}, {2000.0, 50.0}));
+  wheel.bodies[1].pose.position += 0.07 * kAxis;
+  const std::vector<Discrepancy> all = wheel.describe();
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_EQ(rank(wheel.jacobian({all[0], all[1]})), 3);
+  for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kRounding);
+  EXPECT_NEAR(to_rotation_matrix(all[2].axes).col(0).dot(all[2].point2 - all[2].point1), 0.07, kRounding);
+  EXPECT_EQ(all[2].compliance.x(), 1.0 / 2000.0);
+  EXPECT_EQ(all[2].damping.x(), 50.0);
+}
+
+// Reach cones and twist: the row's error is the way to the limit, and its rate is the row's, near the limit.
+TEST_F(JointPair, AReachConesRowPointsToTheCone) {
+  PluginUnderTest plugin("constraint_spherical");
+  const std::vector<double> round = numbers({kPoint}, {0.5, 0, kAxis.x(), kAxis.y(), kAxis.z(), kAbsent, kAbsent});
+  std::vector<double> irregular = numbers({kPoint}, {kAbsent, 4});
+  for (const double number : {0.3, 0.4, 1.8, 0.7, 3.5, 0.35, 5.0, 0.6}) irregular.push_back(number);
+  for (const double number : {kAxis.x(), kAxis.y(), kAxis.z(), kAbsent, kAbsent}) irregular.push_back(number);
+  for (const bool is_round : {true, false}) {
+    int inside = 0, outside = 0;
+    for (int i = 0; i < 200; ++i) {
+      JointProblem socket = joint(&plugin, "Spherical", is_round ? round : irregular);
+      turn(&socket, random_.vector(0.5));
+      for (JointedBody& body : socket.bodies) body.twist = {random_.vector(1.0), random_.vector(1.0)};
+      const auto error = [&] {
+        const Discrepancy d = socket.describe().at(1);
+        return to_rotation_matrix(d.axes).col(0).dot(d.point2 - d.point1);
+      };
+      const Discrepancy d = socket.describe().at(1);
+      (error() < 0.0 ? inside : outside) += 1;
+      const double start = error();
+      // the length of the gradient is that at the cone
+      if (!is_round && std::fabs(start) > 2e-3) continue;
+      const double rate = socket.row_velocity(d, to_rotation_matrix(d.axes).col(0));
+      const std::vector<JointedBody> now = socket.bodies;
+      double at[2];
+      for (int side = 0; side < 2; ++side) {
+        const double time = side == 0 ? -1e-6 : 1e-6;
+        for (std::size_t b = 0; b < 2; ++b)
+          socket.bodies[b].pose = displaced(now[b].pose, time * now[b].twist.linear, time * now[b].twist.angular);
+        at[side] = error();
+      }
+      EXPECT_NEAR((at[1] - at[0]) / 2e-6, rate, is_round ? 1e-8 : 2e-2);
+    }
+    EXPECT_GT(inside, 20);
+    EXPECT_GT(outside, 20);
+  }
+}
+
+TEST_F(JointPair, ATwistIsLimitedAtAnySwing) {
+  PluginUnderTest plugin("constraint_spherical");
+  const std::vector<double> properties = numbers({kPoint}, {kAbsent, 0, kAxis.x(), kAxis.y(), kAxis.z(), -0.3, 0.8});
+  for (int i = 0; i < 20; ++i) {
+    JointProblem socket = joint(&plugin, "Spherical", properties);
+    const double twist = random_.uniform(-1.0, 1.0);
+    turn(&socket, twist * kAxis);
+    Vector3 across = random_.vector(1.0);
+    across -= across.dot(kAxis) * kAxis;
+    turn(&socket, across);
+    const std::vector<Discrepancy> all = socket.describe();
+    ASSERT_EQ(all.size(), 2U);
+    const Discrepancy& d = all[1];
+    const double scale = d.upper.x() / 0.8;
+    EXPECT_NEAR(scale, std::cos(0.5 * across.norm()), kRounding);
+    EXPECT_NEAR(d.lower.x(), -0.3 * scale, kRounding);
+    EXPECT_NEAR(to_rotation_matrix(d.axes).col(0).dot(d.point2 - d.point1), scale * twist, kRounding);
+  }
+}
+
+TEST_F(JointPair, ContradictionsAreRefusedWithTheField) {
+  struct Trial {
+    const char* plugin;
+    const char* type;
+    std::vector<double> properties;
+    const char* field;
+  };
+  const std::vector<Trial> trials = {
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint}, {kAbsent, kAbsent}), "BindAxisPoint1"},
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {0.5, -0.5}), "LowerLimit"},
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {0.1, 0.5}), "LowerLimit"},
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-0.5, -0.1}), "UpperLimit"},
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-4.0, 4.0}), "UpperLimit"},
+      {"constraint_slider", "Slider", numbers({kPoint, Vector3::Zero()}, {kAbsent, kAbsent, kAbsent, kAbsent}), "Axis"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {1.0, -1.0, kAbsent, kAbsent}), "LowerLimit"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {kAbsent, kAbsent, kAbsent, 5.0}), "MaximumForce"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {2.0, 1.0}), "MinimumDistance"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {2.0, 3.0}), "MinimumDistance"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {kAbsent, 0.5}), "MaximumDistance"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint}, {kAbsent, kAbsent}), "MaximumDistance"},
+      {"constraint_universal", "Universal", numbers({kPoint, kAxis, -2.0 * kAxis}), "Axis2"},
+      {"constraint_universal", "Universal", numbers({kPoint, Vector3::Zero(), kAxis}), "Axis1"},
+      {"constraint_constant_velocity", "ConstantVelocity", numbers({kPoint, kAxis, -kAxis}), "Axis2"},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAxis}, {kAbsent, kAbsent}), "RollingAxis"},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAcross}, {kAbsent, 3.0}), "SuspensionDamping"},
+      {"constraint_spherical", "Spherical", numbers({kPoint}, {0.5, 0, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent}),
+       "Axis"},
+      {"constraint_spherical", "Spherical", numbers({kPoint}, {kAbsent, 0, 0, 0, 0, -0.1, 0.1}), "Axis"},
+      {"constraint_spherical", "Spherical",
+       numbers({kPoint}, {0.5, 3, 0.0, 0.5, 1.0, 0.5, 2.0, 0.5, 1, 0, 0, kAbsent, kAbsent}), "ReachConeAngle"},
+      {"constraint_spherical", "Spherical",
+       numbers({kPoint}, {kAbsent, 2, 0.0, 0.5, 1.0, 0.5, 1, 0, 0, kAbsent, kAbsent}), "ReachCone"},
+      {"constraint_spherical", "Spherical",
+       numbers({kPoint}, {kAbsent, 3, 0.0, 0.5, 2.0, 0.5, 1.0, 0.5, 1, 0, 0, kAbsent, kAbsent}), "ReachCone"},
+  };
+  for (const Trial& trial : trials) {
+    PluginUnderTest plugin(trial.plugin);
+    const std::string why = refused(&plugin, trial.type, trial.properties);
+    EXPECT_NE(why.find(std::string(trial.type) + ": " + trial.field), std::string::npos)
+        << trial.type << ", " << trial.field << ": \"" << why << '"';
+  }
+}
+
+}  // namespace
+}  // namespace gravitas::test

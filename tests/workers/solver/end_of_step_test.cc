@@ -1,0 +1,295 @@
+// Newton and Direct: laws over random problems, and problems that are degenerate.
+#include "plugin_sdk/solver/end_of_step.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "plugin_sdk/conformance/draw.h"
+#include "plugin_sdk/math/rotation.h"
+#include "tests/workers/solver/end_of_step_problem.h"
+#include "tests/workers/solver/solver_problem.h"
+
+namespace gravitas {
+namespace {
+
+using conformance::Draw;
+
+// Bodies in a row that are pressed together, with contacts between neighbours and the ground, theta 0 and no overlap: what
+// the answer's velocities are is what its impulses make of the trial's.
+struct Heap {
+  SolverProblem problem;
+  double friction;
+};
+
+Heap random_heap(std::uint64_t seed, double heaviest = 1.0, double restitution = 0.0) {
+  Draw draw(seed);
+  Heap heap;
+  heap.friction = draw.uniform(0.1, 0.9);
+  SolverProblem& p = heap.problem;
+  p.theta = 0.0;
+  const std::uint32_t ground = p.add_immovable();
+  const std::uint32_t count = 2 + draw.below(4);
+  std::uint64_t key = 1;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double mass = i + 1 == count ? heaviest : draw.uniform(0.5, 2.0);
+    const std::uint32_t body =
+        p.add_body({.mass = mass,
+                    .moments = mass * Vector3(draw.uniform(0.1, 0.2), draw.uniform(0.1, 0.2), draw.uniform(0.1, 0.2)),
+                    .pose = {Vector3(0, 0.5 + i, 0), draw.rotation()},
+                    .linear = draw.vector(1.0) + Vector3(0, -2, 0),
+                    .angular = draw.vector(2.0)});
+    // the four corners of a face, so that rows depend on each other
+    for (const double x : {-0.5, 0.5})
+      for (const double z : {-0.5, 0.5})
+        p.add_contact({.body1 = i == 0 ? ground : body - 1,
+                       .body2 = body,
+                       .point = {x, static_cast<double>(i), z},
+                       .restitution = restitution,
+                       .static_friction = heap.friction,
+                       .dynamic_friction = heap.friction,
+                       .key = key++});
+  }
+  return heap;
+}
+
+Vector3 relative_velocity(const SolverProblem& p, std::span<const double> linear, std::span<const double> angular,
+                          std::size_t contact) {
+  Vector3 sum = Vector3::Zero();
+  for (std::size_t end = 0; end < 2; ++end) {
+    const std::uint32_t body = p.contact_body[2 * contact + end];
+    const Vector3 arm = vector_at(p.contact_point, contact) - vector_at(p.trial_position, body);
+    sum += (end == 0 ? -1.0 : 1.0) * (vector_at(linear, body) + vector_at(angular, body).cross(arm));
+  }
+  return sum;
+}
+
+// |r - P_K(r - u^)| / max(|q|, |r|, |u|), u^ = u + mu |u_T| n, K the friction cones (PROBLEMS: FCLIB).
+double contact_residual(const Heap& heap, const SolverAnswer& answer) {
+  const SolverProblem& p = heap.problem;
+  double missing = 0.0, free = 0.0, impulses = 0.0, velocities = 0.0;
+  for (std::size_t i = 0; i < p.contact_key.size(); ++i) {
+    const Vector3 n = vector_at(p.contact_normal, i), r = answer.impulse(i);
+    const Vector3 u = relative_velocity(p, answer.linear_velocity, answer.angular_velocity, i);
+    const Vector3 q = relative_velocity(p, p.trial_linear_velocity, p.trial_angular_velocity, i);
+    const Vector3 slip = u - u.dot(n) * n;
+    const Vector3 z = r - (u + heap.friction * slip.norm() * n);
+    // projection to the cone
+    const double normal = z.dot(n);
+    const Vector3 across = z - normal * n;
+    const double length = across.norm(), mu = heap.friction;
+    Vector3 projected = z;
+    if (mu * length <= -normal) {
+      projected = Vector3::Zero();
+    } else if (length > mu * normal) {
+      const double along = (normal + mu * length) / (1.0 + mu * mu);
+      projected = along * (n + mu * across / length);
+    }
+    missing += (r - projected).squaredNorm();
+    free += q.squaredNorm(), impulses += r.squaredNorm(), velocities += u.squaredNorm();
+  }
+  return std::sqrt(missing / std::max({free, impulses, velocities}));
+}
+
+TEST(EndOfStep, ContactResidualIsBelow1em10) {
+  double worst = 0.0;
+  std::uint32_t most = 0;
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const Heap heap = random_heap(seed);
+    const SolverAnswer answer = heap.problem.solve(newton());
+    EXPECT_TRUE(answer.converged()) << seed;
+    const double residual = contact_residual(heap, answer);
+    EXPECT_LE(residual, 1e-10) << seed;
+    worst = std::max(worst, residual);
+    most = std::max(most, answer.iterations[0]);
+  }
+  RecordProperty("worst_residual", std::to_string(worst));
+  RecordProperty("most_iterations", std::to_string(most));
+}
+
+TEST(EndOfStep, ContactResidualAtAnyMassRatio) {
+  for (const double heaviest : {1e-3, 1e2, 1e4}) {
+    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+      const Heap heap = random_heap(seed, heaviest);
+      EXPECT_LE(contact_residual(heap, heap.problem.solve(newton())), 1e-10) << heaviest << ", " << seed;
+    }
+  }
+}
+
+// Coulomb's law may have several solutions: sweeps need not find the one that steps find, but one.
+TEST(EndOfStep, SweepsEndAtASolutionToo) {
+  int converged = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const Heap heap = random_heap(seed);
+    const SolverAnswer sweeps = heap.problem.solve(direct(20000));
+    if (!sweeps.converged()) continue;  // linear convergence may be slow
+    EXPECT_LE(contact_residual(heap, sweeps), 1e-10) << seed;
+    ++converged;
+  }
+  EXPECT_GE(converged, 30);
+}
+
+TEST(EndOfStep, EnergyNeverRises) {
+  for (const double restitution : {0.0, 0.5, 1.0}) {
+    for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+      const Heap heap = random_heap(seed, 1.0, restitution);
+      const SolverProblem& p = heap.problem;
+      const SolverAnswer answer = p.solve(newton());
+      const double before = p.energy(p.trial_linear_velocity, p.trial_angular_velocity);
+      EXPECT_LE(p.energy(answer.linear_velocity, answer.angular_velocity), before * (1.0 + 1e-12)) << seed;
+    }
+  }
+}
+
+// In the mirror x -> -x the answer is the mirrored one: positions and velocities are vectors, turning is not.
+TEST(EndOfStep, AMirroredHeapMovesMirrored) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Heap heap = random_heap(seed);
+    Heap mirrored = heap;
+    SolverProblem& p = mirrored.problem;
+    const auto flip = [](std::vector<double>* column, std::size_t width, std::initializer_list<std::size_t> which) {
+      for (std::size_t row = 0; row < column->size() / width; ++row)
+        for (const std::size_t k : which) (*column)[width * row + k] *= -1.0;
+    };
+    for (auto* column : {&p.position, &p.linear_velocity, &p.trial_position, &p.trial_linear_velocity, &p.contact_point,
+                         &p.contact_normal})
+      flip(column, 3, {0});
+    for (auto* column : {&p.angular_velocity, &p.trial_angular_velocity}) flip(column, 3, {1, 2});
+    for (auto* column : {&p.orientation, &p.trial_orientation}) flip(column, 4, {2, 3});
+    const SolverAnswer one = heap.problem.solve(newton()), other = p.solve(newton());
+    for (std::size_t i = 0; i < p.flags.size(); ++i) {
+      EXPECT_LE((other.velocity(i) - one.velocity(i).cwiseProduct(Vector3(-1, 1, 1))).norm(), 1e-9) << seed;
+      EXPECT_LE((other.turning(i) - one.turning(i).cwiseProduct(Vector3(1, -1, -1))).norm(), 1e-9) << seed;
+    }
+  }
+}
+
+// ---- degenerate
+
+TEST(EndOfStepDegenerate, WithoutRowsTheTrialStands) {
+  SolverProblem p;
+  p.add_body({.linear = {1, 2, 3}});
+  const SolverAnswer answer = p.solve(newton());
+  EXPECT_EQ(answer.velocity(0), Vector3(1, 2, 3));
+  EXPECT_EQ(answer.stop_reason[0], static_cast<std::uint32_t>(StopReason::kNothingToDo));
+}
+
+TEST(EndOfStepDegenerate, ThousandsOfContactsOnOneBody) {
+  SolverProblem p;
+  const auto ground = p.add_immovable();
+  const auto plate = p.add_body({.mass = 3.0, .pose = {{0, 0.1, 0}, Quaternion::Identity()}, .linear = {0.5, -1, 0}});
+  for (int i = 0; i < 1500; ++i)
+    p.add_contact({.body1 = ground,
+                   .body2 = plate,
+                   .point = {0.01 * (i % 50) - 0.245, 0.0, 0.01 * (i / 50) - 0.145},
+                   .static_friction = 0.4,
+                   .dynamic_friction = 0.4,
+                   .key = static_cast<std::uint64_t>(i + 1)});
+  const SolverAnswer answer = p.solve(newton());
+  EXPECT_NEAR(answer.velocity(plate).y(), 0.0, 1e-6);
+  // mu times the normal impulse
+  EXPECT_NEAR(answer.velocity(plate).x(), 0.5 - 0.4, 1e-6);
+}
+
+TEST(EndOfStepDegenerate, EveryContactThreeTimesIsThatContact) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Heap heap = random_heap(seed);
+    Heap thrice = heap;
+    SolverProblem& p = thrice.problem;
+    const std::size_t count = p.contact_key.size();
+    for (int repeat = 0; repeat < 2; ++repeat)
+      for (std::size_t i = 0; i < count; ++i)
+        p.add_contact({.body1 = p.contact_body[2 * i],
+                       .body2 = p.contact_body[2 * i + 1],
+                       .point = vector_at(p.contact_point, i),
+                       .static_friction = heap.friction,
+                       .dynamic_friction = heap.friction,
+                       .key = 1000 + p.contact_key.size()});
+    EXPECT_LE(contact_residual(thrice, p.solve(newton())), 1e-10) << seed;
+  }
+}
+
+TEST(EndOfStepDegenerate, MomentsOfOneTo1em8) {
+  SolverProblem p;
+  const auto rod = p.add_body({.moments = {1.0, 1.0, 1e-8}, .linear = {0, -1, 0}, .angular = {0.1, 0.2, 5}});
+  p.make_trial({0, -9.81, 0});
+  p.add_discrepancy(kNone, rod, p.joint_at(kNone, rod, {0.3, 0.2, 0.1}));
+  const SolverAnswer answer = p.solve(newton());
+  EXPECT_TRUE(answer.converged());
+  EXPECT_TRUE(std::isfinite(answer.turning(rod).norm()));
+  EXPECT_LE(
+      (carried(p.at_trial(rod, {0.3, 0.2, 0.1}), p.trial_pose(rod), p.committed(answer, rod)) - Vector3(0.3, 0.2, 0.1))
+          .norm(),
+      1e-12);
+}
+
+TEST(EndOfStepDegenerate, ContradictionsAreReportedAndCompromised) {
+  SolverProblem p;
+  const auto left = p.add_body({.linear = {-1, 0, 0}, .kinematic = true});
+  const auto right = p.add_body({.linear = {1, 0, 0}, .kinematic = true});
+  const auto middle = p.add_body({.mass = 2.0});
+  p.make_trial(Vector3::Zero());
+  for (const auto end : {left, right}) p.add_discrepancy(end, middle, p.joint_at(end, middle, Vector3::Zero()));
+  for (const EndOfStepSolver& solver : {newton(), direct()}) {
+    const SolverAnswer answer = p.solve(solver);
+    EXPECT_EQ(answer.stop_reason[0], static_cast<std::uint32_t>(StopReason::kContradiction));
+    EXPECT_LE(answer.velocity(middle).norm(), 1e-12);
+    EXPECT_LE(answer.translation(middle).norm(), 1e-12);
+  }
+}
+
+// Half of a ball is in the ground: it comes out whole in a step, and with no speed of its own.
+TEST(EndOfStepDegenerate, OverlapGivesNoSpeed) {
+  SolverProblem p;
+  const auto ground = p.add_immovable();
+  const auto ball = p.add_body({.pose = {{0, 0, 0}, Quaternion::Identity()}});
+  p.make_trial({0, -9.81, 0});
+  const double depth = 0.5 - p.trial_pose(ball).position.y();
+  p.add_contact({.body1 = ground, .body2 = ball, .point = {0, -0.5 * depth, 0}, .depth = depth, .restitution = 0.5});
+  const SolverAnswer answer = p.solve(newton());
+  EXPECT_NEAR(p.committed(answer, ball).position.y(), 0.5, 1e-12);
+  EXPECT_LE(answer.velocity(ball).norm(), 1e-12);
+}
+
+// Painlevé's rod, mu beyond 4/3: no solution may exist; the answer is finite and says so.
+TEST(EndOfStepDegenerate, PainlevesRodIsAnswered) {
+  for (const double mu : {0.5, 1.5, 3.0}) {
+    for (const double angle : {0.3, 0.9, 1.2}) {
+      SolverProblem p;
+      const auto ground = p.add_immovable();
+      const Vector3 foot = -0.5 * Vector3(std::cos(angle), std::sin(angle), 0);
+      const auto rod = p.add_body(
+          {.moments = Vector3::Constant(1.0 / 12.0), .pose = {-foot, Quaternion::Identity()}, .linear = {1.5, 0, 0}});
+      p.set_trial_velocity(rod, {1.5, -0.0981, 0}, Vector3::Zero());
+      p.add_contact({.body1 = ground, .body2 = rod, .static_friction = mu, .dynamic_friction = mu});
+      const SolverAnswer answer = p.solve(newton());
+      EXPECT_TRUE(std::isfinite(answer.velocity(rod).norm() + answer.turning(rod).norm()));
+      const double before = p.energy(p.trial_linear_velocity, p.trial_angular_velocity);
+      EXPECT_LE(p.energy(answer.linear_velocity, answer.angular_velocity), before * (1.0 + 1e-9));
+    }
+  }
+}
+
+// Rolling and spinning friction end in finite time: a ball's turning is stopped by at most mu_r N each.
+TEST(EndOfStep, RollingAndSpinningFrictionAreBoundedTorques) {
+  for (const double coefficient : {0.001, 10.0}) {
+    SolverProblem p;
+    const auto ground = p.add_immovable();
+    const auto ball = p.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}, .angular = {0, 4, 0}});
+    p.theta = 0.0;
+    p.set_trial_velocity(ball, {0, -0.0981, 0}, {0, 4, 0});
+    p.add_contact({.body1 = ground,
+                   .body2 = ball,
+                   .static_friction = 0.5,
+                   .dynamic_friction = 0.5,
+                   .rolling = 0.01,
+                   .spinning = coefficient});
+    const SolverAnswer answer = p.solve(newton());
+    EXPECT_NEAR(answer.turning(ball).y(), std::max(0.0, 4.0 - coefficient * 0.0981 / 0.4), 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,311 @@
+#include "workers/collision/standard/composite_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/geometry/contour_contacts.h"
+#include "plugin_sdk/geometry/support_map_buffer.h"
+#include "workers/collision/standard/narrow_phase.h"
+#include "workers/collision/standard/pair_functions.h"
+
+namespace gravitas::collision {
+namespace {
+
+// Sines of angles within which features lie flat on each other; heights over a plane, of the triangle's edges, that
+// count as none.
+constexpr double kFlat = 0.03;
+constexpr double kLevel = 1e-7;
+constexpr double kFacePreference = 0.01;
+
+// ---- normals of a mesh
+
+enum class NormalKind {
+  kOwn,     // in the mesh's normal cone at the triangle's feature
+  kFlush,   // not, but the neighbours that stand in its way are flush with the triangle, or rise
+  kForeign  // not: a neighbour has the contact, or it points into the solid
+};
+
+// What the unit normal n, which leads away from a triangle's feature farthest along it, is to the mesh. `side` is -1 where
+// an open mesh is looked at from its back.
+NormalKind classify(const TriangleMesh& mesh, std::uint32_t t, const Vector3& n, double side) {
+  const std::array<Vector3, 3> x = mesh.corners(t);
+  const Vector3 own = side * mesh.normal(t);
+  double longest = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) longest = std::max(longest, (x[(k + 1) % 3] - x[k]).squaredNorm());
+  longest = std::sqrt(longest);
+  const std::array<double, 3> height = {n.dot(x[0]), n.dot(x[1]), n.dot(x[2])};
+  const double top = std::max({height[0], height[1], height[2]});
+  std::array<bool, 3> touches{};
+  std::size_t count = 0;
+  // an edge counts as touching up to a milliradian: the feature's neighbours are those of the edge
+  for (std::size_t k = 0; k < 3; ++k) count += (touches[k] = height[k] >= top - 1e-3 * longest) ? 1 : 0;
+  if (count == 3) return n.dot(own) > 0.0 ? NormalKind::kOwn : NormalKind::kForeign;
+
+  bool leads_out = n.dot(own) > 0.0, is_own = true, is_flush = true, has_border = false;
+  const auto look = [&](std::uint32_t around) {
+    if (around == t) return;
+    leads_out = leads_out || n.dot(side * mesh.normal(around)) > 0.0;
+    const std::array<Vector3, 3> y = mesh.corners(around);
+    for (const Vector3& corner : y) {
+      if (n.dot(corner) <= top + kLevel * longest) continue;
+      is_own = false;
+      is_flush = is_flush && own.dot(corner - x[0]) >= -1e-3 * std::sqrt((corner - x[0]).squaredNorm());
+    }
+  };
+  if (count == 2) {
+    const int edge = touches[0] ? (touches[1] ? 0 : 2) : 1;
+    const std::uint32_t neighbour = mesh.neighbour(t, edge);
+    has_border = neighbour == TriangleMesh::kNone;
+    if (!has_border) look(neighbour);
+  } else {
+    const std::size_t vertex = touches[0] ? 0 : (touches[1] ? 1 : 2);
+    for (const std::uint32_t around : mesh.ring(mesh.triangles()[t][vertex])) look(around);
+    has_border = !mesh.is_closed();
+  }
+  if (!leads_out && !has_border) return NormalKind::kForeign;
+  if (is_own) return NormalKind::kOwn;
+  return is_flush ? NormalKind::kFlush : NormalKind::kForeign;
+}
+
+// ---- a triangle and a convex shape, in the frame of the triangle
+
+struct TriangleSide {
+  const TriangleMesh& mesh;
+  std::uint32_t triangle;
+  double side;  // +1 or -1
+  Matrix3 R;    // the mesh's axes in the frame of the pair
+
+  Vector3 normal() const { return R * (side * mesh.normal(triangle)); }
+  NormalKind kind(const Vector3& n) const { return classify(mesh, triangle, R.transpose() * n, side); }
+};
+
+double tie_of(const PlacedPair& pair) { return std::max(1e-9 * pair.thinnest(), 1e-13 * pair.reach()); }
+
+// The contacts along n, from a to b; those of the features that touch there in a point only if `least` is given.
+void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out) {
+  const double tie = tie_of(pair);
+  ContactCandidates candidates(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
+  Contour a, b;
+  pair.a.contour(n, kFlat, &a);
+  pair.b.contour(pair.R_AB.transpose() * -n, kFlat, &b);
+  place_contour(pair.R_AB, pair.p_AB, &b);
+  add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
+  if (candidates.count() == 0 && least != nullptr)
+    candidates.add(
+        {0.5 * (least->point_a + least->point_b), n, least->depth, (a.code & 0x7FFFU) << 15 | (b.code & 0x7FFFU)});
+  candidates.reduce_to(out);
+}
+
+// The normal at which a triangle `a` touches the other side of the pair: nothing if it is not for it to say. `other` is
+// the triangle on that side, if it is one.
+bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const TriangleSide* other, const Separation& least,
+                   Vector3* normal, bool* is_least) {
+  const double tie = std::max(1e-7 * pair.thinnest(), 1e-14 * pair.reach());
+  const auto within = [&](double depth) { return least.depth >= depth - tie - kFacePreference * std::max(depth, 0.0); };
+  const auto allows = [&](const Vector3& n) {
+    return a.kind(n) == NormalKind::kOwn && (other == nullptr || other->kind(-n) == NormalKind::kOwn);
+  };
+  *is_least = false;
+  // faces first, as near as they come to the least
+  *normal = a.normal();
+  if (within(pair.depth_along(*normal)) && allows(*normal)) return true;
+  if (other != nullptr) {
+    *normal = -other->normal();
+    if (within(pair.depth_along(*normal)) && allows(*normal)) return true;
+  }
+  *normal = least.normal;
+  *is_least = true;
+  const NormalKind kind = a.kind(*normal);
+  const NormalKind other_kind = other == nullptr ? NormalKind::kOwn : other->kind(-*normal);
+  if (kind == NormalKind::kOwn && other_kind == NormalKind::kOwn) return true;
+  if (kind == NormalKind::kForeign || other_kind == NormalKind::kForeign) return false;
+  *is_least = false;
+  *normal = kind == NormalKind::kFlush ? a.normal() : Vector3(-other->normal());
+  // what has sunk below the plane by more than half is no longer on it
+  const Vector3 arm = pair.p_AB + pair.R_AB * pair.b.centre() - pair.a.centre();
+  if (other == nullptr && !(normal->dot(arm) > 0.0)) return false;
+  return allows(*normal);
+}
+
+// ---- mesh against convex, half-space and mesh
+
+Box3 box_of(const SupportMap& map, const Matrix3& R, const Vector3& p) {
+  Box3 box;
+  for (int i = 0; i < 3; ++i) {
+    const Vector3 axis = R.row(i).transpose();
+    box.upper[i] = p[i] + axis.dot(map.support(axis)) + map.rounding();
+    box.lower[i] = p[i] + axis.dot(map.support(-axis)) - map.rounding();
+  }
+  return box;
+}
+
+class Collector {
+ public:
+  Collector(const Pose& frame, std::uint64_t key, double merge, bool is_reversed, ContactList* out)
+      : R_(frame.orientation.toRotationMatrix()),
+        p_(frame.position),
+        key_(key),
+        merge_(merge),
+        is_reversed_(is_reversed),
+        out_(out) {}
+
+  // A contact in the frame, its normal from the mesh to the other.
+  void add(std::uint64_t part, const ContactPoint& contact) const {
+    ContactPoint moved = contact;
+    moved.point = p_ + R_ * contact.point;
+    moved.normal = R_ * contact.normal;
+    if (is_reversed_) moved.normal = -moved.normal;
+    out_->collect(key_of_part(key_, part), moved, merge_);
+  }
+  void add(std::uint64_t part, const Manifold& manifold) const {
+    for (int i = 0; i < manifold.count; ++i) add(part, manifold.contacts[static_cast<std::size_t>(i)]);
+  }
+
+ private:
+  Matrix3 R_;
+  Vector3 p_;
+  std::uint64_t key_;
+  double merge_;
+  bool is_reversed_;
+  ContactList* out_;
+};
+
+void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const Pose& X_MC, double margin,
+                         const Collector& out) {
+  const Matrix3 R = X_MC.orientation.toRotationMatrix();
+  const Vector3 centre = X_MC.position + R * map.centre();
+  mesh.for_each_in(box_of(map, R, X_MC.position).widened(margin), [&](std::uint32_t t) {
+    const TriangleMap triangle(mesh.corners(t), mesh.normal(t));
+    const PlacedPair pair{triangle, map, R, X_MC.position};
+    const Separation least = find_separation(pair, margin);
+    if (!(least.depth >= -margin)) return;
+    const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
+    const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
+    Vector3 normal;
+    bool is_least = false;
+    if (!choose_normal(pair, side, nullptr, least, &normal, &is_least)) return;
+    Manifold manifold;
+    contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+    out.add(t, manifold);
+  });
+  if (!mesh.is_closed() || !mesh.box().widened(0.0).overlaps({centre, centre})) return;
+  const TriangleMesh::Nearest nearest = mesh.nearest(centre);
+  if (!(nearest.signed_distance < 0.0)) return;
+  const Vector3 way = nearest.point - centre;
+  const Vector3 n = way / std::sqrt(way.squaredNorm());
+  const Vector3 back = X_MC.position + R * map.support(R.transpose() * -n) - map.rounding() * n;
+  const double depth = n.dot(nearest.point - back);
+  out.add(TriangleMesh::kNone, ContactPoint{0.5 * (nearest.point + back), n, depth, 0});
+}
+
+void collide_mesh_halfspace(const TriangleMesh& mesh, const Vector3& up, const Vector3& origin, double margin,
+                            const Collector& out) {
+  std::array<std::uint32_t, 128> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const TriangleMesh::Node& node = mesh.nodes()[stack[--depth]];
+    const double lowest = up.dot(node.box.centre() - origin) - up.cwiseAbs().dot(node.box.half_extents());
+    // widened by a rounding: the corner itself is measured below
+    if (lowest > margin * (1.0 + 1e-12) + 1e-12 * node.box.half_extents().maxCoeff()) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first + 1;
+      stack[depth++] = node.first;
+      continue;
+    }
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const std::uint32_t t = mesh.order()[node.first + i];
+      for (const std::uint32_t v : mesh.triangles()[t]) {
+        // each vertex by the first of its triangles
+        if (mesh.ring(v)[0] != t) continue;
+        const Vector3& x = mesh.vertices()[v];
+        const double sunk = up.dot(origin - x);
+        if (sunk >= -margin) out.add(v, ContactPoint{x + 0.5 * sunk * up, -up, sunk, 0});
+      }
+    }
+  }
+}
+
+void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, double margin,
+                       const Collector& out) {
+  const Matrix3 R = X_AB.orientation.toRotationMatrix();
+  const Vector3 centre_a = a.box().centre(), centre_b = X_AB.position + R * b.box().centre();
+  // the box of a in b
+  const Vector3 half = R.cwiseAbs().transpose() * a.box().half_extents();
+  const Vector3 middle = R.transpose() * (centre_a - X_AB.position);
+  const Box3 box{middle - half, middle + half};
+  b.for_each_in(box.widened(margin + 1e-12 * half.maxCoeff()), [&](std::uint32_t tb) {
+    std::array<Vector3, 3> corners = b.corners(tb);
+    Box3 own;
+    for (Vector3& corner : corners) own.extend(corner = X_AB.position + R * corner);
+    const TriangleMap triangle_b(corners, R * b.normal(tb));
+    a.for_each_in(own.widened(margin), [&](std::uint32_t ta) {
+      const TriangleMap triangle_a(a.corners(ta), a.normal(ta));
+      const PlacedPair pair{triangle_a, triangle_b, Matrix3::Identity(), Vector3::Zero()};
+      const Separation least = find_separation(pair, margin);
+      if (!(least.depth >= -margin)) return;
+      const bool a_behind = !a.is_closed() && a.normal(ta).dot(centre_b - triangle_a.centre()) < 0.0;
+      const bool b_behind = !b.is_closed() && triangle_b.normal().dot(centre_a - triangle_b.centre()) < 0.0;
+      const TriangleSide side_a{a, ta, a_behind ? -1.0 : 1.0, Matrix3::Identity()};
+      const TriangleSide side_b{b, tb, b_behind ? -1.0 : 1.0, R};
+      Vector3 normal;
+      bool is_least = false;
+      if (!choose_normal(pair, side_a, &side_b, least, &normal, &is_least)) return;
+      Manifold manifold;
+      contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+      out.add(std::uint64_t{ta} << 32 | tb, manifold);
+    });
+  });
+}
+
+// ---- parts
+
+double merge_distance(const Shape& a, const Shape& b) {
+  return 1e-9 * std::min(a.type == ShapeType::kHalfspace ? b.size.x() : a.size.x(),
+                         b.type == ShapeType::kHalfspace ? a.size.x() : b.size.x());
+}
+
+void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, std::uint64_t key, double margin,
+                   ContactList* out) {
+  const double reach = bounding_radius(a) + bounding_radius(b) + margin;
+  if (!((X_WB.position - X_WA.position).squaredNorm() <= reach * reach * (1.0 + 1e-12))) return;
+  if (a.compound != nullptr) {
+    for (std::size_t i = 0; i < a.compound->children.size(); ++i) {
+      const CompoundShape::Child& child = a.compound->children[i];
+      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), margin, out);
+    }
+  } else if (b.compound != nullptr) {
+    for (std::size_t i = 0; i < b.compound->children.size(); ++i) {
+      const CompoundShape::Child& child = b.compound->children[i];
+      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), margin, out);
+    }
+  } else if (a.mesh != nullptr && b.mesh != nullptr) {
+    collide_mesh_mesh(*a.mesh, *b.mesh, relative(X_WA, X_WB), margin,
+                      Collector(X_WA, key, merge_distance(a, b), false, out));
+  } else if (a.mesh != nullptr || b.mesh != nullptr) {
+    const bool is_reversed = a.mesh == nullptr;
+    const Shape &mesh = is_reversed ? b : a, &other = is_reversed ? a : b;
+    const Pose X_MO = is_reversed ? relative(X_WB, X_WA) : relative(X_WA, X_WB);
+    const Collector collector(is_reversed ? X_WB : X_WA, key, merge_distance(a, b), is_reversed, out);
+    if (other.type == ShapeType::kHalfspace) {
+      collide_mesh_halfspace(*mesh.mesh, X_MO.orientation * Vector3::UnitY(), X_MO.position, margin, collector);
+    } else {
+      SupportMapBuffer buffer;
+      collide_mesh_convex(*mesh.mesh, support_map_of(other, &buffer), X_MO, margin, collector);
+    }
+  } else {
+    Manifold manifold;
+    collide(a, X_WA, b, X_WB, margin, &manifold);
+    for (int i = 0; i < manifold.count; ++i)
+      out->collect(key, manifold.contacts[static_cast<std::size_t>(i)], merge_distance(a, b));
+  }
+}
+
+}  // namespace
+
+void collide_composite(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin,
+                       ContactList* out) {
+  collide_parts(a, X_WA, b, X_WB, 0, margin, out);
+}
+
+}  // namespace gravitas::collision

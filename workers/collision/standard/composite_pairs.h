@@ -1,0 +1,34 @@
+// Meshes and compounds against everything, each other too.
+//
+// A compound is the union of its children. A mesh is taken triangle by triangle: every triangle that its tree finds near
+// the other shape is a convex solid without thickness. What the single triangle cannot know is put right by its
+// neighbours, so that a flush surface has no edges:
+//
+//   a normal at an edge or vertex is kept only if the triangles round it lie below its plane (it is in the mesh's own
+//   normal cone there); else, where they are flush or rise, the triangle's own normal takes its place, and where they
+//   fall away, one of them is nearer and has the contact
+//   a triangle of a closed mesh pushes outward only, one of an open mesh to the side on which the other shape's centre is
+//   a shape whose centre is inside a closed mesh is pushed to the nearest place of its surface
+#pragma once
+
+#include <vector>
+
+#include "plugin_sdk/math/pose.h"
+#include "workers/collision/standard/contact_list.h"
+#include "workers/collision/standard/shapes.h"
+
+namespace gravitas::collision {
+
+struct CompoundShape {
+  struct Child {
+    Shape shape;
+    Pose pose;
+  };
+  std::vector<Child> children;
+};
+
+// Collects the contacts of a pair of which one at least is composite (ContactList::finish() then answers them).
+void collide_composite(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin,
+                       ContactList* out);
+
+}  // namespace gravitas::collision

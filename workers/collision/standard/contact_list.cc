@@ -1,0 +1,71 @@
+#include "workers/collision/standard/contact_list.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <tuple>
+
+#include "plugin_sdk/geometry/contact_candidates.h"
+
+namespace gravitas::collision {
+namespace {
+
+constexpr double kOneNormal = 0.99996;  // cosine of half a degree
+
+}  // namespace
+
+void ContactList::clear() {
+  collected_.clear();
+  contacts_.clear();
+  merge_distance_ = 0.0;
+}
+
+double ContactList::deepest() const {
+  double depth = -std::numeric_limits<double>::infinity();
+  for (const ContactPoint& contact : contacts_) depth = std::max(depth, contact.depth);
+  return depth;
+}
+
+void ContactList::collect(std::uint64_t key, const ContactPoint& contact, double merge_distance) {
+  merge_distance_ = std::max(merge_distance_, merge_distance);
+  collected_.push_back({key_of_part(key, contact.feature), 0, contact});
+}
+
+void ContactList::finish(const Vector3& origin, bool is_swapped) {
+  // groups of one normal, in the order of the deepest first so that they do not depend on the order of the parts
+  std::sort(collected_.begin(), collected_.end(), [](const Collected& x, const Collected& y) {
+    if (x.contact.depth != y.contact.depth) return x.contact.depth > y.contact.depth;
+    return x.key < y.key;
+  });
+  normals_.clear();
+  for (Collected& one : collected_) {
+    one.group = 0;
+    while (one.group < normals_.size() && !(normals_[one.group].dot(one.contact.normal) >= kOneNormal)) ++one.group;
+    if (one.group == normals_.size()) normals_.push_back(one.contact.normal);
+  }
+  std::sort(collected_.begin(), collected_.end(),
+            [](const Collected& x, const Collected& y) { return std::tie(x.group, x.key) < std::tie(y.group, y.key); });
+  contacts_.clear();
+  for (std::size_t i = 0; i < collected_.size();) {
+    group_.clear();
+    const std::uint32_t group = collected_[i].group;
+    for (; i < collected_.size() && collected_[i].group == group; ++i) {
+      ContactPoint& contact = group_.emplace_back(collected_[i].contact);
+      contact.feature = static_cast<std::uint32_t>(collected_[i].key >> 32);
+    }
+    std::array<int, kManifoldCapacity> chosen{};
+    const int count = choose_extremes(group_, merge_distance_, merge_distance_, &chosen);
+    for (int k = 0; k < count; ++k)
+      contacts_.push_back(group_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(k)])]);
+  }
+  std::stable_sort(contacts_.begin(), contacts_.end(),
+                   [](const ContactPoint& x, const ContactPoint& y) { return x.feature < y.feature; });
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    ContactPoint& contact = contacts_[i];
+    if (i > 0 && contact.feature <= contacts_[i - 1].feature) contact.feature = contacts_[i - 1].feature + 1;
+    contact.point += origin;
+    if (is_swapped) contact.normal = -contact.normal;
+  }
+}
+
+}  // namespace gravitas::collision

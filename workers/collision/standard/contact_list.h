@@ -1,0 +1,47 @@
+// The contacts of one pair of shapes, any number of them. Keeps its room from query to query.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "plugin_sdk/geometry/manifold.h"
+
+namespace gravitas::collision {
+
+class ContactList {
+ public:
+  void clear();
+  std::size_t size() const { return contacts_.size(); }
+  const ContactPoint& operator[](std::size_t i) const { return contacts_[i]; }
+  double deepest() const;
+
+  // A contact as it is to be answered.
+  void add(const ContactPoint& contact) { contacts_.push_back(contact); }
+
+  // A contact of one part of a mesh or compound with another; `key` names the parts, contact.feature the features on
+  // them. Points nearer than `merge_distance` (m) with one normal are one contact.
+  void collect(std::uint64_t key, const ContactPoint& contact, double merge_distance);
+  // Answers what was collected: at most four contacts for every normal (normals within half a degree are one), features
+  // folded to 32 bits and made unique, ascending; moved by `origin`, normals turned round if `is_swapped`.
+  void finish(const Vector3& origin, bool is_swapped);
+
+ private:
+  struct Collected {
+    std::uint64_t key;
+    std::uint32_t group;
+    ContactPoint contact;
+  };
+  std::vector<Collected> collected_;
+  std::vector<Vector3> normals_;  // of the groups
+  std::vector<ContactPoint> group_;
+  std::vector<ContactPoint> contacts_;
+  double merge_distance_ = 0.0;
+};
+
+// Mixes a part's number into the key of the whole.
+inline std::uint64_t key_of_part(std::uint64_t key, std::uint64_t part) {
+  std::uint64_t mixed = (key ^ (part + 0x9E3779B97F4A7C15ULL)) * 0xBF58476D1CE4E5B9ULL;
+  return mixed ^ (mixed >> 31);
+}
+
+}  // namespace gravitas::collision

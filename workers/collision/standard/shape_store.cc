@@ -1,0 +1,159 @@
+#include "workers/collision/standard/shape_store.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/collision.h"
+#include "plugin_sdk/geometry/scene_shape.h"
+#include "workers/collision/standard/detector_table.h"
+
+namespace gravitas::collision {
+namespace {
+
+[[noreturn]] void refuse(std::size_t row, const std::string& why) {
+  throw Refusal("shape " + std::to_string(row) + (why.starts_with("has ") || why.starts_with("is ") ? " " : ": ") +
+                why);
+}
+
+ShapeType type_of_kind(SceneShape::Kind kind) {
+  switch (kind) {
+    case SceneShape::Kind::kSphere:
+      return ShapeType::kSphere;
+    case SceneShape::Kind::kBox:
+      return ShapeType::kBox;
+    case SceneShape::Kind::kCylinder:
+      return ShapeType::kCylinder;
+    case SceneShape::Kind::kHalfspace:
+      return ShapeType::kHalfspace;
+    case SceneShape::Kind::kCapsule:
+      return ShapeType::kCapsule;
+    case SceneShape::Kind::kCone:
+      return ShapeType::kCone;
+    case SceneShape::Kind::kConvexPolyhedron:
+      return ShapeType::kConvexPolyhedron;
+    case SceneShape::Kind::kTriangleMesh:
+      return ShapeType::kTriangleMesh;
+    case SceneShape::Kind::kCompound:
+      break;
+  }
+  return ShapeType::kCompound;
+}
+
+// Types that cost little more to make than to find, so that nothing of them is kept.
+bool is_primitive(std::uint64_t type) {
+  return type == type_id("Sphere") || type == type_id("Box") || type == type_id("Cylinder") ||
+         type == type_id("Halfspace") || type == type_id("Capsule") || type == type_id("Cone");
+}
+
+// Without the heap. Throws Refusal.
+Shape read_primitive(std::uint64_t type, std::span<const double> numbers, std::size_t row) {
+  PropertyCursor cursor(numbers);
+  Shape shape;
+  if (type == type_id("Sphere")) {
+    shape.size = Vector3::Constant(cursor.number());
+  } else if (type == type_id("Box")) {
+    shape.type = ShapeType::kBox;
+    shape.size = cursor.vector();
+  } else if (type == type_id("Halfspace")) {
+    shape.type = ShapeType::kHalfspace;
+    shape.size = Vector3::Ones();
+  } else {
+    const double radius = cursor.number();
+    shape.size = Vector3(radius, 0.5 * cursor.number(), radius);
+    shape.type = type == type_id("Cylinder")  ? ShapeType::kCylinder
+                 : type == type_id("Capsule") ? ShapeType::kCapsule
+                                              : ShapeType::kCone;
+  }
+  if (!shape.size.allFinite() || !(shape.size.minCoeff() > 0.0))
+    refuse(row, "has a size that is not finite and positive");
+  return shape;
+}
+
+StoredShape registered_shape(const RegisteredShape& kind, ShapeType type, std::span<const double> parameters) {
+  StoredShape stored;
+  stored.map = kind.read(PropertyCursor(parameters));
+  stored.shape = {type, Vector3(stored.map->radius(), stored.map->thinnest(), 0.0), stored.map.get()};
+  return stored;
+}
+
+}  // namespace
+
+std::vector<TypeDeclaration> declared_shapes() {
+  std::vector<TypeDeclaration> types = scene_shape_types();
+  for (const RegisteredShape& shape : registered_shapes()) types.push_back(shape.declaration());
+  return types;
+}
+
+StoredShape store_shape(std::shared_ptr<const SceneShape> scene_shape) {
+  StoredShape stored;
+  stored.scene_shape = std::move(scene_shape);
+  const SceneShape& scene = *stored.scene_shape;
+  Shape& shape = stored.shape;
+  shape.type = type_of_kind(scene.kind);
+  shape.size = scene.size;
+  if (scene.kind == SceneShape::Kind::kConvexPolyhedron) {
+    stored.map = make_support_map(scene);
+    shape.map = stored.map.get();
+    shape.size = Vector3(shape.map->radius(), shape.map->thinnest(), 0.0);
+  } else if (scene.mesh) {
+    shape.mesh = scene.mesh.get();
+    double radius = 0.0;
+    for (const Vector3& v : scene.mesh->vertices()) radius = std::max(radius, v.squaredNorm());
+    shape.size = Vector3(std::sqrt(radius), scene.mesh->box().half_extents().maxCoeff(), 0.0);
+  } else if (scene.kind == SceneShape::Kind::kCompound) {
+    stored.compound = std::make_unique<CompoundShape>();
+    shape.size = Vector3(0.0, std::numeric_limits<double>::infinity(), 0.0);
+    for (const SceneShape::Child& child : scene.children) {
+      const Shape& own = stored.children.emplace_back(store_shape(child.shape)).shape;
+      stored.compound->children.push_back({own, child.pose});
+      shape.size.x() = std::max(shape.size.x(), std::sqrt(child.pose.position.squaredNorm()) + bounding_radius(own));
+      shape.size.y() = std::min(shape.size.y(), smallest_half_extent(own));
+    }
+    shape.compound = stored.compound.get();
+  }
+  return stored;
+}
+
+StoredShape read_shape(std::uint64_t type, std::span<const double> parameters, std::size_t row) {
+  const std::span<const RegisteredShape> registered = registered_shapes();
+  for (std::size_t i = 0; i < registered.size(); ++i)
+    if (type_id(registered[i].declaration().name) == type)
+      return registered_shape(registered[i],
+                              static_cast<ShapeType>(static_cast<std::size_t>(ShapeType::kRegistered) + i), parameters);
+  std::string why;
+  std::optional<SceneShape> scene = read_scene_shape(type, parameters, &why);
+  if (!scene) refuse(row, why);
+  StoredShape stored = store_shape(std::make_shared<SceneShape>(std::move(*scene)));
+  if (!std::isfinite(bounding_radius(stored.shape)) && stored.shape.type != ShapeType::kHalfspace)
+    refuse(row, "has a size that is not finite and positive");
+  return stored;
+}
+
+const std::vector<Shape>& ShapeStore::read(const stage::CollisionManifoldsRequest& request) {
+  shapes_.clear();
+  for (auto& [hash, kept] : kept_) kept.is_used = false;
+  for (std::size_t i = 0; i < request.shape_type().size(); ++i) {
+    const std::uint64_t type = request.shape_type()[i];
+    const std::span<const double> parameters = shape_parameters(request, i);
+    if (is_primitive(type)) {
+      shapes_.push_back(read_primitive(type, parameters, i));
+      continue;
+    }
+    const std::uint64_t hash = request.shape_hash()[i];
+    auto found = kept_.find(hash);
+    if (found != kept_.end() && (found->second.type != type || found->second.parameters != parameters.size())) {
+      kept_.erase(found);
+      found = kept_.end();
+    }
+    if (found == kept_.end())
+      found = kept_.emplace(hash, Kept{type, parameters.size(), read_shape(type, parameters, i), true}).first;
+    found->second.is_used = true;
+    shapes_.push_back(found->second.stored.shape);
+  }
+  std::erase_if(kept_, [](const auto& kept) { return !kept.second.is_used; });
+  return shapes_;
+}
+
+}  // namespace gravitas::collision

@@ -1,0 +1,50 @@
+// The shapes of a request as the narrow phase takes them, and what is kept of those that are dear to make: polyhedra,
+// meshes with their trees, compounds. Kept by the hash of their content, so that a shape is made once.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "plugin_sdk/plugin.h"
+#include "workers/collision/standard/composite_pairs.h"
+#include "workers/collision/standard/shapes.h"
+
+namespace gravitas::collision {
+
+// Every type that read_shape() takes.
+std::vector<TypeDeclaration> declared_shapes();
+
+// A shape with what its pointers point to.
+struct StoredShape {
+  Shape shape;
+  std::shared_ptr<const SceneShape> scene_shape;
+  std::unique_ptr<SupportMap> map;
+  std::unique_ptr<CompoundShape> compound;
+  std::deque<StoredShape> children;
+};
+
+// Throws Refusal if the parameters make no shape of that type; `row` is the shape's, for the text.
+StoredShape read_shape(std::uint64_t type, std::span<const double> parameters, std::size_t row);
+// The shape of a scene, or of a child of a compound.
+StoredShape store_shape(std::shared_ptr<const SceneShape> scene_shape);
+
+class ShapeStore {
+ public:
+  // The shapes of a request, valid until the next call. Throws Refusal.
+  const std::vector<Shape>& read(const stage::CollisionManifoldsRequest& request);
+
+ private:
+  struct Kept {
+    std::uint64_t type;
+    std::size_t parameters;
+    StoredShape stored;
+    bool is_used;
+  };
+  std::vector<Shape> shapes_;
+  std::map<std::uint64_t, Kept> kept_;  // by hash of the content
+};
+
+}  // namespace gravitas::collision

@@ -1,0 +1,64 @@
+// Constraint `ConstantVelocity`: two shafts that share a point and turn alike, whatever the bend between them.
+// (The seed's glossary reads "continuous-velocity".)
+//
+//      Axis1 ------o            frame 2 is frame 1 bent: it has no twist against it
+//                   \ Axis2
+//
+// Freedoms. The shared point takes the translations, one row the twist: w.(a1 + a2)/|a1 + a2|, w the relative turning, a1
+// and a2 the shafts. A bend is a turn about an axis across both, and moving the bend round a1 turns by k (a1 - a2): neither
+// has a part along a1 + a2, and all that do not are such turns. Four rows of rank 4, none redundant; left are the two
+// bends. With w1 = O1 a1, w2 = O2 a2 and no bending the row says (O2 - O1)(1 + a1.a2) = 0: equal speeds.
+// Undefined at a bend of 180 degrees, which is refused at the start.
+#include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+namespace {
+
+class ConstantVelocity final : public ConstraintPlugin {
+ public:
+  static PluginDeclaration declaration() {
+    return {.name = "ConstantVelocity",
+            .version = "1.0",
+            .slot = Slot::kConstraint,
+            .meaning = "Joint of shafts that turn alike.",
+            .types = {{"ConstantVelocity",
+                       "Two shafts share a point and turn at one speed, at any bend.",
+                       {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
+                        Property::vector("Axis1", "1", "world")
+                            .required()
+                            .means("Shaft of body 1, any length; both point the same way along the drive."),
+                        Property::vector("Axis2", "1", "world").required().means("Shaft of body 2.")}}}};
+  }
+  explicit ConstantVelocity(PropertyCursor) {}
+
+  void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
+    bind_each(request, reply,
+              [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+                demand_type(type, "ConstantVelocity");
+                const Vector3 point = properties.vector();
+                const Vector3 axis1 = unit_axis(properties.vector(), "ConstantVelocity: Axis1");
+                const Vector3 axis2 = unit_axis(properties.vector(), "ConstantVelocity: Axis2");
+                if ((axis1 + axis2).norm() < 1e-6) throw Refusal("ConstantVelocity: Axis2 points against Axis1");
+                const Pose frame1 = frame_along(point, axis1);
+                const Swing bend = swing_between(axis1, axis2);
+                write_frame(bodies.pose1, frame1, &out);
+                write_frame(bodies.pose2, {point, exp_rotation(bend.angle * bend.axis) * frame1.orientation}, &out);
+              });
+  }
+
+  void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
+                     const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
+    describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      double scale = 0.0;
+      emit(held_point(one, two.position, {true, true, true}));
+      emit(twist_row(one.orientation, two.orientation, AxisMode::kLocked, &scale));
+    });
+  }
+};
+
+}  // namespace
+}  // namespace gravitas
+
+GRAVITAS_PLUGIN(gravitas::ConstantVelocity)

@@ -1,0 +1,96 @@
+// Constraint `Distance`: two points, one of either body, within a range of distances.
+//
+//      x1 o-----------o x2      rod: neither bound given, or both equal;  rope: a largest distance alone;
+//           |x2 - x1|           strut: a smallest alone;  both: a rope with a stop
+//
+// Freedoms. One row along u = (x2 - x1)/|x2 - x1|: J v = u.(v2 + w2 x r2 - v1 - w1 x r1) is the rate of the distance, and
+// not zero for any body that can be moved, so a rod takes one freedom of twelve (rank 1), a rope none while it is slack.
+// u turns with the points (the discrepancy is radial). Where the points meet u is undefined and any direction is taken: a
+// rope is slack there, a rod of length 0 is refused.
+#include <cmath>
+#include <string>
+
+#include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+namespace {
+
+// A distance that a scene gives with few digits is put right in the first step.
+constexpr double kGivenDigits = 1e-3;
+
+class Distance final : public ConstraintPlugin {
+ public:
+  static PluginDeclaration declaration() {
+    return {
+        .name = "Distance",
+        .version = "1.0",
+        .slot = Slot::kConstraint,
+        .meaning = "Rod, rope or cable.",
+        .types = {{"Distance",
+                   "A point of either body, kept at a distance: a rod, a rope, or both bounds of a range.",
+                   {Property::vector("BindPoint1", "m", "world").required().means("Point of body 1, at the start."),
+                    Property::vector("BindPoint2", "m", "world").required().means("Point of body 2, at the start."),
+                    Property::number("MinimumDistance", "m")
+                        .at_least(0.0)
+                        .means("Smallest distance; absent: 0, or that of the start if MaximumDistance is absent too."),
+                    Property::number("MaximumDistance", "m")
+                        .at_least(0.0)
+                        .means("Largest distance; absent: none, or that of the start if MinimumDistance is absent "
+                               "too.")}}}};
+  }
+  explicit Distance(PropertyCursor) {}
+
+  void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
+    bind_each(request, reply,
+              [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+                demand_type(type, "Distance");
+                const Vector3 point1 = properties.vector(), point2 = properties.vector();
+                double least = properties.number(), most = properties.number();
+                const double start = (point2 - point1).norm();
+                const bool is_rod = std::isnan(least) && std::isnan(most);
+                if (is_rod) least = most = start;
+                if (std::isnan(least)) least = 0.0;
+                if (std::isnan(most)) most = kUnlimited;
+                demand_range(least, most, start);
+                out.vector(inverse_transform_point(bodies.pose1, point1));
+                out.vector(inverse_transform_point(bodies.pose2, point2));
+                out.number(least);
+                out.number(most);
+              });
+  }
+
+  void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
+                     const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
+    describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Vector3 point1 = transform_point(bodies.pose1, bound.vector());
+      const Vector3 point2 = transform_point(bodies.pose2, bound.vector());
+      const Vector3 between = point2 - point1;
+      const double length = between.norm();
+      const Vector3 along = length > 0.0 ? Vector3(between / length) : Vector3::UnitX();
+      Discrepancy d = row_along(along, point1, point2, AxisMode::kLimited);
+      d.modes |= kRadialDiscrepancy;
+      d.lower.x() = bound.number();
+      d.upper.x() = bound.number();
+      emit(d);
+    });
+  }
+
+ private:
+  static void demand_range(double least, double most, double start) {
+    if (least > most)
+      throw Refusal("Distance: MinimumDistance " + std::to_string(least) + " lies above MaximumDistance " +
+                    std::to_string(most));
+    if (!(most > 0.0)) throw Refusal("Distance: MaximumDistance is 0; a shared point is a Spherical joint");
+    const std::string now = ", but BindPoint1 and BindPoint2 are " + std::to_string(start) + " m apart";
+    if (start < (1.0 - kGivenDigits) * least)
+      throw Refusal("Distance: MinimumDistance is " + std::to_string(least) + now);
+    if (start > (1.0 + kGivenDigits) * most)
+      throw Refusal("Distance: MaximumDistance is " + std::to_string(most) + now);
+  }
+};
+
+}  // namespace
+}  // namespace gravitas
+
+GRAVITAS_PLUGIN(gravitas::Distance)

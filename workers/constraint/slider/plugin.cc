@@ -1,0 +1,92 @@
+// Constraint `Slider`: body 2 slides along an axis of body 1 and does not turn.
+//
+//      body 1 |====o====>====|  x = Axis      points of body 2's frame in body 1's: the origin and the one a
+//                 body 2                      metre out along x in y and z; the one out along y in z
+//
+// Freedoms. The origin's two rows take the translations across the axis; with it held, y and z of the point out along x
+// are the turns about z and y, z of the one out along y the turn about x: five rows of rank 5, none redundant, one freedom
+// left. The rows are taken where body 2 is, so that a long way along the axis is no lever.
+// The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit) and a
+// drive to a speed with a largest force (one row on the velocity, rank 6).
+#include <cmath>
+
+#include "plugin_sdk/joint_rows.h"
+
+namespace gravitas {
+namespace {
+
+class Slider final : public ConstraintPlugin {
+ public:
+  static PluginDeclaration declaration() {
+    return {.name = "Slider",
+            .version = "1.0",
+            .slot = Slot::kConstraint,
+            .meaning = "Straight guide.",
+            .types = {{"Slider",
+                       "The second body slides along an axis of the first and does not turn against it.",
+                       {Property::vector("BindPoint", "m", "world").required().means("A point of the guide."),
+                        Property::vector("Axis", "1", "world").required().means("Its direction, any length."),
+                        Property::number("LowerLimit", "m")
+                            .at_most(0.0)
+                            .means("Smallest way of body 2 along the axis from the start; none if absent."),
+                        Property::number("UpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
+                        Property::number("Speed", "m/s")
+                            .means("Speed of body 2 along the axis that a drive keeps; no drive if absent."),
+                        Property::number("MaximumForce", "N")
+                            .at_least(0.0)
+                            .means("Largest force of the drive; unlimited if absent.")}}}};
+  }
+  explicit Slider(PropertyCursor) {}
+
+  void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
+    bind_each(request, reply,
+              [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+                demand_type(type, "Slider");
+                const Vector3 point = properties.vector();
+                const Pose frame = frame_along(point, unit_axis(properties.vector(), "Slider: Axis"));
+                const double lower = properties.number(), upper = properties.number();
+                const JointLimits limits = JointLimits::of(lower, upper, "Slider: LowerLimit", "Slider: UpperLimit");
+                const double speed = properties.number(), force = properties.number();
+                const bool is_driven = !std::isnan(speed);
+                if (!is_driven && !std::isnan(force)) throw Refusal("Slider: MaximumForce is given without Speed");
+                write_frame(bodies.pose1, frame, &out);
+                write_frame(bodies.pose2, frame, &out);
+                out.number(limits.lower);
+                out.number(limits.upper);
+                out.number(is_driven ? 1.0 : 0.0);
+                out.number(is_driven ? speed : 0.0);
+                out.number(std::isnan(force) ? kUnlimited : force);
+              });
+  }
+
+  void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
+                     const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
+    describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      emit(held_point(one, two.position, {false, true, true}));
+      emit(held_point(one, transform_point(two, Vector3::UnitX()), {false, true, true}));
+      emit(held_point(one, transform_point(two, Vector3::UnitY()), {false, false, true}));
+
+      const Vector3 axis = one.orientation * Vector3::UnitX();
+      JointLimits limits;
+      limits.lower = bound.number();
+      limits.upper = bound.number();
+      if (!limits.is_none()) {
+        Discrepancy limit = row_along(axis, one.position, two.position, AxisMode::kLimited);
+        limit.lower.x() = limits.lower;
+        limit.upper.x() = limits.upper;
+        emit(limit);
+      }
+      if (!bound.flag()) return;
+      Discrepancy drive = row_along(axis, two.position, two.position, AxisMode::kDriven);
+      drive.velocity = bound.number() * axis;
+      drive.maximum_force.x() = bound.number();
+      emit(drive);
+    });
+  }
+};
+
+}  // namespace
+}  // namespace gravitas
+
+GRAVITAS_PLUGIN(gravitas::Slider)

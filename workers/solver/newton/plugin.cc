@@ -1,0 +1,67 @@
+// The Newton solver: joints and contacts together, at the end of the step, to rounding, at any mass ratio.
+//
+// Where the rows are taken: plugin_sdk/solver/end_of_step.h. How they are solved: semi-smooth Newton on Coulomb's cone after
+// the joints have been eliminated by a sparse L D L^T, plugin_sdk/solver/cone_problem.h (kNewton), with the equations and
+// their source.
+//
+// Order: S_{n+1} is of first order in h; what holds at its end holds to Tolerance. Stability: rigid rows at every h and mass
+// ratio, springs and dampers of joints at every stiffness (implicit Euler). Cost: cubic in the rows of contacts, limits and
+// drives of an island (dense; beyond 900 of them projected sweeps, whose convergence is linear), linear in a chain's joints.
+// Known failures: Coulomb friction with large coefficients at long arms (Painlevé) may have no solution or several; then the
+// steps end at `iterations`, and `stop_reason` and `residual` say so. The angles of axes (ConstantVelocity, Axle, limits)
+// are closed to second order in the correction's turn, points to rounding.
+#include "plugin_sdk/solver/end_of_step.h"
+
+namespace gravitas {
+namespace {
+
+class Newton final : public SolverPlugin {
+ public:
+  static PluginDeclaration declaration() {
+    PluginDeclaration declaration;
+    declaration.name = "Newton";
+    declaration.version = "1.0.0";
+    declaration.slot = kSlot;
+    declaration.meaning =
+        "Joints and contacts at the end of the step by semi-smooth Newton on the friction cone: accurate at any mass "
+        "ratio.";
+    declaration.properties = {
+        Property::number("Tolerance", "1")
+            .at_least(1e-15)
+            .at_most(1e-2)
+            .defaults_to({ConeSettings{}.tolerance})
+            .live()
+            .means("Largest violation of a law, as a share of the largest velocity that meets; one step more is taken "
+                   "when it is reached."),
+        Property::integer("Iterations")
+            .at_least(1.0)
+            .at_most(100000.0)
+            .defaults_to({static_cast<double>(ConeSettings{}.iterations)})
+            .live()
+            .means("Largest number of Newton steps of one solution; fewer where it converges.")};
+    return declaration;
+  }
+
+  explicit Newton(PropertyCursor settings) {
+    settings_.cone.method = ConeMethod::kNewton;
+    settings_.cone.tolerance = settings.number();
+    const std::int64_t iterations = settings.integer();
+    if (!(settings_.cone.tolerance >= 1e-15 && settings_.cone.tolerance <= 1e-2))
+      throw Refusal("Tolerance is outside 1e-15 ... 1e-2");
+    if (iterations < 1 || iterations > 100000) throw Refusal("Iterations is outside 1 ... 100000");
+    settings_.cone.iterations = static_cast<std::uint32_t>(iterations);
+  }
+
+  void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) override {
+    solve_end_of_step(request, settings_, reply, host);
+  }
+
+ private:
+  EndOfStepSettings settings_;
+};
+
+}  // namespace
+
+GRAVITAS_PLUGIN(Newton)
+
+}  // namespace gravitas

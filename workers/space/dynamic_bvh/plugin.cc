@@ -1,0 +1,34 @@
+// Space `DynamicBVH`: a hierarchy of bounding volumes over fat boxes, and the pairs of these kept from call to call
+// (pair_finder.h, bounding_tree.h). The fast one, wherever bodies are and however they differ in size.
+//
+// Cost of a call, n bodies of which m left their fat boxes, p pairs: O(n + p) always (looking at every body, and at
+// every candidate), and O(m log n) on the average for those. After a jump of many, O(n log n + p).
+#include "plugin_sdk/plugin.h"
+
+#include "workers/space/dynamic_bvh/pair_finder.h"
+
+namespace gravitas {
+namespace {
+
+class DynamicBvhSpace final : public SpacePlugin {
+ public:
+  static PluginDeclaration declaration() {
+    return {.name = "DynamicBVH",
+            .version = "1.0",
+            .slot = Slot::kSpace,
+            .meaning = "Hierarchy of bounding boxes, refitted as bodies move: the fast one for any mixture of sizes."};
+  }
+  explicit DynamicBvhSpace(PropertyCursor) {}
+
+  void pairs(const stage::SpacePairsRequest& request, const stage::SpacePairsReply& reply, Host& host) override {
+    finder_.find(request, reply, host);
+  }
+
+ private:
+  dynamic_bvh::PairFinder finder_;
+};
+
+}  // namespace
+}  // namespace gravitas
+
+GRAVITAS_PLUGIN(gravitas::DynamicBvhSpace)
