@@ -82,7 +82,12 @@ void flatten_force(const TypeDeclaration& type, const v1::Force& force, const Id
   for (NamedValue& value : values) {
     const auto declared = std::ranges::find(type.properties, value.name, &Property::name);
     if (declared == type.properties.end() || declared->kind != PropertyKind::kBody) continue;
-    if (value.value.kind != PropertyValue::Kind::kText) continue;
+    if (value.value.kind != PropertyValue::Kind::kText) {
+      context->diagnostics->error(value.value.position, force.type() + " \"" + force.id() + "\": " + value.name +
+                                                            " is " + shown(value.value) +
+                                                            "; allowed: " + allowed_values(*declared));
+      return;
+    }
     const std::uint32_t row = bodies.find(value.value.text, value.name, value.position, context->diagnostics);
     if (row == kNone) return;
     const TextPosition position = value.value.position;

@@ -1,0 +1,38 @@
+// Every integrator, with derivatives asked through every carrier and with its plugin_state, gives the same bits.
+#include <gtest/gtest.h>
+
+#include "services/run/session.h"
+#include "tests/paths.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Hosting;
+
+class EveryIntegrator : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHosting) {
+  const auto hash_of = [](Hosting hosting, std::uint32_t threads) {
+    RunOptions options;
+    options.scenes = {in_source("/tests/determinism/afloat.gravitas")};
+    options.hosting = {{std::nullopt, hosting}};
+    options.threads = threads;
+    options.overrides = {std::string("Integrator=") + GetParam()};
+    const RunResult result = run(
+        options, [] { return false; }, [](const Progress&) {});
+    EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    return result.report.chain_hash();
+  };
+  const std::string reference = hash_of(Hosting::kDirect, 1);
+  EXPECT_EQ(hash_of(Hosting::kDirect, 2), reference) << "two threads";
+  EXPECT_EQ(hash_of(Hosting::kSharedMemory, 1), reference) << "in workers";
+  EXPECT_EQ(hash_of(Hosting::kGrpc, 1), reference) << "by gRPC";
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, EveryIntegrator,
+                         ::testing::Values("Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4",
+                                           "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54", "Rosenbrock"),
+                         [](const auto& which) { return std::string(which.param); });
+
+}  // namespace
+}  // namespace gravitas
