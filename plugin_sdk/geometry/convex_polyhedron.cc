@@ -130,6 +130,12 @@ class Builder {
     }
     tolerance_ = std::min(kFlat * extent_, kOfThickness * thickness);
     for (std::size_t f = 0; f < loops_.size(); ++f) {
+      for (const std::uint32_t corner : loops_[f]) {
+        const double height = normals_[f].dot(vertices_[corner] - vertices_[loops_[f][0]]);
+        if (height < -tolerance_)
+          throw Refused{face_text(f) + " is not flat: vertex " + std::to_string(corner) + " lies " +
+                        std::to_string(-height) + " m below it"};
+      }
       if (!(highest[f] > tolerance_)) continue;
       const bool is_own = std::find(loops_[f].begin(), loops_[f].end(), culprit[f]) != loops_[f].end();
       throw Refused{face_text(f) + (is_own ? " is not flat" : " is not convex") + ": vertex " +

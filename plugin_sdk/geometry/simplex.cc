@@ -10,6 +10,10 @@ const SimplexPoint& nearer(const SimplexPoint& x, const SimplexPoint& y) {
   return y.point.squaredNorm() < x.point.squaredNorm() ? y : x;
 }
 
+// Squares of sines below which a triangle is its edges, and a tetrahedron its faces: what their normals say is rounding.
+constexpr double kSliver = 1e-22;
+constexpr double kFlat = 1e-24;
+
 // A point of a side as one of the whole: `rows` says which corners the side has.
 template <std::size_t N>
 SimplexPoint of_whole(const SimplexPoint& side, const std::array<std::size_t, N>& rows) {
@@ -30,17 +34,20 @@ SimplexPoint closest_on_segment(const Vector3& a, const Vector3& b) {
 }
 
 SimplexPoint closest_on_triangle(const Vector3& a, const Vector3& b, const Vector3& c) {
-  const Vector3 normal = (b - a).cross(c - a);
+  const Vector3 ab = b - a, ac = c - a;
+  const Vector3 normal = ab.cross(ac);
   const double area = normal.squaredNorm();
+  const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()});
   // signed doubled areas of the origin's projection with each edge, times |normal|
   const double wa = normal.dot(b.cross(c)), wb = normal.dot(c.cross(a)), wc = normal.dot(a.cross(b));
   const double sum = wa + wb + wc;
-  if (wa > 0.0 && wb > 0.0 && wc > 0.0 && area > 0.0 && sum > 0.0)
+  const bool is_sliver = !(area > kSliver * longest * longest);
+  if (!is_sliver && wa > 0.0 && wb > 0.0 && wc > 0.0)
     return {normal * (normal.dot(a) / area), {wa / sum, wb / sum, wc / sum}};
-  const SimplexPoint ab = of_whole<2>(closest_on_segment(a, b), {0, 1});
-  const SimplexPoint bc = of_whole<2>(closest_on_segment(b, c), {1, 2});
-  const SimplexPoint ca = of_whole<2>(closest_on_segment(c, a), {2, 0});
-  return nearer(nearer(ab, bc), ca);
+  const SimplexPoint on_ab = of_whole<2>(closest_on_segment(a, b), {0, 1});
+  const SimplexPoint on_bc = of_whole<2>(closest_on_segment(b, c), {1, 2});
+  const SimplexPoint on_ca = of_whole<2>(closest_on_segment(c, a), {2, 0});
+  return nearer(nearer(on_ab, on_bc), on_ca);
 }
 
 SimplexPoint closest_on_tetrahedron(const Vector3& a, const Vector3& b, const Vector3& c, const Vector3& d) {
@@ -55,7 +62,9 @@ SimplexPoint closest_on_tetrahedron(const Vector3& a, const Vector3& b, const Ve
     const Vector3 normal = (x[face[1]] - p).cross(x[face[2]] - p);
     const double side_of_origin = -normal.dot(p), side_of_fourth = normal.dot(x[face[3]] - p);
     // a flat tetrahedron has no inside
-    if (side_of_origin * side_of_fourth > 0.0) {
+    const bool is_flat =
+        !(side_of_fourth * side_of_fourth > kFlat * normal.squaredNorm() * (x[face[3]] - p).squaredNorm());
+    if (!is_flat && side_of_origin * side_of_fourth > 0.0) {
       inside[face[3]] = side_of_origin / side_of_fourth;
       continue;
     }

@@ -84,18 +84,20 @@ class ShapeBuilder final : private SiblingShapes {
     return false;
   }
 
-  // Shapes are known by the names of INTERFACE; a plugin that declares them otherwise is taken at its word.
+  // Shapes are known by their names and properties; a plugin that declares them otherwise is taken at its word.
   bool read(const std::string& type, const ShapeExpansion& expansion, std::vector<double>* parameters, std::size_t row,
             std::vector<PropertyProblem>* problems) {
     const auto& known = scene_shape_types();
     const auto standard = std::find_if(known.begin(), known.end(), [&](const auto& t) { return t.name == type; });
+    if (standard == known.end()) return true;
     const TypeDeclaration& declared = *find_type(collision_->declaration, type);
-    if (standard == known.end() || !has_same_properties(*standard, declared)) return true;
     splice(declared.properties, expansion, parameters);
+    const std::optional<std::vector<double>> numbers = as_declared_by(*standard, declared, *parameters);
+    if (!numbers) return true;
     std::string why;
     std::optional<SceneShape> shape;
     try {
-      shape = read_scene_shape(type_id(type), *parameters, &why);
+      shape = read_scene_shape(type_id(type), *numbers, &why);
     } catch (const std::out_of_range& missing) {
       why = missing.what();
     }
@@ -110,16 +112,30 @@ class ShapeBuilder final : private SiblingShapes {
           {expansion.position,
            expansion.prefix + std::to_string(shape->mesh->dropped()) + " triangles without area were dropped", true});
     // the faces of a hull are found here, once, and not by every worker
-    if (shape->polyhedron) *parameters = flattened_shape(*shape);
+    if (shape->polyhedron && declared.properties.size() == standard->properties.size())
+      *parameters = flattened_shape(*shape);
     solids_[row].shape = std::make_shared<SceneShape>(std::move(*shape));
     return true;
   }
 
-  static bool has_same_properties(const TypeDeclaration& a, const TypeDeclaration& b) {
-    return std::equal(a.properties.begin(), a.properties.end(), b.properties.begin(), b.properties.end(),
-                      [](const Property& x, const Property& y) {
-                        return x.name == y.name && x.kind == y.kind && x.columns == y.columns;
-                      });
+  // The numbers of a declared type in the order of the standard one; nothing where it lacks a property.
+  static std::optional<std::vector<double>> as_declared_by(const TypeDeclaration& standard,
+                                                           const TypeDeclaration& declared,
+                                                           std::span<const double> numbers) {
+    std::vector<double> ordered;
+    for (const Property& wanted : standard.properties) {
+      std::size_t begin = 0;
+      bool is_found = false;
+      for (const Property& property : declared.properties) {
+        const std::span<const double> own = numbers.subspan(begin, flat_size_of(property, numbers.subspan(begin)));
+        is_found = property.name == wanted.name && property.kind == wanted.kind && property.columns == wanted.columns;
+        if (is_found) ordered.insert(ordered.end(), own.begin(), own.end());
+        if (is_found) break;
+        begin += own.size();
+      }
+      if (!is_found) return std::nullopt;
+    }
+    return ordered;
   }
 
   std::string folder_of(const Geometry& geometry) const {

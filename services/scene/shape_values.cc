@@ -196,15 +196,18 @@ bool expand_shape_values(const TypeDeclaration& type, const std::string& folder,
   return true;
 }
 
+std::size_t flat_size_of(const Property& property, std::span<const double> numbers) {
+  const std::size_t size = property.flat_size();
+  return property.kind == PropertyKind::kTable ? size + property.columns * static_cast<std::size_t>(numbers[0]) : size;
+}
+
 void splice(const std::vector<Property>& declared, const ShapeExpansion& expansion, std::vector<double>* parameters) {
   if (expansion.vertices.empty()) return;
   std::vector<double> out;
   out.reserve(parameters->size() + expansion.vertices.size() + expansion.faces.size());
   std::size_t begin = 0;
   for (const Property& property : declared) {
-    std::size_t size = property.flat_size();
-    if (property.kind == PropertyKind::kTable)
-      size += property.columns * static_cast<std::size_t>((*parameters)[begin]);
+    const std::size_t size = flat_size_of(property, std::span(*parameters).subspan(begin));
     const std::vector<double>* numbers = property.name == "Vertices" ? &expansion.vertices
                                          : property.name == "Faces"  ? &expansion.faces
                                                                      : nullptr;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,9 @@ struct ShapeExpansion {
 bool expand_shape_values(const TypeDeclaration& type, const std::string& folder, SiblingShapes* siblings,
                          std::vector<NamedValue>* values, ShapeExpansion* expansion,
                          std::vector<PropertyProblem>* problems);
+
+// How many of the numbers from the front are the property's.
+std::size_t flat_size_of(const Property& property, std::span<const double> numbers);
 
 // Replaces the tables Vertices and Faces in flattened parameters.
 void splice(const std::vector<Property>& declared, const ShapeExpansion& expansion, std::vector<double>* parameters);

@@ -9,6 +9,9 @@
 //   fall away, one of them is nearer and has the contact
 //   a triangle of a closed mesh pushes outward only, one of an open mesh to the side on which the other shape's centre is
 //   a shape whose centre is inside a closed mesh is pushed to the nearest place of its surface
+//
+// Known limits. Near an edge of a closed mesh two faces may each report the depth below their own plane, also where the
+// way out over the other is shorter. A shape that has passed through an open mesh with its centre stays on the far side.
 #pragma once
 
 #include <vector>

@@ -11,6 +11,8 @@ namespace gravitas::collision {
 namespace {
 
 constexpr double kOneNormal = 0.99996;  // cosine of half a degree
+// Of the merge distance: depths that differ by less do not decide which points are kept.
+constexpr double kDepthTie = 1e3;
 
 }  // namespace
 
@@ -29,6 +31,24 @@ double ContactList::deepest() const {
 void ContactList::collect(std::uint64_t key, const ContactPoint& contact, double merge_distance) {
   merge_distance_ = std::max(merge_distance_, merge_distance);
   collected_.push_back({key_of_part(key, contact.feature), 0, contact});
+}
+
+void ContactList::begin_at_rim() {
+  Vector3 middle = Vector3::Zero();
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (const ContactPoint& contact : group_) {
+    middle += contact.point / static_cast<double>(group_.size());
+    deepest = std::max(deepest, contact.depth);
+  }
+  std::size_t first = 0;
+  double farthest = -1.0;
+  for (std::size_t i = 0; i < group_.size(); ++i) {
+    const double off = (group_[i].point - middle).squaredNorm();
+    // the first of those that are equally far, but for rounding
+    if (group_[i].depth < deepest - kDepthTie * merge_distance_ || !(off > farthest * (1.0 + 1e-9))) continue;
+    first = i, farthest = off;
+  }
+  std::swap(group_[0], group_[first]);
 }
 
 void ContactList::finish(const Vector3& origin, bool is_swapped) {
@@ -53,13 +73,16 @@ void ContactList::finish(const Vector3& origin, bool is_swapped) {
       ContactPoint& contact = group_.emplace_back(collected_[i].contact);
       contact.feature = static_cast<std::uint32_t>(collected_[i].key >> 32);
     }
+    begin_at_rim();
     std::array<int, kManifoldCapacity> chosen{};
-    const int count = choose_extremes(group_, merge_distance_, merge_distance_, &chosen);
+    const int count = choose_extremes(group_, kDepthTie * merge_distance_, merge_distance_, &chosen);
     for (int k = 0; k < count; ++k)
       contacts_.push_back(group_[static_cast<std::size_t>(chosen[static_cast<std::size_t>(k)])]);
   }
-  std::stable_sort(contacts_.begin(), contacts_.end(),
-                   [](const ContactPoint& x, const ContactPoint& y) { return x.feature < y.feature; });
+  std::sort(contacts_.begin(), contacts_.end(), [](const ContactPoint& x, const ContactPoint& y) {
+    return std::tie(x.feature, x.depth, x.point.x(), x.point.y(), x.point.z()) <
+           std::tie(y.feature, y.depth, y.point.x(), y.point.y(), y.point.z());
+  });
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     ContactPoint& contact = contacts_[i];
     if (i > 0 && contact.feature <= contacts_[i - 1].feature) contact.feature = contacts_[i - 1].feature + 1;

@@ -31,6 +31,10 @@ class ContactList {
     std::uint32_t group;
     ContactPoint contact;
   };
+  // Puts first, of the deepest contacts of a group, the one farthest from its middle: the choice of extremes begins
+  // there, and of flush surfaces many points are equally deep.
+  void begin_at_rim();
+
   std::vector<Collected> collected_;
   std::vector<Vector3> normals_;  // of the groups
   std::vector<ContactPoint> group_;
