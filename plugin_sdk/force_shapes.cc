@@ -5,6 +5,7 @@
 #include <string>
 
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/geometry/scene_shape.h"
 #include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
@@ -31,6 +32,21 @@ Surface capsule_surface(double radius, double height) {
   return revolved_surface(meridian, kRoundSides);
 }
 
+// Read anew each time: a hundred faces are checked in some microseconds.
+Surface polyhedron_surface(const BodyShape& shape) {
+  std::string why;
+  const std::optional<SceneShape> read = read_scene_shape(shape.type, shape.parameters, &why);
+  if (!read) throw Refusal("a ConvexPolyhedron is none: " + why);
+  Surface surface;
+  surface.vertex = read->polyhedron->vertices;
+  for (const ConvexPolyhedron::Face& face : read->polyhedron->faces) {
+    const std::span<const std::uint32_t> corners = read->polyhedron->corners_of(face);
+    surface.corner.insert(surface.corner.end(), corners.begin(), corners.end());
+    surface.face_begin.push_back(static_cast<std::uint32_t>(surface.corner.size()));
+  }
+  return surface;
+}
+
 }  // namespace
 
 BodyShape shape_of(const stage::ForceWrenchesRequest& request, std::uint32_t body) {
@@ -47,6 +63,7 @@ std::optional<Surface> surface_of(const BodyShape& shape) {
     require_sizes(shape, 3);
     return box_surface({size[0], size[1], size[2]});
   }
+  if (shape.type == type_id("ConvexPolyhedron")) return polyhedron_surface(shape);
   if (shape.type != type_id("Cylinder") && shape.type != type_id("Cone") && shape.type != type_id("Capsule"))
     return std::nullopt;
   require_sizes(shape, 2);

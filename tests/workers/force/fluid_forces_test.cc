@@ -194,6 +194,28 @@ TEST(Buoyancy, RefusesShapesThatItDoesNotKnow) {
   }
 }
 
+// A box as polyhedron, given by its corners or by its faces, floats as the box does.
+TEST(Buoyancy, OfAPolyhedronIsThatOfTheBox) {
+  PluginUnderTest force("force_buoyancy");
+  conformance::Draw random(7);
+  std::vector<double> corners = {8};
+  for (int i = 0; i < 8; ++i)
+    corners.insert(corners.end(), {(i & 1) != 0 ? 0.5 : -0.5, (i & 2) != 0 ? 1.0 : -1.0, (i & 4) != 0 ? 0.25 : -0.25});
+  corners.push_back(0);
+  for (int i = 0; i < 50; ++i) {
+    ForceProblem problem{0.0, {type_id("Buoyancy")}, {FluidProperties{}.flat()}, {ForcedBody{}}, {0, 0}};
+    problem.shapes = {{type_id("Box"), {0.5, 1.0, 0.25}}, {type_id("ConvexPolyhedron"), corners}};
+    problem.bodies[0].pose = random.pose(0.5);
+    problem.bodies[0].shape = 0;
+    const ForceAnswer box = ask_wrenches(&force, problem).at(0);
+    problem.bodies[0].shape = 1;
+    const ForceAnswer hull = ask_wrenches(&force, problem).at(0);
+    // rounding of 1e4 N
+    EXPECT_LT((box.wrench.force - hull.wrench.force).norm(), 1e-10);
+    EXPECT_LT((box.wrench.torque - hull.wrench.torque).norm(), 1e-10);
+  }
+}
+
 // ---- Aerodynamic
 
 std::vector<double> flow(double density, const Vector3& velocity, double drag) {

@@ -4,7 +4,7 @@
 //   f = -integral over such parts of rho/2 C_D (n.u)^2 n dA          torque about the centre of mass likewise.
 //
 // u varies over a face as the body turns; the parts are cut out exactly and the integrals, cubic at most, are exact on
-// polyhedra: Box, and Cylinder, Cone, Capsule as polyhedra of 48 sides of the same sections. A plate held against the
+// polyhedra: Box, ConvexPolyhedron, and Cylinder, Cone, Capsule as polyhedra of 48 sides of the same sections. A plate held against the
 // flow has rho/2 C_D A u^2, a Sphere (closed form) rho/2 C_D (pi r^2/2) u^2. Convex bodies only: no face shades another;
 // no suction behind, no friction along faces, no lift from circulation. No potential. The seed defers "geometry-based
 // aerodynamic friction" to future work (§§ 4.2, 6.2.3).
@@ -114,7 +114,7 @@ class Aerodynamic final : public ForcePlugin {
       push = on_ball(shape, pose.position, slip);
     } else {
       const std::optional<Surface> surface = surface_of(shape);
-      if (!surface) throw Refusal("Aerodynamic knows Sphere, Box, Cylinder, Cone and Capsule");
+      if (!surface) throw Refusal("Aerodynamic knows Sphere, Box, ConvexPolyhedron, Cylinder, Cone and Capsule");
       push = on_surface(*surface, pose, slip);
     }
     const double pressure = -0.5 * flow.density * flow.drag;

@@ -5,7 +5,7 @@
 //   torque also -s c_A w
 //   U = rho |g| V (level - up.b)             so that f = -dU/dx, torque = -dU/dturn without drag
 //
-// Exact for Sphere and Box cut by the surface (submerged.h); Cylinder, Cone and Capsule are polyhedra of 48 sides of the
+// Exact for Sphere, Box and ConvexPolyhedron cut by the surface (submerged.h); Cylinder, Cone and Capsule are polyhedra of 48 sides of the
 // same sections. Other shapes are refused. A floating body finds its depth and rocks back upright by itself, since b
 // moves. Region bounds the fluid: a body whose geometry's origin is outside feels nothing, which is a jump at its sides.
 // Level is along up through the world's origin. The seed leaves buoyancy to future work (§ 6.2.3).
@@ -111,7 +111,7 @@ class Buoyancy final : public ForcePlugin {
       return submerged_ball(pose.position, shape.parameters[0], up, level);
     }
     const std::optional<Surface> surface = surface_of(shape);
-    if (!surface) throw Refusal("Buoyancy knows Sphere, Box, Cylinder, Cone and Capsule");
+    if (!surface) throw Refusal("Buoyancy knows Sphere, Box, ConvexPolyhedron, Cylinder, Cone and Capsule");
     return submerged_polyhedron(*surface, pose, up, level);
   }
 };
