@@ -39,11 +39,16 @@ void SampledMap::contour(const Vector3& n, double sine, Contour* out) const {
   for (std::size_t i = 1; i + 1 < out->count; ++i)
     area += (out->points[i] - out->points[0]).cross(out->points[i + 1] - out->points[0]);
   const double size = std::sqrt(area.squaredNorm());
-  // what is no face within rounding, or one seen from its edge, is left as a line or a point
-  if (out->count >= 3 && size > same * same && area.dot(n) > 0.9 * size) {
+  if (out->count < 3) return;
+  // points that lie in no plane, or in one seen from its edge, are no face: the farthest alone is sure to be touched
+  bool is_flat = size > same * same && area.dot(n) > 0.9 * size;
+  for (std::size_t i = 1; i < out->count && is_flat; ++i)
+    is_flat = std::fabs(area.dot(out->points[i] - out->points[0])) <= same * size;
+  if (is_flat) {
     out->normal = area / size;
-  } else if (out->count >= 3) {
-    out->count = 2;
+  } else {
+    out->count = 0;
+    out->add(map_.support(n), 1);
   }
 }
 
