@@ -241,7 +241,7 @@ TEST(AccurateFriction, WhatIsHeldDoesNotCreep) {
                 pad("Left", -0.014, "Right") + pad("Right", 0.014, "Left") +
                     "Body { Id = \"Held\" GeometryId = \"Held\" Material = \"Rubber\" Mass = 0.045 KineticProperties { "
                     "Position = {0, 0, 0} } Forces = { \"Down\" } }\n",
-                guide("G1", "Left") + guide("G2", "Right"), 0.001, 5),
+                guide("G1", "Left") + guide("G2", "Right"), 0.001, 1),
             "Force { Type = \"Basic\" Id = \"Right\" CustomProperties { Force = " + literal(Vector3(force, 0, 0)) +
                 " } } Force { Type = \"Basic\" Id = \"Left\" CustomProperties { Force = " +
                 literal(Vector3(-force, 0, 0)) + " } }"),

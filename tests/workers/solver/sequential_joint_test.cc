@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "plugin_sdk/math/transcendental.h"
-#include "tests/workers/solver/solver_problem.h"
 #include "plugin_sdk/solver/joint_laws.h"
+#include "tests/workers/solver/solver_problem.h"
 #include "workers/solver/sequential/sequential.h"
 
 namespace gravitas {

@@ -8,11 +8,11 @@
 #include <string>
 
 #include "plugin_sdk/plugin.h"
-#include "tests/workers/solver/solver_problem.h"
 #include "plugin_sdk/solver/arrival.h"
 #include "plugin_sdk/solver/coulomb_contact.h"
-#include "workers/solver/sequential/sequential.h"
 #include "plugin_sdk/solver/surface_perturbation.h"
+#include "tests/workers/solver/solver_problem.h"
+#include "workers/solver/sequential/sequential.h"
 
 namespace gravitas {
 namespace {
