@@ -62,8 +62,10 @@ SimplexPoint closest_on_tetrahedron(const Vector3& a, const Vector3& b, const Ve
     const Vector3 normal = (x[face[1]] - p).cross(x[face[2]] - p);
     const double side_of_origin = -normal.dot(p), side_of_fourth = normal.dot(x[face[3]] - p);
     // a flat tetrahedron has no inside
-    const bool is_flat =
-        !(side_of_fourth * side_of_fourth > kFlat * normal.squaredNorm() * (x[face[3]] - p).squaredNorm());
+    const double long_1 = (x[face[1]] - p).squaredNorm(), long_2 = (x[face[2]] - p).squaredNorm();
+    const double area = normal.squaredNorm();
+    const bool is_flat = !(area > kSliver * long_1 * long_2) ||
+                         !(side_of_fourth * side_of_fourth > kFlat * area * (x[face[3]] - p).squaredNorm());
     if (!is_flat && side_of_origin * side_of_fourth > 0.0) {
       inside[face[3]] = side_of_origin / side_of_fourth;
       continue;

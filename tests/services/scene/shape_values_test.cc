@@ -144,7 +144,8 @@ TEST_F(ObjFile, IsReadWithPolygonsAndScale) {
 }
 
 TEST_F(ObjFile, TrianglesWithoutAreaAreCountedAndOpenOnesSaidToBeShells) {
-  const BuiltScene scene = with("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\nf 1 2 2\n");
+  const BuiltScene scene =
+      with("v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0 1\nv 0.5 1 0.5\nf 1 5 2\nf 2 5 4\nf 4 5 3\nf 3 5 1\nf 1 1 2\nf 1 2 2\n");
   EXPECT_THAT(scene.errors(), IsEmpty());
   EXPECT_THAT(scene.warnings(),
               ElementsAre(HasSubstr("2 triangles without area were dropped"), HasSubstr("counts as a shell")));
