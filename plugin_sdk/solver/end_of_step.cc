@@ -551,8 +551,10 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const EndOfStep
   const std::vector<Island> islands = find_islands(request, bodies);
   std::vector<ConeSummary> summaries(islands.size());
   host.parallel_for(islands.size(), [&](std::uint64_t begin, std::uint64_t end) {
-    for (std::uint64_t i = begin; i < end; ++i)
+    for (std::uint64_t i = begin; i < end; ++i) {
       summaries[i] = IslandSolver(request, bodies, islands[i], settings, &answer).solve();
+      host.mark_progress();
+    }
   });
   ConeSummary all;
   for (const ConeSummary& one : summaries) {
