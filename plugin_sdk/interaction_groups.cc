@@ -1,6 +1,7 @@
 #include "plugin_sdk/interaction_groups.h"
 
-#include <cstring>
+#include <algorithm>
+#include <span>
 
 namespace gravitas {
 namespace {
@@ -33,8 +34,8 @@ std::vector<std::vector<std::size_t>> interaction_groups(const stage::Integrator
         const std::span<const double> after = derivatives->wrenches(time, shifted);
         for (std::size_t k = 0; k < movable.size(); ++k)
           if ((k & bit) != side)
-            interact =
-                interact || std::memcmp(&after[6 * movable[k]], &before[6 * movable[k]], 6 * sizeof(double)) != 0;
+            interact = interact || !std::ranges::equal(after.subspan(6 * movable[k], 6),
+                                                       std::span(before).subspan(6 * movable[k], 6));
       }
     }
   }

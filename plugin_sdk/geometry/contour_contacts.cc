@@ -137,14 +137,17 @@ void add_contour_contacts(const Contour& a, double rounding_a, const Contour& b,
       patch.add(flat_a.place(i), feature_of(flat_a.code(i), flat_b.own_code()));
   if (beside > tolerance && out->count() > 0) return;
   for (std::size_t i = 0; i < flat_a.edges(); ++i) {
-    const Vector2 p = flat_a.point(i), u = flat_a.end_of_edge(i) - p;
+    const Vector2& p = flat_a.point(i);
+    const Vector2 u = flat_a.end_of_edge(i) - p;
     for (std::size_t k = 0; k < flat_b.edges(); ++k) {
-      const Vector2 q = flat_b.point(k), v = flat_b.end_of_edge(k) - q;
+      const Vector2& q = flat_b.point(k);
+      const Vector2 v = flat_b.end_of_edge(k) - q;
       const double turn = cross(u, v);
       if (!(std::fabs(turn) > 1e-9 * std::sqrt(u.squaredNorm() * v.squaredNorm()))) continue;
       const double s = cross(q - p, v) / turn, t = cross(q - p, u) / turn;
       if (!(s >= 0.0 && s <= 1.0 && t >= 0.0 && t <= 1.0)) continue;
-      const Vector3 from = flat_a.place(i), to = flat_a.place((i + 1) % a.count);
+      const Vector3& from = flat_a.place(i);
+      const Vector3& to = flat_a.place((i + 1) % a.count);
       patch.add(from + s * (to - from), feature_of(0x4000U | flat_a.code(i), 0x4000U | flat_b.code(k)));
     }
   }

@@ -314,7 +314,8 @@ std::vector<double> flattened_shape(const SceneShape& shape) {
   const auto put_table = [&](std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles) {
     out.push_back(static_cast<double>(vertices.size()));
     for (const Vector3& v : vertices) out.insert(out.end(), {v.x(), v.y(), v.z()});
-    out.push_back(static_cast<double>(triangles.size() / 3));
+    const std::size_t count = triangles.size() / 3;
+    out.push_back(static_cast<double>(count));
     for (const std::uint32_t i : triangles) out.push_back(i);
   };
   switch (shape.kind) {
