@@ -52,6 +52,9 @@ class SharedMemoryCarrier final : public Carrier {
   void send_new_segments(const Arena& arena);
   void post_frame(gravitas_frame_header header, std::span<const ColumnId> columns, const Arena& arena);
   gravitas_frame_header wait_for_message(std::uint64_t* spent_ns);
+  [[noreturn]] void report_death() {
+    link_->report_death(boxes_->theirs->progress.load(std::memory_order_relaxed) == asked_at_mark_);
+  }
   void take_columns(const gravitas_frame_header& header, std::span<const stage::ColumnInfo> infos,
                     std::span<const ColumnId> targets, std::size_t first_room, Arena* arena);
   void answer_callback(const gravitas_frame_header& header, std::size_t first_room, Arena* arena,
@@ -218,16 +221,13 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
   std::uint64_t marks = theirs->progress.load(std::memory_order_relaxed);
   for (;;) {
     // an end from here on counts the signal up; one before may have been seen together with the last message
-    if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_)
-      link_->report_death(theirs->progress.load(std::memory_order_relaxed) == asked_at_mark_);
+    if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_) report_death();
     const std::uint64_t look = std::min(until, channel::now_ns() + kLookNs);
     if (channel::wait(mine, theirs, seen_, look) == channel::Waited::kMessage) {
       seen_ = theirs->signal.load(std::memory_order_acquire);
       gravitas_frame_header header;
       std::memcpy(&header, &theirs->header, sizeof header);
-      if (header.kind == GRAVITAS_FRAME_CRASH && header.epoch == link_->epoch()) {
-        link_->report_death();
-      }
+      if (header.kind == GRAVITAS_FRAME_CRASH && header.epoch == link_->epoch()) report_death();
       // a dead worker's last word may be a reply, but not a question, which may also be the one it asked before
       const bool is_dead_question = header.kind == GRAVITAS_FRAME_CALLBACK && link_->has_ended();
       const bool is_late = header.epoch != link_->epoch() || header.sequence != sequence_;
@@ -236,7 +236,7 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
         return header;
       }
       // a late or foreign message is dropped
-      if (link_->has_ended()) link_->report_death();
+      if (link_->has_ended()) report_death();
       if (header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
         link_->report_bad_frame("a header without the magic");
       continue;

@@ -219,8 +219,11 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
   // Two failures of a slot in neighbouring steps could meet in one request, and would be taken for poison.
   std::map<Slot, std::vector<std::uint32_t>> taken;
   std::map<Slot, bool> is_swapped;
+  // A standby that is killed may be any slot's.
+  std::uint32_t anywhere = 0;
+  const auto has_room = [&](Slot slot) { return taken[slot].size() + anywhere < most; };
   const auto is_free = [&](Slot slot, std::uint32_t step) {
-    return taken[slot].size() < most && std::ranges::all_of(taken[slot], [&](std::uint32_t other) {
+    return has_room(slot) && std::ranges::all_of(taken[slot], [&](std::uint32_t other) {
              return other + 2 <= step || step + 2 <= other;
            });
   };
@@ -237,8 +240,11 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
     fault.step = joins ? plan.faults.back().step : static_cast<std::uint32_t>(2 + draw.below(last_step - 4));
     draw_order(&draw, options.tier, &fault);
     if (!is_free(fault.slot, fault.step)) continue;
+    const bool hits_anybody = fault.means == Means::kKillStandby || fault.means == Means::kSwapKilled;
+    if (hits_anybody && !std::ranges::all_of(slots, has_room)) continue;
     if (fault.group == "swap" && std::exchange(is_swapped[fault.slot], true)) continue;
     taken[fault.slot].push_back(fault.step);
+    anywhere += hits_anybody ? 1 : 0;
     plan.faults.push_back(std::move(fault));
   }
   if (has_last) {
