@@ -127,7 +127,7 @@ void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* d
   const Route route = routes_[call.target];
   StageCall routed = call;
   routed.target = route.target;
-  if (!order_.empty()) order_.clear();
+  order_.clear();
   if (!armed_.empty()) {
     const auto due = std::ranges::find_if(armed_, [&](const FaultInjection& one) { return one.step == step_; });
     if (due != armed_.end()) {

@@ -15,6 +15,7 @@
 #include "kernel/slot_host.h"
 #include "kernel/swap.h"
 #include "kernel/validate.h"
+#include "plugin_sdk/channel/mailbox.h"
 
 namespace gravitas::kernel {
 
@@ -22,6 +23,7 @@ namespace gravitas::kernel {
 struct CallTimes {
   std::uint64_t compute = 0;  // the plugin worked
   std::uint64_t check = 0;    // the frame of the answer was checked
+  std::uint64_t begin = 0;    // when it was asked again after a failed call; 0: it is the first attempt
 };
 
 // Who answers from now on, and why: what a run must know again to be resumed.
@@ -80,6 +82,7 @@ class StageSlot {
     for (;;) {
       try {
         CallTimes times;
+        if (attempts.made > 0) times.begin = channel::now_ns();
         attempt(call, arena, derivatives, &times);
         auto checked = check(Untrusted<StageCall>(call), &times);
         if (attempts.made > 0) note_recovery(attempts);

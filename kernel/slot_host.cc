@@ -100,16 +100,14 @@ void SlotHost::replace_description(SlotDescription description) {
 }
 
 std::string SlotHost::next_rung() {
-  if (rung_ == Rung::kOwn && previous_) {
-    rung_ = Rung::kPrevious;
+  if (previous_) {
     replace_description(std::move(*previous_));
     previous_.reset();
     return "previous build";
   }
   const bool has_fallback =
       std::ranges::any_of(description_.plugins, [](const PluginChoice& one) { return one.fallback != nullptr; });
-  if (rung_ == Rung::kFallback || !has_fallback) return {};
-  rung_ = Rung::kFallback;
+  if (!has_fallback) return {};
   SlotDescription next = description_;
   // what nobody vouches for does not come into this process
   if (next.hosting == Hosting::kDirect) next.hosting = Hosting::kSharedMemory;
@@ -117,6 +115,7 @@ std::string SlotHost::next_rung() {
   for (PluginChoice& plugin : next.plugins) {
     if (!plugin.fallback) continue;
     plugin = PluginChoice(*plugin.fallback);
+    plugin.fallback = nullptr;
     names += (names.empty() ? "" : ", ") + plugin.declaration.name;
   }
   replace_description(std::move(next));
@@ -146,7 +145,7 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
     if (attempts->rejections >= 2 || failures_ >= kBudget) {
       const bool is_to_blame = attempts->rejections >= 2;
       rung = next_rung();
-      *poison = is_to_blame && rung != "previous build";
+      *poison |= is_to_blame && rung != "previous build";
       if (rung.empty()) throw StageFault(last);
       recovery.plugins_changed = true;
       // one chance there
@@ -173,7 +172,6 @@ void SlotHost::cut_over(std::unique_ptr<Carrier> carrier, SlotDescription descri
   old_ = std::exchange(carrier_, std::move(carrier));
   previous_ = description_;
   replace_description(std::move(description));
-  rung_ = Rung::kOwn;
   good_answers_ = 0;
 }
 

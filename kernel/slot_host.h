@@ -75,7 +75,6 @@ class SlotHost {
   void retire(std::vector<std::unique_ptr<Spare>> spares);
 
  private:
-  enum class Rung : std::uint32_t { kOwn, kPrevious, kFallback };
   std::string take_host();
   // Empty: there is none.
   std::string next_rung();
@@ -84,7 +83,6 @@ class SlotHost {
   SlotDescription description_;
   std::uint32_t threads_;
   HostStarter start_;
-  Rung rung_ = Rung::kOwn;
   std::unique_ptr<Carrier> carrier_;
   std::vector<std::unique_ptr<Spare>> standbys_;
   // During probation: what answered before. After it: what it was made of.

@@ -3,7 +3,9 @@
 //   prepare (a host starts beside the run) -> shadow (asked too, compared, not used) -> cut over at a step boundary
 //   -> probation (the old host stays warm) -> committed, or rolled back by itself
 //
-// The run waits for the preparation alone. A plugin that fails in preparation or shadow never touches the run.
+// The run waits for the preparation and, in the steps of the shadow, for the answers that are compared (ten times the
+// longest call so far, or 100 ms, at most: then it goes on without a shadow). A plugin that fails in preparation or
+// shadow never touches the run.
 #pragma once
 
 #include <cstdint>

@@ -141,6 +141,30 @@ TEST_F(Ladder, AFallbackWhoseWorkerDiesUnreadIsAskedAgain) {
   EXPECT_EQ(world.faults().size(), 3U);
 }
 
+// Counts the verdicts.
+class PoisonWitness final : public kernel::CommitListener {
+ public:
+  void on_poison(const Environment&, const kernel::PoisonedCall&) override { ++verdicts; }
+  void on_commit(const Environment&) override {}
+  int verdicts = 0;
+};
+
+TEST_F(Ladder, PoisonStaysPoisonWhenTheFallbackDoesNotStart) {
+  WorldBuilder builder = world(0);
+  SlotDescription& solver = builder.description().solver;
+  solver.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(solver.plugins[0]);
+  std::vector<Fate> fates(100, Fate::kDoesNotStart);
+  fates[0] = Fate::kDiesAtFourthCall;
+  fates[1] = Fate::kDiesOfItsFirstCall;
+  Environment world(builder.description(), starter(fates));
+  PoisonWitness witness;
+  world.set_commit_listener(&witness);
+  while (world.step() == StepOutcome::kCommitted && world.step_count() < kSteps) {
+  }
+  ASSERT_TRUE(world.fault());
+  EXPECT_EQ(witness.verdicts, 1);
+}
+
 TEST_F(Ladder, AStandbyThatCannotBeStartedIsSaidAndTriedAgain) {
   Environment world(Ladder::world(1).steps(kManySteps, 0.001).description(),
                     starter({Fate::kServes, Fate::kDoesNotStart, Fate::kServes}));
