@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <type_traits>
@@ -87,5 +88,11 @@ class Column {
   Arena* arena_ = nullptr;
   ColumnId id_ = 0;
 };
+
+// Columns of a request or reply, in the order of its contract.
+template <typename... T>
+std::array<ColumnId, sizeof...(T)> ids(const Column<T>&... columns) {
+  return {columns.id()...};
+}
 
 }  // namespace gravitas::kernel

@@ -25,8 +25,7 @@ StepOutcome Environment::step() {
   if (fault_) return StepOutcome::kPaused;
   const std::uint64_t start = lap_ns_ = channel::now_ns();
   try {
-    for (StageSlot* slot : {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_})
-      slot->begin_step(step_count_ + 1);
+    for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     if (model_.body_count > 0) {
       run_basic();
     } else {
@@ -119,9 +118,7 @@ void Environment::remember_joints() {
 void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   const DiscrepancyAnswer& d = data_.discrepancies;
-  const DiscrepancyColumns columns{d.point1.span(),     d.point2.span(),  d.velocity.span(),     d.correction.span(),
-                                   d.axes.span(),       d.mode.span(),    d.lower.span(),        d.upper.span(),
-                                   d.compliance.span(), d.damping.span(), d.maximum_force.span()};
+  const DiscrepancyColumns columns = d.columns();
   for (std::size_t row = 0; row < columns.size();) {
     const std::uint32_t joint = d.constraint[row];
     const ConstraintDescription& description = model_.constraints[joint];

@@ -50,21 +50,8 @@ const char* hosting_name(Hosting hosting) {
 }
 
 SlotDescription& EnvironmentDescription::slot(Slot which) {
-  switch (which) {
-    case Slot::kSpace:
-      return space;
-    case Slot::kCollision:
-      return collision;
-    case Slot::kConstraint:
-      return constraint;
-    case Slot::kForce:
-      return force;
-    case Slot::kSolver:
-      return solver;
-    case Slot::kIntegrator:
-      break;
-  }
-  return integrator;
+  SlotDescription* const all[] = {&space, &collision, &constraint, &force, &solver, &integrator};
+  return *all[static_cast<std::uint32_t>(which) - static_cast<std::uint32_t>(Slot::kSpace)];
 }
 
 const SlotDescription& EnvironmentDescription::slot(Slot which) const {

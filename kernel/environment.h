@@ -104,9 +104,8 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // Exchanges a plugin, its settings or its hosting; see swap.h. Throws std::invalid_argument with the reason where that
   // is impossible: the plan leaves the slot out, or the plugin does not serve what the scene needs of it.
-  void order_swap(SwapOrder order);
-  // Asks a second plugin the same for the rest of the run and compares the answers; swap records show how they differ.
-  void compare(SwapOrder order);
+  // To compare is to ask both for the rest of the run; swap records show how the answers differ.
+  void order_swap(SwapOrder order, bool compares = false);
   std::vector<SwapRecord> swaps() const;
   // Throws std::invalid_argument if the slot is left out or hosted in this process.
   void inject(FaultInjection fault);
@@ -175,12 +174,15 @@ class Environment : private DerivativeSource, private SlotObserver {
   ColumnId wrench_column() const override { return data_.wrench.id(); }
   void begin_attempt(bool counts) override;
   void evaluate() override;
-  void ask_forces(const std::array<ColumnId, 5>& state_columns);
+  // At the time in data_.derivative_time.
+  void ask_forces(const Column<double>& position, const Column<double>& orientation,
+                  const Column<double>& linear_velocity, const Column<double>& angular_velocity);
   void sum_wrenches();
 
   // exchange.cc: others in a slot.
   StageSlot& slot_of(Slot slot);
   std::uint32_t place_of(const SwapOrder& order);
+  std::string why_left_out(Slot slot) const;
   void check_fallbacks() const;
   void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) override;
   void on_decision(const Decision& decision) override;
@@ -237,6 +239,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double margin_ = 0.0;
 
   StageSlot space_, collision_, constraint_, force_, solver_, integrator_;
+  const std::array<StageSlot*, 6> slots_ = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};
 
   const std::array<ColumnId, 5> trial_columns_;
   std::vector<std::vector<ColumnId>> discrepancy_reply_;  // per constraint group

@@ -28,31 +28,20 @@ std::vector<std::string> types_in_use(const EnvironmentDescription& description,
 
 }  // namespace
 
-StageSlot& Environment::slot_of(Slot slot) {
-  switch (slot) {
-    case Slot::kSpace:
-      return space_;
-    case Slot::kCollision:
-      return collision_;
-    case Slot::kConstraint:
-      return constraint_;
-    case Slot::kForce:
-      return force_;
-    case Slot::kSolver:
-      return solver_;
-    case Slot::kIntegrator:
-      break;
-  }
-  return integrator_;
-}
+StageSlot& Environment::slot_of(Slot slot) { return **std::ranges::find(slots_, slot, &StageSlot::which); }
 
 Plan Environment::plan() const {
   Plan plan = plan_;
   plan.slots.clear();
   for (const PlannedSlot& planned : plan_.slots)
-    for (const StageSlot* slot : {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_})
+    for (const StageSlot* slot : slots_)
       if (slot->which() == planned.slot) std::ranges::move(slot->hosts(), std::back_inserter(plan.slots));
   return plan;
+}
+
+std::string Environment::why_left_out(Slot slot) const {
+  const auto reason = std::ranges::find(plan_.left_out, slot_name(slot), &LeftOut::what);
+  return "the plan leaves the slot out" + (reason == plan_.left_out.end() ? "" : ": " + reason->why);
 }
 
 // Row of the plugin whose place is taken.
@@ -60,11 +49,7 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
   const StageSlot& slot = slot_of(order.slot);
   if (order.plugin.declaration.slot != order.slot)
     impossible(order, std::string("it is a plugin of slot ") + slot_name(order.plugin.declaration.slot));
-  if (!slot.is_running()) {
-    for (const LeftOut& left_out : plan_.left_out)
-      if (left_out.what == slot_name(order.slot)) impossible(order, "the plan leaves the slot out: " + left_out.why);
-    impossible(order, "the plan leaves the slot out");
-  }
+  if (!slot.is_running()) impossible(order, why_left_out(order.slot));
   const std::vector<PluginChoice>& plugins = slot.description().plugins;
   const std::vector<std::string> in_use = types_in_use(description_, order.slot);
   std::string why;
@@ -77,7 +62,7 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
 }
 
 void Environment::check_fallbacks() const {
-  for (const StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
+  for (const StageSlot* slot : slots_)
     for (const PluginChoice& plugin : slot->description().plugins) {
       if (!plugin.fallback) continue;
       const PluginDeclaration& fallback = plugin.fallback->declaration;
@@ -87,22 +72,15 @@ void Environment::check_fallbacks() const {
     }
 }
 
-void Environment::order_swap(SwapOrder order) {
+void Environment::order_swap(SwapOrder order, bool compares) {
   const std::uint32_t row = place_of(order);
   StageSlot& slot = slot_of(order.slot);
-  slot.order_swap(std::move(order), row);
-}
-
-void Environment::compare(SwapOrder order) {
-  const std::uint32_t row = place_of(order);
-  StageSlot& slot = slot_of(order.slot);
-  slot.order_swap(std::move(order), row, true);
+  slot.order_swap(std::move(order), row, compares);
 }
 
 std::vector<SwapRecord> Environment::swaps() const {
   std::vector<SwapRecord> all;
-  for (const StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
-    std::ranges::move(slot->swaps(), std::back_inserter(all));
+  for (const StageSlot* slot : slots_) std::ranges::move(slot->swaps(), std::back_inserter(all));
   std::ranges::stable_sort(all, {}, &SwapRecord::step);
   return all;
 }
@@ -112,11 +90,7 @@ void Environment::inject(FaultInjection fault) {
   const auto refuse = [&](const std::string& why) {
     throw std::invalid_argument("fault " + fault.order + " in slot " + slot_name(fault.slot) + ": " + why);
   };
-  if (!slot.is_running()) {
-    for (const LeftOut& left_out : plan_.left_out)
-      if (left_out.what == slot_name(fault.slot)) refuse("the plan leaves the slot out: " + left_out.why);
-    refuse("the plan leaves the slot out");
-  }
+  if (!slot.is_running()) refuse(why_left_out(fault.slot));
   if (slot.description().hosting == Hosting::kDirect)
     refuse("it is hosted in the kernel's own process (direct), which the fault would hit");
   slot.inject(std::move(fault));

@@ -7,28 +7,16 @@ namespace gravitas::kernel {
 
 std::span<const ColumnId> Environment::trial_columns() const { return trial_columns_; }
 
-void Environment::ask_forces(const std::array<ColumnId, 5>& state) {
+void Environment::ask_forces(const Column<double>& position, const Column<double>& orientation,
+                             const Column<double>& linear_velocity, const Column<double>& angular_velocity) {
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     const ForceAnswer& answer = data_.force_answers[g];
-    const std::array<ColumnId, 16> request = {state[0],
-                                              group.type.id(),
-                                              group.parameter_begin.id(),
-                                              group.parameter.id(),
-                                              group.application.id(),
-                                              model_.mass.id(),
-                                              model_.geometry_position.id(),
-                                              model_.geometry_orientation.id(),
-                                              state[1],
-                                              state[2],
-                                              state[3],
-                                              state[4],
-                                              model_.body_shape.id(),
-                                              model_.shape_type.id(),
-                                              model_.shape_parameter_begin.id(),
-                                              model_.shape_parameter.id()};
-    const std::array<ColumnId, 4> reply = {answer.wrench.id(), answer.impulse.id(), answer.potential.id(),
-                                           answer.flags.id()};
+    const auto request = ids(data_.derivative_time, group.type, group.parameter_begin, group.parameter,
+                             group.application, model_.mass, model_.geometry_position, model_.geometry_orientation,
+                             position, orientation, linear_velocity, angular_velocity, model_.body_shape,
+                             model_.shape_type, model_.shape_parameter_begin, model_.shape_parameter);
+    const auto reply = ids(answer.wrench, answer.impulse, answer.potential, answer.flags);
     const StageCall call{stage::Method::kForceWrenches, group.target, request, reply};
     ask(Stage::kForce, &force_, call, nullptr, [&](const auto& got) { return validator_.wrenches(got, answer); });
   }
@@ -66,7 +54,8 @@ void Environment::begin_attempt(bool counts) {
 
 void Environment::evaluate() {
   validator_.derivative_request(data_);
-  ask_forces(trial_columns_);
+  ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
+             data_.derivative_angular_velocity);
   sum_wrenches();
   validator_.note_wrench(data_);
   if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
@@ -85,8 +74,7 @@ double Environment::potential_energy() {
       const bool constant = (answer.flags[i] & kConstantWrench) != 0;
       if (!constant && !asked && force_.is_running()) {
         data_.derivative_time[0] = time();
-        ask_forces({data_.derivative_time.id(), front().position.id(), front().orientation.id(),
-                    front().linear_velocity.id(), front().angular_velocity.id()});
+        ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
         asked = true;
       }
       if (!constant) {

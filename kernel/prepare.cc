@@ -31,8 +31,8 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       force_(Slot::kForce, description_.force),
       solver_(Slot::kSolver, description_.solver),
       integrator_(Slot::kIntegrator, description_.integrator),
-      trial_columns_{data_.derivative_time.id(), data_.derivative_position.id(), data_.derivative_orientation.id(),
-                     data_.derivative_linear_velocity.id(), data_.derivative_angular_velocity.id()} {
+      trial_columns_(ids(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
+                         data_.derivative_linear_velocity, data_.derivative_angular_velocity)) {
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
   arena_.seal();
   model_.write(description_);
@@ -49,13 +49,12 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
 }
 
 Environment::~Environment() {
-  for (StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_}) slot->drain();
+  for (StageSlot* slot : slots_) slot->drain();
 }
 
 void Environment::start_slots(const HostStarter& starter) {
-  const std::array<StageSlot*, 6> slots = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};
-  for (StageSlot* slot : slots) slot->start(description_.threads, starter, this, &faults_);
-  for (StageSlot* slot : slots) slot->finish_start();
+  for (StageSlot* slot : slots_) slot->start(description_.threads, starter, this, &faults_);
+  for (StageSlot* slot : slots_) slot->finish_start();
 }
 
 void Environment::bind_joints() {
@@ -64,9 +63,8 @@ void Environment::bind_joints() {
 
 void Environment::bind(const ConstraintGroup& group, const Column<double>& position,
                        const Column<double>& orientation) {
-  const std::array<ColumnId, 6> request = {group.type.id(),      group.body.id(), group.parameter_begin.id(),
-                                           group.parameter.id(), position.id(),   orientation.id()};
-  const std::array<ColumnId, 2> reply = {group.bound_begin.id(), group.bound.id()};
+  const auto request = ids(group.type, group.body, group.parameter_begin, group.parameter, position, orientation);
+  const auto reply = ids(group.bound_begin, group.bound);
   const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
   ask(Stage::kConstrain, &constraint_, call, nullptr,
       [&](const auto& answer) { return validator_.bound(answer, group); });
@@ -77,8 +75,7 @@ void Environment::bind(const ConstraintGroup& group, const Column<double>& posit
 void Environment::ask_constant_forces() {
   if (!force_.is_running()) return;
   data_.derivative_time[0] = 0.0;
-  ask_forces({data_.derivative_time.id(), front().position.id(), front().orientation.id(), front().linear_velocity.id(),
-              front().angular_velocity.id()});
+  ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
   sum_wrenches();
 
   initial_potential_.assign(model_.application_count, 0.0);

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/checks.h"
 
@@ -115,12 +116,8 @@ std::string find_wrong_memory(const State& state, const Model& model, bool has_c
     if (joint >= model.constraint_count || (i > 0 && joint < state.discrepancy_constraint[i - 1]))
       return at_row("discrepancy_constraint", i) + " is no joint, or out of order";
   }
-  const auto pair = [&](std::size_t i) { return std::pair{state.touching[2 * i], state.touching[2 * i + 1]}; };
-  for (std::size_t i = 0; i < state.touching.size() / 2; ++i) {
-    if (!can_touch(model, pair(i).first, pair(i).second))
-      return at_row("touching", i) + " is not two bodies that can touch";
-    if (i > 0 && !(pair(i - 1) < pair(i))) return at_row("touching", i) + " is not in ascending order, or stands twice";
-  }
+  const std::string problem = check_pairs(state.touching.span(), model.flags.span()).text;
+  if (!problem.empty()) return "of the pairs that touch, " + problem;
   return {};
 }
 

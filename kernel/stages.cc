@@ -48,7 +48,7 @@ std::vector<std::string> Environment::warnings() {
     lines.push_back(std::string("stage ") + kStageNames[i] + " took " + std::to_string(overrun_ns_[i] / 1'000'000) +
                     " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
   }
-  for (StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
+  for (StageSlot* slot : slots_)
     for (const std::string& complaint : slot->take_complaints())
       lines.push_back(std::string("worker of slot ") + slot_name(slot->which()) + ": " + complaint);
   return lines;
@@ -92,24 +92,12 @@ void Environment::begin_step() {
 }
 
 Trusted<TrialState> Environment::integrate() {
-  const std::array<ColumnId, 15> request = {data_.time.id(),
-                                            data_.time_step.id(),
-                                            data_.wrench_is_constant.id(),
-                                            model_.flags.id(),
-                                            model_.inverse_mass.id(),
-                                            model_.inertia.id(),
-                                            model_.inverse_inertia.id(),
-                                            model_.damping.id(),
-                                            data_.wrench.id(),
-                                            front().position.id(),
-                                            front().orientation.id(),
-                                            start_linear_velocity().id(),
-                                            start_angular_velocity().id(),
-                                            front().plugin_state.id(),
-                                            front().state_changed.id()};
-  const std::array<ColumnId, 6> reply = {data_.trial_position.id(),        data_.trial_orientation.id(),
-                                         data_.trial_linear_velocity.id(), data_.trial_angular_velocity.id(),
-                                         data_.error_estimate.id(),        data_.next_plugin_state.id()};
+  const auto request =
+      ids(data_.time, data_.time_step, data_.wrench_is_constant, model_.flags, model_.inverse_mass, model_.inertia,
+          model_.inverse_inertia, model_.damping, data_.wrench, front().position, front().orientation,
+          start_linear_velocity(), start_angular_velocity(), front().plugin_state, front().state_changed);
+  const auto reply = ids(data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+                         data_.trial_angular_velocity, data_.error_estimate, data_.next_plugin_state);
   const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
   DerivativeSource* derivatives = wrench_is_constant_ ? nullptr : this;
   return ask(Stage::kIntegrate, &integrator_, call, derivatives,
@@ -134,30 +122,19 @@ void Environment::bound_bodies(const Trusted<TrialState>&) {
 }
 
 Trusted<Pairs> Environment::find_pairs() {
-  const std::array<ColumnId, 5> request = {data_.lower.id(), data_.upper.id(), model_.flags.id(),
-                                           model_.filter_group.id(), model_.filter_mask.id()};
-  const std::array<ColumnId, 1> reply = {data_.pair.id()};
+  const auto request = ids(data_.lower, data_.upper, model_.flags, model_.filter_group, model_.filter_mask);
+  const auto reply = ids(data_.pair);
   return ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr,
              [&](const auto& answer) { return validator_.pairs(answer, data_); });
 }
 
 Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {
-  const std::array<ColumnId, 13> request = {data_.margin.id(),
-                                            model_.shape_hash.id(),
-                                            model_.shape_type.id(),
-                                            model_.shape_parameter_begin.id(),
-                                            model_.shape_parameter.id(),
-                                            model_.body_shape.id(),
-                                            model_.geometry_position.id(),
-                                            model_.geometry_orientation.id(),
-                                            data_.trial_position.id(),
-                                            data_.trial_orientation.id(),
-                                            data_.trial_linear_velocity.id(),
-                                            data_.trial_angular_velocity.id(),
-                                            data_.pair.id()};
-  const std::array<ColumnId, 6> reply = {data_.contact_pair.id(),   data_.contact_feature.id(),
-                                         data_.contact_normal.id(), data_.contact_point.id(),
-                                         data_.contact_depth.id(),  data_.contact_relative_velocity.id()};
+  const auto request =
+      ids(data_.margin, model_.shape_hash, model_.shape_type, model_.shape_parameter_begin, model_.shape_parameter,
+          model_.body_shape, model_.geometry_position, model_.geometry_orientation, data_.trial_position,
+          data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity, data_.pair);
+  const auto reply = ids(data_.contact_pair, data_.contact_feature, data_.contact_normal, data_.contact_point,
+                         data_.contact_depth, data_.contact_relative_velocity);
   const StageCall call{stage::Method::kCollisionManifolds, 0, request, reply};
   return ask(Stage::kNarrowPhase, &collision_, call, nullptr,
              [&](const auto& answer) { return validator_.contacts(answer, data_); });
@@ -201,17 +178,9 @@ void Environment::constrain(const Trusted<TrialState>&) {
     const ConstraintGroup& group = model_.constraint_groups[g];
     const Column<std::uint32_t>& intact = data_.group_intact[g];
     for (std::size_t i = 0; i < group.row.size(); ++i) intact[i] = front().intact[group.row[i]];
-    const std::array<ColumnId, 11> request = {data_.time.id(),
-                                              data_.time_step.id(),
-                                              group.type.id(),
-                                              group.body.id(),
-                                              group.bound_begin.id(),
-                                              group.bound.id(),
-                                              intact.id(),
-                                              data_.trial_position.id(),
-                                              data_.trial_orientation.id(),
-                                              data_.trial_linear_velocity.id(),
-                                              data_.trial_angular_velocity.id()};
+    const auto request =
+        ids(data_.time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact,
+            data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity);
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
     const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
     ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) {
@@ -266,53 +235,19 @@ void Environment::merge_discrepancies() {
 Trusted<Solution> Environment::solve() {
   const DiscrepancyAnswer& joints = data_.discrepancies;
   const Column<double>& wrench = wrench_is_constant_ ? data_.wrench : data_.start_wrench;
-  const std::array<ColumnId, stage::SolverSolveRequest::kColumnCount> request = {data_.time_step.id(),
-                                                                                 data_.theta.id(),
-                                                                                 model_.flags.id(),
-                                                                                 model_.inverse_mass.id(),
-                                                                                 model_.inverse_inertia.id(),
-                                                                                 front().position.id(),
-                                                                                 front().orientation.id(),
-                                                                                 start_linear_velocity().id(),
-                                                                                 start_angular_velocity().id(),
-                                                                                 data_.trial_position.id(),
-                                                                                 data_.trial_orientation.id(),
-                                                                                 data_.trial_linear_velocity.id(),
-                                                                                 data_.trial_angular_velocity.id(),
-                                                                                 wrench.id(),
-                                                                                 data_.discrepancy_body.id(),
-                                                                                 joints.point1.id(),
-                                                                                 joints.point2.id(),
-                                                                                 joints.velocity.id(),
-                                                                                 joints.correction.id(),
-                                                                                 joints.axes.id(),
-                                                                                 joints.mode.id(),
-                                                                                 joints.lower.id(),
-                                                                                 joints.upper.id(),
-                                                                                 joints.compliance.id(),
-                                                                                 joints.damping.id(),
-                                                                                 joints.maximum_force.id(),
-                                                                                 data_.discrepancy_warm_impulse.id(),
-                                                                                 data_.discrepancy_warm_correction.id(),
-                                                                                 data_.contact_body.id(),
-                                                                                 data_.contact_normal.id(),
-                                                                                 data_.contact_point.id(),
-                                                                                 data_.contact_depth.id(),
-                                                                                 data_.contact_key.id(),
-                                                                                 data_.contact_material.id(),
-                                                                                 data_.contact_warm_impulse.id(),
-                                                                                 data_.contact_warm_correction.id()};
-  const std::array<ColumnId, stage::SolverSolveReply::kColumnCount> reply = {data_.solved_linear_velocity.id(),
-                                                                             data_.solved_angular_velocity.id(),
-                                                                             data_.pose_change.id(),
-                                                                             data_.discrepancy_impulse.id(),
-                                                                             data_.discrepancy_correction.id(),
-                                                                             data_.contact_impulse.id(),
-                                                                             data_.contact_correction.id(),
-                                                                             data_.contact_direction.id(),
-                                                                             data_.iterations.id(),
-                                                                             data_.residual.id(),
-                                                                             data_.stop_reason.id()};
+  const auto request =
+      ids(data_.time_step, data_.theta, model_.flags, model_.inverse_mass, model_.inverse_inertia, front().position,
+          front().orientation, start_linear_velocity(), start_angular_velocity(), data_.trial_position,
+          data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity, wrench,
+          data_.discrepancy_body, joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes,
+          joints.mode, joints.lower, joints.upper, joints.compliance, joints.damping, joints.maximum_force,
+          data_.discrepancy_warm_impulse, data_.discrepancy_warm_correction, data_.contact_body, data_.contact_normal,
+          data_.contact_point, data_.contact_depth, data_.contact_key, data_.contact_material,
+          data_.contact_warm_impulse, data_.contact_warm_correction);
+  const auto reply =
+      ids(data_.solved_linear_velocity, data_.solved_angular_velocity, data_.pose_change, data_.discrepancy_impulse,
+          data_.discrepancy_correction, data_.contact_impulse, data_.contact_correction, data_.contact_direction,
+          data_.iterations, data_.residual, data_.stop_reason);
   // a solver answers a row per discrepancy and contact: make room, so that it is not asked twice
   const std::size_t discrepancies = joints.mode.size(), contacts = data_.contact_key.size();
   for (const Column<double>* column : {&data_.discrepancy_impulse, &data_.discrepancy_correction})

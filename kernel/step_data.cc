@@ -19,6 +19,11 @@ std::vector<ColumnId> DiscrepancyAnswer::ids() const {
           mode.id(),       lower.id(),  upper.id(),  compliance.id(), damping.id(),    maximum_force.id()};
 }
 
+DiscrepancyColumns DiscrepancyAnswer::columns() const {
+  return {point1.span(), point2.span(), velocity.span(),   correction.span(), axes.span(),         mode.span(),
+          lower.span(),  upper.span(),  compliance.span(), damping.span(),    maximum_force.span()};
+}
+
 void DiscrepancyAnswer::resize(std::uint64_t rows) const {
   constraint.resize(rows), mode.resize(rows), correction.resize(rows), axes.resize(4 * rows);
   for (const Column<double>* column :

@@ -6,6 +6,7 @@
 
 #include "kernel/arena.h"
 #include "kernel/model.h"
+#include "plugin_sdk/discrepancy.h"
 
 namespace gravitas::kernel {
 
@@ -20,6 +21,7 @@ struct DiscrepancyAnswer {
   DiscrepancyAnswer() = default;
   DiscrepancyAnswer(Arena* arena, std::uint64_t rows);
   std::vector<ColumnId> ids() const;
+  DiscrepancyColumns columns() const;
   void resize(std::uint64_t rows) const;
   // Copies a row of another answer into a row of this one.
   void copy_row(std::size_t row, const DiscrepancyAnswer& source, std::size_t source_row) const;

@@ -183,7 +183,8 @@ TEST_P(Swapped, TheSolverGetsOtherSettings) {
 
 TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
   Environment world(builder().description());
-  world.compare({Slot::kIntegrator, other(Slot::kIntegrator, plugin_path("integrator_euler")), std::nullopt, 0});
+  world.order_swap({Slot::kIntegrator, other(Slot::kIntegrator, plugin_path("integrator_euler")), std::nullopt, 0},
+                   true);
   world.set_rerun_every(Slot::kSolver, 4);
   run_to_end(&world);
   EXPECT_EQ(world.chain_hash(), quiet_chain());

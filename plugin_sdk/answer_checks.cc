@@ -1,0 +1,98 @@
+#include "plugin_sdk/answer_checks.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/checks.h"
+#include "plugin_sdk/solver.h"
+
+namespace gravitas {
+namespace {
+
+// Share of an impulse that rounding may put on the wrong side of a bound.
+constexpr double kRounding = 1e-9;
+
+std::string at_row(const char* what, std::size_t row) { return std::string(what) + " of row " + std::to_string(row); }
+
+AnswerProblem bad_structure(const char* column, std::size_t row, const char* what) {
+  return {true, at_row(column, row) + what};
+}
+
+AnswerProblem bad_number(const char* column, std::size_t row, const char* what) {
+  return {false, at_row(column, row) + what};
+}
+
+AnswerProblem check_unit(std::span<const double> column, std::size_t components, const char* name) {
+  const std::size_t row = first_not_unit(column, components);
+  return row == kNoRow ? AnswerProblem{} : bad_number(name, row, " is not of unit length");
+}
+
+}  // namespace
+
+AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> flags) {
+  for (std::size_t i = 0; i < pair.size() / 2; ++i) {
+    const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
+    if (a >= b || b >= flags.size()) return bad_structure("pair", i, " is not two bodies in order");
+    if (((flags[a] | flags[b]) & kMovable) == 0 || (flags[a] & flags[b] & kHasShape) == 0)
+      return bad_structure("pair", i, " is two bodies that cannot touch");
+    if (i > 0 && !(std::pair(pair[2 * i - 2], pair[2 * i - 1]) < std::pair(a, b)))
+      return bad_structure("pair", i, " is not in ascending order, or stands twice");
+  }
+  return {};
+}
+
+AnswerProblem check_contact_rows(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> feature,
+                                 std::span<const double> normal, std::uint64_t pairs) {
+  for (std::size_t i = 0; i < pair.size(); ++i) {
+    if (pair[i] >= pairs) return bad_structure("contact_pair", i, " is not one of the pairs asked for");
+    if (i > 0 && !(std::pair(pair[i - 1], feature[i - 1]) < std::pair(pair[i], feature[i])))
+      return bad_structure("contact", i, " is not in ascending order of pair and feature, or stands twice");
+  }
+  return check_unit(normal, 3, "normal");
+}
+
+AnswerProblem check_discrepancy_rows(std::span<const std::uint32_t> constraint, std::span<const std::uint32_t> intact,
+                                     const DiscrepancyColumns& rows) {
+  for (std::size_t i = 0; i < constraint.size(); ++i) {
+    const std::uint32_t joint = constraint[i];
+    if (joint >= intact.size() || intact[joint] == 0) return bad_structure("constraint", i, " is no joint that holds");
+    if (i > 0 && constraint[i - 1] > joint) return bad_structure("constraint", i, " is out of order");
+    if (!is_valid_mode(rows.mode[i])) return bad_structure("mode", i, " is unknown");
+    if (!(rows.correction[i] >= 0.0 && rows.correction[i] <= 1.0))
+      return bad_number("correction", i, " is outside 0 … 1");
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
+      if (rows.lower[k] > rows.upper[k]) return bad_number("lower", i, " lies above upper");
+      if (rows.compliance[k] < 0.0 || rows.damping[k] < 0.0 || rows.maximum_force[k] < 0.0)
+        return bad_number("compliance, damping or maximum_force", i, " is negative");
+    }
+  }
+  return check_unit(rows.axes, 4, "axes");
+}
+
+AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const double> material,
+                                std::span<const std::uint32_t> mode) {
+  if (AnswerProblem problem = check_unit(answer.contact_direction, 3, "contact_direction"); !problem.text.empty())
+    return problem;
+  for (std::size_t i = 0; i < answer.contact_correction.size(); ++i) {
+    const Vector3 impulse = vector_at(answer.contact_impulse, i), normal = vector_at(answer.contact_direction, i);
+    const double* row = &material[kMaterialColumns * i];
+    const double along = normal.dot(impulse), tolerance = kRounding * impulse.norm();
+    if (along < -tolerance) return bad_number("contact_impulse", i, " pulls the bodies together");
+    const double friction = std::max(row[kStaticFriction], row[kDynamicFriction]);
+    if ((impulse - along * normal).norm() > friction * along + tolerance)
+      return bad_number("contact_impulse", i, " leaves the friction cone");
+    if (answer.contact_correction[i] < 0.0) return bad_number("contact_correction", i, " is negative");
+  }
+  for (std::size_t i = 0; i < mode.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
+      if (axis_mode(mode[i], axis) == AxisMode::kUnilateral &&
+          (answer.discrepancy_impulse[k] < 0.0 || answer.discrepancy_correction[k] < 0.0))
+        return bad_number("discrepancy_impulse", i, " pulls along a one-sided axis");
+    }
+  }
+  return {};
+}
+
+}  // namespace gravitas

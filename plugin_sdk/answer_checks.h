@@ -1,0 +1,38 @@
+// Structure and numbers of answers, stage by stage: what holds whatever the method, at no more than a look at each row.
+// The kernel demands it of every answer; physics_checks.h goes on from there.
+//
+// Preconditions: check_rows() and first_not_finite() of checks.h have passed. Each returns the first thing that is
+// wrong, as a sentence that begins with the column's name; `text` is empty if all is well.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/physics_checks.h"
+
+namespace gravitas {
+
+struct AnswerProblem {
+  bool is_structure = false;  // ids, order, uniqueness; else a number
+  std::string text;
+};
+
+// Pairs (a, b): a < b, both with a shape, one movable (flags of body.h), ascending, each once.
+AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> flags);
+
+// Contacts of `pairs` pairs: ascending by (pair, feature), each once; unit normals.
+AnswerProblem check_contact_rows(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> feature,
+                                 std::span<const double> normal, std::uint64_t pairs);
+
+// Discrepancies of joints that are intact (1), in the order of the joints; known modes, correction in 0 … 1, lower <=
+// upper, nothing negative that cannot be, unit axes.
+AnswerProblem check_discrepancy_rows(std::span<const std::uint32_t> constraint, std::span<const std::uint32_t> intact,
+                                     const DiscrepancyColumns& rows);
+
+// Multipliers: contacts push, inside the friction cone of their material, along unit directions; one-sided axes too.
+AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const double> material,
+                                std::span<const std::uint32_t> mode);
+
+}  // namespace gravitas
