@@ -8,41 +8,85 @@
 namespace gravitas::collision {
 namespace {
 
-void require_finite(const char* what, std::span<const double> column, std::size_t components) {
+constexpr double kMostTurning = 1e4;  // rad
+constexpr double kFarthest = 1e100;   // m: squares of lengths stay finite
+
+void require_finite(const char* row, const char* what, std::span<const double> column, std::size_t components) {
   const std::size_t i = first_not_finite(column);
-  if (i != kNoRow) throw Refusal("body " + std::to_string(i / components) + " has a " + what + " that is not finite");
+  if (i != kNoRow) throw Refusal(row + std::to_string(i / components) + " has a " + what + " that is not finite");
 }
+
+void require_shape(const ShapeColumns& shapes, const BodyColumns& bodies, std::uint32_t body, const std::string& who) {
+  if (body >= bodies.body_shape.size() || bodies.body_shape[body] >= shapes.shape_type.size())
+    throw Refusal(who + " names a body without shape");
+}
+
+void check_bodies(const BodyColumns& bodies) {
+  require_finite("body ", "geometry position", bodies.geometry_position, 3);
+  require_finite("body ", "geometry orientation", bodies.geometry_orientation, 4);
+  require_finite("body ", "position", bodies.position, 3);
+  require_finite("body ", "orientation", bodies.orientation, 4);
+}
+
+template <typename Request>
+void check_pairs(const Request& request) {
+  const ShapeColumns shapes = shapes_of(request);
+  const BodyColumns bodies = bodies_of(request);
+  for (std::size_t i = 0; i < request.pair().size(); ++i)
+    require_shape(shapes, bodies, request.pair()[i], "pair " + std::to_string(i / 2));
+  check_bodies(bodies);
+}
+
+void push(const stage::ReplyColumn<double>& column, const Vector3& v) { column.push(v.x(), v.y(), v.z()); }
 
 }  // namespace
 
-std::span<const double> shape_parameters(const stage::CollisionManifoldsRequest& request, std::size_t shape) {
-  const std::span<const std::uint32_t> begin = request.shape_parameter_begin();
-  const std::span<const double> parameters = request.shape_parameter();
-  if (shape + 1 >= begin.size() || begin[shape] > begin[shape + 1] || begin[shape + 1] > parameters.size())
+std::span<const double> ShapeColumns::parameters(std::size_t shape) const {
+  const std::span<const std::uint32_t> begin = shape_parameter_begin;
+  if (shape + 1 >= begin.size() || begin[shape] > begin[shape + 1] || begin[shape + 1] > shape_parameter.size())
     throw Refusal("the parameters of shape " + std::to_string(shape) + " lie outside their column");
-  return parameters.subspan(begin[shape], begin[shape + 1] - begin[shape]);
+  return shape_parameter.subspan(begin[shape], begin[shape + 1] - begin[shape]);
 }
 
-void check_bodies(const stage::CollisionManifoldsRequest& request) {
-  const std::size_t bodies = request.body_shape().size(), shapes = request.shape_type().size();
-  for (std::size_t i = 0; i < request.pair().size(); ++i) {
-    const std::uint32_t body = request.pair()[i];
-    if (body >= bodies || request.body_shape()[body] >= shapes)
-      throw Refusal("pair " + std::to_string(i / 2) + " names a body without shape");
-  }
+void check_request(const stage::CollisionManifoldsRequest& request) {
+  check_pairs(request);
   if (!(request.margin() >= 0.0)) throw Refusal("the margin is negative, or no number");
-  require_finite("geometry position", request.geometry_position(), 3);
-  require_finite("geometry orientation", request.geometry_orientation(), 4);
-  require_finite("position", request.position(), 3);
-  require_finite("orientation", request.orientation(), 4);
-  require_finite("linear velocity", request.linear_velocity(), 3);
-  require_finite("angular velocity", request.angular_velocity(), 3);
+  require_finite("body ", "linear velocity", request.linear_velocity(), 3);
+  require_finite("body ", "angular velocity", request.angular_velocity(), 3);
 }
 
-Pose geometry_pose(const stage::CollisionManifoldsRequest& request, std::uint32_t body) {
-  const Pose body_pose{vector_at(request.position(), body), quaternion_at(request.orientation(), body)};
-  return compose(body_pose,
-                 {vector_at(request.geometry_position(), body), quaternion_at(request.geometry_orientation(), body)});
+void check_request(const stage::CollisionTimesOfImpactRequest& request) {
+  check_pairs(request);
+  if (!(request.target_gap() >= 0.0) || !std::isfinite(request.target_gap()))
+    throw Refusal("the target gap is negative, or no finite number");
+  const BodyColumns bodies = bodies_of(request);
+  for (const std::span<const double> lengths : {bodies.geometry_position, bodies.position, request.displacement()})
+    for (std::size_t i = 0; i < lengths.size(); ++i)
+      if (!(std::fabs(lengths[i]) <= kFarthest))
+        throw Refusal("body " + std::to_string(i / 3) + " is, or goes, farther than 1e100 m");
+  require_finite("body ", "rotation", request.rotation(), 3);
+  for (std::size_t body = 0; body < request.body_shape().size(); ++body)
+    if (!(vector_at(request.rotation(), body).squaredNorm() <= kMostTurning * kMostTurning))
+      throw Refusal("body " + std::to_string(body) + " turns by more than 1e4 rad in the interval");
+}
+
+void check_request(const stage::CollisionRaysRequest& request) {
+  const ShapeColumns shapes = shapes_of(request);
+  const BodyColumns bodies = bodies_of(request);
+  const std::size_t rays = request.length().size();
+  for (std::size_t i = 0; i < request.candidate().size(); i += 2) {
+    const std::string who = "candidate " + std::to_string(i / 2);
+    if (request.candidate()[i] >= rays) throw Refusal(who + " names a ray that does not exist");
+    require_shape(shapes, bodies, request.candidate()[i + 1], who);
+  }
+  check_bodies(bodies);
+  require_finite("ray ", "origin", request.origin(), 3);
+  require_finite("ray ", "length", request.length(), 1);
+  for (std::size_t i = 0; i < rays; ++i) {
+    if (!(request.length()[i] >= 0.0)) throw Refusal("ray " + std::to_string(i) + " has a negative length");
+    if (!(std::fabs(vector_at(request.direction(), i).squaredNorm() - 1.0) <= 1e-9))
+      throw Refusal("ray " + std::to_string(i) + " has a direction that is no unit vector");
+  }
 }
 
 void write_contact(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
@@ -56,15 +100,32 @@ void write_contact(const stage::CollisionManifoldsRequest& request, const stage:
       !contact.normal.allFinite())
     throw Refusal("a contact of pair " + std::to_string(pair) +
                   " is not finite: sizes, positions or velocities overflow");
-  const auto push = [](const stage::ReplyColumn<double>& column, const Vector3& v) {
-    column.push(v.x(), v.y(), v.z());
-  };
   reply.contact_pair().push(static_cast<std::uint32_t>(pair));
   reply.feature().push(contact.feature);
   push(reply.normal(), contact.normal);
   push(reply.point(), contact.point);
   reply.depth().push(contact.depth);
   push(reply.relative_velocity(), relative);
+}
+
+void write_impact(const stage::CollisionTimesOfImpactReply& reply, std::size_t pair, const Impact& impact) {
+  if (!impact.point.allFinite() || !impact.normal.allFinite() || !std::isfinite(impact.depth) ||
+      !std::isfinite(impact.fraction))
+    throw Refusal("the impact of pair " + std::to_string(pair) +
+                  " is not finite: sizes, positions or motions overflow");
+  reply.impact_pair().push(static_cast<std::uint32_t>(pair));
+  reply.fraction().push(impact.fraction);
+  push(reply.normal(), impact.normal);
+  push(reply.point(), impact.point);
+  reply.depth().push(impact.depth);
+}
+
+void write_hit(const stage::CollisionRaysReply& reply, std::size_t candidate, const RayHit& hit) {
+  if (!hit.normal.allFinite() || !std::isfinite(hit.distance))
+    throw Refusal("the hit of candidate " + std::to_string(candidate) + " is not finite: sizes or positions overflow");
+  reply.hit_candidate().push(static_cast<std::uint32_t>(candidate));
+  reply.distance().push(hit.distance);
+  push(reply.normal(), hit.normal);
 }
 
 }  // namespace gravitas::collision

@@ -1,27 +1,69 @@
-// What every collision plugin does with its request and reply beside geometry: rows checked, poses composed, contacts
-// written with their velocities. All throw Refusal with the reason.
+// What every collision plugin does with its requests and replies beside geometry: rows checked, poses composed, answers
+// written. All throw Refusal with the reason.
 #pragma once
 
 #include <span>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/geometry/manifold.h"
+#include "plugin_sdk/geometry/ray.h"
+#include "plugin_sdk/geometry/time_of_impact.h"
+#include "plugin_sdk/math/motion.h"
 #include "plugin_sdk/math/pose.h"
 #include "plugin_sdk/plugin.h"
 
 namespace gravitas::collision {
 
-// The flattened properties of a shape.
-std::span<const double> shape_parameters(const stage::CollisionManifoldsRequest& request, std::size_t shape);
+// The columns that all requests of the slot have, named as there.
+struct ShapeColumns {
+  std::span<const std::uint64_t> shape_hash, shape_type;
+  std::span<const std::uint32_t> shape_parameter_begin;
+  std::span<const double> shape_parameter;
 
-// The pairs name bodies with shapes, the margin is one, and every number of a body is finite.
-void check_bodies(const stage::CollisionManifoldsRequest& request);
+  // The flattened properties of a shape.
+  std::span<const double> parameters(std::size_t shape) const;
+};
 
-// The pose of a body's shape in the world.
-Pose geometry_pose(const stage::CollisionManifoldsRequest& request, std::uint32_t body);
+struct BodyColumns {
+  std::span<const std::uint32_t> body_shape;
+  std::span<const double> geometry_position, geometry_orientation, position, orientation;
+
+  Pose pose(std::uint32_t body) const { return {vector_at(position, body), quaternion_at(orientation, body)}; }
+  // Of a body's shape in its body, and in the world.
+  Pose geometry(std::uint32_t body) const {
+    return {vector_at(geometry_position, body), quaternion_at(geometry_orientation, body)};
+  }
+  Pose placed(std::uint32_t body) const { return compose(pose(body), geometry(body)); }
+};
+
+template <typename Request>
+ShapeColumns shapes_of(const Request& request) {
+  return {request.shape_hash(), request.shape_type(), request.shape_parameter_begin(), request.shape_parameter()};
+}
+template <typename Request>
+BodyColumns bodies_of(const Request& request) {
+  return {request.body_shape(), request.geometry_position(), request.geometry_orientation(), request.position(),
+          request.orientation()};
+}
+inline Motion motion_of(const stage::CollisionTimesOfImpactRequest& request, std::uint32_t body) {
+  return {vector_at(request.displacement(), body), vector_at(request.rotation(), body)};
+}
+
+inline Ray ray_of(const stage::CollisionRaysRequest& request, std::uint32_t ray) {
+  return {vector_at(request.origin(), ray), vector_at(request.direction(), ray), request.length()[ray]};
+}
+
+// The pairs (or candidates) name bodies with shapes, the margin (or target) is one, and every number of a body is
+// finite; of rays, that they exist and have unit directions; of motions, that they turn
+// by no more than 1e4 rad and stay within 1e100 m.
+void check_request(const stage::CollisionManifoldsRequest& request);
+void check_request(const stage::CollisionTimesOfImpactRequest& request);
+void check_request(const stage::CollisionRaysRequest& request);
 
 // Appends a contact of a pair, with the velocity of b relative to a at its point.
 void write_contact(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
                    std::size_t pair, const ContactPoint& contact);
+void write_impact(const stage::CollisionTimesOfImpactReply& reply, std::size_t pair, const Impact& impact);
+void write_hit(const stage::CollisionRaysReply& reply, std::size_t candidate, const RayHit& hit);
 
 }  // namespace gravitas::collision

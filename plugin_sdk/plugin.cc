@@ -34,9 +34,28 @@ bool SpacePlugin::dispatch(stage::Method method, const gravitas_column* request,
 
 bool CollisionPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
                                Host& host) {
-  if (method != stage::Method::kCollisionManifolds) return false;
-  manifolds(stage::CollisionManifoldsRequest(request), stage::CollisionManifoldsReply(reply), host);
-  return true;
+  switch (method) {
+    case stage::Method::kCollisionManifolds:
+      manifolds(stage::CollisionManifoldsRequest(request), stage::CollisionManifoldsReply(reply), host);
+      return true;
+    case stage::Method::kCollisionTimesOfImpact:
+      times_of_impact(stage::CollisionTimesOfImpactRequest(request), stage::CollisionTimesOfImpactReply(reply), host);
+      return true;
+    case stage::Method::kCollisionRays:
+      rays(stage::CollisionRaysRequest(request), stage::CollisionRaysReply(reply), host);
+      return true;
+    default:
+      return false;
+  }
+}
+
+void CollisionPlugin::times_of_impact(const stage::CollisionTimesOfImpactRequest&,
+                                      const stage::CollisionTimesOfImpactReply&, Host&) {
+  throw UnknownMethod();
+}
+
+void CollisionPlugin::rays(const stage::CollisionRaysRequest&, const stage::CollisionRaysReply&, Host&) {
+  throw UnknownMethod();
 }
 
 bool ConstraintPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,

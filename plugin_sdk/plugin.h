@@ -67,6 +67,12 @@ class Refusal : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// The plugin does not answer this method: what optional methods throw unless they are overridden.
+class UnknownMethod : public std::exception {
+ public:
+  const char* what() const noexcept override { return "the plugin does not answer this method"; }
+};
+
 // What the host offers to a plugin during a call.
 class Host {
  public:
@@ -130,6 +136,10 @@ class CollisionPlugin {
   virtual ~CollisionPlugin() = default;
   virtual void manifolds(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
                          Host& host) = 0;
+  // Optional: a plugin that overrides one of these declares the capability of its name, and is asked only then.
+  virtual void times_of_impact(const stage::CollisionTimesOfImpactRequest& request,
+                               const stage::CollisionTimesOfImpactReply& reply, Host& host);
+  virtual void rays(const stage::CollisionRaysRequest& request, const stage::CollisionRaysReply& reply, Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 
@@ -192,6 +202,9 @@ template <typename Body>
 std::int32_t guarded(gravitas_error* error, Body&& body) {
   try {
     return body();
+  } catch (const UnknownMethod& unknown) {
+    set_error(error, unknown.what());
+    return GRAVITAS_UNKNOWN_METHOD;
   } catch (const Refusal& refusal) {
     set_error(error, refusal.what());
     return GRAVITAS_REFUSED;

@@ -425,8 +425,8 @@ void judge_coincident(Subject& subject) {
 
 }  // namespace
 
-std::vector<Case> collision_cases(const PluginDeclaration&) {
-  return {
+std::vector<Case> collision_cases(const PluginDeclaration& declaration) {
+  std::vector<Case> cases = {
       make_types_case("collision/types", types_of),
       make_case("collision/nothing", "Without a pair there is no contact.", judge_nothing),
       make_case("collision/known", "Closed forms: depth, normal and place of touching shapes.", judge_known),
@@ -442,6 +442,8 @@ std::vector<Case> collision_cases(const PluginDeclaration&) {
       make_case("collision/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
                 judge_hostile),
   };
+  std::ranges::move(moving_collision_cases(declaration), std::back_inserter(cases));
+  return cases;
 }
 
 std::vector<Question> collision_questions(Subject& subject, Draw* draw) {
@@ -450,6 +452,7 @@ std::vector<Question> collision_questions(Subject& subject, Draw* draw) {
     const Solids world = crowd(subject, count, draw);
     questions.push_back({"a lattice of " + std::to_string(count) + " bodies", kManifolds, world.request(), {}});
   }
+  std::ranges::move(moving_collision_questions(subject), std::back_inserter(questions));
   return questions;
 }
 

@@ -10,6 +10,8 @@ namespace gravitas::conformance {
 
 std::vector<Case> space_cases(const PluginDeclaration& declaration);
 std::vector<Case> collision_cases(const PluginDeclaration& declaration);
+// Of the optional methods of slot collision.
+std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration);
 std::vector<Case> constraint_cases(const PluginDeclaration& declaration);
 std::vector<Case> force_cases(const PluginDeclaration& declaration);
 std::vector<Case> solver_cases(const PluginDeclaration& declaration);
@@ -17,6 +19,7 @@ std::vector<Case> integrator_cases(const PluginDeclaration& declaration);
 
 std::vector<Question> space_questions(Draw* draw);
 std::vector<Question> collision_questions(Subject& subject, Draw* draw);
+std::vector<Question> moving_collision_questions(Subject& subject);
 std::vector<Question> constraint_questions(Subject& subject, Draw* draw);
 std::vector<Question> force_questions(Subject& subject, Draw* draw);
 std::vector<Question> solver_questions(Draw* draw);

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <numeric>
 
 namespace gravitas::collision {
 namespace {
@@ -16,15 +18,13 @@ namespace {
 // rounding
 constexpr double kScoreGain = 1.0 + 1e-6;
 
-using Span = const ContactPoint*;
-
 // index of the largest score(contact), the first of equal ones; -1 if none exceeds `at_least`
-template <typename Score>
-int index_of_largest(Span contacts, int count, double at_least, const Score& score) {
+template <typename Contacts, typename Score>
+int index_of_largest(const Contacts& contacts, int count, double at_least, const Score& score) {
   int best = -1;
   double best_score = at_least;
   for (int i = 0; i < count; ++i) {
-    const double s = score(contacts[i]);
+    const double s = score(contacts(i));
     if (s > (best < 0 ? best_score : best_score * kScoreGain)) {
       best = i;
       best_score = s;
@@ -38,28 +38,25 @@ double area(const ContactPoint& p, const ContactPoint& q, const ContactPoint& x)
   return (q.point - p.point).cross(x.point - p.point).dot(p.normal);
 }
 
-}  // namespace
-
-int choose_extremes(std::span<const ContactPoint> all, double depth_tie, double merge_distance,
-                    std::array<int, kManifoldCapacity>* out) {
-  const Span contacts = all.data();
-  const int count = static_cast<int>(all.size());
+// choose_extremes() of the contacts contacts(0) to contacts(count - 1).
+template <typename Contacts>
+int choose(const Contacts& contacts, int count, double depth_tie, double merge_distance,
+           std::array<int, kManifoldCapacity>* out) {
   int* chosen = out->data();
-  const double deepest = std::max_element(all.begin(), all.end(), [](const ContactPoint& x, const ContactPoint& y) {
-                           return x.depth < y.depth;
-                         })->depth;
+  double deepest = contacts(0).depth;
+  for (int i = 1; i < count; ++i) deepest = std::max(deepest, contacts(i).depth);
   int n = 0;
   for (int i = 0; i < count && n == 0; ++i) {
-    if (contacts[i].depth >= deepest - depth_tie) chosen[n++] = i;
+    if (contacts(i).depth >= deepest - depth_tie) chosen[n++] = i;
   }
-  const ContactPoint& first = contacts[chosen[0]];
+  const ContactPoint& first = contacts(chosen[0]);
 
   const double smallest = merge_distance * merge_distance;
   const int far = index_of_largest(contacts, count, smallest,
                                    [&](const ContactPoint& x) { return (x.point - first.point).squaredNorm(); });
   if (far < 0) return n;
   chosen[n++] = far;
-  const ContactPoint& second = contacts[far];
+  const ContactPoint& second = contacts(far);
 
   // points on one line add nothing to its two ends
   const double thin = merge_distance * (second.point - first.point).norm();
@@ -67,7 +64,7 @@ int choose_extremes(std::span<const ContactPoint> all, double depth_tie, double 
       index_of_largest(contacts, count, thin, [&](const ContactPoint& x) { return std::fabs(area(first, second, x)); });
   if (third_index < 0) return n;
   chosen[n++] = third_index;
-  const ContactPoint& third = contacts[third_index];
+  const ContactPoint& third = contacts(third_index);
 
   const double turn = area(first, second, third) > 0.0 ? 1.0 : -1.0;
   const int outside = index_of_largest(contacts, count, thin, [&](const ContactPoint& x) {
@@ -75,6 +72,14 @@ int choose_extremes(std::span<const ContactPoint> all, double depth_tie, double 
   });
   if (outside >= 0) chosen[n++] = outside;
   return n;
+}
+
+}  // namespace
+
+int choose_extremes(std::span<const ContactPoint> contacts, double depth_tie, double merge_distance,
+                    std::array<int, kManifoldCapacity>* chosen) {
+  const auto at = [&](int i) -> const ContactPoint& { return contacts[static_cast<std::size_t>(i)]; };
+  return choose(at, static_cast<int>(contacts.size()), depth_tie, merge_distance, chosen);
 }
 
 void ContactCandidates::add(const ContactPoint& contact) {
@@ -92,7 +97,7 @@ void ContactCandidates::add(const ContactPoint& contact) {
     ContactPoint& other = contacts_[static_cast<std::size_t>(same)];
     if (contact.depth > other.depth + depth_tie_) other = contact;
   } else if (count_ < kCapacity) {
-    contacts_[static_cast<std::size_t>(count_++)] = contact;
+    std::construct_at(&contacts_[static_cast<std::size_t>(count_++)], contact);
   }
 }
 
@@ -105,24 +110,23 @@ double ContactCandidates::deepest() const {
 }
 
 void ContactCandidates::reduce_to(Manifold* out) const {
-  std::array<ContactPoint, kCapacity> sorted;
-  std::copy_n(contacts_.begin(), count_, sorted.begin());
-  const auto by_feature = [](const ContactPoint& x, const ContactPoint& y) { return x.feature < y.feature; };
-  std::sort(sorted.begin(), sorted.begin() + count_, by_feature);
-
+  static_assert(kCapacity <= 255);
   out->count = 0;
   if (count_ == 0) return;
-  std::array<bool, kCapacity> is_kept{};
-  if (count_ <= kManifoldCapacity) {
-    is_kept.fill(true);
-  } else {
-    std::array<int, kManifoldCapacity> chosen{};
-    const std::span<const ContactPoint> all(sorted.data(), static_cast<std::size_t>(count_));
-    const int n = choose_extremes(all, depth_tie_, merge_distance_, &chosen);
-    for (int i = 0; i < n; ++i) is_kept[static_cast<std::size_t>(chosen[static_cast<std::size_t>(i)])] = true;
+  std::array<std::uint8_t, kCapacity> order;
+  const auto end = order.begin() + count_;
+  std::iota(order.begin(), end, std::uint8_t{0});
+  std::sort(order.begin(), end,
+            [&](std::uint8_t x, std::uint8_t y) { return contacts_[x].feature < contacts_[y].feature; });
+  const auto sorted = [&](int i) -> const ContactPoint& { return contacts_[order[static_cast<std::size_t>(i)]]; };
+  std::array<int, kManifoldCapacity> chosen = {0, 1, 2, 3};
+  int count = count_;
+  if (count_ > kManifoldCapacity) {
+    count = choose(sorted, count_, depth_tie_, merge_distance_, &chosen);
+    std::sort(chosen.begin(), chosen.begin() + count);
   }
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i)
-    if (is_kept[i]) out->contacts[static_cast<std::size_t>(out->count++)] = sorted[i];
+  for (int i = 0; i < count; ++i)
+    out->contacts[static_cast<std::size_t>(out->count++)] = sorted(chosen[static_cast<std::size_t>(i)]);
 }
 
 }  // namespace gravitas::collision

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "plugin_sdk/geometry/manifold.h"
+#include "plugin_sdk/geometry/support_map.h"
 
 namespace gravitas::collision {
 
@@ -15,20 +16,23 @@ namespace gravitas::collision {
 int choose_extremes(std::span<const ContactPoint> contacts, double depth_tie, double merge_distance,
                     std::array<int, kManifoldCapacity>* chosen);
 
-// Fixed capacity: two clipped patches give at most 16 points (4 rim points of each of two discs and
-// two crossings, or 8 corners of a clipped polygon, with room for doubled corners), two round ends of 13 points 52.
+// Room for all that two contours can give: the corners of both, and two crossings for each border of either.
 class ContactCandidates {
  public:
   // Points nearer to each other than `merge_distance` (m) count as one; depths that differ by less
   // than `depth_tie` (m) count as equal. Contacts with a depth below -margin are dropped.
   ContactCandidates(double margin, double merge_distance, double depth_tie)
       : margin_(margin), merge_distance_(merge_distance), depth_tie_(depth_tie) {}
+  ContactCandidates(const ContactCandidates&) = delete;
+  ContactCandidates& operator=(const ContactCandidates&) = delete;
+  ~ContactCandidates() = default;
 
   // Adds a point unless it is too shallow, repeats a feature, or coincides with an earlier point
   // that is as deep: so the more telling features are added first. A doubled feature or place keeps
   // the deeper contact.
   void add(const ContactPoint& contact);
 
+  void clear() { count_ = 0; }
   int count() const { return count_; }
   double deepest() const;
 
@@ -37,13 +41,16 @@ class ContactCandidates {
   void reduce_to(Manifold* out) const;
 
  private:
-  static constexpr int kCapacity = 56;
+  static constexpr int kCapacity = 4 * static_cast<int>(Contour::kCapacity);
 
   double margin_;
   double merge_distance_;
   double depth_tie_;
   int count_ = 0;
-  std::array<ContactPoint, kCapacity> contacts_;
+  // a union, so that the room is not filled with zeros for each pair
+  union {
+    std::array<ContactPoint, kCapacity> contacts_;
+  };
 };
 
 }  // namespace gravitas::collision

@@ -61,7 +61,7 @@ class FlatContour {
     return true;
   }
 
-  // The surface's coordinate along the normal over x, without the rounding. `side` is +1 for the first solid.
+  // The surface's coordinate along the normal over x, without the rounding; `at` is a place that lies over it.
   double height(const Vector2& x, const Vector3& at) const {
     if (count() == 1) return normal_.dot(contour_.points[0]);
     if (count() == 2) {
@@ -158,7 +158,6 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
   const Separation least = find_separation(pair, margin);
   if (!(least.depth >= -margin)) return;
   const double tie = std::max(1e-9 * pair.thinnest(), 1e-14 * pair.reach());
-  const ContactCandidates none(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
 
   const auto contours = [&](const Vector3& n, double sine, Contour* a, Contour* b) {
     pair.a.contour(n, sine, a);
@@ -182,10 +181,10 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
   if (std::isfinite(face_depth) && !(depth < face_depth - shallower_by(pair, face_depth)))
     normal = face, depth = face_depth;
 
-  ContactCandidates candidates = none;
+  ContactCandidates candidates(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
   const double equal = std::max(1e-6 * pair.thinnest(), tie);
   const auto try_normal = [&](const Vector3& n, double wanted) {
-    candidates = none;
+    candidates.clear();
     contours(n, kFlat, &a, &b);
     add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
     return candidates.deepest() >= wanted - equal;

@@ -131,7 +131,7 @@ class Polytope {
     face.corner = {a, b, c};
     const bool has_normal = length > 1e-26 * reach_ * reach_;
     face.normal = has_normal ? Vector3(area / length) : Vector3::Zero();
-    // the corner nearest to the origin has the least error
+    // from the middle of the corners, whose roundings cancel in part
     face.height = has_normal ? face.normal.dot((x + y + z) / 3.0) : std::numeric_limits<double>::infinity();
   }
 

@@ -82,12 +82,11 @@ struct Wrong {
   std::string why;
 };
 
-std::vector<Vector3> read_vertices(PropertyCursor* cursor, double scale = 1.0) {
+std::vector<Vector3> read_vertices(PropertyCursor* cursor) {
   const std::span<const double> numbers = cursor->table(3);
   std::vector<Vector3> vertices;
   vertices.reserve(numbers.size() / 3);
-  for (std::size_t i = 0; i < numbers.size(); i += 3)
-    vertices.push_back(scale * Vector3(numbers[i], numbers[i + 1], numbers[i + 2]));
+  for (std::size_t i = 0; i < numbers.size(); i += 3) vertices.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
   return vertices;
 }
 
@@ -337,7 +336,7 @@ std::vector<double> flattened_shape(const SceneShape& shape) {
       for (const TriangleMesh::Triangle& t : shape.mesh->triangles())
         triangles.insert(triangles.end(), t.begin(), t.end());
       put_table(shape.mesh->vertices(), triangles);
-      const MeshOptions options;
+      const MeshOptions& options = shape.mesh->options();
       out.insert(out.end(),
                  {1.0, static_cast<double>(options.maximum_depth), static_cast<double>(options.minimum_node_size)});
       return out;

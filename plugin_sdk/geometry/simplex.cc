@@ -94,19 +94,6 @@ SimplexPoint closest_on_simplex(std::span<const Vector3> x) {
   }
 }
 
-SegmentParameters closest_on_segments(const Vector3& a0, const Vector3& a1, const Vector3& b0, const Vector3& b1) {
-  const Vector3 u = a1 - a0, v = b1 - b0, w = a0 - b0;
-  const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v), uw = u.dot(w), vw = v.dot(w);
-  const double determinant = uu * vv - uv * uv;
-  double s = determinant > 0.0 ? std::clamp((uv * vw - vv * uw) / determinant, 0.0, 1.0) : 0.0;
-  double t = vv > 0.0 ? (uv * s + vw) / vv : 0.0;
-  if (t < 0.0 || t > 1.0) {
-    t = std::clamp(t, 0.0, 1.0);
-    s = uu > 0.0 ? std::clamp((uv * t - uw) / uu, 0.0, 1.0) : 0.0;
-  }
-  return {s, t};
-}
-
 std::optional<double> ray_on_triangle(const Vector3& origin, const Vector3& direction,
                                       const std::array<Vector3, 3>& corners) {
   const Vector3 ab = corners[1] - corners[0], ac = corners[2] - corners[0];

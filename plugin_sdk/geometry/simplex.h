@@ -26,13 +26,6 @@ SimplexPoint closest_on_tetrahedron(const Vector3& a, const Vector3& b, const Ve
 // One to four corners.
 SimplexPoint closest_on_simplex(std::span<const Vector3> corners);
 
-// The nearest points of two segments, as parameters 0 to 1 along each. Where they are parallel, one such pair.
-struct SegmentParameters {
-  double first;
-  double second;
-};
-SegmentParameters closest_on_segments(const Vector3& a0, const Vector3& a1, const Vector3& b0, const Vector3& b1);
-
 // Where origin + t direction, t >= 0, meets a triangle from either side, its borders included within rounding (T.
 // Moeller and B. Trumbore, 1997). Nothing if it runs along the plane.
 std::optional<double> ray_on_triangle(const Vector3& origin, const Vector3& direction,

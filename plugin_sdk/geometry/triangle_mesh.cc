@@ -72,7 +72,8 @@ std::optional<TriangleMesh> TriangleMesh::make(std::span<const Vector3> vertices
   }
   if (mesh.triangles_.empty()) return refuse("no triangle has an area");
   mesh.join();
-  mesh.build_tree(options);
+  mesh.options_ = options;
+  mesh.build_tree();
   return mesh;
 }
 
@@ -130,7 +131,7 @@ void TriangleMesh::join() {
   }
 }
 
-void TriangleMesh::build_tree(const MeshOptions& options) {
+void TriangleMesh::build_tree() {
   const std::size_t count = triangles_.size();
   std::vector<Vector3> centroids(count);
   std::vector<Box3> boxes(count);
@@ -145,7 +146,7 @@ void TriangleMesh::build_tree(const MeshOptions& options) {
   };
   std::vector<Task> tasks{{0, 0, static_cast<std::uint32_t>(count), 0}};
   nodes_.assign(1, {});
-  const std::uint32_t deepest = std::min(options.maximum_depth, kDeepest);
+  const std::uint32_t deepest = std::min(options_.maximum_depth, kDeepest);
   while (!tasks.empty()) {
     const Task task = tasks.back();
     tasks.pop_back();
@@ -155,7 +156,7 @@ void TriangleMesh::build_tree(const MeshOptions& options) {
       span.extend(centroids[order_[task.first + i]]);
     }
     nodes_[task.node] = {box, task.first, task.count};
-    if (task.depth >= deepest || task.count <= std::max(options.minimum_node_size, 1U)) continue;
+    if (task.depth >= deepest || task.count <= std::max(options_.minimum_node_size, 1U)) continue;
     Eigen::Index axis = 0;
     (span.upper - span.lower).maxCoeff(&axis);
     const auto begin = order_.begin() + task.first;

@@ -69,6 +69,7 @@ class TriangleMesh {
   // Every edge has two triangles that run along it in opposite ways: the mesh bounds a solid, its normals outward.
   bool is_closed() const { return is_closed_; }
   std::size_t dropped() const { return dropped_; }
+  const MeshOptions& options() const { return options_; }
   const Box3& box() const { return nodes_[0].box; }
 
   // A node's children are `first` and `first` + 1, or, where count > 0, its triangles are count entries of order()
@@ -102,7 +103,7 @@ class TriangleMesh {
  private:
   TriangleMesh() = default;
   void join();
-  void build_tree(const MeshOptions& options);
+  void build_tree();
 
   std::vector<Vector3> vertices_;
   std::vector<Triangle> triangles_;
@@ -112,6 +113,7 @@ class TriangleMesh {
   std::vector<std::uint32_t> rings_;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> order_;
+  MeshOptions options_;
   std::size_t dropped_ = 0;
   bool is_closed_ = false;
 };

@@ -187,6 +187,12 @@ TEST(PluginCall, ALongTextIsCutAndEnds) {
   EXPECT_EQ(call.error.text, text.substr(0, sizeof call.error.text - 1));
 }
 
+TEST(PluginCall, AnOptionalMethodThatIsNotOverriddenIsUnknown) {
+  Call call;
+  EXPECT_EQ(call.make([](auto&, auto&, auto&) { throw UnknownMethod(); }), GRAVITAS_UNKNOWN_METHOD);
+  EXPECT_STREQ(call.error.text, "the plugin does not answer this method");
+}
+
 TEST(PluginCall, AnotherMethodIsUnknown) {
   const Pairs never = [](auto&, auto&, auto&) { FAIL(); };
   for (std::uint32_t method = 1; method < stage::kMethodCount + 2; ++method) {
@@ -248,6 +254,16 @@ class ToyCollision final : public CollisionPlugin {
     asked += "manifolds ";
   }
 };
+class MovingCollision final : public CollisionPlugin {
+  void manifolds(const stage::CollisionManifoldsRequest&, const stage::CollisionManifoldsReply&, Host&) override {
+    asked += "manifolds ";
+  }
+  void times_of_impact(const stage::CollisionTimesOfImpactRequest&, const stage::CollisionTimesOfImpactReply&,
+                       Host&) override {
+    asked += "times_of_impact ";
+  }
+  void rays(const stage::CollisionRaysRequest&, const stage::CollisionRaysReply&, Host&) override { asked += "rays "; }
+};
 class ToyConstraint final : public ConstraintPlugin {
   void bind(const stage::ConstraintBindRequest&, const stage::ConstraintBindReply&, Host&) override {
     asked += "bind ";
@@ -279,14 +295,20 @@ std::pair<std::string, int> try_every_method() {
   const gravitas_host none{};
   Host host(&none);
   int known = 0;
-  for (std::uint32_t method = 0; method < stage::kMethodCount; ++method)
-    known += plugin.dispatch(static_cast<stage::Method>(method), nullptr, nullptr, host) ? 1 : 0;
+  for (std::uint32_t method = 0; method < stage::kMethodCount; ++method) {
+    try {
+      known += plugin.dispatch(static_cast<stage::Method>(method), nullptr, nullptr, host) ? 1 : 0;
+    } catch (const UnknownMethod&) {
+      asked += "(not the optional one) ";
+    }
+  }
   return {asked, known};
 }
 
 TEST(PluginSlots, EachAnswersItsOwnQuestionsOnly) {
   using Answer = std::pair<std::string, int>;
-  EXPECT_EQ(try_every_method<ToyCollision>(), Answer("manifolds ", 1));
+  EXPECT_EQ(try_every_method<ToyCollision>(), Answer("manifolds (not the optional one) (not the optional one) ", 1));
+  EXPECT_EQ(try_every_method<MovingCollision>(), Answer("manifolds times_of_impact rays ", 3));
   EXPECT_EQ(try_every_method<ToyConstraint>(), Answer("bind discrepancies ", 2));
   EXPECT_EQ(try_every_method<ToyForce>(), Answer("wrenches ", 1));
   EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve ", 1));

@@ -319,6 +319,8 @@ TEST(StageFrames, MethodsAreNumberedAsTheyAreListed) {
   };
   EXPECT_EQ(name(stage::Method::kSpacePairs), "Space.Pairs");
   EXPECT_EQ(name(stage::Method::kCollisionManifolds), "Collision.Manifolds");
+  EXPECT_EQ(name(stage::Method::kCollisionTimesOfImpact), "Collision.TimesOfImpact");
+  EXPECT_EQ(name(stage::Method::kCollisionRays), "Collision.Rays");
   EXPECT_EQ(name(stage::Method::kConstraintBind), "Constraint.Bind");
   EXPECT_EQ(name(stage::Method::kConstraintDiscrepancies), "Constraint.Discrepancies");
   EXPECT_EQ(name(stage::Method::kForceWrenches), "Force.Wrenches");

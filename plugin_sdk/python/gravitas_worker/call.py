@@ -156,12 +156,14 @@ class Session:
     def _answer(self, call, message):
         """The columns of the reply."""
         layout, rows = call.method.request, {}
+        answer = getattr(self._plugin, self._plugin.methods[call.method.name], None)
+        if answer is None:
+            raise CallFailed("the plugin does not answer this method", Outcome.STATUS_UNKNOWN_METHOD)
         self._put_assets(call.head, layout, message)
         problem = check_rows(layout, message.columns, rows)
         if problem:
             raise Refusal(problem)
         reply = Columns({})
-        answer = getattr(self._plugin, self._plugin.methods[call.method.name])
         with numpy.errstate(all="ignore"):
             answer(Columns(message.columns), reply, call)
         columns = {}

@@ -60,7 +60,9 @@ class Space(Plugin):
 
 
 class Collision(Plugin):
-    slot, methods = "collision", {"Manifolds": "manifolds"}
+    # times_of_impact and rays are asked only of plugins that declare the capability of that name
+    slot = "collision"
+    methods = {"Manifolds": "manifolds", "TimesOfImpact": "times_of_impact", "Rays": "rays"}
 
 
 class Constraint(Plugin):

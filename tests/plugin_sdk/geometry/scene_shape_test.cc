@@ -231,5 +231,22 @@ TEST(SceneShape, SaysWhatIsWrong) {
   EXPECT_THAT(why, testing::HasSubstr("nested more than eight deep"));
 }
 
+// A compound's child passes through its flattened properties on its way to a plugin.
+TEST(SceneShapeFlattened, AMeshKeepsTheOptionsOfItsTree) {
+  std::vector<double> numbers = flattened_shape(cube(Kind::kTriangleMesh));
+  numbers[numbers.size() - 2] = 1.0;
+  numbers[numbers.size() - 1] = 3.0;
+  std::string why;
+  const auto mesh = read_scene_shape(type_id("TriangleMesh"), numbers, &why);
+  ASSERT_TRUE(mesh) << why;
+  EXPECT_EQ(flattened_shape(*mesh), numbers);
+  // one division only
+  EXPECT_EQ(mesh->mesh->nodes().size(), 3U);
+  const SceneShape whole = compound_of(*mesh, {}, *mesh, {}, 0.0);
+  const auto again = read_scene_shape(type_id("Compound"), flattened_shape(whole), &why);
+  ASSERT_TRUE(again) << why;
+  EXPECT_EQ(again->children[1].shape->mesh->nodes().size(), 3U);
+}
+
 }  // namespace
 }  // namespace gravitas

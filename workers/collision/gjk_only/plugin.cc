@@ -7,12 +7,14 @@
 #include "plugin_sdk/plugin.h"
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "plugin_sdk/collision.h"
 #include "plugin_sdk/geometry/contour_contacts.h"
 #include "plugin_sdk/geometry/scene_shape.h"
+#include "plugin_sdk/shape_cache.h"
 #include "workers/collision/gjk_only/sampled_map.h"
 
 namespace gravitas::gjk_only {
@@ -31,9 +33,10 @@ class GjkOnly final : public CollisionPlugin {
  public:
   static PluginDeclaration declaration() {
     PluginDeclaration declared{.name = "GjkOnly",
-                               .version = "1.0",
+                               .version = "1.1",
                                .slot = Slot::kCollision,
                                .meaning = "Every convex shape by its support points alone.",
+                               .capabilities = {"times_of_impact", "rays"},
                                .types = scene_shape_types()};
     std::erase_if(declared.types,
                   [](const TypeDeclaration& type) { return type.name == "TriangleMesh" || type.name == "Compound"; });
@@ -43,17 +46,15 @@ class GjkOnly final : public CollisionPlugin {
 
   void manifolds(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
                  Host& host) override {
-    std::vector<ConvexShape> shapes;
-    for (std::size_t i = 0; i < request.shape_type().size(); ++i) shapes.push_back(read(request, i));
-    collision::check_bodies(request);
+    const Question asked = read(request);
     const std::span<const std::uint32_t> pair = request.pair();
     const std::size_t pairs = pair.size() / 2;
     manifolds_.resize(pairs);
     host.parallel_for(pairs, [&](std::uint64_t begin, std::uint64_t end) {
       for (std::uint64_t i = begin; i < end; ++i) {
         const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
-        collide(shapes[request.body_shape()[a]], collision::geometry_pose(request, a), shapes[request.body_shape()[b]],
-                collision::geometry_pose(request, b), request.margin(), &manifolds_[i]);
+        collide(asked.shape_of(a), asked.bodies.placed(a), asked.shape_of(b), asked.bodies.placed(b), request.margin(),
+                &manifolds_[i]);
       }
     });
     for (std::size_t i = 0; i < pairs; ++i)
@@ -61,11 +62,61 @@ class GjkOnly final : public CollisionPlugin {
         collision::write_contact(request, reply, i, manifolds_[i].contacts[static_cast<std::size_t>(k)]);
   }
 
+  void times_of_impact(const stage::CollisionTimesOfImpactRequest& request,
+                       const stage::CollisionTimesOfImpactReply& reply, Host& host) override {
+    const Question asked = read(request);
+    const std::span<const std::uint32_t> pair = request.pair();
+    impacts_.assign(pair.size() / 2, std::nullopt);
+    const auto moving = [&](std::uint32_t body) {
+      return MovingSolid{asked.shape_of(body).exact.get(), asked.bodies.geometry(body), asked.bodies.pose(body),
+                         collision::motion_of(request, body)};
+    };
+    host.parallel_for(impacts_.size(), [&](std::uint64_t begin, std::uint64_t end) {
+      for (std::uint64_t i = begin; i < end; ++i)
+        impacts_[i] = first_impact(moving(pair[2 * i]), moving(pair[2 * i + 1]), request.target_gap());
+    });
+    for (std::size_t i = 0; i < impacts_.size(); ++i)
+      if (impacts_[i]) collision::write_impact(reply, i, *impacts_[i]);
+  }
+
+  void rays(const stage::CollisionRaysRequest& request, const stage::CollisionRaysReply& reply, Host&) override {
+    const Question asked = read(request);
+    const std::span<const std::uint32_t> candidate = request.candidate();
+    for (std::size_t i = 0; i < candidate.size() / 2; ++i) {
+      const std::uint32_t body = candidate[2 * i + 1];
+      const Pose placed = asked.bodies.placed(body);
+      const Ray ray = ray_in(placed, collision::ray_of(request, candidate[2 * i]));
+      const ConvexShape& shape = asked.shape_of(body);
+      const std::optional<RayHit> hit = shape.exact ? cast_ray(*shape.exact, ray) : cast_ray(*shape.shape, ray);
+      if (hit) collision::write_hit(reply, i, hit_from(placed, *hit));
+    }
+  }
+
  private:
-  static ConvexShape read(const stage::CollisionManifoldsRequest& request, std::size_t row) {
+  // The shapes and bodies of a request, checked.
+  struct Question {
+    std::vector<const ConvexShape*> shapes;
+    collision::BodyColumns bodies;
+    const ConvexShape& shape_of(std::uint32_t body) const { return *shapes[bodies.body_shape[body]]; }
+  };
+  template <typename Request>
+  Question read(const Request& request) {
+    const collision::ShapeColumns columns = collision::shapes_of(request);
+    Question question{{}, collision::bodies_of(request)};
+    kept_.begin();
+    for (std::size_t i = 0; i < columns.shape_type.size(); ++i) {
+      const std::span<const double> parameters = columns.parameters(i);
+      question.shapes.push_back(&kept_.get(columns.shape_hash[i], columns.shape_type[i], parameters.size(),
+                                           [&] { return make(columns.shape_type[i], parameters, i); }));
+    }
+    kept_.end();
+    collision::check_request(request);
+    return question;
+  }
+
+  static ConvexShape make(std::uint64_t type, std::span<const double> parameters, std::size_t row) {
     std::string why;
-    std::optional<SceneShape> shape =
-        read_scene_shape(request.shape_type()[row], collision::shape_parameters(request, row), &why);
+    std::optional<SceneShape> shape = read_scene_shape(type, parameters, &why);
     const bool is_known = shape && shape->kind != Kind::kTriangleMesh && shape->kind != Kind::kCompound;
     if (shape && !is_known) why = "is of a type that this plugin does not know";
     if (!is_known) throw Refusal("shape " + std::to_string(row) + ": " + why);
@@ -104,8 +155,10 @@ class GjkOnly final : public CollisionPlugin {
     }
   }
 
+  ShapeCache<ConvexShape> kept_;
   // scratch, filled anew in every call
   std::vector<Manifold> manifolds_;
+  std::vector<std::optional<Impact>> impacts_;
 };
 
 }  // namespace

@@ -188,7 +188,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
     contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
     out.add(t, manifold);
   });
-  if (!mesh.is_closed() || !mesh.box().widened(0.0).overlaps({centre, centre})) return;
+  if (!mesh.is_closed() || !mesh.box().overlaps({centre, centre})) return;
   const TriangleMesh::Nearest nearest = mesh.nearest(centre);
   if (!(nearest.signed_distance < 0.0)) return;
   const Vector3 way = nearest.point - centre;

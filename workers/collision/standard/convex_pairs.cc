@@ -34,12 +34,11 @@ void collide_convex(const Shape& a, const Shape& b, const Placement& placement, 
   // A preferred face may be a little off the least depth. As long as its patch is about as deep as
   // that, a vertex deeper still lies beside it, in touch with nothing.
   const double rounding = rounding_length(pair);
-  const ContactCandidates none(margin, rounding, std::max(kDepthTie * pair.thinnest, rounding));
-  ContactCandidates candidates = none;
+  ContactCandidates candidates(margin, rounding, std::max(kDepthTie * pair.thinnest, rounding));
   const bool face = axes.preferred.kind != AxisKind::kFree;
   const double shortfall = face ? face_preference(pair, axes.preferred.depth) : rounding;
   if (!contacts_along(pair, axes.preferred, shortfall, &candidates)) {
-    candidates = none;
+    candidates.clear();
     if (!contacts_along(pair, axes.shallowest, face_preference(pair, 0.0), &candidates)) {
       add_support_contact(pair, axes.shallowest, &candidates);
     }

@@ -4,7 +4,6 @@
 #include "workers/collision/standard/pair_functions.h"
 
 namespace gravitas::collision {
-namespace {
 
 SceneShape::Kind kind_of(ShapeType type) {
   switch (type) {
@@ -20,8 +19,6 @@ SceneShape::Kind kind_of(ShapeType type) {
       return SceneShape::Kind::kCone;
   }
 }
-
-}  // namespace
 
 const SupportMap& support_map_of(const Shape& shape, SupportMapBuffer* buffer) {
   return shape.map != nullptr ? *shape.map : buffer->emplace(kind_of(shape.type), shape.size);

@@ -4,7 +4,8 @@
 // equal arguments give equal bits whatever was asked before, and from any thread.
 //
 //   pair                     depth and normal                          points
-//   sphere - anything        closed form                               1
+//   sphere - sphere, box,    closed form                               1
+//   cylinder, half-space
 //   box - half-space         closed form                               up to 4 vertices
 //   cylinder - half-space    closed form                               4 of a cap, 2 of a side line
 //   box - box                separating axes (15)                      face clipping, or 1 edge
@@ -12,7 +13,7 @@
 //   cylinder - cylinder      the curved families (contact_axis.h)      2 on a line, else 1
 //   half-space - half-space  no contact
 //   capsule, cone,           distance or expanding polytope (plugin_sdk/geometry/penetration.h), the features that
-//   polyhedron - any convex  touch laid over each other: up to 4
+//   polyhedron - any convex  touch laid over each other: up to 4; against a half-space the feature turned towards it
 //   mesh - anything          triangle by triangle, through its tree (composite_pairs.h)
 //   compound - anything      child by child
 // For a gap between boxes and cylinders whose closest features own no separating axis, the normal

@@ -1,4 +1,4 @@
-// The functions behind the table of narrow_phase.cc: one per unordered pair of shape types, the
+// The functions behind the table of detector_table.cc: one per unordered pair of shape types, the
 // type with the lower value first.
 #pragma once
 
@@ -40,7 +40,8 @@ void collide_general(const Shape& a, const Shape& b, const Placement& placement,
 void collide_halfspace_general(const Shape& a, const Shape& b, const Placement& placement, double margin,
                                Manifold* out);
 
-// The map of a convex shape: its own, or one made in the buffer.
+// The kind of a primitive that is bounded, and the map of a convex shape: its own, or one made in the buffer.
+SceneShape::Kind kind_of(ShapeType type);
 const SupportMap& support_map_of(const Shape& shape, SupportMapBuffer* buffer);
 
 }  // namespace gravitas::collision

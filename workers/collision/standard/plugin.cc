@@ -4,9 +4,11 @@
 // own place, and written in order.
 #include "plugin_sdk/plugin.h"
 
+#include <optional>
 #include <vector>
 
 #include "plugin_sdk/collision.h"
+#include "workers/collision/standard/moving_pairs.h"
 #include "workers/collision/standard/narrow_phase.h"
 #include "workers/collision/standard/shape_store.h"
 
@@ -22,32 +24,72 @@ class Standard final : public CollisionPlugin {
             .meaning =
                 "Closed forms where there are any, separating axes and clipping, distance and expanding polytopes "
                 "elsewhere.",
+            .capabilities = {"times_of_impact", "rays"},
             .types = declared_shapes()};
   }
   explicit Standard(PropertyCursor) {}
 
   void manifolds(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
                  Host& host) override {
-    const std::vector<Shape>& shapes = store_.read(request);
-    check_bodies(request);
+    const std::vector<Shape>& shapes = store_.read(shapes_of(request));
+    check_request(request);
+    const BodyColumns bodies = bodies_of(request);
     const std::span<const std::uint32_t> pair = request.pair();
     const std::size_t pairs = pair.size() / 2;
     if (contacts_.size() < pairs) contacts_.resize(pairs);
     host.parallel_for(pairs, [&](std::uint64_t begin, std::uint64_t end) {
       for (std::uint64_t i = begin; i < end; ++i) {
         const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
-        collide(shapes[request.body_shape()[a]], geometry_pose(request, a), shapes[request.body_shape()[b]],
-                geometry_pose(request, b), request.margin(), &contacts_[i]);
+        collide(shapes[bodies.body_shape[a]], bodies.placed(a), shapes[bodies.body_shape[b]], bodies.placed(b),
+                request.margin(), &contacts_[i]);
       }
     });
     for (std::size_t i = 0; i < pairs; ++i)
       for (std::size_t k = 0; k < contacts_[i].size(); ++k) write_contact(request, reply, i, contacts_[i][k]);
   }
 
+  void times_of_impact(const stage::CollisionTimesOfImpactRequest& request,
+                       const stage::CollisionTimesOfImpactReply& reply, Host& host) override {
+    const std::vector<Shape>& shapes = store_.read(shapes_of(request));
+    check_request(request);
+    const BodyColumns bodies = bodies_of(request);
+    const std::span<const std::uint32_t> pair = request.pair();
+    impacts_.assign(pair.size() / 2, std::nullopt);
+    const auto moving = [&](std::uint32_t body) {
+      return MovingBody{bodies.geometry(body), bodies.pose(body), motion_of(request, body)};
+    };
+    host.parallel_for(impacts_.size(), [&](std::uint64_t begin, std::uint64_t end) {
+      for (std::uint64_t i = begin; i < end; ++i) {
+        const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
+        impacts_[i] = first_impact(shapes[bodies.body_shape[a]], moving(a), shapes[bodies.body_shape[b]], moving(b),
+                                   request.target_gap());
+      }
+    });
+    for (std::size_t i = 0; i < impacts_.size(); ++i)
+      if (impacts_[i]) write_impact(reply, i, *impacts_[i]);
+  }
+
+  void rays(const stage::CollisionRaysRequest& request, const stage::CollisionRaysReply& reply, Host& host) override {
+    const std::vector<Shape>& shapes = store_.read(shapes_of(request));
+    check_request(request);
+    const BodyColumns bodies = bodies_of(request);
+    const std::span<const std::uint32_t> candidate = request.candidate();
+    hits_.assign(candidate.size() / 2, std::nullopt);
+    host.parallel_for(hits_.size(), [&](std::uint64_t begin, std::uint64_t end) {
+      for (std::uint64_t i = begin; i < end; ++i)
+        hits_[i] = cast_ray(shapes[bodies.body_shape[candidate[2 * i + 1]]], bodies.placed(candidate[2 * i + 1]),
+                            ray_of(request, candidate[2 * i]));
+    });
+    for (std::size_t i = 0; i < hits_.size(); ++i)
+      if (hits_[i]) write_hit(reply, i, *hits_[i]);
+  }
+
  private:
   ShapeStore store_;
   // scratch, filled anew in every call
   std::vector<ContactList> contacts_;
+  std::vector<std::optional<Impact>> impacts_;
+  std::vector<std::optional<RayHit>> hits_;
 };
 
 }  // namespace

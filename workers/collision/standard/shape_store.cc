@@ -91,6 +91,7 @@ StoredShape store_shape(std::shared_ptr<const SceneShape> scene_shape) {
   stored.scene_shape = std::move(scene_shape);
   const SceneShape& scene = *stored.scene_shape;
   Shape& shape = stored.shape;
+  shape.scene = &scene;
   shape.type = type_of_kind(scene.kind);
   shape.size = scene.size;
   if (scene.kind == SceneShape::Kind::kConvexPolyhedron) {
@@ -131,28 +132,19 @@ StoredShape read_shape(std::uint64_t type, std::span<const double> parameters, s
   return stored;
 }
 
-const std::vector<Shape>& ShapeStore::read(const stage::CollisionManifoldsRequest& request) {
+const std::vector<Shape>& ShapeStore::read(const ShapeColumns& shapes) {
   shapes_.clear();
-  for (auto& [hash, kept] : kept_) kept.is_used = false;
-  for (std::size_t i = 0; i < request.shape_type().size(); ++i) {
-    const std::uint64_t type = request.shape_type()[i];
-    const std::span<const double> parameters = shape_parameters(request, i);
-    if (is_primitive(type)) {
-      shapes_.push_back(read_primitive(type, parameters, i));
-      continue;
-    }
-    const std::uint64_t hash = request.shape_hash()[i];
-    auto found = kept_.find(hash);
-    if (found != kept_.end() && (found->second.type != type || found->second.parameters != parameters.size())) {
-      kept_.erase(found);
-      found = kept_.end();
-    }
-    if (found == kept_.end())
-      found = kept_.emplace(hash, Kept{type, parameters.size(), read_shape(type, parameters, i), true}).first;
-    found->second.is_used = true;
-    shapes_.push_back(found->second.stored.shape);
+  kept_.begin();
+  for (std::size_t i = 0; i < shapes.shape_type.size(); ++i) {
+    const std::uint64_t type = shapes.shape_type[i];
+    const std::span<const double> parameters = shapes.parameters(i);
+    shapes_.push_back(
+        is_primitive(type)
+            ? read_primitive(type, parameters, i)
+            : kept_.get(shapes.shape_hash[i], type, parameters.size(), [&] { return read_shape(type, parameters, i); })
+                  .shape);
   }
-  std::erase_if(kept_, [](const auto& kept) { return !kept.second.is_used; });
+  kept_.end();
   return shapes_;
 }
 

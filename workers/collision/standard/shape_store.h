@@ -4,11 +4,12 @@
 
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <memory>
 #include <vector>
 
+#include "plugin_sdk/collision.h"
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/shape_cache.h"
 #include "workers/collision/standard/composite_pairs.h"
 #include "workers/collision/standard/shapes.h"
 
@@ -34,17 +35,11 @@ StoredShape store_shape(std::shared_ptr<const SceneShape> scene_shape);
 class ShapeStore {
  public:
   // The shapes of a request, valid until the next call. Throws Refusal.
-  const std::vector<Shape>& read(const stage::CollisionManifoldsRequest& request);
+  const std::vector<Shape>& read(const ShapeColumns& shapes);
 
  private:
-  struct Kept {
-    std::uint64_t type;
-    std::size_t parameters;
-    StoredShape stored;
-    bool is_used;
-  };
   std::vector<Shape> shapes_;
-  std::map<std::uint64_t, Kept> kept_;  // by hash of the content
+  ShapeCache<StoredShape> kept_;
 };
 
 }  // namespace gravitas::collision

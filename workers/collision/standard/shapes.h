@@ -39,13 +39,17 @@ struct CompoundShape;
 //   half-space nothing; the solid is y <= 0
 //   capsule    x: radius, y: half the distance of the cap centres; axis y
 //   cone       x: radius, y: half height; axis y, apex at +y
-//   others     x: radius of a ball about the origin that holds it, y: least half extent
+//   others     x: radius of a ball about the origin that holds it; y: least half extent, of a mesh the greatest half
+//              extent of its box, of a compound the least of its children
 // Precondition of every function on shapes: the sizes used are finite and > 0.
 struct Shape {
   ShapeType type = ShapeType::kSphere;
   Vector3 size = Vector3::Zero();
-  // Of a polyhedron or a registered type; null for primitives, which need none.
+  // Of a polyhedron or a registered type; null for primitives, whose map is made where one is needed
+  // (support_map_of() of pair_functions.h).
   const SupportMap* map = nullptr;
+  // What it was made of; null for primitives and registered types.
+  const SceneShape* scene = nullptr;
   const TriangleMesh* mesh = nullptr;
   const CompoundShape* compound = nullptr;
 

@@ -1,0 +1,252 @@
+#include "plugin_sdk/geometry/time_of_impact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/geometry/penetration.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+namespace {
+
+double length_of(const Vector3& v) { return std::sqrt(v.squaredNorm()); }
+
+// The core of a solid about the centre of its body, in world axes.
+class TurningCore {
+ public:
+  explicit TurningCore(const MovingSolid& solid)
+      : solid_(solid), map_(*solid.map), spin_(solid.motion.rotation), rate_(length_of(spin_)) {
+    place(0.0);
+    reach_ = length_of(solid.geometry.position) + map_.radius() - map_.rounding();
+    if (!(rate_ > 0.0)) return;
+    axis_ = spin_ / rate_;
+    const TangentBasis basis = orthonormal_basis(axis_);
+    const auto extent = [&](const Vector3& d) { return std::max(support(d), support(-d)); };
+    const double first = extent(basis.first), second = extent(basis.second);
+    // rounded up: a bound
+    off_axis_ = std::min(std::sqrt(first * first + second * second), reach_) * (1.0 + 1e-12);
+    up_ = support(axis_), down_ = support(-axis_);
+  }
+
+  void place(double time) {
+    const Quaternion turned = rotate_by(solid_.start.orientation, time * spin_);
+    R_ = to_rotation_matrix(normalized(turned * solid_.geometry.orientation));
+    p_ = turned * solid_.geometry.position;
+  }
+
+  // The greatest m . x over the core, as it lies now.
+  double support(const Vector3& m) const { return m.dot(p_) + m.dot(R_ * map_.support(R_.transpose() * m)); }
+  // The same over all that the core sweeps when it turns once.
+  double swept_support(const Vector3& m) const {
+    if (!(rate_ > 0.0)) return support(m);
+    const double along = axis_.dot(m);
+    return (along > 0.0 ? along * up_ : -along * down_) + off_axis_ * length_of(m - along * axis_);
+  }
+  // How m turns with the body, and what its support leaves out, per second and per half of its square.
+  Vector3 turning(const Vector3& n) const { return n.cross(spin_); }
+  double remainder(const Vector3& n) const { return length_of(n.cross(spin_)) * rate_ * off_axis_; }
+
+  const SupportMap& map() const { return map_; }
+  const Matrix3& R() const { return R_; }
+  const Vector3& p() const { return p_; }
+  const Vector3& spin() const { return spin_; }
+  // Of the farthest point from the centre, and of what moves when the body turns.
+  double reach() const { return reach_; }
+  double travel() const { return rate_ * off_axis_; }
+
+ private:
+  const MovingSolid& solid_;
+  const SupportMap& map_;
+  Vector3 spin_;
+  double rate_;
+  Matrix3 R_;
+  Vector3 p_;
+  Vector3 axis_ = Vector3::UnitY();
+  double reach_ = 0.0, off_axis_ = 0.0, up_ = 0.0, down_ = 0.0;
+};
+
+// How far a bound f, positive at 0, surely stays positive: `rest` if all the way.
+template <typename Bound>
+double safe_step(const Bound& f, double at_zero, double rest) {
+  double low = 0.0, at_low = at_zero, high = rest, at_high = f(rest);
+  if (at_high >= 0.0) return rest;
+  constexpr int kRounds = 6;
+  for (int i = 0; i < kRounds && high - low > 0.05 * low; ++i) {
+    // the chord of a concave bound crosses zero before the bound does
+    const double chord = low + (high - low) * (at_low / (at_low - at_high));
+    const double value = f(chord);
+    if (value >= 0.0) low = chord, at_low = value;
+    const double middle = 0.5 * (low + high), there = f(middle);
+    if (there >= 0.0) {
+      low = middle, at_low = there;
+    } else {
+      high = middle, at_high = there;
+    }
+  }
+  return low;
+}
+
+// Two bounded solids.
+class ConvexApproach {
+ public:
+  ConvexApproach(const MovingSolid& a, const MovingSolid& b)
+      : a_(a),
+        b_(b),
+        offset_(b.start.position - a.start.position),
+        velocity_(b.motion.displacement - a.motion.displacement) {
+    start_ = a.start.position, motion_ = a.motion.displacement;
+  }
+
+  double sizes() const { return a_.map().radius() + b_.map().radius(); }
+
+  // Looks at the time t: the nearest points, and the plane between them.
+  void look(double t) {
+    a_.place(t), b_.place(t);
+    centres_ = offset_ + t * velocity_;
+    const PlacedPair pair{a_.map(), b_.map(), a_.R().transpose() * b_.R(),
+                          a_.R().transpose() * (centres_ + b_.p() - a_.p())};
+    least_ = find_separation(pair, std::numeric_limits<double>::infinity());
+    normal_ = a_.R() * least_.normal;
+    turning_a_ = a_.turning(normal_), turning_b_ = b_.turning(normal_);
+    remainder_ = a_.remainder(normal_) + b_.remainder(normal_);
+    rounding_ = pair.rounding();
+  }
+  double gap() const { return -least_.depth; }
+  // How far the plane parts the solids s after the time looked at, at least.
+  double parted(double s) const {
+    return normal_.dot(centres_ + s * velocity_) - a_.support(normal_ + s * turning_a_) -
+           b_.support(-(normal_ + s * turning_b_)) - rounding_ - 0.5 * s * s * remainder_;
+  }
+  // The same, whatever the angles.
+  double parted_at_any_angle(double s) const {
+    return normal_.dot(centres_ + s * velocity_) - a_.swept_support(normal_) - b_.swept_support(-normal_) - rounding_;
+  }
+  Impact impact(double t) const {
+    const Vector3 middle = 0.5 * (least_.point_a + least_.point_b);
+    return {t, normal_, start_ + t * motion_ + a_.p() + a_.R() * middle, least_.depth};
+  }
+
+  double step(double half_target, double rest) const {
+    const auto bound = [&](double s) { return parted(s) - half_target; };
+    const double at_zero = bound(0.0);
+    if (!(at_zero > 0.0)) return 0.0;
+    double step = safe_step(bound, at_zero, rest);
+    const double swept = parted_at_any_angle(0.0) - half_target;
+    if (step < rest && swept > 0.0) {
+      const double closing = -normal_.dot(velocity_);
+      step = std::max(step, closing * rest <= swept ? rest : swept / closing);
+    }
+    return step;
+  }
+
+ private:
+  TurningCore a_, b_;
+  Vector3 offset_, velocity_, start_, motion_;
+  Separation least_;
+  Vector3 normal_, centres_, turning_a_, turning_b_;
+  double remainder_ = 0.0, rounding_ = 0.0;
+};
+
+// A half-space, first, and a bounded solid.
+class HalfspaceApproach {
+ public:
+  HalfspaceApproach(const MovingSolid& ground, const MovingSolid& solid)
+      : ground_(ground),
+        b_(solid),
+        offset_(solid.start.position - ground.start.position),
+        velocity_(solid.motion.displacement - ground.motion.displacement) {
+    const Vector3& spin = ground.motion.rotation;
+    tilts_ = !spin.isZero(0.0);
+    if (!tilts_) return;
+    // no point of the solid comes nearer to the plane faster than this
+    const double farthest = std::max(length_of(offset_), length_of(offset_ + velocity_)) + b_.reach();
+    speed_ = (length_of(velocity_) + length_of(spin) * (farthest + length_of(ground.geometry.position)) + b_.travel()) *
+             (1.0 + 1e-12);
+  }
+
+  double sizes() const { return b_.map().radius(); }
+
+  void look(double t) {
+    b_.place(t);
+    centres_ = offset_ + t * velocity_;
+    const Quaternion turned = rotate_by(ground_.start.orientation, t * ground_.motion.rotation);
+    up_ = normalized(turned * ground_.geometry.orientation) * Vector3::UnitY();
+    plane_ = up_.dot(turned * ground_.geometry.position);
+    turning_ = b_.turning(up_), remainder_ = b_.remainder(up_);
+    gap_ = parted(0.0);
+  }
+  double gap() const { return gap_; }
+  double parted(double s) const {
+    return up_.dot(centres_ + s * velocity_) - plane_ - b_.support(-(up_ + s * turning_)) - b_.map().rounding() -
+           0.5 * s * s * remainder_;
+  }
+  Impact impact(double t) const {
+    const Vector3 farthest = b_.map().support(b_.R().transpose() * -up_);
+    const Vector3 foot = b_.p() + b_.R() * farthest - b_.map().rounding() * up_;
+    const Vector3 centre = ground_.start.position + t * ground_.motion.displacement + centres_;
+    return {t, up_, centre + foot - (0.5 * gap_) * up_, -gap_};
+  }
+  double step(double half_target, double rest) const {
+    const double at_zero = gap_ - half_target;
+    if (!(at_zero > 0.0)) return 0.0;
+    if (tilts_) return std::min(rest, at_zero / speed_);
+    const auto bound = [&](double s) { return parted(s) - half_target; };
+    double step = safe_step(bound, at_zero, rest);
+    const double swept = up_.dot(centres_) - plane_ - b_.swept_support(-up_) - b_.map().rounding() - half_target;
+    if (step < rest && swept > 0.0) {
+      const double closing = -up_.dot(velocity_);
+      step = std::max(step, closing * rest <= swept ? rest : swept / closing);
+    }
+    return step;
+  }
+
+ private:
+  const MovingSolid& ground_;
+  TurningCore b_;
+  Vector3 offset_, velocity_;
+  bool tilts_ = false;
+  double speed_ = 0.0;
+  Vector3 up_, centres_, turning_;
+  double plane_ = 0.0, remainder_ = 0.0, gap_ = 0.0;
+};
+
+template <typename Approach>
+std::optional<Impact> advance(Approach* approach, double target_gap, const TimeSpan& span) {
+  const double target = std::max(target_gap, 1e-10 * approach->sizes()), half = 0.5 * target;
+  double t = span.begin;
+  for (int i = 0;; ++i) {
+    approach->look(t);
+    if (!(approach->gap() > target) || i == kMostSteps) return approach->impact(t);
+    const double rest = span.end - t, step = approach->step(half, rest);
+    if (step >= rest) return std::nullopt;
+    // the plane of the nearest points parts them less than their distance by rounding alone
+    if (!(t + step > t)) return approach->impact(t);
+    t += step;
+  }
+}
+
+}  // namespace
+
+std::optional<Impact> first_impact(const MovingSolid& a, const MovingSolid& b, double target_gap,
+                                   const TimeSpan& span) {
+  if (a.map == nullptr && b.map == nullptr) return std::nullopt;
+  if (a.map != nullptr && b.map != nullptr) {
+    ConvexApproach approach(a, b);
+    return advance(&approach, target_gap, span);
+  }
+  const bool is_reversed = b.map == nullptr;
+  HalfspaceApproach approach(is_reversed ? b : a, is_reversed ? a : b);
+  std::optional<Impact> impact = advance(&approach, target_gap, span);
+  if (impact && is_reversed) impact->normal = -impact->normal;
+  return impact;
+}
+
+double greatest_travel(const MovingSolid& solid, const MovingSolid& other) {
+  const Vector3 offset = solid.start.position - other.start.position;
+  const Vector3 velocity = solid.motion.displacement - other.motion.displacement;
+  const TurningCore core(solid);
+  const double farthest = std::max(length_of(offset), length_of(offset + velocity)) + core.reach();
+  return (length_of(velocity) + core.travel() + length_of(other.motion.rotation) * farthest) * (1.0 + 1e-12);
+}
+
+}  // namespace gravitas

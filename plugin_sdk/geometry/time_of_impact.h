@@ -1,0 +1,63 @@
+// When two moving convex solids first come close, never later than they do.
+//
+// Conservative advancement. At the time t the nearest points give a plane that parts the solids, with normal n (from a
+// to b) and gap d. As long as the plane, moving along, parts them by more than half the target they cannot touch; with
+// c(s) = c + s v the offset of the centres, w the angular velocities, and the supports h about the centres at time t,
+//
+//   gap(t + s) >= n . c(s) - h_a(n + s n x w_a) - h_b(-n - s n x w_b) - s^2/2 (k_a + k_b),   k = |n x w| |w| rho
+//
+// because n . (w x x) = (n x w) . x and the second derivative of n . x is at most k, rho being the greatest distance of
+// a point of the solid from the axis through its centre (B. Mirtich, "Timewarp rigid body simulation" (2000), bounds
+// the first derivative alone: steps of first order, where these are of second). The bound is concave in s, so that each
+// chord under it is one, too: regula falsi climbs it from the safe side. A second bound, for solids that spin fast,
+// holds for all angles at once: the support of what the solid sweeps in a whole turn.
+//
+// Steps repeat until the gap is at most the target (an impact), a bound reaches the end of the interval (none), or
+// kMostSteps are spent: then the answer is an impact at the time that was reached, its depth showing that the gap is
+// still wider. That takes a spin of many turns in grazing contact; a whole turn costs some thousand steps then.
+//
+// Lengths in m, world axes. The answer depends on the arguments alone.
+#pragma once
+
+#include <optional>
+
+#include "plugin_sdk/geometry/support_map.h"
+#include "plugin_sdk/math/motion.h"
+
+namespace gravitas {
+
+// A solid of a body on its way: see plugin_sdk/math/motion.h.
+struct MovingSolid {
+  const SupportMap* map = nullptr;  // null: the half-space y <= 0 of its frame
+  Pose geometry;                    // of the solid's frame in the body's
+  Pose start;                       // of the body
+  Motion motion;
+};
+
+struct Impact {
+  double fraction = 0.0;              // of the motion's interval
+  Vector3 normal = Vector3::UnitY();  // unit, from a to b
+  Vector3 point = Vector3::Zero();    // midway between the two surface points
+  double depth = 0.0;                 // minus the gap, at most the target; positive at `begin` if they overlap there
+};
+
+// Part of the interval, 0 <= begin <= end <= 1.
+struct TimeSpan {
+  double begin = 0.0;
+  double end = 1.0;
+};
+
+inline constexpr int kMostSteps = 20000;
+
+// The first time in the span at which the gap is at most `target_gap` (m), or a time before at which it is at most that
+// and was always more than half of it. Nothing if the gap stays above half of it: an impact is never missed.
+//
+// A target below 1e-10 of the radii of the maps counts as that. Two half-spaces never meet. Preconditions: poses finite
+// and unit, rotations at most 1e4 rad.
+std::optional<Impact> first_impact(const MovingSolid& a, const MovingSolid& b, double target_gap,
+                                   const TimeSpan& span = {});
+
+// m: no point of a solid moves farther over the whole interval, seen from the body frame of `other`.
+double greatest_travel(const MovingSolid& solid, const MovingSolid& other);
+
+}  // namespace gravitas
