@@ -11,8 +11,9 @@
 namespace gravitas::kernel {
 namespace {
 
-// A pair touches if a contact of it carries an impulse, or its gap is below this share of the margin.
-constexpr double kTouchingShare = 1e-3;
+// A pair touches if a contact of it carries an impulse, or its gap is below this share of the margin; where impacts are
+// located, a step that ends just before one touches nothing.
+constexpr double kTouchingShare = 1e-3, kLocatedShare = 1e-7;
 
 void copy(const Column<double>& from, const Column<double>& to) {
   // + 0.0 turns -0 into 0: the sign of a zero must not depend on which stages ran
@@ -24,14 +25,14 @@ void copy(const Column<double>& from, const Column<double>& to) {
 StepOutcome Environment::step() {
   if (fault_) return StepOutcome::kPaused;
   const std::uint64_t start = lap_ns_ = channel::now_ns();
+  const CommitFigures figures = figures_;
   try {
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
-    if (model_.body_count > 0) {
-      run_basic();
-    } else {
-      finish_commit();
-    }
+    for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
+    finish_step();
   } catch (const StageFault& fault) {
+    return_to_start();
+    figures_ = figures;
     fault_ = FaultRecord{step_count_ + 1, fault};
     return StepOutcome::kPaused;
   }
@@ -57,7 +58,7 @@ void Environment::commit_trial(const Trusted<TrialState>&) {
   copy(data_.trial_angular_velocity, back().angular_velocity);
   back().plugin_state.assign(data_.next_plugin_state);
   std::ranges::fill(back().state_changed.span(), 0U);
-  finish_commit();
+  end_inner_step();
 }
 
 void Environment::commit_solution(const Trusted<Solution>&) {
@@ -82,20 +83,35 @@ void Environment::commit_solution(const Trusted<Solution>&) {
   figures_ = {};
   remember_contacts();
   remember_joints();
-  finish_commit();
+  end_inner_step();
 }
 
-void Environment::finish_commit() {
-  // begun when the last answer had been checked
-  const std::uint64_t start = lap_ns_;
+void Environment::end_inner_step() {
   if (model_.constraint_count > 0) update_joints();
   if (has_contacts()) find_touching();
-  front_ = 1 - front_;
+  if (listener_ != nullptr && has_contacts()) raise_collision_events();
+  if (listener_ != nullptr && model_.constraint_count > 0) raise_break_events();
+  std::swap(front_, back_);
+  if (inner_ == 0 && states_.size() > 2) std::swap(back_, start_);
+  ++inner_;
+}
+
+void Environment::return_to_start() {
+  if (inner_ > 0) std::swap(front_, start_);
+  inner_ = 0;
+  must_restart_ = false;
+  events_.clear();
+}
+
+void Environment::finish_step() {
+  // begun when the last answer had been checked
+  const std::uint64_t start = lap_ns_;
+  inner_ = 0;
   ++step_count_;
   state_hash_ = kernel::state_hash(front());
   chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
-  if (listener_ != nullptr && has_contacts()) raise_collision_events();
-  if (listener_ != nullptr && model_.constraint_count > 0) raise_break_events();
+  for (const Event& event : events_) listener_->on_event(event);
+  events_.clear();
   lap_ns_ = channel::now_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_ns_ - start);
 }
@@ -146,21 +162,28 @@ void Environment::update_joints() {
   }
 }
 
-// Overlap of every contact at S_{n+1} (its two surface points moved with their bodies), and the pairs that touch.
+double Environment::gap_at(std::size_t contact, const State& state) const {
+  const Vector3 point = vector_at(data_.contact_point.span(), contact);
+  const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
+  const Vector3 half = 0.5 * data_.contact_depth[contact] * normal;
+  const auto carry = [&](const Vector3& from, std::uint32_t body) {
+    return carried(from, pose_of(data_.trial_position, data_.trial_orientation, body),
+                   pose_of(state.position, state.orientation, body));
+  };
+  return normal.dot(carry(point - half, data_.contact_body[2 * contact + 1]) -
+                    carry(point + half, data_.contact_body[2 * contact]));
+}
+
+// Overlap of every contact at S_{n+1}, and the pairs that touch.
 void Environment::find_touching() {
   const State& next = back();
   next.touching.resize(0);
+  const double share = locates_events() ? kLocatedShare : kTouchingShare;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
-    const Vector3 point = vector_at(data_.contact_point.span(), i), normal = vector_at(data_.contact_normal.span(), i);
-    const Vector3 half = 0.5 * data_.contact_depth[i] * normal;
-    const auto carry = [&](const Vector3& from, std::uint32_t body) {
-      return carried(from, pose_of(data_.trial_position, data_.trial_orientation, body),
-                     pose_of(next.position, next.orientation, body));
-    };
-    const double gap = normal.dot(carry(point - half, b) - carry(point + half, a));
+    const double gap = gap_at(i, next);
     figures_.penetration = std::max(figures_.penetration, -gap);
-    const bool touches = gap <= kTouchingShare * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
+    const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
     const std::uint64_t size = next.touching.size();
     if (!touches || (size > 0 && next.touching[size - 2] == a && next.touching[size - 1] == b)) continue;
     next.touching.resize(size + 2);
@@ -169,9 +192,14 @@ void Environment::find_touching() {
   }
 }
 
-// After the swap: front() is S_{n+1}, back() is S_n.
+// Before the states are swapped: back() is what comes, front() what was.
+double Environment::event_time() const {
+  const bool is_last = inner_end_ == length_of_step(step_count_ + 1);
+  return is_last ? time_of(step_count_ + 1) : time() + inner_end_;
+}
+
 void Environment::raise_collision_events() {
-  const std::span<const std::uint32_t> now = front().touching.span(), before = back().touching.span();
+  const std::span<const std::uint32_t> now = back().touching.span(), before = front().touching.span();
   std::size_t n = 0, b = 0, contact = 0;
   const auto pair_at = [](std::span<const std::uint32_t> pairs, std::size_t i) {
     return std::pair{pairs[i], pairs[i + 1]};
@@ -185,8 +213,8 @@ void Environment::raise_collision_events() {
     }
     const auto [first, second] = starts ? pair_at(now, n) : pair_at(before, b);
     Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd,
-                step_count_,
-                time(),
+                step_count_ + 1,
+                event_time(),
                 first,
                 second,
                 kNone,
@@ -201,7 +229,7 @@ void Environment::raise_collision_events() {
           std::max(event.relative_speed, -normal.dot(vector_at(data_.contact_relative_velocity.span(), contact)));
       event.impulse += normal.dot(vector_at(data_.contact_impulse.span(), contact));
     }
-    listener_->on_event(event);
+    events_.push_back(event);
     (starts ? n : b) += 2;
   }
 }
@@ -210,7 +238,7 @@ void Environment::raise_break_events() {
   for (std::uint32_t joint = 0; joint < model_.constraint_count; ++joint) {
     if (front().intact[joint] == back().intact[joint]) continue;
     const ConstraintDescription& broken = model_.constraints[joint];
-    listener_->on_event({EventKind::kBreak, step_count_, time(), broken.body1, broken.body2, joint, 0.0, 0.0});
+    events_.push_back({EventKind::kBreak, step_count_ + 1, event_time(), broken.body1, broken.body2, joint, 0.0, 0.0});
   }
 }
 

@@ -106,8 +106,13 @@ struct ConstraintDescription {
   std::uint32_t plugin = 0;                    // which of the constraint slot's plugins serves the type
 };
 
+// How a step is made of stages (simulators/).
+enum class Simulator : std::uint32_t { kBasic, kSubstepping, kBisection, kContinuous };
+
 struct EnvironmentDescription {
   std::string id;
+  Simulator simulator = Simulator::kBasic;
+  std::uint32_t substeps = 1;     // equal inner steps of a step
   double time_step = 1.0 / 60.0;  // s
   // Number of steps of the whole run and the length of the last one (s), which may be shorter.
   std::uint32_t steps = 600;

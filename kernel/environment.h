@@ -33,6 +33,7 @@
 #include "kernel/validate.h"
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/duration_histogram.h"
+#include "plugin_sdk/event_location.h"
 
 namespace gravitas::kernel {
 
@@ -134,14 +135,29 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::string restore(const SavedState& saved);
 
  private:
-  // simulators/basic.cc: the order of the stages.
-  void run_basic();
+  // simulators/: what a step is made of, and the order of the stages.
+  void make_inner_steps();
+  void finish_inner_step(const Trusted<TrialState>& trial);
+  Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
+  bool locates_events() const {
+    return has_contacts() &&
+           (description_.simulator == Simulator::kBisection || description_.simulator == Simulator::kContinuous);
+  }
+  void locate_events(double begin, double length);
+  // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
+  double first_impact(const Trusted<TrialState>& trial, double begin, double length);
+  double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
 
-  // stages.cc: a stage each.
-  void begin_step();
+  // stages.cc: a stage each. Inner steps begin at a time counted from that of S_n; S_n is in front() for the first, and
+  // later what the one before has made of it.
+  void begin_inner_step(double begin, double length);
   Trusted<TrialState> integrate();
+  Bounds trial_bounds(std::uint32_t body) const;
   void bound_bodies(const Trusted<TrialState>& trial);
+  void bound_motions(const Trusted<TrialState>& trial, double length);
   Trusted<Pairs> find_pairs();
+  void find_impacts(const Trusted<Pairs>& pairs);
+  Encounter encounter(std::size_t impact) const;
   Trusted<Contacts> find_contacts(const Trusted<Pairs>& pairs);
   void look_up_contacts(const Trusted<Contacts>& contacts);
   void constrain(const Trusted<TrialState>& trial);
@@ -154,10 +170,14 @@ class Environment : private DerivativeSource, private SlotObserver {
   void remember_contacts();
   void remember_joints();
   void update_joints();
+  // Gap of a contact whose two surface points move with their bodies from S* to a state.
+  double gap_at(std::size_t contact, const State& state) const;
   void find_touching();
+  double event_time() const;
   void raise_collision_events();
   void raise_break_events();
-  void finish_commit();
+  void end_inner_step();
+  void finish_step();
 
   // prepare.cc: what is asked once.
   void start_slots(const HostStarter& starter);
@@ -218,7 +238,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   }
 
   const State& front() const { return states_[front_]; }
-  State& back() { return states_[1 - front_]; }
+  State& back() { return states_[back_]; }
+  // To S_n from what inner steps have made of it.
+  void return_to_start();
   double time_of(std::uint32_t step) const;
   Pose pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const;
   bool has_contacts() const { return collision_.is_running(); }
@@ -231,11 +253,14 @@ class Environment : private DerivativeSource, private SlotObserver {
   Plan plan_;
   Arena arena_;
   Model model_;
-  std::array<State, 2> states_;
+  std::vector<State> states_;  // a third one, S_n, where there are inner steps
   StepData data_;
   Validator validator_;
-  int front_ = 0;
-  std::uint32_t step_count_ = 0;
+  std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
+  std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
+  double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
+  bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
+  std::optional<Trusted<Pairs>> pairs_;           // the last
   double margin_ = 0.0;
 
   StageSlot space_, collision_, constraint_, force_, solver_, integrator_;
@@ -257,6 +282,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::optional<FaultRecord> fault_;
   std::vector<FaultRecord> faults_;
   EventListener* listener_ = nullptr;
+  std::vector<Event> events_;  // of the inner steps so far
   CommitListener* commit_listener_ = nullptr;
   // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.
   std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};

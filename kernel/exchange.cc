@@ -101,16 +101,21 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   const PluginDeclaration& now = slot.description().plugins[target].declaration;
   if (slot.which() == Slot::kConstraint) bind_again(target);
   if (now.name == before.declaration.name) return;
+  must_restart_ |= inner_ > 0;
   if (slot.which() == Slot::kIntegrator) {
     data_.theta[0] = now.theta;
-    front().plugin_state.resize(0);
-    std::ranges::fill(front().state_changed.span(), 1U);
+    for (const State& state : states_) {
+      state.plugin_state.resize(0);
+      std::ranges::fill(state.state_changed.span(), 1U);
+    }
   }
   if (slot.which() == Slot::kCollision) {
     // its features have other numbers
-    for (const Column<std::uint32_t>* column : {&front().contact_body, &front().contact_feature}) column->resize(0);
-    for (const Column<double>* column : {&front().contact_impulse, &front().contact_correction}) column->resize(0);
-    front().contact_key.resize(0);
+    for (const State& state : states_) {
+      for (const Column<std::uint32_t>* column : {&state.contact_body, &state.contact_feature}) column->resize(0);
+      for (const Column<double>* column : {&state.contact_impulse, &state.contact_correction}) column->resize(0);
+      state.contact_key.resize(0);
+    }
   }
 }
 

@@ -21,7 +21,6 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
     : description_(checked(std::move(description))),
       plan_(make_plan(&description_)),
       model_(&arena_, description_),
-      states_{State(&arena_, description_), State(&arena_, description_)},
       data_(&arena_, model_, description_),
       validator_(arena_, model_, description_.check_physics_every),
       margin_(contact_margin(description_)),
@@ -34,10 +33,11 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       trial_columns_(ids(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
                          data_.derivative_linear_velocity, data_.derivative_angular_velocity)) {
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
+  const bool has_inner_steps = description_.simulator != Simulator::kBasic || description_.substeps > 1;
+  for (int i = 0; i < (has_inner_steps ? 3 : 2); ++i) states_.emplace_back(&arena_, description_);
   arena_.seal();
   model_.write(description_);
-  states_[0].write(description_);
-  states_[1].write(description_);
+  for (const State& state : states_) state.write(description_);
   data_.margin[0] = margin_;
   data_.theta[0] = description_.integrator.plugins.empty() ? 0.5 : description_.integrator.plugins[0].declaration.theta;
   check_fallbacks();

@@ -166,7 +166,7 @@ std::string Environment::restore(const SavedState& saved) {
     ColumnReader(saved_state().columns, model_).read_into(back());
     return problem;
   }
-  front_ = 1 - front_;
+  std::swap(front_, back_);
   step_count_ = saved.step;
   figures_ = saved.figures;
   state_hash_ = saved.state_hash;

@@ -6,17 +6,27 @@
 #include "plugin_sdk/channel/digest.h"
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/motion.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
 namespace {
 
 // Identity of a contact's life: who touches, with which features, since which step.
-std::uint64_t new_contact_key(std::uint32_t a, std::uint32_t b, std::uint32_t feature, std::uint32_t step) {
+std::uint64_t new_contact_key(std::uint32_t a, std::uint32_t b, std::uint32_t feature, std::uint32_t step,
+                              std::uint32_t inner) {
   const std::array<std::uint32_t, 4> identity = {a, b, feature, step};
   channel::Digest digest;
   digest.add(identity.data(), sizeof identity);
+  if (inner > 0) digest.add(&inner, sizeof inner);
   return digest.value();
+}
+
+Bounds bounds_of(const LocalBound& bound, const Pose& pose) {
+  if (bound.kind == BoundKind::kSphere) return sphere_bounds(pose, bound.centre, bound.half_extents.x());
+  if (bound.kind == BoundKind::kBox) return box_bounds(pose, bound.centre, bound.orientation, bound.half_extents);
+  return {Vector3::Constant(-std::numeric_limits<double>::infinity()),
+          Vector3::Constant(std::numeric_limits<double>::infinity())};
 }
 
 }  // namespace
@@ -60,17 +70,18 @@ Pose Environment::pose_of(const Column<double>& position, const Column<double>& 
 }
 
 const Column<double>& Environment::start_linear_velocity() const {
-  return has_impulses_ && step_count_ == 0 ? data_.start_linear_velocity : front().linear_velocity;
+  return has_impulses_ && step_count_ + inner_ == 0 ? data_.start_linear_velocity : front().linear_velocity;
 }
 
 const Column<double>& Environment::start_angular_velocity() const {
-  return has_impulses_ && step_count_ == 0 ? data_.start_angular_velocity : front().angular_velocity;
+  return has_impulses_ && step_count_ + inner_ == 0 ? data_.start_angular_velocity : front().angular_velocity;
 }
 
-void Environment::begin_step() {
+void Environment::begin_inner_step(double begin, double length) {
   validator_.begin_step(step_count_ + 1);
-  data_.time[0] = time();
-  data_.time_step[0] = step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
+  data_.time[0] = time() + begin;
+  data_.time_step[0] = length;
+  inner_end_ = begin + length;
   data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;
   start_wrench_known_ = false;
   if (!wrench_is_constant_) {
@@ -78,7 +89,7 @@ void Environment::begin_step() {
     std::ranges::fill(data_.wrench.span(), 0.0);
     std::ranges::fill(data_.start_wrench.span(), 0.0);
   }
-  if (!has_impulses_ || step_count_ != 0) return;
+  if (!has_impulses_ || step_count_ + inner_ != 0) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* impulse = &data_.impulse[6 * i];
     const Twist twist =
@@ -105,18 +116,40 @@ Trusted<TrialState> Environment::integrate() {
 }
 
 // World bounds at S*, widened so that pairs up to the margin apart overlap.
+Bounds Environment::trial_bounds(std::uint32_t body) const {
+  Bounds bounds = bounds_of(model_.bound[body], pose_of(data_.trial_position, data_.trial_orientation, body));
+  bounds.lower.array() -= 0.5 * margin_;
+  bounds.upper.array() += 0.5 * margin_;
+  return bounds;
+}
+
 void Environment::bound_bodies(const Trusted<TrialState>&) {
   const std::uint64_t start = channel::now_ns();
-  const double widened = 0.5 * margin_;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    const LocalBound& bound = model_.bound[i];
-    Bounds bounds{Vector3::Constant(-std::numeric_limits<double>::infinity()),
-                  Vector3::Constant(std::numeric_limits<double>::infinity())};
-    const Pose pose = pose_of(data_.trial_position, data_.trial_orientation, i);
-    if (bound.kind == BoundKind::kSphere) bounds = sphere_bounds(pose, bound.centre, bound.half_extents.x());
-    if (bound.kind == BoundKind::kBox) bounds = box_bounds(pose, bound.centre, bound.orientation, bound.half_extents);
-    set_vector(data_.lower.span(), i, bounds.lower - Vector3::Constant(widened));
-    set_vector(data_.upper.span(), i, bounds.upper + Vector3::Constant(widened));
+    const Bounds bounds = trial_bounds(i);
+    set_vector(data_.lower.span(), i, bounds.lower);
+    set_vector(data_.upper.span(), i, bounds.upper);
+  }
+  profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
+}
+
+// How the bodies get from S_n to S*, and bounds of all that they pass. A point at the distance r from the centre of mass
+// leaves the chord between its two places by no more than r angle^2 / 8, and never by more than 2 r.
+void Environment::bound_motions(const Trusted<TrialState>&, double length) {
+  const std::uint64_t start = channel::now_ns();
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    const Pose from = pose_of(front().position, front().orientation, i);
+    const Motion motion = motion_between(
+        from, pose_of(data_.trial_position, data_.trial_orientation, i),
+        0.5 * length *
+            (vector_at(start_angular_velocity().span(), i) + vector_at(data_.trial_angular_velocity.span(), i)));
+    set_vector(data_.displacement.span(), i, motion.displacement);
+    set_vector(data_.rotation.span(), i, motion.rotation);
+    const Bounds before = bounds_of(model_.bound[i], from), after = trial_bounds(i);
+    const double radius = model_.bound[i].centre.norm() + model_.bound[i].half_extents.norm();
+    const double leeway = 0.5 * margin_ + radius * std::min(2.0, 0.125 * motion.rotation.squaredNorm());
+    set_vector(data_.lower.span(), i, before.lower.cwiseMin(after.lower) - Vector3::Constant(leeway));
+    set_vector(data_.upper.span(), i, before.upper.cwiseMax(after.upper) + Vector3::Constant(leeway));
   }
   profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
 }
@@ -126,6 +159,34 @@ Trusted<Pairs> Environment::find_pairs() {
   const auto reply = ids(data_.pair);
   return ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr,
              [&](const auto& answer) { return validator_.pairs(answer, data_); });
+}
+
+void Environment::find_impacts(const Trusted<Pairs>&) {
+  const auto request =
+      ids(data_.target_gap, model_.shape_hash, model_.shape_type, model_.shape_parameter_begin, model_.shape_parameter,
+          model_.body_shape, model_.geometry_position, model_.geometry_orientation, front().position,
+          front().orientation, data_.displacement, data_.rotation, data_.pair);
+  const auto reply =
+      ids(data_.impact_pair, data_.impact_fraction, data_.impact_normal, data_.impact_point, data_.impact_depth);
+  ask(Stage::kNarrowPhase, &collision_, {stage::Method::kCollisionTimesOfImpact, 0, request, reply}, nullptr,
+      [&](const auto& answer) { return validator_.impacts(answer, data_); });
+}
+
+Encounter Environment::encounter(std::size_t impact) const {
+  const double fraction = data_.impact_fraction[impact];
+  const auto velocity = [&](std::uint32_t body, const Column<double>& linear, const Column<double>& angular) {
+    const Vector3 centre =
+        vector_at(front().position.span(), body) + fraction * vector_at(data_.displacement.span(), body);
+    return Vector3(vector_at(linear.span(), body) +
+                   vector_at(angular.span(), body).cross(vector_at(data_.impact_point.span(), impact) - centre));
+  };
+  const auto speed = [&](const Column<double>& linear, const Column<double>& angular) {
+    const std::uint32_t* pair = &data_.pair[2 * data_.impact_pair[impact]];
+    return vector_at(data_.impact_normal.span(), impact)
+        .dot(velocity(pair[1], linear, angular) - velocity(pair[0], linear, angular));
+  };
+  return {fraction, -data_.impact_depth[impact], speed(start_linear_velocity(), start_angular_velocity()),
+          speed(data_.trial_linear_velocity, data_.trial_angular_velocity)};
 }
 
 Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {
@@ -166,7 +227,7 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
     };
     while (o < old.contact_key.size() && remembered(o) < identity) ++o;
     const bool known = o < old.contact_key.size() && remembered(o) == identity;
-    data_.contact_key[i] = known ? old.contact_key[o] : new_contact_key(a, b, feature, step_count_);
+    data_.contact_key[i] = known ? old.contact_key[o] : new_contact_key(a, b, feature, step_count_, inner_);
     data_.contact_warm_correction[i] = known ? old.contact_correction[o] : 0.0;
     set_vector(data_.contact_warm_impulse.span(), i,
                known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());

@@ -83,6 +83,11 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
 
   lower = bodies_if(has_shapes, 3), upper = bodies_if(has_shapes, 3);
   pair = Column<std::uint32_t>(arena, 0, 2 * contacts);
+  const bool has_impacts = has_shapes && d.simulator == Simulator::kContinuous;
+  displacement = bodies_if(has_impacts, 3), rotation = bodies_if(has_impacts, 3);
+  target_gap = Column<double>(arena, 1, 0), impact_pair = Column<std::uint32_t>(arena, 0, has_impacts ? contacts : 0);
+  for (Column<double>* column : {&impact_fraction, &impact_normal, &impact_point, &impact_depth})
+    *column = Column<double>(arena, 0, has_impacts ? 3 * contacts : 0);
   contact_pair = Column<std::uint32_t>(arena, 0, contacts), contact_feature = Column<std::uint32_t>(arena, 0, contacts);
   contact_normal = contact_numbers(3), contact_point = contact_numbers(3), contact_depth = contact_numbers(1);
   contact_relative_velocity = contact_numbers(3);

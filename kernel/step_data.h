@@ -62,6 +62,11 @@ struct StepData {
   // Stage::kBroadPhase.
   Column<std::uint32_t> pair;
 
+  // Times of impact: how the bodies get from S_n to S*, the gap that counts, and the answer.
+  Column<double> displacement, rotation, target_gap;
+  Column<std::uint32_t> impact_pair;
+  Column<double> impact_fraction, impact_normal, impact_point, impact_depth;
+
   // Stage::kNarrowPhase, and what the kernel looks up for each contact.
   Column<std::uint32_t> contact_pair, contact_feature;
   Column<double> contact_normal, contact_point, contact_depth, contact_relative_velocity;

@@ -113,6 +113,13 @@ Trusted<Pairs> Validator::pairs(const Untrusted<StageCall>& answer, const StepDa
   return Trusted<Pairs>({});
 }
 
+Trusted<Impacts> Validator::impacts(const Untrusted<StageCall>& answer, const StepData& data) const {
+  check_structure_and_finiteness(answer.value_);
+  require(check_impact_rows(data.impact_pair.span(), data.impact_fraction.span(), data.impact_normal.span(),
+                            data.pair.size() / 2));
+  return Trusted<Impacts>({});
+}
+
 Trusted<Contacts> Validator::contacts(const Untrusted<StageCall>& answer, const StepData& data) const {
   check_structure_and_finiteness(answer.value_);
   require(check_contact_rows(data.contact_pair.span(), data.contact_feature.span(), data.contact_normal.span(),

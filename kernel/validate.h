@@ -49,6 +49,7 @@ class Trusted {
 struct Wrenches {};       // force_answers[group]
 struct TrialState {};     // trial_*
 struct Pairs {};          // pair
+struct Impacts {};        // impact_*
 struct Contacts {};       // contact_*
 struct Bound {};          // bound of a constraint group
 struct Discrepancies {};  // discrepancy_answers[group]
@@ -74,6 +75,7 @@ class Validator {
   Trusted<Wrenches> wrenches(const Untrusted<StageCall>& answer, const ForceAnswer& columns) const;
   Trusted<TrialState> trial_state(const Untrusted<StageCall>& answer, const StepData& data, const State& start) const;
   Trusted<Pairs> pairs(const Untrusted<StageCall>& answer, const StepData& data) const;
+  Trusted<Impacts> impacts(const Untrusted<StageCall>& answer, const StepData& data) const;
   Trusted<Contacts> contacts(const Untrusted<StageCall>& answer, const StepData& data) const;
   Trusted<Bound> bound(const Untrusted<StageCall>& answer, const ConstraintGroup& group) const;
   Trusted<Discrepancies> discrepancies(const Untrusted<StageCall>& answer, const DiscrepancyAnswer& columns,

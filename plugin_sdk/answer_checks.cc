@@ -42,6 +42,17 @@ AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const s
   return {};
 }
 
+AnswerProblem check_impact_rows(std::span<const std::uint32_t> pair, std::span<const double> fraction,
+                                std::span<const double> normal, std::uint64_t pairs) {
+  for (std::size_t i = 0; i < pair.size(); ++i) {
+    if (pair[i] >= pairs) return bad_structure("impact_pair", i, " is not one of the pairs asked for");
+    if (i > 0 && pair[i - 1] >= pair[i])
+      return bad_structure("impact_pair", i, " is not in ascending order, or stands twice");
+    if (!(fraction[i] >= 0.0 && fraction[i] <= 1.0)) return bad_number("fraction", i, " is outside 0 … 1");
+  }
+  return check_unit(normal, 3, "normal");
+}
+
 AnswerProblem check_contact_rows(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> feature,
                                  std::span<const double> normal, std::uint64_t pairs) {
   for (std::size_t i = 0; i < pair.size(); ++i) {

@@ -22,6 +22,10 @@ struct AnswerProblem {
 // Pairs (a, b): a < b, both with a shape, one movable (flags of body.h), ascending, each once.
 AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> flags);
 
+// Impacts of `pairs` pairs: at most one a pair, ascending; fractions in 0 … 1; unit normals.
+AnswerProblem check_impact_rows(std::span<const std::uint32_t> pair, std::span<const double> fraction,
+                                std::span<const double> normal, std::uint64_t pairs);
+
 // Contacts of `pairs` pairs: ascending by (pair, feature), each once; unit normals.
 AnswerProblem check_contact_rows(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> feature,
                                  std::span<const double> normal, std::uint64_t pairs);

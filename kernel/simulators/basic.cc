@@ -3,21 +3,31 @@
 //
 //   S_n -> integrate (asks for forces): S* -> bounds -> broad phase -> narrow phase at S*
 //       -> constrain -> solve -> commit S_{n+1} -> events
+//
+// A committed step is made of one or more inner steps: `Substeps` equal ones, and whatever a simulator makes of each.
 #include "kernel/environment.h"
 
 namespace gravitas::kernel {
 
-void Environment::run_basic() {
-  begin_step();
-  const Trusted<TrialState> trial = integrate();
+void Environment::make_inner_steps() {
+  if (model_.body_count == 0) return;
+  const double length = length_of_step(step_count_ + 1) / description_.substeps;
+  for (std::uint32_t i = 0; i < description_.substeps; ++i) {
+    if (locates_events()) {
+      locate_events(i * length, length);
+    } else {
+      begin_inner_step(i * length, length);
+      finish_inner_step(integrate());
+    }
+  }
+}
+
+void Environment::finish_inner_step(const Trusted<TrialState>& trial) {
   if (!has_reactions()) {
     commit_trial(trial);
     return;
   }
-  if (has_contacts()) {
-    bound_bodies(trial);
-    look_up_contacts(find_contacts(find_pairs()));
-  }
+  if (has_contacts()) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (constraint_.is_running()) constrain(trial);
   commit_solution(solve());
 }

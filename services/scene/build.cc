@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -56,19 +57,32 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
 }
 
 void build_simulator(const Simulator& simulator, BuildContext* context) {
-  if (simulator.type() != "Basic") {
-    context->diagnostics->error(
-        place_of(simulator, Simulator::kTypeFieldNumber),
-        "the simulator \"" + simulator.type() + "\" is not supported by this version; allowed: \"Basic\"");
+  using enum kernel::Simulator;
+  static const std::map<std::string, kernel::Simulator> kSimulators = {
+      {"Basic", kBasic}, {"Substepping", kSubstepping}, {"Bisection", kBisection}, {"Continuous", kContinuous}};
+  const auto found = kSimulators.find(simulator.type());
+  if (found == kSimulators.end()) {
+    context->diagnostics->error(place_of(simulator, Simulator::kTypeFieldNumber),
+                                "the simulator \"" + simulator.type() + "\" is not supported by this version");
+  } else {
+    context->description.simulator = found->second;
   }
   const SimulatorProperties& properties = simulator.custom_properties();
-  if (properties.substeps() != 1) {
-    context->diagnostics->error(place_of(properties, SimulatorProperties::kSubstepsFieldNumber),
-                                "Substeps is " + std::to_string(properties.substeps()) +
-                                    ", which is not supported by this version; allowed: 1");
-  }
+  context->description.substeps = properties.substeps();
   context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
+}
+
+void check_finds_impacts(const InstalledPlugin* collision, BuildContext* context) {
+  if (context->description.simulator != kernel::Simulator::kContinuous || collision == nullptr) return;
+  if (std::ranges::find(collision->declaration.capabilities, "times_of_impact") !=
+      collision->declaration.capabilities.end())
+    return;
+  context->diagnostics->error(place_of(context->scene.simulator(), Simulator::kTypeFieldNumber),
+                              "the simulator \"Continuous\" asks for times of impact, and the collision plugin \"" +
+                                  collision->declaration.name +
+                                  "\" does not declare them; allowed: a collision plugin with the capability "
+                                  "times_of_impact, or the simulator \"Bisection\"");
 }
 
 void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
@@ -159,7 +173,9 @@ void build_world(BuildContext* context) {
 
   PluginSelection plugins(context);
   plugins.choose(Slot::kSpace, environment.space(), has_shapes);
-  const std::vector<Solid> solids = build_shapes(plugins.choose_collision(has_shapes), context);
+  const InstalledPlugin* collision = plugins.choose_collision(has_shapes);
+  check_finds_impacts(collision, context);
+  const std::vector<Solid> solids = build_shapes(collision, context);
   build_forces(bodies, &plugins, context);
   build_bodies({geometries, materials, forces, solids}, context);
   if (diagnostics->ok()) complete_forces(context);

@@ -1,0 +1,87 @@
+// Simulators `Bisection` and `Continuous`: inner steps end at impacts, so that no body passes through another, and each
+// impact is solved where it happens. Both look at trials from the same state and commit the one that ends there; the
+// steps before it are cut so that the last is short against the flight (the solver takes slow arrivals for rest).
+//
+//   Continuous   asks the collision slot for times of impact on the way from S_n to S*; event_location.h says where to
+//                stop. Pairs that touch at the start are the solver's: what they run into next, while they touch, is
+//                found at S* only.
+//   Bisection    (§ 1.4) halves trials until one ends just after a contact closes. It sees contacts at S* alone: what
+//                passes through within a trial is missed.
+//
+// A Zeno sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps: the rest
+// of the step is then made as Basic makes it.
+#include <algorithm>
+
+#include "kernel/environment.h"
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/event_location.h"
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr int kMostInnerSteps = 10'000, kMostTrials = 200;
+constexpr double kShortestFlight = 1e-6;  // of the step
+constexpr double kTargetShare = 1e-8;     // of the margin: gap at which a pair has met
+constexpr double kLead = 0.9;             // of the way to an impact is one step, the rest another
+constexpr double kFinest = 1e-13;         // of the step: how closely a halving ends
+
+}  // namespace
+
+void Environment::locate_events(double begin, double length) {
+  double done = 0.0;
+  bool is_near = false;
+  for (int inner = 0; done < length; ++inner) {
+    const double left = length - done;
+    double stop = left;
+    begin_inner_step(begin + done, left);
+    Trusted<TrialState> trial = integrate();
+    if (inner < kMostInnerSteps) {
+      stop = description_.simulator == Simulator::kContinuous ? first_impact(trial, begin + done, left)
+                                                              : bisect(trial, begin + done, left, is_near);
+      is_near = !is_near && stop < left;
+      if (stop != data_.time_step[0]) {
+        begin_inner_step(begin + done, stop);
+        trial = integrate();
+      }
+    }
+    finish_inner_step(trial);
+    done = stop == left ? length : done + stop;
+  }
+}
+
+double Environment::first_impact(const Trusted<TrialState>& trial, double begin, double length) {
+  data_.target_gap[0] = kTargetShare * margin_;
+  const double shortest_flight = kShortestFlight * length_of_step(step_count_ + 1);
+  double left = length;
+  for (int i = 0;; ++i) {
+    bound_motions(i == 0 ? trial : integrate(), left);
+    find_impacts(find_pairs());
+    NextStop next{left, false};
+    for (std::size_t k = 0; k < data_.impact_pair.size(); ++k) {
+      const NextStop stop = stop_before(encounter(k), left, data_.target_gap[0], shortest_flight);
+      if (stop.length < next.length) next = stop;
+    }
+    if (!next.is_trial || i == kMostTrials) return std::max(next.length, kFinest * length);
+    left = next.length;
+    begin_inner_step(begin, left);
+  }
+}
+
+double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {
+  const auto closes = [&](const Trusted<TrialState>& at) {
+    look_up_contacts(find_contacts(bound_and_pair(at)));
+    for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
+      if (data_.contact_depth[i] > kTargetShare * margin_ && gap_at(i, front()) > kTargetShare * margin_) return true;
+    return false;
+  };
+  if (!closes(trial)) return length;
+  double clear = 0.0, closed = length;
+  while (closed - clear > kFinest * length) {
+    const double middle = 0.5 * (clear + closed);
+    begin_inner_step(begin, middle);
+    (closes(integrate()) ? closed : clear) = middle;
+  }
+  return is_near || clear == 0.0 ? closed : kLead * clear;
+}
+
+}  // namespace gravitas::kernel

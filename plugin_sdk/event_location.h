@@ -1,0 +1,29 @@
+// Where a simulator that stops at events ends its next inner step: decisions from numbers of one pair of bodies, whose
+// separation along the contact's normal changes with the acceleration a = (end_speed - start_speed) / length. Speeds in
+// m/s, positive when the bodies part; times in s.
+#pragma once
+
+namespace gravitas {
+
+struct Encounter {
+  double fraction = 0.0;     // of the trial motion, 0 … 1: when the pair first comes to `target_gap`; 0: it starts so
+  double gap = 0.0;          // then, m; beyond target_gap: what comes later is not known
+  double start_speed = 0.0;  // at the start of the trial
+  double end_speed = 0.0;    // at its end
+};
+
+struct NextStop {
+  double length = 0.0;    // of the next inner step
+  bool is_trial = false;  // look again at a trial of this length, rather than commit it
+};
+
+// The longest inner step, up to `length` (that of the trial), that an encounter allows.
+//
+// A pair that starts closed and parts, to come back within the trial, is followed to the top of its flight; flights
+// shorter than `shortest_flight` are none: the pair rests. One that comes from afar is met where the trial, taken for
+// the straight motion between its ends, deviates from it by less than half the target (by |a| t (length - t) / 2 at the
+// time t). Until then trials are shortened to twice the time of the meeting, and steps end before it, each squaring the
+// distance. The step that meets ends a little after it, two target gaps deep, so that the contact is closed.
+NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight);
+
+}  // namespace gravitas

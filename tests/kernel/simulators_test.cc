@@ -1,0 +1,242 @@
+// Inner steps: what every simulator promises of its committed states, and where events are located.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::Hosting;
+using kernel::Simulator;
+using kernel::StepOutcome;
+using testing::busy_world;
+using testing::plugin_path;
+using testing::WorldBuilder;
+
+constexpr double kGravity = 9.81;
+
+class Listener final : public kernel::EventListener {
+ public:
+  void on_event(const kernel::Event& event) override { events.push_back(event); }
+  std::vector<kernel::Event> events;
+};
+
+// Exact in free flight, and a solver that closes contacts to rounding.
+WorldBuilder accurate(Simulator simulator, std::uint32_t steps, double time_step) {
+  WorldBuilder builder;
+  builder.steps(steps, time_step).integrator("integrator_verlet");
+  builder.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 100});
+  builder.description().simulator = simulator;
+  return builder;
+}
+
+WorldBuilder bouncing(Simulator simulator, double restitution, std::uint32_t steps, double time_step) {
+  WorldBuilder builder = accurate(simulator, steps, time_step);
+  builder.material({restitution, 0.0, 0.0, 0.0}).ground().sphere(0.1, 1.0, Vector3(0, 1.1, 0));
+  builder.gravity(Vector3(0, -kGravity, 0));
+  return builder;
+}
+
+void run(Environment* world) {
+  while (world->step_count() < world->total_steps())
+    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+}
+
+kernel::Hash chain_of(const WorldBuilder& builder) {
+  Environment world(builder.description());
+  run(&world);
+  return world.chain_hash();
+}
+
+TEST(Simulators, SubsteppingIsBasicWithAsManySubsteps) {
+  for (const std::uint32_t substeps : {1U, 2U, 7U}) {
+    WorldBuilder builder = busy_world(Hosting::kDirect).steps(90, 0.02);
+    builder.description().substeps = substeps;
+    const kernel::Hash basic = chain_of(builder);
+    builder.description().simulator = Simulator::kSubstepping;
+    EXPECT_EQ(chain_of(builder), basic) << substeps;
+  }
+}
+
+TEST(Simulators, SubstepsAreStepsThatAreNotCommitted) {
+  WorldBuilder coarse = busy_world(Hosting::kDirect).steps(30, 0.02),
+               fine = busy_world(Hosting::kDirect).steps(60, 0.01);
+  coarse.description().substeps = 2;
+  coarse.description().material_pairs[kSurfacePerturbation] = 0.0;
+  fine.description().material_pairs[kSurfacePerturbation] = 0.0;
+  Environment a(coarse.description()), b(fine.description());
+  run(&a), run(&b);
+  for (std::size_t i = 0; i < a.state().position.size(); ++i)
+    EXPECT_NEAR(a.state().position[i], b.state().position[i], 1e-12) << i;  // times n dt are rounded otherwise
+}
+
+TEST(Simulators, SubsteppingAsksTheSpaceOnceAStepWhereNothingRunsOutOfItsBounds) {
+  WorldBuilder builder = bouncing(Simulator::kSubstepping, 0.0, 20, 0.01);
+  builder.description().substeps = 5;
+  Environment world(builder.description());
+  run(&world);
+  EXPECT_EQ(world.stage_time(kernel::Stage::kBroadPhase).count(), 20U);
+  EXPECT_EQ(world.stage_time(kernel::Stage::kSolve).count(), 100U);
+}
+
+TEST(Simulators, AKilledWorkerChangesNoBitOfInnerSteps) {
+  for (const Simulator simulator : {Simulator::kSubstepping, Simulator::kBisection, Simulator::kContinuous}) {
+    WorldBuilder builder = bouncing(simulator, 0.9, 60, 0.02);
+    builder.description().substeps = 2;
+    const kernel::Hash quiet = chain_of(builder);
+    for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kSolver, Slot::kIntegrator})
+      builder.hosting(slot, Hosting::kSharedMemory);
+    Environment world(builder.description());
+    std::uint32_t step = 20;
+    for (const Slot slot : {Slot::kIntegrator, Slot::kCollision, Slot::kSolver}) {
+      step += 3;
+      world.inject({slot, "kill", step, 1});
+    }
+    run(&world);
+    EXPECT_EQ(world.chain_hash(), quiet);
+    EXPECT_EQ(world.faults().size(), 3U);
+  }
+}
+
+// Serves so many calls, and fails at all others.
+class Weary final : public kernel::Carrier {
+ public:
+  Weary(std::unique_ptr<Carrier> plugins, int* calls_left) : plugins_(std::move(plugins)), calls_left_(calls_left) {}
+  kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
+                          kernel::DerivativeSource* derivatives) override {
+    if (--*calls_left_ < 0) throw kernel::StageFault(kernel::FaultKind::kFailure, "test", "it is weary");
+    return plugins_->call(call, arena, derivatives);
+  }
+  int process_id() const override { return 0; }
+  Hosting hosting() const override { return Hosting::kDirect; }
+
+ private:
+  std::unique_ptr<Carrier> plugins_;
+  int* calls_left_;
+};
+
+TEST(Simulators, AStepThatFailsHalfwayLeavesTheLastCommit) {
+  WorldBuilder builder = bouncing(Simulator::kSubstepping, 0.0, 20, 0.01);
+  builder.description().substeps = 4;
+  Environment quiet(builder.description());
+  for (int i = 0; i < 7; ++i) ASSERT_EQ(quiet.step(), StepOutcome::kCommitted);
+  int calls_left = 4 * 7 + 2;
+  Environment world(builder.description(),
+                    [&](const kernel::SlotDescription& slot, std::uint32_t threads,
+                        std::stop_token) -> std::unique_ptr<kernel::Carrier> {
+                      auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
+                      if (slot.plugins[0].declaration.slot != Slot::kSolver) return plugins;
+                      return std::make_unique<Weary>(std::move(plugins), &calls_left);
+                    });
+  while (world.step() == StepOutcome::kCommitted && world.step_count() < 20) {
+  }
+  ASSERT_TRUE(world.fault());
+  EXPECT_EQ(world.step_count(), 7U);
+  const auto bits = [](const Environment& of) {
+    const kernel::StateView state = of.state();
+    std::vector<double> all(state.position.begin(), state.position.end());
+    all.insert(all.end(), state.linear_velocity.begin(), state.linear_velocity.end());
+    return all;
+  };
+  EXPECT_EQ(bits(world), bits(quiet));
+  EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
+}
+
+class Located : public ::testing::TestWithParam<Simulator> {};
+
+// Impacts of a ball that falls 1 m and keeps its energy: at t0, 3 t0, 5 t0, …
+TEST_P(Located, ImpactsOfABallAreWhereTheyAre) {
+  Environment world(bouncing(GetParam(), 1.0, 150, 1.0 / 60.0).description());
+  Listener listener;
+  world.set_listener(&listener);
+  run(&world);
+  const double first = std::sqrt(2.0 / kGravity);
+  std::vector<double> starts;
+  for (const kernel::Event& event : listener.events) {
+    if (event.kind != kernel::EventKind::kCollisionStart) continue;
+    starts.push_back(event.time);
+    EXPECT_NEAR(event.impulse, 2.0 * kGravity * first, 1e-9);
+  }
+  ASSERT_EQ(starts.size(), 3U);
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    EXPECT_NEAR(starts[i], (2.0 * static_cast<double>(i) + 1.0) * first, 1e-9) << i;
+  // height and speed of the flight after the last impact
+  const double fall = std::remainder(world.time(), 2.0 * first);
+  EXPECT_NEAR(world.state().position[4], 1.1 - 0.5 * kGravity * fall * fall, 1e-9);
+  EXPECT_NEAR(world.state().linear_velocity[4], -kGravity * fall, 1e-9);
+}
+
+// Bounces that halve in time add up to a finite time, after which the ball rests.
+TEST_P(Located, AZenoSequenceEndsAtRest) {
+  const double restitution = 0.5, first = std::sqrt(2.0 / kGravity);
+  const double rests = first * (1.0 + restitution) / (1.0 - restitution);
+  Environment world(bouncing(GetParam(), restitution, 200, 0.01).description());
+  while (world.step_count() < 200) {
+    ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+    const bool is_at_rest = world.state().linear_velocity[4] == 0.0;
+    if (std::fabs(world.time() - rests) > 0.011) {
+      EXPECT_EQ(is_at_rest, world.time() > rests) << world.time();
+    }
+  }
+  EXPECT_NEAR(world.state().position[4], 0.1, 1e-12);
+}
+
+// Equal balls in a row hand on their velocity one after the other.
+TEST_P(Located, ACradleHandsOnWhatItGets) {
+  WorldBuilder builder = accurate(GetParam(), 10, 0.01);
+  builder.material({1.0, 0.0, 0.0, 0.0});
+  for (int i = 0; i < 5; ++i)
+    builder.sphere(0.1, 1.0, Vector3(i == 0 ? -0.05 : 0.2 * i + 1e-6 * i, 0, 0), Vector3(i == 0 ? 1.0 : 0.0, 0, 0));
+  Environment world(builder.description());
+  run(&world);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(world.state().linear_velocity[3 * i], i == 4 ? 1.0 : 0.0, 1e-10) << i;
+}
+
+std::string name_of(const ::testing::TestParamInfo<Simulator>& info) {
+  return info.param == Simulator::kBisection ? "Bisection" : "Continuous";
+}
+
+INSTANTIATE_TEST_SUITE_P(By, Located, ::testing::Values(Simulator::kBisection, Simulator::kContinuous), name_of);
+
+// 10 m a step, through a plate of 3 cm.
+TEST(Continuous, NothingPassesThroughAPlate) {
+  WorldBuilder builder = accurate(Simulator::kContinuous, 5, 0.01);
+  builder.material({0.0, 0.0, 0.0, 0.0}).box(Vector3(1.0, 1.0, 0.015), 1.0, Vector3::Zero());
+  builder.body().flags &= ~static_cast<std::uint32_t>(kMovable);
+  builder.body().mass = 0.0;
+  builder.body().inertia.setZero();
+  builder.box(Vector3(0.1, 0.1, 0.1), 1.0, Vector3(0.02, 0.01, -12.345), Vector3(0, 0, 1000.0));
+  Environment world(builder.description());
+  Listener listener;
+  world.set_listener(&listener);
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+    EXPECT_LE(world.state().position[5], -0.115 + 1e-9);
+  }
+  ASSERT_FALSE(listener.events.empty());
+  EXPECT_NEAR(listener.events[0].time, (12.345 - 0.115) / 1000.0, 1e-9);
+  EXPECT_NEAR(world.state().linear_velocity[5], 0.0, 1e-9);
+}
+
+TEST(Continuous, TwoBodiesMeetHeadOn) {
+  WorldBuilder builder = accurate(Simulator::kContinuous, 3, 0.01);
+  builder.material({1.0, 0.0, 0.0, 0.0});
+  builder.sphere(0.05, 1.0, Vector3(-4.0, 0, 0), Vector3(500, 0, 0));
+  builder.sphere(0.05, 1.0, Vector3(3.0, 0, 0), Vector3(-500, 0, 0));
+  Environment world(builder.description());
+  run(&world);
+  EXPECT_NEAR(world.state().linear_velocity[0], -500.0, 1e-9);
+  EXPECT_NEAR(world.state().linear_velocity[3], 500.0, 1e-9);
+  // 6.9 m at 1000 m/s, then back
+  EXPECT_NEAR(world.state().position[0], -4.0 + 500.0 * (2.0 * 0.0069 - 0.03), 1e-7);
+}
+
+}  // namespace
+}  // namespace gravitas
