@@ -19,6 +19,7 @@
 // Lengths in m, world axes. The answer depends on the arguments alone.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "plugin_sdk/geometry/support_map.h"
@@ -56,6 +57,17 @@ inline constexpr int kMostSteps = 20000;
 // and unit, rotations at most 1e4 rad.
 std::optional<Impact> first_impact(const MovingSolid& a, const MovingSolid& b, double target_gap,
                                    const TimeSpan& span = {});
+
+// A vertex, an edge or a triangle whose corners each go straight from start to end, as those of a body that deforms do.
+struct MovingCorners {
+  std::array<Vector3, 3> start;
+  std::array<Vector3, 3> end;
+  std::size_t count = 0;  // 1 to 3
+};
+
+// The same for two of these; the bound above is exact for them along its plane. A target below 1e-10 of the
+// coordinates, taken from the first corner of a, counts as that.
+std::optional<Impact> first_impact(const MovingCorners& a, const MovingCorners& b, double target_gap);
 
 // m: no point of a solid moves farther over the whole interval, seen from the body frame of `other`.
 double greatest_travel(const MovingSolid& solid, const MovingSolid& other);
