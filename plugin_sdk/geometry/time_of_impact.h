@@ -14,7 +14,9 @@
 //
 // Steps repeat until the gap is at most the target (an impact), a bound reaches the end of the interval (none), or
 // kMostSteps are spent: then the answer is an impact at the time that was reached, its depth showing that the gap is
-// still wider. That takes a spin of many turns in grazing contact; a whole turn costs some thousand steps then.
+// still wider. That takes a spin of many turns in grazing contact; a whole turn costs some thousand steps then. It also
+// ends so where features lie so nearly flush that rounding hides the plane between them: one vertex or edge against
+// another in ten thousand, at gaps up to 1e-7 of the coordinates.
 //
 // Lengths in m, world axes. The answer depends on the arguments alone.
 #pragma once
