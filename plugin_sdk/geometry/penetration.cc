@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "plugin_sdk/geometry/simplex.h"
 
@@ -27,6 +28,24 @@ double length_of(const Vector3& v) { return std::sqrt(v.squaredNorm()); }
 Separation with_rounding(const PlacedPair& pair, const Vector3& normal, double core_depth, const Vector3& a,
                          const Vector3& b) {
   return {normal, core_depth + pair.rounding(), a + pair.a.rounding() * normal, b - pair.b.rounding() * normal};
+}
+
+// A difference that is nearly nothing, `shortness` of the reach, has no good direction: it is made square to the line or
+// triangle that carries it.
+Vector3 square_to(std::span<const Difference> carrier, const Vector3& normal, double shortness) {
+  constexpr double kShort = 1e-5;
+  if (!(shortness < kShort) || carrier.size() < 2) return normal;
+  const Vector3 ab = carrier[1].w - carrier[0].w;
+  Vector3 square = normal - ab * (ab.dot(normal) / ab.squaredNorm());
+  if (carrier.size() == 3) {
+    const Vector3 ac = carrier[2].w - carrier[0].w;
+    const Vector3 area = ab.cross(ac);
+    // of a sliver its edge must do
+    if (length_of(area) > kShort * std::max(ab.squaredNorm(), ac.squaredNorm()))
+      square = area * (area.dot(normal) / area.squaredNorm());
+  }
+  const double length = length_of(square);
+  return length > 0.9 ? Vector3(square / length) : normal;
 }
 
 // ---- overlapping: a polytope inside a - b that grows where it is nearest to the origin
@@ -263,7 +282,8 @@ Separation find_separation(const PlacedPair& pair, double margin) {
   if (distance <= touching) return Polytope(pair).expand();
   Vector3 point_a = Vector3::Zero();
   for (std::size_t k = 0; k < count; ++k) point_a += closest.weight[k] * simplex[k].a;
-  return with_rounding(pair, -closest.point / distance, -distance, point_a, point_a - closest.point);
+  const Vector3 normal = square_to(std::span(simplex.data(), count), -closest.point / distance, distance / reach);
+  return with_rounding(pair, normal, -distance, point_a, point_a - closest.point);
 }
 
 }  // namespace gravitas

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/geometry/penetration.h"
 #include "plugin_sdk/math/rotation.h"
@@ -73,9 +74,10 @@ double safe_step(const Bound& f, double at_zero, double rest) {
   constexpr int kRounds = 6;
   for (int i = 0; i < kRounds && high - low > 0.05 * low; ++i) {
     // the chord of a concave bound crosses zero before the bound does
-    const double chord = low + (high - low) * (at_low / (at_low - at_high));
-    const double value = f(chord);
-    if (value >= 0.0) low = chord, at_low = value;
+    double chord = (high - low) * (at_low / (at_low - at_high)), value = f(low + chord);
+    // of a straight bound both cross in one place, where rounding has the sign
+    if (!(value >= 0.0)) chord *= 0.5, value = f(low + chord);
+    if (value >= 0.0) low += chord, at_low = value;
     const double middle = 0.5 * (low + high), there = f(middle);
     if (there >= 0.0) {
       low = middle, at_low = there;
@@ -210,6 +212,70 @@ class HalfspaceApproach {
   double plane_ = 0.0, remainder_ = 0.0, gap_ = 0.0;
 };
 
+// A vertex, edge or triangle at one instant.
+class CornersMap final : public SupportMap {
+ public:
+  void place(const MovingCorners& corners, const Vector3& origin, double t) {
+    count_ = corners.count;
+    radius_ = 0.0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      corners_[i] = (corners.start[i] - origin) + t * (corners.end[i] - corners.start[i]);
+      radius_ = std::max(radius_, length_of(corners_[i]));
+    }
+    centre_ = corners_[0];
+  }
+  Vector3 support(const Vector3& d) const override {
+    std::size_t farthest = 0;
+    for (std::size_t i = 1; i < count_; ++i)
+      if (d.dot(corners_[i]) > d.dot(corners_[farthest])) farthest = i;
+    return corners_[farthest];
+  }
+
+ private:
+  std::array<Vector3, 3> corners_;
+  std::size_t count_ = 0;
+};
+
+class CornersApproach {
+ public:
+  CornersApproach(const MovingCorners& a, const MovingCorners& b) : a_(a), b_(b), origin_(a.start[0]) {
+    for (const MovingCorners* side : {&a, &b})
+      for (std::size_t i = 0; i < side->count; ++i)
+        size_ = std::max({size_, length_of(side->start[i] - origin_), length_of(side->end[i] - origin_)});
+  }
+  double sizes() const { return size_; }
+  void look(double t) {
+    map_a_.place(a_, origin_, t), map_b_.place(b_, origin_, t);
+    time_ = t;
+    least_ = find_separation({map_a_, map_b_, Matrix3::Identity(), Vector3::Zero()},
+                             std::numeric_limits<double>::infinity());
+  }
+  double gap() const { return -least_.depth; }
+  double parted(double s) const { return -farthest(a_, least_.normal, s) - farthest(b_, -least_.normal, s); }
+  double step(double half_target, double rest) const {
+    const auto bound = [&](double s) { return parted(s) - half_target; };
+    const double at_zero = bound(0.0);
+    return at_zero > 0.0 ? safe_step(bound, at_zero, rest) : 0.0;
+  }
+  Impact impact(double t) const {
+    return {t, least_.normal, origin_ + 0.5 * (least_.point_a + least_.point_b), least_.depth};
+  }
+
+ private:
+  double farthest(const MovingCorners& corners, const Vector3& n, double s) const {
+    double most = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < corners.count; ++i)
+      most = std::max(most, n.dot(corners.start[i] - origin_) + (time_ + s) * n.dot(corners.end[i] - corners.start[i]));
+    return most;
+  }
+
+  const MovingCorners &a_, &b_;
+  Vector3 origin_;
+  double size_ = 0.0, time_ = 0.0;
+  CornersMap map_a_, map_b_;
+  Separation least_;
+};
+
 template <typename Approach>
 std::optional<Impact> advance(Approach* approach, double target_gap, const TimeSpan& span) {
   const double target = std::max(target_gap, 1e-10 * approach->sizes()), half = 0.5 * target;
@@ -239,6 +305,11 @@ std::optional<Impact> first_impact(const MovingSolid& a, const MovingSolid& b, d
   std::optional<Impact> impact = advance(&approach, target_gap, span);
   if (impact && is_reversed) impact->normal = -impact->normal;
   return impact;
+}
+
+std::optional<Impact> first_impact(const MovingCorners& a, const MovingCorners& b, double target_gap) {
+  CornersApproach approach(a, b);
+  return advance(&approach, target_gap, {});
 }
 
 double greatest_travel(const MovingSolid& solid, const MovingSolid& other) {

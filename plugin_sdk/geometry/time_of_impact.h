@@ -14,11 +14,14 @@
 //
 // Steps repeat until the gap is at most the target (an impact), a bound reaches the end of the interval (none), or
 // kMostSteps are spent: then the answer is an impact at the time that was reached, its depth showing that the gap is
-// still wider. That takes a spin of many turns in grazing contact; a whole turn costs some thousand steps then.
+// still wider. That takes a spin of many turns in grazing contact; a whole turn costs some thousand steps then. It also
+// ends so where features lie so nearly flush that rounding hides the plane between them: one vertex or edge against
+// another in ten thousand, at gaps up to 1e-7 of the coordinates.
 //
 // Lengths in m, world axes. The answer depends on the arguments alone.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "plugin_sdk/geometry/support_map.h"
@@ -56,6 +59,17 @@ inline constexpr int kMostSteps = 20000;
 // and unit, rotations at most 1e4 rad.
 std::optional<Impact> first_impact(const MovingSolid& a, const MovingSolid& b, double target_gap,
                                    const TimeSpan& span = {});
+
+// A vertex, an edge or a triangle whose corners each go straight from start to end, as those of a body that deforms do.
+struct MovingCorners {
+  std::array<Vector3, 3> start;
+  std::array<Vector3, 3> end;
+  std::size_t count = 0;  // 1 to 3
+};
+
+// The same for two of these; the bound above is exact for them along its plane. A target below 1e-10 of the
+// coordinates, taken from the first corner of a, counts as that.
+std::optional<Impact> first_impact(const MovingCorners& a, const MovingCorners& b, double target_gap);
 
 // m: no point of a solid moves farther over the whole interval, seen from the body frame of `other`.
 double greatest_travel(const MovingSolid& solid, const MovingSolid& other);
