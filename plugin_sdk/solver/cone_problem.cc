@@ -154,7 +154,6 @@ void ConeProblem::reduce(const SolverBodies& bodies) {
         carried_(i, static_cast<Eigen::Index>(o)) = column[static_cast<std::size_t>(i)];
     }
   }
-  if (other_.size() > kDenseRows) return;
   response_.resize(count, count);
   for (Eigen::Index a = 0; a < count; ++a) {
     const std::uint32_t r = other_[static_cast<std::size_t>(a)];
@@ -206,10 +205,10 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
   into_cones(&lambda_);
 
-  reduce(bodies);
   if (other_.size() > kDenseRows) {
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
+    reduce(bodies);
     solve_dense(settings, tolerance, &summary);
   }
   for (std::size_t o = 0; o < other_.size(); ++o)
@@ -248,48 +247,39 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
 }
 
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
-  constexpr int kPatience = 6, kSweeps = 20;
+  // Newton steps without a residual half as large before the next guess
+  constexpr int kPatience = 6;
   const bool is_newton = settings.method == ConeMethod::kNewton;
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
-    double residual = residual_of(lambda, y), best = residual;
+    double best = residual_of(lambda, y);
     Eigen::VectorXd best_lambda = lambda, best_y = y;
-    int without = 0, mended = 0;
-    Eigen::VectorXd mended_lambda, mended_y;
+    const auto keep_better = [&] {
+      const double residual = residual_of(lambda, y);
+      if (residual < best) best = residual, best_lambda = lambda, best_y = y;
+    };
+    ConePath guesses = path();
+    int without = 0;
     std::uint32_t done = 0;
     // what rounding leaves of sums of large terms is no violation
     double enough = tolerance;
     while (best > enough && done < settings.iterations) {
-      ++done;
-      if (is_newton && without < kPatience && newton_step(nullptr, &lambda, &y)) {
-        ++without;
-      } else if (is_newton && mended % 4 != 3) {
-        // from where the last mending ended: the loads go on settling
-        if (mended > 0) lambda = mended_lambda, y = mended_y;
-        tresca(enough, &lambda, &y);
-        mended_lambda = lambda, mended_y = y;
-        ++mended;
-        without = 0;
+      const double before = best;
+      if (!is_newton) {
+        ++done;
+        sweep(&lambda, &y);
+      } else if (without < kPatience && newton_step(&lambda, &y)) {
+        ++done, ++without;
       } else {
-        if (is_newton) lambda = best_lambda, y = best_y;
-        const int sweeps = is_newton ? kSweeps : 1;
-        for (int i = 0; i < sweeps; ++i) sweep(&lambda, &y);
-        y = start_others_ + response_ * lambda;
-        mended_lambda = lambda, mended_y = y;
-        ++mended;
+        done += guesses.next(&lambda, &y);
         without = 0;
       }
-      residual = residual_of(lambda, y);
-      if (!(residual < best)) continue;
-      if (residual < 0.5 * best) without = 0;
-      best = residual, best_lambda = lambda, best_y = y;
-      enough = std::max(tolerance, 16.0 * kRounding * largest_sum(lambda));
+      keep_better();
+      if (best < 0.5 * before) without = 0;
+      if (best < before) enough = std::max(tolerance, 16.0 * kRounding * largest_sum(best_lambda));
     }
     // one step more costs little and ends at rounding
-    if (is_newton && best <= enough && done > 0 && newton_step(nullptr, &lambda, &y)) {
-      residual = residual_of(lambda, y);
-      if (residual < best) best = residual, best_lambda = lambda, best_y = y;
-    }
+    if (is_newton && best <= enough && done > 0 && newton_step(&lambda, &y)) keep_better();
     summary->iterations += done;
     summary->residual = best;
     summary->has_converged = best <= enough;
@@ -309,17 +299,6 @@ double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
     most = std::max(most, sum * scale_[r] * rows[r].length);
   }
   return most;
-}
-
-// Friction within radii that the present normal impulses give (Tresca): convex, so that steps end at its solution.
-bool ConeProblem::tresca(double tolerance, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
-  constexpr int kSteps = 15;
-  const Eigen::VectorXd loads = lambda->cwiseMax(0.0);
-  for (int step = 0; step < kSteps; ++step) {
-    if (residual_of(*lambda, *y, &loads) <= tolerance) return true;
-    if (!newton_step(&loads, lambda, y)) return false;
-  }
-  return false;
 }
 
 // Held rows and the others in turn.
