@@ -25,7 +25,11 @@ double square(double a) { return a * a; }
 }  // namespace
 
 void ConePath::add_scalar(Eigen::Index row, double lower, double upper, double bound) {
-  scalars_.push_back({row, lower, upper, bound});
+  if (std::isinf(bound) && std::isinf(upper)) {
+    add_normal(row, lower);
+  } else {
+    scalars_.push_back({row, lower, upper, bound});
+  }
 }
 
 void ConePath::add_normal(Eigen::Index row, double target) { normals_.push_back({.row = row, .target = target}); }
@@ -72,6 +76,8 @@ void ConePath::enter(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
     matrix_.diagonal().array() += 1e-8;
     side_ = -start_;
     for (const Normal& normal : normals_) side_[normal.row] += normal.target;
+    for (const Scalar& scalar : scalars_)
+      side_[scalar.row] += std::isfinite(scalar.lower) ? scalar.lower : scalar.upper;
     speed_ = std::max(start_.cwiseAbs().maxCoeff(), side_.cwiseAbs().maxCoeff());
     load_ = std::max(speed_, matrix_.partialPivLu().solve(side_).cwiseAbs().maxCoeff());
   }

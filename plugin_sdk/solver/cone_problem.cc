@@ -154,16 +154,24 @@ void ConeProblem::reduce(const SolverBodies& bodies) {
         carried_(i, static_cast<Eigen::Index>(o)) = column[static_cast<std::size_t>(i)];
     }
   }
-  response_.resize(count, count);
+  // only rows of one body meet, unless held rows carry from one to the other
+  response_.setZero(count, count);
+  others_of_body_.assign(bodies.count() + 1, {});
+  for (std::uint32_t a = 0; a < other_.size(); ++a) {
+    const std::uint32_t r = other_[a];
+    for (const std::uint32_t body : {rows[r].body1, rows[r].body2}) {
+      if (!bodies[body].is_pushed()) continue;
+      std::vector<std::uint32_t>& list = others_of_body_[body];
+      if (list.empty() || list.back() != a) list.push_back(a);
+      for (const std::uint32_t b : list)
+        response_(a, b) = coupling(bodies, r, other_[b]) / (scale_[r] * scale_[other_[b]]);
+    }
+    response_(a, a) = (coupling(bodies, r, r) + rows[r].law.gamma) / (scale_[r] * scale_[r]);
+  }
   for (Eigen::Index a = 0; a < count; ++a) {
-    const std::uint32_t r = other_[static_cast<std::size_t>(a)];
     for (Eigen::Index b = 0; b <= a; ++b) {
-      const std::uint32_t s = other_[static_cast<std::size_t>(b)];
-      double entry = coupling(bodies, r, s);
-      if (a == b) entry += rows[r].law.gamma;
-      entry /= scale_[r] * scale_[s];
-      for (const auto& [i, share] : to_held_[static_cast<std::size_t>(a)]) entry -= share * carried_(i, b);
-      response_(a, b) = response_(b, a) = entry;
+      for (const auto& [i, share] : to_held_[static_cast<std::size_t>(a)]) response_(a, b) -= share * carried_(i, b);
+      response_(b, a) = response_(a, b);
     }
   }
 }
@@ -180,6 +188,28 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
   }
   if (count > 0) worst = std::max(worst, residual_of(Eigen::VectorXd::Zero(count), y));
   return worst <= std::max(smallest, kRounding * motion_);
+}
+
+// The first guess, where it is right as it stands: with the one of the step before, what rests.
+bool ConeProblem::is_solved_by_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance,
+                                     double* residual) {
+  if (!held_.empty()) return false;
+  for (std::size_t o = 0; o < other_.size(); ++o)
+    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
+  BodyMotion x = x0;
+  push(bodies, &x);
+  Eigen::VectorXd y(lambda_.size());
+  find_values(x, &y);
+  *residual = residual_of(lambda_, y);
+  return *residual <= tolerance && !let_slide(lambda_, y, kSlip * tolerance);
+}
+
+// y of the other rows.
+void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
+  for (std::size_t o = 0; o < other_.size(); ++o) {
+    const std::uint32_t r = other_[o];
+    (*y)[static_cast<Eigen::Index>(o)] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
+  }
 }
 
 ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
@@ -205,6 +235,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
   into_cones(&lambda_);
 
+  if (is_solved_by_guess(bodies, x0, std::max(tolerance, 4.0 * smallest), &summary.residual)) return summary;
   if (other_.size() > kDenseRows) {
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
@@ -248,7 +279,7 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
 
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
   // Newton steps without a residual half as large before the next guess
-  constexpr int kPatience = 6;
+  constexpr int kPatience = 4;
   const bool is_newton = settings.method == ConeMethod::kNewton;
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
@@ -304,7 +335,6 @@ double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
 // Held rows and the others in turn.
 void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings,
                               double tolerance, ConeSummary* summary) {
-  const auto count = static_cast<Eigen::Index>(other_.size());
   std::vector<Eigen::MatrixXd> own(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const Block& block = blocks_[b];
@@ -319,7 +349,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
   }
   for (std::size_t o = 0; o < other_.size(); ++o)
     rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
-  Eigen::VectorXd y(count);
+  Eigen::VectorXd y(lambda_.size());
   BodyMotion x;
   summary->has_converged = false;
   const std::uint32_t sweeps = 10 * settings.iterations;
@@ -329,10 +359,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
     if (!held_.empty()) refine_held(bodies, x0);
     x = x0;
     push(bodies, &x);
-    for (Eigen::Index o = 0; o < count; ++o) {
-      const std::uint32_t r = other_[static_cast<std::size_t>(o)];
-      y[o] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
-    }
+    find_values(x, &y);
     summary->residual = residual_of(lambda_, y);
     summary->has_converged = summary->residual <= tolerance;
     if (may_slide && (summary->has_converged || done == sweeps / 2)) {

@@ -20,7 +20,7 @@
 //                   equations are linear but for the direction of a slide, so that steps end at the solution itself once
 //                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-10 added to
 //                   the diagonal of the step's matrix, not of the equation: the answer is one of those that are right.
-//                   Where six steps do not halve the residual, they start anew from the guesses of cone_path.h.
+//                   Where four steps do not halve the residual, they start anew from the guesses of cone_path.h.
 //     kGaussSeidel  projected block Gauss-Seidel, each contact solved exactly (coulomb_contact.h).
 //  3. Static and dynamic friction: all stick within mu_s first; what slips then slides with mu_d.
 //
@@ -112,6 +112,8 @@ class ConeProblem {
   void factorise(const SolverBodies& bodies);
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
+  bool is_solved_by_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance, double* residual);
+  void find_values(const BodyMotion& x, Eigen::VectorXd* y) const;
   JointLaw scaled_law(std::uint32_t row) const;
   Bounds bounds_of(const Block& block) const;
   void confine(const Block& block, double* multipliers) const;
@@ -141,6 +143,7 @@ class ConeProblem {
 
   ProfileLdlt factor_;
   std::vector<std::vector<std::uint32_t>> held_of_body_;                // places among held_
+  std::vector<std::vector<std::uint32_t>> others_of_body_;              // places among other_
   std::vector<double> side_;                                            // (target - q)/scale of held rows
   std::vector<std::vector<std::pair<std::uint32_t, double>>> to_held_;  // W_OE, scaled
   Eigen::MatrixXd carried_;                                             // W_EE^-1 W_EO, scaled
