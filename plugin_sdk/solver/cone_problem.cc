@@ -12,6 +12,9 @@ namespace {
 
 constexpr double kRounding = std::numeric_limits<double>::epsilon();
 
+// Of the largest terms of a row's sum, what may be left by rounding.
+constexpr double kSumRounding = 16.0 * kRounding;
+
 // A contact slips if it does so this much faster than what counts as converged.
 constexpr double kSlip = 1e3;
 
@@ -201,7 +204,27 @@ bool ConeProblem::is_solved_by_guess(const SolverBodies& bodies, const BodyMotio
   Eigen::VectorXd y(lambda_.size());
   find_values(x, &y);
   *residual = residual_of(lambda_, y);
-  return *residual <= tolerance && !let_slide(lambda_, y, kSlip * tolerance);
+  // what each body's motion is summed from
+  BodyMotion terms(x0.size());
+  for (const ConeRow& row : rows) {
+    const double push = std::fabs(row.multiplier);
+    const auto add = [&](std::uint32_t body, const Vector3& turn) {
+      terms[body].linear += bodies[body].inverse_mass * push * row.direction.linear.cwiseAbs();
+      terms[body].angular += push * turn.cwiseAbs();
+    };
+    add(row.body1, row.direction.turn1);
+    add(row.body2, row.direction.turn2);
+  }
+  double sum = 0.0;
+  for (const std::uint32_t r : other_) {
+    const ConstraintDirection& d = rows[r].direction;
+    const double term = d.linear.cwiseAbs().dot(terms[rows[r].body1].linear + terms[rows[r].body2].linear) +
+                        d.angular1.cwiseAbs().dot(terms[rows[r].body1].angular) +
+                        d.angular2.cwiseAbs().dot(terms[rows[r].body2].angular);
+    sum = std::max(sum, (std::fabs(free_[r]) + term) * rows[r].length);
+  }
+  const double enough = std::max(tolerance, kSumRounding * sum);
+  return *residual <= enough && !let_slide(lambda_, y, kSlip * enough);
 }
 
 // y of the other rows.
@@ -235,7 +258,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
   into_cones(&lambda_);
 
-  if (is_solved_by_guess(bodies, x0, std::max(tolerance, 4.0 * smallest), &summary.residual)) return summary;
+  if (is_solved_by_guess(bodies, x0, tolerance, &summary.residual)) return summary;
   if (other_.size() > kDenseRows) {
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
@@ -293,7 +316,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     int without = 0;
     std::uint32_t done = 0;
     // what rounding leaves of sums of large terms is no violation
-    double enough = tolerance;
+    double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
     while (best > enough && done < settings.iterations) {
       const double before = best;
       if (!is_newton) {
@@ -307,7 +330,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       }
       keep_better();
       if (best < 0.5 * before) without = 0;
-      if (best < before) enough = std::max(tolerance, 16.0 * kRounding * largest_sum(best_lambda));
+      if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
     // one step more costs little and ends at rounding
     if (is_newton && best <= enough && done > 0 && newton_step(&lambda, &y)) keep_better();

@@ -419,7 +419,7 @@ class IslandSolver {
 
   // ---- rows on velocity alone
 
-  // offset_ from the present impulses; false if it stays the same to rounding.
+  // offset_ from the present impulses; false if it stays the same as far as they are known.
   bool set_offset(double share) {
     BodyMotion next = start_motion(nullptr);
     const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
@@ -435,7 +435,8 @@ class IslandSolver {
     const double change = largest_change(next, offset_);
     const double size = std::max(largest(next), largest(displacement_));
     offset_ = std::move(next);
-    return change > std::max(0.25 * kRounding * coordinates_, 1e-14 * size);
+    // velocities are known to their residual
+    return change > std::max({kRounding * coordinates_, 1e-14 * size, 4.0 * share * summary_.residual});
   }
 
   // ---- sizes, m
