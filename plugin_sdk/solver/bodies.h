@@ -1,5 +1,5 @@
-// The bodies of a solver's request as a relaxation needs them: both states, inverse masses at the
-// trial pose, and one more body for the world, so that no row has to ask whether a body is there.
+// The bodies of a solver's request as rows need them: both states, inverse masses at the trial pose, and one more body for
+// the world, so that no row has to ask whether a body is there.
 #pragma once
 
 #include <cstddef>
@@ -103,6 +103,8 @@ struct Gain {
   }
   // More than rounding.
   bool is_real() const { return work > 1e-13 * size; }
+  // Enough of one contact for its restitution to be lowered.
+  bool is_to_blame() const { return work > 1e-10 * size; }
 };
 
 }  // namespace gravitas

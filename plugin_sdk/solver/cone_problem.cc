@@ -12,6 +12,9 @@ namespace {
 
 constexpr double kRounding = std::numeric_limits<double>::epsilon();
 
+// Of the largest terms of a row's sum, what may be left by rounding.
+constexpr double kSumRounding = 16.0 * kRounding;
+
 // A contact slips if it does so this much faster than what counts as converged.
 constexpr double kSlip = 1e3;
 
@@ -154,17 +157,24 @@ void ConeProblem::reduce(const SolverBodies& bodies) {
         carried_(i, static_cast<Eigen::Index>(o)) = column[static_cast<std::size_t>(i)];
     }
   }
-  if (other_.size() > kDenseRows) return;
-  response_.resize(count, count);
+  // only rows of one body meet, unless held rows carry from one to the other
+  response_.setZero(count, count);
+  others_of_body_.assign(bodies.count() + 1, {});
+  for (std::uint32_t a = 0; a < other_.size(); ++a) {
+    const std::uint32_t r = other_[a];
+    for (const std::uint32_t body : {rows[r].body1, rows[r].body2}) {
+      if (!bodies[body].is_pushed()) continue;
+      std::vector<std::uint32_t>& list = others_of_body_[body];
+      if (list.empty() || list.back() != a) list.push_back(a);
+      for (const std::uint32_t b : list)
+        response_(a, b) = coupling(bodies, r, other_[b]) / (scale_[r] * scale_[other_[b]]);
+    }
+    response_(a, a) = (coupling(bodies, r, r) + rows[r].law.gamma) / (scale_[r] * scale_[r]);
+  }
   for (Eigen::Index a = 0; a < count; ++a) {
-    const std::uint32_t r = other_[static_cast<std::size_t>(a)];
     for (Eigen::Index b = 0; b <= a; ++b) {
-      const std::uint32_t s = other_[static_cast<std::size_t>(b)];
-      double entry = coupling(bodies, r, s);
-      if (a == b) entry += rows[r].law.gamma;
-      entry /= scale_[r] * scale_[s];
-      for (const auto& [i, share] : to_held_[static_cast<std::size_t>(a)]) entry -= share * carried_(i, b);
-      response_(a, b) = response_(b, a) = entry;
+      for (const auto& [i, share] : to_held_[static_cast<std::size_t>(a)]) response_(a, b) -= share * carried_(i, b);
+      response_(b, a) = response_(a, b);
     }
   }
 }
@@ -181,6 +191,48 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
   }
   if (count > 0) worst = std::max(worst, residual_of(Eigen::VectorXd::Zero(count), y));
   return worst <= std::max(smallest, kRounding * motion_);
+}
+
+// The first guess, where it is right as it stands: with the one of the step before, what rests.
+bool ConeProblem::is_solved_by_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance,
+                                     double* residual) {
+  if (!held_.empty()) return false;
+  for (std::size_t o = 0; o < other_.size(); ++o)
+    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
+  BodyMotion x = x0;
+  push(bodies, &x);
+  Eigen::VectorXd y(lambda_.size());
+  find_values(x, &y);
+  *residual = residual_of(lambda_, y);
+  // what each body's motion is summed from
+  BodyMotion terms(x0.size());
+  for (const ConeRow& row : rows) {
+    const double push = std::fabs(row.multiplier);
+    const auto add = [&](std::uint32_t body, const Vector3& turn) {
+      terms[body].linear += bodies[body].inverse_mass * push * row.direction.linear.cwiseAbs();
+      terms[body].angular += push * turn.cwiseAbs();
+    };
+    add(row.body1, row.direction.turn1);
+    add(row.body2, row.direction.turn2);
+  }
+  double sum = 0.0;
+  for (const std::uint32_t r : other_) {
+    const ConstraintDirection& d = rows[r].direction;
+    const double term = d.linear.cwiseAbs().dot(terms[rows[r].body1].linear + terms[rows[r].body2].linear) +
+                        d.angular1.cwiseAbs().dot(terms[rows[r].body1].angular) +
+                        d.angular2.cwiseAbs().dot(terms[rows[r].body2].angular);
+    sum = std::max(sum, (std::fabs(free_[r]) + term) * rows[r].length);
+  }
+  const double enough = std::max(tolerance, kSumRounding * sum);
+  return *residual <= enough && !let_slide(lambda_, y, kSlip * enough);
+}
+
+// y of the other rows.
+void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
+  for (std::size_t o = 0; o < other_.size(); ++o) {
+    const std::uint32_t r = other_[o];
+    (*y)[static_cast<Eigen::Index>(o)] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
+  }
 }
 
 ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
@@ -206,10 +258,11 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
   into_cones(&lambda_);
 
-  reduce(bodies);
+  if (is_solved_by_guess(bodies, x0, tolerance, &summary.residual)) return summary;
   if (other_.size() > kDenseRows) {
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
+    reduce(bodies);
     solve_dense(settings, tolerance, &summary);
   }
   for (std::size_t o = 0; o < other_.size(); ++o)
@@ -248,48 +301,39 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
 }
 
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
-  constexpr int kPatience = 6, kSweeps = 20;
+  // Newton steps without a residual half as large before the next guess
+  constexpr int kPatience = 4;
   const bool is_newton = settings.method == ConeMethod::kNewton;
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
-    double residual = residual_of(lambda, y), best = residual;
+    double best = residual_of(lambda, y);
     Eigen::VectorXd best_lambda = lambda, best_y = y;
-    int without = 0, mended = 0;
-    Eigen::VectorXd mended_lambda, mended_y;
+    const auto keep_better = [&] {
+      const double residual = residual_of(lambda, y);
+      if (residual < best) best = residual, best_lambda = lambda, best_y = y;
+    };
+    ConePath guesses = path();
+    int without = 0;
     std::uint32_t done = 0;
     // what rounding leaves of sums of large terms is no violation
-    double enough = tolerance;
+    double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
     while (best > enough && done < settings.iterations) {
-      ++done;
-      if (is_newton && without < kPatience && newton_step(nullptr, &lambda, &y)) {
-        ++without;
-      } else if (is_newton && mended % 4 != 3) {
-        // from where the last mending ended: the loads go on settling
-        if (mended > 0) lambda = mended_lambda, y = mended_y;
-        tresca(enough, &lambda, &y);
-        mended_lambda = lambda, mended_y = y;
-        ++mended;
-        without = 0;
+      const double before = best;
+      if (!is_newton) {
+        ++done;
+        sweep(&lambda, &y);
+      } else if (without < kPatience && newton_step(&lambda, &y)) {
+        ++done, ++without;
       } else {
-        if (is_newton) lambda = best_lambda, y = best_y;
-        const int sweeps = is_newton ? kSweeps : 1;
-        for (int i = 0; i < sweeps; ++i) sweep(&lambda, &y);
-        y = start_others_ + response_ * lambda;
-        mended_lambda = lambda, mended_y = y;
-        ++mended;
+        done += guesses.next(&lambda, &y);
         without = 0;
       }
-      residual = residual_of(lambda, y);
-      if (!(residual < best)) continue;
-      if (residual < 0.5 * best) without = 0;
-      best = residual, best_lambda = lambda, best_y = y;
-      enough = std::max(tolerance, 16.0 * kRounding * largest_sum(lambda));
+      keep_better();
+      if (best < 0.5 * before) without = 0;
+      if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
     // one step more costs little and ends at rounding
-    if (is_newton && best <= enough && done > 0 && newton_step(nullptr, &lambda, &y)) {
-      residual = residual_of(lambda, y);
-      if (residual < best) best = residual, best_lambda = lambda, best_y = y;
-    }
+    if (is_newton && best <= enough && done > 0 && newton_step(&lambda, &y)) keep_better();
     summary->iterations += done;
     summary->residual = best;
     summary->has_converged = best <= enough;
@@ -311,21 +355,9 @@ double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
   return most;
 }
 
-// Friction within radii that the present normal impulses give (Tresca): convex, so that steps end at its solution.
-bool ConeProblem::tresca(double tolerance, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
-  constexpr int kSteps = 15;
-  const Eigen::VectorXd loads = lambda->cwiseMax(0.0);
-  for (int step = 0; step < kSteps; ++step) {
-    if (residual_of(*lambda, *y, &loads) <= tolerance) return true;
-    if (!newton_step(&loads, lambda, y)) return false;
-  }
-  return false;
-}
-
 // Held rows and the others in turn.
 void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings,
                               double tolerance, ConeSummary* summary) {
-  const auto count = static_cast<Eigen::Index>(other_.size());
   std::vector<Eigen::MatrixXd> own(blocks_.size());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const Block& block = blocks_[b];
@@ -340,7 +372,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
   }
   for (std::size_t o = 0; o < other_.size(); ++o)
     rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
-  Eigen::VectorXd y(count);
+  Eigen::VectorXd y(lambda_.size());
   BodyMotion x;
   summary->has_converged = false;
   const std::uint32_t sweeps = 10 * settings.iterations;
@@ -350,10 +382,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
     if (!held_.empty()) refine_held(bodies, x0);
     x = x0;
     push(bodies, &x);
-    for (Eigen::Index o = 0; o < count; ++o) {
-      const std::uint32_t r = other_[static_cast<std::size_t>(o)];
-      y[o] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
-    }
+    find_values(x, &y);
     summary->residual = residual_of(lambda_, y);
     summary->has_converged = summary->residual <= tolerance;
     if (may_slide && (summary->has_converged || done == sweeps / 2)) {

@@ -2,6 +2,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/solver/cone_problem.h"
 #include "plugin_sdk/solver/coulomb_contact.h"
@@ -26,47 +27,54 @@ void into_disc(double radius, double* v) {
 
 }  // namespace
 
-void ConeProblem::project(const Block& block, const double* lambda, const double* y, const double* load,
-                          double* projected) const {
-  const std::uint32_t r = other_[block.first];
-  if (block.contact < 0) {
-    const JointLaw& law = rows[r].law;
-    const double scale = scale_[r];
-    const double to_lower = lambda[0] + (law.lower_target / scale - y[0]);
-    const double to_upper = lambda[0] + (law.upper_target / scale - y[0]);
-    double to = 0.0;
-    if (law.has_lower && to_lower > 0.0) {
-      to = to_lower;
-    } else if (law.has_upper && to_upper < 0.0) {
-      to = to_upper;
-    }
-    projected[0] = std::clamp(to, -law.bound * scale, law.bound * scale);
-    return;
-  }
-  const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
-  projected[0] = std::max(0.0, lambda[0] + (contact.target / scale_[r] - y[0]));
-  const double pressed = load != nullptr ? *load : projected[0];
-  std::uint32_t k = 1;
-  if (contact.has_friction) {
-    projected[1] = lambda[1] - y[1], projected[2] = lambda[2] - y[2];
-    into_disc((block.slides ? contact.dynamic_friction : contact.static_friction) * pressed, projected + 1);
-    k = 3;
-  }
-  if (!contact.has_turning) return;
-  const double lever = scale_[r + k] / scale_[r];
-  const double spin = contact.spinning_friction * lever * pressed;
-  projected[k] = std::clamp(lambda[k] - y[k], -spin, spin);
-  projected[k + 1] = lambda[k + 1] - y[k + 1], projected[k + 2] = lambda[k + 2] - y[k + 2];
-  into_disc(contact.rolling_friction * lever * pressed, projected + k + 1);
+JointLaw ConeProblem::scaled_law(std::uint32_t row) const {
+  JointLaw law = rows[row].law;
+  law.lower_target /= scale_[row], law.upper_target /= scale_[row], law.bound *= scale_[row];
+  return law;
 }
 
-double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y,
-                                const Eigen::VectorXd* loads) const {
+ConeProblem::Bounds ConeProblem::bounds_of(const Block& block) const {
+  const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
+  Bounds bounds;
+  if (contact.has_friction) bounds.friction = block.slides ? contact.dynamic_friction : contact.static_friction;
+  if (contact.has_turning) {
+    bounds.turning = contact.has_friction ? 3 : 1;
+    const std::uint32_t r = other_[block.first];
+    const double lever = scale_[r + bounds.turning] / scale_[r];
+    bounds.spinning = contact.spinning_friction * lever, bounds.rolling = contact.rolling_friction * lever;
+  }
+  return bounds;
+}
+
+// Into what a contact's law allows at all: pushing, within the cones of that push.
+void ConeProblem::confine(const Block& block, double* multipliers) const {
+  const Bounds bounds = bounds_of(block);
+  const double pressed = multipliers[0] = std::max(0.0, multipliers[0]);
+  if (bounds.turning != 1 && block.count > 1) into_disc(bounds.friction * pressed, multipliers + 1);
+  if (bounds.turning > 0) confine_turning(bounds, pressed, multipliers + bounds.turning);
+}
+
+void ConeProblem::confine_turning(const Bounds& bounds, double pressed, double* multipliers) {
+  multipliers[0] = std::clamp(multipliers[0], -bounds.spinning * pressed, bounds.spinning * pressed);
+  into_disc(bounds.rolling * pressed, multipliers + 1);
+}
+
+void ConeProblem::project(const Block& block, const double* lambda, const double* y, double* projected) const {
+  const std::uint32_t r = other_[block.first];
+  if (block.contact < 0) {
+    projected[0] = relaxed_multiplier(scaled_law(r), lambda[0], y[0], 1.0);
+    return;
+  }
+  for (std::uint32_t k = 0; k < block.count; ++k) projected[k] = lambda[k] - y[k];
+  projected[0] += contacts[static_cast<std::size_t>(block.contact)].target / scale_[r];
+  confine(block, projected);
+}
+
+double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const {
   double worst = 0.0;
   for (const Block& block : blocks_) {
     double projected[6];
-    project(block, &lambda[block.first], &y[block.first], loads != nullptr ? &(*loads)[block.first] : nullptr,
-            projected);
+    project(block, &lambda[block.first], &y[block.first], projected);
     for (std::uint32_t k = 0; k < block.count; ++k) {
       const std::uint32_t r = other_[block.first + k];
       worst = std::max(worst, std::fabs(lambda[block.first + k] - projected[k]) * scale_[r] * rows[r].length);
@@ -77,17 +85,19 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
 
 // matrix d = side, d the change of lambda: every row that is held by its law as y + W' d = target, every other as where
 // its law puts it.
-void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, const Eigen::VectorXd* loads,
-                            Eigen::MatrixXd* matrix, Eigen::VectorXd* side) const {
+void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) {
+  const Eigen::Index count = lambda.size();
+  matrix_.resize(count, count);
+  side_of_step_.resize(count);
   const auto hold = [&](Eigen::Index i, double missing) {
-    matrix->row(i) = response_.row(i);
-    (*matrix)(i, i) += kProximal;
-    (*side)[i] = missing;
+    matrix_.row(i) = response_.row(i);
+    matrix_(i, i) += kProximal;
+    side_of_step_[i] = missing;
   };
   const auto put = [&](Eigen::Index i, double place) {
-    matrix->row(i).setZero();
-    (*matrix)(i, i) = 1.0;
-    (*side)[i] = place - lambda[i];
+    matrix_.row(i).setZero();
+    matrix_(i, i) = 1.0;
+    side_of_step_[i] = place - lambda[i];
   };
   // two rows that slide along z against a radius mu lambda_N:
   //   (1 - K) d + K W' d - mu dir d_N = mu lambda_N dir - lambda,  K = radius/|z| (1 - dir dir^T)
@@ -98,16 +108,15 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     const double share = std::min(1.0, radius / length);
     const Eigen::Matrix2d across = share * (Eigen::Matrix2d::Identity() - direction * direction.transpose());
     for (int a = 0; a < 2; ++a) {
-      matrix->row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
-      for (int b = 0; b < 2; ++b) (*matrix)(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - kProximal);
-      if (loads == nullptr) (*matrix)(i + a, normal) -= mu * direction[a];
-      (*side)[i + a] = mu * (loads == nullptr ? lambda[normal] : (*loads)[normal]) * direction[a] - lambda[i + a];
+      matrix_.row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
+      for (int b = 0; b < 2; ++b) matrix_(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - kProximal);
+      matrix_(i + a, normal) -= mu * direction[a];
+      side_of_step_[i + a] = mu * lambda[normal] * direction[a] - lambda[i + a];
     }
   };
   const auto disc = [&](Eigen::Index i, Eigen::Index normal, double mu, double normal_after) {
     const double radius = mu * normal_after;
-    const double length = length_of(lambda[i] - y[i], lambda[i + 1] - y[i + 1]);
-    if (length <= radius) {
+    if (length_of(lambda[i] - y[i], lambda[i + 1] - y[i + 1]) <= radius) {
       for (int a = 0; a < 2; ++a) hold(i + a, -y[i + a]);
     } else {
       slide(i, normal, mu, radius);
@@ -116,130 +125,132 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
 
   for (const Block& block : blocks_) {
     const auto i = static_cast<Eigen::Index>(block.first);
-    const std::uint32_t r = other_[block.first];
     double projected[6];
-    project(block, &lambda[i], &y[i], loads != nullptr ? &(*loads)[i] : nullptr, projected);
+    project(block, &lambda[i], &y[i], projected);
     if (block.contact < 0) {
-      const JointLaw& law = rows[r].law;
-      const double bound = law.bound * scale_[r];
-      const bool is_held = projected[0] != 0.0 && std::fabs(projected[0]) < bound;
-      if (is_held || (law.is_equality() && std::fabs(projected[0]) < bound)) {
+      const JointLaw law = scaled_law(other_[block.first]);
+      const bool is_within = std::fabs(projected[0]) < law.bound;
+      if (is_within && (projected[0] != 0.0 || law.is_equality())) {
         hold(i, projected[0] - lambda[i]);
       } else {
         put(i, projected[0]);
       }
       continue;
     }
-    const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
-    if (!(projected[0] > 0.0) && loads == nullptr) {
+    const double pressed = projected[0];
+    if (!(pressed > 0.0)) {
       for (std::uint32_t k = 0; k < block.count; ++k) put(i + k, 0.0);
       continue;
     }
-    if (projected[0] > 0.0) {
-      hold(i, projected[0] - lambda[i]);
+    hold(i, pressed - lambda[i]);
+    const Bounds bounds = bounds_of(block);
+    if (bounds.turning != 1 && block.count > 1) disc(i + 1, i, bounds.friction, pressed);
+    if (bounds.turning == 0) continue;
+    const Eigen::Index k = i + bounds.turning;
+    const double wanted = lambda[k] - y[k];
+    if (std::fabs(wanted) <= bounds.spinning * pressed) {
+      hold(k, -y[k]);
     } else {
-      put(i, 0.0);
+      const double bound = std::copysign(bounds.spinning, wanted);
+      put(k, bound * lambda[i]);
+      matrix_(k, i) -= bound;
     }
-    const double pressed = loads != nullptr ? (*loads)[i] : projected[0];
-    Eigen::Index k = 1;
-    if (contact.has_friction) {
-      disc(i + 1, i, block.slides ? contact.dynamic_friction : contact.static_friction, pressed);
-      k = 3;
-    }
-    if (!contact.has_turning) continue;
-    const double lever = scale_[r + static_cast<std::uint32_t>(k)] / scale_[r];
-    const double spin = contact.spinning_friction * lever;
-    const double wanted = lambda[i + k] - y[i + k];
-    if (std::fabs(wanted) <= spin * pressed) {
-      hold(i + k, -y[i + k]);
-    } else {
-      const double bound = std::copysign(spin, wanted);
-      put(i + k, bound * (loads == nullptr ? lambda[i] : pressed));
-      if (loads == nullptr) (*matrix)(i + k, i) -= bound;
-    }
-    disc(i + k + 1, i, contact.rolling_friction * lever, pressed);
+    disc(k + 1, i, bounds.rolling, pressed);
   }
 }
 
 // False, with nothing done, if the step is not finite.
-bool ConeProblem::newton_step(const Eigen::VectorXd* loads, Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
+bool ConeProblem::newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
   const Eigen::Index count = lambda->size();
-  Eigen::MatrixXd matrix(count, count);
-  Eigen::VectorXd side(count);
-  linearise(*lambda, *y, loads, &matrix, &side);
+  linearise(*lambda, *y);
   // rows that stand by themselves go to the right
-  std::vector<Eigen::Index> coupled;
-  Eigen::VectorXd step = Eigen::VectorXd::Zero(count);
+  coupled_.clear();
+  step_.setZero(count);
   for (Eigen::Index i = 0; i < count; ++i) {
-    bool is_alone = matrix(i, i) == 1.0;
-    for (Eigen::Index j = 0; is_alone && j < count; ++j) is_alone = j == i || matrix(i, j) == 0.0;
+    bool is_alone = matrix_(i, i) == 1.0;
+    for (Eigen::Index j = 0; is_alone && j < count; ++j) is_alone = j == i || matrix_(i, j) == 0.0;
     if (is_alone) {
-      step[i] = side[i];
+      step_[i] = side_of_step_[i];
     } else {
-      coupled.push_back(i);
+      coupled_.push_back(i);
     }
   }
-  const auto size = static_cast<Eigen::Index>(coupled.size());
-  Eigen::MatrixXd core(size, size);
-  Eigen::VectorXd rest(size);
+  const auto size = static_cast<Eigen::Index>(coupled_.size());
+  core_.resize(size, size);
+  rest_.resize(size);
   for (Eigen::Index a = 0; a < size; ++a) {
-    const Eigen::Index i = coupled[static_cast<std::size_t>(a)];
-    rest[a] = side[i] - matrix.row(i).dot(step);
-    for (Eigen::Index b = 0; b < size; ++b) core(a, b) = matrix(i, coupled[static_cast<std::size_t>(b)]);
+    const Eigen::Index i = coupled_[static_cast<std::size_t>(a)];
+    rest_[a] = side_of_step_[i] - matrix_.row(i).dot(step_);
+    for (Eigen::Index b = 0; b < size; ++b) core_(a, b) = matrix_(i, coupled_[static_cast<std::size_t>(b)]);
   }
-  if (size > 0) rest = core.partialPivLu().solve(rest);
-  if (!rest.allFinite() || !step.allFinite()) return false;
-  for (Eigen::Index a = 0; a < size; ++a) step[coupled[static_cast<std::size_t>(a)]] = rest[a];
-  *lambda += step;
+  if (size > 0) rest_ = lu_.compute(core_).solve(rest_).eval();
+  if (!rest_.allFinite() || !step_.allFinite()) return false;
+  for (Eigen::Index a = 0; a < size; ++a) step_[coupled_[static_cast<std::size_t>(a)]] = rest_[a];
+  *lambda += step_;
   *y = start_others_ + response_ * *lambda;
   return true;
 }
 
+// The laws as the path knows them.
+ConePath ConeProblem::path() const {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  ConePath path(response_, start_others_);
+  for (const Block& block : blocks_) {
+    const auto i = static_cast<Eigen::Index>(block.first);
+    const std::uint32_t r = other_[block.first];
+    if (block.contact < 0) {
+      const JointLaw law = scaled_law(r);
+      path.add_scalar(i, law.has_lower ? law.lower_target : -kInfinity, law.has_upper ? law.upper_target : kInfinity,
+                      law.bound);
+      continue;
+    }
+    path.add_normal(i, contacts[static_cast<std::size_t>(block.contact)].target / scale_[r]);
+    const Bounds bounds = bounds_of(block);
+    if (bounds.turning != 1 && block.count > 1) path.add_disc(i + 1, 2, i, bounds.friction);
+    if (bounds.turning == 0) continue;
+    path.add_disc(i + bounds.turning, 1, i, bounds.spinning);
+    path.add_disc(i + bounds.turning + 1, 2, i, bounds.rolling);
+  }
+  return path;
+}
+
 // The law of a block alone, with all others as they are.
 void ConeProblem::relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const {
+  if (!(own(0, 0) > 0.0)) return;
+  const std::uint32_t r = other_[block.first];
   if (block.contact < 0) {
-    const JointLaw& law = rows[other_[block.first]].law;
-    const double scale = scale_[other_[block.first]];
-    JointLaw scaled = law;
-    scaled.lower_target /= scale, scaled.upper_target /= scale, scaled.bound *= scale;
-    if (own(0, 0) > 0.0) lambda[0] = relaxed_multiplier(scaled, lambda[0], y[0], own(0, 0));
+    lambda[0] = relaxed_multiplier(scaled_law(r), lambda[0], y[0], own(0, 0));
     return;
   }
-  const std::uint32_t r = other_[block.first];
-  const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
-  const double target = contact.target / scale_[r];
-  if (!(own(0, 0) > 0.0)) return;
-  std::uint32_t k = 1;
-  if (contact.has_friction) {
-    const double mu = block.slides ? contact.dynamic_friction : contact.static_friction;
+  const double target = contacts[static_cast<std::size_t>(block.contact)].target / scale_[r];
+  const Bounds bounds = bounds_of(block);
+  if (bounds.turning != 1 && block.count > 1) {
     const Matrix3 response = 0.5 * (own.topLeftCorner<3, 3>() + own.topLeftCorner<3, 3>().transpose());
     const Vector3 now(lambda[0], lambda[1], lambda[2]);
     const Vector3 alone = Vector3(y[0], y[1], y[2]) - response * now;
     Vector3 next = now;
     const double size = response.trace();
     const bool has_inverse = response.determinant() > 1e-12 * size * size * size;
-    if (!has_inverse || !solve_coulomb_contact(response, response.inverse(), alone, target, mu, &next)) {
+    if (!has_inverse || !solve_coulomb_contact(response, response.inverse(), alone, target, bounds.friction, &next)) {
       next.x() = std::max(0.0, now.x() + (target - y[0]) / response(0, 0));
       const Vector3 moved = Vector3(y[0], y[1], y[2]) + response.col(0) * (next.x() - now.x());
       const double stiffest = response.bottomRightCorner<2, 2>().trace();
       if (stiffest > 0.0) next.tail<2>() -= moved.tail<2>() / stiffest;
-      into_disc(mu * next.x(), &next.y());
+      into_disc(bounds.friction * next.x(), &next.y());
     }
     for (int i = 0; i < 3; ++i) lambda[i] = next[i];
-    k = 3;
   } else {
     lambda[0] = std::max(0.0, lambda[0] + (target - y[0]) / own(0, 0));
   }
-  if (!contact.has_turning) return;
-  const double lever = scale_[r + k] / scale_[r];
-  const double spin = contact.spinning_friction * lever * lambda[0];
-  if (own(k, k) > 0.0) lambda[k] = std::clamp(lambda[k] - y[k] / own(k, k), -spin, spin);
+  if (bounds.turning == 0) return;
+  const std::uint32_t k = bounds.turning;
+  if (own(k, k) > 0.0) lambda[k] -= y[k] / own(k, k);
   const double stiffest = own(k + 1, k + 1) + own(k + 2, k + 2);
   if (stiffest > 0.0) {
     lambda[k + 1] -= y[k + 1] / stiffest;
     lambda[k + 2] -= y[k + 2] / stiffest;
   }
-  into_disc(contact.rolling_friction * lever * lambda[0], lambda + k + 1);
+  confine_turning(bounds, lambda[0], lambda + k);
 }
 
 void ConeProblem::sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
@@ -271,26 +282,14 @@ bool ConeProblem::let_slide(const Eigen::VectorXd& lambda, const Eigen::VectorXd
 void ConeProblem::into_cones(Eigen::VectorXd* lambda) const {
   for (const Block& block : blocks_) {
     double* at = &(*lambda)[block.first];
-    const std::uint32_t r = other_[block.first];
-    if (block.contact < 0) {
-      const JointLaw& law = rows[r].law;
-      if (!law.has_lower) at[0] = std::min(at[0], 0.0);
-      if (!law.has_upper) at[0] = std::max(at[0], 0.0);
-      at[0] = std::clamp(at[0], -law.bound * scale_[r], law.bound * scale_[r]);
+    if (block.contact >= 0) {
+      confine(block, at);
       continue;
     }
-    const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
-    at[0] = std::max(0.0, at[0]);
-    std::uint32_t k = 1;
-    if (contact.has_friction) {
-      into_disc((block.slides ? contact.dynamic_friction : contact.static_friction) * at[0], at + 1);
-      k = 3;
-    }
-    if (!contact.has_turning) continue;
-    const double lever = scale_[r + k] / scale_[r];
-    const double spin = contact.spinning_friction * lever * at[0];
-    at[k] = std::clamp(at[k], -spin, spin);
-    into_disc(contact.rolling_friction * lever * at[0], at + k + 1);
+    const JointLaw law = scaled_law(other_[block.first]);
+    if (!law.has_lower) at[0] = std::min(at[0], 0.0);
+    if (!law.has_upper) at[0] = std::max(at[0], 0.0);
+    at[0] = std::clamp(at[0], -law.bound, law.bound);
   }
 }
 

@@ -20,4 +20,7 @@ struct ContactLaw {
 ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
                        const SolverBody& two);
 
+// e s of a contact whose impulse did work on its bodies: a half, a quarter, then zero. `times` counts.
+inline double lowered_target(double target, std::uint32_t* times) { return ++*times < 3 ? 0.5 * target : 0.0; }
+
 }  // namespace gravitas

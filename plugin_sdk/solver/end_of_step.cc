@@ -5,13 +5,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <span>
-#include <string>
 
 #include "plugin_sdk/math/rotation.h"
-#include "plugin_sdk/solver.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/islands.h"
+#include "plugin_sdk/solver/reply.h"
 #include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
@@ -19,15 +17,10 @@ namespace {
 
 constexpr double kRounding = std::numeric_limits<double>::epsilon();
 
-DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
-  return {r.point1(), r.point2(), r.velocity(),   r.correction(), r.axes(),         r.mode(),
-          r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
-}
-
 class IslandSolver {
  public:
   IslandSolver(const stage::SolverSolveRequest& request, const SolverBodies& all, const Island& island,
-               const EndOfStepSettings& settings, EndOfStep* answer)
+               const ConeSettings& settings, SolverSolution* answer)
       : request_(request), island_(island), settings_(settings), answer_(*answer) {
     // its own bodies, and those that it is held by
     rows_ = island.bodies;
@@ -104,9 +97,7 @@ class IslandSolver {
     for (int k = 0; k < 3; ++k) {
       const auto place = static_cast<std::size_t>(k);
       joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
-      if (d.is_radial() && k == 0) joint.states[0].error_at_start = start_error.norm();
-      joint.pose_laws[place] =
-          pose_law(joint.states[place], settings_.correction_factor * d.correction, request_.time_step());
+      joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
       const auto at = 3 * row + static_cast<std::uint32_t>(k);
       answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at];
       answer_.joint_impulse[at] = request_.discrepancy_warm_impulse()[at];
@@ -124,9 +115,7 @@ class IslandSolver {
     contact.gap_row = ConstraintDirection::through(point, normal, one, two);
     contact.gap = -request_.contact_depth()[row];
     const Vector3 to_surface = (-0.5 * contact.gap) * normal;
-    const double gap_at_start = normal.dot(carried(point - to_surface, two.trial, two.start) -
-                                           carried(point + to_surface, one.trial, one.start));
-    contact.gap_target = std::min(0.0, (1.0 - settings_.correction_factor) * gap_at_start) - contact.gap;
+    contact.gap_target = 0.0 - contact.gap;
     contact.slop = closing_slop(point, one, two);
     contact.law = contact_law(request_, row, one, two);
     contact.arm1 = point + to_surface - one.trial.position;
@@ -235,7 +224,7 @@ class IslandSolver {
       build_pose();
       const double representable = 0.25 * kRounding * coordinates_;
       const BodyMotion x0 = start_of_step();
-      const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_.cone);
+      const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_);
       note(solved);
       has_pose_ = solved.has_converged;
       BodyMotion next = x0;
@@ -312,7 +301,7 @@ class IslandSolver {
     for (int round = 0;; ++round) {
       build_velocity();
       const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
-      const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_.cone);
+      const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_);
       note(solved);
       has_velocity_ = solved.has_converged;
       summary_.residual = solved.residual;
@@ -396,30 +385,30 @@ class IslandSolver {
     const bool arrives = std::any_of(contacts_.begin(), contacts_.end(),
                                      [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; });
     if (!arrives || round >= kRoundsOfLowering) return false;
-    const auto work_of = [&](std::size_t r, double* size) {
+    const auto add_work_of = [&](std::size_t r, Gain* gain) {
       const ConeRow& row = cone_.rows[r];
       const double start = row.direction.along(before[row.body1], before[row.body2]);
       const double end = row.direction.along(velocity_[row.body1], velocity_[row.body2]);
-      *size += 0.5 * std::fabs(row.multiplier) * (std::fabs(start) + std::fabs(end));
-      return 0.5 * row.multiplier * (start + end);
+      gain->add(0.5 * row.multiplier * (start + end),
+                0.5 * std::fabs(row.multiplier) * (std::fabs(start) + std::fabs(end)));
     };
-    double work = 0.0, size = 0.0;
+    Gain all;
     const std::size_t scalars = cone_.contacts.front().first;
     for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
       // a drive's or spring's work is real
       if (r < scalars && (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0)) continue;
-      work += work_of(r, &size);
+      add_work_of(r, &all);
     }
-    if (!(work > 1e-13 * size)) return false;
+    if (!all.is_real()) return false;
     bool any = false;
     std::size_t cone = 0;
     for (EndContact& contact : contacts_) {
       if (!contact.is_closed) continue;
       const ConeContact& rows = cone_.contacts[cone++];
-      double own = 0.0, own_size = 0.0;
-      for (std::uint32_t k = 0; k < rows.count(); ++k) own += work_of(rows.first + k, &own_size);
-      if (!(contact.law.target > 0.0) || !(own > 1e-10 * own_size)) continue;
-      contact.law.target = ++contact.lowered < 3 ? 0.5 * contact.law.target : 0.0;
+      Gain own;
+      for (std::uint32_t k = 0; k < rows.count(); ++k) add_work_of(rows.first + k, &own);
+      if (!(contact.law.target > 0.0) || !own.is_to_blame()) continue;
+      contact.law.target = lowered_target(contact.law.target, &contact.lowered);
       any = true;
     }
     // no one contact is to blame, or lowering was not enough
@@ -430,7 +419,7 @@ class IslandSolver {
 
   // ---- rows on velocity alone
 
-  // offset_ from the present impulses; false if it stays the same to rounding.
+  // offset_ from the present impulses; false if it stays the same as far as they are known.
   bool set_offset(double share) {
     BodyMotion next = start_motion(nullptr);
     const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
@@ -446,7 +435,8 @@ class IslandSolver {
     const double change = largest_change(next, offset_);
     const double size = std::max(largest(next), largest(displacement_));
     offset_ = std::move(next);
-    return change > std::max(0.25 * kRounding * coordinates_, 1e-14 * size);
+    // velocities are known to their residual
+    return change > std::max({kRounding * coordinates_, 1e-14 * size, 4.0 * share * summary_.residual});
   }
 
   // ---- sizes, m
@@ -479,8 +469,8 @@ class IslandSolver {
 
   const stage::SolverSolveRequest& request_;
   const Island& island_;
-  const EndOfStepSettings& settings_;
-  EndOfStep& answer_;
+  const ConeSettings& settings_;
+  SolverSolution& answer_;
 
   SolverBodies bodies_;                // the island's
   std::vector<std::uint32_t> rows_;    // of the request, of each; rising, the world last
@@ -495,50 +485,14 @@ class IslandSolver {
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
 };
 
-void write(const EndOfStep& answer, const ConeSummary& summary, bool has_rows, const stage::SolverSolveReply& reply) {
-  const std::size_t count = answer.velocity.size() - 1;
-  const std::span<double> linear = reply.linear_velocity().resize(3 * count);
-  const std::span<double> angular = reply.angular_velocity().resize(3 * count);
-  const std::span<double> change = reply.pose_change().resize(6 * count);
-  const bool has_room = linear.size() + angular.size() + change.size() == 12 * count;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const Twist &v = answer.velocity[i], &d = answer.displacement[i];
-    if (!std::isfinite(v.linear.sum() + v.angular.sum() + d.linear.sum() + d.angular.sum()))
-      throw Refusal("the answer for body " + std::to_string(i) +
-                    " is not finite: masses, velocities or errors overflow");
-    if (!has_room) continue;
-    set_vector(linear, i, v.linear);
-    set_vector(angular, i, v.angular);
-    set_vector(change, 2 * i, d.linear);
-    set_vector(change, 2 * i + 1, d.angular);
-  }
-  const auto put = [](const stage::ReplyColumn<double>& column, const std::vector<double>& values) {
-    for (const double value : values)
-      if (!std::isfinite(value)) throw Refusal("a multiplier is not finite: masses, velocities or errors overflow");
-    const std::span<double> room = column.resize(values.size());
-    if (!room.empty()) std::copy(values.begin(), values.end(), room.begin());
-  };
-  put(reply.discrepancy_impulse(), answer.joint_impulse);
-  put(reply.discrepancy_correction(), answer.joint_correction);
-  put(reply.contact_impulse(), answer.contact_impulse);
-  put(reply.contact_correction(), answer.contact_correction);
-  put(reply.contact_direction(), answer.contact_direction);
-  StopReason reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
-  if (summary.contradiction > 0.0) reason = StopReason::kContradiction;
-  if (!summary.has_converged) reason = StopReason::kIterations;
-  reply.iterations().set(summary.iterations);
-  reply.residual().set(std::isfinite(summary.residual) ? summary.residual : kUnlimited);
-  reply.stop_reason().set(static_cast<std::uint32_t>(reason));
-}
-
 }  // namespace
 
-void solve_end_of_step(const stage::SolverSolveRequest& request, const EndOfStepSettings& settings,
+void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSettings& settings,
                        const stage::SolverSolveReply& reply, Host& host) {
   check_solver_request(request);
   SolverBodies bodies;
   bodies.load(request);
-  EndOfStep answer;
+  SolverSolution answer;
   answer.velocity.resize(bodies.count() + 1);
   answer.displacement.resize(bodies.count() + 1);
   for (std::uint32_t i = 0; i < bodies.count(); ++i) answer.velocity[i] = bodies[i].trial_velocity;
@@ -556,14 +510,18 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const EndOfStep
       host.mark_progress();
     }
   });
-  ConeSummary all;
+  SolverOutcome outcome;
+  bool has_converged = true, contradicts = false;
   for (const ConeSummary& one : summaries) {
-    all.iterations += one.iterations;
-    all.residual = std::max(all.residual, one.residual);
-    all.has_converged = all.has_converged && one.has_converged;
-    all.contradiction = std::max(all.contradiction, one.contradiction);
+    outcome.iterations += one.iterations;
+    outcome.residual = std::max(outcome.residual, one.residual);
+    has_converged = has_converged && one.has_converged;
+    contradicts = contradicts || one.contradiction > 0.0;
   }
-  write(answer, all, !islands.empty(), reply);
+  if (!islands.empty()) outcome.stop_reason = StopReason::kConverged;
+  if (contradicts) outcome.stop_reason = StopReason::kContradiction;
+  if (!has_converged) outcome.stop_reason = StopReason::kIterations;
+  write(answer, outcome, reply);
 }
 
 }  // namespace gravitas

@@ -8,12 +8,15 @@
 //     until    delta no longer changes by what lambda_v (friction, drives, springs) adds to it
 //
 // J, arms and world inertia are those at the end of the step, so that what holds is held where the body will be: a chain
-// under 1000 times its mass, linearised at S*, flies apart at 1/60 s. Joints. The pose change is found by Newton's method
-// on the errors themselves: points are carried as rigid bodies, axes turn with body 1, a radial axis with its points;
-// angular errors are carried to first order in delta's turn. Rows push both bodies at body 2's point, midway to body 1's
-// along what is held, which is one place at the end. Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points
-// is not known; a velocity row's arms end at each body's own surface point, which is where the two meet when the gap is
-// closed (a ball that sank by d rolls on its radius, not on a radius less d/2).
+// under 1000 times its mass, linearised at S*, flies apart at 1/60 s.
+//
+// Joints. The pose change is found by Newton's method on the errors themselves: points are carried as rigid bodies, axes
+// turn with body 1, a radial axis with its points; angular errors are carried to first order in delta's turn. Rows push
+// both bodies at body 2's point, midway to body 1's along what is held, which is one place at the end.
+//
+// Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points is not known; a
+// velocity row's arms end at each body's own surface point, which is where the two meet when the gap is closed (a ball that
+// sank by d rolls on its radius, not on a radius less d/2).
 //
 // Laws: joint_laws.h, contact_law.h; solution of the rows: cone_problem.h. Energy. Restitution with friction in coupled
 // impacts can create energy (Kane's paradox): where an island gains, e s of the contacts that arrive and do positive work
@@ -28,15 +31,10 @@
 
 namespace gravitas {
 
-struct EndOfStepSettings {
-  ConeSettings cone;
-  double correction_factor = 1.0;  // share of an old error that a step removes
-};
-
 // Answers the request. Throws Refusal for an impossible one (request_check.h), and where the answer is not finite because
 // the numbers overflow. Islands are solved on the host's threads, each to places of its own. `iterations` of the reply is
-// the sum over islands of Newton steps (sweeps), `residual` the largest of the last velocity solutions' (m/s).
-void solve_end_of_step(const stage::SolverSolveRequest& request, const EndOfStepSettings& settings,
+// the sum over islands of steps (sweeps), `residual` the largest of the last velocity solutions' (m/s).
+void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSettings& settings,
                        const stage::SolverSolveReply& reply, Host& host);
 
 }  // namespace gravitas

@@ -1,6 +1,7 @@
 #include "plugin_sdk/solver/end_of_step_rows.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -38,7 +39,12 @@ ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, c
 Matrix3 stiffened_inverse(const Quaternion& orientation, const Vector3& inverse_moments, const Matrix3& stiffness) {
   const Matrix3 rotation = to_rotation_matrix(orientation);
   const Matrix3 root = rotation * inverse_moments.cwiseSqrt().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix3> modes(root.transpose() * stiffness * root);
+  const Matrix3 added = root.transpose() * stiffness * root;
+  // nothing to limit where added + 1/2 is positive definite
+  const Matrix3 least = added + 0.5 * Matrix3::Identity();
+  if (least(0, 0) > 0.0 && least.topLeftCorner<2, 2>().determinant() > 0.0 && least.determinant() > 0.0)
+    return root * Matrix3(added + Matrix3::Identity()).inverse() * root.transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix3> modes(added);
   if (modes.info() != Eigen::Success) return world_inverse_inertia(orientation, inverse_moments);
   const Vector3 share = (1.0 + modes.eigenvalues().array().max(-0.5)).inverse();
   const Matrix3 base = root * modes.eigenvectors();

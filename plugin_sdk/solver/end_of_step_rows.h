@@ -19,13 +19,6 @@ struct EndBody {
   Matrix3 stiffened;  // inverse of inertia and geometric stiffness, for a step of the pose change
 };
 
-// What is written: every island to the rows of its own bodies, discrepancies and contacts.
-struct EndOfStep {
-  BodyMotion velocity, displacement;
-  std::vector<double> joint_impulse, joint_correction;
-  std::vector<double> contact_impulse, contact_correction, contact_direction;
-};
-
 // A joint's discrepancy and its laws.
 struct EndJoint {
   std::uint32_t row = 0, body1 = 0, body2 = 0;

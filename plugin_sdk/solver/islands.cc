@@ -5,29 +5,21 @@
 #include <span>
 
 namespace gravitas {
-namespace {
+BodyUnion::BodyUnion(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
 
-class Union {
- public:
-  explicit Union(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
-  std::uint32_t root(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a), b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
+std::uint32_t BodyUnion::root(std::uint32_t body) {
+  while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
+  return body;
+}
 
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-}  // namespace
+void BodyUnion::join(std::uint32_t body1, std::uint32_t body2) {
+  const std::uint32_t root1 = root(body1), root2 = root(body2);
+  parent_[std::max(root1, root2)] = std::min(root1, root2);
+}
 
 std::vector<Island> find_islands(const stage::SolverSolveRequest& request, const SolverBodies& bodies) {
   const std::size_t count = bodies.count();
-  Union joined(count + 1);
+  BodyUnion joined(count + 1);
   std::vector<std::uint8_t> is_held(count + 1, 0);
   const auto connect = [&](std::span<const std::uint32_t> pairs) {
     for (std::size_t i = 0; i < pairs.size(); i += 2) {

@@ -3,6 +3,7 @@
 // where it was; what is meant is the transitive closure.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,14 +11,25 @@
 
 namespace gravitas {
 
+// Sets of numbered bodies, by the smallest number in each: the same whatever the order of join().
+class BodyUnion {
+ public:
+  explicit BodyUnion(std::size_t count);
+  std::uint32_t root(std::uint32_t body);
+  void join(std::uint32_t body1, std::uint32_t body2);
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
 struct Island {
   std::vector<std::uint32_t> bodies;         // rows, rising
   std::vector<std::uint32_t> discrepancies;  // rows of the request, rising
   std::vector<std::uint32_t> contacts;
 };
 
-// In the order of their first bodies; bodies without joint or contact are in none, nor are rows that push no body. Union
-// by smaller number with path halving: the same islands in whatever order rows come.
+// In the order of their first bodies; bodies without joint or contact are in none, nor are rows that push no body.
+// The same islands in whatever order rows come.
 std::vector<Island> find_islands(const stage::SolverSolveRequest& request, const SolverBodies& bodies);
 
 }  // namespace gravitas

@@ -69,7 +69,9 @@ JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const 
   a.damping = discrepancy.damping[axis];
   a.maximum_force = discrepancy.maximum_force[axis];
   a.desired_velocity = direction.dot(discrepancy.velocity);
-  a.error_at_start = direction.dot(start_error);
+  // a radial axis points from x1 to x2 at either time
+  const bool is_radial = discrepancy.is_radial() && axis == 0;
+  a.error_at_start = is_radial ? start_error.norm() : direction.dot(start_error);
   a.error_at_trial = direction.dot(discrepancy.point2 - discrepancy.point1);
   return a;
 }

@@ -1,5 +1,4 @@
-// What one axis of a discrepancy asks of a relaxation: the right-hand side of its row, for the pose
-// change and for the velocity.
+// What one axis of a discrepancy asks of a solver: the right-hand side of its row, for the pose change and for the velocity.
 //
 // Every law is one form, with J x the displacement or velocity along the axis, lambda the
 // multiplier and y = J x + gamma lambda:

@@ -7,7 +7,7 @@
 namespace gravitas {
 
 struct EndOfStepSolver {
-  EndOfStepSettings settings;
+  ConeSettings settings;
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply) const {
     gravitas_host plain{};
@@ -23,14 +23,14 @@ struct EndOfStepSolver {
 
 inline EndOfStepSolver newton(double tolerance = 1e-12) {
   EndOfStepSolver solver;
-  solver.settings.cone.tolerance = tolerance;
+  solver.settings.tolerance = tolerance;
   return solver;
 }
 
 inline EndOfStepSolver direct(std::uint32_t sweeps = 1000) {
   EndOfStepSolver solver;
-  solver.settings.cone.method = ConeMethod::kGaussSeidel;
-  solver.settings.cone.iterations = sweeps;
+  solver.settings.method = ConeMethod::kGaussSeidel;
+  solver.settings.iterations = sweeps;
   return solver;
 }
 

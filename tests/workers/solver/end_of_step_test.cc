@@ -1,6 +1,7 @@
 // Newton and Direct: laws over random problems, and problems that are degenerate.
 #include "plugin_sdk/solver/end_of_step.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -105,24 +106,21 @@ TEST(EndOfStep, ContactResidualIsBelow1em10) {
     worst = std::max(worst, residual);
     most = std::max(most, answer.iterations[0]);
   }
-  RecordProperty("worst_residual", std::to_string(worst));
+  RecordProperty("worst_residual", fmt::format("{:.3e}", worst));
   RecordProperty("most_iterations", std::to_string(most));
 }
 
-// Heaps that slide and turn under loads of 1e-3 to 1e4 times their mass. One in ten of the heaviest is not solved; an answer
-// says so, and one that says it has converged has.
+// Heaps that slide and turn under loads of 1e-3 to 1e4 times their mass, all solved. Ill-conditioned: at 1e4 rounding of
+// the loads alone is 1e-12 of the largest.
 TEST(EndOfStep, ContactResidualAtMassRatios) {
-  int converged = 0;
   for (const double heaviest : {1e-3, 1e2, 1e4}) {
-    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 200; ++seed) {
       const Heap heap = random_heap(seed, heaviest);
       const SolverAnswer answer = heap.problem.solve(newton());
-      if (!answer.converged()) continue;
+      EXPECT_TRUE(answer.converged()) << heaviest << ", " << seed;
       EXPECT_LE(contact_residual(heap, answer), 1e-10) << heaviest << ", " << seed;
-      ++converged;
     }
   }
-  EXPECT_GE(converged, 80);
 }
 
 // Coulomb's law may have several solutions: sweeps need not find the one that steps find, but one.

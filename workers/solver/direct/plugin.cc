@@ -30,15 +30,16 @@ class Direct final : public SolverPlugin {
                                   .at_most(100000.0)
                                   .defaults_to({1000.0})
                                   .live()
-                                  .means("Largest number of sweeps of one solution; fewer where it converges.")};
+                                  .means("Largest number of sweeps (Newton: steps) of one solution; fewer where it "
+                                         "converges. Above 900 rows of contacts ten times as many.")};
     return declaration;
   }
 
   explicit Direct(PropertyCursor settings) {
-    settings_.cone.method = settings.choice() == 0 ? ConeMethod::kGaussSeidel : ConeMethod::kNewton;
+    settings_.method = settings.choice() == 0 ? ConeMethod::kGaussSeidel : ConeMethod::kNewton;
     const std::int64_t iterations = settings.integer();
     if (iterations < 1 || iterations > 100000) throw Refusal("Iterations is outside 1 ... 100000");
-    settings_.cone.iterations = static_cast<std::uint32_t>(iterations);
+    settings_.iterations = static_cast<std::uint32_t>(iterations);
   }
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) override {
@@ -46,7 +47,7 @@ class Direct final : public SolverPlugin {
   }
 
  private:
-  EndOfStepSettings settings_;
+  ConeSettings settings_;
 };
 
 }  // namespace

@@ -260,10 +260,10 @@ std::uint32_t ContactImpulses::lower_restitution(const BodyMotion& before, const
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     if (!(row.target > 0.0)) continue;
-    double size = 0.0;
-    const double work = work_of(row, before, after, &size);
-    if (!(work > 1e-10 * size)) continue;
-    row.target = ++row.lowered < 3 ? 0.5 * row.target : 0.0;
+    Gain gain;
+    gain.work = work_of(row, before, after, &gain.size);
+    if (!gain.is_to_blame()) continue;
+    row.target = lowered_target(row.target, &row.lowered);
     ++count;
   }
   return count;

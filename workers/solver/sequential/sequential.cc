@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <span>
-#include <string>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
@@ -29,19 +29,6 @@ void copy(std::span<const double> from, std::vector<double>& to) { to.assign(fro
 void check_range(double violation, double motion) {
   if (!std::isfinite(violation) || !std::isfinite(motion))
     throw Refusal("velocities, errors or arms so large that their products are not finite");
-}
-
-DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
-  return {r.point1(), r.point2(), r.velocity(),   r.correction(), r.axes(),         r.mode(),
-          r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
-}
-
-std::uint32_t root_of(std::vector<std::uint32_t>& group, std::uint32_t body) {
-  while (group[body] != body) {
-    group[body] = group[group[body]];
-    body = group[body];
-  }
-  return body;
 }
 
 }  // namespace
@@ -72,7 +59,9 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   StopReason reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
   if (used_up_) reason = StopReason::kIterations;
   summary_.stop_reason = static_cast<std::uint32_t>(reason);
-  write(reply);
+  pose_joints_.store(solution_.joint_correction);
+  gaps_.store(solution_.contact_correction);
+  write(solution_, {summary_.sweeps, summary_.residual, reason}, reply);
   return summary_;
 }
 
@@ -82,11 +71,11 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   time_step_ = request.time_step();
   coordinates_ = 0.0;
   bodies_.load(request);
-  copy(request.discrepancy_warm_impulse(), joint_impulse_);
-  copy(request.discrepancy_warm_correction(), joint_correction_);
-  copy(request.contact_warm_impulse(), contact_impulse_);
-  copy(request.contact_warm_correction(), contact_correction_);
-  copy(request.contact_normal(), contact_direction_);
+  copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
+  copy(request.discrepancy_warm_correction(), solution_.joint_correction);
+  copy(request.contact_warm_impulse(), solution_.contact_impulse);
+  copy(request.contact_warm_correction(), solution_.contact_correction);
+  copy(request.contact_normal(), solution_.contact_direction);
 
   const DiscrepancyColumns columns = columns_of(request);
   discrepancies_.clear();
@@ -100,8 +89,8 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
-  pose_joints_.build(bodies_, discrepancies_, pose_laws_, joint_correction_);
-  gaps_.build(bodies_, request, settings_.correction_factor, contact_correction_);
+  pose_joints_.build(bodies_, discrepancies_, pose_laws_, solution_.joint_correction);
+  gaps_.build(bodies_, request, settings_.correction_factor, solution_.contact_correction);
   coordinates_ = std::max(coordinates_, gaps_.coordinates());
 
   trial_velocity_.clear();
@@ -113,12 +102,13 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
 
 // ---- pose change
 
-// displacement_ and the multipliers of the pose rows, on top of offset_.
+// solution_.displacement and the multipliers of the pose rows, on top of offset_.
 void SequentialSolver::solve_pose() {
-  displacement_ = offset_;
+  solution_.displacement = offset_;
   const double violation =
-      std::max(pose_joints_.largest_violation(displacement_), gaps_.largest_violation(displacement_));
-  const double motion = std::max(pose_joints_.largest_motion(displacement_), gaps_.largest_motion(displacement_));
+      std::max(pose_joints_.largest_violation(solution_.displacement), gaps_.largest_violation(solution_.displacement));
+  const double motion =
+      std::max(pose_joints_.largest_motion(solution_.displacement), gaps_.largest_motion(solution_.displacement));
   check_range(violation, motion);
   const double representable = 0.25 * kRounding * coordinates_;
   if (violation <= std::max(representable, kRounding * motion)) {
@@ -127,20 +117,20 @@ void SequentialSolver::solve_pose() {
     gaps_.clear_multipliers();
     return;
   }
-  pose_joints_.push_all(bodies_, displacement_);
-  gaps_.push_all(bodies_, displacement_);
+  pose_joints_.push_all(bodies_, solution_.displacement);
+  gaps_.push_all(bodies_, solution_.displacement);
   const double tolerance = std::max(representable, kStillness * std::max(violation, motion));
   bool converged = false;
   for (std::uint32_t i = 0; i < settings_.iterations && !converged; ++i) {
-    const double joints = pose_joints_.sweep(bodies_, displacement_);
-    const double contacts = gaps_.sweep(bodies_, displacement_);
+    const double joints = pose_joints_.sweep(bodies_, solution_.displacement);
+    const double contacts = gaps_.sweep(bodies_, solution_.displacement);
     converged = std::max(joints, contacts) <= tolerance;
     ++summary_.sweeps;
   }
   used_up_ = used_up_ || !converged;
-  displacement_ = offset_;
-  pose_joints_.push_all(bodies_, displacement_);
-  gaps_.push_all(bodies_, displacement_);
+  solution_.displacement = offset_;
+  pose_joints_.push_all(bodies_, solution_.displacement);
+  gaps_.push_all(bodies_, solution_.displacement);
 }
 
 // Adds the contacts and limits that the pose change leaves closed to those that were, and makes the
@@ -148,7 +138,7 @@ void SequentialSolver::solve_pose() {
 bool SequentialSolver::find_closed() {
   bool added = false;
   closed_now_.resize(closed_.size());
-  gaps_.find_closed(displacement_, closed_now_);
+  gaps_.find_closed(solution_.displacement, closed_now_);
   for (std::size_t i = 0; i < closed_.size(); ++i) {
     added = added || closed_now_[i] > closed_[i];
     closed_[i] = std::max(closed_[i], closed_now_[i]);
@@ -156,7 +146,7 @@ bool SequentialSolver::find_closed() {
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double moved = d.directions[axis].along(displacement_[d.body1], displacement_[d.body2]);
+      const double moved = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
       const double error = d.axes[axis].error_at_trial + moved;
       const JointLaw law = velocity_law(d.axes[axis], error, d.slop, time_step_);
       JointLaw& known = velocity_laws_[3 * i + axis];
@@ -174,28 +164,29 @@ bool SequentialSolver::find_closed() {
 // ---- velocity
 
 void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) {
-  velocity_joints_.build(bodies_, discrepancies_, velocity_laws_, joint_impulse_);
-  impulses_.build(bodies_, request, closed_, contact_impulse_);
-  copy(request.contact_normal(), contact_direction_);
+  velocity_joints_.build(bodies_, discrepancies_, velocity_laws_, solution_.joint_impulse);
+  impulses_.build(bodies_, request, closed_, solution_.contact_impulse);
+  copy(request.contact_normal(), solution_.contact_direction);
 }
 
 // Velocities and impulses, with the bound on energy.
 void SequentialSolver::solve_velocity() {
   relax_velocity();
   bound_energy();
-  velocity_joints_.store(joint_impulse_);
-  std::fill(contact_impulse_.begin(), contact_impulse_.end(), 0.0);
-  impulses_.store(contact_impulse_, contact_direction_);
+  velocity_joints_.store(solution_.joint_impulse);
+  std::fill(solution_.contact_impulse.begin(), solution_.contact_impulse.end(), 0.0);
+  impulses_.store(solution_.contact_impulse, solution_.contact_direction);
 }
 
-// velocity_ and the multipliers of the velocity rows.
+// solution_.velocity and the multipliers of the velocity rows.
 void SequentialSolver::relax_velocity() {
   ++summary_.velocity_solutions;
   summary_.residual = 0.0;
-  velocity_ = trial_velocity_;
+  solution_.velocity = trial_velocity_;
   const double violation =
-      std::max(velocity_joints_.largest_violation(velocity_), impulses_.largest_violation(velocity_));
-  const double motion = std::max(velocity_joints_.largest_motion(velocity_), impulses_.largest_motion(velocity_));
+      std::max(velocity_joints_.largest_violation(solution_.velocity), impulses_.largest_violation(solution_.velocity));
+  const double motion =
+      std::max(velocity_joints_.largest_motion(solution_.velocity), impulses_.largest_motion(solution_.velocity));
   check_range(violation, motion);
   if (violation <= kRounding * motion) {
     velocity_joints_.clear_multipliers();
@@ -204,8 +195,8 @@ void SequentialSolver::relax_velocity() {
     return;
   }
   impulses_.let_stick();
-  velocity_joints_.push_all(bodies_, velocity_);
-  impulses_.push_all(bodies_, velocity_);
+  velocity_joints_.push_all(bodies_, solution_.velocity);
+  impulses_.push_all(bodies_, solution_.velocity);
   velocity_converged_ = sweep_velocity(kStillness * std::max(violation, motion));
   used_up_ = used_up_ || !velocity_converged_;
   sum_velocity();
@@ -215,14 +206,14 @@ void SequentialSolver::relax_velocity() {
 bool SequentialSolver::sweep_velocity(double tolerance) {
   const std::uint32_t cap = settings_.iterations;
   for (std::uint32_t done = 1; done <= cap; ++done) {
-    const double joints = velocity_joints_.sweep(bodies_, velocity_);
-    const double contacts = impulses_.sweep(bodies_, velocity_);
+    const double joints = velocity_joints_.sweep(bodies_, solution_.velocity);
+    const double contacts = impulses_.sweep(bodies_, solution_.velocity);
     summary_.residual = std::max(joints, contacts);
     ++summary_.sweeps;
     const bool converged = summary_.residual <= tolerance;
     if (converged || done == cap / 2 || done == cap / 4 * 3) {
       const double slip = kSlipToChange * std::max(summary_.residual, tolerance);
-      if (impulses_.let_slide(velocity_, slip)) continue;
+      if (impulses_.let_slide(solution_.velocity, slip)) continue;
     }
     if (converged) return true;
   }
@@ -245,14 +236,14 @@ void SequentialSolver::bound_energy() {
   const bool bounces = impulses_.has_restitution();
   if (!bounces && velocity_converged_) return;
   for (int round = 0; round < 3; ++round) {
-    const std::uint32_t lowered = impulses_.lower_restitution(trial_velocity_, velocity_);
+    const std::uint32_t lowered = impulses_.lower_restitution(trial_velocity_, solution_.velocity);
     if (lowered == 0) break;
     summary_.restitutions_lowered += lowered;
     relax_velocity();
   }
 
   group_bodies();
-  add_up_gains(velocity_);
+  add_up_gains(solution_.velocity);
   const std::uint32_t dropped = impulses_.drop_restitution(bodies_, group_, gains_);
   summary_.restitutions_dropped += dropped;
   if (dropped > 0) relax_velocity();
@@ -273,7 +264,7 @@ void SequentialSolver::scale_back() {
   add_up_gains(trial_velocity_);
   factor_.clear();
   for (const Gain& gain : gains_) factor_.push_back(gain.work);
-  add_up_gains(velocity_);
+  add_up_gains(solution_.velocity);
   bool any = false;
   for (std::size_t i = 0; i < factor_.size(); ++i) {
     const double along = factor_[i];
@@ -290,65 +281,24 @@ void SequentialSolver::scale_back() {
   sum_velocity();
 }
 
-// velocity_ anew from the multipliers.
+// solution_.velocity anew from the multipliers.
 void SequentialSolver::sum_velocity() {
-  velocity_ = trial_velocity_;
-  velocity_joints_.push_all(bodies_, velocity_);
-  impulses_.push_all(bodies_, velocity_);
+  solution_.velocity = trial_velocity_;
+  velocity_joints_.push_all(bodies_, solution_.velocity);
+  impulses_.push_all(bodies_, solution_.velocity);
 }
 
 // group_[i]: the first of the bodies that joints and contacts connect with body i through bodies
 // that can be pushed.
 void SequentialSolver::group_bodies() {
-  group_.clear();
-  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) group_.push_back(i);
-  const auto connect = [this](std::uint32_t body1, std::uint32_t body2) {
-    if (!bodies_[body1].is_pushed() || !bodies_[body2].is_pushed()) return;
-    const std::uint32_t root1 = root_of(group_, body1);
-    const std::uint32_t root2 = root_of(group_, body2);
-    group_[std::max(root1, root2)] = std::min(root1, root2);
+  BodyUnion joined(bodies_.count() + 1);
+  const auto connect = [&](std::uint32_t body1, std::uint32_t body2) {
+    if (bodies_[body1].is_pushed() && bodies_[body2].is_pushed()) joined.join(body1, body2);
   };
   impulses_.each_pair(connect);
   for (const RelaxationDiscrepancy& d : discrepancies_) connect(d.body1, d.body2);
-  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) group_[i] = root_of(group_, i);
-}
-
-// ---- answer
-
-void SequentialSolver::write(const stage::SolverSolveReply& reply) {
-  const std::size_t count = bodies_.count();
-  const std::span<double> linear = reply.linear_velocity().resize(3 * count);
-  const std::span<double> angular = reply.angular_velocity().resize(3 * count);
-  const std::span<double> change = reply.pose_change().resize(6 * count);
-  const bool has_room = linear.size() + angular.size() + change.size() == 12 * count;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const Twist& v = velocity_[i];
-    const Twist& d = displacement_[i];
-    const double sum = v.linear.sum() + v.angular.sum() + d.linear.sum() + d.angular.sum();
-    if (!std::isfinite(sum))
-      throw Refusal("the answer for body " + std::to_string(i) +
-                    " is not finite: masses, velocities or errors overflow");
-    if (!has_room) continue;
-    set_vector(linear, i, v.linear);
-    set_vector(angular, i, v.angular);
-    set_vector(change, 2 * i, d.linear);
-    set_vector(change, 2 * i + 1, d.angular);
-  }
-
-  pose_joints_.store(joint_correction_);
-  gaps_.store(contact_correction_);
-  const auto put = [](const stage::ReplyColumn<double>& column, const std::vector<double>& values) {
-    const std::span<double> room = column.resize(values.size());
-    if (!room.empty()) std::copy(values.begin(), values.end(), room.begin());
-  };
-  put(reply.discrepancy_impulse(), joint_impulse_);
-  put(reply.discrepancy_correction(), joint_correction_);
-  put(reply.contact_impulse(), contact_impulse_);
-  put(reply.contact_correction(), contact_correction_);
-  put(reply.contact_direction(), contact_direction_);
-  reply.iterations().set(summary_.sweeps);
-  reply.residual().set(summary_.residual);
-  reply.stop_reason().set(summary_.stop_reason);
+  group_.clear();
+  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) group_.push_back(joined.root(i));
 }
 
 }  // namespace gravitas

@@ -58,6 +58,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "plugin_sdk/solver/reply.h"
 #include "workers/solver/sequential/contact_gaps.h"
 #include "workers/solver/sequential/contact_impulses.h"
 #include "workers/solver/sequential/relaxation_joints.h"
@@ -104,7 +105,6 @@ class SequentialSolver {
   void sum_velocity();
   bool acts_on_velocity_alone() const;
   void set_offset(double factor);
-  void write(const stage::SolverSolveReply& reply);
 
   SequentialSettings settings_;
   SequentialSummary summary_;
@@ -120,13 +120,11 @@ class SequentialSolver {
   ContactGaps gaps_;
   ContactImpulses impulses_;
 
-  BodyMotion trial_velocity_, velocity_;  // v*, v_{n+1}
-  BodyMotion offset_;                     // theta h M^-1 J^T lambda of rows on velocity alone
-  BodyMotion displacement_;               // delta
+  SolverSolution solution_;
+  BodyMotion trial_velocity_;  // v*
+  BodyMotion offset_;          // theta h M^-1 J^T lambda of rows on velocity alone
   std::vector<std::uint8_t> closed_, closed_now_;
 
-  std::vector<double> joint_correction_, joint_impulse_;
-  std::vector<double> contact_correction_, contact_impulse_, contact_direction_;
   std::vector<std::uint32_t> group_;
   std::vector<Gain> gains_;
   std::vector<double> factor_;
