@@ -81,6 +81,7 @@ struct BodyDescription {
   double damping = 0.0;               // 1/s
   Pose pose;                          // of the centre of mass, world
   Twist twist;                        // world
+  std::vector<double> motion;         // of a kinematic body: table of MotionCurve, of its geometry; else empty
   std::uint32_t shape = kNone;        // row of `shapes`
   Pose geometry;                      // of the shape's frame in the body's
   LocalBound bound;
@@ -106,8 +107,12 @@ struct ConstraintDescription {
   std::uint32_t plugin = 0;                    // which of the constraint slot's plugins serves the type
 };
 
+// The order of the stages (simulators/).
+enum class Simulator : std::uint32_t { kBasic, kSmooth };
+
 struct EnvironmentDescription {
   std::string id;
+  Simulator simulator = Simulator::kBasic;
   double time_step = 1.0 / 60.0;  // s
   // Number of steps of the whole run and the length of the last one (s), which may be shorter.
   std::uint32_t steps = 600;

@@ -135,17 +135,25 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::string restore(const SavedState& saved);
 
  private:
-  // simulators/basic.cc: the order of the stages.
+  // simulators/: the order of the stages.
   void run_basic();
+  // smooth.cc: derivatives that agree with the joints.
+  bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
+  std::string why_unfit(const PluginDeclaration& plugin) const;
+  void ask_reactions();
 
   // stages.cc: a stage each.
   void begin_step();
   Trusted<TrialState> integrate();
+  // Kinematic bodies with a motion are where it says, whatever an integrator makes of them.
+  void follow_motion(double time, const Column<double>& position, const Column<double>& orientation,
+                     const Column<double>& linear_velocity, const Column<double>& angular_velocity) const;
   void bound_bodies(const Trusted<TrialState>& trial);
   Trusted<Pairs> find_pairs();
   Trusted<Contacts> find_contacts(const Trusted<Pairs>& pairs);
   void look_up_contacts(const Trusted<Contacts>& contacts);
   void constrain(const Trusted<TrialState>& trial);
+  void ask_discrepancies(const std::array<ColumnId, 5>& state_columns);
   void merge_discrepancies();
   Trusted<Solution> solve();
 
@@ -172,7 +180,8 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // forces.cc
   std::span<const ColumnId> trial_columns() const override;
-  ColumnId wrench_column() const override { return data_.wrench.id(); }
+  ColumnId wrench_column() const override { return told_wrench().id(); }
+  const Column<double>& told_wrench() const { return knows_reactions() ? data_.wrench_with_reactions : data_.wrench; }
   void begin_attempt(bool counts) override;
   void evaluate() override;
   void ask_forces(const std::array<ColumnId, 5>& state_columns);

@@ -69,7 +69,8 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
   const std::vector<std::string> in_use = types_in_use(description_, order.slot);
   std::string why;
   for (std::uint32_t row = 0; row < plugins.size(); ++row) {
-    const std::string misfit_here = why_no_stand_in(plugins[row].declaration, order.plugin.declaration, in_use);
+    std::string misfit_here = why_no_stand_in(plugins[row].declaration, order.plugin.declaration, in_use);
+    if (misfit_here.empty()) misfit_here = why_unfit(order.plugin.declaration);
     if (misfit_here.empty()) return row;
     if (why.empty()) why = misfit_here;
   }
@@ -79,9 +80,11 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
 void Environment::check_fallbacks() const {
   for (const StageSlot* slot : {&space_, &collision_, &constraint_, &force_, &solver_, &integrator_})
     for (const PluginChoice& plugin : slot->description().plugins) {
+      if (const std::string why = why_unfit(plugin.declaration); !why.empty()) throw std::invalid_argument(why);
       if (!plugin.fallback) continue;
       const PluginDeclaration& fallback = plugin.fallback->declaration;
-      const std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));
+      std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));
+      if (why.empty()) why = why_unfit(fallback);
       if (!why.empty())
         throw std::invalid_argument("fallback " + fallback.name + " of " + plugin.declaration.name + ": " + why);
     }

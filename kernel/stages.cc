@@ -71,7 +71,7 @@ void Environment::begin_step() {
   validator_.begin_step(step_count_ + 1);
   data_.time[0] = time();
   data_.time_step[0] = step_count_ + 1 == description_.steps ? description_.last_time_step : description_.time_step;
-  data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;
+  data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
   start_wrench_known_ = false;
   if (!wrench_is_constant_) {
     // no trace of earlier steps: a step must be the same after a restore
@@ -111,9 +111,23 @@ Trusted<TrialState> Environment::integrate() {
                                          data_.trial_linear_velocity.id(), data_.trial_angular_velocity.id(),
                                          data_.error_estimate.id(),        data_.next_plugin_state.id()};
   const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
-  DerivativeSource* derivatives = wrench_is_constant_ ? nullptr : this;
-  return ask(Stage::kIntegrate, &integrator_, call, derivatives,
-             [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });
+  DerivativeSource* derivatives = data_.wrench_is_constant[0] != 0 ? nullptr : this;
+  const auto trial = ask(Stage::kIntegrate, &integrator_, call, derivatives,
+                         [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });
+  follow_motion(time_of(step_count_ + 1), data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+                data_.trial_angular_velocity);
+  return trial;
+}
+
+void Environment::follow_motion(double time, const Column<double>& position, const Column<double>& orientation,
+                                const Column<double>& linear_velocity, const Column<double>& angular_velocity) const {
+  for (const auto& [body, curve] : model_.curves) {
+    const MotionCurve::State state = curve.at(time);
+    set_vector(position.span(), body, state.pose.position);
+    set_quaternion(orientation.span(), body, state.pose.orientation);
+    set_vector(linear_velocity.span(), body, state.twist.linear);
+    set_vector(angular_velocity.span(), body, state.twist.angular);
+  }
 }
 
 // World bounds at S*, widened so that pairs up to the margin apart overlap.
@@ -197,21 +211,19 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
 }
 
 void Environment::constrain(const Trusted<TrialState>&) {
+  ask_discrepancies({data_.time.id(), data_.trial_position.id(), data_.trial_orientation.id(),
+                     data_.trial_linear_velocity.id(), data_.trial_angular_velocity.id()});
+}
+
+void Environment::ask_discrepancies(const std::array<ColumnId, 5>& state) {
   for (std::size_t g = 0; g < model_.constraint_groups.size(); ++g) {
     const ConstraintGroup& group = model_.constraint_groups[g];
     const Column<std::uint32_t>& intact = data_.group_intact[g];
     for (std::size_t i = 0; i < group.row.size(); ++i) intact[i] = front().intact[group.row[i]];
-    const std::array<ColumnId, 11> request = {data_.time.id(),
-                                              data_.time_step.id(),
-                                              group.type.id(),
-                                              group.body.id(),
-                                              group.bound_begin.id(),
-                                              group.bound.id(),
-                                              intact.id(),
-                                              data_.trial_position.id(),
-                                              data_.trial_orientation.id(),
-                                              data_.trial_linear_velocity.id(),
-                                              data_.trial_angular_velocity.id()};
+    const std::array<ColumnId, 11> request = {
+        state[0],         data_.time_step.id(), group.type.id(), group.body.id(), group.bound_begin.id(),
+        group.bound.id(), intact.id(),          state[1],        state[2],        state[3],
+        state[4]};
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
     const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
     ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) {

@@ -56,12 +56,18 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
 }
 
 void build_simulator(const Simulator& simulator, BuildContext* context) {
-  if (simulator.type() != "Basic") {
+  const bool is_smooth = simulator.type() == "Smooth";
+  if (is_smooth) context->description.simulator = kernel::Simulator::kSmooth;
+  if (simulator.type() != "Basic" && !is_smooth) {
     context->diagnostics->error(
         place_of(simulator, Simulator::kTypeFieldNumber),
-        "the simulator \"" + simulator.type() + "\" is not supported by this version; allowed: \"Basic\"");
+        "the simulator \"" + simulator.type() + "\" is not supported by this version; allowed: \"Basic\", \"Smooth\"");
   }
   const SimulatorProperties& properties = simulator.custom_properties();
+  if (properties.has_accuracy() && !is_smooth)
+    context->diagnostics->error(place_of(properties, SimulatorProperties::kAccuracyFieldNumber),
+                                "Accuracy belongs to the simulator \"Smooth\"; allowed: Type = \"Smooth\", or Accuracy "
+                                "in KineticIntegrator { … }");
   if (properties.substeps() != 1) {
     context->diagnostics->error(place_of(properties, SimulatorProperties::kSubstepsFieldNumber),
                                 "Substeps is " + std::to_string(properties.substeps()) +
@@ -69,6 +75,29 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
   }
   context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
+}
+
+// The simulator's Accuracy is the integrator's.
+void hand_on_accuracy(BuildContext* context) {
+  const SimulatorProperties& properties = context->scene.simulator().custom_properties();
+  if (!properties.has_accuracy() || context->description.integrator.plugins.empty()) return;
+  kernel::PluginChoice& integrator = context->description.integrator.plugins[0];
+  const TextPosition place = place_of(properties, SimulatorProperties::kAccuracyFieldNumber);
+  std::size_t at = 0;
+  for (const Property& property : integrator.declaration.properties) {
+    if (property.name != "Accuracy") {
+      at += property.flat_size();
+      continue;
+    }
+    for (const auto& own : context->environment.kinetic_integrator().custom_properties().property())
+      if (own.name() == "Accuracy")
+        context->diagnostics->error(place, "Accuracy stands in KineticIntegrator { … } too; allowed: one of them");
+    integrator.settings[at] = properties.accuracy();
+    return;
+  }
+  context->diagnostics->error(place, "the integrator \"" + integrator.declaration.name +
+                                         "\" has no Accuracy; allowed: \"DormandPrince54\", \"Rosenbrock\", or a "
+                                         "smaller TimeStep instead");
 }
 
 void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
@@ -168,6 +197,7 @@ void build_world(BuildContext* context) {
   if (!diagnostics->full()) build_filter(bodies, context);
   plugins.choose(Slot::kSolver, environment.constraint_solver(), has_shapes || has_joints);
   plugins.choose(Slot::kIntegrator, environment.kinetic_integrator(), has_bodies);
+  if (diagnostics->ok()) hand_on_accuracy(context);
   plugins.report_unused();
   if (diagnostics->ok()) build_materials(context);
 }

@@ -76,9 +76,9 @@ TEST(Build, RefusesTooManySteps) {
 }
 
 TEST(Build, RefusesWhatThisVersionLacks) {
-  EXPECT_THAT(errors_of("Environment { } Simulator { Type = \"Smooth\" }"),
-              ElementsAre("scene:1:36: error: the simulator \"Smooth\" is not supported by this version; allowed: "
-                          "\"Basic\""));
+  EXPECT_THAT(errors_of("Environment { } Simulator { Type = \"Bisection\" }"),
+              ElementsAre("scene:1:36: error: the simulator \"Bisection\" is not supported by this version; allowed: "
+                          "\"Basic\", \"Smooth\""));
   EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { Substeps = 4 } }"),
               ElementsAre("scene:1:59: error: Substeps is 4, which is not supported by this version; allowed: 1"));
 }

@@ -1,17 +1,19 @@
 // The Newton solver: joints and contacts together, at the end of the step, to rounding, at any mass ratio.
 //
-// Where the rows are taken: plugin_sdk/solver/end_of_step.h. How they are solved: semi-smooth Newton on Coulomb's cone after
-// the joints have been eliminated by a sparse L D L^T, plugin_sdk/solver/cone_problem.h (kNewton), with the equations and
-// their source.
+// Where the rows are taken: plugin_sdk/solver/end_of_step.h. How they are solved: semi-smooth Newton on Coulomb's cone
+// after the joints have been eliminated by a sparse L D L^T, plugin_sdk/solver/cone_problem.h (kNewton), with the
+// equations and their source.
 //
-// Order: S_{n+1} is of first order in h; what holds at its end holds to Tolerance. Stability: rigid rows at every h and mass
-// ratio, springs and dampers of joints at every stiffness (implicit Euler). Cost: cubic in the rows of contacts, limits and
-// drives of an island (dense; beyond 900 of them projected sweeps, whose convergence is linear), linear in a chain's joints.
-// Known failures: Coulomb friction with large coefficients at long arms (Painlevé) may have no solution or several, and of
-// random heaps that slide and turn under 100 to 10,000 times their mass about one in ten is not solved in 100 steps; then
-// `stop_reason` and `residual` say so. What rests, sticks or slides evenly is solved at any ratio. The angles of axes (ConstantVelocity, Axle, limits)
-// are closed to second order in the correction's turn, points to rounding.
+// Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); what holds at its end
+// holds to Tolerance. Stability: rigid rows at every h and mass ratio, springs and dampers of joints at every stiffness
+// (implicit Euler). Cost: cubic in the rows of contacts, limits and drives of an island (dense; beyond 900 of them
+// projected sweeps, whose convergence is linear), linear in a chain's joints. Known failures: Coulomb friction with
+// large coefficients at long arms (Painlevé) may have no solution or several, and of random heaps that slide and turn
+// under 100 to 10,000 times their mass about one in ten is not solved in 100 steps; then `stop_reason` and `residual`
+// say so. What rests, sticks or slides evenly is solved at any ratio. The angles of axes (ConstantVelocity, Axle,
+// limits) are closed to second order in the correction's turn, points to rounding.
 #include "plugin_sdk/solver/end_of_step.h"
+#include "plugin_sdk/solver/reactions.h"
 
 namespace gravitas {
 namespace {
@@ -26,6 +28,7 @@ class Newton final : public SolverPlugin {
     declaration.meaning =
         "Joints and contacts at the end of the step by semi-smooth Newton on the friction cone: accurate at any mass "
         "ratio.";
+    declaration.capabilities = {"reactions"};
     declaration.properties = {
         Property::number("Tolerance", "1")
             .at_least(1e-15)
@@ -55,6 +58,11 @@ class Newton final : public SolverPlugin {
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) override {
     solve_end_of_step(request, settings_, reply, host);
+  }
+
+  void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
+                 Host&) override {
+    solve_reactions(request, reply);
   }
 
  private:
