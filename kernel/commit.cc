@@ -193,7 +193,7 @@ void Environment::find_touching() {
 }
 
 // Before the states are swapped: back() is what comes, front() what was.
-double Environment::event_time() const {
+double Environment::inner_end_time() const {
   const bool is_last = inner_end_ == length_of_step(step_count_ + 1);
   return is_last ? time_of(step_count_ + 1) : time() + inner_end_;
 }
@@ -214,7 +214,7 @@ void Environment::raise_collision_events() {
     const auto [first, second] = starts ? pair_at(now, n) : pair_at(before, b);
     Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd,
                 step_count_ + 1,
-                event_time(),
+                inner_end_time(),
                 first,
                 second,
                 kNone,
@@ -238,7 +238,8 @@ void Environment::raise_break_events() {
   for (std::uint32_t joint = 0; joint < model_.constraint_count; ++joint) {
     if (front().intact[joint] == back().intact[joint]) continue;
     const ConstraintDescription& broken = model_.constraints[joint];
-    events_.push_back({EventKind::kBreak, step_count_ + 1, event_time(), broken.body1, broken.body2, joint, 0.0, 0.0});
+    events_.push_back(
+        {EventKind::kBreak, step_count_ + 1, inner_end_time(), broken.body1, broken.body2, joint, 0.0, 0.0});
   }
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
@@ -24,6 +25,11 @@ std::string validate_body(const EnvironmentDescription& d, const BodyDescription
   if ((body.flags & kMovable) != 0 && !(body.mass > 0.0 && body.inertia.minCoeff() > 0.0))
     return who + "a movable body needs positive mass and moments of inertia";
   if (body.damping < 0.0) return who + "negative damping";
+  if (!body.motion.empty()) {
+    if ((body.flags & kKinematic) == 0) return who + "it follows a motion and is not kinematic";
+    const std::string problem = MotionCurve::find_problem(body.motion);
+    if (!problem.empty()) return who + "motion: " + problem;
+  }
   if (((body.flags & kHasShape) != 0) != (body.shape != kNone)) return who + "shape and flags disagree";
   if (body.shape != kNone && body.shape >= d.shapes.size()) return who + "there is no such shape";
   if (body.material >= d.material_count) return who + "there is no such material";

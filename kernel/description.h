@@ -81,6 +81,7 @@ struct BodyDescription {
   double damping = 0.0;               // 1/s
   Pose pose;                          // of the centre of mass, world
   Twist twist;                        // world
+  std::vector<double> motion;         // of a kinematic body: table of MotionCurve, of its geometry; else empty
   std::uint32_t shape = kNone;        // row of `shapes`
   Pose geometry;                      // of the shape's frame in the body's
   LocalBound bound;
@@ -107,7 +108,7 @@ struct ConstraintDescription {
 };
 
 // How a step is made of stages (simulators/).
-enum class Simulator : std::uint32_t { kBasic, kSubstepping, kBisection, kContinuous };
+enum class Simulator : std::uint32_t { kBasic, kSubstepping, kBisection, kContinuous, kSmooth };
 
 struct EnvironmentDescription {
   std::string id;

@@ -147,12 +147,18 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
+  // smooth.cc: derivatives that agree with the joints.
+  bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
+  void ask_reactions();
 
   // stages.cc: a stage each. Inner steps begin at a time counted from that of S_n; S_n is in front() for the first, and
   // later what the one before has made of it.
   void begin_inner_step(double begin, double length);
   Trusted<TrialState> integrate();
   Bounds trial_bounds(std::uint32_t body) const;
+  // Kinematic bodies with a motion are where it says, whatever an integrator makes of them.
+  void follow_motion(double time, const Column<double>& position, const Column<double>& orientation,
+                     const Column<double>& linear_velocity, const Column<double>& angular_velocity) const;
   void bound_bodies(const Trusted<TrialState>& trial);
   void bound_motions(const Trusted<TrialState>& trial, double length);
   Trusted<Pairs> find_pairs();
@@ -161,6 +167,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   Trusted<Contacts> find_contacts(const Trusted<Pairs>& pairs);
   void look_up_contacts(const Trusted<Contacts>& contacts);
   void constrain(const Trusted<TrialState>& trial);
+  void ask_discrepancies(const Column<double>& time, const Column<double>& position, const Column<double>& orientation,
+                         const Column<double>& linear_velocity, const Column<double>& angular_velocity);
   void merge_discrepancies();
   Trusted<Solution> solve();
 
@@ -173,7 +181,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Gap of a contact whose two surface points move with their bodies from S* to a state.
   double gap_at(std::size_t contact, const State& state) const;
   void find_touching();
-  double event_time() const;
+  double inner_end_time() const;
   void raise_collision_events();
   void raise_break_events();
   void end_inner_step();
@@ -191,7 +199,8 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // forces.cc
   std::span<const ColumnId> trial_columns() const override;
-  ColumnId wrench_column() const override { return data_.wrench.id(); }
+  ColumnId wrench_column() const override { return told_wrench().id(); }
+  const Column<double>& told_wrench() const { return knows_reactions() ? data_.wrench_with_reactions : data_.wrench; }
   void begin_attempt(bool counts) override;
   void evaluate() override;
   // At the time in data_.derivative_time.
@@ -204,6 +213,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t place_of(const SwapOrder& order);
   std::string why_left_out(Slot slot) const;
   void check_fallbacks() const;
+  std::string why_unfit(const PluginDeclaration& plugin) const;
   void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) override;
   void on_decision(const Decision& decision) override;
   void on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) override;

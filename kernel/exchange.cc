@@ -54,19 +54,34 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
   const std::vector<std::string> in_use = types_in_use(description_, order.slot);
   std::string why;
   for (std::uint32_t row = 0; row < plugins.size(); ++row) {
-    const std::string misfit_here = why_no_stand_in(plugins[row].declaration, order.plugin.declaration, in_use);
+    std::string misfit_here = why_no_stand_in(plugins[row].declaration, order.plugin.declaration, in_use);
+    if (misfit_here.empty()) misfit_here = why_unfit(order.plugin.declaration);
     if (misfit_here.empty()) return row;
     if (why.empty()) why = misfit_here;
   }
   impossible(order, why);
 }
 
+// Why a plugin cannot serve the simulator; empty if it can.
+std::string Environment::why_unfit(const PluginDeclaration& plugin) const {
+  const char* simulator = knows_reactions() ? "Smooth" : "Continuous";
+  const bool is_asked = knows_reactions()
+                            ? plugin.slot == Slot::kSolver
+                            : description_.simulator == Simulator::kContinuous && plugin.slot == Slot::kCollision;
+  const char* capability = knows_reactions() ? "reactions" : "times_of_impact";
+  if (!is_asked || std::ranges::find(plugin.capabilities, capability) != plugin.capabilities.end()) return {};
+  return std::string("the simulator ") + simulator + " needs a plugin with the capability '" + capability +
+         "' in slot " + slot_name(plugin.slot) + ", and " + plugin.name + " has it not";
+}
+
 void Environment::check_fallbacks() const {
   for (const StageSlot* slot : slots_)
     for (const PluginChoice& plugin : slot->description().plugins) {
+      if (const std::string why = why_unfit(plugin.declaration); !why.empty()) throw std::invalid_argument(why);
       if (!plugin.fallback) continue;
       const PluginDeclaration& fallback = plugin.fallback->declaration;
-      const std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));
+      std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));
+      if (why.empty()) why = why_unfit(fallback);
       if (!why.empty())
         throw std::invalid_argument("fallback " + fallback.name + " of " + plugin.declaration.name + ": " + why);
     }

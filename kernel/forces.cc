@@ -54,10 +54,15 @@ void Environment::begin_attempt(bool counts) {
 
 void Environment::evaluate() {
   validator_.derivative_request(data_);
-  ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
-             data_.derivative_angular_velocity);
-  sum_wrenches();
-  validator_.note_wrench(data_);
+  follow_motion(data_.derivative_time[0], data_.derivative_position, data_.derivative_orientation,
+                data_.derivative_linear_velocity, data_.derivative_angular_velocity);
+  if (!wrench_is_constant_) {
+    ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
+               data_.derivative_angular_velocity);
+    sum_wrenches();
+  }
+  if (knows_reactions()) ask_reactions();
+  validator_.note_wrench(told_wrench());
   if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
   std::ranges::copy(data_.wrench.span(), data_.start_wrench.data());
   start_wrench_known_ = true;

@@ -126,6 +126,8 @@ void Model::write(const EnvironmentDescription& d) {
     set_quaternion(geometry_orientation.span(), i, body.geometry.orientation);
     filter_group[i] = body.filter_group;
     filter_mask[i] = body.filter_mask;
+    if (!body.motion.empty())
+      curves.emplace_back(static_cast<std::uint32_t>(i), MotionCurve(body.motion, body.geometry));
   }
   for (std::size_t i = 0; i < d.shapes.size(); ++i) {
     shape_hash[i] = hash_of(d.shapes[i]);

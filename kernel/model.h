@@ -8,6 +8,7 @@
 
 #include "kernel/arena.h"
 #include "kernel/description.h"
+#include "plugin_sdk/motion_curve.h"
 
 namespace gravitas::kernel {
 
@@ -52,6 +53,7 @@ struct Model {
   std::vector<LocalBound> bound;
   std::vector<std::uint32_t> material;
   std::vector<std::string> body_id;
+  std::vector<std::pair<std::uint32_t, MotionCurve>> curves;  // kinematic bodies that follow one
 
   // Shapes.
   Column<std::uint64_t> shape_hash, shape_type;

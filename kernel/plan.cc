@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <stdexcept>
 
 namespace gravitas::kernel {
 namespace {
@@ -76,6 +77,10 @@ Plan make_plan(EnvironmentDescription* d) {
   }
 
   const bool has_contacts = can_any_touch(*d);
+  if (d->simulator == Simulator::kSmooth && has_contacts)
+    throw std::invalid_argument(
+        "the simulator Smooth moves bodies that cannot touch, and some of these can: leave out their geometry, forbid "
+        "the pairs in CollisionFilter, or use the simulator Basic");
   if (has_contacts) {
     add(&plan, Slot::kSpace, d->space);
     add(&plan, Slot::kCollision, d->collision);

@@ -82,7 +82,7 @@ void Environment::begin_inner_step(double begin, double length) {
   data_.time[0] = time() + begin;
   data_.time_step[0] = length;
   inner_end_ = begin + length;
-  data_.wrench_is_constant[0] = wrench_is_constant_ ? 1 : 0;
+  data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
   start_wrench_known_ = false;
   if (!wrench_is_constant_) {
     // no trace of earlier steps: a step must be the same after a restore
@@ -110,9 +110,23 @@ Trusted<TrialState> Environment::integrate() {
   const auto reply = ids(data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                          data_.trial_angular_velocity, data_.error_estimate, data_.next_plugin_state);
   const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};
-  DerivativeSource* derivatives = wrench_is_constant_ ? nullptr : this;
-  return ask(Stage::kIntegrate, &integrator_, call, derivatives,
-             [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });
+  DerivativeSource* derivatives = data_.wrench_is_constant[0] != 0 ? nullptr : this;
+  const auto trial = ask(Stage::kIntegrate, &integrator_, call, derivatives,
+                         [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });
+  follow_motion(inner_end_time(), data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+                data_.trial_angular_velocity);
+  return trial;
+}
+
+void Environment::follow_motion(double time, const Column<double>& position, const Column<double>& orientation,
+                                const Column<double>& linear_velocity, const Column<double>& angular_velocity) const {
+  for (const auto& [body, curve] : model_.curves) {
+    const MotionCurve::State state = curve.at(time);
+    set_vector(position.span(), body, state.pose.position);
+    set_quaternion(orientation.span(), body, state.pose.orientation);
+    set_vector(linear_velocity.span(), body, state.twist.linear);
+    set_vector(angular_velocity.span(), body, state.twist.angular);
+  }
 }
 
 // World bounds at S*, widened so that pairs up to the margin apart overlap.
@@ -235,13 +249,19 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
 }
 
 void Environment::constrain(const Trusted<TrialState>&) {
+  ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+                    data_.trial_angular_velocity);
+}
+
+void Environment::ask_discrepancies(const Column<double>& time, const Column<double>& position,
+                                    const Column<double>& orientation, const Column<double>& linear_velocity,
+                                    const Column<double>& angular_velocity) {
   for (std::size_t g = 0; g < model_.constraint_groups.size(); ++g) {
     const ConstraintGroup& group = model_.constraint_groups[g];
     const Column<std::uint32_t>& intact = data_.group_intact[g];
     for (std::size_t i = 0; i < group.row.size(); ++i) intact[i] = front().intact[group.row[i]];
-    const auto request =
-        ids(data_.time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact,
-            data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity);
+    const auto request = ids(time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact,
+                             position, orientation, linear_velocity, angular_velocity);
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
     const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
     ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) {

@@ -62,7 +62,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   margin = Column<double>(arena, 1, 0);
   wrench_is_constant = Column<std::uint32_t>(arena, 1, 0);
 
-  const bool has_forces = model.application_count > 0;
+  const bool is_smooth = d.simulator == Simulator::kSmooth && has_joints;
+  const bool has_forces = model.application_count > 0 || is_smooth;
   start_linear_velocity = bodies_if(has_forces, 3), start_angular_velocity = bodies_if(has_forces, 3);
   derivative_time = Column<double>(arena, 1, 0);
   derivative_position = bodies_if(has_forces, 3), derivative_orientation = bodies_if(has_forces, 4);
@@ -75,6 +76,10 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
     answer.flags = Column<std::uint32_t>(arena, rows, 0);
   }
   wrench = bodies(6), impulse = bodies_if(has_forces, 6), start_wrench = bodies_if(has_reactions, 6);
+
+  kinematic_acceleration = bodies_if(is_smooth, 6), reaction = bodies_if(is_smooth, 6);
+  wrench_with_reactions = bodies_if(is_smooth, 6);
+  reaction_residual = Column<double>(arena, 1, 0);
 
   trial_position = bodies(3), trial_orientation = bodies(4), trial_linear_velocity = bodies(3);
   trial_angular_velocity = bodies(3);
@@ -106,7 +111,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   discrepancies = DiscrepancyAnswer(arena, rows);
   discrepancy_body = Column<std::uint32_t>(arena, 0, 2 * rows);
   const auto axis_numbers = [&] { return Column<double>(arena, 0, 3 * rows); };
-  discrepancy_warm_impulse = axis_numbers(), discrepancy_warm_correction = axis_numbers();
+  discrepancy_force = axis_numbers(), discrepancy_warm_impulse = axis_numbers(),
+  discrepancy_warm_correction = axis_numbers();
 
   solved_linear_velocity = bodies_if(has_reactions, 3), solved_angular_velocity = bodies_if(has_reactions, 3);
   pose_change = bodies_if(has_reactions, 6);

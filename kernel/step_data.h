@@ -52,6 +52,10 @@ struct StepData {
   // Wrenches at S_n for the solver, which may differ from the last ones that the integrator asked for.
   Column<double> start_wrench;
 
+  // Simulator Smooth: accelerations of kinematic bodies, what the joints answer, and the wrenches with it. Written by
+  // Stage::kSolve inside kIntegrate.
+  Column<double> kinematic_acceleration, reaction, discrepancy_force, reaction_residual, wrench_with_reactions;
+
   // Stage::kIntegrate: S*.
   Column<double> trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity, error_estimate,
       next_plugin_state;

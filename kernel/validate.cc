@@ -148,6 +148,11 @@ Trusted<Discrepancies> Validator::discrepancies(const Untrusted<StageCall>& answ
   return Trusted<Discrepancies>({});
 }
 
+Trusted<Reactions> Validator::reactions(const Untrusted<StageCall>& answer) const {
+  check_structure_and_finiteness(answer.value_);
+  return Trusted<Reactions>({});
+}
+
 Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const StepData& data) const {
   check_structure_and_finiteness(answer.value_);
   for (std::size_t i = 0; i < model_.body_count; ++i) {

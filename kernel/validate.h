@@ -53,6 +53,7 @@ struct Impacts {};        // impact_*
 struct Contacts {};       // contact_*
 struct Bound {};          // bound of a constraint group
 struct Discrepancies {};  // discrepancy_answers[group]
+struct Reactions {};      // reaction, discrepancy_force
 struct Solution {};       // solved_*, pose_change, multipliers
 
 class Validator {
@@ -80,14 +81,15 @@ class Validator {
   Trusted<Bound> bound(const Untrusted<StageCall>& answer, const ConstraintGroup& group) const;
   Trusted<Discrepancies> discrepancies(const Untrusted<StageCall>& answer, const DiscrepancyAnswer& columns,
                                        std::span<const std::uint32_t> intact) const;
+  Trusted<Reactions> reactions(const Untrusted<StageCall>& answer) const;
   Trusted<Solution> solution(const Untrusted<StageCall>& answer, const StepData& data) const;
   // The trial state of a derivative request, which comes from a plugin too.
   void derivative_request(const StepData& data) const;
 
   // What an integrator is told while it is asked, against which its answer is held.
   void begin_integration() { told_.clear(); }
-  void note_wrench(const StepData& data) {
-    if (samples_physics_) told_.add(data.wrench.span());
+  void note_wrench(const Column<double>& wrench) {
+    if (samples_physics_) told_.add(wrench.span());
   }
 
  private:

@@ -78,9 +78,17 @@ bool ForcePlugin::dispatch(stage::Method method, const gravitas_column* request,
 
 bool SolverPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
                             Host& host) {
+  if (method == stage::Method::kSolverReactions) {
+    reactions(stage::SolverReactionsRequest(request), stage::SolverReactionsReply(reply), host);
+    return true;
+  }
   if (method != stage::Method::kSolverSolve) return false;
   solve(stage::SolverSolveRequest(request), stage::SolverSolveReply(reply), host);
   return true;
+}
+
+void SolverPlugin::reactions(const stage::SolverReactionsRequest&, const stage::SolverReactionsReply&, Host&) {
+  throw Refusal("this solver has no answer to Solver.Reactions");
 }
 
 bool IntegratorPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,

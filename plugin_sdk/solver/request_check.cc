@@ -63,13 +63,23 @@ void check_pairs(const char* column, std::span<const std::uint32_t> values, std:
   }
 }
 
-void check_bodies(const stage::SolverSolveRequest& r, std::size_t bodies) {
+template <typename Request>
+void check_masses(const Request& r, std::size_t bodies) {
   check_numbers("inverse_mass", r.inverse_mass(), bodies, 1, 0.0);
   check_numbers("inverse_inertia", r.inverse_inertia(), bodies, 3, 0.0);
+}
+
+template <typename Request>
+void check_state(const Request& r, std::size_t bodies) {
   check_numbers("position", r.position(), bodies, 3);
   check_unit("orientation", r.orientation(), bodies, 4);
   check_numbers("linear_velocity", r.linear_velocity(), bodies, 3);
   check_numbers("angular_velocity", r.angular_velocity(), bodies, 3);
+}
+
+void check_bodies(const stage::SolverSolveRequest& r, std::size_t bodies) {
+  check_masses(r, bodies);
+  check_state(r, bodies);
   check_numbers("trial_position", r.trial_position(), bodies, 3);
   check_unit("trial_orientation", r.trial_orientation(), bodies, 4);
   check_numbers("trial_linear_velocity", r.trial_linear_velocity(), bodies, 3);
@@ -77,7 +87,9 @@ void check_bodies(const stage::SolverSolveRequest& r, std::size_t bodies) {
   check_numbers("wrench", r.wrench(), bodies, 6);
 }
 
-void check_discrepancies(const stage::SolverSolveRequest& r, std::size_t bodies) {
+// The columns that both questions have.
+template <typename Request>
+void check_discrepancies(const Request& r, std::size_t bodies) {
   const std::size_t rows = r.mode().size();
   check_pairs("discrepancy_body", r.discrepancy_body(), rows, bodies, true);
   check_numbers("point1", r.point1(), rows, 3);
@@ -90,8 +102,6 @@ void check_discrepancies(const stage::SolverSolveRequest& r, std::size_t bodies)
   check_numbers("compliance", r.compliance(), rows, 3, 0.0);
   check_numbers("damping", r.damping(), rows, 3, 0.0);
   check_numbers("maximum_force", r.maximum_force(), rows, 3, 0.0);
-  check_numbers("discrepancy_warm_impulse", r.discrepancy_warm_impulse(), rows, 3);
-  check_numbers("discrepancy_warm_correction", r.discrepancy_warm_correction(), rows, 3);
   for (std::size_t row = 0; row < rows; ++row) {
     if (!is_valid_mode(r.mode()[row])) refuse("mode", row, std::to_string(r.mode()[row]) + " is no mode");
     for (int axis = 0; axis < 3; ++axis) {
@@ -127,7 +137,20 @@ void check_solver_request(const stage::SolverSolveRequest& request) {
   const std::size_t bodies = request.flags().size();
   check_bodies(request, bodies);
   check_discrepancies(request, bodies);
+  check_numbers("discrepancy_warm_impulse", request.discrepancy_warm_impulse(), request.mode().size(), 3);
+  check_numbers("discrepancy_warm_correction", request.discrepancy_warm_correction(), request.mode().size(), 3);
   check_contacts(request, bodies);
+}
+
+void check_reactions_request(const stage::SolverReactionsRequest& r) {
+  const std::size_t bodies = r.flags().size();
+  check_masses(r, bodies);
+  check_numbers("inertia", r.inertia(), bodies, 3, 0.0);
+  check_numbers("drag", r.drag(), bodies, 1, 0.0);
+  check_state(r, bodies);
+  check_numbers("wrench", r.wrench(), bodies, 6);
+  check_numbers("acceleration", r.acceleration(), bodies, 6);
+  check_discrepancies(r, bodies);
 }
 
 }  // namespace gravitas

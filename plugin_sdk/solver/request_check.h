@@ -12,5 +12,6 @@ namespace gravitas {
 // 0 ... 1, an orientation or normal that is not unit within 1e-6, a body that does not exist or is
 // paired with itself, an unknown mode, a lower limit above the upper.
 void check_solver_request(const stage::SolverSolveRequest& request);
+void check_reactions_request(const stage::SolverReactionsRequest& request);
 
 }  // namespace gravitas

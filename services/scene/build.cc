@@ -58,31 +58,43 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
 
 void build_simulator(const Simulator& simulator, BuildContext* context) {
   using enum kernel::Simulator;
-  static const std::map<std::string, kernel::Simulator> kSimulators = {
-      {"Basic", kBasic}, {"Substepping", kSubstepping}, {"Bisection", kBisection}, {"Continuous", kContinuous}};
-  const auto found = kSimulators.find(simulator.type());
-  if (found == kSimulators.end()) {
-    context->diagnostics->error(place_of(simulator, Simulator::kTypeFieldNumber),
-                                "the simulator \"" + simulator.type() + "\" is not supported by this version");
-  } else {
-    context->description.simulator = found->second;
-  }
+  static const std::map<std::string, kernel::Simulator> kSimulators = {{"Basic", kBasic},
+                                                                       {"Substepping", kSubstepping},
+                                                                       {"Bisection", kBisection},
+                                                                       {"Continuous", kContinuous},
+                                                                       {"Smooth", kSmooth}};
+  context->description.simulator = kSimulators.at(simulator.type());
   const SimulatorProperties& properties = simulator.custom_properties();
+  if (properties.has_accuracy() && context->description.simulator != kSmooth)
+    context->diagnostics->error(place_of(properties, SimulatorProperties::kAccuracyFieldNumber),
+                                "Accuracy belongs to the simulator \"Smooth\"; allowed: Type = \"Smooth\", or Accuracy "
+                                "in KineticIntegrator { … }");
   context->description.substeps = properties.substeps();
   context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
 }
 
-void check_finds_impacts(const InstalledPlugin* collision, BuildContext* context) {
-  if (context->description.simulator != kernel::Simulator::kContinuous || collision == nullptr) return;
-  if (std::ranges::find(collision->declaration.capabilities, "times_of_impact") !=
-      collision->declaration.capabilities.end())
+// The simulator's Accuracy is the integrator's.
+void hand_on_accuracy(BuildContext* context) {
+  const SimulatorProperties& properties = context->scene.simulator().custom_properties();
+  if (!properties.has_accuracy() || context->description.integrator.plugins.empty()) return;
+  kernel::PluginChoice& integrator = context->description.integrator.plugins[0];
+  const TextPosition place = place_of(properties, SimulatorProperties::kAccuracyFieldNumber);
+  std::size_t at = 0;
+  for (const Property& property : integrator.declaration.properties) {
+    if (property.name != "Accuracy") {
+      at += property.flat_size();
+      continue;
+    }
+    for (const auto& own : context->environment.kinetic_integrator().custom_properties().property())
+      if (own.name() == "Accuracy")
+        context->diagnostics->error(place, "Accuracy stands in KineticIntegrator { … } too; allowed: one of them");
+    integrator.settings[at] = properties.accuracy();
     return;
-  context->diagnostics->error(place_of(context->scene.simulator(), Simulator::kTypeFieldNumber),
-                              "the simulator \"Continuous\" asks for times of impact, and the collision plugin \"" +
-                                  collision->declaration.name +
-                                  "\" does not declare them; allowed: a collision plugin with the capability "
-                                  "times_of_impact, or the simulator \"Bisection\"");
+  }
+  context->diagnostics->error(place, "the integrator \"" + integrator.declaration.name +
+                                         "\" has no Accuracy; allowed: \"DormandPrince54\", \"Rosenbrock\", or a "
+                                         "smaller TimeStep instead");
 }
 
 void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
@@ -173,9 +185,7 @@ void build_world(BuildContext* context) {
 
   PluginSelection plugins(context);
   plugins.choose(Slot::kSpace, environment.space(), has_shapes);
-  const InstalledPlugin* collision = plugins.choose_collision(has_shapes);
-  check_finds_impacts(collision, context);
-  const std::vector<Solid> solids = build_shapes(collision, context);
+  const std::vector<Solid> solids = build_shapes(plugins.choose_collision(has_shapes), context);
   build_forces(bodies, &plugins, context);
   build_bodies({geometries, materials, forces, solids}, context);
   if (diagnostics->ok()) complete_forces(context);
@@ -184,6 +194,7 @@ void build_world(BuildContext* context) {
   if (!diagnostics->full()) build_filter(bodies, context);
   plugins.choose(Slot::kSolver, environment.constraint_solver(), has_shapes || has_joints);
   plugins.choose(Slot::kIntegrator, environment.kinetic_integrator(), has_bodies);
+  if (diagnostics->ok()) hand_on_accuracy(context);
   plugins.report_unused();
   if (diagnostics->ok()) build_materials(context);
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "plugin_sdk/geometry/mass_properties.h"
+#include "plugin_sdk/motion_curve.h"
 
 namespace gravitas::scene {
 namespace {
@@ -47,6 +48,7 @@ class BodyBuilder {
     description->mass = inertia->mass;
     description->inertia = inertia->moments;
     set_pose(inertia->X_GB, description);
+    set_motion(description);
     set_bound(description);
     set_material(description);
     set_forces(description);
@@ -200,6 +202,62 @@ class BodyBuilder {
     diagnostics_.warning(place_of(kinetic, is_linear ? KineticProperties::kLinearVelocityFieldNumber
                                                      : KineticProperties::kAngularVelocityFieldNumber),
                          what() + " is immovable: its velocities are dropped (a body that keeps them is Kinematic)");
+  }
+
+  // The body starts where its Motion has it, with the velocities there.
+  void set_motion(kernel::BodyDescription* description) {
+    const int field = Body::kMotionFieldNumber;
+    if (!written(field)) return;
+    if (!body_.kinematic()) {
+      refuse(field, "has a Motion and is not kinematic; required: Kinematic = true");
+      return;
+    }
+    const KineticProperties& kinetic = body_.kinetic_properties();
+    for (const int other :
+         {KineticProperties::kPositionFieldNumber, KineticProperties::kOrientationFieldNumber,
+          KineticProperties::kLinearVelocityFieldNumber, KineticProperties::kAngularVelocityFieldNumber}) {
+      if (!is_written(kinetic, other)) continue;
+      diagnostics_.error(place_of(kinetic, other),
+                         what() + " starts where its Motion is at time 0; allowed: leave out pose and velocities");
+      return;
+    }
+    std::vector<PropertyProblem> problems;
+    const bool is_table = flatten_motion(from_message(body_.motion()), &description->motion, &problems);
+    diagnostics_.add(problems, place(field), what() + ": ");
+    if (!is_table) return;
+    const std::string problem = MotionCurve::find_problem(description->motion);
+    if (!problem.empty()) {
+      refuse(field, "has a Motion that cannot be followed: " + problem);
+      return;
+    }
+    const MotionCurve::State start = MotionCurve(description->motion, description->geometry).at(0.0);
+    description->pose = start.pose;
+    description->twist = start.twist;
+  }
+
+  static bool flatten_motion(const PropertyValue& given, std::vector<double>* out,
+                             std::vector<PropertyProblem>* problems) {
+    using Kind = PropertyValue::Kind;
+    const auto refuse = [&](const PropertyValue& value, const std::string& what) {
+      problems->push_back({value.position, what + " is " + shown(value) +
+                                               "; allowed: {{t, {px, py, pz}, {qw, qx, qy, qz}}, …} with ascending t"});
+      return false;
+    };
+    if (given.kind != Kind::kList || given.list.empty()) return refuse(given, "Motion");
+    for (std::size_t i = 0; i < given.list.size(); ++i) {
+      const PropertyValue& row = given.list[i];
+      const std::string which = "row " + std::to_string(i) + " of Motion";
+      if (row.kind != Kind::kList || row.list.size() != 3) return refuse(row, which);
+      if (!flatten_value(Property::number("the time of " + which, "s"), row.list[0], out, problems) ||
+          !flatten_value(Property::vector("the position of " + which, "m", "world").at_least(-1e15).at_most(1e15),
+                         row.list[1], out, problems) ||
+          !flatten_value(Property::quaternion("the orientation of " + which, "world"), row.list[2], out, problems))
+        return false;
+      const std::size_t end = out->size(), columns = MotionCurve::kColumns;
+      if (i > 0 && !((*out)[end - columns] > (*out)[end - 2 * columns]))
+        return refuse(row.list[0], "the time of " + which);
+    }
+    return true;
   }
 
   void set_bound(kernel::BodyDescription* description) {

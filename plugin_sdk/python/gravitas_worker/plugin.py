@@ -74,7 +74,10 @@ class Force(Plugin):
 
 
 class Solver(Plugin):
-    slot, methods = "solver", {"Solve": "solve"}
+    slot, methods = "solver", {"Solve": "solve", "Reactions": "reactions"}
+
+    def reactions(self, request, reply, host):
+        raise Refusal("this solver has no answer to Solver.Reactions")
 
 
 class Integrator(Plugin):

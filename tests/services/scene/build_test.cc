@@ -75,11 +75,6 @@ TEST(Build, RefusesTooManySteps) {
               ElementsAre(HasSubstr("Duration/TimeStep is inf")));
 }
 
-TEST(Build, RefusesWhatThisVersionLacks) {
-  EXPECT_THAT(errors_of("Environment { } Simulator { Type = \"Smooth\" }"),
-              ElementsAre("scene:1:36: error: the simulator \"Smooth\" is not supported by this version"));
-}
-
 TEST(Build, ChecksWhereAWorkerIs) {
   const auto errors = [](const std::string& place) {
     return errors_of("Environment { } Plugins { Plugin { Slot = \"solver\" " + place + " } }");

@@ -134,9 +134,6 @@ TEST(Overrides, NameTheirMistakes) {
               ElementsAre("--set Simulator.TimeStep=fast: TimeStep is \"fast\"; allowed: a number > 0"));
   EXPECT_THAT(errors_of("Simulator=Basik"),
               ElementsAre(testing::StartsWith("--set Simulator=Basik: Type is \"Basik\"; did you mean \"Basic\"?")));
-  EXPECT_THAT(errors_of("Body.Ball01.Motion={}"),
-              ElementsAre("--set Body.Ball01.Motion={}: Motion is not supported by this version; allowed: leave it "
-                          "out"));
   EXPECT_THAT(errors_of("Space.Bodies=1"), ElementsAre(testing::HasSubstr("\"Bodies\" is no property")));
   EXPECT_THAT(errors_of("Plugin.solvr.Deadline=1"),
               ElementsAre(testing::HasSubstr("no slot \"solvr\"; did you mean \"solver\"?")));

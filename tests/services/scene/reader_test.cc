@@ -225,8 +225,6 @@ TEST(Reader, RefusesMissingNames) {
 }
 
 TEST(Reader, RefusesWhatThisVersionDoesNotSupport) {
-  EXPECT_THAT(errors_of(body("Id = \"A\" Motion = {{0, {0, 0, 0}, {1, 0, 0, 0}}}")),
-              ElementsAre("scene:1:50: error: Motion is not supported by this version; allowed: leave it out"));
   EXPECT_THAT(errors_of("Plugins { Plugin { Slot = \"solver\"\nProcess = \"x\" } }"),
               ElementsAre("scene:2:1: error: Process is not supported by this version; allowed: leave it out"));
 }

@@ -1,14 +1,16 @@
 // The Direct solver: joints exactly, contacts by iteration.
 //
-// Where the rows are taken: plugin_sdk/solver/end_of_step.h. Joints are eliminated by a sparse L D L^T that bears dependent
-// rows (plugin_sdk/solver/profile_ldlt.h); contacts, limits and drives feel each other through what is left and are solved
-// by projected Gauss-Seidel sweeps, each contact exactly (plugin_sdk/solver/cone_problem.h, kGaussSeidel), or, with
-// ContactSolver = "Newton", as Newton does.
+// Where the rows are taken: plugin_sdk/solver/end_of_step.h. Joints are eliminated by a sparse L D L^T that bears
+// dependent rows (plugin_sdk/solver/profile_ldlt.h); contacts, limits and drives feel each other through what is left
+// and are solved by projected Gauss-Seidel sweeps, each contact exactly (plugin_sdk/solver/cone_problem.h,
+// kGaussSeidel), or, with ContactSolver = "Newton", as Newton does.
 //
-// Order: S_{n+1} is of first order in h; joints are closed to rounding at every mass ratio. Sweeps converge linearly, the
-// slower the more contacts carry one another: stacks of ten under a thousand times their mass are for Newton. `stop_reason`
-// and `residual` say when they ran out. Other limits: those of Newton.
+// Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); joints are closed to
+// rounding at every mass ratio. Sweeps converge linearly, the slower the more contacts carry one another: stacks of ten
+// under a thousand times their mass are for Newton. `stop_reason` and `residual` say when they ran out. Other limits:
+// those of Newton.
 #include "plugin_sdk/solver/end_of_step.h"
+#include "plugin_sdk/solver/reactions.h"
 
 namespace gravitas {
 namespace {
@@ -21,6 +23,7 @@ class Direct final : public SolverPlugin {
     declaration.version = "1.0.0";
     declaration.slot = kSlot;
     declaration.meaning = "Joints exactly, by a sparse factorisation at the end of the step; contacts by iteration.";
+    declaration.capabilities = {"reactions"};
     declaration.properties = {Property::choice("ContactSolver", {"GaussSeidel", "Newton"})
                                   .defaults_to({0.0})
                                   .live()
@@ -44,6 +47,11 @@ class Direct final : public SolverPlugin {
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) override {
     solve_end_of_step(request, settings_, reply, host);
+  }
+
+  void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
+                 Host&) override {
+    solve_reactions(request, reply);
   }
 
  private:

@@ -4,7 +4,8 @@
 // the joints have been eliminated by a sparse L D L^T, plugin_sdk/solver/cone_problem.h (kNewton), with the equations and
 // their source; where its steps do not settle, from guesses along the central path (cone_path.h).
 //
-// Order: S_{n+1} is of first order in h; what holds at its end holds to Tolerance. Stability: rigid rows at every h and mass
+// Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); what holds at its end holds to
+// Tolerance. Stability: rigid rows at every h and mass
 // ratio, springs and dampers of joints at every stiffness (implicit Euler). Cost: cubic in the rows of contacts, limits and
 // drives of an island (dense; beyond 900 of them projected sweeps, ten for each of `Iterations`, whose convergence is
 // linear), linear in a chain's joints.
@@ -13,6 +14,7 @@
 // (1600 of 1600), under a million times 392 of 400. The angles of axes (ConstantVelocity, Axle, limits) are closed to second
 // order in the correction's turn, points to rounding.
 #include "plugin_sdk/solver/end_of_step.h"
+#include "plugin_sdk/solver/reactions.h"
 
 namespace gravitas {
 namespace {
@@ -27,6 +29,7 @@ class Newton final : public SolverPlugin {
     declaration.meaning =
         "Joints and contacts at the end of the step by semi-smooth Newton on the friction cone: accurate at any mass "
         "ratio.";
+    declaration.capabilities = {"reactions"};
     declaration.properties = {
         Property::number("Tolerance", "1")
             .at_least(1e-15)
@@ -56,6 +59,11 @@ class Newton final : public SolverPlugin {
 
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) override {
     solve_end_of_step(request, settings_, reply, host);
+  }
+
+  void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
+                 Host&) override {
+    solve_reactions(request, reply);
   }
 
  private:

@@ -1,0 +1,124 @@
+#include "plugin_sdk/motion_curve.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/checks.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+namespace {
+
+// Slope at a row between difference quotients `before` over h1 and `after` over h2: that of the parabola, or rest.
+Vector3 slope(const Vector3& before, double h1, const Vector3& after, double h2) {
+  if (before.isZero(0.0) || after.isZero(0.0)) return Vector3::Zero();
+  return (h2 * before + h1 * after) / (h1 + h2);
+}
+
+// Slope at an end, next to the quotient `near` over h1, with `far` over h2 beyond.
+Vector3 end_slope(const Vector3& near, double h1, const Vector3& far, double h2) {
+  if (near.isZero(0.0)) return Vector3::Zero();
+  return near + (h1 / (h1 + h2)) * (near - far);
+}
+
+std::vector<Vector3> slopes(const std::vector<Vector3>& quotients, const std::vector<double>& lengths) {
+  const std::size_t intervals = quotients.size();
+  std::vector<Vector3> all(intervals + 1, Vector3::Zero());
+  if (intervals == 0) return all;
+  if (intervals == 1) return {quotients[0], quotients[0]};
+  all.front() = end_slope(quotients[0], lengths[0], quotients[1], lengths[1]);
+  for (std::size_t i = 1; i < intervals; ++i)
+    all[i] = slope(quotients[i - 1], lengths[i - 1], quotients[i], lengths[i]);
+  all.back() =
+      end_slope(quotients[intervals - 1], lengths[intervals - 1], quotients[intervals - 2], lengths[intervals - 2]);
+  return all;
+}
+
+}  // namespace
+
+std::string MotionCurve::find_problem(std::span<const double> table) {
+  if (table.empty() || table.size() % kColumns != 0) return "it has no rows of time, position and orientation";
+  for (std::size_t row = 0; row < table.size() / kColumns; ++row) {
+    const std::span<const double> numbers = table.subspan(row * kColumns, kColumns);
+    const std::string which = "row " + std::to_string(row);
+    if (first_not_finite(numbers) != kNoRow) return which + " has a number that is not finite";
+    if (row > 0 && !(numbers[0] > table[(row - 1) * kColumns])) return "the time of " + which + " does not ascend";
+    if (first_not_unit(numbers.subspan(4, 4), 4) != kNoRow) return "the orientation of " + which + " is not unit";
+  }
+  return {};
+}
+
+MotionCurve::MotionCurve(std::span<const double> table, const Pose& frame_in_body) : frame_in_body_(frame_in_body) {
+  rows_.resize(table.size() / kColumns);
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    rows_[i].time = table[i * kColumns];
+    rows_[i].pose.position = vector_at(table.subspan(i * kColumns + 1, 3), 0);
+    rows_[i].pose.orientation = quaternion_at(table.subspan(i * kColumns + 4, 4), 0);
+  }
+  std::vector<double> lengths;
+  std::vector<Vector3> moves, turns;
+  for (std::size_t i = 0; i + 1 < rows_.size(); ++i) {
+    const Row &from = rows_[i], &to = rows_[i + 1];
+    lengths.push_back(to.time - from.time);
+    moves.emplace_back((to.pose.position - from.pose.position) / lengths[i]);
+    turns.emplace_back(log_rotation(shorter_arc(to.pose.orientation * from.pose.orientation.conjugate())) / lengths[i]);
+  }
+  const std::vector<Vector3> velocities = slopes(moves, lengths), angular = slopes(turns, lengths);
+  for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i].twist = {velocities[i], angular[i]};
+  for (std::size_t i = 0; i + 1 < rows_.size(); ++i) {
+    const Vector3 first = lengths[i] / 3.0 * angular[i], last = lengths[i] / 3.0 * angular[i + 1];
+    const Quaternion turn = exp_rotation(lengths[i] * turns[i]);
+    rows_[i].turns = {first, log_rotation(exp_rotation(-last) * turn * exp_rotation(-first)), last};
+  }
+}
+
+MotionCurve::State MotionCurve::frame_at(double time) const {
+  const auto next = std::ranges::upper_bound(rows_, time, {}, &Row::time);
+  const bool is_outside = next == rows_.begin() || next == rows_.end();
+  if (is_outside) {
+    const Row& end = next == rows_.begin() ? rows_.front() : rows_.back();
+    const double beyond = time - end.time;
+    return {displaced(end.pose, beyond * end.twist.linear, beyond * end.twist.angular), end.twist, {}};
+  }
+  const Row &from = *(next - 1), &to = *next;
+  const double h = to.time - from.time, s = (time - from.time) / h, r = 1.0 - s;
+  State state;
+
+  // x = x0 + (3 s^2 - 2 s^3)(x1 - x0) + h (s r^2 v0 - s^2 r v1)
+  const Vector3 move = to.pose.position - from.pose.position;
+  const Vector3 &v0 = from.twist.linear, &v1 = to.twist.linear;
+  state.pose.position = from.pose.position + s * s * (1.0 + 2.0 * r) * move + h * (s * r * r * v0 - s * s * r * v1);
+  state.twist.linear = 6.0 * s * r / h * move + r * (1.0 - 3.0 * s) * v0 + s * (3.0 * s - 2.0) * v1;
+  state.change.linear = (6.0 * (r - s) / h * move + (6.0 * s - 4.0) * v0 + (6.0 * s - 2.0) * v1) / h;
+
+  // factors from the right: q = e3 e2 e1 q0, each turning what those before it did
+  const std::array<double, 3> b = {1.0 - r * r * r, s * s * (3.0 - 2.0 * s), s * s * s};
+  const std::array<double, 3> rate = {3.0 * r * r / h, 6.0 * s * r / h, 3.0 * s * s / h};
+  const std::array<double, 3> bend = {-6.0 * r / (h * h), 6.0 * (r - s) / (h * h), 6.0 * s / (h * h)};
+  state.pose.orientation = from.pose.orientation;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vector3& c = from.turns[k];
+    const Quaternion e = exp_rotation(b[k] * c);
+    state.pose.orientation = e * state.pose.orientation;
+    const Vector3 own = rate[k] * c, carried = e * state.twist.angular;
+    state.change.angular = bend[k] * c + own.cross(carried) + e * state.change.angular;
+    state.twist.angular = own + carried;
+  }
+  state.pose.orientation = normalized(state.pose.orientation);
+  return state;
+}
+
+MotionCurve::State MotionCurve::at(double time) const {
+  State state = frame_at(time);
+  const Pose body = inverse(frame_in_body_);
+  const Vector3 arm = state.pose.orientation * body.position;
+  const Vector3 &w = state.twist.angular, &a = state.change.angular;
+  state.pose.position += arm;
+  state.pose.orientation = state.pose.orientation * body.orientation;
+  state.twist.linear += w.cross(arm);
+  state.change.linear += a.cross(arm) + w.cross(w.cross(arm));
+  return state;
+}
+
+}  // namespace gravitas

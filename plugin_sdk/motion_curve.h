@@ -1,0 +1,63 @@
+// The way of a kinematic body that follows a table of poses: a curve with continuous velocities (C1) through its rows.
+//
+// Position: cubic Hermite between rows. Orientation, with s = (t - t_k)/h in a row's interval of length h,
+//
+//   q(s) = exp(b3 c3) exp(b2 c2) exp(b1 c1) q_k,    b1 = 1 - (1-s)^3,  b2 = 3 s^2 - 2 s^3,  b3 = s^3,
+//   c1 = h w_k/3,  c3 = h w_{k+1}/3,  exp(c2) = exp(-c3) q_{k+1} q_k^-1 exp(-c1)
+//
+// (Kim, Kim, Shin, "A general construction scheme for unit quaternion curves with simple high order derivatives",
+// SIGGRAPH 1995, cumulative Bezier basis, here with turns in world axes): unit without normalising, through both rows,
+// with the angular velocities w_k and w_{k+1} there; at a constant angular velocity it is exact.
+//
+// Velocities at rows are those of the parabola through the row and its neighbours (at the ends the first and last
+// three), turns taken as rotation vectors / time; of two rows, their difference quotient. So motion at constant
+// velocities is exact, and so are positions at constant acceleration. Where a neighbouring row says the same position
+// (attitude), the velocity (angular velocity) is zero: a row that stands twice is a rest. Before the first row and
+// after the last the body goes on with the velocities there. Between rows it turns by less than half a turn, the
+// shorter way.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/pose.h"
+
+namespace gravitas {
+
+class MotionCurve {
+ public:
+  // Numbers of a row: time (s), position (m), orientation (w, x, y, z).
+  static constexpr std::size_t kColumns = 8;
+
+  // Says what is wrong with a table (rows one after the other), empty if nothing: not whole rows, none, times that do
+  // not ascend, a number that is not finite, a quaternion that is not unit.
+  static std::string find_problem(std::span<const double> table);
+
+  // The table is that of a frame X_GB^-1 fixed in the body, the curve's poses are those of the body: the geometry's
+  // frame follows the table, the centre of mass goes where that takes it. Precondition: find_problem() finds none.
+  MotionCurve(std::span<const double> table, const Pose& frame_in_body);
+
+  struct State {
+    Pose pose;     // of the body, world
+    Twist twist;   // world
+    Twist change;  // m/s^2, rad/s^2; at a row that of the interval that begins there
+  };
+  State at(double time) const;
+
+ private:
+  struct Row {
+    double time = 0.0;
+    Pose pose;
+    Twist twist;
+    std::array<Vector3, 3> turns;  // c1, c2, c3 of the interval that begins here
+  };
+  State frame_at(double time) const;
+
+  std::vector<Row> rows_;
+  Pose frame_in_body_;
+};
+
+}  // namespace gravitas

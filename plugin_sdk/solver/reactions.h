@@ -1,0 +1,30 @@
+// The solver's second question: reactions of joints for which accelerations agree with the joints in a given state.
+//
+//   J M^-1 J^T lambda = -(gamma + J a),   reaction = J^T lambda
+//
+// a is what forces, the gyroscopic term and drag make of each body (of a kinematic one what it is given), gamma what
+// the velocities alone do to the second derivative of each row's error. Points of a discrepancy are carried by their
+// bodies, its axes by body 1, a radial axis by its points; with w the relative velocity of the points seen from body 1,
+//
+//   along an axis      gamma = a.(w2 x (w2 x r2) - w1 x (w1 x r1) - 2 w1 x w),   r1, r2 the arms to body 2's point
+//   radial, e = x2-x1  gamma = e.(w2 x (w2 x r2) - w1 x (w1 x r1))/|e| + (|e'|^2 - (e.e'/|e|)^2)/|e|
+//   about an axis      gamma = (w1 x a).(w2 - w1)
+//
+// Held are axes that hold always: locked, or limited with one limit, without compliance; driven ones without damping;
+// all without a bound on the force. Limits, friction, springs and bounded drives are left to the end of the step, so
+// they are of first order; so is an angular row whose axis does not turn with body 1 (of ConstantVelocity, and of an
+// Axle's camber).
+//
+// Dependent rows are left out by the factorisation (profile_ldlt.h); rows that contradict each other are met as well as
+// can be (least squares), and `residual` says by how much they are missed. Where a mechanism passes a singular
+// configuration a row there counts as dependent within a pivot of 1e-12 of its diagonal.
+#pragma once
+
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+
+// Throws Refusal for an impossible request (request_check.h), and where a reaction is not finite.
+void solve_reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply);
+
+}  // namespace gravitas

@@ -1,0 +1,56 @@
+// Problems of motion with known answers, as worlds made by hand, and the methods that are measured on them.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "kernel/environment.h"
+#include "tests/kernel/world_builder.h"
+
+namespace gravitas::testing {
+
+// An integrator as it is shown and started.
+struct MotionMethod {
+  std::string name;     // "SymplecticSplitting 4"
+  std::string library;  // "integrator_symplectic_splitting"
+  std::vector<double> settings;
+  double order = 0.0;        // of its theory, on smooth problems
+  double joint_order = 0.0;  // on jointed ones with the simulator Smooth; 0: not claimed
+};
+
+// All shipped integrators; adaptive ones at an accuracy.
+std::vector<MotionMethod> fixed_step_methods();
+std::vector<MotionMethod> adaptive_methods(double accuracy);
+
+struct MotionProblem {
+  std::string name;
+  double duration;  // s
+  bool is_jointed;
+  WorldBuilder world;  // without integrator, steps
+  // Distance of a final state from the known one, relative to the problem's size.
+  std::function<double(const kernel::StateView&)> error;
+};
+
+MotionProblem tumbling_box();        // PROBLEMS' torque-free box: attitude
+MotionProblem spring_and_spin();     // a mass on a spring, with rotation: position, attitude
+MotionProblem point_pendulum();      // on a rod, a quarter swing from rest
+MotionProblem spherical_pendulum();  // on a rod
+MotionProblem double_pendulum();     // two hinged rods
+MotionProblem heavy_top();           // about a fixed point
+MotionProblem four_bar();            // the N-four-bar of two loops: singular twice a turn, redundant
+
+// What a run came to.
+struct MotionResult {
+  double error = 0.0;
+  double joint_error = 0.0;  // largest at a committed step, m
+  double seconds = 0.0;      // of the steps, CPU
+  std::uint64_t derivatives = 0;
+};
+
+// Runs with steps of duration/steps. Jointed problems: with the simulator and solver Direct. Throws std::runtime_error
+// with the fault where the run pauses.
+MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps,
+                        kernel::Simulator simulator = kernel::Simulator::kSmooth);
+
+}  // namespace gravitas::testing

@@ -1,0 +1,143 @@
+// Observed orders of all integrators, free and jointed (simulator Smooth), against their theory.
+//
+// The table in tests/numerics/ORDERS.md is written by
+//   GRAVITAS_TABLES=tests/numerics build/release/bin/test_numerics --gtest_filter='Orders.*'
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/numerics/motion_problem.h"
+
+namespace gravitas {
+namespace {
+
+using testing::MotionMethod;
+using testing::MotionProblem;
+
+// A method on a problem: the coarsest of four steps that halve, small enough for the leading term, large enough for
+// errors above rounding.
+struct Case {
+  const char* method;
+  std::uint32_t steps;
+};
+
+struct Row {
+  std::string problem, method;
+  double theory = 0.0;
+  std::vector<double> errors;
+  double order() const { return std::log2(errors[errors.size() - 2] / errors.back()); }
+};
+
+MotionMethod method_named(const std::string& name) {
+  for (const MotionMethod& method : testing::fixed_step_methods())
+    if (method.name == name) return method;
+  throw std::out_of_range(name);
+}
+
+std::vector<Row>& all_rows() {
+  static std::vector<Row> rows;
+  return rows;
+}
+
+void expect_orders(const MotionProblem& problem, const std::vector<Case>& cases) {
+  for (const Case& one : cases) {
+    const MotionMethod method = method_named(one.method);
+    Row row{problem.name, method.name, method.order, {}};
+    for (std::uint32_t steps = one.steps; steps <= 8 * one.steps; steps *= 2)
+      row.errors.push_back(testing::run_motion(problem, method, steps).error);
+    EXPECT_NEAR(row.order(), row.theory, 0.1) << problem.name << ", " << method.name;
+    all_rows().push_back(row);
+  }
+}
+
+TEST(Orders, OfFreeMotionAreThoseOfTheTheory) {
+  expect_orders(testing::spring_and_spin(), {{"Euler", 20000},
+                                             {"SemiImplicitEuler", 2000},
+                                             {"Verlet", 200},
+                                             {"BasicVerlet", 200},
+                                             {"ImplicitMidpoint", 200},
+                                             {"RK4", 100},
+                                             {"RKMK4", 100},
+                                             {"SymplecticSplitting 2", 200},
+                                             {"SymplecticSplitting 4", 50},
+                                             {"SymplecticSplitting 6", 20}});
+}
+
+TEST(Orders, OfJointedMotionAreThoseOfTheTheory) {
+  expect_orders(testing::double_pendulum(), {{"SemiImplicitEuler", 2000},
+                                             {"Verlet", 500},
+                                             {"BasicVerlet", 500},
+                                             {"ImplicitMidpoint", 500},
+                                             {"RK4", 200},
+                                             {"RKMK4", 200},
+                                             {"SymplecticSplitting 2", 500},
+                                             {"SymplecticSplitting 4", 200}});
+}
+
+TEST(Orders, OfARodInSpaceAreThoseOfTheTheory) {
+  expect_orders(testing::spherical_pendulum(), {{"ImplicitMidpoint", 1000},
+                                                {"RK4", 800},
+                                                {"RKMK4", 800},
+                                                {"SymplecticSplitting 4", 800},
+                                                {"SymplecticSplitting 6", 250}});
+}
+
+// The error of a method of order five per step falls like the accuracy asked for.
+TEST(Orders, AdaptiveMethodsKeepWhatIsAskedOfThem) {
+  for (const MotionProblem& problem :
+       {testing::double_pendulum(), testing::spherical_pendulum(), testing::point_pendulum()}) {
+    for (const double accuracy : {1e-6, 1e-8, 1e-10}) {
+      for (const MotionMethod& method : testing::adaptive_methods(accuracy)) {
+        const double error = testing::run_motion(problem, method, 100).error;
+        // errors of a hundred steps add up, and grow along the motion
+        EXPECT_LT(error, 100.0 * accuracy) << problem.name << ", " << method.name << ", " << accuracy;
+        all_rows().push_back({problem.name, method.name + " " + std::to_string(accuracy), 0.0, {error}});
+      }
+    }
+  }
+}
+
+// With the simulator Basic the same integrator is of first order: what Smooth is for.
+TEST(Orders, WithoutReactionsInTheDerivativeAreOne) {
+  const MotionProblem problem = testing::double_pendulum();
+  const MotionMethod method = method_named("RK4");
+  const double basic = testing::run_motion(problem, method, 1000, kernel::Simulator::kBasic).error;
+  EXPECT_GT(basic, 1e-3);
+  EXPECT_LT(testing::run_motion(problem, method, 1000).error, 1e-5 * basic);
+}
+
+// Last, since it writes what the others found.
+TEST(Orders, TableIsWrittenWhereOneIsAskedFor) {
+  const char* folder = std::getenv("GRAVITAS_TABLES");
+  if (folder == nullptr) GTEST_SKIP() << "GRAVITAS_TABLES is not set";
+  std::ofstream out(std::string(folder) + "/ORDERS.md");
+  out << "# Observed orders\n\nWritten by `GRAVITAS_TABLES=tests/numerics build/release/bin/test_numerics "
+         "--gtest_filter='Orders.*'`.\nErrors at the end, relative to the problem's size (m or rad), for a step and "
+         "its "
+         "half, quarter and eighth; the order is\nthat between the last two. Jointed problems: simulator Smooth, "
+         "solver "
+         "Direct.\n\n"
+         "| problem | integrator | theory | observed | errors |\n| --- | --- | --- | --- | --- |\n";
+  for (const Row& row : all_rows()) {
+    if (row.errors.size() < 2) continue;
+    std::string errors;
+    for (const double error : row.errors) {
+      char text[32];
+      std::snprintf(text, sizeof text, "%s%.1e", errors.empty() ? "" : ", ", error);
+      errors += text;
+    }
+    char order[32];
+    std::snprintf(order, sizeof order, "%.0f | %.2f", row.theory, row.order());
+    out << "| " << row.problem << " | " << row.method << " | " << order << " | " << errors << " |\n";
+  }
+  EXPECT_TRUE(out.good());
+}
+
+}  // namespace
+}  // namespace gravitas
