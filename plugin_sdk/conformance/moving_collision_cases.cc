@@ -8,6 +8,7 @@
 #include "plugin_sdk/conformance/slot_cases.h"
 #include "plugin_sdk/conformance/solids.h"
 #include "plugin_sdk/math/motion.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas::conformance {
 namespace {
@@ -136,10 +137,10 @@ std::vector<KnownImpact> known_impacts(const PluginDeclaration& d) {
                        return world;
                      }(),
                      // law of cosines: 25 + 25 + 50 cos(angle) = 4
-                     std::acos(-46.0 / 50.0) / 3.14159265358979, Vector3(0.2, 0.0, 0.0)});
+                     math::acos(-46.0 / 50.0) / 3.14159265358979, Vector3(0.2, 0.0, 0.0)});
     known.back().normal = [&] {
-      const double angle = std::acos(-46.0 / 50.0);
-      return Vector3(0.5 * (5.0 + 5.0 * std::cos(angle)), 0.5 * 5.0 * std::sin(angle), 0.0);
+      const double angle = math::acos(-46.0 / 50.0);
+      return Vector3(0.5 * (5.0 + 5.0 * math::cos(angle)), 0.5 * 5.0 * math::sin(angle), 0.0);
     }();
     if (has("Halfspace"))
       known.push_back({"a half-space and a unit sphere that falls on it from 4 m",

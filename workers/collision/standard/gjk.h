@@ -1,7 +1,5 @@
-// The direction between two boxes or cylinders by the method of Gilbert, Johnson and Keerthi (1988): the
-// point of A - B closest to the origin, found by closest points of growing simplices
-// (plugin_sdk/geometry/simplex.h). find_separation() of the SDK does the same for any support maps; here the search
-// begins where the separating axes ended, and needs neither points nor depth.
+// The distance between two convex shapes by the method of Gilbert, Johnson and Keerthi (1988): the
+// point of A - B closest to the origin, found by closest points of growing simplices.
 #pragma once
 
 #include "plugin_sdk/math/types.h"
