@@ -194,8 +194,7 @@ void Environment::find_touching() {
 
 // Before the states are swapped: back() is what comes, front() what was.
 double Environment::inner_end_time() const {
-  const bool is_last = inner_end_ == length_of_step(step_count_ + 1);
-  return is_last ? time_of(step_count_ + 1) : time() + inner_end_;
+  return inner_end_ == length_of_step(step_count_ + 1) ? time_of(step_count_ + 1) : time() + inner_end_;
 }
 
 void Environment::raise_collision_events() {

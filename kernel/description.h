@@ -108,7 +108,7 @@ struct ConstraintDescription {
 };
 
 // How a step is made of stages (simulators/).
-enum class Simulator : std::uint32_t { kBasic, kSubstepping, kBisection, kContinuous, kSmooth };
+enum class Simulator : std::uint32_t { kBasic, kSubstepping, kSmooth, kBisection, kContinuous };
 
 struct EnvironmentDescription {
   std::string id;

@@ -139,10 +139,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void make_inner_steps();
   void finish_inner_step(const Trusted<TrialState>& trial);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
-  bool locates_events() const {
-    return has_contacts() &&
-           (description_.simulator == Simulator::kBisection || description_.simulator == Simulator::kContinuous);
-  }
+  bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
   void locate_events(double begin, double length);
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);

@@ -64,14 +64,13 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
 
 // Why a plugin cannot serve the simulator; empty if it can.
 std::string Environment::why_unfit(const PluginDeclaration& plugin) const {
-  const char* simulator = knows_reactions() ? "Smooth" : "Continuous";
-  const bool is_asked = knows_reactions()
-                            ? plugin.slot == Slot::kSolver
-                            : description_.simulator == Simulator::kContinuous && plugin.slot == Slot::kCollision;
-  const char* capability = knows_reactions() ? "reactions" : "times_of_impact";
-  if (!is_asked || std::ranges::find(plugin.capabilities, capability) != plugin.capabilities.end()) return {};
-  return std::string("the simulator ") + simulator + " needs a plugin with the capability '" + capability +
-         "' in slot " + slot_name(plugin.slot) + ", and " + plugin.name + " has it not";
+  const bool is_smooth = knows_reactions(), asks = is_smooth || description_.simulator == Simulator::kContinuous;
+  const char* capability = is_smooth ? "reactions" : "times_of_impact";
+  if (!asks || plugin.slot != (is_smooth ? Slot::kSolver : Slot::kCollision)) return {};
+  if (std::ranges::find(plugin.capabilities, capability) != plugin.capabilities.end()) return {};
+  return std::string("the simulator ") + (is_smooth ? "Smooth" : "Continuous") +
+         " needs a plugin with the capability '" + capability + "' in slot " + slot_name(plugin.slot) + ", and " +
+         plugin.name + " has it not";
 }
 
 void Environment::check_fallbacks() const {
@@ -89,8 +88,7 @@ void Environment::check_fallbacks() const {
 
 void Environment::order_swap(SwapOrder order, bool compares) {
   const std::uint32_t row = place_of(order);
-  StageSlot& slot = slot_of(order.slot);
-  slot.order_swap(std::move(order), row, compares);
+  slot_of(order.slot).order_swap(std::move(order), row, compares);
 }
 
 std::vector<SwapRecord> Environment::swaps() const {

@@ -3,40 +3,14 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <utility>
+
+#include "plugin_sdk/pair_rule.h"
 
 namespace gravitas::kernel {
 namespace {
 
 constexpr double kMarginShare = 0.01;
-
-// Two bodies can touch if both have a shape, one can be pushed, and their filters let them.
-bool can_any_touch(const EnvironmentDescription& d) {
-  // bodies that differ in nothing that matters here count once
-  struct Kind {
-    std::uint32_t flags;
-    std::uint64_t group, mask;
-    int count;
-  };
-  std::vector<Kind> kinds;
-  for (const BodyDescription& body : d.bodies) {
-    if ((body.flags & kHasShape) == 0) continue;
-    const auto same = std::ranges::find_if(kinds, [&](const Kind& kind) {
-      return kind.flags == body.flags && kind.group == body.filter_group && kind.mask == body.filter_mask;
-    });
-    if (same != kinds.end()) {
-      ++same->count;
-    } else {
-      kinds.push_back({body.flags, body.filter_group, body.filter_mask, 1});
-    }
-  }
-  for (const Kind& a : kinds) {
-    for (const Kind& b : kinds) {
-      if (&a == &b && a.count < 2) continue;
-      if (((a.flags | b.flags) & kMovable) != 0 && (a.group & b.mask) != 0 && (b.group & a.mask) != 0) return true;
-    }
-  }
-  return false;
-}
 
 void add(Plan* plan, Slot slot, const SlotDescription& description) {
   PlannedSlot& planned = plan->slots.emplace_back();
@@ -76,7 +50,9 @@ Plan make_plan(EnvironmentDescription* d) {
     leave_out(&plan, &d->force, "force", "no force acts on any body");
   }
 
-  const bool has_contacts = can_any_touch(*d);
+  std::vector<TouchRights> rights;
+  for (const BodyDescription& body : d->bodies) rights.push_back({body.flags, body.filter_group, body.filter_mask});
+  const bool has_contacts = can_any_touch(std::move(rights));
   if (d->simulator == Simulator::kSmooth && has_contacts)
     throw std::invalid_argument(
         "the simulator Smooth moves bodies that cannot touch, and some of these can: leave out their geometry, forbid "

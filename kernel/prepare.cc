@@ -1,7 +1,5 @@
 // What an environment does once, before its first step: start its hosts, bind its joints, ask for the forces.
 #include <algorithm>
-#include <iterator>
-#include <numeric>
 #include <stdexcept>
 
 #include "kernel/environment.h"

@@ -69,11 +69,6 @@ class ColumnReader {
   std::string problem_;
 };
 
-bool can_touch(const Model& model, std::uint32_t a, std::uint32_t b) {
-  return a < b && b < model.body_count && ((model.flags[a] | model.flags[b]) & kMovable) != 0 &&
-         (model.flags[a] & model.flags[b] & kHasShape) != 0;
-}
-
 bool are_flags(std::span<const std::uint32_t> column) {
   return std::ranges::all_of(column, [](std::uint32_t flag) { return flag <= 1; });
 }
@@ -101,16 +96,9 @@ std::string find_wrong_body(const State& state, const State& initial, const Mode
 std::string find_wrong_memory(const State& state, const Model& model, bool has_contacts) {
   if (!has_contacts && (state.contact_key.size() > 0 || state.touching.size() > 0))
     return "there are contacts, and nothing can touch";
-  const auto contact = [&](std::size_t i) {
-    return std::tuple{state.contact_body[2 * i], state.contact_body[2 * i + 1], state.contact_feature[i]};
-  };
-  for (std::size_t i = 0; i < state.contact_key.size(); ++i) {
-    const auto [a, b, feature] = contact(i);
-    if (!can_touch(model, a, b)) return at_row("contact_body", i) + " is not two bodies that can touch";
-    if (i > 0 && !(contact(i - 1) < contact(i)))
-      return at_row("contact_body", i) + " is not in ascending order, or stands twice";
-    if (state.contact_correction[i] < 0.0) return at_row("contact_correction", i) + " is negative";
-  }
+  const AnswerProblem contacts = check_remembered_contacts(state.contact_body.span(), state.contact_feature.span(),
+                                                           state.contact_correction.span(), model.flags.span());
+  if (!contacts.text.empty()) return contacts.text;
   for (std::size_t i = 0; i < state.discrepancy_constraint.size(); ++i) {
     const std::uint32_t joint = state.discrepancy_constraint[i];
     if (joint >= model.constraint_count || (i > 0 && joint < state.discrepancy_constraint[i - 1]))

@@ -1,6 +1,7 @@
 #include "plugin_sdk/answer_checks.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "plugin_sdk/body.h"
@@ -38,6 +39,19 @@ AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const s
       return bad_structure("pair", i, " is two bodies that cannot touch");
     if (i > 0 && !(std::pair(pair[2 * i - 2], pair[2 * i - 1]) < std::pair(a, b)))
       return bad_structure("pair", i, " is not in ascending order, or stands twice");
+  }
+  return {};
+}
+
+AnswerProblem check_remembered_contacts(std::span<const std::uint32_t> body, std::span<const std::uint32_t> feature,
+                                        std::span<const double> correction, std::span<const std::uint32_t> flags) {
+  const auto contact = [&](std::size_t i) { return std::tuple{body[2 * i], body[2 * i + 1], feature[i]}; };
+  for (std::size_t i = 0; i < feature.size(); ++i) {
+    if (!check_pairs(body.subspan(2 * i, 2), flags).text.empty())
+      return bad_structure("contact_body", i, " is not two bodies that can touch");
+    if (i > 0 && !(contact(i - 1) < contact(i)))
+      return bad_structure("contact_body", i, " is not in ascending order, or stands twice");
+    if (correction[i] < 0.0) return bad_number("contact_correction", i, " is negative");
   }
   return {};
 }

@@ -22,6 +22,11 @@ struct AnswerProblem {
 // Pairs (a, b): a < b, both with a shape, one movable (flags of body.h), ascending, each once.
 AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> flags);
 
+// Contacts that are remembered from a step to the next, by their bodies (2 a row): two that can touch, ascending by
+// (bodies, feature), each once; no negative correction.
+AnswerProblem check_remembered_contacts(std::span<const std::uint32_t> body, std::span<const std::uint32_t> feature,
+                                        std::span<const double> correction, std::span<const std::uint32_t> flags);
+
 // Impacts of `pairs` pairs: at most one a pair, ascending; fractions in 0 … 1; unit normals.
 AnswerProblem check_impact_rows(std::span<const std::uint32_t> pair, std::span<const double> fraction,
                                 std::span<const double> normal, std::uint64_t pairs);

@@ -1,10 +1,30 @@
 // The one rule by which every space decides whether two bodies are a pair, so that all spaces agree.
 #pragma once
 
+#include <compare>
+#include <cstdint>
+#include <vector>
+
 #include "plugin_sdk/body.h"
 #include "schemas/stage_frames.h"
 
 namespace gravitas {
+
+// What a body brings to the question whom it may touch.
+struct TouchRights {
+  std::uint32_t flags = 0;  // BodyFlag bits
+  std::uint64_t group = 0, mask = 0;
+  auto operator<=>(const TouchRights&) const = default;
+};
+
+// Both have shapes, one of them can be pushed, and their filters allow it.
+constexpr bool may_touch(const TouchRights& a, const TouchRights& b) {
+  return (a.flags & b.flags & kHasShape) != 0 && ((a.flags | b.flags) & kMovable) != 0 && (a.group & b.mask) != 0 &&
+         (b.group & a.mask) != 0;
+}
+
+// True if any two of the bodies may touch. Cost: n log n, and quadratic in how many differ.
+bool can_any_touch(std::vector<TouchRights> bodies);
 
 // True if bodies a and b both have shapes, one of them can be pushed, their filters allow it, and their closed
 // bounds overlap.
@@ -18,8 +38,7 @@ class PairRule {
         mask_(request.filter_mask()) {}
 
   bool may_touch(std::uint32_t a, std::uint32_t b) const {
-    return (flags_[a] & flags_[b] & kHasShape) != 0 && ((flags_[a] | flags_[b]) & kMovable) != 0 &&
-           (group_[a] & mask_[b]) != 0 && (group_[b] & mask_[a]) != 0;
+    return gravitas::may_touch({flags_[a], group_[a], mask_[a]}, {flags_[b], group_[b], mask_[b]});
   }
 
   bool bounds_overlap(std::uint32_t a, std::uint32_t b) const {

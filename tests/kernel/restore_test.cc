@@ -193,7 +193,7 @@ const std::vector<Spoilt>& ways_to_spoil() {
       {"huge_body", [](OwnedState* s) { s->u32("contact_body")[1] = ~0U; }, "not two bodies that can touch"},
       {"itself", [](OwnedState* s) { s->u32("contact_body")[1] = s->u32("contact_body")[0]; }, "can touch"},
       {"twice", [](OwnedState* s) { s->u32("contact_feature")[1] = s->u32("contact_feature")[0]; }, "stands twice"},
-      {"pulls", [](OwnedState* s) { s->f64("contact_correction")[0] = -1.0; }, "contact_correction is negative"},
+      {"pulls", [](OwnedState* s) { s->f64("contact_correction")[0] = -1.0; }, "contact_correction of row 0 is negative"},
       {"no_joint", [](OwnedState* s) { s->u32("discrepancy_constraint")[0] = 1; }, "is no joint"},
       {"no_pair", [](OwnedState* s) { s->u32("touching")[0] = 9; },
        "pairs that touch, pair of row 0 is not two bodies"},

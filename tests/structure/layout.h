@@ -10,8 +10,10 @@ namespace gravitas::structure {
 
 /// Longest C++, proto, Python or TypeScript file, in lines: beyond it a file is more than one idea.
 inline constexpr int kLongestFile = 600;
-/// All C++ of kernel/ together, in lines: what can be read in an afternoon.
+/// All C++ of kernel/ together, in lines, but for the simulators: what can be read in an afternoon.
 inline constexpr int kLongestKernel = 6000;
+/// A simulator, in lines: each is an order of stages of its own, in one file, and may come and go.
+inline constexpr int kLongestSimulator = 150;
 /// Longest README of a room, in lines: a page.
 inline constexpr int kLongestReadme = 60;
 

@@ -66,10 +66,13 @@ TEST(Sizes, OfThisRepositoryReadWell) { EXPECT_EQ(report(find_overlong_sources(t
 TEST(Sizes, AFileAtTheLimitPassesAndOneBeyondIsFound) {
   const SampleTree sample({{"workers/a.cc", lines(kLongestFile)},
                            {"workers/b.h", lines(kLongestFile + 1)},
+                           {"kernel/simulators/a.cc", lines(kLongestSimulator)},
+                           {"kernel/simulators/b.cc", lines(kLongestSimulator + 1)},
                            {"deploy/scenes/c.gravitas", lines(kLongestFile + 1)}});
   const auto findings = find_overlong_sources(sample.tree());
-  ASSERT_EQ(findings.size(), 1u) << report(findings);
-  EXPECT_EQ(findings[0].path, "workers/b.h");
+  ASSERT_EQ(findings.size(), 2u) << report(findings);
+  EXPECT_EQ(findings[0].path, "kernel/simulators/b.cc");
+  EXPECT_EQ(findings[1].path, "workers/b.h");
 }
 
 TEST(Sizes, AKernelBeyondAnAfternoonIsFound) {
