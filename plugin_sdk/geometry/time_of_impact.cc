@@ -48,7 +48,7 @@ class TurningCore {
   double remainder(const Vector3& n) const { return length_of(n.cross(spin_)) * rate_ * off_axis_; }
 
   const SupportMap& map() const { return map_; }
-  const Matrix3& R() const { return R_; }
+  const Matrix3& axes() const { return R_; }
   const Vector3& p() const { return p_; }
   const Vector3& spin() const { return spin_; }
   // Of the farthest point from the centre, and of what moves when the body turns.
@@ -105,10 +105,10 @@ class ConvexApproach {
   void look(double t) {
     a_.place(t), b_.place(t);
     centres_ = offset_ + t * velocity_;
-    const PlacedPair pair{a_.map(), b_.map(), a_.R().transpose() * b_.R(),
-                          a_.R().transpose() * (centres_ + b_.p() - a_.p())};
+    const PlacedPair pair{a_.map(), b_.map(), a_.axes().transpose() * b_.axes(),
+                          a_.axes().transpose() * (centres_ + b_.p() - a_.p())};
     least_ = find_separation(pair, std::numeric_limits<double>::infinity());
-    normal_ = a_.R() * least_.normal;
+    normal_ = a_.axes() * least_.normal;
     turning_a_ = a_.turning(normal_), turning_b_ = b_.turning(normal_);
     remainder_ = a_.remainder(normal_) + b_.remainder(normal_);
     rounding_ = pair.rounding();
@@ -125,7 +125,7 @@ class ConvexApproach {
   }
   Impact impact(double t) const {
     const Vector3 middle = 0.5 * (least_.point_a + least_.point_b);
-    return {t, normal_, start_ + t * motion_ + a_.p() + a_.R() * middle, least_.depth};
+    return {t, normal_, start_ + t * motion_ + a_.p() + a_.axes() * middle, least_.depth};
   }
 
   double step(double half_target, double rest) const {
@@ -183,8 +183,8 @@ class HalfspaceApproach {
            0.5 * s * s * remainder_;
   }
   Impact impact(double t) const {
-    const Vector3 farthest = b_.map().support(b_.R().transpose() * -up_);
-    const Vector3 foot = b_.p() + b_.R() * farthest - b_.map().rounding() * up_;
+    const Vector3 farthest = b_.map().support(b_.axes().transpose() * -up_);
+    const Vector3 foot = b_.p() + b_.axes() * farthest - b_.map().rounding() * up_;
     const Vector3 centre = ground_.start.position + t * ground_.motion.displacement + centres_;
     return {t, up_, centre + foot - (0.5 * gap_) * up_, -gap_};
   }
