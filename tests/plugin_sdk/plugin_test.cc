@@ -280,6 +280,9 @@ class ToyForce final : public ForcePlugin {
 };
 class ToySolver final : public SolverPlugin {
   void solve(const stage::SolverSolveRequest&, const stage::SolverSolveReply&, Host&) override { asked += "solve "; }
+  void reactions(const stage::SolverReactionsRequest&, const stage::SolverReactionsReply&, Host&) override {
+    asked += "reactions ";
+  }
 };
 class ToyIntegrator final : public IntegratorPlugin {
   void integrate(const stage::IntegratorIntegrateRequest&, const stage::IntegratorIntegrateReply&, Host&) override {
@@ -311,7 +314,7 @@ TEST(PluginSlots, EachAnswersItsOwnQuestionsOnly) {
   EXPECT_EQ(try_every_method<MovingCollision>(), Answer("manifolds times_of_impact rays ", 3));
   EXPECT_EQ(try_every_method<ToyConstraint>(), Answer("bind discrepancies ", 2));
   EXPECT_EQ(try_every_method<ToyForce>(), Answer("wrenches ", 1));
-  EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve ", 1));
+  EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve reactions ", 2));
   EXPECT_EQ(try_every_method<ToyIntegrator>(), Answer("integrate ", 1));
 }
 

@@ -95,7 +95,8 @@ Simulator { CustomProperties { TimeStep = )" +
          testing::literal(time_step) + R"( Duration = 1 } }
 Environment {
   Space { Bodies {
-    Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = { "Link" } KineticProperties { Position = {1.2, 0, 0} } }
+    Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = { "Link" }
+      KineticProperties { Position = {1.2, 0, 0} } }
     Body { Id = "B" Mass = 1 PrincipalMoments = {1, 1, 1} } } }
   KineticIntegrator )" +
          integrator + "\n}\n";
@@ -132,7 +133,8 @@ TEST(Floating, FindsItsDepthAndComesUpright) {
   SceneRun run(R"(
 Geometries { Geometry { Type = "Box" Id = "Raft" CustomProperties { HalfExtents = {1, 0.25, 2} } } }
 Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } }
-  Force { Type = "Buoyancy" Id = "Lake" CustomProperties { FluidDensity = 1000 FluidLevel = 3 LinearDrag = 8000 AngularDrag = 8000 } } }
+  Force { Type = "Buoyancy" Id = "Lake"
+    CustomProperties { FluidDensity = 1000 FluidLevel = 3 LinearDrag = 8000 AngularDrag = 8000 } } }
 Simulator { CustomProperties { TimeStep = 0.01 Duration = 40 } }
 Environment {
   Space { Bodies { Body { Id = "Raft" GeometryId = "Raft" MassDensity = 600 Forces = { "Down", "Lake" }
@@ -149,8 +151,8 @@ Environment {
 
 // ---- joined bodies
 
-// A point on a massless rod of 1 m from the horizontal: x, y at 10 s. The solver projects after a free step, so that the
-// order is one; the error of today's pipeline, and that it halves with the step.
+// A point on a massless rod of 1 m from the horizontal: x, y at 10 s. The simulator Basic projects after a free step,
+// so that the order is one: the error, and that it halves with the step.
 TEST(JoinedBodies, SwingToFirstOrder) {
   const auto error_at = [](double h) {
     SceneRun run(R"(

@@ -327,6 +327,7 @@ TEST(StageFrames, MethodsAreNumberedAsTheyAreListed) {
   EXPECT_EQ(name(stage::Method::kIntegratorIntegrate), "Integrator.Integrate");
   EXPECT_EQ(name(stage::Method::kIntegratorDerivative), "Integrator.Derivative");
   EXPECT_EQ(name(stage::Method::kSolverSolve), "Solver.Solve");
+  EXPECT_EQ(name(stage::Method::kSolverReactions), "Solver.Reactions");
 }
 
 TEST(StageFrames, PackagesCarryAMajorVersionAndMatchTheirFolder) {

@@ -17,6 +17,7 @@ namespace {
 using kernel::BodyDescription;
 using kernel::BoundKind;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 constexpr double kPi = std::numbers::pi;
@@ -254,6 +255,31 @@ TEST(BuildBodies, ABoundOfTheUnboundedIsNone) {
               ElementsAre("scene:2:44: warning: Body \"Ball\" has an unbounded geometry: "
                           "BoundingVolumeType \"Sphere\" "
                           "is taken as \"None\""));
+}
+
+// ---- motion
+
+TEST(BuildBodies, StartWhereTheirMotionHasThem) {
+  const BodyDescription door = body(
+      "GeometryId = \"Brick\" Kinematic = true Motion = {{-1, {0, 0, 0}, {1, 0, 0, 0}}, {1, {2, 4, 6}, {1, 0, 0, 0}}}");
+  EXPECT_EQ(door.motion.size(), 16U);
+  expect_vector(door.pose.position, Vector3(1, 2, 3));
+  expect_vector(door.twist.linear, Vector3(1, 2, 3));
+}
+
+TEST(BuildBodies, RefuseAMotionThatCannotBeFollowed) {
+  const std::string row = "{0, {0, 0, 0}, {1, 0, 0, 0}}",
+                    kinematic = "GeometryId = \"Unit\" Kinematic = true Motion = ";
+  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 1 Motion = {" + row + "}"),
+              ElementsAre(HasSubstr("has a Motion and is not kinematic; required: Kinematic = true")));
+  EXPECT_THAT(errors_of(kinematic + "{" + row + "} KineticProperties { Position = {0, 0, 1} }"),
+              ElementsAre(HasSubstr("starts where its Motion is at time 0; allowed: leave out pose and velocities")));
+  EXPECT_THAT(errors_of(kinematic + "{}"), ElementsAre(HasSubstr("Motion is a list of 0; allowed: {{t, {px, py, pz}")));
+  EXPECT_THAT(errors_of(kinematic + "{{0, {0, 0, 0}}}"), ElementsAre(HasSubstr("row 0 of Motion is a list of 2")));
+  EXPECT_THAT(errors_of(kinematic + "{" + row + ", " + row + "}"),
+              ElementsAre(HasSubstr("the time of row 1 of Motion is 0; allowed")));
+  EXPECT_THAT(errors_of(kinematic + "{{0, {0, 0, 0}, {2, 0, 0, 0}}}"),
+              ElementsAre(HasSubstr("the orientation of row 0 of Motion")));
 }
 
 // ---- what they name
