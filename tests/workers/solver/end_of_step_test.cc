@@ -258,6 +258,59 @@ TEST(EndOfStepDegenerate, OverlapGivesNoSpeed) {
   EXPECT_LE(answer.velocity(ball).norm(), 1e-12);
 }
 
+// Immovable and kinematic bodies on both sides of a joint and of a contact: nothing to push, nothing done.
+TEST(EndOfStepDegenerate, InfiniteMassesOnBothSidesAreLeftAlone) {
+  SolverProblem p;
+  const auto ground = p.add_immovable();
+  const auto lift = p.add_body({.linear = {0, -1, 0}, .kinematic = true});
+  const auto ball = p.add_body({.pose = {{5, 0, 0}, Quaternion::Identity()}});
+  p.make_trial({0, -9.81, 0});
+  p.add_contact({.body1 = ground, .body2 = lift, .depth = 0.1});
+  p.add_discrepancy(ground, lift, p.joint_at(ground, lift, {0, 0, 0}));
+  for (const EndOfStepSolver& solver : {newton(), direct()}) {
+    const SolverAnswer answer = p.solve(solver);
+    EXPECT_EQ(answer.velocity(lift), Vector3(0, -1, 0));
+    EXPECT_EQ(answer.translation(lift), Vector3::Zero());
+    EXPECT_EQ(answer.impulse(0), Vector3::Zero());
+    EXPECT_EQ(answer.velocity(ball), p.trial_twist(ball).linear);
+  }
+}
+
+// Two balls at one place, pushed apart along whatever normal was chosen: the whole overlap, shared by mass, and no speed.
+TEST(EndOfStepDegenerate, CoincidentBodiesPart) {
+  SolverProblem p;
+  const auto one = p.add_body({.mass = 1.0}), two = p.add_body({.mass = 3.0});
+  p.make_trial(Vector3::Zero());
+  p.add_contact({.body1 = one, .body2 = two, .normal = Vector3::UnitX(), .depth = 1.0, .restitution = 0.5});
+  for (const EndOfStepSolver& solver : {newton(), direct()}) {
+    const SolverAnswer answer = p.solve(solver);
+    EXPECT_NEAR(answer.translation(one).x(), -0.75, 1e-12);
+    EXPECT_NEAR(answer.translation(two).x(), 0.25, 1e-12);
+    EXPECT_LE(answer.velocity(one).norm() + answer.velocity(two).norm(), 1e-12);
+  }
+}
+
+// At 1000 g a ball on the ground stays where it is, and the ground bears 1000 times its weight.
+TEST(EndOfStepDegenerate, AThousandTimesGravityIsCarried) {
+  SolverProblem p;
+  const auto ground = p.add_immovable();
+  const auto ball = p.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}});
+  p.make_trial({0, -9810, 0});
+  const double depth = 0.5 - p.trial_pose(ball).position.y();
+  p.add_contact({.body1 = ground,
+                 .body2 = ball,
+                 .point = {0, -0.5 * depth, 0},
+                 .depth = depth,
+                 .static_friction = 0.5,
+                 .dynamic_friction = 0.5});
+  for (const EndOfStepSolver& solver : {newton(), direct()}) {
+    const SolverAnswer answer = p.solve(solver);
+    EXPECT_NEAR(answer.impulse(0).y(), 98.1, 98.1 * 1e-14);
+    EXPECT_NEAR(p.committed(answer, ball).position.y(), 0.5, 1e-14);
+    EXPECT_LE(answer.velocity(ball).norm(), 98.1 * 1e-14);
+  }
+}
+
 // Painlevé's rod, mu beyond 4/3: no solution may exist; the answer is finite and says so.
 TEST(EndOfStepDegenerate, PainlevesRodIsAnswered) {
   for (const double mu : {0.5, 1.5, 3.0}) {
@@ -293,6 +346,58 @@ TEST(EndOfStep, RollingAndSpinningFrictionAreBoundedTorques) {
                    .spinning = coefficient});
     const SolverAnswer answer = p.solve(newton());
     EXPECT_NEAR(answer.turning(ball).y(), std::max(0.0, 4.0 - coefficient * 0.0981 / 0.4), 1e-12);
+  }
+}
+
+// A ball that rolls evenly at 2 m/s is held back by a torque of mu_r N and the friction F that keeps it rolling:
+// m a = -F, I a/r = F r - mu_r N, so a = -mu_r N / (r (m + I/r^2)).
+TEST(EndOfStep, RollingFrictionSlowsABallThatRolls) {
+  SolverProblem p;
+  const auto ground = p.add_immovable();
+  const auto ball =
+      p.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}, .linear = {2, 0, 0}, .angular = {0, 0, -4}});
+  p.theta = 0.0;
+  p.set_trial_velocity(ball, {2, -0.0981, 0}, {0, 0, -4});
+  p.add_contact({.body1 = ground, .body2 = ball, .static_friction = 0.5, .dynamic_friction = 0.5, .rolling = 0.02});
+  const SolverAnswer answer = p.solve(newton());
+  const double lost = 0.02 * 0.0981 / (0.5 * (1.0 + 0.4 / 0.25));
+  EXPECT_NEAR(answer.velocity(ball).x(), 2.0 - lost, 1e-12);
+  EXPECT_NEAR(answer.turning(ball).z(), -(2.0 - lost) / 0.5, 1e-12);
+}
+
+// Ten cubes of 1 kg at rest under 1 to 10,000 kg: contact k bears the weight above it, to 1e-8, and nothing sinks.
+TEST(EndOfStep, AStackCarriesItsWeightAtEveryRatio) {
+  for (const double load : {1.0, 1e2, 1e4}) {
+    SolverProblem p;
+    p.time_step = 1.0 / 60;
+    const auto ground = p.add_immovable();
+    for (int i = 0; i <= 10; ++i) {
+      const double mass = i == 10 ? load : 1.0;
+      p.add_body(
+          {.mass = mass, .moments = Vector3::Constant(mass / 6.0), .pose = {{0, 0.5 + i, 0}, Quaternion::Identity()}});
+    }
+    p.make_trial({0, -9.81, 0});
+    const double fallen = 9.81 / 3600.0;
+    for (int i = 0; i <= 10; ++i)
+      for (int corner = 0; corner < 4; ++corner)
+        p.add_contact({.body1 = i == 0 ? ground : static_cast<std::uint32_t>(i),
+                       .body2 = static_cast<std::uint32_t>(i + 1),
+                       .point = {corner % 2 - 0.5, i - (i == 0 ? 0.5 : 1.0) * fallen, corner / 2 - 0.5},
+                       .depth = i == 0 ? fallen : 0.0,
+                       .static_friction = 0.5,
+                       .dynamic_friction = 0.5,
+                       .key = static_cast<std::uint64_t>(4 * i + corner + 1)});
+    const SolverAnswer answer = p.solve(newton());
+    EXPECT_TRUE(answer.converged()) << load;
+    for (std::size_t i = 0; i <= 10; ++i) {
+      double force = 0.0;
+      for (std::size_t corner = 0; corner < 4; ++corner) force += 60.0 * answer.impulse(4 * i + corner).y();
+      const double weight = 9.81 * (static_cast<double>(10 - i) + load);
+      EXPECT_NEAR(force, weight, 1e-8 * weight) << load << ", " << i;
+      EXPECT_NEAR(p.committed(answer, static_cast<std::uint32_t>(i + 1)).position.y(), 0.5 + static_cast<double>(i),
+                  1e-12)
+          << load << ", " << i;
+    }
   }
 }
 
