@@ -5,6 +5,7 @@
 
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/motion_curve.h"
+#include "plugin_sdk/slots.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
@@ -78,8 +79,7 @@ std::string EnvironmentDescription::validate() const {
     if (std::string problem = validate_body(*this, body); !problem.empty()) return problem;
   for (const ConstraintDescription& joint : constraints)
     if (std::string problem = validate_joint(*this, joint); !problem.empty()) return problem;
-  for (const Slot which :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+  for (const Slot which : kSlots)
     if (!(slot(which).deadline > 0.0))
       return std::string("the deadline of slot ") + slot_name(which) + " must be positive";
   return {};

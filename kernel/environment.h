@@ -111,7 +111,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Throws std::invalid_argument if the slot is left out or hosted in this process.
   void inject(FaultInjection fault);
   // See StageSlot::set_rerun_every().
-  void set_rerun_every(Slot slot, std::uint32_t calls) { slot_of(slot).set_rerun_every(calls); }
+  void set_rerun_every(Slot slot, std::uint32_t steps) { slot_of(slot).set_rerun_every(steps); }
   // What is worth a line in the report and no fault: complaints of workers, direct calls beyond their deadline.
   std::vector<std::string> warnings();
   const DurationHistogram& stage_time(Stage stage) const { return profile_[static_cast<std::size_t>(stage)]; }

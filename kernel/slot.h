@@ -113,8 +113,8 @@ class StageSlot {
   void order_swap(SwapOrder order, std::uint32_t target, bool only_compare = false);
   // All so far, in the order they were asked for.
   std::vector<SwapRecord> swaps() const;
-  // Every so many calls another process is asked the same, and must give the same bytes; 0: never.
-  void set_rerun_every(std::uint32_t calls);
+  // In every so many steps another process is asked the same, and must give the same bytes; 0: never.
+  void set_rerun_every(std::uint32_t steps);
 
  private:
   // The plugins of a slot live in one host, but for those that are commands or at an address.
@@ -129,7 +129,6 @@ class StageSlot {
   };
   struct Rerun {
     std::uint32_t every = 0;
-    std::uint64_t calls = 0;
     std::vector<std::unique_ptr<Carrier>> checkers;  // per host
   };
 

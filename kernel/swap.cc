@@ -52,8 +52,8 @@ std::vector<SwapRecord> StageSlot::swaps() const {
   return records;
 }
 
-void StageSlot::set_rerun_every(std::uint32_t calls) {
-  rerun_.every = calls;
+void StageSlot::set_rerun_every(std::uint32_t steps) {
+  rerun_.every = steps;
   update_watch();
 }
 
@@ -184,7 +184,7 @@ void StageSlot::watch(const StageCall& call, Arena* arena, DerivativeSource* der
       ++i;
     }
   }
-  if (rerun_.every > 0 && ++rerun_.calls % rerun_.every == 0) rerun(call, arena, derivatives, recheck);
+  if (rerun_.every > 0 && step_ % rerun_.every == 0) rerun(call, arena, derivatives, recheck);
 }
 
 // False if the swap is refused.

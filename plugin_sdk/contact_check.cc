@@ -175,7 +175,7 @@ class ContactCheck {
     deepest_ = -std::numeric_limits<double>::infinity();
     for (std::size_t row = first; row < end; ++row) deepest_ = std::max(deepest_, answer_.depth[row]);
     for (std::size_t row = first; row < end; ++row) {
-      if (!check_velocity(row, one, two)) return false;
+      if (!check_velocity(row, one, two) || !check_distinct(row, first)) return false;
       const Vector3 normal = vector_at(answer_.normal, row), half = 0.5 * answer_.depth[row] * normal;
       const Vector3 point = vector_at(answer_.point, row);
       // two solids with edges: a point may stand for a patch, beside the face it is measured from
@@ -208,6 +208,16 @@ class ContactCheck {
     const Vector3 relative = velocity(two) - velocity(one);
     return is_within("relative_velocity", row, (vector_at(answer_.relative_velocity, row) - relative).norm(),
                      kOfCoordinates * sizes, "v_b - v_a at the point, m/s");
+  }
+
+  // A contact that stands twice, under two features.
+  bool check_distinct(std::size_t row, std::size_t first) {
+    for (std::size_t other = first; other < row; ++other) {
+      if (vector_at(answer_.point, other) != vector_at(answer_.point, row)) continue;
+      wrong_ = "contacts " + std::to_string(other) + " and " + std::to_string(row) + " of a pair are at the same point";
+      return false;
+    }
+    return true;
   }
 
   // A point on the surface, with the normal that leads out there.

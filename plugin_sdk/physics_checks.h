@@ -6,8 +6,9 @@
 // Preconditions: the columns have passed structure and numbers (plugin_sdk/checks.h): lengths match, indices exist,
 // numbers are finite, quaternions and normals are unit. Requests are those that the answer was made from.
 //
-// What no law tells is not looked at: wrenches of forces, and where a method may choose (which of several normals of a
-// deep overlap, how a load is shared among contacts).
+// What no law tells is not looked at: wrenches of forces and discrepancies of joints, whose types are their plugins' (they
+// are confirmed by another process instead), and where a method may choose (which of several normals of a deep overlap,
+// how a load is shared among contacts).
 #pragma once
 
 #include <cstdint>
@@ -78,6 +79,7 @@ struct ContactColumns {
 //   there, that of other shapes leads to the side on which the other's centre is (its direction is not looked at)
 //   no point is deeper than the two shapes overlap along the normal
 //   relative_velocity is that of the two bodies at the point
+//   no two contacts of a pair are at the same point
 //   a pair whose overlap has a closed form (a sphere or a half-space and anything, two boxes that overlap) has a
 //   contact, the deepest of about that depth, and where a face of
 //   a box lies on a half-space, as many as corners within, up to four
@@ -93,13 +95,15 @@ struct SolutionColumns {
 };
 
 // With J as in discrepancy.h and contacts pushed at their points:
-//   momentum   M (v_{n+1} - v*) = sum of J^T lambda, linear and angular. Arms at S* or at S* (+) delta: what delta
-//              moves of an arm is allowed for, and so is what rolling and spinning friction can turn, of which nothing is
-//              reported
-//   pose       M delta = sum of J^T mu + theta h J^T lambda of the rows on velocity alone (friction, drives, soft ones)
+//   momentum   M (v_{n+1} - v*) = sum of J^T lambda, linear and angular, all directions at S*, or all at S* (+) delta
+//              (linear axes turn with body 1). Arms at either: what delta moves of them is allowed for, and so is what
+//              rolling and spinning friction can turn, of which nothing is reported
+//   pose       M delta = sum of J^T mu + theta h J^T lambda of the rows on velocity alone (friction, drives, soft ones),
+//              or of another lambda up to twice that large where the solver says that it stopped before it was done
 //   energy     kinetic energy does not grow where nothing drives: no desired velocity, no compliance, no kinematic body
 //   restitution  where the solver says that it converged, no contact that pushes separates faster than it can have
 //              arrived
+//   touching   then, too, no contact that corrects moves its two surfaces further apart than they overlap
 class SolutionCheck {
  public:
   std::string check(const stage::SolverSolveRequest& request, const SolutionColumns& answer);
@@ -113,6 +117,8 @@ class SolutionCheck {
   };
   struct Pushes {
     Push velocity, pose;
+    double coordinates = 0.0;                // m, of what acts on it
+    double loose = 0.0, loose_moment = 0.0;  // kg m, kg m^2: sizes of what rows on velocity alone displace
   };
 
  private:

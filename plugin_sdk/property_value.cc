@@ -277,6 +277,13 @@ bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue
   return good;
 }
 
+std::size_t flat_size_of(const Property& declared, std::span<const double> numbers) {
+  std::size_t size = declared.flat_size();
+  if (size > numbers.size()) return 0;
+  if (declared.kind == PropertyKind::kTable) size += static_cast<std::size_t>(numbers[0]) * declared.columns;
+  return size <= numbers.size() ? size : 0;
+}
+
 std::string check_flattened(const std::vector<Property>& declared, std::span<const double> numbers) {
   for (const Property& p : declared) {
     std::size_t size = p.flat_size(), first = 0;

@@ -15,8 +15,18 @@ namespace {
 
 // Of the sum of magnitudes that cancel in a balance.
 constexpr double kRelative = 1e-10;
+// The same where the directions are those at the end, which a method finds step by step.
+constexpr double kRelativeAtEnd = 1e-8;
+// Of what rows on velocity alone displace, where a method stopped between two rounds.
+constexpr double kRoundBefore = 2.0;
 // Of the momenta and energies themselves.
 constexpr double kRounding = 1e-13;
+// A displacement that changes by less from one look at it to the next has settled, of the coordinates.
+constexpr double kSettled = 4e-16;
+// Rounding of a gap, of the coordinates that it is the difference of.
+constexpr double kOfCoordinates = 1e-12;
+// Share of the largest correction that none is.
+constexpr double kNegligible = 1e-6;
 
 using Push = SolutionCheck::Push;
 using Pushes = SolutionCheck::Pushes;
@@ -33,33 +43,64 @@ void push_couple(const Vector3& impulse, Push* push) {
   push->moment += impulse.norm();
 }
 
+// Where a method takes the directions of its rows.
+enum class Directions : std::uint8_t { kOfTrial, kOfEnd };
+
 class Balance {
  public:
   Balance(const stage::SolverSolveRequest& request, const SolutionColumns& answer, std::vector<Pushes>* pushes)
-      : request_(request), answer_(answer), bodies_(request.flags().size()), pushes_(*pushes) {
-    pushes_.assign(bodies_, Pushes{});
-  }
+      : request_(request), answer_(answer), bodies_(request.flags().size()), pushes_(*pushes) {}
 
   std::string check() {
-    add_contacts();
-    add_discrepancies();
-    for (std::size_t i = 0; i < bodies_; ++i) {
-      if ((request_.flags()[i] & kMovable) == 0 || (request_.flags()[i] & kKinematic) != 0) continue;
-      if (std::string wrong = check_body(i); !wrong.empty()) return wrong;
-    }
-    if (std::string wrong = check_energy(); !wrong.empty()) return wrong;
+    std::string wrong = check_bodies(Directions::kOfTrial);
+    if (!wrong.empty() && !check_bodies(Directions::kOfEnd).empty()) return wrong;
+    if (wrong = check_energy(); !wrong.empty()) return wrong;
+    if (is_unfinished()) return {};
+    if (wrong = check_touching(); !wrong.empty()) return wrong;
     return check_separation();
   }
 
  private:
+  std::string check_bodies(Directions directions) {
+    pushes_.assign(bodies_, Pushes{});
+    add_contacts();
+    add_discrepancies(directions);
+    const double relative = directions == Directions::kOfTrial ? kRelative : kRelativeAtEnd;
+    for (std::size_t i = 0; i < bodies_; ++i) {
+      if ((request_.flags()[i] & kMovable) == 0 || (request_.flags()[i] & kKinematic) != 0) continue;
+      if (std::string wrong = check_body(i, relative); !wrong.empty()) return wrong;
+    }
+    return {};
+  }
+
+  bool is_unfinished() const { return answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kIterations); }
+
+  // What the pose change turns a body by, rad, and where it carries a point of the trial state.
+  Vector3 turn_of(std::uint32_t body) const {
+    return body == kNone ? Vector3(Vector3::Zero()) : vector_at(answer_.pose_change, 2 * body + 1);
+  }
+  Vector3 carried(std::uint32_t body, const Vector3& point) const {
+    if (body == kNone) return point;
+    const Vector3 position = vector_at(request_.trial_position(), body);
+    return position + vector_at(answer_.pose_change, 2 * body) + exp_rotation(turn_of(body)) * (point - position);
+  }
+
   // Calls push(pushes of the body, arm, sign) for both bodies of a row that acts at a point.
   template <typename Apply>
   void for_both(std::span<const std::uint32_t> pair, std::size_t row, const Vector3& point, Apply&& apply) {
     for (const std::size_t end : {0U, 1U}) {
       const std::uint32_t body = pair[2 * row + end];
       if (body == kNone) continue;
-      apply(pushes_[body], point - vector_at(request_.trial_position(), body), end == 0 ? -1.0 : 1.0);
+      const Vector3 position = vector_at(request_.trial_position(), body);
+      pushes_[body].coordinates = std::max(pushes_[body].coordinates, point.norm() + position.norm());
+      apply(pushes_[body], point - position, end == 0 ? -1.0 : 1.0);
     }
+  }
+
+  // A displacement that rows on velocity alone make.
+  static void loosen(double size, const Vector3& arm, Pushes* body) {
+    body->loose += size;
+    body->loose_moment += size * arm.norm();
   }
 
   void add_contacts() {
@@ -82,11 +123,23 @@ class Balance {
                  body.pose.size += share * impulse.norm();
                  body.pose.moment += share * impulse.norm() * arm.norm();
                  body.pose.unreported += share * turning;
+                 loosen(share * friction.norm(), arm, &body);
                });
     }
   }
 
-  void add_discrepancies() {
+  // Linear ones turn with body 1, a radial axis with its points.
+  Matrix3 axes_of(std::size_t i, const Discrepancy& d, Directions directions) const {
+    const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
+    Matrix3 axes = d.axes.toRotationMatrix();
+    if (directions == Directions::kOfTrial || d.is_angular()) return axes;
+    axes = exp_rotation(turn_of(one)).toRotationMatrix() * axes;
+    const Vector3 between = carried(two, d.point2) - carried(one, d.point1);
+    if (d.is_radial() && between.norm() > 0.0) axes.col(0) = between.normalized();
+    return axes;
+  }
+
+  void add_discrepancies(Directions directions) {
     const DiscrepancyColumns columns{request_.point1(),     request_.point2(),       request_.velocity(),
                                      request_.correction(), request_.axes(),         request_.mode(),
                                      request_.lower(),      request_.upper(),        request_.compliance(),
@@ -94,7 +147,8 @@ class Balance {
     const double share = request_.theta() * request_.time_step();
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const Discrepancy d = columns.at(i);
-      const Matrix3 axes = d.axes.toRotationMatrix();
+      const Matrix3 axes = axes_of(i, d, directions);
+      const Vector3 point = 0.5 * (d.point1 + d.point2);
       is_driven_ = is_driven_ || !d.velocity.isZero(0.0);
       for (int axis = 0; axis < 3; ++axis) {
         const AxisMode mode = axis_mode(d.modes, axis);
@@ -106,12 +160,12 @@ class Balance {
         const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
         const Vector3 impulse = answer_.discrepancy_impulse[k] * axes.col(axis);
         const Vector3 correction = answer_.discrepancy_correction[k] * axes.col(axis);
-        for_both(request_.discrepancy_body(), i, 0.5 * (d.point1 + d.point2),
-                 [&](Pushes& body, const Vector3& arm, double sign) {
-                   add(d, arm, sign * impulse, &body.velocity);
-                   add(d, arm, sign * correction, &body.pose);
-                   if (on_velocity) add(d, arm, sign * share * impulse, &body.pose);
-                 });
+        for_both(request_.discrepancy_body(), i, point, [&](Pushes& body, const Vector3& arm, double sign) {
+          add(d, arm, sign * impulse, &body.velocity);
+          add(d, arm, sign * correction, &body.pose);
+          if (on_velocity) add(d, arm, sign * share * impulse, &body.pose);
+          if (on_velocity) loosen(share * impulse.norm(), arm, &body);
+        });
       }
     }
   }
@@ -130,7 +184,7 @@ class Balance {
     return world_inertia(quaternion_at(request_.trial_orientation(), i), inertia);
   }
 
-  std::string check_body(std::size_t i) const {
+  std::string check_body(std::size_t i, double relative) const {
     const double inverse_mass = request_.inverse_mass()[i];
     const double mass = inverse_mass > 0.0 ? 1.0 / inverse_mass : 0.0;
     const Matrix3 inertia = inertia_of(i);
@@ -138,21 +192,25 @@ class Balance {
     const Twist after{vector_at(answer_.linear_velocity, i), vector_at(answer_.angular_velocity, i)};
     const Twist change{vector_at(answer_.pose_change, 2 * i), vector_at(answer_.pose_change, 2 * i + 1)};
     const double moved = change.linear.norm(), turned = change.angular.norm();
-    const auto& [velocity, pose] = pushes_[i];
+    const Push &velocity = pushes_[i].velocity, &pose = pushes_[i].pose;
+    const double settled = kSettled * pushes_[i].coordinates;
+    // before a method is done, what friction and drives displace may be that of the round before
+    const double before_last = is_unfinished() ? kRoundBefore : 0.0;
 
     std::string wrong =
         off_by("linear_velocity", i, (mass * (after.linear - before.linear) - velocity.linear).norm(),
-               kRelative * velocity.size + kRounding * mass * (before.linear.norm() + after.linear.norm()),
+               relative * velocity.size + kRounding * mass * (before.linear.norm() + after.linear.norm()),
                "m (v - v*) is the sum of the impulses, N s");
     if (!wrong.empty()) return wrong;
     wrong = off_by("pose_change", i, (mass * change.linear - pose.linear).norm(),
-                   kRelative * pose.size + kRounding * mass * moved, "m delta is the sum of the corrections, kg m");
+                   relative * pose.size + before_last * pushes_[i].loose + mass * (kRounding * moved + settled),
+                   "m delta is the sum of the corrections, kg m");
     if (!wrong.empty()) return wrong;
 
     // arms and inertia at the end of the step are as good
     const Vector3 turning = inertia * (after.angular - before.angular);
     const auto arms = [&](const Push& push, double made) {
-      return kRelative * push.moment + 2.0 * (push.size * moved + (push.moment + made) * turned) +
+      return relative * push.moment + 2.0 * (push.size * moved + (push.moment + made) * turned) +
              1.001 * push.unreported;
     };
     const double spin = (inertia * before.angular).norm() + (inertia * after.angular).norm();
@@ -161,7 +219,8 @@ class Balance {
     if (!wrong.empty()) return wrong;
     const Vector3 displaced = inertia * change.angular;
     return off_by("pose_change", i, (displaced - pose.angular).norm(),
-                  arms(pose, displaced.norm()) + kRounding * displaced.norm(),
+                  arms(pose, displaced.norm()) + before_last * pushes_[i].loose_moment + kRounding * displaced.norm() +
+                      inertia.norm() * settled,
                   "I delta is the sum of the corrections' moments, kg m^2");
   }
 
@@ -188,8 +247,35 @@ class Balance {
     return text;
   }
 
+  // gap(S_{n+1}) = min(0, ...) <= 0 where a contact corrects.
+  std::string check_touching() const {
+    double largest = 0.0;
+    for (const double correction : answer_.contact_correction) largest = std::max(largest, correction);
+    for (std::size_t i = 0; i < request_.contact_key().size(); ++i) {
+      if (!(answer_.contact_correction[i] > kNegligible * largest)) continue;
+      const Vector3 normal = vector_at(request_.contact_normal(), i), point = vector_at(request_.contact_point(), i);
+      double apart = 0.0, sizes = 0.0, turned = 0.0, coordinates = point.norm();
+      for (const std::size_t end : {0U, 1U}) {
+        const std::uint32_t body = request_.contact_body()[2 * i + end];
+        const Vector3 linear = vector_at(answer_.pose_change, 2 * body);
+        const Vector3 position = vector_at(request_.trial_position(), body);
+        const Vector3 swept = turn_of(body).cross(point - position);
+        apart += (end == 0 ? -1.0 : 1.0) * normal.dot(linear + swept);
+        sizes += linear.norm() + swept.norm();
+        turned += turn_of(body).norm();
+        coordinates += position.norm();
+      }
+      const double allowed = request_.contact_depth()[i] + (1e-3 + turned) * sizes + kOfCoordinates * coordinates;
+      if (apart <= allowed) continue;
+      char text[160];
+      std::snprintf(text, sizeof text, "contact_correction of row %zu moves apart by %.3g m what overlaps by %.3g m", i,
+                    apart, request_.contact_depth()[i]);
+      return text;
+    }
+    return {};
+  }
+
   std::string check_separation() const {
-    if (answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kIterations)) return {};
     for (std::size_t i = 0; i < request_.contact_key().size(); ++i) {
       const Vector3 direction = vector_at(answer_.contact_direction, i);
       const Vector3 impulse = vector_at(answer_.contact_impulse, i), point = vector_at(request_.contact_point(), i);

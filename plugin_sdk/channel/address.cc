@@ -1,11 +1,9 @@
 #include "plugin_sdk/channel/address.h"
 
 #include <arpa/inet.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,46 +14,32 @@
 namespace gravitas::channel {
 namespace {
 
-int connect_unix(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) {
-    errno = ENAMETOOLONG;
-    return -1;
-  }
-  path.copy(address.sun_path, path.size());
-  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (descriptor >= 0 && connect(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-    return descriptor;
+// Closes what did not come about, and keeps errno.
+int give_up(int descriptor) {
   const int problem = errno;
   if (descriptor >= 0) close(descriptor);
   errno = problem;
   return -1;
 }
 
+int connect_unix(const std::string& path) {
+  const std::optional<sockaddr_un> address = unix_address(path);
+  if (!address) return -1;
+  const int descriptor = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (descriptor >= 0 && connect(descriptor, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0)
+    return descriptor;
+  return give_up(descriptor);
+}
+
 int connect_tcp(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  std::string host = address.substr(0, colon);
-  if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
-  addrinfo hints{}, *found = nullptr;
-  hints.ai_socktype = SOCK_STREAM;
-  if (getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &hints, &found) != 0) {
-    errno = EADDRNOTAVAIL;
-    return -1;
-  }
-  int descriptor = -1, problem = EADDRNOTAVAIL;
-  for (const addrinfo* one = found; one != nullptr && descriptor < 0; one = one->ai_next) {
+  const Resolved found = resolve(address);
+  int descriptor = -1;
+  for (const addrinfo* one = found.get(); one != nullptr && descriptor < 0; one = one->ai_next) {
     descriptor = socket(one->ai_family, one->ai_socktype | SOCK_CLOEXEC, one->ai_protocol);
-    if (descriptor >= 0 && connect(descriptor, one->ai_addr, one->ai_addrlen) != 0) {
-      problem = errno;
-      close(descriptor);
-      descriptor = -1;
-    }
+    if (descriptor >= 0 && connect(descriptor, one->ai_addr, one->ai_addrlen) != 0) descriptor = give_up(descriptor);
   }
-  freeaddrinfo(found);
   const int yes = 1;
   if (descriptor >= 0) setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-  errno = problem;
   return descriptor;
 }
 
@@ -73,6 +57,38 @@ bool is_local_address(std::string_view address) {
   if (host == "localhost" || host == "[::1]") return true;
   in_addr number{};
   return inet_pton(AF_INET, host.c_str(), &number) == 1 && (ntohl(number.s_addr) >> 24) == 127;
+}
+
+std::optional<sockaddr_un> unix_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof address.sun_path) {
+    errno = ENAMETOOLONG;
+    return std::nullopt;
+  }
+  path.copy(address.sun_path, path.size());
+  return address;
+}
+
+int probe_unix(const std::string& path) {
+  const std::optional<sockaddr_un> address = unix_address(path);
+  const int asking = address ? socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0) : -1;
+  const bool reached =
+      asking >= 0 && connect(asking, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0;
+  const int problem = reached || errno == EAGAIN || errno == EINPROGRESS ? 0 : errno;
+  if (asking >= 0) close(asking);
+  return problem;
+}
+
+Resolved resolve(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  std::string host = address.substr(0, colon);
+  if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
+  addrinfo hints{}, *found = nullptr;
+  hints.ai_socktype = SOCK_STREAM;
+  const bool is_found = getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &hints, &found) == 0;
+  if (!is_found) errno = EADDRNOTAVAIL;
+  return {is_found ? found : nullptr, freeaddrinfo};
 }
 
 int connect_to(const std::string& address) {

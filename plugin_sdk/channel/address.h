@@ -1,6 +1,11 @@
 // Addresses at which a worker may be reached without encryption: this machine's own.
 #pragma once
 
+#include <netdb.h>
+#include <sys/un.h>
+
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -8,6 +13,17 @@ namespace gravitas::channel {
 
 // True for "unix:PATH", "127.N.N.N:PORT", "localhost:PORT" and "[::1]:PORT".
 bool is_local_address(std::string_view address);
+
+// Of a path; nothing, and ENAMETOOLONG, if it is too long.
+std::optional<sockaddr_un> unix_address(const std::string& path);
+
+// 0 if somebody listens on the socket at this path, if only with a full queue; else the error: ECONNREFUSED if the socket
+// was left behind by somebody who is gone.
+int probe_unix(const std::string& path);
+
+// What a HOST:PORT stands for; null, and EADDRNOTAVAIL, if nothing.
+using Resolved = std::unique_ptr<addrinfo, void (*)(addrinfo*)>;
+Resolved resolve(const std::string& address);
 
 // Connects to such an address and returns the descriptor; -1 with errno. Precondition: is_local_address().
 int connect_to(const std::string& address);

@@ -1,11 +1,9 @@
 #include "plugin_sdk/host/listener.h"
 
 #include <grpcpp/server_posix.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -38,45 +36,22 @@ int listen_on(const sockaddr* address, socklen_t size) {
   return -1;
 }
 
-bool nobody_listens(const sockaddr* address, socklen_t size) {
-  const int asking = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const bool refused = asking >= 0 && connect(asking, address, size) != 0 && errno == ECONNREFUSED;
-  if (asking >= 0) close(asking);
-  return refused;
-}
-
 int listen_unix(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) {
-    errno = ENAMETOOLONG;
-    return -1;
-  }
-  path.copy(address.sun_path, path.size());
-  const auto* plain = reinterpret_cast<const sockaddr*>(&address);
-  const int listening = listen_on(plain, sizeof address);
+  const std::optional<sockaddr_un> address = channel::unix_address(path);
+  if (!address) return -1;
+  const auto* plain = reinterpret_cast<const sockaddr*>(&*address);
+  const int listening = listen_on(plain, sizeof *address);
   if (listening >= 0 || errno != EADDRINUSE) return listening;
   // left behind by a worker that was killed
-  if (nobody_listens(plain, sizeof address)) unlink(path.c_str());
-  return listen_on(plain, sizeof address);
+  if (channel::probe_unix(path) == ECONNREFUSED) unlink(path.c_str());
+  return listen_on(plain, sizeof *address);
 }
 
 int listen_tcp(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  std::string host = address.substr(0, colon);
-  if (host.starts_with('[')) host = host.substr(1, host.size() - 2);
-  addrinfo hints{}, *found = nullptr;
-  hints.ai_socktype = SOCK_STREAM;
-  if (getaddrinfo(host.c_str(), address.substr(colon + 1).c_str(), &hints, &found) != 0) {
-    errno = EADDRNOTAVAIL;
-    return -1;
-  }
+  const channel::Resolved found = channel::resolve(address);
   int listening = -1;
-  for (const addrinfo* one = found; one != nullptr && listening < 0; one = one->ai_next)
+  for (const addrinfo* one = found.get(); one != nullptr && listening < 0; one = one->ai_next)
     listening = listen_on(one->ai_addr, one->ai_addrlen);
-  const int problem = errno;
-  freeaddrinfo(found);
-  errno = problem;
   return listening;
 }
 

@@ -25,6 +25,7 @@
 #include "services/campaign/leftovers.h"
 #include "services/campaign/page.h"
 #include "services/campaign/table.h"
+#include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
 
@@ -182,12 +183,6 @@ class TrialLog {
   std::FILE* file_ = nullptr;
 };
 
-void write_file(const std::string& path, const std::string& text) {
-  std::FILE* file = std::fopen(path.c_str(), "we");
-  const bool written = file != nullptr && std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  if (file == nullptr || std::fclose(file) != 0 || !written) fail("'" + path + "'");
-}
-
 class Parent {
  public:
   Parent(const Options& options) : options_(options), log_(options.out), next_(options.shard - 1) {
@@ -220,9 +215,9 @@ class Parent {
     table.set_tier(options_.draw.tier == Tier::kReal ? "real" : "simulated");
     table.set_seconds(seconds_since(start_));
     if (options_.out.empty()) return table;
-    write_file(options_.out + "/table.txt", table_text(table));
-    write_file(options_.out + "/table.json", to_json(table, JsonForm::kPage));
-    write_file(options_.out + "/index.html", page(table, tally_));
+    write_text_file(options_.out + "/table.txt", table_text(table), "table");
+    write_text_file(options_.out + "/table.json", to_json(table, JsonForm::kPage), "table");
+    write_text_file(options_.out + "/index.html", page(table, tally_), "page");
     return table;
   }
 
@@ -302,7 +297,7 @@ TrialOptions trial_options(const Options& options) {
   TrialOptions one;
   one.tier = options.draw.tier;
   one.deadline = options.deadline;
-  if (!options.without.empty()) one.defences = without_defence(options.without);
+  if (!options.without.empty()) leave_out_defence(options.without, &one);
   return one;
 }
 
@@ -312,11 +307,11 @@ v1::Table run(const Options& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {
   // bad input is found here, not in a child
   load_scenes(options.scenes);
-  if (!options.without.empty()) without_defence(options.without);
+  trial_options(options);
   return Parent(options).make(interrupted, progress);
 }
 
-int serve_trials(const Options& options) {
+void serve_trials(const Options& options) {
   const std::vector<Scene> scenes = load_scenes(options.scenes);
   const TrialOptions one = trial_options(options);
   std::uint64_t first = 0, count = 0, stride = 0;
@@ -329,7 +324,6 @@ int serve_trials(const Options& options) {
     }
     std::cout << "done" << std::endl;
   }
-  return 0;
 }
 
 v1::Trial repeat_trial(const Options& options, std::uint64_t seed) {

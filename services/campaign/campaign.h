@@ -38,8 +38,8 @@ struct Progress {
 v1::Table run(const Options& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress);
 
-// What a child process of run() does: reads orders from standard input until it ends. Returns the exit code.
-int serve_trials(const Options& options);
+// What a child process of run() does: reads orders from standard input until that ends.
+void serve_trials(const Options& options);
 
 // One trial by its seed, in this process.
 v1::Trial repeat_trial(const Options& options, std::uint64_t seed);

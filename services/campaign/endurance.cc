@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/slots.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/scenes.h"
 #include "services/run/session.h"
@@ -20,9 +21,7 @@ constexpr std::chrono::milliseconds kStep{1};
 constexpr std::uint32_t kStepsPerKill = 1000;
 
 void set_hosting(kernel::Hosting hosting, kernel::EnvironmentDescription* description) {
-  for (const Slot slot :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
-    description->slot(slot).hosting = hosting;
+  for (const Slot slot : kSlots) description->slot(slot).hosting = hosting;
 }
 
 }  // namespace
@@ -39,13 +38,13 @@ EnduranceResult endure(const std::string& name, double seconds, const std::funct
   {
     set_hosting(kernel::Hosting::kSharedMemory, &scene.description);
     const std::unique_ptr<kernel::Environment> world = gravitas::start(scene.description);
+    const std::uint32_t turn = kStepsPerKill / static_cast<std::uint32_t>(world->plan().slots.size());
     auto next = std::chrono::steady_clock::now();
     while (world->step_count() < scene.description.steps && !interrupted()) {
       // the slots take turns through the second
       const std::uint32_t step = world->step_count();
-      const std::vector<kernel::PlannedSlot> slots = world->plan().slots;
-      const std::uint32_t turn = kStepsPerKill / static_cast<std::uint32_t>(slots.size());
       if (step % turn == turn / 2) {
+        const std::vector<kernel::PlannedSlot> slots = world->plan().slots;
         kill(slots[step / turn % slots.size()].process_id, SIGKILL);
         ++result.kills;
       }

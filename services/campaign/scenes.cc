@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/slots.h"
 #include "services/catalog/catalog.h"
 #include "services/run/session.h"
 #include "services/scene/build.h"
@@ -15,9 +16,6 @@
 
 namespace gravitas::campaign {
 namespace {
-
-constexpr std::array<Slot, 6> kSlots = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                                        Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
 struct BuiltIn {
   const char* name;
@@ -108,6 +106,12 @@ Environment {
 )"},
 }};
 
+std::vector<std::string> built_in_scenes() {
+  std::vector<std::string> names;
+  for (const BuiltIn& one : kBuiltIn) names.emplace_back(one.name);
+  return names;
+}
+
 void require(const scene::Problems& problems) {
   if (problems.ok()) return;
   std::string text;
@@ -150,12 +154,6 @@ void run_quietly(Scene* scene, std::uint32_t steps) {
 }
 
 }  // namespace
-
-std::vector<std::string> built_in_scenes() {
-  std::vector<std::string> names;
-  for (const BuiltIn& one : kBuiltIn) names.emplace_back(one.name);
-  return names;
-}
 
 std::vector<Scene> load_scenes(const std::vector<std::string>& names, std::uint32_t steps) {
   Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());

@@ -19,10 +19,7 @@ struct Scene {
   std::vector<kernel::Hash> chains;  // of the quiet run, hosted direct: [n] after n steps
 };
 
-// Names of the scenes that are built in: contacts without and with joints, and all slots at work.
-std::vector<std::string> built_in_scenes();
-
-// Scenes by name or file; the built-in ones if there is none. Makes `steps` steps of each for its quiet run. Throws
+// Scenes by name or file; the built-in ones (contacts, joints, all) if there is none. Makes `steps` steps of each for its quiet run. Throws
 // BadInput.
 std::vector<Scene> load_scenes(const std::vector<std::string>& names, std::uint32_t steps = kMostSteps);
 

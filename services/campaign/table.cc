@@ -45,6 +45,11 @@ void Tally::add(const v1::Trial& trial, const std::string& command) {
   for (const v1::Fault& fault : trial.faults()) {
     ++injected_;
     manifested_ += fault.outcome() != "M";
+    const bool is_escaped = fault.outcome() == "not caught";
+    wrong_values_ += is_escaped || (fault.group() == "values" && fault.outcome() == "B");
+    not_caught_ += is_escaped;
+    if (is_escaped && failures_.size() < kShownFailures)
+      failures_.push_back(fmt::format("{}: {} in slot {} was not noticed", command, fault.order(), fault.slot()));
     v1::Row& row = rows_[fault.group()];
     row.set_group(fault.group());
     count(fault, &row);
@@ -67,12 +72,19 @@ v1::Table Tally::table() const {
   if (manifested_ > 0)
     table.set_forbidden_bound(std::min(
         1.0, (forbidden_ > 0 ? 3.0 * static_cast<double>(forbidden_) + 1.0 : 3.0) / static_cast<double>(manifested_)));
+  table.set_wrong_values(wrong_values_);
+  table.set_not_caught(not_caught_);
   for (const auto& [group, row] : rows_) *table.add_rows() = row;
   *table.mutable_standby() = quantiles(standby_);
   *table.mutable_cold_start() = quantiles(cold_start_);
   *table.mutable_swap_pause() = quantiles(swap_pause_);
   for (const std::string& failure : failures_) table.add_failures(failure);
   return table;
+}
+
+bool is_passed(const v1::Table& table) {
+  const double most = kMayEscape * static_cast<double>(table.wrong_values());
+  return table.forbidden() == 0 && static_cast<double>(table.not_caught()) <= most;
 }
 
 std::string table_text(const v1::Table& table) {
@@ -90,6 +102,11 @@ std::string table_text(const v1::Table& table) {
               ? fmt::format("nothing forbidden happened: with 95 % confidence at most {:.2g} of faults\n",
                             table.forbidden_bound())
               : fmt::format("{} trials with something forbidden\n", table.forbidden());
+  if (table.wrong_values() > 0)
+    text += fmt::format("{} of {} wrong values were not noticed without an ordered re-run ({:.3g} %; {:g} % may be)\n",
+                        table.not_caught(), table.wrong_values(),
+                        100.0 * static_cast<double>(table.not_caught()) / static_cast<double>(table.wrong_values()),
+                        100.0 * kMayEscape);
   if (table.unprovoked() > 0)
     text += fmt::format("{} failed calls besides, which no fault explains (a busy machine's deadlines)\n",
                         table.unprovoked());

@@ -10,7 +10,10 @@
 #include <thread>
 
 #include "kernel/environment.h"
+#include "kernel/slot_host.h"
 #include "plugin_sdk/near_miss.h"
+#include "plugin_sdk/slots.h"
+#include "services/campaign/host_trouble.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/simulated_carrier.h"
 #include "services/run/session.h"
@@ -22,9 +25,6 @@ using kernel::Environment;
 using kernel::FaultRecord;
 using kernel::StepOutcome;
 
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
-
 struct NamedDefence {
   const char* name;
   bool kernel::Defences::*member;
@@ -34,6 +34,8 @@ constexpr NamedDefence kDefences[] = {
     {"physics", &kernel::Defences::physics},     {"replay", &kernel::Defences::replay},
     {"digest", &kernel::Defences::digest},       {"epoch", &kernel::Defences::epoch},
     {"deadline", &kernel::Defences::deadline}};
+
+constexpr const char* kConfirmation = "confirmation";
 
 // Counts commits: none may be lost or made twice.
 class CommitCount final : public kernel::CommitListener {
@@ -114,17 +116,23 @@ class Run {
   void begin(std::uint32_t step);
   void attack_from_outside(const PlannedFault& fault);
   void order_swap(const PlannedFault& fault);
-  void stop_rerun(std::uint32_t step);
+  // Which slots' answers of this step are confirmed by another process.
+  void set_reruns(std::uint32_t step);
   // The step is not what it was in the quiet run.
   void judge_divergence(std::uint32_t step);
   void judge_pause(std::uint32_t step);
   void attribute_records();
   void judge_swaps();
+  void step_neighbour(std::uint32_t step);
   void write();
   // A standby was killed then, unseen: who asks it next may see a second death of the same request, as poison does,
   // where the carrier cannot tell whether it was read.
   Injected* killed_standby(std::uint32_t step);
+  // A busy machine's deadlines have used up the slot's budget, with faults that it would have borne: what follows is right.
+  bool is_worn_out(Slot slot) const;
   int process_of(Slot slot) const;
+  // The same run without faults, in the kernel's process.
+  kernel::EnvironmentDescription alone_description() const;
   void forbid(std::string what) { trial_.add_forbidden(std::move(what)); }
   Injected* find(const FaultRecord& record);
 
@@ -134,6 +142,8 @@ class Run {
   SimulatedHosts hosts_;
   kernel::EnvironmentDescription description_;
   std::unique_ptr<Environment> world_;
+  std::unique_ptr<Environment> neighbour_;
+  std::vector<std::jthread> pauses_;
   std::vector<Injected> faults_;
   bool is_over_ = false, has_other_plugin_ = false;
   v1::Trial trial_;
@@ -145,11 +155,19 @@ int Run::process_of(Slot slot) const {
   return 0;
 }
 
+kernel::EnvironmentDescription Run::alone_description() const {
+  kernel::EnvironmentDescription description = scene_.description;
+  description.steps = plan_.steps;
+  for (const Slot slot : kSlots) description.slot(slot).hosting = kernel::Hosting::kDirect;
+  return description;
+}
+
 void Run::order_swap(const PlannedFault& fault) {
   kernel::SwapOrder order;
   order.slot = fault.slot;
   const std::vector<kernel::PluginChoice>& own = description_.slot(fault.slot).plugins;
   order.plugin = own[0];
+  if (fault.means == Means::kSwapRefused) order.plugin.library = "/dev/null";
   order.step = fault.step;
   world_->order_swap(std::move(order));
 }
@@ -161,8 +179,13 @@ void Run::attack_from_outside(const PlannedFault& fault) {
   switch (fault.means) {
     case Means::kKill:
       return send(process_of(fault.slot), SIGKILL);
+    case Means::kPause:
+      pauses_.push_back(continue_later(process_of(fault.slot), fault.pause * options_.deadline));
+      [[fallthrough]];
     case Means::kStop:
       return send(process_of(fault.slot), SIGSTOP);
+    case Means::kSwapRefused:
+      return order_swap(fault);
     case Means::kSwapKilled:
       order_swap(fault);
       [[fallthrough]];
@@ -179,24 +202,36 @@ void Run::attack_from_outside(const PlannedFault& fault) {
   }
 }
 
-void Run::begin(std::uint32_t step) {
-  for (Injected& fault : faults_) {
-    if (fault.plan->step != step) continue;
-    fault.happened = true;
-    if (fault.plan->rerun) world_->set_rerun_every(fault.plan->slot, 1);
-    attack_from_outside(*fault.plan);
+void Run::set_reruns(std::uint32_t step) {
+  for (const Slot slot : kSlots) {
+    const bool has_no_law = std::ranges::find(kConfirmed, slot) != std::end(kConfirmed);
+    const bool is_asked = std::ranges::any_of(faults_, [&](const Injected& one) {
+      return one.plan->step == step && one.plan->slot == slot && one.plan->rerun;
+    });
+    world_->set_rerun_every(slot, is_asked || (has_no_law && options_.confirms && options_.defences.physics) ? 1 : 0);
   }
 }
 
-void Run::stop_rerun(std::uint32_t step) {
-  for (const Injected& fault : faults_)
-    if (fault.plan->step == step && fault.plan->rerun) world_->set_rerun_every(fault.plan->slot, 0);
+// It shares the process with all that happens, and may not notice any of it.
+void Run::step_neighbour(std::uint32_t step) {
+  if (neighbour_->step() != StepOutcome::kCommitted || !(neighbour_->chain_hash() == scene_.chains[step]))
+    forbid(fmt::format("step {} of another environment in the same process was disturbed", step));
+}
+
+void Run::begin(std::uint32_t step) {
+  set_reruns(step);
+  for (Injected& fault : faults_) {
+    if (fault.plan->step != step) continue;
+    fault.happened = true;
+    attack_from_outside(*fault.plan);
+  }
 }
 
 void Run::go() {
   description_ = description_of(plan_, scene_, options_);
   world_ = options_.tier == Tier::kReal ? std::make_unique<Environment>(description_)
                                         : std::make_unique<Environment>(description_, hosts_.starter());
+  if (plan_.has_neighbour) neighbour_ = std::make_unique<Environment>(alone_description());
   CommitCount commits;
   world_->set_commit_listener(&commits);
   for (const PlannedFault& fault : plan_.faults) {
@@ -207,6 +242,7 @@ void Run::go() {
   for (std::uint32_t step = 1; step <= plan_.steps && !is_over_; ++step) {
     begin(step);
     const StepOutcome outcome = world_->step();
+    if (neighbour_) step_neighbour(step);
     const std::uint32_t expected = outcome == StepOutcome::kCommitted ? step : step - 1;
     if (world_->step_count() != expected || !commits.is(expected))
       forbid(fmt::format("step {} was lost or made twice: {} are counted", step, world_->step_count()));
@@ -215,7 +251,6 @@ void Run::go() {
     } else if (!(world_->chain_hash() == scene_.chains[step]) && !has_other_plugin_) {
       judge_divergence(step);
     }
-    stop_rerun(step);
   }
   attribute_records();
   judge_swaps();
@@ -241,6 +276,19 @@ Run::Injected* Run::killed_standby(std::uint32_t step) {
     if (kills && fault.happened && fault.plan->step <= step && step <= fault.plan->step + 1) return &fault;
   }
   return nullptr;
+}
+
+bool Run::is_worn_out(Slot slot) const {
+  std::uint32_t failures = 0, unprovoked = 0;
+  for (const FaultRecord& record : world_->faults()) {
+    if (record.fault.slot != slot) continue;
+    ++failures;
+    const bool is_planned = std::ranges::any_of(faults_, [&](const Injected& one) {
+      return one.plan->slot == slot && one.plan->step <= record.step && record.step <= one.plan->step + 1;
+    });
+    unprovoked += record.fault.kind == kernel::FaultKind::kDeadline && !is_planned ? 1 : 0;
+  }
+  return unprovoked > 0 && failures >= kernel::SlotHost::kBudget;
 }
 
 void Run::judge_divergence(std::uint32_t step) {
@@ -270,18 +318,16 @@ void Run::judge_pause(std::uint32_t step) {
   for (Injected& fault : faults_)
     if (fault.plan->duty == Duty::kPoison && fault.plan->step == step && fault.plan->slot == last.slot) poison = &fault;
   if (poison == nullptr && last.kind == kernel::FaultKind::kDeath) poison = killed_standby(step);
-  if (poison == nullptr || plan_.has_fallbacks) {
+  const bool is_tired = is_worn_out(last.slot);
+  if ((poison == nullptr && !is_tired) || plan_.has_fallbacks) {
     for (Injected& fault : faults_)
       if (fault.plan->step == step) fault.outcome = "forbidden";
     forbid(
         fmt::format("paused at step {} where it had to recover: slot {}: {}", step, slot_name(last.slot), last.text));
     return;
   }
-  poison->outcome = "Q";
-  kernel::EnvironmentDescription again = scene_.description;
-  again.steps = plan_.steps;
-  for (const Slot slot : kSlots) again.slot(slot).hosting = kernel::Hosting::kDirect;
-  Environment resumed(again);
+  if (poison != nullptr) poison->outcome = "Q";
+  Environment resumed(alone_description());
   const std::string problem = resumed.restore(world_->saved_state());
   if (!problem.empty()) return forbid(fmt::format("the state of the pause cannot be resumed: {}", problem));
   while (resumed.step_count() < plan_.steps && resumed.step() == StepOutcome::kCommitted) {
@@ -305,8 +351,15 @@ void Run::attribute_records() {
 }
 
 void Run::judge_swaps() {
-  for (const kernel::SwapRecord& swap : world_->swaps())
+  for (const kernel::SwapRecord& swap : world_->swaps()) {
     if (swap.pause_us > 0.0) trial_.add_swap_pause_us(swap.pause_us);
+    for (const Injected& fault : faults_) {
+      const bool is_it = fault.happened && fault.plan->means == Means::kSwapRefused && fault.plan->slot == swap.slot;
+      if (is_it && swap.state != kernel::SwapState::kRefused)
+        forbid(fmt::format("a swap of slot {} to what is no library is {}", slot_name(swap.slot),
+                           kernel::swap_state_name(swap.state)));
+    }
+  }
 }
 
 void Run::write() {
@@ -326,12 +379,20 @@ void Run::write() {
       line->set_recovered_by(record.recovered_by);
       if (record.recovered_by.starts_with("fallback") && fault.outcome.empty()) outcome = "F";
     }
-    if (outcome == "F" && fault.plan->duty != Duty::kPoison && killed_standby(fault.plan->step) == nullptr) {
+    if (outcome == "F" && fault.plan->duty != Duty::kPoison && killed_standby(fault.plan->step) == nullptr &&
+        !is_worn_out(fault.plan->slot)) {
       outcome = "forbidden";
       forbid(fmt::format("the fallback took over at step {} from {}, which had to be recovered", fault.plan->step,
                          fault.plan->order));
     }
     line->set_outcome(outcome);
+  }
+  if (plan_.trouble != HostTrouble::kNone) {
+    v1::Fault* line = trial_.add_faults();
+    line->set_order(plan_.trouble == HostTrouble::kSignals ? "a storm of signals" : "a proxy and a locale");
+    line->set_group("host");
+    line->set_times(1);
+    line->set_outcome("M");
   }
   if (options_.tier == Tier::kReal) return;
   for (const SimulatedHosts::FailedStart& start : hosts_.failed_starts()) {
@@ -346,21 +407,28 @@ void Run::write() {
 
 }  // namespace
 
-std::vector<std::string> defence_names() {
-  std::vector<std::string> names;
-  for (const NamedDefence& one : kDefences) names.emplace_back(one.name);
-  return names;
+void leave_out_defence(const std::string& name, TrialOptions* options) {
+  std::vector<std::string> names = {kConfirmation};
+  for (const NamedDefence& one : kDefences) {
+    names.emplace_back(one.name);
+    if (name == one.name) options->defences.*one.member = false;
+  }
+  if (name == kConfirmation) options->confirms = false;
+  if (std::ranges::find(names, name) == names.end())
+    throw BadInput(fmt::format("--without {}: there is no such defence; {}", name, allowed_names(name, names)));
 }
 
-kernel::Defences without_defence(const std::string& name) {
-  kernel::Defences defences;
-  for (const NamedDefence& one : kDefences) {
-    if (name != one.name) continue;
-    defences.*one.member = false;
-    return defences;
-  }
-  throw BadInput(fmt::format("--without {}: there is no such defence; {}", name, allowed_names(name, defence_names())));
+namespace {
+
+v1::Trial make_trial(const TrialPlan& plan, const Scene& scene, const TrialOptions& options) {
+  std::optional<SignalStorm> storm;
+  std::optional<ForeignSurroundings> surroundings;
+  if (plan.trouble == HostTrouble::kSignals) storm.emplace();
+  if (plan.trouble == HostTrouble::kSurroundings) surroundings.emplace();
+  return Run(plan, scene, options).make();
 }
+
+}  // namespace
 
 v1::Trial run_trial(const TrialPlan& plan, const Scene& scene, const TrialOptions& options) {
   // libraries and gRPC keep some of what the first trials open
@@ -368,7 +436,7 @@ v1::Trial run_trial(const TrialPlan& plan, const Scene& scene, const TrialOption
   constexpr std::size_t kSlack = 16;
   static std::uint32_t trials = 0;
   static std::size_t most_descriptors = 0;
-  v1::Trial trial = Run(plan, scene, options).make();
+  v1::Trial trial = make_trial(plan, scene, options);
   if (options.tier == Tier::kSimulated) return trial;
   // the supervisor's thread lets go of a process a moment after its end
   std::vector<std::string> leftovers = find_leftovers();

@@ -12,12 +12,12 @@ namespace gravitas::campaign {
 struct TrialOptions {
   Tier tier = Tier::kReal;
   kernel::Defences defences = {};
+  bool confirms = true;    // another process is asked where no law of physics tells
   double deadline = 0.25;  // s, of a call
 };
 
-// The defences that can be switched off for the self-test. Throws BadInput for another name.
-kernel::Defences without_defence(const std::string& name);
-std::vector<std::string> defence_names();
+// Switches a defence off, for the self-test. Throws BadInput for a name that is none.
+void leave_out_defence(const std::string& name, TrialOptions* options);
 
 // Never throws for what the run does: that is `forbidden` in the answer. The real tier looks for processes and mappings
 // that are left over in this process, so one trial is made at a time.

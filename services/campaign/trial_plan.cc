@@ -84,11 +84,40 @@ std::string wire_order(Draw* draw, Tier tier) {
   }
 }
 
+// What is asked of a slot in a step.
+stage::Method method_of(Slot slot) {
+  switch (slot) {
+    case Slot::kSpace:
+      return stage::Method::kSpacePairs;
+    case Slot::kCollision:
+      return stage::Method::kCollisionManifolds;
+    case Slot::kConstraint:
+      return stage::Method::kConstraintDiscrepancies;
+    case Slot::kForce:
+      return stage::Method::kForceWrenches;
+    case Slot::kSolver:
+      return stage::Method::kSolverSolve;
+    case Slot::kIntegrator:
+      break;
+  }
+  return stage::Method::kIntegratorIntegrate;
+}
+
+// Which numbers are changed: the first column's if it is not said.
+std::string draw_column(Draw* draw, Slot slot) {
+  if (draw->chance(40)) return {};
+  std::vector<const char*> names;
+  for (const stage::ColumnInfo& column : stage::method_info(method_of(slot)).reply)
+    if (column.type == stage::ElementType::kF64 && column.rows_index != stage::kScalar) names.push_back(column.name);
+  return names.empty() ? "" : fmt::format(",column={}", draw->one_of(names));
+}
+
 // Fills in the order and what has to become of it.
 void draw_value(Draw* draw, PlannedFault* fault) {
   const bool has_numbers = fault->slot != Slot::kSpace;
   const bool has_ids = fault->slot == Slot::kSpace || fault->slot == Slot::kCollision;
-  const std::string rows = draw->chance(25) ? ",all=1" : "";
+  std::string rows = draw->chance(25) ? ",all=1" : "";
+  rows += draw_column(draw, fault->slot);
   const std::uint64_t kind = has_numbers ? draw->below(11) : 7 + draw->below(4);
   fault->duty = Duty::kWrong;
   switch (kind) {
@@ -164,15 +193,21 @@ void draw_order(Draw* draw, Tier tier, PlannedFault* fault) {
     default: {
       // nobody is outside in the simulated tier
       const std::uint64_t means = tier == Tier::kSimulated ? 99 : draw->below(100);
-      fault->means = means < 40   ? Means::kKill
-                     : means < 45 ? Means::kStop
-                     : means < 75 ? Means::kKillStandby
-                     : means < 88 ? Means::kSwapKilled
+      fault->means = means < 32   ? Means::kKill
+                     : means < 36 ? Means::kStop
+                     : means < 44 ? Means::kPause
+                     : means < 70 ? Means::kKillStandby
+                     : means < 82 ? Means::kSwapKilled
+                     : means < 88 ? Means::kSwapRefused
                                   : Means::kSwapFaulty;
+      if (fault->means == Means::kPause) fault->pause = 0.1 * static_cast<double>(1 + draw->below(15));
       const bool is_swap = fault->means >= Means::kSwapKilled;
       if (is_swap) fault->group = "swap";
-      fault->order = fault->means == Means::kKill          ? "SIGKILL from outside"
-                     : fault->means == Means::kStop        ? "SIGSTOP from outside"
+      fault->order = fault->means == Means::kKill   ? "SIGKILL from outside"
+                     : fault->means == Means::kStop ? "SIGSTOP from outside"
+                     : fault->means == Means::kPause
+                         ? fmt::format("SIGSTOP from outside, SIGCONT after {:.1f} deadlines", fault->pause)
+                     : fault->means == Means::kSwapRefused ? "a swap to what is no library"
                      : fault->means == Means::kKillStandby ? "SIGKILL to a standby"
                      : fault->means == Means::kSwapKilled  ? "a swap, killed in preparation"
                                                            : "kill,at=compute";
@@ -198,6 +233,14 @@ PlannedFault draw_last(Draw* draw, Slot slot) {
   return fault;
 }
 
+// Whose failures it may count as: a wrong wrench may be noticed by what the integrator makes of it, and is charged to
+// that.
+std::vector<Slot> slots_hit(const PlannedFault& fault) {
+  const bool is_wrong = fault.duty == Duty::kWrong || fault.duty == Duty::kInTolerance;
+  if (fault.slot == Slot::kForce && is_wrong) return {Slot::kForce, Slot::kIntegrator};
+  return {fault.slot};
+}
+
 }  // namespace
 
 std::uint64_t trial_seed(std::uint64_t campaign_seed, std::uint64_t index) {
@@ -213,6 +256,10 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
   plan.hosting = draw.one_of(options.hostings);
   plan.steps = static_cast<std::uint32_t>(kFewestSteps + draw.below(kMostSteps - kFewestSteps + 1));
   plan.has_fallbacks = draw.chance(50);
+  plan.has_neighbour = draw.chance(20);
+  const std::uint64_t trouble = draw.below(100);
+  if (options.tier == Tier::kReal && trouble < 20)
+    plan.trouble = trouble < 10 ? HostTrouble::kSignals : HostTrouble::kSurroundings;
   const std::vector<Slot>& slots = scenes[plan.scene].slots;
   const std::uint32_t most = options.tier == Tier::kReal ? kMostReal : kMostSimulated;
 
@@ -231,6 +278,7 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
   const Slot last_slot = draw.one_of(slots);
   const std::uint32_t last_step = plan.steps - 3;
   if (has_last) taken[last_slot].push_back(last_step);
+  if (has_last && last_slot == Slot::kForce) taken[Slot::kIntegrator].push_back(last_step);
   for (std::uint32_t tries = 0; plan.faults.size() < options.faults_per_trial && tries < 8 * options.faults_per_trial;
        ++tries) {
     PlannedFault fault;
@@ -239,11 +287,12 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
     const bool joins = !plan.faults.empty() && draw.chance(25);
     fault.step = joins ? plan.faults.back().step : static_cast<std::uint32_t>(2 + draw.below(last_step - 4));
     draw_order(&draw, options.tier, &fault);
-    if (!is_free(fault.slot, fault.step)) continue;
+    const std::vector<Slot> hit = slots_hit(fault);
+    if (!std::ranges::all_of(hit, [&](Slot slot) { return is_free(slot, fault.step); })) continue;
     const bool hits_anybody = fault.means == Means::kKillStandby || fault.means == Means::kSwapKilled;
     if (hits_anybody && !std::ranges::all_of(slots, has_room)) continue;
     if (fault.group == "swap" && std::exchange(is_swapped[fault.slot], true)) continue;
-    taken[fault.slot].push_back(fault.step);
+    for (const Slot slot : hit) taken[slot].push_back(fault.step);
     anywhere += hits_anybody ? 1 : 0;
     plan.faults.push_back(std::move(fault));
   }

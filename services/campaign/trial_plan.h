@@ -17,9 +17,11 @@ enum class Means {
   kOrder,        // the worker commits it in a call (plugin_sdk/host/fault_kinds.h)
   kKill,         // SIGKILL from outside between two steps
   kStop,         // SIGSTOP from outside between two steps
+  kPause,        // the same, and SIGCONT a while later
   kKillStandby,  // SIGKILL to a worker that stands by or is being started
   kSwapKilled,   // a swap whose new worker is killed while it is being prepared
-  kSwapFaulty    // a swap whose new worker fails on probation
+  kSwapFaulty,   // a swap whose new worker fails on probation
+  kSwapRefused   // a swap to a library that is none
 };
 
 // What has to become of it.
@@ -39,7 +41,11 @@ struct PlannedFault {
   std::string order;  // of the worker; else what is done
   std::string group;
   bool rerun = false;  // another process is asked the same in this step
+  double pause = 0.0;  // of kPause: SIGCONT after so many deadlines
 };
+
+// What the machine does to all of a trial.
+enum class HostTrouble { kNone, kSignals, kSurroundings };
 
 struct TrialPlan {
   std::uint64_t seed = 0;
@@ -47,6 +53,8 @@ struct TrialPlan {
   kernel::Hosting hosting = kernel::Hosting::kSharedMemory;
   std::uint32_t steps = 0;
   bool has_fallbacks = false;
+  bool has_neighbour = false;  // another environment in the same process, which nothing may reach
+  HostTrouble trouble = HostTrouble::kNone;
   std::vector<PlannedFault> faults;  // by step
 };
 

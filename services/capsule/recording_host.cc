@@ -1,5 +1,6 @@
 #include "services/capsule/recording_host.h"
 
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -13,12 +14,9 @@ namespace {
 
 class RecordingHost final : public kernel::Carrier {
  public:
-  RecordingHost(std::unique_ptr<kernel::Carrier> host, const std::vector<kernel::PluginChoice>& plugins,
-                const Selection& selection, std::shared_ptr<Writer> writer,
-                std::shared_ptr<const std::atomic<std::uint32_t>> step)
-      : host_(std::move(host)), selection_(selection), writer_(std::move(writer)), step_(std::move(step)) {
-    for (const kernel::PluginChoice& plugin : plugins) rows_.push_back(writer_->add_plugin(plugin));
-  }
+  RecordingHost(std::unique_ptr<kernel::Carrier> host, std::vector<kernel::PluginChoice> plugins,
+                std::shared_ptr<Tape> tape)
+      : host_(std::move(host)), plugins_(std::move(plugins)), tape_(std::move(tape)) {}
 
   kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives) override;
@@ -31,11 +29,17 @@ class RecordingHost final : public kernel::Carrier {
   std::vector<std::string> sandbox() const override { return host_->sandbox(); }
 
  private:
+  bool is_kept() const {
+    return tape_->writer && plugins_[0].declaration.slot == tape_->slot && tape_->step >= tape_->first_step &&
+           tape_->writer->calls() < tape_->most_calls;
+  }
+  void keep(v1::CapsuleCall* record, std::uint32_t target);
+
   std::unique_ptr<kernel::Carrier> host_;
-  const Selection selection_;
-  std::shared_ptr<Writer> writer_;
-  std::shared_ptr<const std::atomic<std::uint32_t>> step_;
-  std::vector<std::uint32_t> rows_;  // of the plugins in the capsule
+  const std::vector<kernel::PluginChoice> plugins_;
+  const std::shared_ptr<Tape> tape_;
+  std::shared_ptr<Writer> known_to_;  // the writer whose capsule has the plugins, in these rows
+  std::vector<std::uint32_t> rows_;
 };
 
 // Writes down what is asked during a call.
@@ -61,14 +65,26 @@ class RecordedDerivatives final : public kernel::DerivativeSource {
   v1::CapsuleCall* record_;
 };
 
+void RecordingHost::keep(v1::CapsuleCall* record, std::uint32_t target) {
+  try {
+    if (known_to_ != tape_->writer) {
+      known_to_ = tape_->writer;
+      rows_.clear();
+      for (const kernel::PluginChoice& plugin : plugins_) rows_.push_back(known_to_->add_plugin(plugin));
+    }
+    record->set_plugin(rows_[target]);
+    known_to_->add_call(*record);
+  } catch (const std::system_error& problem) {
+    tape_->problem = problem.what();
+    tape_->writer.reset();
+  }
+}
+
 kernel::CallResult RecordingHost::call(const kernel::StageCall& call, kernel::Arena* arena,
                                        kernel::DerivativeSource* derivatives) {
-  const std::uint32_t step = step_->load();
-  if (step < selection_.first_step || writer_->calls() >= selection_.most_calls)
-    return host_->call(call, arena, derivatives);
+  if (!is_kept()) return host_->call(call, arena, derivatives);
   v1::CapsuleCall record = begin_call(call, *arena);
-  record.set_plugin(rows_[call.target]);
-  record.set_step(step);
+  record.set_step(tape_->step);
   RecordedDerivatives recorded(derivatives, *arena, &record);
   try {
     kernel::CallResult result = host_->call(call, arena, derivatives != nullptr ? &recorded : nullptr);
@@ -77,24 +93,21 @@ kernel::CallResult RecordingHost::call(const kernel::StageCall& call, kernel::Ar
     record.set_status(result.status);
     record.set_text(result.text);
     if (result.status == GRAVITAS_OK) copy_columns(*arena, call.reply, call.info().reply, record.mutable_reply());
-    writer_->add_call(record);
+    keep(&record, call.target);
     return result;
   } catch (const kernel::StageFault& fault) {
     record.set_fault(fault.text);
-    writer_->add_call(record);
+    keep(&record, call.target);
     throw;
   }
 }
 
 }  // namespace
 
-kernel::HostStarter recording(const Selection& selection, std::shared_ptr<Writer> writer,
-                              std::shared_ptr<const std::atomic<std::uint32_t>> step) {
-  return [=](const kernel::SlotDescription& slot, std::uint32_t threads,
-             std::stop_token stop) -> std::unique_ptr<kernel::Carrier> {
-    std::unique_ptr<kernel::Carrier> host = kernel::start_host(slot, threads, std::move(stop));
-    if (slot.plugins[0].declaration.slot != selection.slot) return host;
-    return std::make_unique<RecordingHost>(std::move(host), slot.plugins, selection, writer, step);
+kernel::HostStarter recording(std::shared_ptr<Tape> tape) {
+  return [tape = std::move(tape)](const kernel::SlotDescription& slot, std::uint32_t threads,
+                                  std::stop_token stop) -> std::unique_ptr<kernel::Carrier> {
+    return std::make_unique<RecordingHost>(kernel::start_host(slot, threads, std::move(stop)), slot.plugins, tape);
   };
 }
 

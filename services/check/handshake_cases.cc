@@ -151,9 +151,7 @@ std::string judge_settings(Examination& examination) {
   std::size_t at = 0;
   for (const Property& p : examinee.declaration.properties) {
     // in a table: its number of rows
-    const std::size_t size = p.kind == PropertyKind::kTable
-                                 ? 1 + static_cast<std::size_t>(examinee.settings[at]) * p.columns
-                                 : p.flat_size();
+    const std::size_t size = flat_size_of(p, std::span(examinee.settings).subspan(at));
     std::vector<double> forbidden =
         p.kind == PropertyKind::kTable ? std::vector<double>{-1.0, 0.5} : forbidden_values(p);
     if (examination.options.quick) forbidden = {forbidden.back()};

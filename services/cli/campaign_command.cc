@@ -1,8 +1,6 @@
 // `gravitas campaign`.
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <csignal>
 #include <iostream>
 #include <memory>
@@ -12,15 +10,12 @@
 #include "services/campaign/endurance.h"
 #include "services/campaign/table.h"
 #include "services/cli/commands.h"
+#include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
 
 namespace gravitas::cli {
 namespace {
-
-volatile std::sig_atomic_t interrupt_requested = 0;
-
-void request_interrupt(int) { interrupt_requested = 1; }
 
 struct Arguments {
   campaign::Options options;
@@ -41,33 +36,15 @@ void read_shard(Arguments* arguments) {
   arguments->options.shards = all;
 }
 
-// A line on a person's terminal, ten times a second.
-class ProgressLine {
- public:
-  void show(const std::string& text) {
-    const auto now = std::chrono::steady_clock::now();
-    if (isatty(STDERR_FILENO) != 1 || now - last_ < std::chrono::milliseconds(100)) return;
-    last_ = now;
-    std::cerr << fmt::format("\r{:<78}", text) << std::flush;
-    is_shown_ = true;
-  }
-  ~ProgressLine() {
-    if (is_shown_) std::cerr << fmt::format("\r{:<78}\r", "");
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_{};
-  bool is_shown_ = false;
-};
-
 int endure(const Arguments& arguments) {
   campaign::EnduranceResult result;
   {
-    ProgressLine line;
-    result = campaign::endure(
-        arguments.options.scenes.empty() ? "" : arguments.options.scenes[0], arguments.endurance,
-        [] { return interrupt_requested != 0; },
-        [&](double seconds) { line.show(fmt::format("{:.0f} of {:.0f} s", seconds, arguments.endurance)); });
+    StatusLine line;
+    result =
+        campaign::endure(arguments.options.scenes.empty() ? "" : arguments.options.scenes[0], arguments.endurance,
+                         interrupted, [&](double seconds) {
+                           line.show([&] { return fmt::format("{:.0f} of {:.0f} s", seconds, arguments.endurance); });
+                         });
   }
   if (arguments.json) {
     std::cout << fmt::format(
@@ -84,7 +61,7 @@ int endure(const Arguments& arguments) {
         result.problem.empty() ? "the chain of hashes is that of the quiet run" : "failed: " + result.problem);
   }
   if (!result.problem.empty()) return kExaminedFailed;
-  return interrupt_requested != 0 ? kInterrupted : kDone;
+  return interrupted() ? kInterrupted : kDone;
 }
 
 int run_campaign(Arguments* arguments) {
@@ -98,10 +75,10 @@ int run_campaign(Arguments* arguments) {
   if (arguments->serve) {
     // Ctrl-C is for the parent, which lets its processes end their trials
     std::signal(SIGINT, SIG_IGN);
-    return campaign::serve_trials(options);
+    campaign::serve_trials(options);
+    return kDone;
   }
-  std::signal(SIGINT, request_interrupt);
-  std::signal(SIGTERM, request_interrupt);
+  listen_to_interrupts();
   if (arguments->endurance > 0.0) return endure(*arguments);
   if (arguments->trial) {
     const campaign::v1::Trial trial = campaign::repeat_trial(options, *arguments->trial);
@@ -110,17 +87,17 @@ int run_campaign(Arguments* arguments) {
   }
   campaign::v1::Table table;
   {
-    ProgressLine line;
-    table = campaign::run(
-        options, [] { return interrupt_requested != 0; },
-        [&](const campaign::Progress& now) {
-          line.show(fmt::format("{} of {} faults, {:.0f} a second, {} forbidden", now.injected, now.wanted,
-                                static_cast<double>(now.injected) / now.seconds, now.forbidden));
-        });
+    StatusLine line;
+    table = campaign::run(options, interrupted, [&](const campaign::Progress& now) {
+      line.show([&] {
+        return fmt::format("{} of {} faults, {:.0f} a second, {} forbidden", now.injected, now.wanted,
+                           static_cast<double>(now.injected) / now.seconds, now.forbidden);
+      });
+    });
   }
   std::cout << (arguments->json ? to_json(table, JsonForm::kPage) : campaign::table_text(table));
-  if (table.forbidden() > 0) return kExaminedFailed;
-  return interrupt_requested != 0 ? kInterrupted : kDone;
+  if (!campaign::is_passed(table)) return kExaminedFailed;
+  return interrupted() ? kInterrupted : kDone;
 }
 
 }  // namespace
@@ -165,10 +142,10 @@ void add_campaign(CLI::App* app, Action* action) {
   command->add_option("--patience", options.patience, "A trial that is silent for longer has hung, s")
       ->check(CLI::Range(1.0, 1e6))
       ->capture_default_str();
-  command->add_option(
-      "--without", options.without,
-      "Switch a defence off, to see the campaign fail: structure, numbers, replay, digest, epoch or deadline; "
-      "physics shows in the counts of what is not caught alone");
+  command->add_option("--without", options.without,
+                      "Switch a defence off, to see the campaign fail: structure, numbers, physics, confirmation, "
+                      "replay, digest, epoch "
+                      "or deadline");
   command->add_option("--trial", arguments->trial, "Only the trial with this seed, in this process; prints it");
   command
       ->add_option("--endurance", arguments->endurance,

@@ -1,11 +1,7 @@
 // `gravitas capture`, `gravitas replay` and `gravitas bisect`: a plugin's calls, kept and asked again.
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <csignal>
 #include <iostream>
 #include <memory>
 #include <system_error>
@@ -15,6 +11,7 @@
 #include "services/capsule/replay.h"
 #include "services/cli/commands.h"
 #include "services/cli/scene_options.h"
+#include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/session.h"
@@ -22,72 +19,49 @@
 namespace gravitas::cli {
 namespace {
 
-volatile std::sig_atomic_t interrupt_requested = 0;
-
-void request_interrupt(int) { interrupt_requested = 1; }
-
-void listen_to_interrupts() {
-  std::signal(SIGINT, request_interrupt);
-  std::signal(SIGTERM, request_interrupt);
-}
-
-// A count that is rewritten in place on a person's terminal, for work longer than two seconds.
-class CountLine {
- public:
-  void show(const std::string& text) {
-    const auto now = std::chrono::steady_clock::now();
-    if (isatty(STDERR_FILENO) != 1 || now - start_ < std::chrono::seconds(2) ||
-        now - last_ < std::chrono::milliseconds(100))
-      return;
-    last_ = now;
-    std::cerr << fmt::format("\r{:<60}", text) << std::flush;
-    is_shown_ = true;
-  }
-  ~CountLine() {
-    if (is_shown_) std::cerr << fmt::format("\r{:<60}\r", "");
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
-  bool is_shown_ = false;
-};
-
 struct CaptureLine {
   RunOptions options;
   SceneOptions scene{&options};
-  capsule::Selection selection;
+  std::shared_ptr<capsule::Tape> tape = std::make_shared<capsule::Tape>();
   std::string slot, out;
 };
 
 int capture(CaptureLine* line) {
   line->scene.apply();
-  line->selection.slot = parse_slot("--slot", line->slot, line->slot);
+  capsule::Tape& tape = *line->tape;
+  tape.slot = parse_slot("--slot", line->slot, line->slot);
   listen_to_interrupts();
   std::shared_ptr<capsule::Writer> writer;
   try {
-    writer = std::make_shared<capsule::Writer>(line->out, capsule_header(line->options, line->selection.slot));
+    tape.writer = writer = std::make_shared<capsule::Writer>(line->out, capsule_header(line->options, tape.slot));
   } catch (const std::system_error& problem) {
     throw BadInput(problem.what());
   }
-  const auto step = std::make_shared<std::atomic<std::uint32_t>>(1);
-  line->options.starter = capsule::recording(line->selection, writer, step);
-  CountLine count;
-  const RunResult result = run(
-      line->options, [&] { return interrupt_requested != 0 || writer->calls() >= line->selection.most_calls; },
-      [&](const Progress& now) {
-        step->store(now.step + 1);
-        count.show(fmt::format("step {} of {}, {} calls", now.step, now.steps, writer->calls()));
-      });
-  writer->close();
+  line->options.starter = capsule::recording(line->tape);
+  const auto is_enough = [&] { return writer->calls() >= tape.most_calls; };
+  RunResult result;
+  {
+    StatusLine count;
+    result = run(
+        line->options, [&] { return interrupted() || is_enough() || !tape.problem.empty(); },
+        [&](const Progress& now) {
+          tape.step = now.step + 1;
+          count.show([&] { return fmt::format("step {} of {}, {} calls", now.step, now.steps, writer->calls()); });
+        });
+  }
   for (const std::string& warning : result.report.warnings()) std::cerr << warning << '\n';
-  const bool is_enough = writer->calls() >= line->selection.most_calls;
+  if (!tape.problem.empty()) {
+    std::cerr << fmt::format("gravitas: {}\n", tape.problem);
+    return kOurFault;
+  }
+  writer->close();
   std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->out, writer->calls(), line->slot,
                            result.report.steps());
   if (writer->calls() == 0) {
     std::cerr << fmt::format("gravitas: slot {} was not asked: `gravitas plan` says why\n", line->slot);
     return kBadInput;
   }
-  if (result.outcome == RunOutcome::kCompleted || is_enough) return kDone;
+  if (result.outcome == RunOutcome::kCompleted || is_enough()) return kDone;
   if (result.outcome == RunOutcome::kInterrupted) return kInterrupted;
   std::cerr << fmt::format("gravitas: {}\n", result.fault);
   return result.outcome == RunOutcome::kPaused ? kPaused : kOurFault;
@@ -107,10 +81,10 @@ void print_first(const report::v1::ReplayReport& report) {
                            first.text());
 }
 
-std::function<bool(std::uint32_t)> progress_of(CountLine* line) {
+std::function<bool(std::uint32_t)> progress_of(StatusLine* line) {
   return [line](std::uint32_t number) {
-    line->show(fmt::format("call {}", number));
-    return interrupt_requested == 0;
+    line->show([&] { return fmt::format("call {}", number); });
+    return !interrupted();
   };
 }
 
@@ -120,7 +94,7 @@ int replay(ReplayLine* line) {
   listen_to_interrupts();
   report::v1::ReplayReport report;
   {
-    CountLine count;
+    StatusLine count;
     report = capsule::replay(line->options, progress_of(&count));
   }
   if (line->json) {
@@ -134,7 +108,7 @@ int replay(ReplayLine* line) {
     std::cout << '\n';
     print_first(report);
   }
-  if (interrupt_requested != 0) return kInterrupted;
+  if (interrupted()) return kInterrupted;
   return report.different() + report.failed_again() == 0 ? kDone : kExaminedFailed;
 }
 
@@ -144,7 +118,7 @@ int bisect(ReplayLine* line) {
   listen_to_interrupts();
   report::v1::ReplayReport report;
   {
-    CountLine count;
+    StatusLine count;
     report = capsule::bisect(line->options, line->other, progress_of(&count));
   }
   if (line->json) {
@@ -154,7 +128,7 @@ int bisect(ReplayLine* line) {
                              report.different() == 0 ? "" : ", then a difference");
     print_first(report);
   }
-  if (interrupt_requested != 0) return kInterrupted;
+  if (interrupted()) return kInterrupted;
   return report.different() == 0 ? kDone : kExaminedFailed;
 }
 
@@ -180,9 +154,9 @@ void add_capture(CLI::App* app, Action* action) {
   line->scene.add_to(command);
   command->add_option("--slot", line->slot, "space, collision, constraint, force, solver or integrator")->required();
   command->add_option("--out", line->out, "The capsule's file")->required();
-  command->add_option("--from-step", line->selection.first_step, "First step whose calls are kept [1]")
+  command->add_option("--from-step", line->tape->first_step, "First step whose calls are kept [1]")
       ->check(CLI::PositiveNumber);
-  command->add_option("--calls", line->selection.most_calls, "Stop after so many calls")->check(CLI::PositiveNumber);
+  command->add_option("--calls", line->tape->most_calls, "Stop after so many calls")->check(CLI::PositiveNumber);
   command->callback([=] { *action = [=] { return capture(line.get()); }; });
 }
 

@@ -1,9 +1,6 @@
 // `gravitas check`.
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <chrono>
-#include <csignal>
 #include <iostream>
 #include <memory>
 
@@ -11,39 +8,18 @@
 #include "services/check/describe.h"
 #include "services/check/examination.h"
 #include "services/cli/commands.h"
+#include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
 
 namespace gravitas::cli {
 namespace {
 
-volatile std::sig_atomic_t interrupt_requested = 0;
-
-void request_interrupt(int) { interrupt_requested = 1; }
-
-// A line of progress on a person's terminal, for work longer than two seconds.
-class CaseLine {
- public:
-  void show(const check::Progress& progress) {
-    const auto now = Clock::now();
-    if (isatty(STDERR_FILENO) != 1 || now - start_ < std::chrono::seconds(2) ||
-        now - last_ < std::chrono::milliseconds(100))
-      return;
-    last_ = now;
-    std::string text = fmt::format("{} {}", progress.level, progress.name);
-    if (progress.all > 0) text += fmt::format(", call {} of {}", progress.done, progress.all);
-    std::cerr << fmt::format("\r{:<70}", text) << std::flush;
-    is_shown_ = true;
-  }
-  ~CaseLine() {
-    if (is_shown_) std::cerr << fmt::format("\r{:<70}\r", "");
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now(), last_{};
-  bool is_shown_ = false;
-};
+std::string text_of(const check::Progress& progress) {
+  std::string text = fmt::format("{} {}", progress.level, progress.name);
+  if (progress.all > 0) text += fmt::format(", call {} of {}", progress.done, progress.all);
+  return text;
+}
 
 struct Arguments {
   std::string plugin;
@@ -63,20 +39,19 @@ void demand_known(const check::Options& options, const PluginDeclaration& declar
 }
 
 int check_plugin(const Arguments& arguments) {
-  std::signal(SIGINT, request_interrupt);
-  std::signal(SIGTERM, request_interrupt);
+  listen_to_interrupts();
   check::Examinee examinee = check::find_examinee(arguments.plugin);
   check::complete(&examinee, arguments.options.quick);
   if (examinee.problem.empty()) demand_known(arguments.options, examinee.declaration);
   report::v1::CheckReport report;
   {
-    CaseLine line;
+    StatusLine line;
     report = check::examine(
-        examinee, arguments.options, [&](const check::Progress& now) { line.show(now); },
-        [] { return interrupt_requested != 0; });
+        examinee, arguments.options, [&](const check::Progress& now) { line.show([&] { return text_of(now); }); },
+        interrupted);
   }
   std::cout << (arguments.json ? to_json(report, JsonForm::kPage) : check::check_text(report));
-  if (interrupt_requested != 0) return kInterrupted;
+  if (interrupted()) return kInterrupted;
   return report.conforms() ? kDone : kExaminedFailed;
 }
 

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -22,8 +23,9 @@ using control::ControlClient;
 struct CommandLine {
   std::string socket;
   bool json = false, no_wait = false;
-  std::uint32_t steps = 1;
-  std::string text;  // what a swap, a setting or a fault is
+  std::uint32_t steps = 1, captured_steps = 100;
+  std::string text;  // what a swap, a setting, a fault or a slot is
+  std::string out;
 };
 
 using Order = std::function<int(const CommandLine&, ControlClient*)>;
@@ -112,6 +114,23 @@ int inject(const CommandLine& line, ControlClient* client) {
   return kDone;
 }
 
+int capture(const CommandLine& line, ControlClient* client) {
+  api::CaptureRequest request;
+  request.set_slot(line.text);
+  request.set_path(std::filesystem::absolute(line.out).lexically_normal().string());
+  request.set_steps(line.captured_steps);
+  const api::Captured captured = client->capture(request);
+  if (line.json) {
+    std::cout << to_json(captured, JsonForm::kPage);
+  } else {
+    std::cout << fmt::format("{}: {} calls of slot {} in {} steps from step {} on\n", line.out, captured.calls(),
+                             line.text, captured.steps(), captured.first_step());
+  }
+  if (captured.steps() == line.captured_steps) return kDone;
+  std::cerr << "gravitas ctl: the run ended or was reset before\n";
+  return kExaminedFailed;
+}
+
 // A page that is rewritten in place on a terminal, a line per second elsewhere.
 int watch(const CommandLine& line, ControlClient* client) {
   const bool is_terminal = isatty(STDOUT_FILENO) == 1 && !line.json;
@@ -141,7 +160,8 @@ void add_ctl(CLI::App* app, Action* action) {
   CLI::App* ctl = app->add_subcommand("ctl", "Watch and control a run of `gravitas serve`");
   ctl->require_subcommand(1);
   ctl->footer("Example: gravitas ctl status");
-  ctl->add_option("--socket", line->socket, "Socket of the server; the one that is running if absent");
+  ctl->add_option("--socket", line->socket,
+                  "Socket of the server, or ADDR:PORT where it listens; the one that is running if absent");
   const auto add = [&](const char* name, const char* meaning, const char* example, Order order) {
     CLI::App* command = ctl->add_subcommand(name, meaning);
     command->footer(fmt::format("Example: gravitas ctl {}", example));
@@ -179,6 +199,14 @@ void add_ctl(CLI::App* app, Action* action) {
       ->add_flag("--no-wait", line->no_wait, no_wait);
   add_order("inject", "Have a worker commit a fault", "inject solver:kill", inject, "SPEC",
             "SLOT:KIND[@step=N][,ARGUMENT=VALUE]...: at step N, or the next");
+  CLI::App* capture_command =
+      add_order("capture", "Keep a slot's calls in the next steps as a capsule, for gravitas replay and bisect",
+                "capture solver --out solver.capsule --steps 50", capture, "SLOT",
+                "space, collision, constraint, force, solver or integrator");
+  capture_command->add_option("--out", line->out, "The capsule's file, on the server's machine")->required();
+  capture_command->add_option("--steps", line->captured_steps, "For so many steps")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
 }
 

@@ -1,8 +1,6 @@
 // `gravitas run` and `gravitas plan`.
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <chrono>
 #include <csignal>
 #include <iostream>
 #include <limits>
@@ -10,6 +8,7 @@
 
 #include "services/cli/commands.h"
 #include "services/cli/scene_options.h"
+#include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/fault_spec.h"
 #include "services/run/report.h"
@@ -18,48 +17,16 @@
 namespace gravitas::cli {
 namespace {
 
-volatile std::sig_atomic_t interrupt_requested = 0;
-
-// The first Ctrl-C ends the run after its step; the second ends the program.
-void request_interrupt(int number) {
-  interrupt_requested = 1;
-  std::signal(number, SIG_DFL);
-}
-
 struct CommandLine {
   RunOptions options;
   SceneOptions scene{&options};
   bool progress = false, quiet = false, json = false;
 };
 
-// One line that is rewritten in place on a terminal, or a line per second elsewhere.
-class ProgressLine {
- public:
-  ProgressLine(bool wanted, bool quiet) : is_terminal_(isatty(STDERR_FILENO) == 1), wanted_(wanted), quiet_(quiet) {}
-
-  void show(const Progress& progress) {
-    // the clock is looked at now and then only
-    if (quiet_ || (!wanted_ && !is_terminal_) || (++calls_ & 15) != 0) return;
-    const auto now = std::chrono::steady_clock::now();
-    if (!wanted_ && now - start_ < std::chrono::seconds(2)) return;
-    if (now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(1000))) return;
-    last_ = now;
-    std::cerr << (is_terminal_ ? "\r" : "")
-              << fmt::format("t = {:.2f} of {:.6g} s, step {} of {} ({:.0f} %)", progress.time, progress.duration,
-                             progress.step, progress.steps, 100.0 * progress.step / progress.steps)
-              << (is_terminal_ ? "   " : "\n") << std::flush;
-    shown_ = true;
-  }
-
-  void finish() {
-    if (shown_ && is_terminal_) std::cerr << '\n';
-  }
-
- private:
-  bool is_terminal_, wanted_, quiet_, shown_ = false;
-  unsigned calls_ = 0;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
-};
+std::string text_of(const Progress& progress) {
+  return fmt::format("t = {:.2f} of {:.6g} s, step {} of {} ({:.0f} %)", progress.time, progress.duration,
+                     progress.step, progress.steps, 100.0 * progress.step / progress.steps);
+}
 
 // A word as a shell reads it.
 std::string quoted(const std::string& word) {
@@ -93,14 +60,16 @@ void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warni
 
 int run_scene(CommandLine* line) {
   line->scene.apply();
-  std::signal(SIGINT, request_interrupt);
-  std::signal(SIGTERM, request_interrupt);
+  listen_to_interrupts();
   // a file beyond the limit of its size is an error of that write, as a full disk is
   std::signal(SIGXFSZ, SIG_IGN);
-  ProgressLine progress(line->progress, line->quiet);
-  const RunResult result = run(
-      line->options, [] { return interrupt_requested != 0; }, [&](const Progress& now) { progress.show(now); });
-  progress.finish();
+  RunResult result;
+  {
+    StatusLine progress(line->progress && !line->quiet);
+    result = run(line->options, interrupted, [&](const Progress& now) {
+      if (!line->quiet) progress.show([&] { return text_of(now); });
+    });
+  }
   if (!line->quiet) print_warnings(result.report.warnings());
   if (line->json) {
     std::cout << to_json(result.report, JsonForm::kPage);
@@ -175,7 +144,7 @@ void add_run(CLI::App* app, Action* action) {
   add_list(command, "--compare", &options.comparisons,
            "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
   add_list(command, "--rerun", &options.reruns,
-           "Ask another process the same at every N-th call and take the majority's bytes: SLOT=N; repeatable");
+           "Ask another process the same in every N-th step and take the majority's bytes: SLOT=N; repeatable");
   add_list(command, "--fault", &options.faults, "Inject a fault: SLOT:KIND@step=N[,arg=...]; repeatable");
   command->add_flag("--json", line->json, "Print the report instead of the summary");
   command->add_flag("--progress", line->progress, "Show progress from the start");

@@ -8,6 +8,7 @@
 #include <iostream>
 #include <memory>
 
+#include "plugin_sdk/channel/address.h"
 #include "services/cli/commands.h"
 #include "services/cli/scene_options.h"
 #include "services/control/served_run.h"
@@ -21,8 +22,8 @@ namespace {
 struct CommandLine {
   control::ServeOptions options;
   SceneOptions scene{&options.run};
-  std::string socket;
-  bool headless = false;
+  std::string socket, listen;
+  bool headless = false, remote = false;
 };
 
 int serve(CommandLine* line) {
@@ -30,6 +31,12 @@ int serve(CommandLine* line) {
   if (!std::isfinite(line->options.speed) || line->options.speed < 0.0)
     throw BadInput(
         fmt::format("--speed {:g}: allowed: a finite number > 0, or 0: as fast as possible", line->options.speed));
+  if (!line->listen.empty() && !line->remote &&
+      (line->listen.starts_with("unix:") || !channel::is_local_address(line->listen)))
+    throw BadInput(fmt::format(
+        "--listen {}: nothing is encrypted and whoever connects controls the run, so only this machine is allowed: "
+        "127.0.0.1:PORT or [::1]:PORT; others with --allow-remote",
+        line->listen));
   line->scene.apply();
   // from here on a signal ends it in order
   boost::asio::io_context loop;
@@ -43,8 +50,10 @@ int serve(CommandLine* line) {
   for (const std::string& warning : run.scene_warnings()) std::cerr << warning << '\n';
   {
     const control::ServerSocket socket(line->socket);
-    const control::ControlServer server(&run, socket.path());
-    std::cout << fmt::format("serving {} at unix:{}\n", run.scene(), socket.path()) << std::flush;
+    const control::ControlServer server(&run, socket.path(), line->listen);
+    std::cout << fmt::format("serving {} at unix:{}{}\n", run.scene(), socket.path(),
+                             server.address().empty() ? "" : " and " + server.address())
+              << std::flush;
     loop.run();
   }
   std::cout << control::status_page(run.status());
@@ -59,12 +68,17 @@ void add_serve(CLI::App* app, Action* action) {
   command->footer(
       "Example: gravitas serve deploy/scenes/two_spheres_motor.gravitas --headless --duration 3600 &\n"
       "         gravitas ctl status; gravitas ctl swap solver=Sequential,hosting=direct\n"
-      "Ends with Ctrl-C. The socket is the only guard: whoever may open it controls the run.");
+      "Ends with Ctrl-C. The socket is the only guard: whoever may open it, or reaches the address, controls the run "
+      "and "
+      "what it loads.");
   line->scene.add_to(command);
   command->add_flag("--headless", line->headless, "The control API alone, without the page");
   command->add_option("--speed", line->options.speed,
                       "Simulated seconds per second; 0: as fast as possible [1: real time]");
   command->add_flag("--paused", line->options.is_paused, "Begin paused");
+  CLI::Option* listen =
+      command->add_option("--listen", line->listen, "Listen at ADDR:PORT of this machine, too; port 0: a free one");
+  command->add_flag("--allow-remote", line->remote, "Let --listen take an address that others reach")->needs(listen);
   command->add_option("--socket", line->socket,
                       "Listen at this path instead of a private folder in $XDG_RUNTIME_DIR or /tmp");
   command->callback([=] { *action = [=] { return serve(line.get()); }; });

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <grpcpp/grpcpp.h>
 
-#include <charconv>
 #include <chrono>
 #include <filesystem>
 
 #include "gravitas/control_api/v1/control_api.grpc.pb.h"
+#include "services/run/exchange_spec.h"
 #include "services/run/session.h"
 
 namespace gravitas::control {
@@ -54,11 +54,14 @@ struct ControlClient::Connection {
   }
 };
 
-ControlClient::ControlClient(const std::string& socket) : connection_(std::make_unique<Connection>()) {
-  connection_->channel =
-      grpc::CreateCustomChannel("unix:" + socket, grpc::InsecureChannelCredentials(), channel_arguments());
+ControlClient::ControlClient(const std::string& place) : connection_(std::make_unique<Connection>()) {
+  const std::size_t colon = place.rfind(':');
+  const bool is_address = colon != std::string::npos && place.find('/') == std::string::npos &&
+                          place.find_first_not_of("0123456789", colon + 1) == std::string::npos;
+  connection_->channel = grpc::CreateCustomChannel(is_address ? place : "unix:" + place,
+                                                   grpc::InsecureChannelCredentials(), channel_arguments());
   if (!connection_->channel->WaitForConnected(std::chrono::system_clock::now() + kConnect))
-    throw ControlError(ControlError::Kind::kNoServer, fmt::format("no server answers at {}", socket));
+    throw ControlError(ControlError::Kind::kNoServer, fmt::format("no server answers at {}", place));
   connection_->stub = api::Control::NewStub(connection_->channel);
 }
 
@@ -92,6 +95,10 @@ api::InjectOrdered ControlClient::inject(const std::string& fault) {
   return connection_->call(&api::Control::Stub::Inject, request);
 }
 
+api::Captured ControlClient::capture(const api::CaptureRequest& request) {
+  return connection_->call(&api::Control::Stub::Capture, request);
+}
+
 void ControlClient::watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show) {
   grpc::ClientContext context;
   api::WatchRequest request;
@@ -110,39 +117,13 @@ void ControlClient::watch(std::uint32_t interval_ms, const std::function<bool(co
 // ---- what a person writes
 
 api::SwapRequest parse_swap_request(const std::string& text) {
-  const auto refuse = [&](const std::string& why) {
-    throw BadInput(fmt::format("swap {}: {}; allowed: SLOT=PLUGIN[@step=N][,hosting=direct|shm|grpc]", text, why));
-  };
+  const SwapSpec spec = parse_swap_order(text);
+  const bool is_path = spec.plugin.find('/') != std::string::npos || spec.plugin.ends_with(".so");
   api::SwapRequest request;
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) refuse("no SLOT=");
-  request.set_slot(text.substr(0, equals));
-  const std::size_t step_at = text.find("@step=", equals), hosting_at = text.find(",hosting=", equals);
-  const std::size_t end = std::min({step_at, hosting_at, text.size()});
-  std::string plugin = text.substr(equals + 1, end - equals - 1);
-  if (plugin.empty()) refuse("no PLUGIN");
-  if (plugin.find_first_of("@,") != std::string::npos) refuse(fmt::format("'{}' is no plugin", plugin));
-  if (plugin.find('/') != std::string::npos || plugin.ends_with(".so"))
-    plugin = std::filesystem::absolute(plugin).lexically_normal().string();
-  request.set_plugin(plugin);
-  const auto word_at = [&](std::size_t at, std::size_t name) {
-    const std::size_t begin = at + name;
-    return text.substr(begin, text.find_first_of("@,", begin) - begin);
-  };
-  std::size_t length = end;
-  if (step_at != std::string::npos) {
-    const std::string word = word_at(step_at, 6);
-    std::uint32_t step = 0;
-    const auto [rest, error] = std::from_chars(word.data(), word.data() + word.size(), step);
-    if (error != std::errc() || rest != word.data() + word.size()) refuse(fmt::format("'{}' is no step", word));
-    request.set_step(step);
-    length += 6 + word.size();
-  }
-  if (hosting_at != std::string::npos) {
-    request.set_hosting(word_at(hosting_at, 9));
-    length += 9 + request.hosting().size();
-  }
-  if (length != text.size()) refuse("there is more than that");
+  request.set_slot(slot_name(spec.slot));
+  request.set_plugin(is_path ? std::filesystem::absolute(spec.plugin).lexically_normal().string() : spec.plugin);
+  request.set_step(spec.step);
+  if (spec.hosting) request.set_hosting(kernel::hosting_name(*spec.hosting));
   return request;
 }
 

@@ -21,10 +21,11 @@ class ControlError : public std::runtime_error {
   Kind kind;
 };
 
-// All functions throw ControlError: kRefused with the server's reason, kNoServer if nobody answers on the socket.
+// All functions throw ControlError: kRefused with the server's reason, kNoServer if nobody answers.
 class ControlClient {
  public:
-  explicit ControlClient(const std::string& socket);
+  // At the path of a socket, or at ADDR:PORT.
+  explicit ControlClient(const std::string& place);
   ~ControlClient();
   ControlClient(const ControlClient&) = delete;
   ControlClient& operator=(const ControlClient&) = delete;
@@ -37,6 +38,7 @@ class ControlClient {
   api::SwapOrdered swap(const api::SwapRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
   api::InjectOrdered inject(const std::string& fault);
+  api::Captured capture(const api::CaptureRequest& request);
   // Until `show` returns false, or the server ends.
   void watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show);
 
@@ -46,7 +48,7 @@ class ControlClient {
 };
 
 // Reads `SLOT=PLUGIN[@step=N][,hosting=MODE]`, a relative path of a library made absolute, and
-// `Slot.Property=VALUE`. Throw BadInput; names are for the server to judge.
+// `Slot.Property=VALUE`. Throw BadInput; names of plugins and properties are for the server to judge.
 api::SwapRequest parse_swap_request(const std::string& text);
 api::SetPropertyRequest parse_set_request(const std::string& text);
 

@@ -5,9 +5,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
+#include <system_error>
 
 #include "plugin_sdk/near_miss.h"
 #include "plugin_sdk/property_value.h"
+#include "plugin_sdk/slots.h"
+#include "services/recorder/identity.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/scene/parser.h"
@@ -23,9 +27,7 @@ double seconds(std::chrono::steady_clock::duration duration) { return std::chron
 
 kernel::EnvironmentDescription slots_of(const kernel::EnvironmentDescription& whole) {
   kernel::EnvironmentDescription slots;
-  for (const Slot slot :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
-    slots.slot(slot) = whole.slot(slot);
+  for (const Slot slot : kSlots) slots.slot(slot) = whole.slot(slot);
   return slots;
 }
 
@@ -37,9 +39,7 @@ bool is_pending(kernel::SwapState state) {
 std::pair<std::size_t, std::size_t> place_of(const kernel::PluginChoice& plugin, const Property& wanted) {
   std::size_t begin = 0;
   for (const Property& property : plugin.declaration.properties) {
-    std::size_t size = property.flat_size();
-    if (property.kind == PropertyKind::kTable)
-      size += static_cast<std::size_t>(plugin.settings.at(begin)) * property.columns;
+    const std::size_t size = flat_size_of(property, std::span(plugin.settings).subspan(begin));
     if (&property == &wanted) return {begin, size};
     begin += size;
   }
@@ -66,7 +66,10 @@ PropertyValue parse_value(const std::string& what, const std::string& text) {
 }  // namespace
 
 ServedRun::ServedRun(const ServeOptions& options)
-    : speed_(options.speed), description_(load(options.run, &scene_warnings_, &catalog_)), timer_(loop_) {
+    : options_(options.run),
+      speed_(options.speed),
+      description_(load(options.run, &scene_warnings_, &catalog_)),
+      timer_(loop_) {
   for (const std::string& path : options.run.scenes) scene_ += (scene_.empty() ? "" : " ") + path;
   begin_environment();
   if (!options.is_paused && state_ == State::kPaused) go();
@@ -80,13 +83,26 @@ ServedRun::~ServedRun() { loop_.stop(); }
 
 void ServedRun::begin_environment() {
   // where the new one cannot be made the old one stays
-  environment_ = start(description_);
+  auto environment = start(description_, capsule::recording(tape_));
+  close_capture();
+  environment_ = std::move(environment);
+  events_ = std::make_unique<EventLog>("", description_);
+  figures_ = std::make_unique<Figures>(description_);
+  recorder_ = std::make_unique<Recorder>(identity_of(description_), [this] {
+    recorder::v1::Tally tally;
+    figures_->write(&tally);
+    events_->write(&tally);
+    return tally;
+  });
+  environment_->set_listener(events_.get());
   environment_->set_commit_listener(this);
   active_ = slots_of(description_);
   forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
   orders_.clear();
   warnings_ = scene_warnings_;
   fault_.clear();
+  checkpoint_.clear();
+  next_collection_ = {};
   stand(environment_->total_steps() == 0 ? State::kFinished : State::kPaused);
 }
 
@@ -103,6 +119,7 @@ void ServedRun::go() {
 void ServedRun::stand(State state) {
   state_ = state;
   timer_.cancel();
+  if (state == State::kFinished || state == State::kFaulted) close_capture();
   if (!steps_left_) return;
   steps_left_.reset();
   step_order_.set_value();
@@ -142,17 +159,22 @@ void ServedRun::on_turn() {
 }
 
 void ServedRun::make_step() {
+  tape_->step = environment_->step_count() + 1;
   try {
+    // the initial state, too
+    if (environment_->step_count() == 0) figures_->follow(environment_.get());
     if (environment_->step() == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
       fault_ = fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(record.fault.slot),
                            record.fault.plugin, record.fault.text, kernel::fault_kind_name(record.fault.kind));
-      return stand(State::kFaulted);
+      return keep_faulted_state();
     }
+    figures_->follow(environment_.get());
   } catch (const std::exception& problem) {
     fault_ = problem.what();
-    return stand(State::kFaulted);
+    return keep_faulted_state();
   }
+  if (capture_ && environment_->step_count() >= capture_->begun + capture_->steps) close_capture();
   const Clock::time_point now = Clock::now();
   if (now - rate_begin_ >= kRateWindow) {
     rate_ = (environment_->step_count() - rate_step_) / seconds(now - rate_begin_);
@@ -161,6 +183,18 @@ void ServedRun::make_step() {
   }
   if (environment_->step_count() >= environment_->total_steps()) return stand(State::kFinished);
   if (steps_left_ && --*steps_left_ == 0) stand(State::kPaused);
+}
+
+// As a run does that pauses: what was computed is not lost with the server.
+void ServedRun::keep_faulted_state() {
+  stand(State::kFaulted);
+  try {
+    const std::string path = std::filesystem::absolute(paused_checkpoint(options_));
+    recorder_->save_to(path, *environment_);
+    checkpoint_ = path;
+  } catch (const std::exception& problem) {
+    fault_ += fmt::format("; no checkpoint: {}", problem.what());
+  }
 }
 
 // ---- orders
@@ -319,7 +353,56 @@ api::InjectOrdered ServedRun::inject(const api::InjectRequest& request) {
   });
 }
 
-void ServedRun::on_decision(const kernel::Environment&, const kernel::Decision& decision) {
+void ServedRun::on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) {
+  warnings_.push_back(keep_poisoned_call(options_, environment.step_count() + 1, poisoned));
+}
+
+std::future<api::Captured> ServedRun::capture(const api::CaptureRequest& request) {
+  const std::string what = fmt::format("capture {}", request.slot());
+  const Slot slot = parse_slot("capture", request.slot(), request.slot());
+  if (request.steps() == 0) throw BadInput(what + ": allowed: a number of steps from 1");
+  if (!request.path().starts_with('/')) throw BadInput(what + ": allowed: an absolute path for the capsule");
+  return between_steps([&] {
+    require_steps_left("capture");
+    if (capture_) throw NotNow(what + ": another capture is being made");
+    for (const kernel::LeftOut& left_out : environment_->plan().left_out)
+      if (left_out.what == slot_name(slot)) throw BadInput(what + ": the plan leaves the slot out: " + left_out.why);
+    try {
+      tape_->writer = std::make_shared<capsule::Writer>(request.path(), capsule_header(options_, slot));
+    } catch (const std::system_error& problem) {
+      throw BadInput(fmt::format("{}: {}", what, problem.what()));
+    }
+    tape_->slot = slot;
+    tape_->problem.clear();
+    capture_ = Capture{{}, environment_->step_count(), request.steps()};
+    return capture_->end.get_future();
+  });
+}
+
+void ServedRun::end_capture() {
+  between_steps([this] { close_capture(); });
+}
+
+void ServedRun::close_capture() {
+  if (!capture_) return;
+  Capture capture = std::move(*capture_);
+  capture_.reset();
+  const std::shared_ptr<capsule::Writer> writer = std::exchange(tape_->writer, nullptr);
+  try {
+    if (!tape_->problem.empty()) throw std::runtime_error(tape_->problem);
+    writer->close();
+    api::Captured captured;
+    captured.set_calls(writer->calls());
+    captured.set_first_step(capture.begun + 1);
+    captured.set_steps(environment_->step_count() - capture.begun);
+    capture.end.set_value(std::move(captured));
+  } catch (...) {
+    capture.end.set_exception(std::current_exception());
+  }
+}
+
+void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {
+  recorder_->on_decision(environment, decision);
   active_.slot(decision.slot).plugins.at(decision.target) = *decision.plugin;
 }
 

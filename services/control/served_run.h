@@ -23,7 +23,11 @@
 
 #include "gravitas/control_api/v1/control_api.pb.h"
 #include "kernel/environment.h"
+#include "services/capsule/recording_host.h"
 #include "services/catalog/catalog.h"
+#include "services/recorder/event_log.h"
+#include "services/recorder/recorder.h"
+#include "services/run/figures.h"
 #include "services/run/session.h"
 
 namespace gravitas::control {
@@ -63,6 +67,9 @@ class ServedRun final : private kernel::CommitListener {
   api::SwapOrdered swap(const api::SwapRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
   api::InjectOrdered inject(const api::InjectRequest& request);
+  // Begins to keep calls. The future is ready when the steps are made, or end_capture() has ended it.
+  std::future<api::Captured> capture(const api::CaptureRequest& request);
+  void end_capture();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -72,6 +79,11 @@ class ServedRun final : private kernel::CommitListener {
     Slot slot;
     std::uint32_t step, rank;
     kernel::PluginChoice plugin;
+  };
+  // Calls that are being kept.
+  struct Capture {
+    std::promise<api::Captured> end;
+    std::uint32_t begun, steps;  // after so many commits, and for how many more
   };
 
   // Has the stepping thread do it between two steps, and waits.
@@ -90,6 +102,8 @@ class ServedRun final : private kernel::CommitListener {
   void schedule();
   void on_turn();
   void make_step();
+  void keep_faulted_state();
+  void close_capture();
   Clock::time_point due() const;
   void require_steps_left(const std::string& what) const;
   std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
@@ -105,7 +119,9 @@ class ServedRun final : private kernel::CommitListener {
 
   void on_commit(const kernel::Environment&) override {}
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
+  void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override;
 
+  const RunOptions options_;
   std::string scene_;
   double speed_;
   std::vector<std::string> scene_warnings_;
@@ -113,9 +129,16 @@ class ServedRun final : private kernel::CommitListener {
   const kernel::EnvironmentDescription description_;
   kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
 
+  // What a checkpoint holds besides the state.
+  std::unique_ptr<EventLog> events_;
+  std::unique_ptr<Figures> figures_;
+  std::unique_ptr<Recorder> recorder_;
+  const std::shared_ptr<capsule::Tape> tape_ = std::make_shared<capsule::Tape>();
+  std::optional<Capture> capture_;
+
   std::unique_ptr<kernel::Environment> environment_;
   State state_ = State::kPaused;
-  std::string fault_;
+  std::string fault_, checkpoint_;
   std::vector<Order> orders_;
   std::uint32_t forgotten_orders_ = 0;  // of before the last reset: numbers go on
   std::vector<std::string> warnings_;   // different ones

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plugin_sdk/property_value.h"
+#include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
 #include "services/run/report.h"
 
@@ -39,10 +40,8 @@ std::vector<api::Setting> setting_messages(const kernel::PluginChoice& plugin) {
   std::vector<api::Setting> settings;
   std::span<const double> rest = plugin.settings;
   for (const Property& property : plugin.declaration.properties) {
-    std::size_t size = property.flat_size();
-    if (property.kind == PropertyKind::kTable && !rest.empty())
-      size += static_cast<std::size_t>(rest[0]) * property.columns;
-    if (size > rest.size()) break;
+    const std::size_t size = flat_size_of(property, rest);
+    if (size == 0) break;
     api::Setting& setting = settings.emplace_back();
     setting.set_name(property.name);
     setting.set_value(value_text(property, rest.first(size)));
@@ -71,6 +70,7 @@ api::Status ServedRun::status() {
     status.set_scene(scene_);
     status.set_state(state_name());
     status.set_fault(fault_);
+    status.set_checkpoint(checkpoint_);
     status.set_time(environment_->time());
     status.set_time_step(environment_->time_step());
     status.set_step(environment_->step_count());
@@ -103,8 +103,7 @@ void ServedRun::write_plan(api::Plan* plan) const {
     slot->set_plugin(one.plugin());
     slot->set_hosting(one.hosting());
     slot->set_pid(one.pid());
-    for (const Slot which :
-         {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+    for (const Slot which : kSlots)
       for (const kernel::PluginChoice& plugin : active_.slot(which).plugins)
         if (one.slot() == slot_name(which) && one.plugin() == plugin.declaration.name && slot->settings_size() == 0)
           for (api::Setting& setting : setting_messages(plugin)) *slot->add_settings() = std::move(setting);

@@ -32,17 +32,25 @@ grpc::Status answered(Action&& action) {
 
 class ControlServer::Service final : public api::Control::Service {
  public:
-  Service(ServedRun* run, const std::string& socket) : run_(*run) {
+  Service(ServedRun* run, const std::string& socket, const std::string& address) : run_(*run) {
     grpc::ServerBuilder builder;
-    int bound = 0;
+    int bound = 0, port = 0;
     builder.AddListeningPort("unix:" + socket, grpc::InsecureServerCredentials(), &bound);
+    if (!address.empty()) builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+    // else two servers would share a port without a word
+    builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     builder.RegisterService(this);
     // nobody else may connect, wherever --socket puts it
     const mode_t before = umask(0177);
     server_ = builder.BuildAndStart();
     umask(before);
+    if (!address.empty() && port == 0)
+      throw BadInput(fmt::format("--listen {}: cannot listen there: is it a free address of this machine?", address));
+    if (!address.empty()) address_ = fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
     if (server_ == nullptr || bound == 0) throw std::runtime_error(fmt::format("cannot listen on {}", socket));
   }
+
+  const std::string& address() const { return address_; }
 
   void end() {
     server_->Shutdown(std::chrono::system_clock::now());
@@ -80,6 +88,15 @@ class ControlServer::Service final : public api::Control::Service {
   grpc::Status Inject(grpc::ServerContext*, const api::InjectRequest* request, api::InjectOrdered* reply) override {
     return answered([&] { *reply = run_.inject(*request); });
   }
+  grpc::Status Capture(grpc::ServerContext* context, const api::CaptureRequest* request,
+                       api::Captured* reply) override {
+    return answered([&] {
+      std::future<api::Captured> captured = run_.capture(*request);
+      while (captured.wait_for(kGlance) == std::future_status::timeout)
+        if (context->IsCancelled()) run_.end_capture();
+      *reply = captured.get();
+    });
+  }
   grpc::Status Watch(grpc::ServerContext* context, const api::WatchRequest* request,
                      grpc::ServerWriter<api::Status>* writer) override {
     return answered([&] {
@@ -107,11 +124,14 @@ class ControlServer::Service final : public api::Control::Service {
   }
 
   ServedRun& run_;
+  std::string address_;
   std::unique_ptr<grpc::Server> server_;
 };
 
-ControlServer::ControlServer(ServedRun* run, const std::string& socket)
-    : service_(std::make_unique<Service>(run, socket)) {}
+ControlServer::ControlServer(ServedRun* run, const std::string& socket, const std::string& address)
+    : service_(std::make_unique<Service>(run, socket, address)) {}
+
+const std::string& ControlServer::address() const { return service_->address(); }
 
 ControlServer::~ControlServer() { service_->end(); }
 

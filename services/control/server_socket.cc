@@ -1,16 +1,16 @@
 #include "services/control/server_socket.h"
 
 #include <fmt/format.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
 
+#include "plugin_sdk/channel/address.h"
 #include "services/run/session.h"
 
 namespace gravitas::control {
@@ -27,20 +27,6 @@ std::string runtime_folder() {
   return folder != nullptr && *folder == '/' ? folder : "";
 }
 
-bool somebody_listens(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) return false;
-  path.copy(address.sun_path, path.size());
-  const int asking = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (asking < 0) throw std::system_error(errno, std::generic_category(), "socket");
-  // a server whose queue is full says EAGAIN
-  const bool reached = connect(asking, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
-                       errno == EAGAIN || errno == EINPROGRESS;
-  close(asking);
-  return reached;
-}
-
 bool is_own_folder(const std::string& path) {
   struct stat about {};
   return lstat(path.c_str(), &about) == 0 && S_ISDIR(about.st_mode) && about.st_uid == geteuid() &&
@@ -55,7 +41,12 @@ void make_room(const std::string& path) {
   struct stat about {};
   if (lstat(path.c_str(), &about) != 0) return;
   if (!S_ISSOCK(about.st_mode)) throw BadInput(fmt::format("--socket {}: a file stands there that is no socket", path));
-  if (somebody_listens(path)) throw BadInput(fmt::format("--socket {}: another server listens there", path));
+  const int problem = channel::probe_unix(path);
+  if (problem == 0) throw BadInput(fmt::format("--socket {}: another server listens there", path));
+  // only what a server that is gone has left behind
+  if (problem != ECONNREFUSED)
+    throw BadInput(
+        fmt::format("--socket {}: a socket stands there: {}", path, std::generic_category().message(problem)));
   unlink(path.c_str());
 }
 
@@ -93,7 +84,7 @@ std::vector<std::string> find_servers() {
          entry.increment(problem)) {
       const std::string folder = entry->path().string(), path = folder + "/" + kName;
       const bool is_named = entry->path().filename().string().starts_with(kPrefix);
-      if (is_named && is_own_folder(folder) && somebody_listens(path)) found.push_back(path);
+      if (is_named && is_own_folder(folder) && channel::probe_unix(path) == 0) found.push_back(path);
     }
   }
   std::ranges::sort(found);

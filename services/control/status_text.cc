@@ -51,6 +51,8 @@ std::string status_page(const api::Status& status) {
   const std::string speed = status.speed() == 0.0 ? "as fast as possible" : fmt::format("speed {:g}", status.speed());
   std::string text = fmt::format("{}, {}\n  {}\n", status.scene(), speed, status_line(status));
   if (!status.fault().empty()) text += fmt::format("  fault: {}\n", status.fault());
+  if (!status.checkpoint().empty())
+    text += fmt::format("  checkpoint: {}; gravitas run --resume goes on from it\n", status.checkpoint());
   text += fmt::format("  state hash {}\n  chain hash {}\n", status.state_hash(), status.chain_hash());
   text += plan_table(status.plan());
   const auto heading = [&](const char* what, std::uint32_t count) {

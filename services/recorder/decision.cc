@@ -8,16 +8,10 @@
 
 #include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/property_value.h"
+#include "plugin_sdk/slots.h"
 
 namespace gravitas {
 namespace {
-
-std::optional<Slot> find_slot(const std::string& name) {
-  for (const Slot slot :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
-    if (name == slot_name(slot)) return slot;
-  return std::nullopt;
-}
 
 std::optional<kernel::Hosting> find_hosting(const std::string& name) {
   for (const auto hosting : {kernel::Hosting::kDirect, kernel::Hosting::kSharedMemory, kernel::Hosting::kGrpc})

@@ -72,6 +72,14 @@ void replace_file(const std::string& path, std::span<const std::byte> bytes) {
   if (!folder.is_open() || fsync(folder.handle()) != 0) fail("folder of '" + path + "'");
 }
 
+void write_text_file(const std::string& path, const std::string& text, const std::string& what) {
+  const std::string named = what + " '" + path + "'";
+  OpenFile file(path, O_WRONLY | O_CREAT | O_TRUNC);
+  if (!file.is_open()) fail(named);
+  write_all(file.handle(), std::as_bytes(std::span(text)), named);
+  if (!file.close()) fail(named);
+}
+
 std::vector<std::byte> read_whole_file(const std::string& path) {
   const std::string what = "'" + path + "'";
   // a pipe that nobody writes to must not block

@@ -15,6 +15,9 @@ void write_all(int file, std::span<const std::byte> bytes, const std::string& wh
 // throws std::system_error naming the file; what was at `path` is still there, and PATH.tmp is gone.
 void replace_file(const std::string& path, std::span<const std::byte> bytes);
 
+// Writes a text where a damaged old one is no loss. Throws std::system_error naming `what` and the file.
+void write_text_file(const std::string& path, const std::string& text, const std::string& what);
+
 // All bytes of a regular file. Throws std::system_error, or std::runtime_error if it is no regular file.
 std::vector<std::byte> read_whole_file(const std::string& path);
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plugin_sdk/channel/digest.h"
+#include "plugin_sdk/slots.h"
 
 namespace gravitas {
 namespace {
@@ -95,8 +96,7 @@ recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& d) {
   add_part("materials", PartDigest() << d.material_count << d.material_pairs, &identity);
   add_part("forces", digest_forces(d), &identity);
   add_part("joints", digest_joints(d), &identity);
-  for (const Slot slot :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+  for (const Slot slot : kSlots)
     add_part(fmt::format("the plugin of slot {} or its settings", slot_name(slot)), digest_plugins(d.slot(slot)),
              &identity);
   return identity;

@@ -7,13 +7,11 @@
 
 #include "plugin_sdk/near_miss.h"
 #include "plugin_sdk/property_value.h"
+#include "plugin_sdk/slots.h"
 #include "services/run/session.h"
 
 namespace gravitas {
 namespace {
-
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
 [[noreturn]] void refuse(const std::string& option, const std::string& text, const std::string& why) {
   throw BadInput(fmt::format("{} {}: {}", option, text, why));
@@ -28,13 +26,21 @@ std::uint32_t parse_count(const std::string& option, const std::string& text, co
   return number;
 }
 
+// Whether a step is part of a specification.
+enum class StepWord : std::uint8_t { kNone, kOptional, kRequired };
+
 // SLOT=PLUGIN, then `@step=N` and `,hosting=MODE`.
-SwapSpec parse(const std::string& option, const std::string& text, bool has_step) {
-  const std::string form = has_step ? "SLOT=PLUGIN@step=N[,hosting=direct|shm|grpc]" : "SLOT=PLUGIN[,hosting=…]";
+SwapSpec parse(const std::string& option, const std::string& text, StepWord step_word) {
+  static constexpr const char* kForms[] = {"SLOT=PLUGIN[,hosting=direct|shm|grpc]",
+                                           "SLOT=PLUGIN[@step=N][,hosting=direct|shm|grpc]",
+                                           "SLOT=PLUGIN@step=N[,hosting=direct|shm|grpc]"};
+  const std::string form = kForms[static_cast<std::size_t>(step_word)];
   const auto wrong_form = [&] { refuse(option, text, "allowed: " + form); };
   const std::size_t equals = text.find('=');
+  const bool has_step =
+      step_word == StepWord::kRequired || (step_word == StepWord::kOptional && text.rfind('@') != std::string::npos);
   const std::size_t at = has_step ? text.rfind('@') : std::min(text.find(','), text.size());
-  if (equals == std::string::npos || at == std::string::npos || at < equals + 2) wrong_form();
+  if (equals == std::string::npos || at == std::string::npos || at < equals + 2 || text.ends_with(',')) wrong_form();
   SwapSpec spec;
   spec.text = option + " " + text;
   spec.slot = parse_slot(option, text, text.substr(0, equals));
@@ -43,13 +49,13 @@ SwapSpec parse(const std::string& option, const std::string& text, bool has_step
   for (std::size_t begin = at + 1; begin < text.size();) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     const std::string word = text.substr(begin, end - begin);
-    if (has_step && word.starts_with("step=")) {
+    if (has_step && !step_known && word.starts_with("step=")) {
       spec.step = parse_count(option, text, word.substr(5), "step");
       step_known = true;
-    } else if (word.starts_with("hosting=")) {
+    } else if (word.starts_with("hosting=") && !spec.hosting) {
       spec.hosting = parse_hosting_mode(option, text, word.substr(8));
     } else {
-      refuse(option, text, fmt::format("'{}' is unknown; allowed: {}", word, form));
+      refuse(option, text, fmt::format("'{}' is unknown, or there twice; allowed: {}", word, form));
     }
     begin = end + 1;
   }
@@ -69,8 +75,7 @@ std::vector<double> default_settings(const SwapSpec& spec, const PluginDeclarati
 }  // namespace
 
 Slot parse_slot(const std::string& option, const std::string& text, const std::string& name) {
-  for (const Slot slot : kSlots)
-    if (name == slot_name(slot)) return slot;
+  if (const std::optional<Slot> slot = find_slot(name)) return *slot;
   refuse(option, text,
          fmt::format("unknown slot '{}'; allowed: space, collision, constraint, force, solver, integrator", name));
 }
@@ -84,15 +89,17 @@ kernel::Hosting parse_hosting_mode(const std::string& option, const std::string&
                      option == "--hosting" ? ", grpc:ADDRESS" : ""));
 }
 
-SwapSpec parse_swap(const std::string& text) { return parse("--swap", text, true); }
+SwapSpec parse_swap(const std::string& text) { return parse("--swap", text, StepWord::kRequired); }
 
-SwapSpec parse_compare(const std::string& text) { return parse("--compare", text, false); }
+SwapSpec parse_swap_order(const std::string& text) { return parse("swap", text, StepWord::kOptional); }
+
+SwapSpec parse_compare(const std::string& text) { return parse("--compare", text, StepWord::kNone); }
 
 RerunSpec parse_rerun(const std::string& text) {
   const std::size_t equals = text.find('=');
-  if (equals == std::string::npos) refuse("--rerun", text, "allowed: SLOT=N, every N-th call");
+  if (equals == std::string::npos) refuse("--rerun", text, "allowed: SLOT=N, every N-th step");
   return {parse_slot("--rerun", text, text.substr(0, equals)),
-          parse_count("--rerun", text, text.substr(equals + 1), "number of calls")};
+          parse_count("--rerun", text, text.substr(equals + 1), "number of steps")};
 }
 
 kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDescription& scene, Catalog* catalog) {

@@ -21,12 +21,14 @@ struct SwapSpec {
 
 // Throws BadInput with what is wrong and what is allowed.
 SwapSpec parse_swap(const std::string& text);
+// The same in an order to a run that goes on: without `@step=N` before the next step, which is 0 here.
+SwapSpec parse_swap_order(const std::string& text);
 // `SLOT=PLUGIN[,hosting=…]`: it is asked the same as the slot's plugin, and compared.
 SwapSpec parse_compare(const std::string& text);
 
 struct RerunSpec {
   Slot slot = Slot::kSolver;
-  std::uint32_t every = 1;  // calls
+  std::uint32_t every = 1;  // steps
 };
 // `SLOT=N`.
 RerunSpec parse_rerun(const std::string& text);

@@ -10,13 +10,12 @@
 
 #include "plugin_sdk/host/fault_kinds.h"
 #include "plugin_sdk/near_miss.h"
+#include "plugin_sdk/slots.h"
 #include "services/run/session.h"
 
 namespace gravitas {
 namespace {
 
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 constexpr char kForm[] = "SLOT:KIND@step=N[,ARGUMENT=VALUE]...";
 
 [[noreturn]] void refuse(const std::string& specification, const std::string& why) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/property_value.h"
 
 namespace gravitas {
 namespace {
@@ -18,16 +19,11 @@ void write_change(const Vector3& initial, const Vector3& final_value, report::v1
 // Numbers of a property among the flattened ones, or nothing if the type has no such property.
 std::optional<std::vector<double>> property_of(const TypeDeclaration& type, const std::vector<double>& numbers,
                                                const std::string& name) {
-  std::size_t next = 0;
+  std::span<const double> rest = numbers;
   for (const Property& property : type.properties) {
-    std::size_t size = property.flat_size();
-    if (property.kind == PropertyKind::kTable && next < numbers.size())
-      size += static_cast<std::size_t>(numbers[next]) * property.columns;
-    if (next + size > numbers.size()) return std::nullopt;
-    if (property.name == name)
-      return std::vector<double>(numbers.begin() + static_cast<std::ptrdiff_t>(next),
-                                 numbers.begin() + static_cast<std::ptrdiff_t>(next + size));
-    next += size;
+    const std::span<const double> own = rest.first(flat_size_of(property, rest));
+    if (property.name == name) return std::vector<double>(own.begin(), own.end());
+    rest = rest.subspan(own.size());
   }
   return std::nullopt;
 }

@@ -11,10 +11,12 @@
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
+#include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
+#include "services/recorder/durable_file.h"
 #include "services/recorder/event_log.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/json.h"
@@ -47,8 +49,7 @@ void require(const scene::Problems& problems) {
 
 void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description) {
   for (const HostingChoice& choice : choices) {
-    for (const Slot slot :
-         {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+    for (const Slot slot : kSlots)
       if (!choice.slot || *choice.slot == slot) {
         description->slot(slot).hosting = choice.hosting;
         description->slot(slot).attached = choice.attached;
@@ -63,15 +64,11 @@ std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
                      fault.text, kernel::fault_kind_name(fault.kind));
 }
 
-void write_report_file(const std::string& path, const report::v1::Report& report) {
-  std::FILE* file = std::fopen(path.c_str(), "we");
-  const std::string text = to_json(report, JsonForm::kPage);
-  const bool written = file != nullptr && std::fwrite(text.data(), 1, text.size(), file) == text.size();
-  const bool closed = file != nullptr && std::fclose(file) == 0;
-  if (!written || !closed) throw std::system_error(errno, std::generic_category(), "report '" + path + "'");
-}
-
 }  // namespace
+
+std::string paused_checkpoint(const RunOptions& options) {
+  return checkpoint_target(std::filesystem::path(options.scenes[0]).stem().string() + ".paused.checkpoint");
+}
 
 recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot) {
   recorder::v1::CapsuleHeader header;
@@ -80,6 +77,28 @@ recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot)
   header.set_slot(slot_name(slot));
   header.set_threads(options.threads);
   return header;
+}
+
+std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, const kernel::PoisonedCall& poisoned) {
+  recorder::v1::CapsuleHeader header = capsule_header(options, poisoned.plugin.declaration.slot);
+  header.set_poison(true);
+  recorder::v1::CapsuleCall call = capsule::begin_call(poisoned.call, poisoned.arena);
+  call.set_step(step);
+  call.set_fault(poisoned.fault.text);
+  const std::string path = fmt::format("{}.{}.step{}.capsule", std::filesystem::path(options.scenes[0]).stem().string(),
+                                       header.slot(), step);
+  try {
+    capsule::Writer writer(path, header);
+    writer.add_plugin(poisoned.plugin);
+    writer.add_call(call);
+    writer.close();
+    return fmt::format(
+        "slot {}, plugin {}: the request that it fails at in step {} is kept; to ask it alone: gravitas replay {}",
+        header.slot(), poisoned.plugin.declaration.name, step, path);
+  } catch (const std::system_error& problem) {
+    return fmt::format("the request that plugin {} fails at in step {} could not be kept: {}",
+                       poisoned.plugin.declaration.name, step, problem.what());
+  }
 }
 
 std::string installed_worker() { return kernel::worker_program(); }
@@ -126,7 +145,9 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
                                            const kernel::HostStarter& starter) {
   try {
-    return std::make_unique<kernel::Environment>(description, starter);
+    auto environment = std::make_unique<kernel::Environment>(description, starter);
+    for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
+    return environment;
   } catch (const kernel::StageFault& fault) {
     throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text));
   } catch (const std::invalid_argument& problem) {
@@ -233,7 +254,8 @@ class Run final : private kernel::CommitListener {
     guard([&] { events_->close(); });
     write_report();
     guard([&] {
-      if (!options_.report.empty()) write_report_file(options_.report, result_.report);
+      if (!options_.report.empty())
+        write_text_file(options_.report, to_json(result_.report, JsonForm::kPage), "report");
     });
     result_.summary = summarize(result_.report, events_->meetings());
   }
@@ -307,38 +329,17 @@ class Run final : private kernel::CommitListener {
     if (recorder_) recorder_->on_commit(environment);
   }
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
+    put_in_force(message_of(decision), &decisions_);
     if (recorder_) recorder_->on_decision(environment, decision);
   }
 
-  // The request is kept, so that its plugin can be asked it alone.
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override {
-    const std::uint32_t step = environment.step_count() + 1;
-    recorder::v1::CapsuleHeader header = capsule_header(options_, poisoned.plugin.declaration.slot);
-    header.set_poison(true);
-    recorder::v1::CapsuleCall call = capsule::begin_call(poisoned.call, poisoned.arena);
-    call.set_step(step);
-    call.set_fault(poisoned.fault.text);
-    const std::string path = fmt::format(
-        "{}.{}.step{}.capsule", std::filesystem::path(options_.scenes[0]).stem().string(), header.slot(), step);
-    try {
-      capsule::Writer writer(path, header);
-      writer.add_plugin(poisoned.plugin);
-      writer.add_call(call);
-      writer.close();
-      warnings_.push_back(fmt::format(
-          "slot {}, plugin {}: the request that it fails at in step {} is kept; to ask it alone: gravitas replay {}",
-          header.slot(), poisoned.plugin.declaration.name, step, path));
-    } catch (const std::system_error& problem) {
-      warnings_.push_back(fmt::format("the request that plugin {} fails at in step {} could not be kept: {}",
-                                      poisoned.plugin.declaration.name, step, problem.what()));
-    }
+    warnings_.push_back(keep_poisoned_call(options_, environment.step_count() + 1, poisoned));
   }
 
   // Where no recorder keeps a checkpoint.
   void keep_paused_state() {
-    std::string path = checkpoint_path_;
-    if (path.empty())
-      path = checkpoint_target(std::filesystem::path(options_.scenes[0]).stem().string() + ".paused.checkpoint");
+    const std::string path = checkpoint_path_.empty() ? paused_checkpoint(options_) : checkpoint_path_;
     Recorder recorder(identity_of(description_), [this] { return tally(); });
     recorder.set_decisions(decisions_);
     recorder.save_to(path, *environment_);
@@ -415,7 +416,7 @@ class Run final : private kernel::CommitListener {
   std::vector<kernel::SwapOrder> swaps_, comparisons_;
   std::vector<kernel::FaultInjection> faults_;
   std::vector<RerunSpec> reruns_;
-  std::vector<recorder::v1::Decision> decisions_;  // in force where the run begins
+  std::vector<recorder::v1::Decision> decisions_;  // in force
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
   recorder::v1::Tally resumed_tally_;  // of the checkpoint

@@ -69,6 +69,10 @@ struct RunResult {
 kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings,
                                     Catalog* plugins = nullptr);
 
+// Slots whose answers no law of physics tells right from wrong (plugin_sdk/physics_checks.h): where the physics is checked
+// (CheckPhysicsEvery), another process confirms them.
+inline constexpr Slot kConfirmed[] = {Slot::kConstraint, Slot::kForce};
+
 // Starts the environment of a description. A plugin that cannot be used is BadInput.
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
                                            const kernel::HostStarter& starter = kernel::start_host);
@@ -85,6 +89,14 @@ struct Progress {
 // Throws BadInput for input and files that cannot be used.
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress);
+
+// Where a run that pauses leaves its last commit if nobody asked for another place: SCENE.paused.checkpoint in the current
+// folder. Throws BadInput if no file can be written there.
+std::string paused_checkpoint(const RunOptions& options);
+
+// Keeps a request that nobody may be asked again, in the current folder, so that its plugin can be asked it alone. Returns
+// what is to be said of it.
+std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, const kernel::PoisonedCall& poisoned);
 
 // Of a capsule (services/capsule/capsule.h) of a run.
 recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "plugin_sdk/property_value.h"
+
 namespace gravitas::scene {
 namespace {
 
@@ -12,11 +14,10 @@ constexpr const char* kGravity = "Gravity";
 // Calls visit(property, its numbers) for each property of flattened parameters.
 template <typename Visit>
 void for_each_property(const TypeDeclaration& type, std::vector<double>* parameters, Visit&& visit) {
-  double* next = parameters->data();
+  std::span<double> rest = *parameters;
   for (const Property& property : type.properties) {
-    visit(property, next);
-    const bool is_table = property.kind == PropertyKind::kTable;
-    next += is_table ? 1 + static_cast<std::size_t>(next[0]) * property.columns : property.flat_size();
+    visit(property, rest.data());
+    rest = rest.subspan(flat_size_of(property, rest));
   }
 }
 

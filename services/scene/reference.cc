@@ -5,6 +5,7 @@
 #include <set>
 
 #include "plugin_sdk/property_value.h"
+#include "plugin_sdk/slots.h"
 #include "services/scene/grammar.h"
 
 namespace gravitas::scene {
@@ -105,8 +106,7 @@ std::string reference_page(const Catalog& catalog) {
   std::set<std::string> written;
   write_block(scene_grammar(), &written, &page);
   page += "\n## Plugins\n";
-  for (const Slot slot :
-       {Slot::kSpace, Slot::kCollision, Slot::kConstraint, Slot::kForce, Slot::kSolver, Slot::kIntegrator}) {
+  for (const Slot slot : kSlots) {
     page += fmt::format("\n### Slot {}\n", slot_name(slot));
     for (const InstalledPlugin& plugin : catalog.plugins()) {
       const PluginDeclaration& d = plugin.declaration;

@@ -196,11 +196,6 @@ bool expand_shape_values(const TypeDeclaration& type, const std::string& folder,
   return true;
 }
 
-std::size_t flat_size_of(const Property& property, std::span<const double> numbers) {
-  const std::size_t size = property.flat_size();
-  return property.kind == PropertyKind::kTable ? size + property.columns * static_cast<std::size_t>(numbers[0]) : size;
-}
-
 void splice(const std::vector<Property>& declared, const ShapeExpansion& expansion, std::vector<double>* parameters) {
   if (expansion.vertices.empty()) return;
   std::vector<double> out;

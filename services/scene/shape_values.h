@@ -43,9 +43,6 @@ bool expand_shape_values(const TypeDeclaration& type, const std::string& folder,
                          std::vector<NamedValue>* values, ShapeExpansion* expansion,
                          std::vector<PropertyProblem>* problems);
 
-// How many of the numbers from the front are the property's.
-std::size_t flat_size_of(const Property& property, std::span<const double> numbers);
-
 // Replaces the tables Vertices and Faces in flattened parameters.
 void splice(const std::vector<Property>& declared, const ShapeExpansion& expansion, std::vector<double>* parameters);
 

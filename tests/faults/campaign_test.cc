@@ -101,7 +101,8 @@ TEST(SimulatedFaults, AreTheSameAgain) {
 // A campaign that cannot fail would prove nothing.
 class WithoutADefence : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Of, WithoutADefence,
-                         ::testing::Values("structure", "numbers", "replay", "digest", "epoch", "deadline"),
+                         ::testing::Values("structure", "numbers", "physics", "confirmation", "replay", "digest",
+                                           "epoch", "deadline"),
                          [](const auto& one) { return std::string(one.param); });
 
 TEST_P(WithoutADefence, TheCampaignFails) {

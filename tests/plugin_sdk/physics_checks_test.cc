@@ -292,6 +292,9 @@ TEST(CheckContacts, FindsContactsThatAreMissing) {
   EXPECT_THAT(m.check(), HasSubstr("3 contacts where 4 corners"));
   m.pair.clear();
   EXPECT_THAT(m.check(), HasSubstr("has no contact"));
+  m = box_in_ground();
+  m.add(-Vector3::UnitY(), Vector3(0.5, -0.01, 0.5), 0.02, Vector3(0, 1, 0));
+  EXPECT_THAT(m.check(), HasSubstr("contacts 3 and 4 of a pair are at the same point"));
   Manifolds apart({{0, Vector3(0, 0.52, 0)}, {2, Vector3::Zero()}});
   EXPECT_THAT(apart.check(), IsEmpty()) << "beyond the margin";
   Manifolds balls({{0, Vector3::Zero()}, {0, Vector3(0.9, 0, 0)}});
@@ -355,7 +358,7 @@ struct Solution {
     request.u32(Request::kContactBody) = {0, 1};
     request.f64(Request::kContactNormal) = {0, 1, 0};
     put(&request.f64(Request::kContactPoint), point);
-    request.f64(Request::kContactDepth) = {0.0};
+    request.f64(Request::kContactDepth) = {0.01};
     request.u64(Request::kContactKey) = {7};
     request.f64(Request::kContactMaterial) = {0.5, 0.5, 0.5, 0, 0, 0};
     solve(theta);
@@ -433,6 +436,14 @@ TEST(CheckSolution, FindsAnImpulseThatPushesWhatIsSeparating) {
   s.impulse = {0.0, 1.5, 0.0};
   s.solve(1.0);
   EXPECT_THAT(s.check(), IsEmpty());
+}
+
+TEST(CheckSolution, FindsACorrectionBeyondTheOverlap) {
+  Solution s;
+  s.request.f64(Solution::Request::kContactDepth) = {1e-4};
+  EXPECT_THAT(s.check(), HasSubstr("contact_correction of row 0 moves apart"));
+  s.reason = StopReason::kIterations;
+  EXPECT_THAT(s.check(), IsEmpty()) << "it does not say that it is done";
 }
 
 }  // namespace

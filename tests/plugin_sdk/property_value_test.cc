@@ -191,6 +191,14 @@ TEST(PropertyText, CutsLongTextsBetweenCharacters) {
   EXPECT_EQ(shown(PropertyValue::of("a")), "\"a\"");
 }
 
+TEST(FlatSize, OfATableIsInItsNumbers) {
+  const std::vector<double> numbers = {2, 10, 11, 12, 20, 21, 22, 5};
+  EXPECT_EQ(flat_size_of(Property::table("T", 3, "m", "world"), numbers), 7U);
+  EXPECT_EQ(flat_size_of(Property::vector("V", "m", "world"), numbers), 3U);
+  EXPECT_EQ(flat_size_of(Property::table("T", 4, "m", "world"), numbers), 0U) << "they end before";
+  EXPECT_EQ(flat_size_of(Property::number("N", "m"), {}), 0U);
+}
+
 TEST(CheckFlattened, TakesWhatFlattenMakes) {
   const std::vector<Property> declared = {Property::number("Mass", "kg").above(0.0).required(),
                                           Property::flag("IsOn").defaults_to({1.0}),

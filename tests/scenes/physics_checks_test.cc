@@ -36,6 +36,15 @@ const Methods kMethods[] = {
     {"OneSweep", {"Integrator=SemiImplicitEuler", "Solver.Iterations=1"}},
     {"HalfCorrected", {"Integrator=SemiImplicitEuler", "Solver.CorrectionFactor=0.5"}},
     {"Grid", {"Space=Grid"}},
+    {"NewtonVerlet", {"Solver=Newton", "Integrator=Verlet"}},
+    {"NewtonLongSteps", {"Solver=Newton", "Simulator.TimeStep=0.05"}},
+    {"DirectRK4", {"Solver=Direct", "Integrator=RK4"}},
+    {"BasicVerletKDTree", {"Integrator=BasicVerlet", "Space=KDTree"}},
+    {"RKMK4SweepAndPrune", {"Integrator=RKMK4", "Space=SweepAndPrune"}},
+    {"SymplecticSplitting", {"Integrator=SymplecticSplitting"}},
+    {"ImplicitMidpoint", {"Integrator=ImplicitMidpoint"}},
+    {"DormandPrince54", {"Integrator=DormandPrince54"}},
+    {"Rosenbrock", {"Integrator=Rosenbrock"}},
     {"LongSteps", {"Simulator.TimeStep=0.05"}},
 };
 

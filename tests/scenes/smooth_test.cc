@@ -16,9 +16,10 @@ using testing::SceneRun;
 using testing::set;
 using ::testing::ThrowsMessage;
 
-std::vector<std::string> smooth(std::vector<std::string> more) {
-  more.insert(more.begin(), "Simulator=Smooth");
-  return more;
+std::vector<std::string> smooth(const std::vector<std::string>& more) {
+  std::vector<std::string> all = {"Simulator=Smooth"};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
 }
 
 TEST(Smooth, KeepsTheEnergyOfADoublePendulum) {

@@ -117,6 +117,21 @@ TEST(Exchange, AResumedRunGoesOnWithWhoeverAnswered) {
   }
 }
 
+// Nobody asked for a checkpoint; what a pause leaves knows it all the same.
+TEST(Exchange, APauseRemembersWhoAnswered) {
+  const ScratchFolder folder;
+  const std::string report = folder.path("report.json");
+  const auto go = [&](std::vector<std::string> words, int code) {
+    words.insert(words.begin(), {"run", kSample, "--quiet", "--steps", "120", "--report", report});
+    const ProgramResult result = run_program(words, folder);
+    EXPECT_EQ(result.exit_code, code) << result.err;
+    return read_report(read_file(report)).chain_hash();
+  };
+  const std::string whole = go({"--swap", "integrator=SemiImplicitEuler@step=40"}, 0);
+  go({"--swap", "integrator=SemiImplicitEuler@step=40", "--fault", "solver:kill@step=80,times=100"}, 3);
+  EXPECT_EQ(go({"--resume", folder.path("two_spheres_motor.paused.checkpoint")}, 0), whole);
+}
+
 TEST(Exchange, ASlowWorkerIsFlaggedAndChangesNoBit) {
   const Outcome run = run_sample({"--fault", "solver:slow,seconds=0.1@step=50"});
   ASSERT_EQ(run.program.exit_code, 0) << run.program.err;

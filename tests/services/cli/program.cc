@@ -64,6 +64,8 @@ pid_t start_program(const std::vector<std::string>& arguments, const ScratchFold
   posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, 1, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  // what it leaves where it was started goes with the folder
+  posix_spawn_file_actions_addchdir_np(&actions, folder.path("").c_str());
   pid_t process = -1;
   const int problem = posix_spawn(&process, argv[0], &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);

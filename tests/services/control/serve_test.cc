@@ -157,6 +157,23 @@ TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   EXPECT_THAT(result.err, HasSubstr("the server has ended"));
 }
 
+TEST(Serve, CtlReachesItAtAnAddressAndCapturesCalls) {
+  Served served({"--duration", "3600", "--listen", "127.0.0.1:0"});
+  const std::string said = served.said(), mark = " and ";
+  ASSERT_NE(said.find(mark), std::string::npos) << said;
+  const std::string address =
+      said.substr(said.find(mark) + mark.size(), said.find('\n') - said.find(mark) - mark.size());
+  const ScratchFolder folder;
+  const std::string file = folder.path("solver.capsule");
+  ProgramResult result =
+      testing::run_program({"ctl", "--socket", address, "capture", "solver", "--out", file, "--steps", "15"}, folder);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("15 calls of slot solver in 15 steps"));
+  result = testing::run_program({"replay", file}, folder);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("15 calls: 15 same, 0 different"));
+}
+
 TEST(Serve, WhatCannotBeIsExitCode2) {
   const ScratchFolder folder;
   ProgramResult result = testing::run_program({"serve", kSample}, folder);
@@ -165,13 +182,17 @@ TEST(Serve, WhatCannotBeIsExitCode2) {
   result = testing::run_program({"serve", kSample, "--headless", "--speed", "-1"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("--speed -1"));
+  result = testing::run_program({"serve", kSample, "--headless", "--listen", "0.0.0.0:4711"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("others with --allow-remote"));
   result = testing::run_program({"serve", folder.path("none.gravitas"), "--headless"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   result = testing::run_program({"ctl", "--socket", folder.path("none.sock"), "status"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("no server answers"));
   EXPECT_EQ(testing::run_program({"ctl"}, folder).exit_code, 2);
-  for (const char* command : {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "watch"}) {
+  for (const char* command :
+       {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "capture", "watch"}) {
     result = testing::run_program({"ctl", command, "--help"}, folder);
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ctl ") + command));

@@ -6,12 +6,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "services/capsule/replay.h"
 #include "services/control/client.h"
 #include "services/control/server.h"
 #include "services/control/server_socket.h"
@@ -240,7 +243,21 @@ TEST(ServedRun, AnInjectedFaultIsSurvived) {
   EXPECT_EQ(end.faults(1).slot(), "integrator");
 }
 
+// Files that a run leaves where it was started go into a folder of the test's own.
+class CurrentFolder {
+ public:
+  CurrentFolder() { std::filesystem::current_path(scratch_.path("")); }
+  ~CurrentFolder() { std::filesystem::current_path(before_); }
+  CurrentFolder(const CurrentFolder&) = delete;
+  CurrentFolder& operator=(const CurrentFolder&) = delete;
+
+ private:
+  const std::filesystem::path before_ = std::filesystem::current_path();
+  const gravitas::testing::ScratchFolder scratch_;
+};
+
 TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
+  const CurrentFolder here;
   Served served;
   served.client.inject("solver:kill@step=5,times=100");
   const api::Status status = served.to_the_end();
@@ -248,8 +265,72 @@ TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
   EXPECT_EQ(status.step(), 4U);
   EXPECT_THAT(status.fault(), HasSubstr("step 5: slot solver, plugin Sequential"));
   EXPECT_THAT(refusal([&] { served.client.step(1); }), HasSubstr("reset begins it again"));
+  // what it left goes on to where nobody disturbed it
+  RunOptions resumed = sample("direct").run;
+  resumed.resume = status.checkpoint();
+  const RunResult whole = run(
+      resumed, [] { return false; }, [](const Progress&) {});
+  EXPECT_EQ(whole.report.chain_hash(), quiet_chain());
+  EXPECT_EQ(whole.report.steps(), kSteps);
+  EXPECT_GT(whole.report.events().collision_start(), 0U);
   EXPECT_EQ(served.client.reset().state(), "paused");
+  EXPECT_EQ(served.client.status().checkpoint(), "");
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+TEST(ServedRun, TheCallsOfItsNextStepsAreCaptured) {
+  const gravitas::testing::ScratchFolder folder;
+  for (const char* hosting : {"shm", "direct"}) {
+    Served served(sample(hosting));
+    served.client.step(5);
+    api::CaptureRequest request;
+    request.set_slot("solver");
+    request.set_path(folder.path("solver.capsule"));
+    request.set_steps(20);
+    std::future<api::Captured> captured = served.run.capture(request);
+    EXPECT_THROW(served.run.capture(request), NotNow);
+    EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+    const api::Captured result = captured.get();
+    EXPECT_EQ(result.first_step(), 6U);
+    EXPECT_EQ(result.steps(), 20U);
+    EXPECT_EQ(result.calls(), 20U);
+    capsule::ReplayOptions replay;
+    replay.file = request.path();
+    const report::v1::ReplayReport report = capsule::replay(replay, [](std::uint32_t) { return true; });
+    EXPECT_EQ(report.calls(), 20U);
+    EXPECT_EQ(report.same(), 20U);
+    EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("reset begins it again"));
+  }
+}
+
+TEST(ServedRun, ACaptureThatTheRunOutlivesIsKeptAsFarAsItCame) {
+  const gravitas::testing::ScratchFolder folder;
+  Served served(sample("direct"));
+  api::CaptureRequest request;
+  request.set_slot("integrator");
+  request.set_path(folder.path("integrator.capsule"));
+  request.set_steps(1000);
+  std::future<api::Captured> captured = served.run.capture(request);
+  served.client.step(3);
+  served.run.end_capture();
+  EXPECT_EQ(captured.get().steps(), 3U);
+  captured = served.run.capture(request);
+  served.client.reset();
+  EXPECT_EQ(captured.get().calls(), 0U);
+  request.set_path("/nowhere/at/all");
+  EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("/nowhere/at/all"));
+  request.set_path("relative");
+  EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("an absolute path"));
+}
+
+TEST(ServedRun, ItListensAtAnAddress) {
+  const gravitas::testing::ScratchFolder folder;
+  ServedRun run(sample("direct"));
+  const ControlServer server(&run, folder.path("one"), "127.0.0.1:0");
+  EXPECT_THAT(server.address(), ::testing::MatchesRegex("127.0.0.1:[1-9][0-9]*"));
+  EXPECT_EQ(ControlClient(server.address()).step(3).step(), 3U);
+  EXPECT_EQ(ControlClient(folder.path("one")).status().step(), 3U);
+  EXPECT_THROW(ControlServer(&run, folder.path("two"), server.address()), BadInput);
 }
 
 TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
@@ -260,9 +341,14 @@ TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
   const auto set = [&](const std::string& text) {
     return refusal([&] { served.client.set_property(parse_set_request(text)); });
   };
-  EXPECT_THAT(swap("sovler=Sequential"), HasSubstr("unknown slot 'sovler'; allowed: space"));
+  // other clients may say anything
+  api::SwapRequest strange = parse_swap_request("solver=Sequential");
+  strange.set_slot("sovler");
+  EXPECT_THAT(refusal([&] { served.client.swap(strange); }), HasSubstr("unknown slot 'sovler'; allowed: space"));
+  strange.set_slot("solver");
+  strange.set_hosting("shn");
+  EXPECT_THAT(refusal([&] { served.client.swap(strange); }), HasSubstr("allowed: direct, shm, grpc"));
   EXPECT_THAT(swap("solver=Sequentail"), HasSubstr("did you mean \"Sequential\"?"));
-  EXPECT_THAT(swap("solver=Sequential,hosting=shn"), HasSubstr("allowed: direct, shm, grpc"));
   EXPECT_THAT(swap("solver=/nowhere/plugin.so"), HasSubstr("cannot be used"));
   EXPECT_THAT(swap("force=Gravity"), HasSubstr("the plan leaves the slot out"));
   EXPECT_THAT(swap("solver=Sequential@step=121"), HasSubstr("allowed: 1 (the next) to 120"));
@@ -285,8 +371,9 @@ TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
 }
 
 TEST(ServedRun, WhatIsNoSpecificationIsRefusedAtHome) {
-  for (const char* text : {"", "solver", "=Sequential", "solver=", "solver=Sequential@5", "solver=S@step=x",
-                           "solver=S@step=5,more", "solver=S,hosting=shm,hosting=shm"})
+  for (const char* text :
+       {"", "solver", "=Sequential", "solver=", "solver=Sequential@5", "solver=S@step=x", "solver=S@step=5,more",
+        "solver=S,hosting=shm,hosting=shm", "solver=S,", "sovler=S", "solver=S,hosting=shn"})
     EXPECT_THROW(parse_swap_request(text), BadInput) << text;
   for (const char* text : {"", "Solver", "Solver=5", "Solver.Iterations", "Solver.=5", ".Iterations=5", "Solver.I="})
     EXPECT_THROW(parse_set_request(text), BadInput) << text;

@@ -1,0 +1,38 @@
+// What the commands share of a person's terminal: Ctrl-C, and a line that tells how far the work is.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace gravitas::cli {
+
+// From now on the first SIGINT or SIGTERM is noted, and the second ends the program.
+void listen_to_interrupts();
+// The first has come.
+bool interrupted();
+
+// A line on standard error for work longer than two seconds, rewritten in place and gone at the end. Where that is no
+// terminal: nothing, or a line a second if it `is_wanted`, from the start.
+class StatusLine {
+ public:
+  explicit StatusLine(bool is_wanted = false);
+  ~StatusLine();
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+
+  // text() is called only when it is shown.
+  template <typename Text>
+  void show(Text&& text) {
+    if (is_due()) print(text());
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool is_due();
+  void print(const std::string& text);
+
+  bool is_terminal_, is_wanted_, is_shown_ = false;
+  Clock::time_point start_ = Clock::now(), last_{};
+};
+
+}  // namespace gravitas::cli
