@@ -360,7 +360,7 @@ std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration) {
                               "Hostile numbers are refused with a reason, or answered with finite ones.",
                               judge_impact_hostile));
   } else {
-    cases.push_back(unknown_case("impact/unknown", kTimes));
+    cases.push_back(unknown_case("collision/impact_unknown", kTimes));
   }
   if (has_capability(declaration, "rays")) {
     cases.push_back(
@@ -369,7 +369,7 @@ std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration) {
     cases.push_back(make_case(
         "rays/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.", judge_ray_hostile));
   } else {
-    cases.push_back(unknown_case("rays/unknown", kRays));
+    cases.push_back(unknown_case("collision/rays_unknown", kRays));
   }
   return cases;
 }

@@ -19,7 +19,7 @@ constexpr double kDistance = 1e6;
 // Rows that all copies share.
 bool is_shared(const ColumnInfo& info) {
   const std::string_view rows = info.rows;
-  return info.rows_index == stage::kScalar || rows.starts_with("shape") || rows.starts_with("force");
+  return info.rows_index == stage::kScalar || rows.starts_with("shape") || rows.starts_with("force") || rows == "ray";
 }
 
 std::uint64_t rows_of(const MessageColumns& request, std::span<const ColumnInfo> infos, std::string_view word) {
@@ -42,12 +42,12 @@ void repeat_begins(std::vector<std::uint32_t>* begins, std::uint32_t copies) {
     for (std::size_t i = 1; i < one.size(); ++i) begins->push_back(copy * one.back() + one[i]);
 }
 
-// Indices of bodies; in `application` the second of two.
+// Indices of bodies; in `application` and `candidate` the second of two.
 void repeat_indices(const ColumnInfo& info, std::uint32_t bodies, std::uint32_t copies,
                     std::vector<std::uint32_t>* indices) {
   const std::size_t size = indices->size();
   repeat(indices, copies);
-  const bool is_second = std::string_view(info.name) == "application";
+  const bool is_second = std::string_view(info.name) == "application" || std::string_view(info.name) == "candidate";
   if (std::string_view(info.name) == "body_shape") return;
   for (std::size_t i = size; i < indices->size(); ++i)
     if ((*indices)[i] != GRAVITAS_NONE && (!is_second || i % 2 == 1))
