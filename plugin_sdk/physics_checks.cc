@@ -80,7 +80,8 @@ std::string check_pose(const StepOfBody& s, std::size_t body) {
   const Vector3 between = 0.5 * s.h * (s.start.angular + s.end.angular);
   const double apart = s.h * (s.end.angular - s.start.angular).norm();
   return off_by("orientation", body, (log_rotation(change) - between).norm(),
-                (0.5 + turn) * apart + spread + kRounding * (1.0 + turn), "the turn by h w, w between w_n and w*");
+                (0.5 + turn) * apart + spread + turn * turn * turn / 12.0 + kRounding * (1.0 + turn),
+                "the turn by h w, w between w_n and w*");
 }
 
 }  // namespace

@@ -49,7 +49,8 @@ struct IntegratedState {
 //   |v* - v_n - h a|     <= min(1, c h) (|v_n| + h |a|) + 3 h (change of a within the step)
 //   |w* - w_n - h alpha| <= min(1, c h) (|w_n| + h |alpha|) + 3 h (change of the torque)/I + what a turn by h w makes
 //   |x* - x_n - h (v_n + v*)/2| <= h/2 |v* - v_n| + 3 h^2 (change of a): x* moves with a velocity between the two
-//   the turn from q_n to q*, as a rotation vector, so too; and q* has the sign of q_n, while h |w| is below 1.5
+//   the turn from q_n to q*, as a rotation vector, so too, but for (h w)^3/12, by which Cayley's map turns less than the
+//   exponential; and q* has the sign of q_n, while h |w| is below 1.5
 // and slack of rounding's size. Kinematic bodies keep their velocities. `wrenches` is not read where the request's
 // wrenches are constant; where it is empty else, accelerations are not looked at.
 std::string check_integration(const stage::IntegratorIntegrateRequest& request, const IntegratedState& answer,

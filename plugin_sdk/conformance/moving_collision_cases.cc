@@ -350,24 +350,27 @@ Case unknown_case(const char* name, stage::Method method) {
 std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration) {
   std::vector<Case> cases;
   if (has_capability(declaration, "times_of_impact")) {
-    cases.push_back(make_case("impact/known", "Closed forms: when moving shapes first touch, and that others miss.",
+    cases.push_back(make_case("collision/impact_known",
+                              "Closed forms: when moving shapes first touch, and that others miss.",
                               judge_known_impacts));
-    cases.push_back(
-        make_case("impact/seen", "Before an impact nothing overlaps; then the gap is within the target.", judge_seen));
-    cases.push_back(
-        make_case("impact/refusals", "Bodies that do not exist and no targets are refused.", judge_impact_refusals));
-    cases.push_back(make_case("impact/hostile",
+    cases.push_back(make_case("collision/impact_seen",
+                              "Before an impact nothing overlaps; then the gap is within the target.", judge_seen));
+    cases.push_back(make_case("collision/impact_refusals", "Bodies that do not exist and no targets are refused.",
+                              judge_impact_refusals));
+    cases.push_back(make_case("collision/impact_hostile",
                               "Hostile numbers are refused with a reason, or answered with finite ones.",
                               judge_impact_hostile));
   } else {
     cases.push_back(unknown_case("collision/impact_unknown", kTimes));
   }
   if (has_capability(declaration, "rays")) {
+    cases.push_back(make_case("collision/rays_known", "Closed forms: where rays meet shapes, and that others miss.",
+                              judge_known_hits));
     cases.push_back(
-        make_case("rays/known", "Closed forms: where rays meet shapes, and that others miss.", judge_known_hits));
-    cases.push_back(make_case("rays/refusals", "Rays and bodies that do not exist are refused.", judge_ray_refusals));
-    cases.push_back(make_case(
-        "rays/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.", judge_ray_hostile));
+        make_case("collision/rays_refusals", "Rays and bodies that do not exist are refused.", judge_ray_refusals));
+    cases.push_back(make_case("collision/rays_hostile",
+                              "Hostile numbers are refused with a reason, or answered with finite ones.",
+                              judge_ray_hostile));
   } else {
     cases.push_back(unknown_case("collision/rays_unknown", kRays));
   }

@@ -53,7 +53,7 @@ PartDigest digest_bodies(const kernel::EnvironmentDescription& d) {
     digest << body.flags << body.mass << body.inertia << body.damping << body.pose << body.twist.linear
            << body.twist.angular << body.shape << body.geometry << body.bound.kind << body.bound.centre
            << body.bound.orientation << body.bound.half_extents << body.material << body.filter_group
-           << body.filter_mask << body.forces.size();
+           << body.filter_mask << body.motion << body.forces.size();
     for (const std::uint32_t force : body.forces) digest << force;
   }
   return digest;
@@ -91,6 +91,7 @@ PartDigest digest_plugins(const kernel::SlotDescription& slot) {
 recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& d) {
   recorder::v1::Identity identity;
   identity.set_time_step(d.time_step);
+  add_part("the simulator or its Substeps", PartDigest() << d.simulator << d.substeps, &identity);
   add_part("bodies", digest_bodies(d), &identity);
   add_part("geometries", digest_shapes(d), &identity);
   add_part("materials", PartDigest() << d.material_count << d.material_pairs, &identity);

@@ -29,9 +29,9 @@ struct Methods {
   std::vector<std::string> overrides;
 };
 
-// Newton and Direct take minutes for the piles, and a solution of Newton that stops unfinished may break its balance of
-// corrections by more than is allowed (README).
-constexpr std::size_t kMostBodiesOfAccurate = 60;
+// A solution of Newton or Direct that stops unfinished may break a balance by more than is allowed (README), and the piles
+// take them minutes.
+constexpr std::size_t kMostBodiesOfAccurate = 5;
 
 const Methods kMethods[] = {
     {"Euler", {"Integrator=Euler"}},

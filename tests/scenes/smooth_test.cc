@@ -55,7 +55,7 @@ Environment {
 
 TEST(Smooth, RefusesWhatItCannotMove) {
   EXPECT_THAT([] { SceneRun run("double_pendulum.gravitas", smooth({"Solver=Sequential"})); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("needs a solver with the capability 'reactions'")));
+              ThrowsMessage<std::runtime_error>(HasSubstr("needs a plugin with the capability 'reactions'")));
   EXPECT_THAT([] { SceneRun run("stack.gravitas", smooth({"Solver=Direct"})); },
               ThrowsMessage<std::runtime_error>(HasSubstr("moves bodies that cannot touch, and some of these can")));
 }

@@ -171,6 +171,8 @@ class Identity : public ::testing::TestWithParam<Change> {};
 
 INSTANTIATE_TEST_SUITE_P(Of, Identity,
                          ::testing::Values(Change{"duration", "Simulator.Duration=99", ""}, Change{"hosting", "", ""},
+                                           Change{"simulator", "Simulator=Continuous", "the simulator"},
+                                           Change{"substeps", "Simulator.Substeps=2", "the simulator"},
                                            Change{"time_step", "Simulator.TimeStep=0.005", "time step (0.0"},
                                            Change{"position", "Body.Ball01.Position={0,7,0}", "bodies"},
                                            Change{"velocity", "Body.Ball01.LinearVelocity={1,0,0}", "bodies"},

@@ -28,15 +28,19 @@ using testing::ScratchFolder;
 struct Case {
   const char* scene;
   std::uint32_t steps, stop;
+  std::vector<std::string> overrides = {};
+  const char* suffix = "";
 };
 
 void PrintTo(const Case& one, std::ostream* out) { *out << one.scene; }
 
-RunOptions options_of(const std::string& scene, Hosting hosting, std::uint32_t steps) {
+RunOptions options_of(const std::string& scene, Hosting hosting, std::uint32_t steps,
+                      const std::vector<std::string>& overrides = {}) {
   RunOptions options;
   options.scenes = {scene.starts_with('/') ? scene : testing::shipped_scene(scene)};
   options.hosting = {{std::nullopt, hosting}};
   options.steps = steps;
+  options.overrides = overrides;
   return options;
 }
 
@@ -50,33 +54,34 @@ const std::string kPile = in_source("/tests/determinism/pile.gravitas");
 
 class Resume : public ::testing::TestWithParam<Case> {};
 
-INSTANTIATE_TEST_SUITE_P(Scene, Resume,
-                         ::testing::Values(Case{"bounce", 240, 100}, Case{"double_pendulum", 240, 77},
-                                           Case{"pendulum", 200, 100}, Case{"sliding_boxes", 240, 120},
-                                           Case{"slope", 200, 50}, Case{"stack", 300, 251}, Case{"thruster", 200, 99},
-                                           Case{"two_spheres_motor", 300, 130}, Case{kCallbacks.c_str(), 120, 60},
-                                           Case{kPile.c_str(), 120, 64}),
-                         [](const auto& which) {
-                           const std::string path = which.param.scene;
-                           const std::size_t slash = path.rfind('/');
-                           return slash == std::string::npos ? path
-                                                             : path.substr(slash + 1, path.rfind('.') - slash - 1);
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Scene, Resume,
+    ::testing::Values(Case{"bounce", 240, 100}, Case{"double_pendulum", 240, 77}, Case{"pendulum", 200, 100},
+                      Case{"sliding_boxes", 240, 120}, Case{"slope", 200, 50}, Case{"stack", 300, 251},
+                      Case{"thruster", 200, 99}, Case{"two_spheres_motor", 300, 130}, Case{kCallbacks.c_str(), 120, 60},
+                      Case{kPile.c_str(), 120, 64}, Case{"bounce", 240, 101, {"Simulator=Continuous"}, "_continuous"},
+                      Case{"stack", 60, 33, {"Simulator=Substepping", "Simulator.Substeps=3"}, "_substepping"}),
+    [](const auto& which) {
+      const std::string path = which.param.scene;
+      const std::size_t slash = path.rfind('/');
+      return (slash == std::string::npos ? path : path.substr(slash + 1, path.rfind('.') - slash - 1)) +
+             which.param.suffix;
+    });
 
 TEST_P(Resume, EndsWithTheChainAndTheReportOfTheRunThatNeverStopped) {
-  const auto [scene, steps, stop] = GetParam();
+  const auto [scene, steps, stop, overrides, suffix] = GetParam();
   const ScratchFolder folder;
-  const RunResult whole = run_quietly(options_of(scene, Hosting::kDirect, steps));
+  const RunResult whole = run_quietly(options_of(scene, Hosting::kDirect, steps, overrides));
   for (const auto& [first, second] : {std::pair{Hosting::kDirect, Hosting::kDirect},
                                       {Hosting::kDirect, Hosting::kSharedMemory},
                                       {Hosting::kSharedMemory, Hosting::kDirect}}) {
-    RunOptions part = options_of(scene, first, stop);
+    RunOptions part = options_of(scene, first, stop, overrides);
     part.checkpoint = folder.path("checkpoint");
     part.checkpoint_every = 25;
     const RunResult stopped = run_quietly(part);
     ASSERT_EQ(stopped.outcome, RunOutcome::kCompleted) << stopped.fault;
     EXPECT_EQ(stopped.checkpoint_step, stop);
-    RunOptions rest = options_of(scene, second, steps);
+    RunOptions rest = options_of(scene, second, steps, overrides);
     rest.resume = part.checkpoint;
     const RunResult resumed = run_quietly(rest);
     ASSERT_EQ(resumed.outcome, RunOutcome::kCompleted) << resumed.fault;
