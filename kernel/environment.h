@@ -106,7 +106,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Exchanges a plugin, its settings or its hosting; see swap.h. Throws std::invalid_argument with the reason where that
   // is impossible: the plan leaves the slot out, or the plugin does not serve what the scene needs of it.
   // To compare is to ask both for the rest of the run; swap records show how the answers differ.
-  void order_swap(SwapOrder order, bool compares = false);
+  void order_swap(const SwapOrder& order, bool compares = false);
   std::vector<SwapRecord> swaps() const;
   // Throws std::invalid_argument if the slot is left out or hosted in this process.
   void inject(FaultInjection fault);

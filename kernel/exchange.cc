@@ -86,9 +86,9 @@ void Environment::check_fallbacks() const {
     }
 }
 
-void Environment::order_swap(SwapOrder order, bool compares) {
+void Environment::order_swap(const SwapOrder& order, bool compares) {
   const std::uint32_t row = place_of(order);
-  slot_of(order.slot).order_swap(std::move(order), row, compares);
+  slot_of(order.slot).order_swap(order, row, compares);
 }
 
 std::vector<SwapRecord> Environment::swaps() const {

@@ -1,7 +1,6 @@
 // The one rule by which every space decides whether two bodies are a pair, so that all spaces agree.
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <vector>
 
@@ -14,7 +13,7 @@ namespace gravitas {
 struct TouchRights {
   std::uint32_t flags = 0;  // BodyFlag bits
   std::uint64_t group = 0, mask = 0;
-  auto operator<=>(const TouchRights&) const = default;
+  bool operator==(const TouchRights&) const = default;
 };
 
 // Both have shapes, one of them can be pushed, and their filters allow it.

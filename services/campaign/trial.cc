@@ -169,7 +169,7 @@ void Run::order_swap(const PlannedFault& fault) {
   order.plugin = own[0];
   if (fault.means == Means::kSwapRefused) order.plugin.library = "/dev/null";
   order.step = fault.step;
-  world_->order_swap(std::move(order));
+  world_->order_swap(order);
 }
 
 void Run::attack_from_outside(const PlannedFault& fault) {

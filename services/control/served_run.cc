@@ -325,7 +325,7 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
   Order kept{order.slot, order.step, 0, order.plugin};
   for (const Order& other : orders_) kept.rank += other.slot == kept.slot && other.step == kept.step ? 1U : 0U;
   try {
-    environment_->order_swap(std::move(order));
+    environment_->order_swap(order);
   } catch (const std::invalid_argument& problem) {
     throw BadInput(problem.what());
   }

@@ -315,8 +315,8 @@ class Run final : private kernel::CommitListener {
 
   void give_orders() {
     try {
-      for (kernel::SwapOrder& order : swaps_) environment_->order_swap(std::move(order));
-      for (kernel::SwapOrder& order : comparisons_) environment_->order_swap(std::move(order), true);
+      for (const kernel::SwapOrder& order : swaps_) environment_->order_swap(order);
+      for (const kernel::SwapOrder& order : comparisons_) environment_->order_swap(order, true);
       for (kernel::FaultInjection& fault : faults_)
         if (fault.step > environment_->step_count()) environment_->inject(std::move(fault));
       for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
