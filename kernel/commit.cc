@@ -26,6 +26,7 @@ StepOutcome Environment::step() {
   if (fault_) return StepOutcome::kPaused;
   const std::uint64_t start = lap_ns_ = channel::now_ns();
   const CommitFigures figures = figures_;
+  events_.clear();
   try {
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
@@ -111,7 +112,6 @@ void Environment::finish_step() {
   state_hash_ = kernel::state_hash(front());
   chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
   for (const Event& event : events_) listener_->on_event(event);
-  events_.clear();
   lap_ns_ = channel::now_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_ns_ - start);
 }

@@ -137,7 +137,7 @@ class Environment : private DerivativeSource, private SlotObserver {
  private:
   // simulators/: what a step is made of, and the order of the stages.
   void make_inner_steps();
-  void finish_inner_step(const Trusted<TrialState>& trial);
+  void finish_inner_step(const Trusted<TrialState>& trial, bool has_found_contacts = false);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
   bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
   void locate_events(double begin, double length);

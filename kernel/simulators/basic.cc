@@ -22,12 +22,12 @@ void Environment::make_inner_steps() {
   }
 }
 
-void Environment::finish_inner_step(const Trusted<TrialState>& trial) {
+void Environment::finish_inner_step(const Trusted<TrialState>& trial, bool has_found_contacts) {
   if (!has_reactions()) {
     commit_trial(trial);
     return;
   }
-  if (has_contacts()) look_up_contacts(find_contacts(bound_and_pair(trial)));
+  if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (constraint_.is_running()) constrain(trial);
   commit_solution(solve());
 }

@@ -33,18 +33,20 @@ void Environment::locate_events(double begin, double length) {
   for (int inner = 0; done < length; ++inner) {
     const double left = length - done;
     double stop = left;
+    bool has_found_contacts = false;
     begin_inner_step(begin + done, left);
     Trusted<TrialState> trial = integrate();
     if (inner < kMostInnerSteps) {
-      stop = description_.simulator == Simulator::kContinuous ? first_impact(trial, begin + done, left)
-                                                              : bisect(trial, begin + done, left, is_near);
+      const bool bisects = description_.simulator == Simulator::kBisection;
+      stop = bisects ? bisect(trial, begin + done, left, is_near) : first_impact(trial, begin + done, left);
       is_near = !is_near && stop < left;
+      has_found_contacts = bisects && stop == data_.time_step[0];
       if (stop != data_.time_step[0]) {
         begin_inner_step(begin + done, stop);
         trial = integrate();
       }
     }
-    finish_inner_step(trial);
+    finish_inner_step(trial, has_found_contacts);
     done = stop == left ? length : done + stop;
   }
 }
