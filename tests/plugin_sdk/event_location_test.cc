@@ -1,0 +1,108 @@
+#include "plugin_sdk/event_location.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace gravitas {
+namespace {
+
+constexpr double kGravity = 9.81;        // m/s²
+constexpr double kTargetGap = 1e-11;     // m
+constexpr double kShortestFlight = 1e-8; // s
+
+// A point above a floor, whose gap is gap + speed t - kGravity t² / 2.
+struct Flight {
+  double gap = 0.0, speed = 0.0;
+
+  Flight after(double time) const {
+    return {gap + speed * time - 0.5 * kGravity * time * time, speed - kGravity * time};
+  }
+
+  // What a collision plugin says of the straight way to where it is after `length`.
+  Encounter encounter(double length) const {
+    const Flight end = after(length);
+    if (gap <= kTargetGap) return {0.0, gap, speed, end.speed};
+    if (end.gap > kTargetGap) return {1.0, end.gap, speed, end.speed};
+    return {(gap - kTargetGap) / (gap - end.gap), kTargetGap, speed, end.speed};
+  }
+};
+
+struct Landing {
+  double time = 0.0, gap = 0.0;
+  int steps = 0, trials = 0;
+};
+
+// Steps as a simulator takes them until the floor is met.
+Landing land(Flight flight, double time_step) {
+  Landing landing;
+  for (; flight.gap > kTargetGap && landing.steps < 100; ++landing.steps) {
+    NextStop next{time_step, true};
+    for (; next.is_trial && landing.trials < 1000; ++landing.trials) {
+      const double length = next.length;
+      next = stop_before(flight.encounter(length), length, kTargetGap, kShortestFlight);
+      next.length = std::min(next.length, length);
+    }
+    landing.time += next.length;
+    flight = flight.after(next.length);
+  }
+  landing.gap = flight.gap;
+  return landing;
+}
+
+TEST(EventLocation, AFallIsMetAtItsTime) {
+  for (const double height : {1e-6, 1e-3, 0.1, 5.0}) {
+    const double time = std::sqrt(2.0 * height / kGravity);
+    for (const double share : {1.01, 3.0, 10.0}) {
+      const Landing landing = land({height, 0.0}, share * time);
+      const double speed = kGravity * time;
+      EXPECT_NEAR(landing.time, time, 4.0 * kTargetGap / speed + 1e-15) << height << " m, " << share;
+      // the contact is closed, and no deeper than said: two target gaps, and half of one for the bend
+      EXPECT_LE(landing.gap, kTargetGap);
+      EXPECT_GE(landing.gap, -3.0 * kTargetGap);
+      EXPECT_LE(landing.steps, 80);
+      EXPECT_LE(landing.trials, 160);
+    }
+  }
+}
+
+TEST(EventLocation, AStraightWayIsMetInOneStep) {
+  const NextStop stop = stop_before({0.25, kTargetGap, -100.0, -100.0}, 0.01, kTargetGap, kShortestFlight);
+  EXPECT_FALSE(stop.is_trial);
+  EXPECT_DOUBLE_EQ(stop.length, 0.0025 + 2.0 * kTargetGap / 100.0);
+}
+
+TEST(EventLocation, WhatTheDetectorDidNotFollowToTheEndIsLookedAtAgain) {
+  const NextStop stop = stop_before({0.5, 1e-3, -100.0, -100.0}, 0.01, kTargetGap, kShortestFlight);
+  EXPECT_FALSE(stop.is_trial);
+  EXPECT_DOUBLE_EQ(stop.length, 0.005);
+}
+
+TEST(EventLocation, AFlightThatEndsWithinTheStepIsFollowedToItsTop) {
+  const double speed = 0.02, length = 0.01;  // its top after 2 ms, back after 4
+  const Encounter encounter = Flight{0.0, speed}.encounter(length);
+  EXPECT_DOUBLE_EQ(stop_before(encounter, length, kTargetGap, kShortestFlight).length, speed / kGravity);
+}
+
+TEST(EventLocation, PairsThatRestPartOrPressNeedNoStop) {
+  const double length = 0.01;
+  const auto stop = [&](double start_speed, double end_speed) {
+    return stop_before({0.0, 0.0, start_speed, end_speed}, length, kTargetGap, kShortestFlight).length;
+  };
+  EXPECT_EQ(stop(0.0, -kGravity * length), length);   // rests
+  EXPECT_EQ(stop(-1.0, -2.0), length);                // pressed: the solver's
+  EXPECT_EQ(stop(1.0, 0.5), length);                  // parts
+  EXPECT_EQ(stop(0.4 * kShortestFlight * kGravity, -kGravity * length), length);  // a flight too short to be one
+  EXPECT_LT(stop(0.6 * kShortestFlight * kGravity, -kGravity * length), length);
+}
+
+TEST(EventLocation, GrazingIsNotWorthAStep) {
+  // met at the very end, at a speed that goes no deeper than the target in what is left
+  const NextStop stop = stop_before({0.999, kTargetGap, -1e-9, -1e-9}, 0.01, kTargetGap, kShortestFlight);
+  EXPECT_FALSE(stop.is_trial);
+  EXPECT_EQ(stop.length, 0.01);
+}
+
+}  // namespace
+}  // namespace gravitas
