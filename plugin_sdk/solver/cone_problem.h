@@ -122,8 +122,10 @@ class ConeProblem {
   void project(const Block& block, const double* lambda, const double* y, double* projected) const;
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
-  void linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y);
+  bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y);
   bool newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y);
+  void solve_sliding();
+  void solve_sticking();
   ConePath path() const;
   void sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
   void relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const;
@@ -138,7 +140,8 @@ class ConeProblem {
   std::vector<double> scale_;                // by row, root of W_ii; 0: pushes nothing
   std::vector<std::uint32_t> held_, other_;  // rows
   std::vector<Block> blocks_;
-  std::vector<double> free_;  // q by row
+  std::vector<double> free_;                        // q by row
+  std::vector<std::pair<double, double>> speeds_;  // |v|, |w| by body
   double motion_ = 0.0;       // largest sum of what meets in a row, m/s
 
   ProfileLdlt factor_;
@@ -152,10 +155,14 @@ class ConeProblem {
   Eigen::VectorXd lambda_;                                              // of other rows, scaled
 
   // of a Newton step
-  Eigen::MatrixXd matrix_, core_;
-  Eigen::VectorXd side_of_step_, step_, rest_;
+  enum class RowKind : std::uint8_t { kHeld, kPut, kSliding };
+  std::vector<RowKind> kinds_;
+  Eigen::MatrixXd sliding_, core_;
+  Eigen::VectorXd side_of_step_, step_;
+  std::vector<double> rest_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-  std::vector<Eigen::Index> coupled_;
+  std::vector<Eigen::Index> coupled_, factored_;  // rows; of sticking_
+  ProfileLdlt sticking_;
 };
 
 }  // namespace gravitas

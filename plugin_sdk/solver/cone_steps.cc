@@ -83,21 +83,23 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
   return worst;
 }
 
-// matrix d = side, d the change of lambda: every row that is held by its law as y + W' d = target, every other as where
-// its law puts it.
-void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) {
+// Equations of a step, d the change of lambda: a row that its law holds as y + W' d = target, any other as where its law
+// puts it, alone or (in sliding_, and then true is returned) together with others.
+bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) {
   const Eigen::Index count = lambda.size();
-  matrix_.resize(count, count);
+  bool any_slides = false;
+  kinds_.resize(other_.size());
   side_of_step_.resize(count);
-  const auto hold = [&](Eigen::Index i, double missing) {
-    matrix_.row(i) = response_.row(i);
-    matrix_(i, i) += kProximal;
-    side_of_step_[i] = missing;
+  const auto note = [&](Eigen::Index i, RowKind kind, double side) {
+    kinds_[static_cast<std::size_t>(i)] = kind;
+    side_of_step_[i] = side;
   };
-  const auto put = [&](Eigen::Index i, double place) {
-    matrix_.row(i).setZero();
-    matrix_(i, i) = 1.0;
-    side_of_step_[i] = place - lambda[i];
+  const auto hold = [&](Eigen::Index i, double missing) { note(i, RowKind::kHeld, missing); };
+  const auto put = [&](Eigen::Index i, double place) { note(i, RowKind::kPut, place - lambda[i]); };
+  const auto start_sliding = [&](Eigen::Index i, double side) {
+    if (!any_slides) sliding_.resize(count, count);
+    any_slides = true;
+    note(i, RowKind::kSliding, side);
   };
   // two rows that slide along z against a radius mu lambda_N:
   //   (1 - K) d + K W' d - mu dir d_N = mu lambda_N dir - lambda,  K = radius/|z| (1 - dir dir^T)
@@ -108,10 +110,10 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     const double share = std::min(1.0, radius / length);
     const Eigen::Matrix2d across = share * (Eigen::Matrix2d::Identity() - direction * direction.transpose());
     for (int a = 0; a < 2; ++a) {
-      matrix_.row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
-      for (int b = 0; b < 2; ++b) matrix_(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - kProximal);
-      matrix_(i + a, normal) -= mu * direction[a];
-      side_of_step_[i + a] = mu * lambda[normal] * direction[a] - lambda[i + a];
+      start_sliding(i + a, mu * lambda[normal] * direction[a] - lambda[i + a]);
+      sliding_.row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
+      for (int b = 0; b < 2; ++b) sliding_(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - kProximal);
+      sliding_(i + a, normal) -= mu * direction[a];
     }
   };
   const auto disc = [&](Eigen::Index i, Eigen::Index normal, double mu, double normal_after) {
@@ -152,43 +154,84 @@ void ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
       hold(k, -y[k]);
     } else {
       const double bound = std::copysign(bounds.spinning, wanted);
-      put(k, bound * lambda[i]);
-      matrix_(k, i) -= bound;
+      start_sliding(k, bound * lambda[i] - lambda[k]);
+      sliding_.row(k).setZero();
+      sliding_(k, k) = 1.0;
+      sliding_(k, i) = -bound;
     }
     disc(k + 1, i, bounds.rolling, pressed);
   }
+  return any_slides;
 }
 
 // False, with nothing done, if the step is not finite.
 bool ConeProblem::newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
   const Eigen::Index count = lambda->size();
-  linearise(*lambda, *y);
-  // rows that stand by themselves go to the right
+  const bool any_slides = linearise(*lambda, *y);
+  // what is put somewhere goes to the right
   coupled_.clear();
   step_.setZero(count);
   for (Eigen::Index i = 0; i < count; ++i) {
-    bool is_alone = matrix_(i, i) == 1.0;
-    for (Eigen::Index j = 0; is_alone && j < count; ++j) is_alone = j == i || matrix_(i, j) == 0.0;
-    if (is_alone) {
+    if (kinds_[static_cast<std::size_t>(i)] == RowKind::kPut) {
       step_[i] = side_of_step_[i];
     } else {
       coupled_.push_back(i);
     }
   }
-  const auto size = static_cast<Eigen::Index>(coupled_.size());
-  core_.resize(size, size);
-  rest_.resize(size);
-  for (Eigen::Index a = 0; a < size; ++a) {
-    const Eigen::Index i = coupled_[static_cast<std::size_t>(a)];
-    rest_[a] = side_of_step_[i] - matrix_.row(i).dot(step_);
-    for (Eigen::Index b = 0; b < size; ++b) core_(a, b) = matrix_(i, coupled_[static_cast<std::size_t>(b)]);
+  const bool any_put = static_cast<Eigen::Index>(coupled_.size()) < count;
+  rest_.resize(coupled_.size());
+  for (std::size_t a = 0; a < coupled_.size(); ++a) {
+    const Eigen::Index i = coupled_[a];
+    rest_[a] = side_of_step_[i];
+    if (any_put)
+      rest_[a] -= kinds_[static_cast<std::size_t>(i)] == RowKind::kHeld ? response_.col(i).dot(step_)
+                                                                          : sliding_.row(i).dot(step_);
   }
-  if (size > 0) rest_ = lu_.compute(core_).solve(rest_).eval();
-  if (!rest_.allFinite() || !step_.allFinite()) return false;
-  for (Eigen::Index a = 0; a < size; ++a) step_[coupled_[static_cast<std::size_t>(a)]] = rest_[a];
+  if (any_slides) {
+    solve_sliding();
+  } else {
+    solve_sticking();
+  }
+  if (!step_.allFinite()) return false;
+  for (const double change : rest_)
+    if (!std::isfinite(change)) return false;
+  for (std::size_t a = 0; a < coupled_.size(); ++a) step_[coupled_[a]] = rest_[a];
   *lambda += step_;
   *y = start_others_ + response_ * *lambda;
   return true;
+}
+
+void ConeProblem::solve_sliding() {
+  const auto size = static_cast<Eigen::Index>(coupled_.size());
+  core_.resize(size, size);
+  for (Eigen::Index a = 0; a < size; ++a) {
+    const Eigen::Index i = coupled_[static_cast<std::size_t>(a)];
+    const bool is_held = kinds_[static_cast<std::size_t>(i)] == RowKind::kHeld;
+    for (Eigen::Index b = 0; b < size; ++b) {
+      const Eigen::Index j = coupled_[static_cast<std::size_t>(b)];
+      core_(a, b) = is_held ? response_(j, i) : sliding_(i, j);
+    }
+    if (is_held) core_(a, a) += kProximal;
+  }
+  Eigen::Map<Eigen::VectorXd> rest(rest_.data(), size);
+  if (size > 0) rest = lu_.compute(core_).solve(rest).eval();
+}
+
+// Symmetric, and a contact's rows meet only those of its two bodies: a stack costs what a band costs.
+void ConeProblem::solve_sticking() {
+  if (coupled_ != factored_) {
+    std::vector<std::size_t> first(coupled_.size());
+    for (std::size_t a = 0; a < coupled_.size(); ++a)
+      while (first[a] < a && response_(coupled_[first[a]], coupled_[a]) == 0.0) ++first[a];
+    sticking_.start(first);
+    for (std::size_t a = 0; a < coupled_.size(); ++a) {
+      for (std::size_t b = first[a]; b <= a; ++b) sticking_.entry(a, b) = response_(coupled_[b], coupled_[a]);
+      sticking_.entry(a, a) += kProximal;
+    }
+    sticking_.factorise();
+    factored_ = coupled_;
+  }
+  sticking_.solve(&rest_);
 }
 
 // The laws as the path knows them.

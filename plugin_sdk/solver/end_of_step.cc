@@ -20,8 +20,8 @@ constexpr double kRounding = std::numeric_limits<double>::epsilon();
 class IslandSolver {
  public:
   IslandSolver(const stage::SolverSolveRequest& request, const SolverBodies& all, const Island& island,
-               const ConeSettings& settings, SolverSolution* answer)
-      : request_(request), island_(island), settings_(settings), answer_(*answer) {
+               const ConeSettings& settings, ConeProblem* cone, SolverSolution* answer)
+      : request_(request), island_(island), settings_(settings), answer_(*answer), cone_(*cone) {
     // its own bodies, and those that it is held by
     rows_ = island.bodies;
     for (const std::uint32_t row : island.discrepancies)
@@ -37,13 +37,19 @@ class IslandSolver {
   ConeSummary solve() {
     load();
     const double share = request_.theta() * request_.time_step();
+    guess_offset(share);
+    double change = 0.0;
     for (int round = 0; round < kRounds; ++round) {
       solve_pose();
       find_closed();
       solve_velocity();
-      has_settled_ = !(share > 0.0) || !set_offset(share);
+      if (share > 0.0) change = set_offset(share);
+      // velocities are known to their residual
+      has_settled_ = change <= 4.0 * share * summary_.residual;
       if (has_settled_) break;
     }
+    // settled or not, the pose change answered is that of the impulses answered
+    if (change > 0.0) solve_pose();
     summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
     store();
     return summary_;
@@ -124,6 +130,32 @@ class IslandSolver {
     answer_.contact_correction[row] = std::max(0.0, request_.contact_warm_correction()[row]);
     set_vector(answer_.contact_impulse, row, vector_at(request_.contact_warm_impulse(), row));
     set_vector(answer_.contact_direction, row, normal);
+  }
+
+  // ---- the first guess
+
+  // offset_ as the impulses of the step before make it: what rests or moves steadily is found in one round.
+  void guess_offset(double share) {
+    for (EndJoint& joint : joints_) {
+      move_to_end(&joint);
+      for (std::size_t k = 0; k < 3; ++k)
+        if (velocity_law_of(joint, k).is_velocity_only)
+          push_at_trial(joint, joint.directions[k], share * answer_.joint_impulse[3 * joint.row + k], &offset_);
+    }
+    for (const EndContact& contact : contacts_) {
+      const Vector3 impulse = vector_at(answer_.contact_impulse, contact.row);
+      const Vector3 normal = contact.law.frame.col(0);
+      const Vector3 friction = impulse - normal.dot(impulse) * normal;
+      push_at_trial(contact, direction_at(friction, contact.arm1, contact.arm2), share, &offset_);
+    }
+  }
+
+  template <class Row>
+  void push_at_trial(const Row& row, const ConstraintDirection& direction, double amount, BodyMotion* x) const {
+    if (amount == 0.0) return;
+    const SolverBody &one = bodies_[row.body1], &two = bodies_[row.body2];
+    with_turns(direction, one.inverse_inertia, two.inverse_inertia)
+        .push(amount, one.inverse_mass, two.inverse_mass, (*x)[row.body1], (*x)[row.body2]);
   }
 
   // ---- the end of the step
@@ -232,8 +264,10 @@ class IslandSolver {
       const double change = largest_change(next, displacement_), size = largest(next);
       displacement_ = std::move(next);
       keep_corrections();
-      // Newton's steps shrink until rounding stops them
-      if (change <= std::max(4.0 * representable, 1e-14 * size) || joints_.empty()) break;
+      if (joints_.empty()) break;
+      // steps shrink at a rising rate, until rounding stops them
+      const double enough = std::max(4.0 * representable, 1e-14 * size);
+      if (change <= enough || (step > 0 && change < 1e-2 * last && change * (change / last) <= enough)) break;
       if (step > 3 && !(change < 0.9 * last) && change <= 1e-9 * size) break;
       last = change;
     }
@@ -287,12 +321,15 @@ class IslandSolver {
       for (std::size_t k = 0; k < 3; ++k) {
         const JointLaw known = joint.velocity_laws[k];
         JointLaw& law = joint.velocity_laws[k];
-        law =
-            velocity_law(joint.states[k], joint.errors[static_cast<Eigen::Index>(k)], joint.slop, request_.time_step());
+        law = velocity_law_of(joint, k);
         law.has_lower = law.has_lower || known.has_lower;
         law.has_upper = law.has_upper || known.has_upper;
       }
     }
+  }
+
+  JointLaw velocity_law_of(const EndJoint& joint, std::size_t k) const {
+    return velocity_law(joint.states[k], joint.errors[static_cast<Eigen::Index>(k)], joint.slop, request_.time_step());
   }
 
   // ---- velocity
@@ -419,8 +456,8 @@ class IslandSolver {
 
   // ---- rows on velocity alone
 
-  // offset_ from the present impulses; false if it stays the same as far as they are known.
-  bool set_offset(double share) {
+  // offset_ from the present impulses. Returns by how much that changes it, m; 0 for rounding.
+  double set_offset(double share) {
     BodyMotion next = start_motion(nullptr);
     const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
     const auto push = [&](const ConeRow& row) {
@@ -435,8 +472,7 @@ class IslandSolver {
     const double change = largest_change(next, offset_);
     const double size = std::max(largest(next), largest(displacement_));
     offset_ = std::move(next);
-    // velocities are known to their residual
-    return change > std::max({kRounding * coordinates_, 1e-14 * size, 4.0 * share * summary_.residual});
+    return change > std::max(kRounding * coordinates_, 1e-14 * size) ? change : 0.0;
   }
 
   // ---- sizes, m
@@ -471,6 +507,7 @@ class IslandSolver {
   const Island& island_;
   const ConeSettings& settings_;
   SolverSolution& answer_;
+  ConeProblem& cone_;
 
   SolverBodies bodies_;                // the island's
   std::vector<std::uint32_t> rows_;    // of the request, of each; rising, the world last
@@ -480,7 +517,6 @@ class IslandSolver {
   std::vector<EndBody> end_;
   double coordinates_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
-  ConeProblem cone_;
   ConeSummary summary_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
 };
@@ -505,8 +541,10 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSetti
   const std::vector<Island> islands = find_islands(request, bodies);
   std::vector<ConeSummary> summaries(islands.size());
   host.parallel_for(islands.size(), [&](std::uint64_t begin, std::uint64_t end) {
+    // its matrices are large; memory is all that stays of them
+    thread_local ConeProblem cone;
     for (std::uint64_t i = begin; i < end; ++i) {
-      summaries[i] = IslandSolver(request, bodies, islands[i], settings, &answer).solve();
+      summaries[i] = IslandSolver(request, bodies, islands[i], settings, &cone, &answer).solve();
       host.mark_progress();
     }
   });

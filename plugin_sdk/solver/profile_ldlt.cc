@@ -8,11 +8,12 @@ namespace {
 
 constexpr double kDependent = 1e-12;
 
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
+double dot(const double* a, const double* b, std::size_t count) {
+  const auto size = static_cast<Eigen::Index>(count);
+  return Eigen::Map<const Eigen::VectorXd>(a, size).dot(Eigen::Map<const Eigen::VectorXd>(b, size));
 }
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) { return dot(a.data(), b.data(), a.size()); }
 
 }  // namespace
 
@@ -35,9 +36,9 @@ void ProfileLdlt::factorise() {
     // row[j] holds l_ij d_j until it is divided
     for (std::size_t j = from; j < i; ++j) {
       const double* other = &values_[begin_[j]];
-      double sum = row[j - from];
-      for (std::size_t k = std::max(from, first_[j]); k < j; ++k) sum -= row[k - from] * other[k - first_[j]];
-      row[j - from] = pivot_[j] > 0.0 ? sum : 0.0;
+      const std::size_t both = std::max(from, first_[j]);
+      row[j - from] =
+          pivot_[j] > 0.0 ? row[j - from] - dot(row + (both - from), other + (both - first_[j]), j - both) : 0.0;
     }
     for (std::size_t j = from; j < i; ++j) {
       if (!(pivot_[j] > 0.0)) continue;
