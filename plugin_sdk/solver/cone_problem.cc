@@ -63,8 +63,8 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
   for (std::uint32_t r = 0; r < rows.size(); ++r) {
     const ConeRow& row = rows[r];
     free_[r] = value(x0, r);
-    const auto &[speed1, spin1] = speeds_[row.body1];
-    const auto &[speed2, spin2] = speeds_[row.body2];
+    const auto& [speed1, spin1] = speeds_[row.body1];
+    const auto& [speed2, spin2] = speeds_[row.body2];
     const double arms = row.direction.angular1.norm() * spin1 + row.direction.angular2.norm() * spin2;
     const double size = std::fabs(row.start) + row.direction.linear.norm() * (speed1 + speed2) + arms;
     motion_ = std::max(motion_, size * row.length);

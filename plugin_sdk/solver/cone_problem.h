@@ -140,9 +140,9 @@ class ConeProblem {
   std::vector<double> scale_;                // by row, root of W_ii; 0: pushes nothing
   std::vector<std::uint32_t> held_, other_;  // rows
   std::vector<Block> blocks_;
-  std::vector<double> free_;                        // q by row
+  std::vector<double> free_;                       // q by row
   std::vector<std::pair<double, double>> speeds_;  // |v|, |w| by body
-  double motion_ = 0.0;       // largest sum of what meets in a row, m/s
+  double motion_ = 0.0;                            // largest sum of what meets in a row, m/s
 
   ProfileLdlt factor_;
   std::vector<std::vector<std::uint32_t>> held_of_body_;                // places among held_

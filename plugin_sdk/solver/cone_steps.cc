@@ -185,7 +185,7 @@ bool ConeProblem::newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
     rest_[a] = side_of_step_[i];
     if (any_put)
       rest_[a] -= kinds_[static_cast<std::size_t>(i)] == RowKind::kHeld ? response_.col(i).dot(step_)
-                                                                          : sliding_.row(i).dot(step_);
+                                                                        : sliding_.row(i).dot(step_);
   }
   if (any_slides) {
     solve_sliding();

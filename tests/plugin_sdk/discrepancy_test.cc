@@ -331,5 +331,25 @@ TEST(DiscrepancyColumns, GiveBackWhatWasPushed) {
   }
 }
 
+// ---- load ---------------------------------------------------------------------------------------
+
+TEST(DiscrepancyLoad, IsTheWayThatTheImpulseKeptFrom) {
+  Discrepancy d;
+  const InverseInertia point{.mass = 0.5, .moments = Matrix3::Zero()}, world;
+  // a point of 2 kg from the world: g h^2
+  const double h = 0.01, g = 9.81;
+  EXPECT_DOUBLE_EQ(held_back(d, Vector3(0, 2.0 * g * h, 0), h, Vector3::Zero(), world, Vector3::Zero(), point),
+                   g * h * h);
+  // across the end of a rod of length 1 a quarter of the mass is felt, along it all
+  const Vector3 middle(0.5, 0, 0);
+  const InverseInertia rod{.mass = 0.5, .moments = Vector3(0, 6, 6).asDiagonal()};
+  EXPECT_NEAR(held_back(d, Vector3::UnitY(), h, Vector3::Zero(), world, middle, rod), h * 4 * 0.5, 1e-16);
+  EXPECT_NEAR(held_back(d, Vector3::UnitX(), h, Vector3::Zero(), world, middle, rod), h * 0.5, 1e-16);
+  // either end of a pair
+  EXPECT_NEAR(held_back(d, -Vector3::UnitY(), h, middle, rod, middle, rod), h * 8 * 0.5, 1e-16);
+  d.modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked, true);
+  EXPECT_EQ(held_back(d, Vector3::UnitY(), h, Vector3::Zero(), world, middle, rod), 0.0);
+}
+
 }  // namespace
 }  // namespace gravitas

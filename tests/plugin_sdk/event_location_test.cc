@@ -8,9 +8,9 @@
 namespace gravitas {
 namespace {
 
-constexpr double kGravity = 9.81;        // m/s²
-constexpr double kTargetGap = 1e-11;     // m
-constexpr double kShortestFlight = 1e-8; // s
+constexpr double kGravity = 9.81;         // m/s²
+constexpr double kTargetGap = 1e-11;      // m
+constexpr double kShortestFlight = 1e-8;  // s
 
 // A point above a floor, whose gap is gap + speed t - kGravity t² / 2.
 struct Flight {
@@ -90,9 +90,9 @@ TEST(EventLocation, PairsThatRestPartOrPressNeedNoStop) {
   const auto stop = [&](double start_speed, double end_speed) {
     return stop_before({0.0, 0.0, start_speed, end_speed}, length, kTargetGap, kShortestFlight).length;
   };
-  EXPECT_EQ(stop(0.0, -kGravity * length), length);   // rests
-  EXPECT_EQ(stop(-1.0, -2.0), length);                // pressed: the solver's
-  EXPECT_EQ(stop(1.0, 0.5), length);                  // parts
+  EXPECT_EQ(stop(0.0, -kGravity * length), length);                               // rests
+  EXPECT_EQ(stop(-1.0, -2.0), length);                                            // pressed: the solver's
+  EXPECT_EQ(stop(1.0, 0.5), length);                                              // parts
   EXPECT_EQ(stop(0.4 * kShortestFlight * kGravity, -kGravity * length), length);  // a flight too short to be one
   EXPECT_LT(stop(0.6 * kShortestFlight * kGravity, -kGravity * length), length);
 }

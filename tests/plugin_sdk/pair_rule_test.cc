@@ -20,10 +20,10 @@ TEST(PairRule, ShapesMovabilityAndBothMasksDecide) {
   const TouchRights ball{kHasShape | kMovable, 1, 1}, ground{kHasShape, 1, 1};
   EXPECT_TRUE(may_touch(ball, ball));
   EXPECT_TRUE(may_touch(ball, ground));
-  EXPECT_FALSE(may_touch(ground, ground));                          // nothing can be pushed
-  EXPECT_FALSE(may_touch(ball, {kMovable, 1, 1}));                  // a body without a shape
-  EXPECT_FALSE(may_touch(ball, {kHasShape | kMovable, 1, 2}));      // it does not look for group 1
-  EXPECT_FALSE(may_touch(ball, {kHasShape | kMovable, 2, 1}));      // nobody looks for group 2
+  EXPECT_FALSE(may_touch(ground, ground));                      // nothing can be pushed
+  EXPECT_FALSE(may_touch(ball, {kMovable, 1, 1}));              // a body without a shape
+  EXPECT_FALSE(may_touch(ball, {kHasShape | kMovable, 1, 2}));  // it does not look for group 1
+  EXPECT_FALSE(may_touch(ball, {kHasShape | kMovable, 2, 1}));  // nobody looks for group 2
   EXPECT_TRUE(may_touch({kHasShape | kMovable, 1, 2}, {kHasShape, 2, 1}));
 }
 
