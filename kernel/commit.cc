@@ -7,6 +7,7 @@
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/merged_rows.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -28,6 +29,7 @@ StepOutcome Environment::step() {
   const CommitFigures figures = figures_;
   events_.clear();
   try {
+    find_sleepers();
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
     finish_step();
@@ -76,7 +78,8 @@ void Environment::commit_solution(const Trusted<Solution>&) {
       return !std::equal(&a[3 * i], &a[3 * i] + 3, &b[3 * i]);
     };
     back().state_changed[i] = moved || differs(data_.solved_linear_velocity, data_.trial_linear_velocity) ||
-                              differs(data_.solved_angular_velocity, data_.trial_angular_velocity);
+                              differs(data_.solved_angular_velocity, data_.trial_angular_velocity) ||
+                              data_.flags[i] != model_.flags[i];
   }
   copy(back().position, back().position);
   copy(back().orientation, back().orientation);
@@ -92,13 +95,15 @@ void Environment::end_inner_step() {
   if (has_contacts()) find_touching();
   if (listener_ != nullptr && has_contacts()) raise_collision_events();
   if (listener_ != nullptr && model_.constraint_count > 0) raise_break_events();
+  back().rested.assign(front().rested);
+  back().rest_wrench.assign(front().rest_wrench);
   std::swap(front_, back_);
   if (inner_ == 0 && states_.size() > 2) std::swap(back_, start_);
   ++inner_;
 }
 
 void Environment::return_to_start() {
-  if (inner_ > 0) std::swap(front_, start_);
+  if (inner_ > 0) std::swap(front_, states_.size() > 2 ? start_ : back_);
   inner_ = 0;
   must_restart_ = false;
   events_.clear();
@@ -107,27 +112,43 @@ void Environment::return_to_start() {
 void Environment::finish_step() {
   // begun when the last answer had been checked
   const std::uint64_t start = lap_ns_;
-  inner_ = 0;
   ++step_count_;
-  state_hash_ = kernel::state_hash(front());
+  settle();
+  if (inner_ > 0) state_hash_ = kernel::state_hash(front());
+  inner_ = 0;
   chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
   for (const Event& event : events_) listener_->on_event(event);
   lap_ns_ = channel::now_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_ns_ - start);
 }
 
+// What is remembered of those who sleep goes on.
 void Environment::remember_contacts() {
-  back().contact_body.assign(data_.contact_body);
-  back().contact_feature.assign(data_.contact_feature);
-  back().contact_key.assign(data_.contact_key);
-  back().contact_impulse.assign(data_.contact_impulse);
-  back().contact_correction.assign(data_.contact_correction);
+  const State& old = front();
+  const auto key = [](const Column<std::uint32_t>& body, const Column<std::uint32_t>& feature) {
+    return [&](std::size_t i) { return std::array{body[2 * i], body[2 * i + 1], feature[i]}; };
+  };
+  const auto goes_on = [&](std::size_t i) {
+    return !is_awake(old.contact_body[2 * i]) && !is_awake(old.contact_body[2 * i + 1]);
+  };
+  merge_rows(data_.contact_key.size(), key(data_.contact_body, data_.contact_feature), old.contact_key.size(),
+             key(old.contact_body, old.contact_feature), goes_on, &merged_);
+  copy_rows(merged_, 2, data_.contact_body, old.contact_body, back().contact_body);
+  copy_rows(merged_, 1, data_.contact_feature, old.contact_feature, back().contact_feature);
+  copy_rows(merged_, 1, data_.contact_key, old.contact_key, back().contact_key);
+  copy_rows(merged_, 3, data_.contact_impulse, old.contact_impulse, back().contact_impulse);
+  copy_rows(merged_, 1, data_.contact_correction, old.contact_correction, back().contact_correction);
 }
 
 void Environment::remember_joints() {
-  back().discrepancy_constraint.assign(data_.discrepancies.constraint);
-  back().discrepancy_impulse.assign(data_.discrepancy_impulse);
-  back().discrepancy_correction.assign(data_.discrepancy_correction);
+  const State& old = front();
+  const Column<std::uint32_t>&now = data_.discrepancies.constraint, &before = old.discrepancy_constraint;
+  const auto key = [](const Column<std::uint32_t>& joint) { return [&](std::size_t i) { return joint[i]; }; };
+  const auto goes_on = [&](std::size_t i) { return sleeps(model_.constraints[before[i]]); };
+  merge_rows(now.size(), key(now), before.size(), key(before), goes_on, &merged_);
+  copy_rows(merged_, 1, now, before, back().discrepancy_constraint);
+  copy_rows(merged_, 3, data_.discrepancy_impulse, old.discrepancy_impulse, back().discrepancy_impulse);
+  copy_rows(merged_, 3, data_.discrepancy_correction, old.discrepancy_correction, back().discrepancy_correction);
 }
 
 // Joint errors at S_{n+1}; joints whose error or load is beyond what they bear end with this commit.
@@ -176,20 +197,26 @@ double Environment::gap_at(std::size_t contact, const State& state) const {
 
 // Overlap of every contact at S_{n+1}, and the pairs that touch.
 void Environment::find_touching() {
-  const State& next = back();
-  next.touching.resize(0);
+  const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
+  now.resize(0);
   const double share = locates_events() ? kLocatedShare : kTouchingShare;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
-    const double gap = gap_at(i, next);
+    const double gap = gap_at(i, back());
     figures_.penetration = std::max(figures_.penetration, -gap);
     const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
-    const std::uint64_t size = next.touching.size();
-    if (!touches || (size > 0 && next.touching[size - 2] == a && next.touching[size - 1] == b)) continue;
-    next.touching.resize(size + 2);
-    next.touching[size] = a;
-    next.touching[size + 1] = b;
+    const std::uint64_t size = now.size();
+    if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;
+    now.resize(size + 2);
+    now[size] = a;
+    now[size + 1] = b;
   }
+  const auto key = [](const Column<std::uint32_t>& pair) {
+    return [&](std::size_t i) { return std::array{pair[2 * i], pair[2 * i + 1]}; };
+  };
+  const auto goes_on = [&](std::size_t i) { return !is_awake(before[2 * i]) && !is_awake(before[2 * i + 1]); };
+  merge_rows(now.size() / 2, key(now), before.size() / 2, key(before), goes_on, &merged_);
+  copy_rows(merged_, 2, now, before, back().touching);
 }
 
 // Before the states are swapped: back() is what comes, front() what was.
@@ -198,39 +225,27 @@ double Environment::inner_end_time() const {
 }
 
 void Environment::raise_collision_events() {
-  const std::span<const std::uint32_t> now = back().touching.span(), before = front().touching.span();
-  std::size_t n = 0, b = 0, contact = 0;
-  const auto pair_at = [](std::span<const std::uint32_t> pairs, std::size_t i) {
-    return std::pair{pairs[i], pairs[i + 1]};
-  };
-  while (n < now.size() || b < before.size()) {
-    const bool starts = b >= before.size() || (n < now.size() && pair_at(now, n) < pair_at(before, b));
-    const bool ends = n >= now.size() || (b < before.size() && pair_at(before, b) < pair_at(now, n));
-    if (!starts && !ends) {
-      n += 2, b += 2;
-      continue;
-    }
-    const auto [first, second] = starts ? pair_at(now, n) : pair_at(before, b);
+  std::size_t contact = 0;
+  visit_changes(front().touching.span(), back().touching.span(), [&](bool starts, std::uint32_t a, std::uint32_t b) {
     Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd,
                 step_count_ + 1,
                 inner_end_time(),
-                first,
-                second,
+                a,
+                b,
                 kNone,
                 0.0,
                 0.0};
     for (; starts && contact < data_.contact_key.size(); ++contact) {
       const std::pair bodies{data_.contact_body[2 * contact], data_.contact_body[2 * contact + 1]};
-      if (bodies > std::pair{first, second}) break;
-      if (bodies != std::pair{first, second}) continue;
+      if (bodies > std::pair{a, b}) break;
+      if (bodies != std::pair{a, b}) continue;
       const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
       event.relative_speed =
           std::max(event.relative_speed, -normal.dot(vector_at(data_.contact_relative_velocity.span(), contact)));
       event.impulse += normal.dot(vector_at(data_.contact_impulse.span(), contact));
     }
     events_.push_back(event);
-    (starts ? n : b) += 2;
-  }
+  });
 }
 
 void Environment::raise_break_events() {

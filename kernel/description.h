@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/activity.h"
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/local_bound.h"
 #include "plugin_sdk/math/pose.h"
 #include "plugin_sdk/plugin.h"
 
@@ -55,16 +57,6 @@ struct SlotDescription {
   std::uint32_t standbys = 1;         // workers that wait, warm, to take over from one that fails; none if direct
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
   Defences defences = {};
-};
-
-// What the broad phase sees of a body's shape, fixed in the body's frame.
-enum class BoundKind : std::uint32_t { kNone, kSphere, kBox };
-
-struct LocalBound {
-  BoundKind kind = BoundKind::kNone;
-  Vector3 centre = Vector3::Zero();                 // m
-  Quaternion orientation = Quaternion::Identity();  // box to body
-  Vector3 half_extents = Vector3::Zero();           // m; a sphere's radius in x
 };
 
 struct ShapeDescription {
@@ -114,6 +106,7 @@ struct EnvironmentDescription {
   std::string id;
   Simulator simulator = Simulator::kBasic;
   std::uint32_t substeps = 1;     // equal inner steps of a step
+  SleepRule sleep;                // when islands fall asleep (plugin_sdk/activity.h)
   double time_step = 1.0 / 60.0;  // s
   // Number of steps of the whole run and the length of the last one (s), which may be shorter.
   std::uint32_t steps = 600;

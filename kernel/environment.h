@@ -34,6 +34,7 @@
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/duration_histogram.h"
 #include "plugin_sdk/event_location.h"
+#include "plugin_sdk/merged_rows.h"
 
 namespace gravitas::kernel {
 
@@ -121,6 +122,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   const DurationHistogram& validation_time(Stage stage) const { return validation_[static_cast<std::size_t>(stage)]; }
   const DurationHistogram& step_time() const { return step_profile_; }
 
+  // With the next step the island of a body is awake, if it sleeps. To be given again after a resume before that.
+  void wake(std::uint32_t body) { wake_orders_.push_back(body); }
+  bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
+
   // At most one listener; null: no events are made.
   void set_listener(EventListener* listener) { listener_ = listener; }
   // At most one; null: nobody.
@@ -144,6 +149,22 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
+  // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
+  bool can_sleep() const { return description_.sleep.energy > 0.0; }
+  void remember_wrenches();
+  void find_sleepers();
+  bool does_anything_move() const;
+  bool is_awake(std::uint32_t body) const { return body != kNone && (data_.flags[body] & kMovable) != 0; }
+  bool sleeps(const ConstraintDescription& joint) const {
+    return sleepers_ > 0 && !is_awake(joint.body1) && !is_awake(joint.body2);
+  }
+  bool is_carrying(std::uint32_t body) const;
+  void leave_out_sleepers();
+  void look_for_pushes();
+  bool wakes_sleepers();
+  void wake_island(std::uint32_t body);
+  Connections connections();
+  void settle();
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
@@ -269,6 +290,14 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::optional<Trusted<Pairs>> pairs_;           // the last
   double margin_ = 0.0;
+
+  Activity activity_;
+  std::uint32_t sleepers_ = 0;               // in this step
+  bool wakes_all_ = false;                   // with the next step
+  std::vector<std::uint32_t> wake_orders_;   // of the user
+  std::vector<std::uint32_t> pushed_;        // asleep, under another force than before
+  std::vector<std::uint32_t> joint_bodies_;  // scratch of connections()
+  std::vector<MergedRow> merged_;            // scratch
 
   StageSlot space_, collision_, constraint_, force_, solver_, integrator_;
   const std::array<StageSlot*, 6> slots_ = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};

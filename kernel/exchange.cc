@@ -114,7 +114,9 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   const PluginDeclaration& now = slot.description().plugins[target].declaration;
   if (slot.which() == Slot::kConstraint) bind_again(target);
   if (now.name == before.declaration.name) return;
-  must_restart_ |= inner_ > 0;
+  must_restart_ |= inner_ > 0 || sleepers_ > 0;
+  wakes_all_ = true;
+  find_sleepers();
   if (slot.which() == Slot::kIntegrator) {
     data_.theta[0] = now.theta;
     for (const State& state : states_) {

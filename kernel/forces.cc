@@ -49,7 +49,9 @@ void Environment::sum_wrenches() {
 void Environment::begin_attempt(bool counts) {
   attempt_counts_ = counts;
   validator_.begin_integration();
-  if (counts) start_wrench_known_ = false;
+  if (!counts) return;
+  start_wrench_known_ = false;
+  pushed_.clear();
 }
 
 void Environment::evaluate() {
@@ -60,6 +62,7 @@ void Environment::evaluate() {
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);
     sum_wrenches();
+    if (sleepers_ > 0 && attempt_counts_) look_for_pushes();
   }
   if (knows_reactions()) ask_reactions();
   validator_.note_wrench(told_wrench());

@@ -1,7 +1,6 @@
 #include "kernel/plan.h"
 
 #include <algorithm>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -9,8 +8,6 @@
 
 namespace gravitas::kernel {
 namespace {
-
-constexpr double kMarginShare = 0.01;
 
 void add(Plan* plan, Slot slot, const SlotDescription& description) {
   PlannedSlot& planned = plan->slots.emplace_back();
@@ -24,16 +21,15 @@ void leave_out(Plan* plan, SlotDescription* slot, const char* name, const char* 
   plan->left_out.push_back({name, why});
 }
 
-}  // namespace
-
-double contact_margin(const EnvironmentDescription& d) {
-  double smallest = std::numeric_limits<double>::max();
-  for (const BodyDescription& body : d.bodies) {
-    if (body.bound.kind == BoundKind::kSphere) smallest = std::min(smallest, body.bound.half_extents.x());
-    if (body.bound.kind == BoundKind::kBox) smallest = std::min(smallest, body.bound.half_extents.minCoeff());
-  }
-  return smallest == std::numeric_limits<double>::max() ? 0.0 : kMarginShare * smallest;
+const char* why_none_sleeps(const EnvironmentDescription& d, bool has_contacts) {
+  const auto may_sleep = [](const BodyDescription& body) { return (body.flags & kCanSleep) != 0; };
+  if (d.sleep.energy == 0.0) return "SleepEnergy is 0";
+  if (d.simulator == Simulator::kSmooth) return "the simulator Smooth stops no motion";
+  if (!has_contacts && d.constraints.empty()) return "there are neither contacts nor joints that could hold a body";
+  return std::ranges::none_of(d.bodies, may_sleep) ? "no body may sleep" : nullptr;
 }
+
+}  // namespace
 
 Plan make_plan(EnvironmentDescription* d) {
   Plan plan;
@@ -75,6 +71,10 @@ Plan make_plan(EnvironmentDescription* d) {
     add(&plan, Slot::kSolver, d->solver);
   } else {
     leave_out(&plan, &d->solver, "solver", "there are neither contacts nor joints");
+  }
+  if (const char* why = why_none_sleeps(*d, has_contacts)) {
+    d->sleep.energy = 0.0;
+    plan.left_out.push_back({"sleep", why});
   }
   return plan;
 }

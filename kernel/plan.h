@@ -30,11 +30,8 @@ struct Plan {
   std::vector<LeftOut> left_out;
 };
 
-// Removes from the description the plugins of slots that it does not need, and says so.
+// Removes from the description the plugins of slots that it does not need, and the energy of sleep where nothing can
+// fall asleep, and says so.
 Plan make_plan(EnvironmentDescription* description);
-
-// Gap up to which contacts are asked for: a hundredth of the smallest bounded shape, so that a contact which
-// the reactions of this step close is known to the solver. m.
-double contact_margin(const EnvironmentDescription& description);
 
 }  // namespace gravitas::kernel

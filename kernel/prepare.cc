@@ -21,7 +21,8 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       model_(&arena_, description_),
       data_(&arena_, model_, description_),
       validator_(arena_, model_, description_.check_physics_every),
-      margin_(contact_margin(description_)),
+      margin_(contact_margin(model_.bound)),
+      activity_(description_.sleep),
       space_(Slot::kSpace, description_.space),
       collision_(Slot::kCollision, description_.collision),
       constraint_(Slot::kConstraint, description_.constraint),
@@ -90,7 +91,10 @@ void Environment::ask_constant_forces() {
       }
     }
   }
-  if (!wrench_is_constant_) return;
+  if (!wrench_is_constant_) {
+    remember_wrenches();
+    return;
+  }
   force_.stop();
   std::erase_if(plan_.slots, [](const PlannedSlot& planned) { return planned.slot == Slot::kForce; });
   plan_.left_out.push_back({"force", "all forces are constant: asked once at the start"});

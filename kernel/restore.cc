@@ -21,9 +21,12 @@ std::string at_row(const std::string& what, std::size_t row) { return "row " + s
 // Reads columns into a state; returns the first that has another name, type or length than the state's should.
 class ColumnReader {
  public:
-  ColumnReader(std::span<const SavedColumn> saved, const Model& model) : saved_(saved) {
+  // `like`: a state of the same environment.
+  ColumnReader(std::span<const SavedColumn> saved, const Model& model, const State& like) : saved_(saved) {
     rows_[static_cast<std::size_t>(StateRows::kBody)] = model.body_count;
     rows_[static_cast<std::size_t>(StateRows::kJoint)] = model.constraint_count;
+    rows_[static_cast<std::size_t>(StateRows::kRest)] = like.rested.size();
+    rows_[static_cast<std::size_t>(StateRows::kWrench)] = like.rest_wrench.size() / 6;
   }
 
   std::string read_into(const State& state) {
@@ -65,7 +68,7 @@ class ColumnReader {
 
   std::span<const SavedColumn> saved_;
   std::size_t next_ = 0;
-  std::array<std::uint64_t, 6> rows_ = {kUnknown, kUnknown, kUnknown, kUnknown, kUnknown, kUnknown};
+  std::array<std::uint64_t, 8> rows_ = {0, 0, kUnknown, kUnknown, kUnknown, kUnknown, 0, 0};
   std::string problem_;
 };
 
@@ -89,7 +92,8 @@ std::string find_wrong_body(const State& state, const State& initial, const Mode
         differs(state.angular_velocity, initial.angular_velocity, 3))
       return "the immovable body '" + model.body_id[i] + "' has moved";
   }
-  return {};
+  const std::uint32_t sleeper = find_wrong_sleeper(bodies_at_rest(model, state), state.rested.span());
+  return sleeper == kNone ? "" : "the body '" + model.body_id[sleeper] + "' sleeps, and may not or moves";
 }
 
 // What is remembered of contacts, joints and pairs that touch.
@@ -144,17 +148,18 @@ std::string Environment::find_misfit(const SavedState& saved) const {
 std::string Environment::restore(const SavedState& saved) {
   std::string problem = find_misfit(saved);
   if (!problem.empty()) return problem;
-  problem = ColumnReader(saved.columns, model_).read_into(back());
+  problem = ColumnReader(saved.columns, model_, front()).read_into(back());
   if (problem.empty()) problem = find_wrong_body(back(), front(), model_);
   if (problem.empty()) problem = find_wrong_memory(back(), model_, has_contacts());
   if (problem.empty() && !(kernel::state_hash(back()) == saved.state_hash))
     problem = "its poses and velocities are not those of its hash";
   if (!problem.empty()) {
     // the second state as it was
-    ColumnReader(saved_state().columns, model_).read_into(back());
+    ColumnReader(saved_state().columns, model_, front()).read_into(back());
     return problem;
   }
   std::swap(front_, back_);
+  wakes_all_ = false;
   step_count_ = saved.step;
   figures_ = saved.figures;
   state_hash_ = saved.state_hash;

@@ -12,7 +12,7 @@
 
 namespace gravitas::kernel {
 
-// Largest overlap (m) and joint error (m; rad count as m) of the state that the last step committed.
+// Largest overlap (m) and joint error (m; rad count as m) of the state that the last step committed, of who was awake.
 struct CommitFigures {
   double penetration = 0.0;
   double joint_error = 0.0;

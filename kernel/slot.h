@@ -108,6 +108,8 @@ class StageSlot {
 
   // A worker commits a fault; consumed by the first attempts at that step.
   void inject(FaultInjection fault) { armed_.push_back(std::move(fault)); }
+  // True if a call of this step is to be hit.
+  bool has_order() const { return std::ranges::find(armed_, step_, &FaultInjection::step) != armed_.end(); }
 
   // Begins a swap of the plugin in row `target`; see swap.h. With `only_compare` it never cuts over.
   void order_swap(SwapOrder order, std::uint32_t target, bool only_compare = false);

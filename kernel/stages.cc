@@ -1,36 +1,14 @@
 // The stages between S_n and the solver's answer: each asks its slot and checks what comes back.
 #include <algorithm>
-#include <limits>
 
 #include "kernel/environment.h"
-#include "plugin_sdk/channel/digest.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/contact_key.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/motion.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
-namespace {
-
-// Identity of a contact's life: who touches, with which features, since which step.
-std::uint64_t new_contact_key(std::uint32_t a, std::uint32_t b, std::uint32_t feature, std::uint32_t step,
-                              std::uint32_t inner) {
-  const std::array<std::uint32_t, 4> identity = {a, b, feature, step};
-  channel::Digest digest;
-  digest.add(identity.data(), sizeof identity);
-  if (inner > 0) digest.add(&inner, sizeof inner);
-  return digest.value();
-}
-
-Bounds bounds_of(const LocalBound& bound, const Pose& pose) {
-  if (bound.kind == BoundKind::kSphere) return sphere_bounds(pose, bound.centre, bound.half_extents.x());
-  if (bound.kind == BoundKind::kBox) return box_bounds(pose, bound.centre, bound.orientation, bound.half_extents);
-  return {Vector3::Constant(-std::numeric_limits<double>::infinity()),
-          Vector3::Constant(std::numeric_limits<double>::infinity())};
-}
-
-}  // namespace
-
 void Environment::book_call(Stage stage, StageSlot* slot, std::uint64_t start, const CallTimes& times) {
   const std::uint64_t end = channel::now_ns();
   // what failed before it is no measure of how long a call takes
@@ -104,7 +82,7 @@ void Environment::begin_inner_step(double begin, double length) {
 
 Trusted<TrialState> Environment::integrate() {
   const auto request =
-      ids(data_.time, data_.time_step, data_.wrench_is_constant, model_.flags, model_.inverse_mass, model_.inertia,
+      ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, model_.inverse_mass, model_.inertia,
           model_.inverse_inertia, model_.damping, data_.wrench, front().position, front().orientation,
           start_linear_velocity(), start_angular_velocity(), front().plugin_state, front().state_changed);
   const auto reply = ids(data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
@@ -131,10 +109,8 @@ void Environment::follow_motion(double time, const Column<double>& position, con
 
 // World bounds at S*, widened so that pairs up to the margin apart overlap.
 Bounds Environment::trial_bounds(std::uint32_t body) const {
-  Bounds bounds = bounds_of(model_.bound[body], pose_of(data_.trial_position, data_.trial_orientation, body));
-  bounds.lower.array() -= 0.5 * margin_;
-  bounds.upper.array() += 0.5 * margin_;
-  return bounds;
+  return widened(bounds_of(model_.bound[body], pose_of(data_.trial_position, data_.trial_orientation, body)),
+                 0.5 * margin_);
 }
 
 void Environment::bound_bodies(const Trusted<TrialState>&) {
@@ -147,23 +123,21 @@ void Environment::bound_bodies(const Trusted<TrialState>&) {
   profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
 }
 
-// How the bodies get from S_n to S*, and bounds of all that they pass. A point at the distance r from the centre of mass
-// leaves the chord between its two places by no more than r angle^2 / 8, and never by more than 2 r.
+// How the bodies get from S_n to S*, and bounds of all that they pass.
 void Environment::bound_motions(const Trusted<TrialState>&, double length) {
   const std::uint64_t start = channel::now_ns();
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const Pose from = pose_of(front().position, front().orientation, i);
+    const Pose to = pose_of(data_.trial_position, data_.trial_orientation, i);
     const Motion motion = motion_between(
-        from, pose_of(data_.trial_position, data_.trial_orientation, i),
+        from, to,
         0.5 * length *
             (vector_at(start_angular_velocity().span(), i) + vector_at(data_.trial_angular_velocity.span(), i)));
     set_vector(data_.displacement.span(), i, motion.displacement);
     set_vector(data_.rotation.span(), i, motion.rotation);
-    const Bounds before = bounds_of(model_.bound[i], from), after = trial_bounds(i);
-    const double radius = model_.bound[i].centre.norm() + model_.bound[i].half_extents.norm();
-    const double leeway = 0.5 * margin_ + radius * std::min(2.0, 0.125 * motion.rotation.squaredNorm());
-    set_vector(data_.lower.span(), i, before.lower.cwiseMin(after.lower) - Vector3::Constant(leeway));
-    set_vector(data_.upper.span(), i, before.upper.cwiseMax(after.upper) + Vector3::Constant(leeway));
+    const Bounds bounds = widened(swept_bounds(model_.bound[i], from, to, motion.rotation), 0.5 * margin_);
+    set_vector(data_.lower.span(), i, bounds.lower);
+    set_vector(data_.upper.span(), i, bounds.upper);
   }
   profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
 }
@@ -171,8 +145,10 @@ void Environment::bound_motions(const Trusted<TrialState>&, double length) {
 Trusted<Pairs> Environment::find_pairs() {
   const auto request = ids(data_.lower, data_.upper, model_.flags, model_.filter_group, model_.filter_mask);
   const auto reply = ids(data_.pair);
-  return ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr,
-             [&](const auto& answer) { return validator_.pairs(answer, data_); });
+  const auto pairs = ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr,
+                         [&](const auto& answer) { return validator_.pairs(answer, data_); });
+  if (sleepers_ > 0) leave_out_sleepers();
+  return pairs;
 }
 
 void Environment::find_impacts(const Trusted<Pairs>&) {
@@ -259,7 +235,8 @@ void Environment::ask_discrepancies(const Column<double>& time, const Column<dou
   for (std::size_t g = 0; g < model_.constraint_groups.size(); ++g) {
     const ConstraintGroup& group = model_.constraint_groups[g];
     const Column<std::uint32_t>& intact = data_.group_intact[g];
-    for (std::size_t i = 0; i < group.row.size(); ++i) intact[i] = front().intact[group.row[i]];
+    for (std::size_t i = 0; i < group.row.size(); ++i)
+      intact[i] = front().intact[group.row[i]] != 0 && !sleeps(model_.constraints[group.row[i]]) ? 1 : 0;
     const auto request = ids(time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact,
                              position, orientation, linear_velocity, angular_velocity);
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
@@ -317,7 +294,7 @@ Trusted<Solution> Environment::solve() {
   const DiscrepancyAnswer& joints = data_.discrepancies;
   const Column<double>& wrench = wrench_is_constant_ ? data_.wrench : data_.start_wrench;
   const auto request =
-      ids(data_.time_step, data_.theta, model_.flags, model_.inverse_mass, model_.inverse_inertia, front().position,
+      ids(data_.time_step, data_.theta, data_.flags, model_.inverse_mass, model_.inverse_inertia, front().position,
           front().orientation, start_linear_velocity(), start_angular_velocity(), data_.trial_position,
           data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity, wrench,
           data_.discrepancy_body, joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes,

@@ -23,6 +23,8 @@ State::State(Arena* arena, const EnvironmentDescription& d) {
   discrepancy_impulse = Column<double>(arena, 0, 24 * joints);
   discrepancy_correction = Column<double>(arena, 0, 24 * joints);
   touching = Column<std::uint32_t>(arena, 0, 2 * contacts);
+  rested = Column<std::uint32_t>(arena, d.sleep.energy > 0.0 ? n : 0, 0);
+  rest_wrench = Column<double>(arena, 0, d.sleep.energy > 0.0 && !d.force.plugins.empty() ? 6 * n : 0);
 }
 
 void State::write(const EnvironmentDescription& d) const {

@@ -6,11 +6,12 @@
 
 #include "kernel/arena.h"
 #include "kernel/description.h"
+#include "kernel/model.h"
 
 namespace gravitas::kernel {
 
 // What the rows of a column of the state stand for: columns of one kind have the same number of rows.
-enum class StateRows : std::uint32_t { kBody, kJoint, kPluginState, kContact, kDiscrepancy, kTouching };
+enum class StateRows : std::uint32_t { kBody, kJoint, kPluginState, kContact, kDiscrepancy, kTouching, kRest, kWrench };
 
 struct State {
   State(Arena* arena, const EnvironmentDescription& description);
@@ -44,6 +45,11 @@ struct State {
   // Pairs of bodies that touch, ascending.
   Column<std::uint32_t> touching;  // 2
 
+  // Steps that a body has been at rest, or kAsleep, and the wrench under which it is. Written by Stage::kCommit; empty
+  // where nothing can fall asleep, the wrench also where wrenches are constant.
+  Column<std::uint32_t> rested;
+  Column<double> rest_wrench;  // 6, N and N m, world
+
   // visit(name, what a row is, numbers per row, column) for every column, always in this order.
   template <typename Visit>
   void visit_columns(Visit&& visit) const {
@@ -63,7 +69,15 @@ struct State {
     visit("discrepancy_impulse", StateRows::kDiscrepancy, 3U, discrepancy_impulse);
     visit("discrepancy_correction", StateRows::kDiscrepancy, 3U, discrepancy_correction);
     visit("touching", StateRows::kTouching, 2U, touching);
+    visit("rested", StateRows::kRest, 1U, rested);
+    visit("rest_wrench", StateRows::kWrench, 6U, rest_wrench);
   }
 };
+
+inline BodiesAtRest bodies_at_rest(const Model& model, const State& state) {
+  return {model.flags.span(),           model.mass.span(),
+          model.inertia.span(),         state.orientation.span(),
+          state.linear_velocity.span(), state.angular_velocity.span()};
+}
 
 }  // namespace gravitas::kernel

@@ -61,6 +61,7 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   time = Column<double>(arena, 1, 0), time_step = Column<double>(arena, 1, 0), theta = Column<double>(arena, 1, 0);
   margin = Column<double>(arena, 1, 0);
   wrench_is_constant = Column<std::uint32_t>(arena, 1, 0);
+  flags = d.sleep.energy > 0.0 ? Column<std::uint32_t>(arena, n, 0) : model.flags;
 
   const bool is_smooth = d.simulator == Simulator::kSmooth && has_joints;
   const bool has_forces = model.application_count > 0 || is_smooth;
@@ -96,7 +97,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   contact_pair = Column<std::uint32_t>(arena, 0, contacts), contact_feature = Column<std::uint32_t>(arena, 0, contacts);
   contact_normal = contact_numbers(3), contact_point = contact_numbers(3), contact_depth = contact_numbers(1);
   contact_relative_velocity = contact_numbers(3);
-  contact_body = Column<std::uint32_t>(arena, 0, 2 * contacts);
+  contact_body = Column<std::uint32_t>(arena, 0, 2 * contacts),
+  touching = Column<std::uint32_t>(arena, 0, 2 * contacts);
   contact_key = Column<std::uint64_t>(arena, 0, contacts);
   contact_material = contact_numbers(kMaterialColumns);
   contact_warm_impulse = contact_numbers(3), contact_warm_correction = contact_numbers(1);

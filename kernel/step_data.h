@@ -38,6 +38,8 @@ struct StepData {
   // Scalars of the step: a row each. Written at its start.
   Column<double> time, time_step, theta, margin;
   Column<std::uint32_t> wrench_is_constant;
+  // Of bodies, as this step has them: who sleeps is immovable. Written at its start; the model's where nothing sleeps.
+  Column<std::uint32_t> flags;
 
   // Velocities at the start of the step: those of S_n plus instantaneous impulses. Written at its start, and
   // only in a step that has such impulses.
@@ -77,6 +79,9 @@ struct StepData {
   Column<std::uint32_t> contact_body;
   Column<std::uint64_t> contact_key;
   Column<double> contact_material, contact_warm_impulse, contact_warm_correction;
+
+  // Stage::kCommit: pairs of them that touch.
+  Column<std::uint32_t> touching;
 
   // Stage::kConstrain.
   std::vector<Column<std::uint32_t>> group_intact;

@@ -79,7 +79,7 @@ Trusted<TrialState> Validator::trial_state(const Untrusted<StageCall>& answer, c
   if (const std::size_t row = first_not_unit(data.trial_orientation.span(), 4); row != kNoRow)
     bad_numbers(at_row("orientation", row) + " is not of unit length");
   for (std::size_t i = 0; i < model_.body_count; ++i) {
-    if ((model_.flags[i] & (kMovable | kKinematic)) != 0) continue;
+    if ((data.flags[i] & (kMovable | kKinematic)) != 0) continue;
     if (!same_row(data.trial_position.span(), start.position.span(), i, 3) ||
         !same_row(data.trial_orientation.span(), start.orientation.span(), i, 4) ||
         !same_row(data.trial_linear_velocity.span(), start.linear_velocity.span(), i, 3) ||
@@ -156,7 +156,7 @@ Trusted<Reactions> Validator::reactions(const Untrusted<StageCall>& answer) cons
 Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const StepData& data) const {
   check_structure_and_finiteness(answer.value_);
   for (std::size_t i = 0; i < model_.body_count; ++i) {
-    if ((model_.flags[i] & kMovable) != 0) continue;
+    if ((data.flags[i] & kMovable) != 0) continue;
     const std::span<const double> change = data.pose_change.span().subspan(6 * i, 6);
     if (!same_row(data.solved_linear_velocity.span(), data.trial_linear_velocity.span(), i, 3) ||
         !same_row(data.solved_angular_velocity.span(), data.trial_angular_velocity.span(), i, 3) ||

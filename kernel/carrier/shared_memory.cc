@@ -9,9 +9,9 @@
 #include <cstring>
 
 #include "kernel/carrier/carrier.h"
-#include "kernel/carrier/reply_frame.h"
 #include "kernel/carrier/worker_link.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/reply_frame.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -72,7 +72,7 @@ class SharedMemoryCarrier final : public Carrier {
   Segment response_;
   std::uint64_t response_generation_ = 0;
   std::uint64_t sent_state_ = 0, sent_response_ = 0;
-  std::array<Room, GRAVITAS_MAX_COLUMNS> rooms_{};
+  std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms_{};
   std::size_t room_count_ = 0;
 };
 
@@ -259,8 +259,9 @@ void SharedMemoryCarrier::take_columns(const gravitas_frame_header& header, std:
   std::array<std::byte*, GRAVITAS_MAX_COLUMNS> data;
   std::memcpy(columns.data(), boxes_->theirs->columns, infos.size() * sizeof columns[0]);
   for (std::size_t i = 0; i < infos.size(); ++i) data[i] = arena->data(targets[i]);
-  const std::string problem = read_reply_frame(header, columns, infos, std::span(rooms_).subspan(first_room),
-                                               response_.data(), std::span(data).first(infos.size()), defences_.digest);
+  const std::string problem =
+      channel::read_reply_frame(header, columns, infos, std::span(rooms_).subspan(first_room), response_.data(),
+                                std::span(data).first(infos.size()), defences_.digest);
   if (!problem.empty()) link_->report_bad_frame(problem);
   for (std::size_t i = 0; i < infos.size(); ++i)
     if (header.status == GRAVITAS_OK || header.status == GRAVITAS_NEEDS_CAPACITY)

@@ -10,9 +10,9 @@
 namespace gravitas::kernel {
 
 void Environment::make_inner_steps() {
-  if (model_.body_count == 0) return;
+  if (!does_anything_move()) return;
   const double length = length_of_step(step_count_ + 1) / description_.substeps;
-  for (std::uint32_t i = 0; i < description_.substeps; ++i) {
+  for (std::uint32_t i = 0; i < description_.substeps && !must_restart_; ++i) {
     if (locates_events()) {
       locate_events(i * length, length);
     } else {
@@ -28,6 +28,7 @@ void Environment::finish_inner_step(const Trusted<TrialState>& trial, bool has_f
     return;
   }
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
+  if (sleepers_ > 0 && wakes_sleepers()) return;
   if (constraint_.is_running()) constrain(trial);
   commit_solution(solve());
 }

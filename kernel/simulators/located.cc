@@ -30,7 +30,7 @@ constexpr double kFinest = 1e-13;         // of the step: how closely a halving 
 void Environment::locate_events(double begin, double length) {
   double done = 0.0;
   bool is_near = false;
-  for (int inner = 0; done < length; ++inner) {
+  for (int inner = 0; done < length && !must_restart_; ++inner) {
     const double left = length - done;
     double stop = left;
     bool has_found_contacts = false;

@@ -5,7 +5,11 @@
 #include <span>
 
 namespace gravitas {
-BodyUnion::BodyUnion(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
+
+void BodyUnion::reset(std::size_t count) {
+  parent_.resize(count);
+  std::iota(parent_.begin(), parent_.end(), 0U);
+}
 
 std::uint32_t BodyUnion::root(std::uint32_t body) {
   while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];

@@ -14,7 +14,9 @@ namespace gravitas {
 // Sets of numbered bodies, by the smallest number in each: the same whatever the order of join().
 class BodyUnion {
  public:
-  explicit BodyUnion(std::size_t count);
+  explicit BodyUnion(std::size_t count) { reset(count); }
+  // Each body by itself again.
+  void reset(std::size_t count);
   std::uint32_t root(std::uint32_t body);
   void join(std::uint32_t body1, std::uint32_t body2);
 

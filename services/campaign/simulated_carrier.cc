@@ -11,9 +11,9 @@
 #include <optional>
 #include <thread>
 
-#include "kernel/carrier/reply_frame.h"
 #include "kernel/fault.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/reply_frame.h"
 #include "plugin_sdk/host/fault_injection.h"
 #include "plugin_sdk/host/faulty_reply.h"
 #include "plugin_sdk/host/hosted_plugins.h"
@@ -101,7 +101,7 @@ class SimulatedCarrier final : public kernel::Carrier {
   host::HostedPlugins plugins_;
   std::uint64_t epoch_ = 0, sequence_ = 0;
   std::atomic<bool> dead_{false};
-  std::array<kernel::Room, GRAVITAS_MAX_COLUMNS> rooms_{};
+  std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms_{};
   Reply reply_, before_;  // of this call and of the one before
 };
 
@@ -254,9 +254,9 @@ kernel::CallResult SimulatedCarrier::take(Reply* reply, const kernel::StageCall&
   std::array<std::byte*, GRAVITAS_MAX_COLUMNS> targets;
   for (std::size_t i = 0; i < call.reply.size(); ++i) targets[i] = arena->data(call.reply[i]);
   const std::string problem =
-      kernel::read_reply_frame(taken->header, std::span(taken->columns).first(call.reply.size()), call.info().reply,
-                               std::span(rooms_).first(call.reply.size()), taken->bytes(),
-                               std::span(targets).first(call.reply.size()), defences_.digest);
+      channel::read_reply_frame(taken->header, std::span(taken->columns).first(call.reply.size()), call.info().reply,
+                                std::span(rooms_).first(call.reply.size()), taken->bytes(),
+                                std::span(targets).first(call.reply.size()), defences_.digest);
   if (!problem.empty()) reject(problem);
   kernel::CallResult result;
   result.status = taken->header.status;

@@ -22,7 +22,7 @@ using recorder::v1::Checkpoint;
 
 // the first byte is no text, the line ends tell a copy that was made as text
 constexpr std::array<unsigned char, 8> kMagic = {0x89, 'G', 'R', 'V', 'C', '\r', '\n', 0x1a};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 
 struct Header {
   std::array<unsigned char, 8> magic;
@@ -72,6 +72,8 @@ void visit_columns(recorder::v1::State* state, Visit&& visit) {
   visit("discrepancy_impulse", state->mutable_discrepancy_impulse());
   visit("discrepancy_correction", state->mutable_discrepancy_correction());
   visit("touching", state->mutable_touching());
+  visit("rested", state->mutable_rested());
+  visit("rest_wrench", state->mutable_rest_wrench());
 }
 
 void set_hash(const kernel::Hash& hash, recorder::v1::Hash* message) {

@@ -22,6 +22,10 @@ const char* kind_name(kernel::EventKind kind) {
       return "collision_end";
     case kernel::EventKind::kBreak:
       return "break";
+    case kernel::EventKind::kWake:
+      return "wake";
+    case kernel::EventKind::kSleep:
+      return "sleep";
   }
   return "unknown";
 }
@@ -55,6 +59,12 @@ void EventLog::on_event(const kernel::Event& event) {
     case kernel::EventKind::kBreak:
       counts_.set_break_(counts_.break_() + 1);
       break;
+    case kernel::EventKind::kWake:
+      counts_.set_wake(counts_.wake() + 1);
+      break;
+    case kernel::EventKind::kSleep:
+      counts_.set_sleep(counts_.sleep() + 1);
+      break;
   }
   if (file_ != nullptr) write(event, kind_name(event.kind));
 }
@@ -76,7 +86,8 @@ void EventLog::write(const kernel::Event& event, const char* kind) {
   message.set_step(event.step);
   message.set_kind(kind);
   message.add_bodies(body_id(event.a));
-  message.add_bodies(body_id(event.b));
+  const bool is_of_one = event.kind == kernel::EventKind::kWake || event.kind == kernel::EventKind::kSleep;
+  if (!is_of_one) message.add_bodies(body_id(event.b));
   if (event.constraint != kNone) message.set_constraint(description_.constraints[event.constraint].id);
   message.set_relative_speed(event.relative_speed);
   message.set_impulse(event.impulse);
@@ -88,6 +99,8 @@ void EventLog::write(recorder::v1::Tally* tally) const {
   tally->set_collision_start(counts_.collision_start());
   tally->set_collision_end(counts_.collision_end());
   tally->set_break_(counts_.break_());
+  tally->set_sleep(counts_.sleep());
+  tally->set_wake(counts_.wake());
   tally->clear_meetings();
   for (const Meeting& meeting : meetings_) {
     recorder::v1::Meeting* message = tally->add_meetings();
@@ -102,6 +115,8 @@ void EventLog::resume(const recorder::v1::Tally& tally) {
   counts_.set_collision_start(tally.collision_start());
   counts_.set_collision_end(tally.collision_end());
   counts_.set_break_(tally.break_());
+  counts_.set_sleep(tally.sleep());
+  counts_.set_wake(tally.wake());
   for (const recorder::v1::Meeting& message : tally.meetings()) {
     const auto body = std::ranges::find(description_.bodies, message.body(), &kernel::BodyDescription::id);
     if (body == description_.bodies.end() || meetings_.size() >= kMostMeetings) continue;

@@ -70,6 +70,7 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
                                 "Accuracy belongs to the simulator \"Smooth\"; allowed: Type = \"Smooth\", or Accuracy "
                                 "in KineticIntegrator { … }");
   context->description.substeps = properties.substeps();
+  context->description.sleep = {properties.sleep_energy(), properties.sleep_time()};
   context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
 }

@@ -155,25 +155,25 @@ class ShapeBuilder final : private SiblingShapes {
 
 }  // namespace
 
-kernel::LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG) {
-  kernel::LocalBound bound;
+LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG) {
+  LocalBound bound;
   if (bounding_volume_type == "None" || !solid.has_mass()) return bound;
   const SceneShape& shape = *solid.shape;
   bound.orientation = X_BG.orientation;
   // no corner outside by a rounding
   const double widened = 1.0 + 4.0 * std::numeric_limits<double>::epsilon();
   if (shape.kind == SceneShape::Kind::kSphere) {
-    bound.kind = kernel::BoundKind::kSphere;
+    bound.kind = BoundKind::kSphere;
     bound.centre = X_BG.position;
     bound.half_extents = {shape.size.x(), 0.0, 0.0};
   } else if (bounding_volume_type == "Sphere") {
     const Ball ball = bounding_ball(shape);
-    bound.kind = kernel::BoundKind::kSphere;
+    bound.kind = BoundKind::kSphere;
     bound.centre = transform_point(X_BG, ball.centre);
     bound.half_extents = {ball.radius * widened, 0.0, 0.0};
   } else {
     const Box3 box = local_box(shape);
-    bound.kind = kernel::BoundKind::kBox;
+    bound.kind = BoundKind::kBox;
     bound.centre = transform_point(X_BG, box.centre());
     bound.half_extents = box.half_extents();
     // the middle of two coordinates is rounded where they are not opposite

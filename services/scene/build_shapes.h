@@ -22,7 +22,7 @@ struct Solid {
 };
 
 // The bound that BoundingVolumeType asks for ("" is the default), in the body's frame B.
-kernel::LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG);
+LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG);
 
 // Fills description.shapes, a row per Geometry, and returns what is known of each. `collision` may
 // be null if there is no geometry.

@@ -62,6 +62,24 @@ void falling(benchmark::State& state, Hosting hosting) {
   state.SetLabel("chain " + world.chain_hash().text().substr(0, 8));
 }
 
+// n boxes at rest on the ground, far from each other; with `energy` 0 they stay awake. With a visitor, a ball flies past.
+void resting(benchmark::State& state, double energy, bool has_visitor) {
+  WorldBuilder builder;
+  builder.steps(kEndless, 0.01).space("space_dynamic_bvh").ground();
+  const auto count = static_cast<std::uint32_t>(state.range(0));
+  for (std::uint32_t i = 0; i < count; ++i) {
+    builder.box(Vector3(0.5, 0.25, 0.5), 1.0, Vector3(3.0 * (i % 100), 0.25, 3.0 * (i / 100)));
+    builder.body().flags |= kCanSleep;
+  }
+  builder.gravity(Vector3(0, -9.81, 0));
+  if (has_visitor) builder.sphere(0.5, 1.0, Vector3(-10, 50, 0), Vector3(0, 0, 0.01));
+  builder.description().sleep.energy = energy;
+  Environment world(builder.description());
+  for (int i = 0; i < 60; ++i) step(&world, &state);
+  for (auto _ : state) step(&world, &state);
+  state.SetLabel("chain " + world.chain_hash().text().substr(0, 8));
+}
+
 // A vortex-like force that depends on time asks the force slot at every derivative: four times a step.
 void four_derivatives(benchmark::State& state, Hosting hosting) {
   WorldBuilder builder(hosting);
@@ -149,6 +167,15 @@ BENCHMARK_CAPTURE(four_derivatives, grpc, Hosting::kGrpc)->Arg(1)->Arg(1000)->Us
 BENCHMARK_CAPTURE(falling, direct, Hosting::kDirect)->RangeMultiplier(10)->Range(1, 100'000)->UseRealTime();
 BENCHMARK_CAPTURE(falling, shm, Hosting::kSharedMemory)->RangeMultiplier(10)->Range(1, 100'000)->UseRealTime();
 BENCHMARK_CAPTURE(falling, grpc, Hosting::kGrpc)->RangeMultiplier(10)->Range(1, 100'000)->UseRealTime();
+BENCHMARK_CAPTURE(resting, awake, 0.0, false)->Arg(10'000)->UseRealTime()->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(resting, asleep, SleepRule{}.energy, false)
+    ->Arg(10'000)
+    ->UseRealTime()
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(resting, visited, SleepRule{}.energy, true)
+    ->Arg(10'000)
+    ->UseRealTime()
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK(start_to_first_step)->UseRealTime()->Iterations(20)->Unit(benchmark::kMillisecond);
 BENCHMARK(pile_in_workers)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(memory)->UseRealTime()->Iterations(1)->Unit(benchmark::kMillisecond);

@@ -5,8 +5,8 @@
 #include <cstring>
 #include <vector>
 
-#include "kernel/carrier/reply_frame.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/reply_frame.h"
 #include "schemas/stage_frames.h"
 #include "tests/fuzz/fuzz_target.h"
 
@@ -32,7 +32,7 @@ void frame(std::span<const std::byte> bytes) {
   const bool is_signed = take<std::uint8_t>(&bytes) % 2 == 0;
   auto header = take<gravitas_frame_header>(&bytes);
   std::array<gravitas_frame_column, GRAVITAS_MAX_COLUMNS> columns{};
-  std::array<kernel::Room, GRAVITAS_MAX_COLUMNS> rooms{};
+  std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms{};
   std::vector<std::vector<std::byte>> targets;
   std::array<std::byte*, GRAVITAS_MAX_COLUMNS> pointers{};
   std::uint64_t offset = 0;
@@ -59,8 +59,8 @@ void frame(std::span<const std::byte> bytes) {
       header.digest = channel::frame_digest(header, std::span(columns).first(method.reply.size()), method.reply,
                                             header.status == GRAVITAS_OK ? data.data() : nullptr);
   }
-  const std::string problem = kernel::read_reply_frame(header, columns, method.reply, rooms, response.data(),
-                                                       std::span(pointers).first(method.reply.size()));
+  const std::string problem = channel::read_reply_frame(header, columns, method.reply, rooms, response.data(),
+                                                        std::span(pointers).first(method.reply.size()));
   if (!problem.empty() || header.status != GRAVITAS_OK) return;
   for (std::size_t i = 0; i < method.reply.size(); ++i) {
     require(columns[i].count <= kRoomElements, "a frame that is accepted fits its rooms");

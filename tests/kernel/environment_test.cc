@@ -43,7 +43,7 @@ TEST(Environment, ASceneOfOneFreeBodyNeedsTheIntegratorAlone) {
   Environment world(builder.description());
   ASSERT_EQ(world.plan().slots.size(), 1U);
   EXPECT_EQ(world.plan().slots[0].slot, Slot::kIntegrator);
-  EXPECT_EQ(world.plan().left_out.size(), 5U);
+  EXPECT_EQ(world.plan().left_out.size(), 6U);
 }
 
 TEST(Environment, TheBallThatBouncesIsTheSameInEveryHosting) {

@@ -55,17 +55,37 @@ TEST(Plan, WhatIsLeftOutHasAReasonAndNoPlugins) {
   WorldBuilder builder;
   builder.sphere(1, 1, Vector3::Zero());
   const Plan plan = make_plan(&builder.description());
-  ASSERT_EQ(plan.left_out.size(), 5U);
+  ASSERT_EQ(plan.left_out.size(), 6U);
   for (const LeftOut& left_out : plan.left_out) EXPECT_FALSE(left_out.why.empty()) << left_out.what;
   EXPECT_TRUE(builder.description().solver.plugins.empty());
   EXPECT_TRUE(builder.description().collision.plugins.empty());
 }
 
-TEST(Plan, TheMarginIsAHundredthOfTheSmallestShape) {
-  WorldBuilder builder;
-  EXPECT_EQ(contact_margin(builder.ground().description()), 0.0);
-  builder.sphere(2, 1, Vector3::Zero()).box(Vector3(3, 0.5, 1), 1, Vector3::Zero());
-  EXPECT_DOUBLE_EQ(contact_margin(builder.description()), 0.005);
+std::string why_none_sleeps(EnvironmentDescription* description) {
+  const Plan plan = make_plan(description);
+  const auto left_out = std::ranges::find(plan.left_out, "sleep", &LeftOut::what);
+  EXPECT_EQ(description->sleep.energy > 0.0, left_out == plan.left_out.end());
+  return left_out == plan.left_out.end() ? "" : left_out->why;
+}
+
+TEST(Plan, SleepIsLeftOutWhereNothingCanFallAsleep) {
+  const auto why = [](const auto& change) {
+    WorldBuilder builder;
+    builder.ground().sphere(1, 1, Vector3(0, 1, 0)).body().flags |= kCanSleep;
+    change(&builder);
+    return why_none_sleeps(&builder.description());
+  };
+  EXPECT_EQ(why([](WorldBuilder*) {}), "");
+  EXPECT_EQ(why([](WorldBuilder* builder) { builder->description().sleep.energy = 0.0; }), "SleepEnergy is 0");
+  EXPECT_EQ(why([](WorldBuilder* builder) { builder->body().flags &= ~std::uint32_t{kCanSleep}; }),
+            "no body may sleep");
+  EXPECT_EQ(why([](WorldBuilder* builder) { builder->body().filter_mask = 0; }),
+            "there are neither contacts nor joints that could hold a body");
+  const auto make_smooth = [](WorldBuilder* builder) {
+    builder->body().filter_mask = 0;
+    builder->description().simulator = Simulator::kSmooth;
+  };
+  EXPECT_EQ(why(make_smooth), "the simulator Smooth stops no motion");
 }
 
 }  // namespace

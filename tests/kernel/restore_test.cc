@@ -168,7 +168,7 @@ const double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::n
 
 const std::vector<Spoilt>& ways_to_spoil() {
   static const std::vector<Spoilt> ways = {
-      {"missing", [](OwnedState* s) { s->drop_last(); }, "column touching is missing"},
+      {"missing", [](OwnedState* s) { s->drop_last(); }, "column rest_wrench is missing"},
       {"added", [](OwnedState* s) { s->add(); }, "more columns"},
       {"renamed", [](OwnedState* s) { s->rename(2, "speed"); }, "column linear_velocity is missing"},
       {"short", [](OwnedState* s) { s->f64("position").pop_back(); }, "column position has 11 numbers, not 3"},

@@ -100,7 +100,7 @@ WorldBuilder& WorldBuilder::sphere(double radius, double mass, const Vector3& po
   body.inertia = Vector3::Constant(0.4 * mass * radius * radius);
   body.pose.position = position;
   body.twist.linear = velocity;
-  body.bound = {kernel::BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(radius)};
+  body.bound = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(radius)};
   add_body(body, "Sphere", {radius});
   return *this;
 }
@@ -113,7 +113,7 @@ WorldBuilder& WorldBuilder::box(const Vector3& half_extents, double mass, const 
   body.inertia = mass / 3.0 * Vector3(squares.y() + squares.z(), squares.z() + squares.x(), squares.x() + squares.y());
   body.pose.position = position;
   body.twist.linear = velocity;
-  body.bound = {kernel::BoundKind::kBox, Vector3::Zero(), Quaternion::Identity(), half_extents};
+  body.bound = {BoundKind::kBox, Vector3::Zero(), Quaternion::Identity(), half_extents};
   add_body(body, "Box", {half_extents.x(), half_extents.y(), half_extents.z()});
   return *this;
 }

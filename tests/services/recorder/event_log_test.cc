@@ -52,12 +52,13 @@ TEST(EventLog, WritesALineOfJsonPerEvent) {
   log.on_event(meeting(3, 0, 1));
   log.on_event(parting(4, 0, 1));
   log.on_event({EventKind::kBreak, 5, 0.5, kNone, 1, 0, 0.0, 0.0});
+  log.on_event({EventKind::kSleep, 6, 0.6, 1, kNone, kNone, 0.0, 0.0});
   log.close();
   std::istringstream text(testing::read_file(folder.path("events")));
   std::vector<events::v1::Event> events;
   for (std::string line; std::getline(text, line);)
     ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &events.emplace_back()).ok()) << line;
-  ASSERT_EQ(events.size(), 3U);
+  ASSERT_EQ(events.size(), 4U);
   EXPECT_EQ(events[0].kind(), "collision_start");
   EXPECT_EQ(events[0].step(), 3U);
   EXPECT_EQ(events[0].time(), 0.1 * 3);
@@ -69,6 +70,8 @@ TEST(EventLog, WritesALineOfJsonPerEvent) {
   EXPECT_EQ(events[2].constraint(), "Rope");
   // the world has no id
   EXPECT_THAT(events[2].bodies(), ElementsAre("", "Ball"));
+  EXPECT_EQ(events[3].kind(), "sleep");
+  EXPECT_THAT(events[3].bodies(), ElementsAre("Ball"));
 }
 
 TEST(EventLog, CountsEachKind) {
@@ -77,10 +80,19 @@ TEST(EventLog, CountsEachKind) {
   for (std::uint32_t step = 1; step <= 5; ++step) log.on_event(meeting(step, 1, 2));
   log.on_event(parting(6, 1, 2));
   log.on_event({EventKind::kBreak, 7, 0.7, kNone, 1, 0, 0.0, 0.0});
-  EXPECT_EQ(log.counts().collision_start(), 5U);
-  EXPECT_EQ(log.counts().collision_end(), 1U);
-  EXPECT_EQ(log.counts().break_(), 1U);
-  EXPECT_EQ(log.counts().sleep(), 0U);
+  for (std::uint32_t step = 8; step <= 10; ++step) log.on_event({EventKind::kSleep, step, 0.8, 1, kNone, kNone, 0, 0});
+  for (std::uint32_t step = 11; step <= 12; ++step) log.on_event({EventKind::kWake, step, 1.1, 1, kNone, kNone, 0, 0});
+  recorder::v1::Tally tally;
+  log.write(&tally);
+  EventLog resumed("", d);
+  resumed.resume(tally);
+  for (const EventLog* each : {&log, &resumed}) {
+    EXPECT_EQ(each->counts().collision_start(), 5U);
+    EXPECT_EQ(each->counts().collision_end(), 1U);
+    EXPECT_EQ(each->counts().break_(), 1U);
+    EXPECT_EQ(each->counts().sleep(), 3U);
+    EXPECT_EQ(each->counts().wake(), 2U);
+  }
 }
 
 TEST(EventLog, RemembersWhenEachMovableBodyFirstMetAnImmovableOne) {

@@ -15,7 +15,6 @@ namespace gravitas::scene {
 namespace {
 
 using kernel::BodyDescription;
-using kernel::BoundKind;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -93,7 +92,7 @@ TEST(BuildBodies, AShapeOfThePluginsOwnNeedsThem) {
                           "Mass and PrincipalMoments"));
   const BodyDescription blob = body("GeometryId = \"Blob\" Mass = 2 PrincipalMoments = {1, 1, 1}");
   EXPECT_EQ(blob.mass, 2.0);
-  EXPECT_EQ(blob.bound.kind, BoundKind::kNone);
+  EXPECT_EQ(blob.bound.kind, BoundKind::kEverywhere);
   EXPECT_EQ(body("GeometryId = \"Blob\" Immovable = true").mass, 0.0);
 }
 
@@ -146,7 +145,7 @@ TEST(BuildBodies, UnboundedGeometryIsImmovable) {
   EXPECT_EQ(ground.flags, kUnbounded | kHasShape);
   EXPECT_EQ(ground.mass, 0.0);
   EXPECT_EQ(ground.inertia, Vector3::Zero());
-  EXPECT_EQ(ground.bound.kind, BoundKind::kNone);
+  EXPECT_EQ(ground.bound.kind, BoundKind::kEverywhere);
   EXPECT_THAT(errors_of("GeometryId = \"Ground\" Immovable = false"),
               ElementsAre("scene:2:35: error: Body \"Ball\" has an unbounded geometry and is movable; allowed: "
                           "Immovable = true, or Kinematic = true"));
@@ -241,7 +240,8 @@ TEST(BuildBodies, BoundsFollowTheShape) {
   EXPECT_GE(bound("Brick", "Sphere").half_extents.x(), std::sqrt(14.0));
   EXPECT_NEAR(bound("Brick", "Sphere").half_extents.x(), std::sqrt(14.0), 1e-14);
   EXPECT_NEAR(bound("Rod", "Sphere").half_extents.x(), std::sqrt(1.25), 1e-14);
-  for (const char* shape : {"Unit", "Brick", "Rod"}) EXPECT_EQ(bound(shape, "None").kind, BoundKind::kNone) << shape;
+  for (const char* shape : {"Unit", "Brick", "Rod"})
+    EXPECT_EQ(bound(shape, "None").kind, BoundKind::kEverywhere) << shape;
 }
 
 TEST(BuildBodies, BoundsStandWhereTheGeometryDoes) {

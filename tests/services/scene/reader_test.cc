@@ -120,7 +120,8 @@ TEST(Reader, SuggestsNamesForUnknownOnes) {
       errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
       ElementsAre(
           "scene:1:32: error: unknown property \"TimeStp\" in CustomProperties; did you mean "
-          "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\", \"CheckPhysicsEvery\""));
+          "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\", \"CheckPhysicsEvery\", "
+          "\"SleepEnergy\", \"SleepTime\""));
 }
 
 TEST(Reader, SaysWhereANameBelongs) {

@@ -1,11 +1,11 @@
-#include "kernel/carrier/reply_frame.h"
+#include "plugin_sdk/channel/reply_frame.h"
 
 #include <array>
 #include <cstring>
 
 #include "plugin_sdk/channel/mailbox.h"
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 
 std::string read_reply_frame(const gravitas_frame_header& header, std::span<const gravitas_frame_column> columns,
                              std::span<const stage::ColumnInfo> infos, std::span<const Room> rooms,
@@ -22,10 +22,10 @@ std::string read_reply_frame(const gravitas_frame_header& header, std::span<cons
     std::memcpy(targets[i], response + rooms[i].offset, columns[i].count * stage::element_size(infos[i].type));
     data[i] = targets[i];
   }
-  if (check_digest && channel::frame_digest(header, columns.first(infos.size()), infos,
-                                            complete ? data.data() : nullptr) != header.digest)
+  if (check_digest &&
+      frame_digest(header, columns.first(infos.size()), infos, complete ? data.data() : nullptr) != header.digest)
     return "a digest that does not fit its content";
   return {};
 }
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

@@ -8,7 +8,7 @@
 
 #include "schemas/frame/column.h"
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 
 // Where the worker was told to put a column: bytes from the start of the response segment, elements.
 struct Room {
@@ -24,4 +24,4 @@ std::string read_reply_frame(const gravitas_frame_header& header, std::span<cons
                              std::span<const stage::ColumnInfo> infos, std::span<const Room> rooms,
                              const std::byte* response, std::span<std::byte* const> targets, bool check_digest = true);
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

@@ -1,0 +1,145 @@
+// Who sleeps takes no part in a step: immovable for integrator and solver, in no pair with another that stands still, its
+// joints not asked; what is remembered of its contacts and joints goes on to the next state. The space keeps it, so that
+// what comes near is found.
+//
+//   at the step's start        those asleep, but for islands that the user or another plugin wakes
+//   when contacts at S* are    islands that something moving touches, leaves or holds by a joint, or whose forces have
+//   known                      changed, are awake; the step is made again from S_n
+//   after the last inner step  islands that have rested long enough fall asleep: velocities 0, poses as they are
+//
+// A step in which nothing moves is that of the clock alone. plugin_sdk/activity.h has the rule.
+#include <algorithm>
+#include <utility>
+
+#include "kernel/environment.h"
+
+namespace gravitas::kernel {
+
+// Where wrenches change, those of bodies at rest are part of the state.
+void Environment::remember_wrenches() {
+  if (!can_sleep()) return;
+  for (const State& state : states_) {
+    state.rest_wrench.resize(6ULL * model_.body_count);
+    std::ranges::fill(state.rest_wrench.span(), 0.0);
+  }
+}
+
+void Environment::find_sleepers() {
+  sleepers_ = 0;
+  if (!can_sleep()) return;
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    const bool is_asleep = front().rested[i] == kAsleep && !wakes_all_;
+    data_.flags[i] = is_asleep ? model_.flags[i] & ~std::uint32_t{kMovable} : model_.flags[i];
+    sleepers_ += is_asleep ? 1 : 0;
+  }
+  for (const std::uint32_t body : wake_orders_) wake_island(body);
+}
+
+bool Environment::does_anything_move() const {
+  if (sleepers_ == 0 || !wrench_is_constant_ || !model_.curves.empty()) return model_.body_count > 0;
+  const auto turns = [&](std::uint32_t body) {
+    return !vector_at(front().linear_velocity.span(), body).isZero(0.0) ||
+           !vector_at(front().angular_velocity.span(), body).isZero(0.0);
+  };
+  for (std::uint32_t i = 0; i < model_.body_count; ++i)
+    if (is_awake(i) || ((model_.flags[i] & kKinematic) != 0 && turns(i))) return true;
+  // faults are ordered for calls
+  return std::ranges::any_of(slots_, &StageSlot::has_order);
+}
+
+// A kinematic body that goes elsewhere in this step.
+bool Environment::is_carrying(std::uint32_t body) const {
+  if (body == kNone || (model_.flags[body] & kKinematic) == 0) return false;
+  const auto differs = [&](const Column<double>& a, const Column<double>& b, std::size_t components) {
+    return !std::equal(&a[components * body], &a[components * body] + components, &b[components * body]);
+  };
+  return differs(data_.trial_position, front().position, 3) ||
+         differs(data_.trial_orientation, front().orientation, 4) ||
+         !vector_at(data_.trial_linear_velocity.span(), body).isZero(0.0) ||
+         !vector_at(data_.trial_angular_velocity.span(), body).isZero(0.0);
+}
+
+void Environment::leave_out_sleepers() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < data_.pair.size(); i += 2) {
+    const std::uint32_t a = data_.pair[i], b = data_.pair[i + 1];
+    if (!is_awake(a) && !is_awake(b) && !is_carrying(a) && !is_carrying(b)) continue;
+    data_.pair[kept++] = a;
+    data_.pair[kept++] = b;
+  }
+  data_.pair.resize(kept);
+}
+
+void Environment::look_for_pushes() {
+  for (std::uint32_t i = 0; i < model_.body_count; ++i)
+    if (data_.flags[i] != model_.flags[i] &&
+        activity_.is_pushed(model_.mass[i], vector_at(model_.inertia.span(), i), data_.wrench.span().subspan(6 * i, 6),
+                            front().rest_wrench.span().subspan(6 * i, 6)))
+      pushed_.push_back(i);
+}
+
+// With contacts at S* in place. True if somebody has been woken, and the step is to be made again.
+bool Environment::wakes_sleepers() {
+  const std::uint32_t before = sleepers_;
+  const auto sleeps = [&](std::uint32_t body) { return body != kNone && data_.flags[body] != model_.flags[body]; };
+  for (const std::uint32_t body : data_.contact_body.span())
+    if (sleeps(body)) wake_island(body);
+  const Connections connected = connections();
+  for (const std::span<const std::uint32_t> pairs : {connected.contacts, connected.joints}) {
+    for (std::size_t i = 0; i < pairs.size(); i += 2) {
+      const std::uint32_t a = pairs[i], b = pairs[i + 1];
+      if (sleeps(a) && is_carrying(b)) wake_island(a);
+      if (sleeps(b) && is_carrying(a)) wake_island(b);
+    }
+  }
+  for (const std::uint32_t body : pushed_) wake_island(body);
+  must_restart_ |= sleepers_ < before;
+  return must_restart_;
+}
+
+void Environment::wake_island(std::uint32_t body) {
+  if (!can_sleep() || data_.flags[body] == model_.flags[body]) return;
+  const auto sleeps = [&](std::uint32_t i) { return data_.flags[i] != model_.flags[i]; };
+  for (const std::uint32_t one : activity_.sleepers_with(body, model_.body_count, connections(), sleeps)) {
+    data_.flags[one] = model_.flags[one];
+    --sleepers_;
+  }
+}
+
+Connections Environment::connections() {
+  joint_bodies_.clear();
+  for (std::uint32_t i = 0; i < model_.constraint_count; ++i)
+    if (front().intact[i] != 0)
+      for (const std::uint32_t body : {model_.constraints[i].body1, model_.constraints[i].body2})
+        joint_bodies_.push_back(body);
+  return {front().contact_body.span(), joint_bodies_};
+}
+
+// The last inner step has become the state in front.
+void Environment::settle() {
+  wakes_all_ = false;
+  wake_orders_.clear();
+  if (!can_sleep() || inner_ == 0) return;
+  const auto raise = [&](EventKind kind, std::uint32_t body) {
+    if (listener_ != nullptr) events_.push_back({kind, step_count_, time(), body, kNone, kNone, 0.0, 0.0});
+  };
+  const State& next = front();
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    if (next.rested[i] != kAsleep || !is_awake(i)) continue;
+    next.rested[i] = 0;
+    raise(EventKind::kWake, i);
+  }
+  const BodiesAtRest bodies = bodies_at_rest(model_, next);
+  const std::uint32_t steps = activity_.steps_to_sleep(description_.time_step);
+  activity_.count_rest(bodies, steps, next.rested.span());
+  if (!wrench_is_constant_)
+    activity_.start_again_where_pushed(bodies, data_.start_wrench.span(), next.rest_wrench.span(), next.rested.span());
+  for (const std::uint32_t body : activity_.fall_asleep(bodies, connections(), steps, next.rested.span())) {
+    for (const Column<double>* velocity : {&next.linear_velocity, &next.angular_velocity})
+      set_vector(velocity->span(), body, Vector3::Zero());
+    next.state_changed[body] = 1;
+    raise(EventKind::kSleep, body);
+  }
+}
+
+}  // namespace gravitas::kernel

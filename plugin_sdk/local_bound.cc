@@ -1,0 +1,39 @@
+#include "plugin_sdk/local_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace gravitas {
+
+double contact_margin(std::span<const LocalBound> bounds) {
+  constexpr double kMarginShare = 0.01;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const LocalBound& bound : bounds) {
+    if (bound.kind == BoundKind::kSphere) smallest = std::min(smallest, bound.half_extents.x());
+    if (bound.kind == BoundKind::kBox) smallest = std::min(smallest, bound.half_extents.minCoeff());
+  }
+  return std::isinf(smallest) ? 0.0 : kMarginShare * smallest;
+}
+
+Bounds bounds_of(const LocalBound& bound, const Pose& body) {
+  if (bound.kind == BoundKind::kSphere) return sphere_bounds(body, bound.centre, bound.half_extents.x());
+  if (bound.kind == BoundKind::kBox) return box_bounds(body, bound.centre, bound.orientation, bound.half_extents);
+  return {Vector3::Constant(-std::numeric_limits<double>::infinity()),
+          Vector3::Constant(std::numeric_limits<double>::infinity())};
+}
+
+Bounds swept_bounds(const LocalBound& bound, const Pose& from, const Pose& to, const Vector3& rotation) {
+  // a point at the distance r from the centre of mass leaves the chord between its two places by no more than
+  // r angle^2 / 8, and never by more than 2 r
+  const Bounds before = bounds_of(bound, from), after = bounds_of(bound, to);
+  const double radius = bound.centre.norm() + bound.half_extents.norm();
+  return widened({before.lower.cwiseMin(after.lower), before.upper.cwiseMax(after.upper)},
+                 radius * std::min(2.0, 0.125 * rotation.squaredNorm()));
+}
+
+Bounds widened(const Bounds& bounds, double margin) {
+  return {bounds.lower - Vector3::Constant(margin), bounds.upper + Vector3::Constant(margin)};
+}
+
+}  // namespace gravitas

@@ -1,0 +1,34 @@
+// What the broad phase sees of a body's shape, fixed in the body's frame, and what that is in the world.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/motion.h"
+
+namespace gravitas {
+
+enum class BoundKind : std::uint32_t { kEverywhere, kSphere, kBox };
+
+struct LocalBound {
+  BoundKind kind = BoundKind::kEverywhere;
+  Vector3 centre = Vector3::Zero();                 // m
+  Quaternion orientation = Quaternion::Identity();  // box to body
+  Vector3 half_extents = Vector3::Zero();           // m; a sphere's radius in x
+};
+
+// Gap up to which contacts are asked for: a hundredth of the smallest half extent, so that a contact which the reactions
+// of a step close is known to the solver. m; 0 where nothing has bounds.
+double contact_margin(std::span<const LocalBound> bounds);
+
+// World bounds.
+Bounds bounds_of(const LocalBound& bound, const Pose& body);
+
+// World bounds of all that a body passes on its way between two poses.
+Bounds swept_bounds(const LocalBound& bound, const Pose& from, const Pose& to, const Vector3& rotation);
+
+// The same, wider by `margin` (m) on all sides.
+Bounds widened(const Bounds& bounds, double margin);
+
+}  // namespace gravitas

@@ -1,0 +1,48 @@
+#include "plugin_sdk/local_bound.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "plugin_sdk/math/motion.h"
+
+namespace gravitas {
+namespace {
+
+constexpr LocalBound* kNothing = nullptr;
+
+LocalBound box(const Vector3& half_extents) {
+  return {BoundKind::kBox, Vector3::Zero(), Quaternion::Identity(), half_extents};
+}
+
+TEST(LocalBound, TheMarginIsAHundredthOfTheSmallest) {
+  const LocalBound ground;
+  const LocalBound ball = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(2)};
+  EXPECT_EQ(contact_margin({kNothing, 0}), 0.0);
+  EXPECT_EQ(contact_margin(std::array{ground}), 0.0);
+  EXPECT_DOUBLE_EQ(contact_margin(std::array{ground, ball, box(Vector3(3, 0.5, 1))}), 0.005);
+}
+
+TEST(LocalBound, WithoutOneABodyIsEverywhere) {
+  const Bounds bounds = bounds_of(LocalBound{}, Pose{});
+  EXPECT_TRUE(std::isinf(bounds.lower.x()) && std::isinf(bounds.upper.z()));
+}
+
+// Every corner on its way stays inside.
+TEST(LocalBound, AMotionStaysInItsSweptBounds) {
+  const LocalBound bound = box(Vector3(1.0, 0.2, 0.5));
+  const Pose from{Vector3(1, 2, 3), Quaternion::Identity()};
+  for (const double angle : {0.1, 1.0, 3.0}) {
+    const Motion motion{Vector3(4, -1, 0), angle * Vector3(0.6, 0, 0.8)};
+    const Bounds swept = swept_bounds(bound, from, moved(from, motion, 1.0), motion.rotation);
+    for (int i = 0; i <= 40; ++i) {
+      const Bounds now = bounds_of(bound, moved(from, motion, i / 40.0));
+      EXPECT_TRUE((swept.lower.array() <= now.lower.array() + 1e-12).all()) << angle << ' ' << i;
+      EXPECT_TRUE((swept.upper.array() >= now.upper.array() - 1e-12).all()) << angle << ' ' << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace gravitas
