@@ -17,19 +17,20 @@ void Environment::make_inner_steps() {
       locate_events(i * length, length);
     } else {
       begin_inner_step(i * length, length);
-      finish_inner_step(integrate());
+      const auto trial = integrate();
+      if (has_reactions()) {
+        commit_solution(react(trial));
+      } else {
+        commit_trial(trial);
+      }
     }
   }
 }
 
-void Environment::finish_inner_step(const Trusted<TrialState>& trial) {
-  if (!has_reactions()) {
-    commit_trial(trial);
-    return;
-  }
+Trusted<Solution> Environment::react(const Trusted<TrialState>& trial) {
   if (has_contacts()) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (constraint_.is_running()) constrain(trial);
-  commit_solution(solve());
+  return solve();
 }
 
 }  // namespace gravitas::kernel
