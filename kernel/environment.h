@@ -142,7 +142,8 @@ class Environment : private DerivativeSource, private SlotObserver {
  private:
   // simulators/: what a step is made of, and the order of the stages.
   void make_inner_steps();
-  void finish_inner_step(const Trusted<TrialState>& trial, bool has_found_contacts = false);
+  // Nothing where somebody asleep is woken: the step starts again.
+  std::optional<Trusted<Solution>> react(const Trusted<TrialState>& trial, bool has_found_contacts = false);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
   bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
   void locate_events(double begin, double length);
@@ -165,12 +166,13 @@ class Environment : private DerivativeSource, private SlotObserver {
   void wake_island(std::uint32_t body);
   Connections connections();
   void settle();
+  std::optional<Trusted<Solution>> react_until_a_slide_ends(Trusted<TrialState> trial, double begin, double* length,
+                                                            bool has_found_contacts);
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
 
-  // stages.cc: a stage each. Inner steps begin at a time counted from that of S_n; S_n is in front() for the first, and
-  // later what the one before has made of it.
+  // stages.cc: a stage each. Inner steps begin some time after S_n, in front() what the one before has made of it.
   void begin_inner_step(double begin, double length);
   Trusted<TrialState> integrate();
   Bounds trial_bounds(std::uint32_t body) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace gravitas {
 
@@ -22,6 +23,24 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   }
   if (length > 2.5 * time) return {2.0 * time, true};
   return {time * (closing > bend ? std::max(0.5, 1.0 - 2.0 * bend * (length - time) / (closing * time)) : 0.5)};
+}
+
+void Slide::add(const Vector3& normal, double friction, const Vector3& start_velocity, const Vector3& end_velocity,
+                const Vector3& impulse) {
+  const double weight = friction * normal.dot(impulse);
+  const Vector3 slip = start_velocity - normal.dot(start_velocity) * normal;
+  const double speed = slip.norm();
+  if (!(weight > 0.0 && speed > 0.0)) return;
+  weight_ += weight;
+  start_ += weight * speed;
+  end_ += weight * slip.dot(end_velocity) / speed;
+  used_ -= slip.dot(impulse);
+}
+
+double Slide::end(double length) const {
+  constexpr double kStuck = 1e-9;  // of the speed at the start
+  if (std::fabs(end_) <= kStuck * start_) return length * used_ / start_;
+  return end_ < start_ ? length * start_ / (start_ - end_) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace gravitas

@@ -3,6 +3,8 @@
 // m/s, positive when the bodies part; times in s.
 #pragma once
 
+#include "plugin_sdk/math/types.h"
+
 namespace gravitas {
 
 struct Encounter {
@@ -25,5 +27,25 @@ struct NextStop {
 // time t). Until then trials are shortened to twice the time of the meeting, and steps end before it, each squaring the
 // distance. The step that meets ends a little after it, two target gaps deep, so that the contact is closed.
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight);
+
+// Two bodies whose surfaces slide on each other, in a trial with its solution: sums over their contacts, each weighted
+// with the largest friction that it bears, mu lambda_N.
+class Slide {
+ public:
+  // A contact with a unit normal, the coefficient of dynamic friction, velocities of body 2 relative to body 1 (m/s) at
+  // the contact when the trial begins and ends, and the impulse (N s) on body 2.
+  void add(const Vector3& normal, double friction, const Vector3& start_velocity, const Vector3& end_velocity,
+           const Vector3& impulse);
+
+  // Speed of the slide at its start, m/s; 0 without friction.
+  double start_speed() const { return weight_ > 0.0 ? start_ / weight_ : 0.0; }
+  // When it comes to its end, s, if friction is the same throughout a trial of `length`: beyond that while the surfaces
+  // slide on, before it where they slide back, or where sticking took less than the friction of all that time.
+  // Infinite for a slide that does not slow down.
+  double end(double length) const;
+
+ private:
+  double weight_ = 0.0, start_ = 0.0, end_ = 0.0, used_ = 0.0;
+};
 
 }  // namespace gravitas

@@ -45,7 +45,7 @@ void for_each_application(const stage::ForceWrenchesRequest& request, const stag
                PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force])), body);
     if (!a.wrench.force.allFinite() || !a.wrench.torque.allFinite() || !a.impulse.force.allFinite() ||
         !a.impulse.torque.allFinite() || !std::isfinite(a.potential))
-      throw Refusal("the wrench of application " + std::to_string(i / 2) +
+      throw Refusal("the wrench of application " + std::to_string(i / 2) + " on body " + std::to_string(body) +
                     " is not finite: the force's properties or the body's mass or state are not, or too large");
     const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
       column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());

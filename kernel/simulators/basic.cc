@@ -17,20 +17,21 @@ void Environment::make_inner_steps() {
       locate_events(i * length, length);
     } else {
       begin_inner_step(i * length, length);
-      finish_inner_step(integrate());
+      const auto trial = integrate();
+      if (has_reactions()) {
+        if (const auto solution = react(trial)) commit_solution(*solution);
+      } else {
+        commit_trial(trial);
+      }
     }
   }
 }
 
-void Environment::finish_inner_step(const Trusted<TrialState>& trial, bool has_found_contacts) {
-  if (!has_reactions()) {
-    commit_trial(trial);
-    return;
-  }
+std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& trial, bool has_found_contacts) {
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
-  if (sleepers_ > 0 && wakes_sleepers()) return;
+  if (sleepers_ > 0 && wakes_sleepers()) return std::nullopt;
   if (constraint_.is_running()) constrain(trial);
-  commit_solution(solve());
+  return solve();
 }
 
 }  // namespace gravitas::kernel

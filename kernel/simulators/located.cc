@@ -1,12 +1,14 @@
-// Simulators `Bisection` and `Continuous`: inner steps end at impacts, so that no body passes through another, and each
-// impact is solved where it happens. Both look at trials from the same state and commit the one that ends there; the
-// steps before it are cut so that the last is short against the flight (the solver takes slow arrivals for rest).
+// Simulators `Bisection` and `Continuous`: inner steps end at impacts, so that nothing passes through another, and each is
+// solved where it happens. Both look at trials from the same state and commit the one that ends there; the steps before
+// it are cut so that the last is short against the flight (the solver takes slow arrivals for rest).
 //
 //   Continuous   asks the collision slot for times of impact on the way from S_n to S*; event_location.h says where to
 //                stop. Pairs that touch at the start are the solver's: what they run into next, while they touch, is
 //                found at S* only.
 //   Bisection    (§ 1.4) halves trials until one ends just after a contact closes. It sees contacts at S* alone: what
 //                passes through within a trial is missed.
+//
+// Both also end inner steps where surfaces stop sliding on each other (slides.cc).
 //
 // A Zeno sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps: the rest
 // of the step is then made as Basic makes it.
@@ -19,7 +21,7 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostInnerSteps = 10'000, kMostTrials = 200;
+constexpr int kMostInnerSteps = 10'000, kMostTrials = 200, kMostSlides = 100;
 constexpr double kShortestFlight = 1e-6;  // of the step
 constexpr double kTargetShare = 1e-8;     // of the margin: gap at which a pair has met
 constexpr double kLead = 0.9;             // of the way to an impact is one step, the rest another
@@ -46,7 +48,11 @@ void Environment::locate_events(double begin, double length) {
         trial = integrate();
       }
     }
-    finish_inner_step(trial, has_found_contacts);
+    const std::optional<Trusted<Solution>> solution =
+        inner < kMostSlides ? react_until_a_slide_ends(trial, begin + done, &stop, has_found_contacts)
+                            : react(trial, has_found_contacts);
+    if (!solution) return;
+    commit_solution(*solution);
     done = stop == left ? length : done + stop;
   }
 }
@@ -59,8 +65,15 @@ double Environment::first_impact(const Trusted<TrialState>& trial, double begin,
     bound_motions(i == 0 ? trial : integrate(), left);
     find_impacts(find_pairs());
     NextStop next{left, false};
+    std::span<const std::uint32_t> touching = front().touching.span();
     for (std::size_t k = 0; k < data_.impact_pair.size(); ++k) {
-      const NextStop stop = stop_before(encounter(k), left, data_.target_gap[0], shortest_flight);
+      const auto pair = data_.pair.span().subspan(2 * data_.impact_pair[k], 2);
+      while (!touching.empty() && std::ranges::lexicographical_compare(touching.first(2), pair))
+        touching = touching.subspan(2);
+      Encounter met = encounter(k);
+      // the solver has them, whatever gap it left
+      if (!touching.empty() && std::ranges::equal(touching.first(2), pair)) met.fraction = 0.0;
+      const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;
     }
     if (!next.is_trial || i == kMostTrials) return std::max(next.length, kFinest * length);

@@ -16,10 +16,10 @@ Twist displacement_of(const SolverBody& body) {
 
 }  // namespace
 
-double arrival_speed(double start_velocity, double trial_velocity, double gap_at_start, double time_step) {
+double arrival_speed(double start_velocity, double trial_velocity, double way, double time_step) {
   if (!(trial_velocity < 0.0)) return 0.0;
   const double gained = trial_velocity - start_velocity;  // a h
-  const double square = start_velocity * start_velocity - 2.0 * (gained / time_step) * std::max(0.0, gap_at_start);
+  const double square = start_velocity * start_velocity - 2.0 * (gained / time_step) * std::max(0.0, way);
   const double speed = std::sqrt(std::max(0.0, square));
   return speed < 2.0 * std::fabs(gained) ? 0.0 : speed;
 }

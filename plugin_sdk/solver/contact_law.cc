@@ -31,10 +31,12 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
   const Vector3 normal = vector_at(request.contact_normal(), i);
   const Vector3 point = vector_at(request.contact_point(), i);
   const auto through = ConstraintDirection::through(point, normal, one, two);
-  const double gap = gap_before(-request.contact_depth()[i], through, one, two);
+  const double gap_at_trial = -request.contact_depth()[i];
+  // a contact that counts as closed though S* leaves a gap arrives no faster than S* says
+  const double way = gap_before(gap_at_trial, through, one, two) - std::max(0.0, gap_at_trial);
   const double start = through.along(one.start_velocity, two.start_velocity);
   const double trial = through.along(one.trial_velocity, two.trial_velocity);
-  const double speed = arrival_speed(start, trial, gap, request.time_step());
+  const double speed = arrival_speed(start, trial, way, request.time_step());
   const double restitution = material[kRestitution];
   law.frame = frame_of(normal);
   law.target = restitution * speed;
@@ -45,7 +47,7 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
   const auto across = ConstraintDirection::through(point, tilted, one, two);
   const double tilted_start = across.along(one.start_velocity, two.start_velocity);
   const double tilted_trial = across.along(one.trial_velocity, two.trial_velocity);
-  const double tilted_speed = arrival_speed(tilted_start, tilted_trial, gap, request.time_step());
+  const double tilted_speed = arrival_speed(tilted_start, tilted_trial, way, request.time_step());
   const bool keeps_signs = tilted_trial < 0.0 && (tilted_start < 0.0) == (start < 0.0);
   if (!keeps_signs || !(tilted_speed > 0.0) || !(tilted.dot(normal) > 0.0)) return law;
   law.frame = frame_of(tilted);

@@ -141,7 +141,7 @@ MotionProblem heavy_top() {
 }
 
 // Rods of 1 m and 1 kg: cranks from (i, 0) up to (i, 1), couplers between, i = 0, 1, 2.
-MotionProblem four_bar() {
+MotionProblem four_bar(double duration) {
   WorldBuilder world = jointed_world();
   const double across = 1.0 / 12.0;
   for (int i = 0; i < 3; ++i) {
@@ -158,10 +158,144 @@ MotionProblem four_bar() {
     hinge(&world, i, 3 + i, {i + 0.0, 1, 0});
     hinge(&world, 3 + i, i + 1, {i + 1.0, 1, 0});
   }
-  return {"four-bar", 10.0, true, world, [](const kernel::StateView& state) {
-            const Vector3 tip = 2.0 * position_of(state, 0);
-            return (tip - Vector3(0.328458111540815379, 0.944518538178600962, 0)).norm();
+  const Vector3 after_ten(0.328458111540815379, 0.944518538178600962, 0);
+  const Vector3 after_twenty(0.839746574306843547, 0.542978536352884662, 0);
+  return {"four-bar", duration, true, world, [=](const kernel::StateView& state) {
+            return (2.0 * position_of(state, 0) - (duration == 10.0 ? after_ten : after_twenty)).norm();
           }};
+}
+
+MotionProblem mujoco_box() {
+  WorldBuilder world;
+  world.point(1.0, Vector3(0.13, 0.10, 0.05) / 3.0, {0, 0, 0});
+  world.body().twist.angular = {1, 2, 3};
+  return {"MuJoCo's box", 5.0, false, world, [](const kernel::StateView& state) {
+            const Quaternion exact(-0.3648637429868626004, 0.02356335734258868336, 0.02126200105200739735,
+                                   -0.9305198249127347748);
+            return angle_between(quaternion_at(state.orientation, 0), exact);
+          }};
+}
+
+// L = (2, 0, 6): turns about L at |L|/I, after a turn about the body's axis at w3 (1 - J/I).
+MotionProblem symmetric_rotor() {
+  WorldBuilder world;
+  world.point(1.0, {1.0, 1.0, 0.2}, {0, 0, 0});
+  world.body().twist.angular = {2, 0, 30};
+  return {"symmetric rotor", 10.0, false, world, [](const kernel::StateView& state) {
+            const double t = 10.0;
+            const Quaternion exact = exp_rotation(t * Vector3(2, 0, 6)) * exp_rotation(t * Vector3(0, 0, 30 * 0.8));
+            return angle_between(quaternion_at(state.orientation, 0), exact);
+          }};
+}
+
+// About the pivot I1 = 0.012, I3 = 0.001: 1 kg at 0.1 m.
+MotionProblem lagrange_top() {
+  WorldBuilder world = jointed_world();
+  const Quaternion tilt = exp_rotation(Vector3(std::numbers::pi / 6.0, 0, 0));
+  const Vector3 axis = tilt * Vector3::UnitZ();
+  world.point(1.0, {0.002, 0.002, 0.001}, 0.1 * axis);
+  world.body().pose.orientation = tilt;
+  world.body().twist.angular = 200.0 * axis;
+  world.gravity({0, 0, -9.81});
+  world.joint("Spherical", "constraint_spherical", kNone, 0,
+              {0, 0, 0, kAbsent, 0, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent});
+  return {"Lagrange top", 2.0, true, world, [](const kernel::StateView& state) {
+            const Vector3 exact(-0.920011678805164078, -0.0342355524846993032, 0.390392671304381693);
+            return (quaternion_at(state.orientation, 0) * Vector3::UnitZ() - exact).norm();
+          }};
+}
+
+double no_reference(const kernel::StateView&) { return 0.0; }
+
+MotionProblem bricard() {
+  WorldBuilder world = jointed_world();
+  const Vector3 joints[] = {{0, 0, 0}, {1, 0, 0}, {1, -1, 0}, {1, -1, 1}, {0, -1, 1}, {0, 0, 1}};
+  const Vector3 axes[] = {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 0}};
+  for (int i = 0; i < 5; ++i) {
+    const Vector3 along = (joints[i + 1] - joints[i]).cwiseAbs();
+    world.point(1.0, (Vector3::Ones() - along) / 12.0 + 1e-3 * along, 0.5 * (joints[i] + joints[i + 1]));
+  }
+  world.gravity({0, -9.81, 0});
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    const Vector3 end = joints[i] + axes[i];
+    world.joint("Revolute", "constraint_revolute", i == 0 ? kNone : i - 1, i == 5 ? kNone : i,
+                {joints[i].x(), joints[i].y(), joints[i].z(), end.x(), end.y(), end.z(), kAbsent, kAbsent});
+  }
+  return {"Bricard", 10.0, true, world, no_reference};
+}
+
+MotionProblem triple_pendulum() {
+  WorldBuilder world = jointed_world();
+  for (int i = 0; i < 3; ++i) world.point(1.0, {1e-4, 0.0075, 0.0075}, {0.3 * i + 0.15, 0, 0});
+  world.gravity({0, -10, 0});
+  for (std::uint32_t i = 0; i < 3; ++i) hinge(&world, i == 0 ? kNone : i - 1, i, {0.3 * i, 0, 0});
+  return {"pendulum challenge", 10.0, true, world, no_reference};
+}
+
+// IFToMM A05: a shaft along z, a slider on it, two arms (a rod with a ball without moments at its end) hinged to the shaft
+// at z = 1, springs from the slider to the rods' midpoints. Arms hang 30 degrees below the horizontal.
+MotionProblem flyball_governor() {
+  constexpr double kRod = 0.3, kBall = 5.0, kSlider = 3.0, kStiffness = 8e5, kDamping = 4e4,
+                   kSpin = 2 * std::numbers::pi;
+  constexpr double kAcross = kRod * 1.0001 / 12.0, kAlong = kRod * 2e-4 / 12.0, kAngle = std::numbers::pi / 6.0;
+  const double centre = (0.5 * kRod + kBall) / (kRod + kBall);
+  const double moment = kAcross + kRod * std::pow(centre - 0.5, 2) + kBall * std::pow(1.0 - centre, 2);
+  WorldBuilder world = jointed_world();
+  world.point(kRod, {kAcross, kAcross, kAlong}, {0, 0, 0.5});
+  world.body().twist.angular = {0, 0, kSpin};
+  world.point(kSlider, Vector3::Constant(kSlider * 0.02 / 12.0), {0, 0, 0.5});
+  world.body().twist.angular = {0, 0, kSpin};
+  for (const double side : {1.0, -1.0}) {
+    const Vector3 along(side * std::cos(kAngle), 0, -std::sin(kAngle));
+    world.point(kRod + kBall, {kAlong, moment, moment}, Vector3(0.05 * side, 0, 1) + centre * along);
+    kernel::BodyDescription& arm = world.body();
+    arm.pose.orientation = exp_rotation(Vector3(0, side > 0.0 ? kAngle : std::numbers::pi - kAngle, 0));
+    arm.twist.angular = {0, 0, kSpin};
+    arm.twist.linear = arm.twist.angular.cross(arm.pose.position);
+    spring_between(&world, {kStiffness, kDamping, 0.5}, Vector3(0.5 - centre, 0, 0), 1, Vector3(0.05 * side, 0, 0));
+  }
+  world.gravity({0, 0, -9.81});
+  world.joint("Revolute", "constraint_revolute", kNone, 0, {0, 0, 0, 0, 0, 1, kAbsent, kAbsent});
+  world.joint("Slider", "constraint_slider", 0, 1, {0, 0, 0.5, 0, 0, 1, kAbsent, kAbsent, kAbsent, kAbsent});
+  for (const std::uint32_t arm : {2U, 3U}) {
+    const double x = arm == 2 ? 0.05 : -0.05;
+    world.joint("Revolute", "constraint_revolute", 0, arm, {x, 0, 1, x, 1, 1, kAbsent, kAbsent});
+  }
+  return {"flyball governor", 10.0, true, world,
+          [](const kernel::StateView& state) { return std::fabs(position_of(state, 1).z() - 0.619622917061365659); }};
+}
+
+void spring_between(WorldBuilder* world, const SpringValues& spring, const Vector3& attachment,
+                    std::uint32_t anchor_body, const Vector3& anchor) {
+  const auto row = static_cast<std::uint32_t>(world->description().forces.size());
+  world->force("Spring", "force_spring",
+               {spring.stiffness, spring.damping, spring.rest_length, attachment.x(), attachment.y(), attachment.z(),
+                anchor_body == kNone ? kAbsent : anchor_body, anchor.x(), anchor.y(), anchor.z()});
+  if (anchor_body != kNone) world->description().bodies[anchor_body].forces.push_back(row);
+}
+
+double energy_of(kernel::Environment* environment) {
+  const kernel::Model& model = environment->model();
+  const kernel::StateView state = environment->state();
+  double energy = environment->potential_energy();
+  for (std::uint32_t i = 0; i < model.body_count; ++i)
+    if (model.inverse_mass[i] > 0.0)
+      energy += kinetic_energy(1.0 / model.inverse_mass[i], vector_at(model.inertia.span(), i),
+                               quaternion_at(state.orientation, i),
+                               {vector_at(state.linear_velocity, i), vector_at(state.angular_velocity, i)});
+  return energy;
+}
+
+Vector3 angular_momentum_of(const kernel::Environment& environment) {
+  const kernel::Model& model = environment.model();
+  const kernel::StateView state = environment.state();
+  Vector3 sum = Vector3::Zero();
+  for (std::uint32_t i = 0; i < model.body_count; ++i)
+    if (model.inverse_mass[i] > 0.0)
+      sum += angular_momentum(1.0 / model.inverse_mass[i], vector_at(model.inertia.span(), i),
+                              {vector_at(state.position, i), quaternion_at(state.orientation, i)},
+                              {vector_at(state.linear_velocity, i), vector_at(state.angular_velocity, i)});
+  return sum;
 }
 
 MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps,
@@ -172,11 +306,17 @@ MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method
   world.description().simulator = simulator;
   kernel::Environment environment(world.description());
   MotionResult result;
-  const std::clock_t start = std::clock();
+  const double energy = energy_of(&environment);
+  const Vector3 momentum = angular_momentum_of(environment);
+  std::clock_t start = std::clock();  // looking at invariants is not counted
   for (std::uint32_t i = 0; i < steps; ++i) {
     if (environment.step() != kernel::StepOutcome::kCommitted)
       throw std::runtime_error(problem.name + ", " + method.name + ": " + environment.fault()->fault.what());
     result.joint_error = std::max(result.joint_error, environment.figures().joint_error);
+    const std::clock_t pause = std::clock();
+    result.energy_error = std::max(result.energy_error, std::fabs(energy_of(&environment) - energy));
+    result.momentum_error = std::max(result.momentum_error, (angular_momentum_of(environment) - momentum).norm());
+    start += std::clock() - pause;
   }
   result.seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.error = problem.error(environment.state());

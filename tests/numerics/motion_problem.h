@@ -32,19 +32,38 @@ struct MotionProblem {
   std::function<double(const kernel::StateView&)> error;
 };
 
-MotionProblem tumbling_box();        // PROBLEMS' torque-free box: attitude
-MotionProblem spring_and_spin();     // a mass on a spring, with rotation: position, attitude
-MotionProblem point_pendulum();      // on a rod, a quarter swing from rest
-MotionProblem spherical_pendulum();  // on a rod
-MotionProblem double_pendulum();     // two hinged rods
-MotionProblem heavy_top();           // about a fixed point
-MotionProblem four_bar();            // the N-four-bar of two loops: singular twice a turn, redundant
+MotionProblem tumbling_box();                    // PROBLEMS' torque-free box: attitude
+MotionProblem spring_and_spin();                 // a mass on a spring, with rotation: position, attitude
+MotionProblem point_pendulum();                  // on a rod, a quarter swing from rest
+MotionProblem spherical_pendulum();              // on a rod
+MotionProblem double_pendulum();                 // two hinged rods
+MotionProblem heavy_top();                       // about a fixed point
+MotionProblem four_bar(double duration = 10.0);  // 10 or 20 s of the N-four-bar of two loops: singular, redundant
+MotionProblem mujoco_box();                      // a free box: attitude
+MotionProblem symmetric_rotor();                 // J/I = 0.2: attitude, in closed form
+MotionProblem lagrange_top();                    // fast, tilted, without precession at the start: axis
+MotionProblem bricard();           // five rods, six hinges, over-constrained: no reference, it keeps its energy
+MotionProblem triple_pendulum();   // three links of 0.3 m: no reference, it keeps its energy
+MotionProblem flyball_governor();  // stiff: height of the slider
+
+// A spring on the last body, from a point of it (its principal axes) to a point of another body, or of the world (kNone).
+struct SpringValues {
+  double stiffness = 0.0, damping = 0.0, rest_length = 0.0;  // N/m, N s/m, m
+};
+void spring_between(WorldBuilder* world, const SpringValues& spring, const Vector3& attachment,
+                    std::uint32_t anchor_body, const Vector3& anchor);
+
+// Kinetic energy and what forces report as potential, J; angular momentum about the origin, kg m^2/s.
+double energy_of(kernel::Environment* environment);
+Vector3 angular_momentum_of(const kernel::Environment& environment);
 
 // What a run came to.
 struct MotionResult {
   double error = 0.0;
-  double joint_error = 0.0;  // largest at a committed step, m
-  double seconds = 0.0;      // of the steps, CPU
+  double joint_error = 0.0;     // largest at a committed step, m
+  double energy_error = 0.0;    // largest change at a committed step, J
+  double momentum_error = 0.0;  // of the angular momentum about the origin, largest change, kg m^2/s
+  double seconds = 0.0;         // of the steps, CPU
   std::uint64_t derivatives = 0;
 };
 

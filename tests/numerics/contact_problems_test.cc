@@ -1,0 +1,387 @@
+// Reference problems of contact, with the simulator that stops at impacts and at the ends of slides.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "kernel/environment.h"
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/math/rotation.h"
+#include "tests/kernel/world_builder.h"
+#include "tests/numerics/motion_problem.h"
+#include "tests/numerics/reached.h"
+
+namespace gravitas {
+namespace {
+
+using kernel::Environment;
+using kernel::Simulator;
+using kernel::StepOutcome;
+using testing::CpuClock;
+using testing::expect_reached;
+using testing::plugin_path;
+using testing::WorldBuilder;
+
+constexpr double kGravity = 9.81;
+
+class Listener final : public kernel::EventListener {
+ public:
+  void on_event(const kernel::Event& event) override { events.push_back(event); }
+  std::vector<kernel::Event> events;
+};
+
+// Exact in free flight, and a solver that closes contacts to rounding.
+WorldBuilder contact_world(std::uint32_t steps, double time_step, const testing::Material& material) {
+  WorldBuilder world;
+  world.steps(steps, time_step).integrator("integrator_verlet").material(material);
+  world.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 500});
+  world.description().simulator = Simulator::kContinuous;
+  return world;
+}
+
+void step(Environment* world) { ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text; }
+
+void run(Environment* world) {
+  while (world->step_count() < world->total_steps()) ASSERT_NO_FATAL_FAILURE(step(world));
+}
+
+Vector3 position(const Environment& world, std::size_t body) { return vector_at(world.state().position, body); }
+Vector3 velocity(const Environment& world, std::size_t body) { return vector_at(world.state().linear_velocity, body); }
+Vector3 spin(const Environment& world, std::size_t body) { return vector_at(world.state().angular_velocity, body); }
+
+// Of spheres on the ground, which is body 0.
+double energy_of_spheres(const Environment& world, double mass) {
+  double energy = 0.0;
+  for (std::size_t i = 1; i < world.model().body_count; ++i)
+    energy += mass * (0.5 * velocity(world, i).squaredNorm() + kGravity * position(world, i).y());
+  return energy;
+}
+
+// ---- impacts
+
+// SimBenchmark's bounce: 7 x 7 balls fall from a centre height of 5 m and keep their energy.
+TEST(ContactProblems, BallsBounceForTwentySeconds) {
+  WorldBuilder builder = contact_world(2000, 0.01, {1.0, 0.0, 0.0, 0.0});
+  builder.ground();
+  for (int i = 0; i < 49; ++i) builder.sphere(0.1, 10.0, Vector3(i % 7, 5.0, i / 7));
+  builder.gravity({0, -kGravity, 0});
+  const CpuClock clock;
+  Environment world(builder.description());
+  const double fall = std::sqrt(2.0 * 4.9 / kGravity);
+  double squares = 0.0, apex = 0.0;
+  while (world.step_count() < world.total_steps()) {
+    ASSERT_NO_FATAL_FAILURE(step(&world));
+    squares += std::pow(energy_of_spheres(world, 10.0) / 24034.5 - 1.0, 2);
+    for (std::size_t i = 1; i <= 49; ++i) {
+      const double apex_time = world.time() + velocity(world, i).y() / kGravity;
+      apex = std::max(apex, std::fabs(std::remainder(apex_time, 2.0 * fall)));
+    }
+  }
+  const char* method = "Continuous, Verlet, Newton, 10 ms";
+  expect_reached(
+      {"bounce of 49 balls", method, "energy, relative RMS", 1e-10, std::sqrt(squares / 2000), clock.seconds()});
+  expect_reached({"bounce of 49 balls", method, "apex times, s", 1e-9, apex, clock.seconds()});
+}
+
+TEST(ContactProblems, OneBallKeepsItsEnergyAtSixtyHertz) {
+  WorldBuilder builder = contact_world(600, 1.0 / 60.0, {1.0, 0.0, 0.0, 0.0});
+  builder.ground().sphere(0.5, 1.0, Vector3(0, 1.5, 0)).gravity({0, -kGravity, 0});
+  const CpuClock clock;
+  Environment world(builder.description());
+  double worst = 0.0;
+  while (world.step_count() < world.total_steps()) {
+    ASSERT_NO_FATAL_FAILURE(step(&world));
+    worst = std::max(worst, std::fabs(energy_of_spheres(world, 1.0) / (1.5 * kGravity) - 1.0));
+  }
+  expect_reached({"bounce", "Continuous, Verlet, Newton, 1/60 s", "energy, relative", 1e-10, worst, clock.seconds()});
+}
+
+// A turned and spinning cube, 10 m a step: its lowest corner meets the plane.
+TEST(ContactProblems, ACubeAtAThousandMetresPerSecondMeetsAPlane) {
+  WorldBuilder builder = contact_world(6, 0.01, {0.5, 0.0, 0.0, 0.0});
+  builder.ground().box({0.1, 0.1, 0.1}, 1.0, {0, 25.0, 0}, {0, -1000.0, 0});
+  builder.body().pose.orientation = exp_rotation(Vector3(0.3, 0.2, 0.5));
+  const CpuClock clock;
+  Environment world(builder.description());
+  Listener listener;
+  world.set_listener(&listener);
+  double deepest = 0.0;
+  const auto lowest_corner = [](const Vector3& centre, const Quaternion& q) {
+    double lowest = centre.y();
+    for (int k = 0; k < 8; ++k)
+      lowest =
+          std::min(lowest, centre.y() + (q * Vector3(k & 1 ? 0.1 : -0.1, k & 2 ? 0.1 : -0.1, k & 4 ? 0.1 : -0.1)).y());
+    return lowest;
+  };
+  const double height = lowest_corner({0, 25.0, 0}, builder.body().pose.orientation);
+  while (world.step_count() < world.total_steps()) {
+    ASSERT_NO_FATAL_FAILURE(step(&world));
+    deepest = std::max(deepest, -lowest_corner(position(world, 1), quaternion_at(world.state().orientation, 1)));
+  }
+  ASSERT_FALSE(listener.events.empty());
+  const char* method = "Continuous, Verlet, Newton, 10 ms";
+  expect_reached({"cube at 1000 m/s", method, "time of impact, s", 1e-9,
+                  std::fabs(listener.events[0].time - height / 1000.0), clock.seconds()});
+  expect_reached({"cube at 1000 m/s", method, "overlap at a committed step, m", 1e-9, deepest, clock.seconds()});
+}
+
+TEST(ContactProblems, APlateAtAHundredMetresPerSecondMeetsAPlate) {
+  WorldBuilder builder = contact_world(10, 0.01, {0.5, 0.0, 0.0, 0.0});
+  builder.box({1.0, 0.015, 1.0}, 1.0, {0, 0, 0}).box({0.5, 0.015, 0.5}, 1.0, {0.1, 3.456, 0.2}, {0, -100.0, 0});
+  const CpuClock clock;
+  Environment world(builder.description());
+  Listener listener;
+  world.set_listener(&listener);
+  double deepest = 0.0;
+  while (world.step_count() < world.total_steps()) {
+    ASSERT_NO_FATAL_FAILURE(step(&world));
+    deepest = std::max(deepest, world.figures().penetration);
+    ASSERT_GT(position(world, 1).y(), position(world, 0).y());
+  }
+  ASSERT_FALSE(listener.events.empty());
+  const char* method = "Continuous, Verlet, Newton, 10 ms";
+  expect_reached({"plate at 100 m/s", method, "time of impact, s", 1e-9,
+                  std::fabs(listener.events[0].time - (3.456 - 0.03) / 100.0), clock.seconds()});
+  expect_reached({"plate at 100 m/s", method, "overlap at a committed step, m", 1e-9, deepest, clock.seconds()});
+}
+
+TEST(ContactProblems, TwoCubesMeetHeadOnAtFiveHundredMetresPerSecond) {
+  WorldBuilder builder = contact_world(3, 0.01, {1.0, 0.0, 0.0, 0.0});
+  builder.box({0.05, 0.05, 0.05}, 1.0, {-4, 0, 0}, {500, 0, 0}).box({0.05, 0.05, 0.05}, 1.0, {3, 0, 0}, {-500, 0, 0});
+  const CpuClock clock;
+  Environment world(builder.description());
+  Listener listener;
+  world.set_listener(&listener);
+  double deepest = 0.0;
+  while (world.step_count() < world.total_steps()) {
+    ASSERT_NO_FATAL_FAILURE(step(&world));
+    deepest = std::max(deepest, 0.1 - (position(world, 1).x() - position(world, 0).x()));
+  }
+  ASSERT_FALSE(listener.events.empty());
+  const char* method = "Continuous, Verlet, Newton, 10 ms";
+  expect_reached({"head-on at 500 m/s", method, "time of impact, s", 1e-9, std::fabs(listener.events[0].time - 0.0069),
+                  clock.seconds()});
+  expect_reached({"head-on at 500 m/s", method, "overlap at a committed step, m", 1e-9, deepest, clock.seconds()});
+}
+
+// SimBenchmark's 666: 6^3 balls fall from `base` in columns that are not quite straight.
+WorldBuilder box_of_balls(WorldBuilder world, double base) {
+  world.ground();
+  std::mt19937_64 numbers(6);
+  const auto jitter = [&] { return 1e-3 * static_cast<double>(numbers() >> 11) * 0x1p-53; };
+  for (int i = 0; i < 216; ++i) {
+    const double x = 0.21 * (i % 6) + jitter(), y = base + 0.21 * (i / 36) + jitter(),
+                 z = 0.21 * (i / 6 % 6) + jitter();
+    world.sphere(0.1, 10.0, Vector3(x, y, z));
+  }
+  return world.gravity({0, -kGravity, 0}).space("space_dynamic_bvh");
+}
+
+double sum_of_squared_overlaps(const Environment& world) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < world.model().body_count; ++i) {
+    sum += std::pow(std::max(0.0, 0.1 - position(world, i).y()), 2);
+    for (std::size_t k = 1; k < i; ++k)
+      sum += std::pow(std::max(0.0, 0.2 - (position(world, i) - position(world, k)).norm()), 2);
+  }
+  return sum;
+}
+
+TEST(ContactProblems, BallsOf666DoNotOverlap) {
+  const std::uint32_t seconds = testing::runs_long_problems() ? 10 : 1;
+  for (const std::uint32_t substeps : {1U, 10U}) {
+    WorldBuilder builder = box_of_balls(contact_world(100 * seconds, 0.01, {0.0, 0.0, 0.0, 0.0}), 0.101);
+    builder.description().simulator = Simulator::kSubstepping;
+    builder.description().substeps = substeps;
+    const CpuClock clock;
+    Environment world(builder.description());
+    double sum = 0.0;
+    while (world.step_count() < world.total_steps()) {
+      ASSERT_NO_FATAL_FAILURE(step(&world));
+      sum += sum_of_squared_overlaps(world);
+    }
+    expect_reached({"666, " + std::to_string(seconds) + " s",
+                    "Substepping " + std::to_string(substeps) + ", Verlet, Newton, 10 ms",
+                    "mean of sum of overlap^2, m^2", 1e-8, sum / world.total_steps(), clock.seconds(),
+                    substeps == 1 ? 1e-3 : 0.0});
+  }
+}
+
+// All of the first impacts of 36 columns, and hundreds of those within them, fall into twelve steps.
+TEST(ContactProblems, ElasticBallsOf666KeepTheirEnergy) {
+  const std::uint32_t steps = testing::runs_long_problems() ? 10000 : 600;
+  const WorldBuilder builder = box_of_balls(contact_world(steps, 0.001, {1.0, 0.0, 0.0, 0.0}), 1.101);
+  const CpuClock clock;
+  Environment world(builder.description());
+  const double start = energy_of_spheres(world, 10.0);
+  double squares = 0.0;
+  while (world.step_count() < world.total_steps()) {
+    ASSERT_NO_FATAL_FAILURE(step(&world));
+    squares += std::pow(energy_of_spheres(world, 10.0) / start - 1.0, 2);
+  }
+  expect_reached({"elastic 666, " + std::to_string(steps) + " ms", "Continuous, Verlet, Newton, 1 ms",
+                  "energy, relative RMS", 1e-10, std::sqrt(squares / steps), clock.seconds()});
+}
+
+// ---- ends of slides
+
+// A ball that is set sliding rolls from 2 v / (7 mu g) on, at 5/7 v.
+TEST(ContactProblems, ASlidingBallComesToRoll) {
+  for (const double time_step : {0.01, 0.001}) {
+    const auto steps = static_cast<std::uint32_t>(std::lround(0.6 / time_step));
+    WorldBuilder builder = contact_world(steps, time_step, {0.0, 0.3, 0.3, 0.0});
+    builder.ground().sphere(0.2, 1.5, {0, 0.2, 0}, {5.0, 0, 0}).gravity({0, -kGravity, 0});
+    const CpuClock clock;
+    Environment world(builder.description());
+    ASSERT_NO_FATAL_FAILURE(run(&world));
+    const double time = 0.485413329450026698, way = 2.08034284050011442, speed = 25.0 / 7.0;
+    const double error = std::fabs(position(world, 1).x() - (way + speed * (world.time() - time)));
+    const double turn = std::fabs(spin(world, 1).z() + speed / 0.2);
+    const std::string method = "Continuous, Verlet, Newton, " + std::to_string(std::lround(1e3 * time_step)) + " ms";
+    expect_reached({"slide to roll", method, "position, m", 1e-9, error, clock.seconds()});
+    expect_reached(
+        {"slide to roll", method, "speed, m/s", 1e-9, std::fabs(velocity(world, 1).x() - speed), clock.seconds()});
+    expect_reached({"slide to roll", method, "spin, rad/s", 1e-9, turn, clock.seconds()});
+  }
+}
+
+TEST(ContactProblems, ABoxStopsWhereItShouldInSixteenDirections) {
+  double worst = 0.0, worst_time = 0.0, turned = 0.0;
+  const CpuClock clock;
+  for (int i = 0; i < 16; ++i) {
+    const double angle = std::numbers::pi / 8.0 * i;
+    const Vector3 direction(std::cos(angle), 0.0, std::sin(angle));
+    WorldBuilder builder = contact_world(120, 1.0 / 60.0, {0.0, 0.3, 0.3, 0.0});
+    builder.ground().box({0.3, 0.2, 0.25}, 2.0, {0, 0.2, 0}, 5.0 * direction).gravity({0, -kGravity, 0});
+    Environment world(builder.description());
+    double stop = 0.0;
+    while (world.step_count() < world.total_steps()) {
+      const double speed = velocity(world, 1).norm(), time = world.time();
+      ASSERT_NO_FATAL_FAILURE(step(&world));
+      if (velocity(world, 1).norm() < 1e-9 && speed > 1e-9) stop = time + speed / (0.3 * kGravity);
+    }
+    worst = std::max(worst, (position(world, 1) - Vector3(0, 0.2, 0) - 4.24736663268773 * direction).norm());
+    worst_time = std::max(worst_time, std::fabs(stop - 1.69894665307509));
+    turned = std::max(turned, log_rotation(shorter_arc(quaternion_at(world.state().orientation, 1))).norm());
+  }
+  const char* method = "Continuous, Verlet, Newton, 1/60 s";
+  expect_reached({"stop in 16 directions", method, "place, m", 1e-8, worst, clock.seconds()});
+  expect_reached({"stop in 16 directions", method, "time, s", 1e-8, worst_time, clock.seconds()});
+  expect_reached({"stop in 16 directions", method, "turn, rad", 1e-8, turned, clock.seconds()});
+}
+
+TEST(ContactProblems, ACubeSlidesAtThirtyDegrees) {
+  const double angle = std::numbers::pi / 6.0, way = 25.0 / (2.0 * 0.5 * kGravity);
+  WorldBuilder builder = contact_world(120, 1.0 / 60.0, {0.0, 0.5, 0.5, 0.0});
+  builder.ground().box({0.5, 0.5, 0.5}, 1.0, {0, 0.5, 0}, 5.0 * Vector3(std::cos(angle), 0.0, std::sin(angle)));
+  builder.gravity({0, -kGravity, 0});
+  const CpuClock clock;
+  Environment world(builder.description());
+  ASSERT_NO_FATAL_FAILURE(run(&world));
+  const Vector3 end = position(world, 1);
+  const double degrees = std::fabs(std::atan2(end.z(), end.x()) - angle) * 180.0 / std::numbers::pi;
+  const char* method = "Continuous, Verlet, Newton, 1/60 s";
+  expect_reached({"slide30", method, "distance, relative", 1e-6, std::fabs(std::hypot(end.x(), end.z()) / way - 1.0),
+                  clock.seconds()});
+  expect_reached({"slide30", method, "direction, degrees", 1e-6, degrees, clock.seconds()});
+}
+
+// Up an incline, to rest for an instant, and back: 2 v (sin - mu cos) ... the slide turns within a step.
+TEST(ContactProblems, ABoxThatSlidesUpASlopeComesBack) {
+  const double slope = 0.5, friction = 0.3, up = kGravity * (std::sin(slope) + friction * std::cos(slope)),
+               down = kGravity * (std::sin(slope) - friction * std::cos(slope));
+  WorldBuilder builder = contact_world(60, 1.0 / 60.0, {0.0, friction, friction, 0.0});
+  builder.ground().box({0.3, 0.2, 0.25}, 2.0, {0, 0.2, 0}, {3.0, 0, 0});
+  builder.gravity(kGravity * Vector3(-std::sin(slope), -std::cos(slope), 0));
+  const CpuClock clock;
+  Environment world(builder.description());
+  ASSERT_NO_FATAL_FAILURE(run(&world));
+  const double turn = 3.0 / up, back = world.time() - turn;
+  expect_reached({"up a slope and back", "Continuous, Verlet, Newton, 1/60 s", "place, m", 1e-9,
+                  std::fabs(position(world, 1).x() - (9.0 / (2.0 * up) - 0.5 * down * back * back)), clock.seconds()});
+}
+
+// ---- a contact that moves
+
+// A rod of 1 m, 0.1 rad from the vertical, its foot on a floor without friction. Its ends are the centres of a capsule's
+// caps, which stay at the capsule's radius above the floor. The reaction turns with the rod and is taken where a step
+// ends, so that contacts are of first order: the rod is 40 % of a step early or late.
+TEST(ContactProblems, ARodFallsOverToFirstOrder) {
+  const double radius = 0.02, tilt = 0.1;
+  std::vector<double> errors;
+  for (const double time_step : {1e-3, 1e-4}) {
+    WorldBuilder builder =
+        contact_world(static_cast<std::uint32_t>(std::lround(0.6 / time_step)), time_step, {0.0, 0.0, 0.0, 0.0});
+    builder.ground().sphere(radius, 1.0, {0, radius + 0.5 * std::cos(tilt), 0});
+    builder.body().inertia = Vector3(1.0 / 12.0, 1e-4, 1.0 / 12.0);
+    builder.body().pose.orientation = exp_rotation(Vector3(0, 0, -tilt));
+    builder.body().bound = {kernel::BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(),
+                            Vector3::Constant(0.5 + radius)};
+    builder.description().shapes.back() = {"rod", "Capsule", {radius, 1.0}};
+    builder.gravity({0, -kGravity, 0});
+    const CpuClock clock;
+    Environment world(builder.description());
+    double time = 0.0, rate = 0.0, drift = 0.0;
+    while (world.step_count() < world.total_steps() && time == 0.0) {
+      const double before = world.time(),
+                   angle = 2.0 * std::atan2(-world.state().orientation[7], world.state().orientation[4]);
+      const double spin_before = -spin(world, 1).z();
+      ASSERT_NO_FATAL_FAILURE(step(&world));
+      drift = std::max(drift, std::fabs(position(world, 1).x()));
+      if (std::fabs(spin(world, 1).z()) < 1e-3 && spin_before > 1.0) {
+        // the angle that is missing, at a rate that hardly changes
+        const double missing = std::numbers::pi / 2.0 - angle, grows = 1.5 * kGravity;
+        time = before + missing / (spin_before + 0.5 * grows * missing / spin_before);
+        rate = spin_before + grows * (time - before);
+      }
+    }
+    const std::string method =
+        time_step == 1e-3 ? "Continuous, Verlet, Newton, 1 ms" : "Continuous, Verlet, Newton, 0.1 ms";
+    errors.push_back(std::fabs(time - 0.585947472819335));
+    expect_reached(
+        {"falling rod", method, "time of the strike, s", 1e-8, errors.back(), clock.seconds(), 0.5 * time_step});
+    expect_reached({"falling rod", method, "rate at the strike, rad/s", 1e-8, std::fabs(rate - 5.41137437109393665),
+                    clock.seconds(), 1.5 * time_step});
+    expect_reached({"falling rod", method, "sideways drift, m", 1e-12, drift, clock.seconds()});
+  }
+  EXPECT_NEAR(std::log10(errors[0] / errors[1]), 1.0, 0.1);
+}
+
+// Euler's disk in steady motion: it rolls on its rim, its centre at rest. With the angle A of its axis from the vertical, the
+// radius a, half the height b, and moments I1 across and I3 along the axis: the turning w is along the way from the centre
+// to the contact, so Omega^2 sin A (I1 cos A - I3 (b/a) sin A) = m g (a cos A - b sin A); 4 g/a for b = 0.
+TEST(ContactProblems, EulersDiskRollsToFirstOrder) {
+  const double a = 0.0381, b = 0.001, tilt = 10.0 * std::numbers::pi / 180.0, mass = 0.1;
+  const double across = mass * (0.25 * a * a + b * b / 3.0), along = 0.5 * mass * a * a;
+  const double rate = std::sqrt(mass * kGravity * (a * std::cos(tilt) - b * std::sin(tilt)) /
+                                (std::sin(tilt) * (across * std::cos(tilt) - along * b / a * std::sin(tilt))));
+  std::vector<double> errors;
+  for (const double time_step : {1e-3, 1e-4}) {
+    const auto steps = static_cast<std::uint32_t>(std::lround(0.2 / time_step));
+    WorldBuilder builder = contact_world(steps, time_step, {0.0, 1.0, 1.0, 0.0});
+    builder.ground().sphere(a, mass, {0, a * std::sin(tilt) + b * std::cos(tilt), 0});
+    builder.body().inertia = Vector3(across, along, across);
+    // its axis, y, leans towards -x: the contact is on that side
+    builder.body().pose.orientation = exp_rotation(Vector3(0, 0, tilt));
+    const Vector3 axis(-std::sin(tilt), std::cos(tilt), 0), down(-std::cos(tilt), -std::sin(tilt), 0);
+    builder.body().twist.angular = -rate * std::sin(tilt) * (down - b / a * axis);
+    builder.description().shapes.back() = {"disk", "Cylinder", {a, 2.0 * b}};
+    builder.gravity({0, -kGravity, 0});
+    const CpuClock clock;
+    Environment world(builder.description());
+    const double start = testing::energy_of(&world);
+    ASSERT_NO_FATAL_FAILURE(run(&world));
+    errors.push_back(std::fabs(testing::energy_of(&world) / start - 1.0));
+    const std::string method =
+        time_step == 1e-3 ? "Continuous, Verlet, Newton, 1 ms" : "Continuous, Verlet, Newton, 0.1 ms";
+    expect_reached(
+        {"Euler's disk, 0.2 s", method, "energy, relative", 1e-9, errors.back(), clock.seconds(), 400.0 * time_step});
+  }
+  EXPECT_NEAR(std::log10(errors[0] / errors[1]), 1.0, 0.1);
+}
+
+}  // namespace
+}  // namespace gravitas
