@@ -240,7 +240,7 @@ class Polytope {
 double PlacedPair::reach() const { return a.radius() + b.radius() + length_of(p_AB); }
 double PlacedPair::thinnest() const { return std::min(a.thinnest(), b.thinnest()); }
 
-Separation find_separation(const PlacedPair& pair, double margin) {
+std::optional<Separation> find_distance(const PlacedPair& pair, double margin) {
   constexpr int kIterations = 96;
   const double reach = pair.reach(), touching = 1e-11 * reach;
   std::array<Difference, 4> simplex;
@@ -252,11 +252,12 @@ Separation find_separation(const PlacedPair& pair, double margin) {
   SimplexPoint closest{simplex[0].w, {1.0}};
   for (int i = 0; i < kIterations; ++i) {
     const double squared = closest.point.squaredNorm(), distance = std::sqrt(squared);
-    if (distance <= touching) return Polytope(pair).expand();
+    if (distance <= touching) return std::nullopt;
     const Difference next = difference_along(pair, -closest.point);
     // the supporting plane towards the origin bounds the distance from below
     const double bound = next.w.dot(closest.point) / distance;
-    if (bound - pair.rounding() > margin) return {-closest.point / distance, pair.rounding() - bound, {}, {}};
+    if (bound - pair.rounding() > margin)
+      return Separation{-closest.point / distance, pair.rounding() - bound, Vector3::Zero(), Vector3::Zero()};
     if (distance - bound <= 1e-15 * reach + 1e-14 * distance) break;
     bool is_known = false;
     for (std::size_t k = 0; k < count; ++k) is_known = is_known || simplex[k].w == next.w;
@@ -276,14 +277,19 @@ Separation find_separation(const PlacedPair& pair, double margin) {
       closest.weight[kept++] = found.weight[k];
     }
     count = kept;
-    if (count == 4 || count == 0) return Polytope(pair).expand();
+    if (count == 4 || count == 0) return std::nullopt;
   }
   const double distance = length_of(closest.point);
-  if (distance <= touching) return Polytope(pair).expand();
+  if (distance <= touching) return std::nullopt;
   Vector3 point_a = Vector3::Zero();
   for (std::size_t k = 0; k < count; ++k) point_a += closest.weight[k] * simplex[k].a;
   const Vector3 normal = square_to(std::span(simplex.data(), count), -closest.point / distance, distance / reach);
   return with_rounding(pair, normal, -distance, point_a, point_a - closest.point);
+}
+
+Separation find_separation(const PlacedPair& pair, double margin) {
+  const std::optional<Separation> apart = find_distance(pair, margin);
+  return apart ? *apart : Polytope(pair).expand();
 }
 
 }  // namespace gravitas
