@@ -50,6 +50,8 @@ BodyColumns bodies_of(const Request& request) {
   return {request.body_shape(), request.geometry_position(), request.geometry_orientation(), request.position(),
           request.orientation()};
 }
+// A shape cast is a time of impact without rotation: the body that is cast has the displacement of the cast, the others
+// rest. A sweep that turns on its way is asked the same way.
 inline Motion motion_of(const stage::CollisionTimesOfImpactRequest& request, std::uint32_t body) {
   return {vector_at(request.displacement(), body), vector_at(request.rotation(), body)};
 }
