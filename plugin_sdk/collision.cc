@@ -16,9 +16,11 @@ void require_finite(const char* row, const char* what, std::span<const double> c
   if (i != kNoRow) throw Refusal(row + std::to_string(i / components) + " has a " + what + " that is not finite");
 }
 
-void require_shape(const ShapeColumns& shapes, const BodyColumns& bodies, std::uint32_t body, const std::string& who) {
+// `row` of `what` names the body.
+void require_shape(const ShapeColumns& shapes, const BodyColumns& bodies, std::uint32_t body, const char* what,
+                   std::size_t row) {
   if (body >= bodies.body_shape.size() || bodies.body_shape[body] >= shapes.shape_type.size())
-    throw Refusal(who + " names a body without shape");
+    throw Refusal(what + std::to_string(row) + " names a body without shape");
 }
 
 void check_bodies(const BodyColumns& bodies) {
@@ -33,7 +35,7 @@ void check_pairs(const Request& request) {
   const ShapeColumns shapes = shapes_of(request);
   const BodyColumns bodies = bodies_of(request);
   for (std::size_t i = 0; i < request.pair().size(); ++i)
-    require_shape(shapes, bodies, request.pair()[i], "pair " + std::to_string(i / 2));
+    require_shape(shapes, bodies, request.pair()[i], "pair ", i / 2);
   check_bodies(bodies);
 }
 
@@ -75,9 +77,9 @@ void check_request(const stage::CollisionRaysRequest& request) {
   const BodyColumns bodies = bodies_of(request);
   const std::size_t rays = request.length().size();
   for (std::size_t i = 0; i < request.candidate().size(); i += 2) {
-    const std::string who = "candidate " + std::to_string(i / 2);
-    if (request.candidate()[i] >= rays) throw Refusal(who + " names a ray that does not exist");
-    require_shape(shapes, bodies, request.candidate()[i + 1], who);
+    if (request.candidate()[i] >= rays)
+      throw Refusal("candidate " + std::to_string(i / 2) + " names a ray that does not exist");
+    require_shape(shapes, bodies, request.candidate()[i + 1], "candidate ", i / 2);
   }
   check_bodies(bodies);
   require_finite("ray ", "origin", request.origin(), 3);

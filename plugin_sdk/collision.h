@@ -33,7 +33,12 @@ struct BodyColumns {
   Pose geometry(std::uint32_t body) const {
     return {vector_at(geometry_position, body), quaternion_at(geometry_orientation, body)};
   }
-  Pose placed(std::uint32_t body) const { return compose(pose(body), geometry(body)); }
+  Pose placed(std::uint32_t body) const {
+    // most shapes lie in their body as they are: composing with the identity would change no bit
+    const Pose X_WB = pose(body), X_BS = geometry(body);
+    const bool is_same = X_BS.position.isZero(0.0) && X_BS.orientation.w() == 1.0 && X_BS.orientation.vec().isZero(0.0);
+    return is_same ? X_WB : compose(X_WB, X_BS);
+  }
 };
 
 template <typename Request>
@@ -45,6 +50,8 @@ BodyColumns bodies_of(const Request& request) {
   return {request.body_shape(), request.geometry_position(), request.geometry_orientation(), request.position(),
           request.orientation()};
 }
+// A shape cast is a time of impact without rotation: the body that is cast has the displacement of the cast, the others
+// rest. A sweep that turns on its way is asked the same way.
 inline Motion motion_of(const stage::CollisionTimesOfImpactRequest& request, std::uint32_t body) {
   return {vector_at(request.displacement(), body), vector_at(request.rotation(), body)};
 }

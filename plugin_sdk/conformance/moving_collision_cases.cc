@@ -216,6 +216,42 @@ void judge_seen(Subject& subject) {
   }
 }
 
+// Shape casts: bodies that do not turn. To cast a at b is to cast b at a the other way, and a cast that begins on the way
+// ends in the same place.
+void judge_casts(Subject& subject) {
+  const std::vector<TypeDeclaration> types = convex_types(subject);
+  Draw draw(84);
+  for (const TypeDeclaration& type_a : types) {
+    for (const TypeDeclaration& type_b : types) {
+      for (int repeat = 0; repeat < 4; ++repeat) {
+        const Solid a = random_solid(subject.declaration(), type_a, &draw);
+        const Solid b = random_solid(subject.declaration(), type_b, &draw);
+        const Vector3 way = draw.direction();
+        Solids world = Solids::two(a, {-6.0 * way, draw.rotation()}, b, {Vector3::Zero(), draw.rotation()});
+        // through the middle of b, so that no cast grazes it
+        const Vector3 cast = 12.0 * way;
+        Inquiry inquiry(subject, a.type + " cast at " + b.type + ", pair " + std::to_string(repeat));
+        const auto first = [&](const Vector3& way_a, const Vector3& way_b) {
+          world.bodies[0].twist = {way_a, Vector3::Zero()}, world.bodies[1].twist = {way_b, Vector3::Zero()};
+          const std::vector<Found> found = ask_times(&inquiry, world);
+          inquiry.expect(found.size() == 1, "no impact came, though a goes through the middle of b");
+          return found[0];
+        };
+        const Found one = first(cast, Vector3::Zero());
+        // either may stop up to the target before the surface, measured along its normal
+        const double along = std::fabs(one.normal.dot(cast));
+        inquiry.expect(along > 0.0, "the normal is square to the way that ends there");
+        const double tolerance = 1e-9 + 2.0 * kTarget / along;
+        const Found other = first(Vector3::Zero(), -cast);
+        inquiry.expect_near("fraction with b cast the other way", other.fraction, one.fraction, tolerance);
+        world.bodies[0].pose.position += 0.5 * one.fraction * cast;
+        const Found rest = first(cast, Vector3::Zero());
+        inquiry.expect_near("fraction from half-way", rest.fraction, 0.5 * one.fraction, tolerance);
+      }
+    }
+  }
+}
+
 Solids mixed_flight(Subject& subject, std::uint64_t seed) {
   Draw draw(seed);
   Solids world;
@@ -355,6 +391,9 @@ std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration) {
                               judge_known_impacts));
     cases.push_back(make_case("collision/impact_seen",
                               "Before an impact nothing overlaps; then the gap is within the target.", judge_seen));
+    cases.push_back(make_case("collision/impact_casts",
+                              "Shape casts end in one place, whichever body is cast and wherever the cast begins.",
+                              judge_casts));
     cases.push_back(make_case("collision/impact_refusals", "Bodies that do not exist and no targets are refused.",
                               judge_impact_refusals));
     cases.push_back(make_case("collision/impact_hostile",

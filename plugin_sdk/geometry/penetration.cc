@@ -54,8 +54,9 @@ class Polytope {
  public:
   explicit Polytope(const PlacedPair& pair) : pair_(pair), reach_(pair.reach()) {}
 
-  Separation expand() {
-    if (!start()) return flat();
+  // `simplex`: what the search for the distance ended with.
+  Separation expand(std::span<const Difference> simplex) {
+    if (!start_from(simplex) && !start()) return flat();
     for (;;) {
       const std::size_t nearest = nearest_face();
       const Face& face = faces_[nearest];
@@ -78,6 +79,18 @@ class Polytope {
     Vector3 normal;
     double height;  // of the plane from the origin; infinite where the face has no normal
   };
+
+  // The tetrahedron that was found to hold the origin, if it is none of a sliver.
+  bool start_from(std::span<const Difference> simplex) {
+    constexpr double kSliver = 1e-3;
+    if (simplex.size() < 4) return false;
+    const Vector3 ab = simplex[1].w - simplex[0].w, ac = simplex[2].w - simplex[0].w, ad = simplex[3].w - simplex[0].w;
+    const double volume = ab.cross(ac).dot(ad);
+    if (!(volume * volume > kSliver * kSliver * ab.squaredNorm() * ac.squaredNorm() * ad.squaredNorm())) return false;
+    std::copy(simplex.begin(), simplex.end(), vertices_.begin());
+    add_tetrahedron(volume > 0.0);
+    return true;
+  }
 
   // Four corners of a solid, or false with normal_ across what a - b is.
   bool start() {
@@ -125,14 +138,18 @@ class Polytope {
       return false;
     }
     vertices_ = {from, to, third, up >= down ? above : below};
+    add_tetrahedron(up >= down);
+    return true;
+  }
+
+  // The faces of the first four vertices, outward; `is_above`: the fourth is on the side from which the others run
+  // counter-clockwise.
+  void add_tetrahedron(bool is_above) {
     vertex_count_ = 4;
-    // outward seen from the fourth
-    const bool is_above = up >= down;
     add_face(0, is_above ? 2 : 1, is_above ? 1 : 2);
     add_face(0, is_above ? 1 : 3, is_above ? 3 : 1);
     add_face(1, is_above ? 2 : 3, is_above ? 3 : 2);
     add_face(2, is_above ? 0 : 3, is_above ? 3 : 0);
-    return true;
   }
 
   // Of cores that lie in a plane or line together: no depth across it.
@@ -235,28 +252,34 @@ class Polytope {
   Vector3 point_b_ = Vector3::Zero();
 };
 
-}  // namespace
+// The corners that the search for the distance ends with.
+struct Simplex {
+  std::array<Difference, 4> corners;
+  std::size_t count = 1;
 
-double PlacedPair::reach() const { return a.radius() + b.radius() + length_of(p_AB); }
-double PlacedPair::thinnest() const { return std::min(a.thinnest(), b.thinnest()); }
+  std::span<const Difference> used() const { return std::span(corners.data(), count); }
+};
 
-Separation find_separation(const PlacedPair& pair, double margin) {
+// Nothing if the cores overlap or touch.
+std::optional<Separation> search_distance(const PlacedPair& pair, double margin, Simplex* out) {
   constexpr int kIterations = 96;
   const double reach = pair.reach(), touching = 1e-11 * reach;
-  std::array<Difference, 4> simplex;
+  std::array<Difference, 4>& simplex = out->corners;
+  std::size_t& count = out->count;
+  count = 1;
   std::array<Vector3, 4> corners;
-  std::size_t count = 1;
   Vector3 first = pair.p_AB + pair.R_AB * pair.b.centre() - pair.a.centre();
   if (!(first.squaredNorm() > 0.0)) first = Vector3::UnitY();
   simplex[0] = difference_along(pair, first);
   SimplexPoint closest{simplex[0].w, {1.0}};
   for (int i = 0; i < kIterations; ++i) {
     const double squared = closest.point.squaredNorm(), distance = std::sqrt(squared);
-    if (distance <= touching) return Polytope(pair).expand();
+    if (distance <= touching) return std::nullopt;
     const Difference next = difference_along(pair, -closest.point);
     // the supporting plane towards the origin bounds the distance from below
     const double bound = next.w.dot(closest.point) / distance;
-    if (bound - pair.rounding() > margin) return {-closest.point / distance, pair.rounding() - bound, {}, {}};
+    if (bound - pair.rounding() > margin)
+      return Separation{-closest.point / distance, pair.rounding() - bound, Vector3::Zero(), Vector3::Zero()};
     if (distance - bound <= 1e-15 * reach + 1e-14 * distance) break;
     bool is_known = false;
     for (std::size_t k = 0; k < count; ++k) is_known = is_known || simplex[k].w == next.w;
@@ -276,14 +299,30 @@ Separation find_separation(const PlacedPair& pair, double margin) {
       closest.weight[kept++] = found.weight[k];
     }
     count = kept;
-    if (count == 4 || count == 0) return Polytope(pair).expand();
+    if (count == 4 || count == 0) return std::nullopt;
   }
   const double distance = length_of(closest.point);
-  if (distance <= touching) return Polytope(pair).expand();
+  if (distance <= touching) return std::nullopt;
   Vector3 point_a = Vector3::Zero();
   for (std::size_t k = 0; k < count; ++k) point_a += closest.weight[k] * simplex[k].a;
   const Vector3 normal = square_to(std::span(simplex.data(), count), -closest.point / distance, distance / reach);
   return with_rounding(pair, normal, -distance, point_a, point_a - closest.point);
+}
+
+}  // namespace
+
+double PlacedPair::reach() const { return a.radius() + b.radius() + length_of(p_AB); }
+double PlacedPair::thinnest() const { return std::min(a.thinnest(), b.thinnest()); }
+
+std::optional<Separation> find_distance(const PlacedPair& pair, double margin) {
+  Simplex simplex;
+  return search_distance(pair, margin, &simplex);
+}
+
+Separation find_separation(const PlacedPair& pair, double margin) {
+  Simplex simplex;
+  const std::optional<Separation> apart = search_distance(pair, margin, &simplex);
+  return apart ? *apart : Polytope(pair).expand(simplex.used());
 }
 
 }  // namespace gravitas

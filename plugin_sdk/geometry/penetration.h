@@ -13,6 +13,8 @@
 // them, being rounded, but two equal cylinders end on end inside each other come near) end at 96 points: 1e-4.
 #pragma once
 
+#include <optional>
+
 #include "plugin_sdk/geometry/support_map.h"
 #include "plugin_sdk/math/types.h"
 
@@ -46,5 +48,7 @@ struct Separation {
 // If the pair is further apart than `margin` (m, >= 0) the search may end early: then depth is only known to be below
 // -margin, and nothing else is.
 Separation find_separation(const PlacedPair& pair, double margin);
+// The same if the cores are apart; nothing if they overlap, or are nearer than 1e-11 of `reach`.
+std::optional<Separation> find_distance(const PlacedPair& pair, double margin);
 
 }  // namespace gravitas

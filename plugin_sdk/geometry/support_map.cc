@@ -4,6 +4,7 @@
 #include <cmath>
 #include <new>
 
+#include "plugin_sdk/geometry/lane_points.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
 
 namespace gravitas {
@@ -190,50 +191,43 @@ class PolyhedronMap final : public SupportMap {
  public:
   explicit PolyhedronMap(const ConvexPolyhedron& polyhedron) : polyhedron_(polyhedron) {
     for (const Vector3& v : polyhedron.vertices) {
+      vertices_.add(v);
       radius_ = std::max(radius_, v.squaredNorm());
       centre_ += v / static_cast<double>(polyhedron.vertices.size());
     }
     radius_ = std::sqrt(radius_);
     thinnest_ = std::numeric_limits<double>::infinity();
-    for (const ConvexPolyhedron::Face& face : polyhedron.faces)
-      thinnest_ =
-          std::min(thinnest_, 0.5 * (face.offset + (-face.normal).dot(vertex(polyhedron.support(-face.normal)))));
+    for (const ConvexPolyhedron::Face& face : polyhedron.faces) {
+      normals_.add(face.normal);
+      thinnest_ = std::min(thinnest_, 0.5 * (face.offset + (-face.normal).dot(support(-face.normal))));
+    }
+    find_neighbours();
   }
-  Vector3 support(const Vector3& d) const override { return vertex(polyhedron_.support(d)); }
+  Vector3 support(const Vector3& d) const override { return vertex(vertices_.farthest(d)); }
 
   void contour(const Vector3& n, double sine, Contour* out) const override {
     out->count = 0;
-    const ConvexPolyhedron::Face* best = nullptr;
-    double cosine = std::sqrt(1.0 - sine * sine);
-    for (const ConvexPolyhedron::Face& face : polyhedron_.faces) {
-      const double towards = face.normal.dot(n);
-      if (towards > cosine || (best == nullptr && towards == cosine)) cosine = towards, best = &face;
-    }
-    const auto vertices = static_cast<std::uint32_t>(polyhedron_.vertices.size());
-    if (best != nullptr) {
-      const auto loop = polyhedron_.corners_of(*best);
+    const std::uint32_t towards = normals_.farthest(n);
+    const ConvexPolyhedron::Face& face = polyhedron_.faces[towards];
+    if (face.normal.dot(n) >= std::sqrt(1.0 - sine * sine)) {
+      const auto loop = polyhedron_.corners_of(face);
       // of a face with very many corners every other one
       const std::size_t stride = 1 + (loop.size() - 1) / Contour::kCapacity;
       for (std::size_t i = 0; i < loop.size(); i += stride) out->add(vertex(loop[i]), 1 + loop[i]);
-      out->normal = best->normal;
-      out->code = (1 + vertices + static_cast<std::uint32_t>(best - polyhedron_.faces.data())) & 0x7FFFU;
+      out->normal = face.normal;
+      out->code = (1 + static_cast<std::uint32_t>(polyhedron_.vertices.size()) + towards) & 0x7FFFU;
       return;
     }
-    const std::uint32_t first = polyhedron_.support(n);
+    const std::uint32_t first = vertices_.farthest(n);
     out->add(vertex(first), 1 + first);
     out->code = 1 + first;
     // the edge at the vertex that is most nearly in the plane
     std::uint32_t second = first;
     double least = sine;
-    for (const ConvexPolyhedron::Face& face : polyhedron_.faces) {
-      const auto loop = polyhedron_.corners_of(face);
-      for (std::size_t i = 0; i < loop.size(); ++i) {
-        if (loop[i] != first) continue;
-        const std::uint32_t next = loop[(i + 1) % loop.size()];
-        const Vector3 edge = vertex(next) - vertex(first);
-        const double falls = std::fabs(edge.dot(n)) / std::sqrt(edge.squaredNorm());
-        if (falls <= least) least = falls, second = next;
-      }
+    for (std::uint32_t i = neighbour_begin_[first]; i < neighbour_begin_[first + 1]; ++i) {
+      const Vector3 edge = vertex(neighbours_[i]) - vertex(first);
+      const double falls = std::fabs(edge.dot(n)) / std::sqrt(edge.squaredNorm());
+      if (falls <= least) least = falls, second = neighbours_[i];
     }
     if (second == first) return;
     out->add(vertex(second), 1 + second);
@@ -242,7 +236,25 @@ class PolyhedronMap final : public SupportMap {
 
  private:
   const Vector3& vertex(std::uint32_t i) const { return polyhedron_.vertices[i]; }
+
+  // Every edge runs along two faces in opposite ways, so that each corner's next ones are all its neighbours.
+  void find_neighbours() {
+    neighbour_begin_.assign(polyhedron_.vertices.size() + 1, 0);
+    for (const std::uint32_t corner : polyhedron_.corners) ++neighbour_begin_[corner + 1];
+    for (std::size_t i = 1; i < neighbour_begin_.size(); ++i) neighbour_begin_[i] += neighbour_begin_[i - 1];
+    neighbours_.resize(polyhedron_.corners.size());
+    std::vector<std::uint32_t> place(neighbour_begin_.begin(), neighbour_begin_.end() - 1);
+    for (const ConvexPolyhedron::Face& face : polyhedron_.faces) {
+      const auto loop = polyhedron_.corners_of(face);
+      for (std::size_t i = 0; i < loop.size(); ++i) neighbours_[place[loop[i]]++] = loop[(i + 1) % loop.size()];
+    }
+  }
+
   const ConvexPolyhedron& polyhedron_;
+  LanePoints vertices_;
+  LanePoints normals_;  // of the faces
+  std::vector<std::uint32_t> neighbour_begin_;
+  std::vector<std::uint32_t> neighbours_;  // of vertex i: from neighbour_begin_[i] to neighbour_begin_[i + 1]
 };
 
 }  // namespace

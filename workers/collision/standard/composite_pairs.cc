@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "plugin_sdk/geometry/contour_contacts.h"
+#include "plugin_sdk/geometry/simplex.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
 #include "workers/collision/standard/narrow_phase.h"
 #include "workers/collision/standard/pair_functions.h"
@@ -170,14 +172,52 @@ class Collector {
   ContactList* out_;
 };
 
+// Calls visit(triangle, separation) for every triangle that a ball comes within `margin` of, in a fixed order. Nothing is
+// said of the separation where the centre is in the triangle, within rounding.
+template <typename Visit>
+void for_each_at_ball(const TriangleMesh& mesh, const Vector3& centre, double radius, double margin,
+                      const Visit& visit) {
+  const double reach = radius + margin, squared_reach = reach * reach;
+  std::array<std::uint32_t, 128> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const TriangleMesh::Node& node = mesh.nodes()[stack[--depth]];
+    if (node.box.squared_distance(centre) > squared_reach) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first + 1;
+      stack[depth++] = node.first;
+      continue;
+    }
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const std::uint32_t t = mesh.order()[node.first + i];
+      const std::array<Vector3, 3> x = mesh.corners(t);
+      // across the normal first: most triangles that are near are out of reach there
+      const Vector3& up = mesh.normal(t);
+      const double h = up.dot(centre), h0 = up.dot(x[0]), h1 = up.dot(x[1]), h2 = up.dot(x[2]);
+      if (h - std::max({h0, h1, h2}) > reach || std::min({h0, h1, h2}) - h > reach) continue;
+      const Vector3 way = -closest_on_triangle(x[0] - centre, x[1] - centre, x[2] - centre).point;
+      const double squared = way.squaredNorm();
+      if (squared > squared_reach) continue;
+      const double distance = std::sqrt(squared);
+      if (!(distance > 1e-11 * (radius + std::sqrt(centre.squaredNorm())))) {
+        visit(t, std::nullopt);
+        continue;
+      }
+      const Vector3 n = way / distance;
+      visit(t, Separation{n, radius - distance, centre - way, centre - radius * n});
+    }
+  }
+}
+
 void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const Pose& X_MC, double margin,
                          const Collector& out) {
   const Matrix3 R = X_MC.orientation.toRotationMatrix();
   const Vector3 centre = X_MC.position + R * map.centre();
-  mesh.for_each_in(box_of(map, R, X_MC.position).widened(margin), [&](std::uint32_t t) {
+  const auto collide_triangle = [&](std::uint32_t t, const std::optional<Separation>& known) {
     const TriangleMap triangle(mesh.corners(t), mesh.normal(t));
     const PlacedPair pair{triangle, map, R, X_MC.position};
-    const Separation least = find_separation(pair, margin);
+    const Separation least = known ? *known : find_separation(pair, margin);
     if (!(least.depth >= -margin)) return;
     const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
     const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
@@ -187,7 +227,13 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
     Manifold manifold;
     contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
     out.add(t, manifold);
-  });
+  };
+  if (map.rounding() == map.radius()) {
+    for_each_at_ball(mesh, centre, map.radius(), margin, collide_triangle);
+  } else {
+    mesh.for_each_in(box_of(map, R, X_MC.position).widened(margin),
+                     [&](std::uint32_t t) { collide_triangle(t, std::nullopt); });
+  }
   if (!mesh.is_closed() || !mesh.box().overlaps({centre, centre})) return;
   const TriangleMesh::Nearest nearest = mesh.nearest(centre);
   if (!(nearest.signed_distance < 0.0)) return;

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "workers/collision/standard/gjk.h"
+#include "plugin_sdk/geometry/penetration.h"
+#include "plugin_sdk/geometry/support_map_buffer.h"
+#include "workers/collision/standard/pair_functions.h"
 #include "workers/collision/standard/unit_vector.h"
 
 namespace gravitas::collision {
@@ -16,11 +19,8 @@ namespace {
 constexpr double kParallel = 1e-8;
 
 constexpr double kFacePreference = 0.01;
-constexpr double kFaceTie = 1e-7;
 
 bool is_box(const Shape& shape) { return shape.type == ShapeType::kBox; }
-
-double tie_length(const ConvexPair& pair) { return std::max(kFaceTie * pair.thinnest, 1e-14 * pair.reach); }
 
 // whether a later axis of this depth replaces an earlier one
 bool beats(const ConvexPair& pair, double depth, double earlier) {
@@ -41,15 +41,12 @@ ContactAxis best_face(const ConvexPair& pair, const Shape& shape, const Matrix3&
   return best;
 }
 
-// cross products of the line directions of both shapes: all axes of a box, the axis of a cylinder
+// cross products of the line directions of both shapes: all axes of a box, the axis of the cylinder b
 void offer_edge_axes(ShallowestAxis* search) {
   const ConvexPair& pair = search->pair();
   for (int i = 0; i < 3; ++i) {
     if (!is_box(pair.a) && i != 1) continue;
-    for (int j = 0; j < 3; ++j) {
-      if (!is_box(pair.b) && j != 1) continue;
-      search->offer(Vector3::Unit(i).cross(pair.R_AB.col(j)), kParallel);
-    }
+    search->offer(Vector3::Unit(i).cross(pair.R_AB.col(1)), kParallel);
   }
 }
 
@@ -125,19 +122,15 @@ bool find_contact_axes(const ConvexPair& pair, double margin, ContactAxes* out) 
   offer_edge_axes(&search);
   if (search.depth() < -margin) return false;
 
-  // for two boxes the 15 axes decide whether they overlap; with a cylinder only the distance does
-  const bool boxes = is_box(pair.a) && is_box(pair.b);
-  const bool axes_overlap = std::min(shallowest.depth, search.depth()) >= -tie_length(pair);
-  if (!boxes || !axes_overlap) {
-    const Vector3& guess = search.depth() < face.depth ? search.best().normal : face.normal;
-    const GjkResult gjk = gjk_separation(pair, guess);
-    if (gjk.separated) {
-      search.offer_signed(gjk.normal);
-      if (search.depth() < -margin) return false;
-      if (!boxes) refine_axis(gjk.normal, &search);
-    } else if (!boxes) {
-      search_curved(&search);
-    }
+  // with a cylinder only the distance decides whether they overlap
+  SupportMapBuffer buffer_a, buffer_b;
+  const PlacedPair placed{support_map_of(pair.a, &buffer_a), support_map_of(pair.b, &buffer_b), pair.R_AB, pair.p_AB};
+  if (const std::optional<Separation> least = find_distance(placed, margin)) {
+    search.offer_signed(least->normal);
+    if (search.depth() < -margin) return false;
+    refine_axis(least->normal, &search);
+  } else {
+    search_curved(&search);
   }
   if (std::min(shallowest.depth, search.depth()) < -margin) return false;
   out->preferred = beats(pair, search.depth(), face.depth) ? search.best() : face;

@@ -1,4 +1,4 @@
-// The contact normal of two boxes or cylinders: the direction n that minimises h(n) of
+// The contact normal of two cylinders, or of a box and a cylinder: the direction n that minimises h(n) of
 // convex_pair.h over the unit sphere.
 //
 // If the solids overlap, a minimum of h can lie only where the boundary of A - B is flat or curves

@@ -10,6 +10,7 @@
 // difference x(n) of the two support points is its gradient and h(n) = n . x(n).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "plugin_sdk/math/types.h"
@@ -22,8 +23,8 @@ struct ConvexPair {
   const Shape& b;
   Matrix3 R_AB;
   Vector3 p_AB;
-  // m, the size of the coordinates that appear: bounding radii and offset together. Rounding errors
-  // of points and depths are a few units of 1e-16 times this.
+  // m, the size of the coordinates that appear: extents and offset together. Rounding errors of points and depths are a
+  // few units of 1e-16 times this.
   double reach;
   // m, smallest half extent of both shapes.
   double thinnest;
@@ -33,8 +34,8 @@ struct ConvexPair {
         b(second),
         R_AB(rotation),
         p_AB(offset),
-        reach(bounding_radius(first) + bounding_radius(second) + std::sqrt(offset.squaredNorm())),
-        thinnest(std::fmin(smallest_half_extent(first), smallest_half_extent(second))) {}
+        reach(first.size.sum() + second.size.sum() + offset.cwiseAbs().sum()),
+        thinnest(std::min(smallest_half_extent(first), smallest_half_extent(second))) {}
 
   // h(n), m; n in A, unit. The shapes are symmetric, so s_B(-n) = s_B(n).
   double depth_along(const Vector3& n) const {
@@ -48,6 +49,13 @@ struct ConvexPair {
 };
 
 // m; places and depths that differ by less count as the same.
-inline double rounding_length(const ConvexPair& pair) { return std::fmax(1e-9 * pair.thinnest, 1e-14 * pair.reach); }
+inline double rounding_length(const ConvexPair& pair) { return std::max(1e-9 * pair.thinnest, 1e-14 * pair.reach); }
+
+// m; of two directions that differ by no more in depth, the one that comes first in order is taken.
+inline double tie_length(const ConvexPair& pair) { return std::max(1e-7 * pair.thinnest, 1e-14 * pair.reach); }
+
+// m; depths closer than this do not decide which points of a large patch are kept. A body at rest trembles by less, so
+// its manifold keeps its features.
+inline double depth_tie(const ConvexPair& pair) { return std::max(1e-6 * pair.thinnest, rounding_length(pair)); }
 
 }  // namespace gravitas::collision

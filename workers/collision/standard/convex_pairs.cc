@@ -1,4 +1,4 @@
-// Boxes and cylinders against each other, in two stages: the contact normal (contact_axis.h), then
+// Cylinders against cylinders and boxes, in two stages: the contact normal (contact_axis.h), then
 // the points along it (patch_contacts.h).
 #include <algorithm>
 
@@ -10,10 +10,6 @@
 
 namespace gravitas::collision {
 namespace {
-
-// Of the thinnest half extent: depths closer than this do not decide which points of a large patch
-// are kept. A body at rest trembles by less, so its manifold keeps its features.
-constexpr double kDepthTie = 1e-6;
 
 // The contacts along `axis`; false if the features that own it miss the depth by more than
 // `shortfall` (m).
@@ -34,7 +30,7 @@ void collide_convex(const Shape& a, const Shape& b, const Placement& placement, 
   // A preferred face may be a little off the least depth. As long as its patch is about as deep as
   // that, a vertex deeper still lies beside it, in touch with nothing.
   const double rounding = rounding_length(pair);
-  ContactCandidates candidates(margin, rounding, std::max(kDepthTie * pair.thinnest, rounding));
+  ContactCandidates candidates(margin, rounding, depth_tie(pair));
   const bool face = axes.preferred.kind != AxisKind::kFree;
   const double shortfall = face ? face_preference(pair, axes.preferred.depth) : rounding;
   if (!contacts_along(pair, axes.preferred, shortfall, &candidates)) {

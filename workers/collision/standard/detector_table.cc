@@ -19,7 +19,7 @@ void collide_nothing(const Shape&, const Shape&, const Placement&, double, Manif
 constexpr std::size_t kOwn = 4;
 constexpr PairFunction kPairFunctions[kOwn][kOwn] = {
     {collide_sphere_sphere, collide_sphere_box, collide_sphere_cylinder, collide_sphere_halfspace},
-    {nullptr, collide_convex, collide_convex, collide_box_halfspace},
+    {nullptr, collide_box_box, collide_convex, collide_box_halfspace},
     {nullptr, nullptr, collide_convex, collide_cylinder_halfspace},
     {nullptr, nullptr, nullptr, collide_nothing},
 };

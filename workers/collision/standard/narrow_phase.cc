@@ -43,10 +43,10 @@ bool surely_apart(const Shape& a, const Shape& b, const Vector3& offset, double 
 
 void collide_in_order(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin,
                       Manifold* out) {
-  const Placement placement{X_WA.orientation.toRotationMatrix(), X_WB.orientation.toRotationMatrix(),
-                            X_WB.position - X_WA.position};
   out->count = 0;
-  if (surely_apart(a, b, placement.p_AB_W, margin)) return;
+  const Vector3 offset = X_WB.position - X_WA.position;
+  if (surely_apart(a, b, offset, margin)) return;
+  const Placement placement{X_WA.orientation.toRotationMatrix(), X_WB.orientation.toRotationMatrix(), offset};
   detector(a.type, b.type)(a, b, placement, margin, out);
   for (int i = 0; i < out->count; ++i) {
     out->contacts[static_cast<std::size_t>(i)].point += X_WA.position;

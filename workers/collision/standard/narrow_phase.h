@@ -8,7 +8,7 @@
 //   cylinder, half-space
 //   box - half-space         closed form                               up to 4 vertices
 //   cylinder - half-space    closed form                               4 of a cap, 2 of a side line
-//   box - box                separating axes (15)                      face clipping, or 1 edge
+//   box - box                separating axes (15, box_axes.h)          face clipping, or 1 edge
 //   box - cylinder,          separating axes and an exact search of    patch clipping: 3 or 4 on a face,
 //   cylinder - cylinder      the curved families (contact_axis.h)      2 on a line, else 1
 //   half-space - half-space  no contact
@@ -17,7 +17,7 @@
 //   mesh - anything          triangle by triangle, through its tree (composite_pairs.h)
 //   compound - anything      child by child
 // For a gap between boxes and cylinders whose closest features own no separating axis, the normal
-// is that of the closest points (gjk.h).
+// is that of the closest points (plugin_sdk/geometry/penetration.h).
 //
 // The convention for the contact point is that of equations 2.70 and 2.82 (the midpoint of the two
 // surface points) for every pair, also where §§ 2.5.3.2, 2.5.3.3 and 4.3.2.15 put it elsewhere.

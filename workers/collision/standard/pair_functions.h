@@ -32,7 +32,10 @@ void collide_box_halfspace(const Shape& a, const Shape& b, const Placement& plac
 void collide_cylinder_halfspace(const Shape& a, const Shape& b, const Placement& placement, double margin,
                                 Manifold* out);
 
-// convex_pairs.cc: box - box, box - cylinder, cylinder - cylinder
+// box_pairs.cc
+void collide_box_box(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
+
+// convex_pairs.cc: box - cylinder, cylinder - cylinder
 void collide_convex(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
 
 // general_pairs.cc: any two convex shapes; a half-space (a) and any bounded convex shape

@@ -19,35 +19,6 @@ namespace {
 
 // ---- face of a box ----
 
-// x: reference face, exactly perpendicular to the normal; y: the other box's face
-void face_against_face(const BoxFace& x, const BoxFace& y, PatchSink* sink) {
-  ClippedPolygon polygon;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Vector3 arm = y.vertices[i] - x.plane.point;
-    polygon.push({x.u.dot(arm), x.v.dot(arm), static_cast<int>(i)});
-  }
-  clip_to_rectangle(x.half_u, x.half_v, sink->tolerance(), &polygon);
-
-  for (int i = 0; i < polygon.count; ++i) {
-    const ClipVertex& vertex = polygon[i];
-    const int in = polygon[(i + polygon.count - 1) % polygon.count].line_out;
-    const int out = vertex.line_out;
-    FeatureCode code_x = x.code;
-    FeatureCode code_y = y.code;
-    // a corner of the subject, a corner of the rectangle, or a crossing of an edge of each
-    if (in < kFirstSide && out < kFirstSide) {
-      code_y = y.vertex_codes[static_cast<std::size_t>(out)];
-    } else if (in >= kFirstSide && out >= kFirstSide) {
-      code_x = x.vertex_codes[static_cast<std::size_t>(rectangle_corner(vertex.x, vertex.y))];
-    } else {
-      code_x = x.edge_codes[static_cast<std::size_t>(std::max(in, out) - kFirstSide)];
-      code_y = y.edge_codes[static_cast<std::size_t>(std::min(in, out))];
-    }
-    const Vector3 place = x.plane.point + vertex.x * x.u + vertex.y * x.v;
-    sink->add(place, x.plane, y.plane, code_x, code_y);
-  }
-}
-
 // x: reference face; y: side line of a cylinder. A clipped end keeps the name of its end.
 void face_against_line(const BoxFace& x, const Line& y, PatchSink* sink) {
   const Vector3 from = y.ends[0] - x.plane.point;
@@ -184,9 +155,7 @@ void cap_against_cap(const Cap& x, const Cap& y, PatchSink* sink) {
 void add_reference_contacts(const FacingShape& x, int face, const FacingShape& y, PatchSink* sink) {
   if (x.is_box()) {
     const BoxFace reference = box_face(x, face);
-    if (y.is_box()) {
-      face_against_face(reference, facing_box_face(y), sink);
-    } else if (cap_faces(y)) {
+    if (cap_faces(y)) {
       face_against_cap(reference, facing_cap(y, reference.u), sink);
     } else {
       face_against_line(reference, facing_line(y), sink);

@@ -41,34 +41,35 @@ ShapeType type_of_kind(SceneShape::Kind kind) {
   return ShapeType::kCompound;
 }
 
-// Types that cost little more to make than to find, so that nothing of them is kept.
-bool is_primitive(std::uint64_t type) {
-  return type == type_id("Sphere") || type == type_id("Box") || type == type_id("Cylinder") ||
-         type == type_id("Halfspace") || type == type_id("Capsule") || type == type_id("Cone");
-}
-
-// Without the heap. Throws Refusal.
-Shape read_primitive(std::uint64_t type, std::span<const double> numbers, std::size_t row) {
-  PropertyCursor cursor(numbers);
-  Shape shape;
+// The primitives cost little more to make than to find, so that nothing of them is kept. False for another type. Without
+// the heap. Throws Refusal.
+bool read_primitive(std::uint64_t type, std::span<const double> numbers, std::size_t row, Shape* out) {
+  Shape& shape = *out = Shape();
+  const auto require = [&](std::size_t count) {
+    if (numbers.size() < count) refuse(row, "has fewer numbers than its properties take");
+  };
   if (type == type_id("Sphere")) {
-    shape.size = Vector3::Constant(cursor.number());
+    require(1);
+    shape.size = Vector3::Constant(numbers[0]);
   } else if (type == type_id("Box")) {
+    require(3);
     shape.type = ShapeType::kBox;
-    shape.size = cursor.vector();
+    shape.size = Vector3(numbers[0], numbers[1], numbers[2]);
   } else if (type == type_id("Halfspace")) {
     shape.type = ShapeType::kHalfspace;
     shape.size = Vector3::Ones();
-  } else {
-    const double radius = cursor.number();
-    shape.size = Vector3(radius, 0.5 * cursor.number(), radius);
+  } else if (type == type_id("Cylinder") || type == type_id("Capsule") || type == type_id("Cone")) {
+    require(2);
+    shape.size = Vector3(numbers[0], 0.5 * numbers[1], numbers[0]);
     shape.type = type == type_id("Cylinder")  ? ShapeType::kCylinder
                  : type == type_id("Capsule") ? ShapeType::kCapsule
                                               : ShapeType::kCone;
+  } else {
+    return false;
   }
   if (!shape.size.allFinite() || !(shape.size.minCoeff() > 0.0))
     refuse(row, "has a size that is not finite and positive");
-  return shape;
+  return true;
 }
 
 StoredShape registered_shape(const RegisteredShape& kind, ShapeType type, std::span<const double> parameters) {
@@ -133,16 +134,14 @@ StoredShape read_shape(std::uint64_t type, std::span<const double> parameters, s
 }
 
 const std::vector<Shape>& ShapeStore::read(const ShapeColumns& shapes) {
-  shapes_.clear();
+  shapes_.resize(shapes.shape_type.size());
   kept_.begin();
   for (std::size_t i = 0; i < shapes.shape_type.size(); ++i) {
     const std::uint64_t type = shapes.shape_type[i];
     const std::span<const double> parameters = shapes.parameters(i);
-    shapes_.push_back(
-        is_primitive(type)
-            ? read_primitive(type, parameters, i)
-            : kept_.get(shapes.shape_hash[i], type, parameters.size(), [&] { return read_shape(type, parameters, i); })
-                  .shape);
+    if (read_primitive(type, parameters, i, &shapes_[i])) continue;
+    shapes_[i] =
+        kept_.get(shapes.shape_hash[i], type, parameters.size(), [&] { return read_shape(type, parameters, i); }).shape;
   }
   kept_.end();
   return shapes_;

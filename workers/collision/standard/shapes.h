@@ -6,6 +6,7 @@
 // only in the sign of the distance between the centres. Other convex shapes bring a support map.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -84,7 +85,7 @@ inline double smallest_half_extent(const Shape& shape) {
       return shape.size.minCoeff();
     case ShapeType::kCylinder:
     case ShapeType::kCone:
-      return std::fmin(shape.size.x(), shape.size.y());
+      return std::min(shape.size.x(), shape.size.y());
     case ShapeType::kSphere:
     case ShapeType::kCapsule:
     case ShapeType::kHalfspace:
