@@ -7,6 +7,7 @@
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/joint_load.h"
 #include "plugin_sdk/merged_rows.h"
 
 namespace gravitas::kernel {
@@ -156,29 +157,28 @@ void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   const DiscrepancyAnswer& d = data_.discrepancies;
   const DiscrepancyColumns columns = d.columns();
+  const std::vector<std::string>& solves = solver_.description().plugins[0].declaration.capabilities;
+  const bool leaves_no_error = std::ranges::find(solves, "closes_joints") != solves.end();
+  const auto body = [&](std::uint32_t i) {
+    if (i == kNone) return JointBody{};
+    return JointBody{pose_of(data_.trial_position, data_.trial_orientation, i),
+                     pose_of(back().position, back().orientation, i), model_.inverse_mass[i],
+                     vector_at(model_.inverse_inertia.span(), i)};
+  };
   for (std::size_t row = 0; row < columns.size();) {
-    const std::uint32_t joint = d.constraint[row];
+    const std::size_t first = row;
+    const std::uint32_t joint = d.constraint[first];
     const ConstraintDescription& description = model_.constraints[joint];
-    const auto poses = [&](const Column<double>& position, const Column<double>& orientation) {
-      return std::pair{pose_of(position, orientation, description.body1),
-                       pose_of(position, orientation, description.body2)};
-    };
-    const auto [trial1, trial2] = poses(data_.trial_position, data_.trial_orientation);
-    const auto [next1, next2] = poses(back().position, back().orientation);
-    double error = 0.0;
-    Vector3 impulse = Vector3::Zero();
-    for (; row < columns.size() && d.constraint[row] == joint; ++row) {
-      const Discrepancy discrepancy = columns.at(row);
-      error = std::max(error, joint_error(discrepancy, error_at(discrepancy, trial1, trial2, next1, next2)));
-      if (!discrepancy.is_angular()) impulse += discrepancy.axes * vector_at(data_.discrepancy_impulse.span(), row);
-    }
-    const double force = impulse.norm() / data_.time_step[0];
-    const bool breaks = (description.breaking_threshold > 0.0 && error > description.breaking_threshold) ||
-                        (description.breaking_force > 0.0 && force > description.breaking_force);
+    while (row < columns.size() && d.constraint[row] == joint) ++row;
+    const JointLoad load = joint_load(columns, data_.discrepancy_impulse.span(), first, row, body(description.body1),
+                                      body(description.body2), data_.time_step[0]);
+    const bool breaks = (description.breaking_threshold > 0.0 &&
+                         (leaves_no_error ? load.held : load.error) > description.breaking_threshold) ||
+                        (description.breaking_force > 0.0 && load.force > description.breaking_force);
     if (breaks) {
       back().intact[joint] = 0;
     } else {
-      figures_.joint_error = std::max(figures_.joint_error, error);
+      figures_.joint_error = std::max(figures_.joint_error, load.error);
     }
   }
 }

@@ -10,6 +10,7 @@
 #include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/constraint.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/joint_load.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
@@ -349,6 +350,22 @@ TEST(DiscrepancyLoad, IsTheWayThatTheImpulseKeptFrom) {
   EXPECT_NEAR(held_back(d, -Vector3::UnitY(), h, middle, rod, middle, rod), h * 8 * 0.5, 1e-16);
   d.modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked, true);
   EXPECT_EQ(held_back(d, Vector3::UnitY(), h, Vector3::Zero(), world, middle, rod), 0.0);
+}
+
+// A pair of rods end to end, held by two rows at one point that share the load; the second row is off by 1 mm.
+TEST(DiscrepancyLoad, OfAJointIsItsWorstRowAndTheSumOfItsForces) {
+  const std::vector<double> point(6, 0.0), moved{0, 0, 0, 0, 1e-3, 0}, zero(6, 0.0), correction(2, 1.0);
+  const std::vector<double> axes{1, 0, 0, 0, 1, 0, 0, 0}, impulses{3, 0, 0, 0, 4, 0};
+  const std::vector<double> unlimited(6, kUnlimited);
+  const std::uint32_t locked = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked);
+  const std::vector<std::uint32_t> modes{locked, locked};
+  const DiscrepancyColumns rows{point, moved, zero, correction, axes, modes, zero, zero, zero, zero, unlimited};
+  JointBody one, two;
+  one.inverse_mass = two.inverse_mass = 0.5;
+  const JointLoad load = joint_load(rows, impulses, 0, 2, one, two, 0.01);
+  EXPECT_DOUBLE_EQ(load.error, 1e-3);
+  EXPECT_DOUBLE_EQ(load.force, 500.0);
+  EXPECT_DOUBLE_EQ(load.held, 4.0 * 0.01);
 }
 
 }  // namespace

@@ -125,5 +125,23 @@ TEST_P(Motor, JointBreaksBeyondItsThreshold) {
   EXPECT_GT(breaks.body("Ball").pose.position.norm(), 10.0);
 }
 
+// Newton leaves no error: what the threshold is judged on is how far the impulse held the joint, g h^2 of a ball that hangs.
+TEST_P(Motor, JointThatIsLeftNoErrorBreaksByWhatItHolds) {
+  const auto holds = [&](const char* solver, double threshold) {
+    SceneRun run("pendulum.gravitas",
+                 with({set("Body.Ball.Position", Vector3(0, -1, 0)), std::string("Solver=") + solver,
+                       set("Constraint.Pivot.BreakingThreshold", threshold)}));
+    run.steps(100);
+    EXPECT_EQ(run.count_events(kernel::EventKind::kBreak), run.holds("Pivot") ? 0U : 1U);
+    return run.holds("Pivot");
+  };
+  const double held = kG * 1e-3 * 1e-3;
+  for (const char* solver : {"Newton", "Direct"}) {
+    EXPECT_TRUE(holds(solver, held * (1.0 + 1e-6))) << solver;
+    EXPECT_FALSE(holds(solver, held * (1.0 - 1e-6))) << solver;
+  }
+  EXPECT_TRUE(holds("Sequential", held * (1.0 - 1e-6)));
+}
+
 }  // namespace
 }  // namespace gravitas
