@@ -154,6 +154,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();
   void find_sleepers();
+  void let_sleep(std::uint32_t body, bool sleeps);
   bool does_anything_move() const;
   bool is_awake(std::uint32_t body) const { return body != kNone && (data_.flags[body] & kMovable) != 0; }
   bool sleeps(const ConstraintDescription& joint) const {

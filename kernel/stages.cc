@@ -82,8 +82,8 @@ void Environment::begin_inner_step(double begin, double length) {
 
 Trusted<TrialState> Environment::integrate() {
   const auto request =
-      ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, model_.inverse_mass, model_.inertia,
-          model_.inverse_inertia, model_.damping, data_.wrench, front().position, front().orientation,
+      ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, data_.inverse_mass, model_.inertia,
+          data_.inverse_inertia, model_.damping, data_.wrench, front().position, front().orientation,
           start_linear_velocity(), start_angular_velocity(), front().plugin_state, front().state_changed);
   const auto reply = ids(data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                          data_.trial_angular_velocity, data_.error_estimate, data_.next_plugin_state);
@@ -294,7 +294,7 @@ Trusted<Solution> Environment::solve() {
   const DiscrepancyAnswer& joints = data_.discrepancies;
   const Column<double>& wrench = wrench_is_constant_ ? data_.wrench : data_.start_wrench;
   const auto request =
-      ids(data_.time_step, data_.theta, data_.flags, model_.inverse_mass, model_.inverse_inertia, front().position,
+      ids(data_.time_step, data_.theta, data_.flags, data_.inverse_mass, data_.inverse_inertia, front().position,
           front().orientation, start_linear_velocity(), start_angular_velocity(), data_.trial_position,
           data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity, wrench,
           data_.discrepancy_body, joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes,

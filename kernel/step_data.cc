@@ -61,7 +61,10 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   time = Column<double>(arena, 1, 0), time_step = Column<double>(arena, 1, 0), theta = Column<double>(arena, 1, 0);
   margin = Column<double>(arena, 1, 0);
   wrench_is_constant = Column<std::uint32_t>(arena, 1, 0);
-  flags = d.sleep.energy > 0.0 ? Column<std::uint32_t>(arena, n, 0) : model.flags;
+  const bool can_sleep = d.sleep.energy > 0.0;
+  flags = can_sleep ? Column<std::uint32_t>(arena, n, 0) : model.flags;
+  inverse_mass = can_sleep ? bodies(1) : model.inverse_mass;
+  inverse_inertia = can_sleep ? bodies(3) : model.inverse_inertia;
 
   const bool is_smooth = d.simulator == Simulator::kSmooth && has_joints;
   const bool has_forces = model.application_count > 0 || is_smooth;

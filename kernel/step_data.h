@@ -40,6 +40,7 @@ struct StepData {
   Column<std::uint32_t> wrench_is_constant;
   // Of bodies, as this step has them: who sleeps is immovable. Written at its start; the model's where nothing sleeps.
   Column<std::uint32_t> flags;
+  Column<double> inverse_mass, inverse_inertia;
 
   // Velocities at the start of the step: those of S_n plus instantaneous impulses. Written at its start, and
   // only in a step that has such impulses.

@@ -9,15 +9,16 @@
 //
 // So what flies or drifts freely never sleeps, however slow it is. What is held and slow is told from what rests by its
 // speed alone, and no threshold can tell a slide of a micrometre a second from rest: the default energy is that of
-// 1.4e-6 m/s, far above what solvers leave of a body at rest (1e-15 m/s in stacks) and far below what is meant to move.
-// The time bridges turning points: a pendulum of length l is slower than v for 2 v/a at the end of a swing of amplitude
-// a g/l, and a thrown ball 2 v/g. What swings or slides more slowly than that all the time is stopped; a scene about such
-// motions sets the energy to 0, or CanSleep = false.
+// 1.4e-6 m/s, far above what solvers leave of a body at rest (1e-15 m/s in stacks) and far below what is meant to
+// move. The time bridges turning points: with the acceleration a, what turns back is slower than v for 2 v/a, in the
+// gravity of the Earth 3e-7 s of a throw. What swings or slides more slowly than that all the time is stopped, and what
+// starts more slowly than that out of an unstable balance stays in it; a scene about such motions sets the energy to 0,
+// or CanSleep = false.
 //
 // Asleep, a body has velocity 0, and nothing moves it until its whole island is woken: by a contact or a joint with what
-// moves, by the user, by another plugin in a slot, or by a force that changes; and while forces change, no body is at rest.
+// moves, by the user, by another plugin in a slot, or by a force that changes; and while forces change, nothing rests.
 // A force has changed when the difference to what it was when the rest began, were it alone, would in SleepRule::time
-// bring the body to SleepRule::energy.
+// bring the body to SleepRule::energy. A joint whose drive depends on time alone wakes nobody; no shipped one does.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-// Who sleeps takes no part in a step: immovable for integrator and solver, in no pair with another that stands still, its
-// joints not asked; what is remembered of its contacts and joints goes on to the next state. The space keeps it, so that
-// what comes near is found.
+// Who sleeps takes no part in a step: immovable for integrator and solver, in no pair with another that stands still,
+// its joints not asked; what is remembered of its contacts and joints goes on to the next state. The space keeps it, so
+// that what comes near is found. Forces that are not constant are asked for it, too: that is how a change is seen.
 //
 //   at the step's start        those asleep, but for islands that the user or another plugin wakes
 //   when contacts at S* are    islands that something moving touches, leaves or holds by a joint, or whose forces have
@@ -9,7 +9,6 @@
 //
 // A step in which nothing moves is that of the clock alone. plugin_sdk/activity.h has the rule.
 #include <algorithm>
-#include <utility>
 
 #include "kernel/environment.h"
 
@@ -29,22 +28,30 @@ void Environment::find_sleepers() {
   if (!can_sleep()) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const bool is_asleep = front().rested[i] == kAsleep && !wakes_all_;
-    data_.flags[i] = is_asleep ? model_.flags[i] & ~std::uint32_t{kMovable} : model_.flags[i];
+    let_sleep(i, is_asleep);
     sleepers_ += is_asleep ? 1 : 0;
   }
   for (const std::uint32_t body : wake_orders_) wake_island(body);
 }
 
+void Environment::let_sleep(std::uint32_t body, bool sleeps) {
+  const std::uint32_t flags = sleeps ? model_.flags[body] & ~std::uint32_t{kMovable} : model_.flags[body];
+  if (data_.flags[body] == flags) return;
+  data_.flags[body] = flags;
+  data_.inverse_mass[body] = sleeps ? 0.0 : model_.inverse_mass[body];
+  set_vector(data_.inverse_inertia.span(), body,
+             sleeps ? Vector3(Vector3::Zero()) : vector_at(model_.inverse_inertia.span(), body));
+}
+
 bool Environment::does_anything_move() const {
   if (sleepers_ == 0 || !wrench_is_constant_ || !model_.curves.empty()) return model_.body_count > 0;
-  const auto turns = [&](std::uint32_t body) {
-    return !vector_at(front().linear_velocity.span(), body).isZero(0.0) ||
-           !vector_at(front().angular_velocity.span(), body).isZero(0.0);
-  };
-  for (std::uint32_t i = 0; i < model_.body_count; ++i)
-    if (is_awake(i) || ((model_.flags[i] & kKinematic) != 0 && turns(i))) return true;
-  // faults are ordered for calls
-  return std::ranges::any_of(slots_, &StageSlot::has_order);
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    if (is_awake(i)) return true;
+    if ((model_.flags[i] & kKinematic) != 0 && (!vector_at(front().linear_velocity.span(), i).isZero(0.0) ||
+                                                !vector_at(front().angular_velocity.span(), i).isZero(0.0)))
+      return true;
+  }
+  return std::ranges::any_of(slots_, &StageSlot::has_order);  // a fault is ordered for a call
 }
 
 // A kinematic body that goes elsewhere in this step.
@@ -81,15 +88,13 @@ void Environment::look_for_pushes() {
 // With contacts at S* in place. True if somebody has been woken, and the step is to be made again.
 bool Environment::wakes_sleepers() {
   const std::uint32_t before = sleepers_;
-  const auto sleeps = [&](std::uint32_t body) { return body != kNone && data_.flags[body] != model_.flags[body]; };
-  for (const std::uint32_t body : data_.contact_body.span())
-    if (sleeps(body)) wake_island(body);
+  for (const std::uint32_t body : data_.contact_body.span()) wake_island(body);
   const Connections connected = connections();
   for (const std::span<const std::uint32_t> pairs : {connected.contacts, connected.joints}) {
     for (std::size_t i = 0; i < pairs.size(); i += 2) {
       const std::uint32_t a = pairs[i], b = pairs[i + 1];
-      if (sleeps(a) && is_carrying(b)) wake_island(a);
-      if (sleeps(b) && is_carrying(a)) wake_island(b);
+      if (is_carrying(b)) wake_island(a);
+      if (is_carrying(a)) wake_island(b);
     }
   }
   for (const std::uint32_t body : pushed_) wake_island(body);
@@ -98,10 +103,10 @@ bool Environment::wakes_sleepers() {
 }
 
 void Environment::wake_island(std::uint32_t body) {
-  if (!can_sleep() || data_.flags[body] == model_.flags[body]) return;
+  if (!can_sleep() || body == kNone || data_.flags[body] == model_.flags[body]) return;
   const auto sleeps = [&](std::uint32_t i) { return data_.flags[i] != model_.flags[i]; };
   for (const std::uint32_t one : activity_.sleepers_with(body, model_.body_count, connections(), sleeps)) {
-    data_.flags[one] = model_.flags[one];
+    let_sleep(one, false);
     --sleepers_;
   }
 }

@@ -1,4 +1,4 @@
-// Sleep and wake in worlds made by hand: what is kept, what it costs, and that no fault and no stop changes a bit of it.
+// Sleep and wake in worlds made by hand: what is kept, what it costs, and that no fault or stop changes a bit of it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -99,23 +99,46 @@ TEST(Sleep, AContactWakesTheIslandAndNoOther) {
   }
 }
 
-// A ball of equal mass at rest takes (1 + e)/2 of the other's speed, asleep or not.
+// A ball at rest (1) and one of equal mass that comes and takes (1 + e)/2 of its speed, asleep or not.
+void expect_an_impact_upon_a_sleeper(Simulator simulator, const std::string& integrator,
+                                     const std::vector<double>& settings = {}) {
+  WorldBuilder builder;
+  builder.steps(150, kTimeStep).material({0.5, 0.0, 0.0, 0.0}).ground();
+  builder.plugin(Slot::kIntegrator, plugin_path(integrator), settings);
+  builder.sphere(0.5, 1.0, Vector3(0, 0.5, 0)).sphere(0.5, 1.0, Vector3(-3, 0.5, 0), Vector3(2, 0, 0));
+  may_sleep(&builder).gravity(kDown);
+  builder.description().simulator = simulator;
+  builder.description().substeps = 2;
+  Environment world(builder.description());
+  run(&world, kAsleepBy);
+  EXPECT_TRUE(world.is_asleep(1));
+  EXPECT_FALSE(world.is_asleep(2));
+  run(&world, 90);
+  EXPECT_FALSE(world.is_asleep(1));
+  EXPECT_NEAR(velocity(world, 1).x(), 1.5, 1e-9);
+  EXPECT_NEAR(velocity(world, 2).x(), 0.5, 1e-9);
+  EXPECT_NEAR(position(world, 1).y(), 0.5, 1e-6);
+}
+
 TEST(Sleep, ASleeperTakesAnImpactAsOneThatIsAwake) {
   for (const Simulator simulator :
-       {Simulator::kBasic, Simulator::kSubstepping, Simulator::kBisection, Simulator::kContinuous}) {
-    WorldBuilder builder;
-    builder.steps(150, kTimeStep).material({0.5, 0.0, 0.0, 0.0}).ground();
-    builder.sphere(0.5, 1.0, Vector3(0, 0.5, 0)).sphere(0.5, 1.0, Vector3(-3, 0.5, 0), Vector3(2, 0, 0));
-    may_sleep(&builder).gravity(kDown);
-    builder.description().simulator = simulator;
-    builder.description().substeps = 2;
-    Environment world(builder.description());
-    run(&world, kAsleepBy);
-    EXPECT_TRUE(world.is_asleep(1));
-    run(&world, 90);
-    EXPECT_FALSE(world.is_asleep(1));
-    EXPECT_NEAR(velocity(world, 1).x(), 1.5, 1e-9);
-    EXPECT_NEAR(velocity(world, 2).x(), 0.5, 1e-9);
+       {Simulator::kBasic, Simulator::kSubstepping, Simulator::kBisection, Simulator::kContinuous})
+    expect_an_impact_upon_a_sleeper(simulator, "integrator_semi_implicit_euler");
+}
+
+TEST(Sleep, EveryIntegratorLeavesSleepersAloneAndTakesThemUpAgain) {
+  const std::vector<std::pair<std::string, std::vector<double>>> integrators = {{"euler", {}},
+                                                                                {"verlet", {}},
+                                                                                {"basic_verlet", {}},
+                                                                                {"rk4", {}},
+                                                                                {"rkmk4", {}},
+                                                                                {"implicit_midpoint", {}},
+                                                                                {"symplectic_splitting", {4}},
+                                                                                {"dormand_prince54", {1e-8}},
+                                                                                {"rosenbrock", {1e-6}}};
+  for (const auto& [integrator, settings] : integrators) {
+    SCOPED_TRACE(integrator);
+    expect_an_impact_upon_a_sleeper(Simulator::kBasic, "integrator_" + integrator, settings);
   }
 }
 

@@ -58,7 +58,8 @@ INSTANTIATE_TEST_SUITE_P(
     Scene, Resume,
     ::testing::Values(Case{"bounce", 240, 100}, Case{"double_pendulum", 240, 77}, Case{"pendulum", 200, 100},
                       Case{"sliding_boxes", 240, 120}, Case{"slope", 200, 50}, Case{"stack", 300, 251},
-                      Case{"thruster", 200, 99}, Case{"two_spheres_motor", 300, 130}, Case{kCallbacks.c_str(), 120, 60},
+                      Case{"stack", 260, 120, {}, "_asleep"}, Case{"thruster", 200, 99},
+                      Case{"two_spheres_motor", 300, 130}, Case{kCallbacks.c_str(), 120, 60},
                       Case{kPile.c_str(), 120, 64}, Case{"bounce", 240, 101, {"Simulator=Continuous"}, "_continuous"},
                       Case{"stack", 60, 33, {"Simulator=Substepping", "Simulator.Substeps=3"}, "_substepping"}),
     [](const auto& which) {
