@@ -175,11 +175,8 @@ void Environment::update_joints() {
     const bool breaks = (description.breaking_threshold > 0.0 &&
                          (leaves_no_error ? load.held : load.error) > description.breaking_threshold) ||
                         (description.breaking_force > 0.0 && load.force > description.breaking_force);
-    if (breaks) {
-      back().intact[joint] = 0;
-    } else {
-      figures_.joint_error = std::max(figures_.joint_error, load.error);
-    }
+    back().intact[joint] = breaks ? 0 : 1;
+    if (!breaks) figures_.joint_error = std::max(figures_.joint_error, load.error);
   }
 }
 
