@@ -318,7 +318,7 @@ TEST(ContactProblems, ARodFallsOverToFirstOrder) {
     builder.ground().sphere(radius, 1.0, {0, radius + 0.5 * std::cos(tilt), 0});
     builder.body().inertia = Vector3(1.0 / 12.0, 1e-4, 1.0 / 12.0);
     builder.body().pose.orientation = exp_rotation(Vector3(0, 0, -tilt));
-    builder.body().bound = {kernel::BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(),
+    builder.body().bound = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(),
                             Vector3::Constant(0.5 + radius)};
     builder.description().shapes.back() = {"rod", "Capsule", {radius, 1.0}};
     builder.gravity({0, -kGravity, 0});
