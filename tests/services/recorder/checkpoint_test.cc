@@ -108,8 +108,8 @@ TEST(Checkpoint, EachRefusalSaysWhatItIs) {
     return sealed_again(other);
   };
   EXPECT_THAT(refusal(with(0, 'x')), HasSubstr("not a checkpoint of Gravitas"));
-  EXPECT_THAT(refusal(with(8, 0)), HasSubstr("format is version 0; this build reads version 1"));
-  EXPECT_THAT(refusal(with(8, 2)), HasSubstr("format is version 2"));
+  EXPECT_THAT(refusal(with(8, 0)), HasSubstr("format is version 0; this build reads version 2"));
+  EXPECT_THAT(refusal(with(8, 1)), HasSubstr("format is version 1"));
   std::vector<std::byte> schema = bytes;
   schema[16] ^= std::byte{1};
   EXPECT_THAT(refusal(sealed_again(schema)), HasSubstr("schema is not that of this build"));
