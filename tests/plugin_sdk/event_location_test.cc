@@ -7,6 +7,20 @@
 namespace gravitas {
 namespace {
 
+// Up at 0.01 m/s and back at 0.03 m/s in 4 ms: it is at the top of its flight, 5e-6 m, after 1 ms.
+TEST(NextStop, FollowsAFlightToItsTop) {
+  EXPECT_NEAR(stop_before({0.0, 0.0, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
+}
+
+// The straight motion to the end of the trial goes down at once, the bent one does not.
+TEST(NextStop, FollowsAFlightToItsTopThoughTheStraightMotionMeetsBefore) {
+  EXPECT_NEAR(stop_before({1e-5, 2e-10, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
+}
+
+TEST(NextStop, TakesFlightsLowerThanTheTargetForRest) {
+  EXPECT_EQ(stop_before({0.0, 0.0, 1e-6, -0.04}, 0.004, 1e-10, 1e-9).length, 0.004);
+}
+
 const Vector3 kUp(0, 1, 0);
 
 // mu g = 3 m/s^2 on 2 kg, in a trial of `length` of a slide that began at 3 m/s.
