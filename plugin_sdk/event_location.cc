@@ -8,12 +8,14 @@ namespace gravitas {
 
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight) {
   const double acceleration = (encounter.end_speed - encounter.start_speed) / length;
-  if (encounter.fraction <= 0.0) {
-    if (encounter.start_speed <= 0.0 || encounter.end_speed >= 0.0) return {length};
-    const double top = encounter.start_speed / -acceleration;
-    return {2.0 * top <= shortest_flight ? length : std::min(length, top)};
-  }
   const double time = encounter.fraction * length;
+  const bool comes_back = encounter.start_speed > 0.0 && encounter.end_speed < 0.0;
+  const double top = comes_back ? encounter.start_speed / -acceleration : 0.0;
+  if (comes_back && top >= time) {
+    const bool rests = 2.0 * top <= shortest_flight || 0.5 * encounter.start_speed * top <= target_gap;
+    return {rests ? length : std::min(length, top)};
+  }
+  if (encounter.fraction <= 0.0) return {length};
   if (encounter.gap > target_gap) return {time};
   const double closing = -(encounter.start_speed + acceleration * time);
   const double bend = 0.5 * std::fabs(acceleration) * time;

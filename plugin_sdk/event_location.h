@@ -21,8 +21,9 @@ struct NextStop {
 
 // The longest inner step, up to `length` (that of the trial), that an encounter allows.
 //
-// A pair that starts closed and parts, to come back within the trial, is followed to the top of its flight; flights
-// shorter than `shortest_flight` are none: the pair rests. One that comes from afar is met where the trial, taken for
+// A pair that starts closed and parts, to come back within the trial, is followed to the top of its flight, and so is one
+// that the straight motion lets meet before; flights shorter than `shortest_flight`, or lower than the target gap, are
+// none: the pair rests. One that comes from afar is met where the trial, taken for
 // the straight motion between its ends, deviates from it by less than half the target (by |a| t (length - t) / 2 at the
 // time t). Until then trials are shortened to twice the time of the meeting, and steps end before it, each squaring the
 // distance. The step that meets ends a little after it, two target gaps deep, so that the contact is closed.

@@ -22,10 +22,10 @@ class TableWriter final : public ::testing::Environment {
     if (table_folder() == nullptr || rows().empty()) return;
     std::ofstream out(std::string(table_folder()) + "/PROBLEMS.md");
     out << "# Reference problems: wanted and reached\n\n"
-           "Written by `GRAVITAS_TABLES=tests/numerics GRAVITAS_LONG_PROBLEMS=1 build/release/bin/test_numerics`.\n"
-           "Hosting direct, one thread; CPU time of the whole run, start included. Rows marked * miss their target: "
-           "the\n"
-           "README of this folder says why.\n\n"
+           "Written by `GRAVITAS_TABLES=tests/numerics build/release/bin/test_numerics`; with "
+           "`GRAVITAS_LONG_PROBLEMS=1`\n"
+           "runs have their full length. Hosting direct, one thread; CPU time of the run. Rows marked * miss what is\n"
+           "wanted: the README of this folder says why.\n\n"
            "| problem | method | figure | wanted | reached | CPU, s |\n| --- | --- | --- | --- | --- | --- |\n";
     for (const Reached& row : rows()) {
       char numbers[96];

@@ -79,22 +79,17 @@ TEST(EventLocation, WhatTheDetectorDidNotFollowToTheEndIsLookedAtAgain) {
   EXPECT_DOUBLE_EQ(stop.length, 0.005);
 }
 
-TEST(EventLocation, AFlightThatEndsWithinTheStepIsFollowedToItsTop) {
-  const double speed = 0.02, length = 0.01;  // its top after 2 ms, back after 4
-  const Encounter encounter = Flight{0.0, speed}.encounter(length);
-  EXPECT_DOUBLE_EQ(stop_before(encounter, length, kTargetGap, kShortestFlight).length, speed / kGravity);
-}
-
 TEST(EventLocation, PairsThatRestPartOrPressNeedNoStop) {
   const double length = 0.01;
   const auto stop = [&](double start_speed, double end_speed) {
     return stop_before({0.0, 0.0, start_speed, end_speed}, length, kTargetGap, kShortestFlight).length;
   };
-  EXPECT_EQ(stop(0.0, -kGravity * length), length);                               // rests
-  EXPECT_EQ(stop(-1.0, -2.0), length);                                            // pressed: the solver's
-  EXPECT_EQ(stop(1.0, 0.5), length);                                              // parts
-  EXPECT_EQ(stop(0.4 * kShortestFlight * kGravity, -kGravity * length), length);  // a flight too short to be one
-  EXPECT_LT(stop(0.6 * kShortestFlight * kGravity, -kGravity * length), length);
+  EXPECT_EQ(stop(0.0, -kGravity * length), length);  // rests
+  EXPECT_EQ(stop(-1.0, -2.0), length);               // pressed: the solver's
+  EXPECT_EQ(stop(1.0, 0.5), length);                 // parts
+  // flights of 5e-12 m and 2e-11 m
+  EXPECT_EQ(stop(1e-5, -kGravity * length), length);
+  EXPECT_LT(stop(2e-5, -kGravity * length), length);
 }
 
 TEST(EventLocation, GrazingIsNotWorthAStep) {
@@ -102,6 +97,20 @@ TEST(EventLocation, GrazingIsNotWorthAStep) {
   const NextStop stop = stop_before({0.999, kTargetGap, -1e-9, -1e-9}, 0.01, kTargetGap, kShortestFlight);
   EXPECT_FALSE(stop.is_trial);
   EXPECT_EQ(stop.length, 0.01);
+}
+
+// Up at 0.01 m/s and back at 0.03 m/s in 4 ms: it is at the top of its flight, 5e-6 m, after 1 ms.
+TEST(NextStop, FollowsAFlightToItsTop) {
+  EXPECT_NEAR(stop_before({0.0, 0.0, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
+}
+
+// The straight motion to the end of the trial goes down at once, the bent one does not.
+TEST(NextStop, FollowsAFlightToItsTopThoughTheStraightMotionMeetsBefore) {
+  EXPECT_NEAR(stop_before({1e-5, 2e-10, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
+}
+
+TEST(NextStop, TakesFlightsLowerThanTheTargetForRest) {
+  EXPECT_EQ(stop_before({0.0, 0.0, 1e-6, -0.04}, 0.004, 1e-10, 1e-9).length, 0.004);
 }
 
 // ---- slides -------------------------------------------------------------------------------------
