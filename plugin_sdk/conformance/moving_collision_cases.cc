@@ -216,8 +216,8 @@ void judge_seen(Subject& subject) {
   }
 }
 
-// Shape casts: bodies that do not turn. To cast a at b is to cast b at a the other way, and a cast that begins on the way
-// ends in the same place.
+// Shape casts: bodies that do not turn. To cast a at b is to cast b at a the other way, and a cast that begins on the
+// way ends in the same place.
 void judge_casts(Subject& subject) {
   const std::vector<TypeDeclaration> types = convex_types(subject);
   Draw draw(84);

@@ -12,8 +12,8 @@ namespace {
 using Lanes = __m256d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Sine of the angle of two edges below which their cross product is rounding. What they stand for is a sliver: leaving it
-// out costs less than 1e-8 of an edge length in depth.
+// Sine of the angle of two edges below which their cross product is rounding. What they stand for is a sliver: leaving
+// it out costs less than 1e-8 of an edge length in depth.
 constexpr double kParallel = 1e-8;
 
 Lanes all(double x) { return _mm256_set1_pd(x); }

@@ -1,9 +1,9 @@
 // Box against box by the 15 separating axes of § 4.3.2.3: the normals of the faces and the cross products of the edges.
 //
-// One of them has the least depth if the boxes overlap, and then its features meet: a face of one and what of the other's
-// facing face lies over it, or two edges. Apart, an axis proves its gap, and the gap is the distance if the features that
-// own the axis lie opposite each other. Only where they do not (a vertex off a vertex, off an edge, parallel edges), the
-// normal is that of the closest points.
+// One of them has the least depth if the boxes overlap, and then its features meet: a face of one and what of the
+// other's facing face lies over it, or two edges. Apart, an axis proves its gap, and the gap is the distance if the
+// features that own the axis lie opposite each other. Only where they do not (a vertex off a vertex, off an edge,
+// parallel edges), the normal is that of the closest points.
 #include <algorithm>
 #include <array>
 #include <cmath>

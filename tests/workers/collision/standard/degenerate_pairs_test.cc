@@ -1,5 +1,5 @@
-// Pairs at which a method may lose its direction: touching exactly, corner on corner, edges that are parallel or nearly so,
-// one inside the other, needles and sheets. The answers are known beforehand, or those of the SDK's search by support
+// Pairs at which a method may lose its direction: touching exactly, corner on corner, edges that are parallel or nearly
+// so, one inside the other, needles and sheets. The answers are known beforehand, or those of the SDK's search by support
 // points, which knows nothing of axes.
 #include <gtest/gtest.h>
 
@@ -122,8 +122,8 @@ TEST(DegeneratePairs, NearlyParallelEdges) {
         const double least = least_depth(a, X_A, b, X_B);
         const ContactList contacts = all_contacts(a, X_A, b, X_B, 10.0);
         ASSERT_GT(contacts.size(), 0U);
-        // a face is preferred by 1 % of the depth, and by 1e-7 of the thinnest half extent; points count as equally deep
-        // up to 1e-6 of it
+        // a face is preferred by 1 % of the depth, and by 1e-7 of the thinnest half extent; points count as equally
+        // deep up to 1e-6 of it
         EXPECT_NEAR(contacts.deepest(), least, 0.0102 * std::max(least, 0.0) + 1.3e-6)
             << angle << (is_near ? ", near" : "");
         X_B.position += (contacts.deepest() + random.uniform(-1e-4, 1e-4)) * contacts[0].normal;
