@@ -113,10 +113,12 @@ class Balance {
       const Vector3 normal = vector_at(request_.contact_normal(), i);
       const double* material = &request_.contact_material()[kMaterialColumns * i];
       const double turning = std::max(0.0, along) * (material[kRollingFriction] + material[kSpinningFriction]);
+      // from the middle to either surface
+      const double to_surface = 0.5 * std::fabs(request_.contact_depth()[i]) * normal.cross(impulse).norm();
       for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i),
                [&](Pushes& body, const Vector3& arm, double sign) {
                  push_at(arm, sign * impulse, &body.velocity);
-                 body.velocity.unreported += turning;
+                 body.velocity.unreported += turning + to_surface;
                  push_at(arm, sign * correction * normal, &body.pose);
                  push_at(arm, sign * share * friction, &body.pose);
                  // of an impulse that is taken apart, rounding stays

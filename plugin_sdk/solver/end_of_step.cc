@@ -48,8 +48,8 @@ class IslandSolver {
       has_settled_ = change <= 4.0 * share * summary_.residual;
       if (has_settled_) break;
     }
-    // settled or not, the pose change answered is that of the impulses answered
-    if (change > 0.0) solve_pose();
+    // the pose change answered is that of the impulses answered; where they do not settle it must not move their rows away
+    if (has_settled_ && change > 0.0) solve_pose();
     summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
     store();
     return summary_;
