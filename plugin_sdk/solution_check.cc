@@ -124,7 +124,7 @@ class Balance {
                  // of an impulse that is taken apart, rounding stays
                  body.pose.size += share * impulse.norm();
                  body.pose.moment += share * impulse.norm() * arm.norm();
-                 body.pose.unreported += share * turning;
+                 body.pose.unreported += share * (turning + to_surface);
                  loosen(share * friction.norm(), arm, &body);
                });
     }
