@@ -281,8 +281,8 @@ TEST(Sleep, ChangesNoBitOfThoseAwake) {
     std::vector<double> motion;
     for (int i = 0; i < 250; ++i) {
       run(&world, 1);
-      motion.insert(motion.end(), &world.state().position[3], &world.state().position[9]);
-      motion.insert(motion.end(), &world.state().linear_velocity[3], &world.state().linear_velocity[9]);
+      motion.insert(motion.end(), world.state().position.data() + 3, world.state().position.data() + 9);
+      motion.insert(motion.end(), world.state().linear_velocity.data() + 3, world.state().linear_velocity.data() + 9);
     }
     return motion;
   };
