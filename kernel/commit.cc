@@ -132,8 +132,8 @@ void Environment::remember_contacts() {
   const auto goes_on = [&](std::size_t i) {
     return !is_awake(old.contact_body[2 * i]) && !is_awake(old.contact_body[2 * i + 1]);
   };
-  merge_rows(data_.contact_key.size(), key(data_.contact_body, data_.contact_feature), old.contact_key.size(),
-             key(old.contact_body, old.contact_feature), goes_on, &merged_);
+  merge_rows(data_.contact_key.size(), key(data_.contact_body, data_.contact_feature),
+             sleepers_ > 0 ? old.contact_key.size() : 0, key(old.contact_body, old.contact_feature), goes_on, &merged_);
   copy_rows(merged_, 2, data_.contact_body, old.contact_body, back().contact_body);
   copy_rows(merged_, 1, data_.contact_feature, old.contact_feature, back().contact_feature);
   copy_rows(merged_, 1, data_.contact_key, old.contact_key, back().contact_key);
@@ -146,7 +146,7 @@ void Environment::remember_joints() {
   const Column<std::uint32_t>&now = data_.discrepancies.constraint, &before = old.discrepancy_constraint;
   const auto key = [](const Column<std::uint32_t>& joint) { return [&](std::size_t i) { return joint[i]; }; };
   const auto goes_on = [&](std::size_t i) { return sleeps(model_.constraints[before[i]]); };
-  merge_rows(now.size(), key(now), before.size(), key(before), goes_on, &merged_);
+  merge_rows(now.size(), key(now), sleepers_ > 0 ? before.size() : 0, key(before), goes_on, &merged_);
   copy_rows(merged_, 1, now, before, back().discrepancy_constraint);
   copy_rows(merged_, 3, data_.discrepancy_impulse, old.discrepancy_impulse, back().discrepancy_impulse);
   copy_rows(merged_, 3, data_.discrepancy_correction, old.discrepancy_correction, back().discrepancy_correction);
@@ -170,11 +170,13 @@ void Environment::update_joints() {
     const std::uint32_t joint = d.constraint[first];
     const ConstraintDescription& description = model_.constraints[joint];
     while (row < columns.size() && d.constraint[row] == joint) ++row;
-    const JointLoad load = joint_load(columns, data_.discrepancy_impulse.span(), first, row, body(description.body1),
-                                      body(description.body2), data_.time_step[0]);
-    const bool breaks = (description.breaking_threshold > 0.0 &&
-                         (leaves_no_error ? load.held : load.error) > description.breaking_threshold) ||
-                        (description.breaking_force > 0.0 && load.force > description.breaking_force);
+    const JointBody one = body(description.body1), two = body(description.body2);
+    const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row};
+    const double h = data_.time_step[0], threshold = description.breaking_threshold;
+    const JointLoad load = joint_load(rows, one, two, h);
+    const bool breaks =
+        (threshold > 0.0 && (leaves_no_error ? held_back(rows, one, two, h) : load.error) > threshold) ||
+        (description.breaking_force > 0.0 && load.force > description.breaking_force);
     back().intact[joint] = breaks ? 0 : 1;
     if (!breaks) figures_.joint_error = std::max(figures_.joint_error, load.error);
   }
@@ -212,7 +214,7 @@ void Environment::find_touching() {
     return [&](std::size_t i) { return std::array{pair[2 * i], pair[2 * i + 1]}; };
   };
   const auto goes_on = [&](std::size_t i) { return !is_awake(before[2 * i]) && !is_awake(before[2 * i + 1]); };
-  merge_rows(now.size() / 2, key(now), before.size() / 2, key(before), goes_on, &merged_);
+  merge_rows(now.size() / 2, key(now), sleepers_ > 0 ? before.size() / 2 : 0, key(before), goes_on, &merged_);
   copy_rows(merged_, 2, now, before, back().touching);
 }
 

@@ -17,10 +17,13 @@ bool moves(const BodiesAtRest& bodies, std::uint32_t body) {
   return !twist.linear.isZero(0.0) || !twist.angular.isZero(0.0);
 }
 
-double energy_per_mass(const BodiesAtRest& bodies, std::uint32_t body) {
-  return kinetic_energy(bodies.mass[body], vector_at(bodies.inertia, body), quaternion_at(bodies.orientation, body),
-                        twist_of(bodies, body)) /
-         bodies.mass[body];
+// Whether the kinetic energy per mass is below a value; what flies is told without a look at its rotation.
+bool is_slow(const BodiesAtRest& bodies, std::uint32_t body, double energy) {
+  const Twist twist = twist_of(bodies, body);
+  const double mass = bodies.mass[body];
+  return 0.5 * twist.linear.squaredNorm() < energy &&
+         kinetic_energy(mass, vector_at(bodies.inertia, body), quaternion_at(bodies.orientation, body), twist) / mass <
+             energy;
 }
 
 bool is_awake(const BodiesAtRest& bodies, std::span<const std::uint32_t> rested, std::uint32_t body) {
@@ -44,7 +47,7 @@ std::uint32_t Activity::steps_to_sleep(double time_step) const {
 void Activity::count_rest(const BodiesAtRest& bodies, std::uint32_t steps, std::span<std::uint32_t> rested) const {
   for (std::uint32_t i = 0; i < rested.size(); ++i) {
     if (!is_awake(bodies, rested, i)) continue;
-    const bool rests = (bodies.flags[i] & kCanSleep) != 0 && energy_per_mass(bodies, i) < rule_.energy;
+    const bool rests = (bodies.flags[i] & kCanSleep) != 0 && is_slow(bodies, i, rule_.energy);
     rested[i] = rests ? std::min(rested[i] + 1, steps) : 0;
   }
 }

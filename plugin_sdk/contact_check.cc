@@ -14,9 +14,9 @@ namespace {
 // Of the sizes of the shapes, and of the coordinates.
 constexpr double kOfSize = 1e-7, kOfCoordinates = 1e-12;
 // Normals of spheres and half-spaces, rad; faces that lie on each other, rad.
-constexpr double kOfNormal = 1e-6, kFlat = 1e-2;
+constexpr double kOfNormal = 1e-6, kFlatContact = 1e-2;
 // Share of the overlap that the deepest contact has at least, and of the margin within which one is demanded.
-constexpr double kDeepest = 0.9;
+constexpr double kShareOfDeepest = 0.9;
 constexpr std::size_t kMostCorners = 4;
 
 enum class Form { kUnknown, kSphere, kBox, kCylinder, kHalfspace };
@@ -237,7 +237,7 @@ class ContactCheck {
   bool check_presence(std::size_t pair, std::size_t first, std::size_t end, const Solid& a, const Solid& b) {
     const std::optional<Expected> expected = expected_of(a, b);
     if (!expected) return true;
-    const double least = expected->knows_gap ? slack_ - kDeepest * request_.margin() : slack_;
+    const double least = expected->knows_gap ? slack_ - kShareOfDeepest * request_.margin() : slack_;
     if (!(expected->depth > least)) return true;
     char text[160];
     if (first == end) {
@@ -245,7 +245,7 @@ class ContactCheck {
       wrong_ = text;
       return false;
     }
-    const double shallow = std::min(expected->depth, kDeepest * expected->depth) - slack_;
+    const double shallow = std::min(expected->depth, kShareOfDeepest * expected->depth) - slack_;
     if (expected->knows_depth && deepest_ < shallow) {
       std::snprintf(text, sizeof text, "pair %zu overlaps by %.3g m, its deepest contact by %.3g", pair,
                     expected->depth, deepest_);
@@ -266,9 +266,9 @@ class ContactCheck {
     // of two boxes a method may show an edge or one corner instead
     if (!is_flat(a) || !is_flat(b) || (a.is_bounded() && b.is_bounded())) return 0;
     const Vector3 normal = vector_at(answer_.normal, first);
-    const auto axis_a = face_axis(a, normal, kFlat), axis_b = face_axis(b, normal, kFlat);
+    const auto axis_a = face_axis(a, normal, kFlatContact), axis_b = face_axis(b, normal, kFlatContact);
     if (!axis_a || !axis_b) return 0;
-    const double gap = kDeepest * request_.margin();
+    const double gap = kShareOfDeepest * request_.margin();
     return corners_within(a, b, normal, gap, slack_) + corners_within(b, a, -normal, gap, slack_);
   }
 

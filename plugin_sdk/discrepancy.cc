@@ -56,16 +56,6 @@ double joint_error(const Discrepancy& discrepancy, const Vector3& error) {
   return std::sqrt(sum);
 }
 
-double held_back(const Discrepancy& discrepancy, const Vector3& impulse, double time_step, const Vector3& com1,
-                 const InverseInertia& body1, const Vector3& com2, const InverseInertia& body2) {
-  const double size = impulse.norm();
-  if (discrepancy.is_angular() || !(size > 0.0)) return 0.0;
-  const JacobianRow row = jacobian_row(discrepancy, impulse / size, com1, com2);
-  const double response = body1.mass + body2.mass + row.angular1.dot(body1.moments * row.angular1) +
-                          row.angular2.dot(body2.moments * row.angular2);
-  return size * time_step * response;
-}
-
 Discrepancy contact_discrepancy(const Vector3& point, const Vector3& normal, double depth) {
   Discrepancy contact;
   contact.point1 = point + 0.5 * depth * normal;

@@ -100,18 +100,6 @@ Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& n
 // over the limits where they are exceeded; what gives way (compliance) is no error. m, or rad for the angular twin.
 double joint_error(const Discrepancy& discrepancy, const Vector3& error);
 
-// How a body resists impulses: 1/kg, and 1/(kg m^2) in the world's axes. Zero for what nothing pushes.
-struct InverseInertia {
-  double mass = 0.0;
-  Matrix3 moments = Matrix3::Zero();
-};
-
-// How far the joint would have come open in the step without the impulse (N s, world) that held it, m: |impulse| h / m_eff,
-// with m_eff the mass that bodies at com1 and com2 show along it. What breaks a joint where the solver leaves no error. 0
-// for the angular twin.
-double held_back(const Discrepancy& discrepancy, const Vector3& impulse, double time_step, const Vector3& com1,
-                 const InverseInertia& body1, const Vector3& com2, const InverseInertia& body2);
-
 // A contact as a discrepancy (§ 2.7.5.1, with x1 and x2 as they must be: x2 - x1 along the normal is minus the
 // depth): first axis the normal (unit, from body 1 to body 2), unilateral; the others friction.
 Discrepancy contact_discrepancy(const Vector3& point, const Vector3& normal, double depth);

@@ -6,26 +6,49 @@
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
+namespace {
 
-JointLoad joint_load(const DiscrepancyColumns& rows, std::span<const double> impulses, std::size_t first,
-                     std::size_t end, const JointBody& body1, const JointBody& body2, double time_step) {
-  const auto inertia = [](const JointBody& body) {
-    return InverseInertia{body.inverse_mass, world_inverse_inertia(body.trial.orientation, body.inverse_moments)};
-  };
-  const InverseInertia inertia1 = inertia(body1), inertia2 = inertia(body2);
+// Impulse of a row, world.
+Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::size_t row) {
+  return discrepancy.axes * vector_at(joint.impulses, row);
+}
+
+// Velocity per impulse along a row, 1/kg.
+double response(const JointBody& body, const Vector3& angular_row) {
+  const Vector3 local = body.trial.orientation.conjugate() * angular_row;
+  return body.inverse_mass + local.dot(body.inverse_moments.cwiseProduct(local));
+}
+
+}  // namespace
+
+JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
   JointLoad load;
   Vector3 sum = Vector3::Zero();
-  for (std::size_t row = first; row < end; ++row) {
-    const Discrepancy discrepancy = rows.at(row);
-    const Vector3 impulse = discrepancy.axes * vector_at(impulses, row);
+  for (std::size_t row = joint.first; row < joint.end; ++row) {
+    const Discrepancy discrepancy = joint.rows.at(row);
     load.error = std::max(
         load.error, joint_error(discrepancy, error_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next)));
-    load.held = std::max(load.held, held_back(discrepancy, impulse, time_step, body1.trial.position, inertia1,
-                                              body2.trial.position, inertia2));
-    if (!discrepancy.is_angular()) sum += impulse;
+    if (!discrepancy.is_angular()) sum += impulse_of(joint, discrepancy, row);
   }
   load.force = sum.norm() / time_step;
   return load;
+}
+
+double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const JointBody& body1, const JointBody& body2,
+                 double time_step) {
+  const double size = impulse.norm();
+  if (discrepancy.is_angular() || !(size > 0.0)) return 0.0;
+  const JacobianRow row = jacobian_row(discrepancy, impulse / size, body1.trial.position, body2.trial.position);
+  return size * time_step * (response(body1, row.angular1) + response(body2, row.angular2));
+}
+
+double held_back(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
+  double most = 0.0;
+  for (std::size_t row = joint.first; row < joint.end; ++row) {
+    const Discrepancy discrepancy = joint.rows.at(row);
+    most = std::max(most, held_back(discrepancy, impulse_of(joint, discrepancy, row), body1, body2, time_step));
+  }
+  return most;
 }
 
 }  // namespace gravitas

@@ -8,22 +8,34 @@
 
 namespace gravitas {
 
+// The default is the world: nothing moves or pushes it.
 struct JointBody {
   Pose trial, next;  // centre of mass at S* and S_{n+1}, world
   double inverse_mass = 0.0;
   Vector3 inverse_moments = Vector3::Zero();  // principal, 1/(kg m^2)
 };
 
+// Rows [first, end) of one joint, with the impulses (N s, along each row's axes) that the solver answered.
+struct JointRows {
+  const DiscrepancyColumns& rows;
+  std::span<const double> impulses;
+  std::size_t first, end;
+};
+
 struct JointLoad {
   double error = 0.0;  // at S_{n+1}, m, or rad for angular rows
   double force = 0.0;  // norm of the sum of what pushed, N
-  // The most that a row would have come open by (held_back() of discrepancy.h), m: what a breaking threshold is compared
-  // with where the solver leaves no error (capability `closes_joints`).
-  double held = 0.0;
 };
 
-// Rows [first, end) of one joint, with the impulses (N s, along each row's axes) that the solver answered.
-JointLoad joint_load(const DiscrepancyColumns& rows, std::span<const double> impulses, std::size_t first,
-                     std::size_t end, const JointBody& body1, const JointBody& body2, double time_step);
+JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
+
+// How far a discrepancy would have come open in the step without the impulse (N s, world) that held it, m:
+// |impulse| h / m_eff, with m_eff the mass that the bodies at S* show along it. 0 for the angular twin.
+double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const JointBody& body1, const JointBody& body2,
+                 double time_step);
+
+// The most of a joint's rows: what a breaking threshold is compared with where the solver leaves no error (capability
+// `closes_joints`).
+double held_back(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
 
 }  // namespace gravitas

@@ -10,7 +10,7 @@
 namespace gravitas {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kHalfTurn = 3.14159265358979323846;
 
 Vector3 first_axis(const Quaternion& q) { return q * Vector3::UnitX(); }
 
@@ -43,7 +43,7 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 double JointLimits::turn(double angle) const {
   if (lower == -kUnlimited || upper == kUnlimited) return angle;
   const double middle = 0.5 * (lower + upper);
-  return angle - 2.0 * kPi * std::round((angle - middle) / (2.0 * kPi));
+  return angle - 2.0 * kHalfTurn * std::round((angle - middle) / (2.0 * kHalfTurn));
 }
 
 Pose frame_along(const Vector3& origin, const Vector3& first) {
@@ -109,8 +109,8 @@ double twist_between(const Quaternion& frame1, const Quaternion& frame2) {
   // relative turn q = swing * twist about x: the twist is the part of q about x
   const Quaternion q = shorter_arc(frame1.conjugate() * frame2);
   const double twist = 2.0 * math::atan2(q.x(), q.w());
-  if (twist > kPi) return twist - 2.0 * kPi;
-  return twist < -kPi ? twist + 2.0 * kPi : twist;
+  if (twist > kHalfTurn) return twist - 2.0 * kHalfTurn;
+  return twist < -kHalfTurn ? twist + 2.0 * kHalfTurn : twist;
 }
 
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {

@@ -15,7 +15,7 @@ namespace gravitas {
 namespace {
 
 // Some thousand roundings of the numbers that a residual is made of.
-constexpr double kRounding = 1e-12;
+constexpr double kOfArithmetic = 1e-12;
 // Factor on what changes within a step: a sum of several looks at it may overshoot.
 constexpr double kChange = 3.0;
 // Turns within a step up to which a rotation vector tells which way it went, rad.
@@ -45,7 +45,7 @@ std::string check_velocities(const StepOfBody& s, std::size_t body) {
   const double sizes = s.start.linear.norm() + s.h * a.norm();
   const double spread = kChange * s.h * s.inverse_mass * s.force_spread;
   std::string wrong = off_by("linear_velocity", body, (s.end.linear - s.start.linear - s.h * a).norm(),
-                             (s.damped + kRounding) * sizes + spread, "v_n + h a");
+                             (s.damped + kOfArithmetic) * sizes + spread, "v_n + h a");
   if (!wrong.empty()) return wrong;
 
   const Vector3& w = s.start.angular;
@@ -58,7 +58,7 @@ std::string check_velocities(const StepOfBody& s, std::size_t body) {
   const double turned = unequal > 1e-9 ? turn * (1.0 + unequal) * s.h * rate : 0.0;
   const double turning = kChange * s.h * inverse * s.torque_spread;
   return off_by("angular_velocity", body, (s.end.angular - w - s.h * alpha).norm(),
-                (s.damped + kRounding) * (w.norm() + s.h * alpha.norm() + s.h * rate) + turned + turning,
+                (s.damped + kOfArithmetic) * (w.norm() + s.h * alpha.norm() + s.h * rate) + turned + turning,
                 "w_n + h alpha");
 }
 
@@ -67,7 +67,7 @@ std::string check_pose(const StepOfBody& s, std::size_t body) {
   const double reach = s.h * (s.start.linear.norm() + s.end.linear.norm()) + s.from.position.norm();
   std::string wrong =
       off_by("position", body, (s.to.position - s.from.position - s.h * mean).norm(),
-             s.h * half.norm() + kChange * s.h * s.h * s.inverse_mass * s.force_spread + kRounding * reach,
+             s.h * half.norm() + kChange * s.h * s.h * s.inverse_mass * s.force_spread + kOfArithmetic * reach,
              "x_n + h v, v between v_n and v*");
   if (!wrong.empty()) return wrong;
 
@@ -80,7 +80,7 @@ std::string check_pose(const StepOfBody& s, std::size_t body) {
   const Vector3 between = 0.5 * s.h * (s.start.angular + s.end.angular);
   const double apart = s.h * (s.end.angular - s.start.angular).norm();
   return off_by("orientation", body, (log_rotation(change) - between).norm(),
-                (0.5 + turn) * apart + spread + turn * turn * turn / 12.0 + kRounding * (1.0 + turn),
+                (0.5 + turn) * apart + spread + turn * turn * turn / 12.0 + kOfArithmetic * (1.0 + turn),
                 "the turn by h w, w between w_n and w*");
 }
 

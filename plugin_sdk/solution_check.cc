@@ -20,11 +20,11 @@ constexpr double kRelativeAtEnd = 1e-8;
 // Of what rows on velocity alone displace, where a method stopped between two rounds.
 constexpr double kRoundBefore = 2.0;
 // Of the momenta and energies themselves.
-constexpr double kRounding = 1e-13;
+constexpr double kOfSolution = 1e-13;
 // A displacement that changes by less from one look at it to the next has settled, of the coordinates.
 constexpr double kSettled = 4e-16;
 // Rounding of a gap, of the coordinates that it is the difference of.
-constexpr double kOfCoordinates = 1e-12;
+constexpr double kOfSolvedCoordinates = 1e-12;
 // Share of the largest correction that none is.
 constexpr double kNegligible = 1e-6;
 
@@ -201,11 +201,11 @@ class Balance {
 
     std::string wrong =
         off_by("linear_velocity", i, (mass * (after.linear - before.linear) - velocity.linear).norm(),
-               relative * velocity.size + kRounding * mass * (before.linear.norm() + after.linear.norm()),
+               relative * velocity.size + kOfSolution * mass * (before.linear.norm() + after.linear.norm()),
                "m (v - v*) is the sum of the impulses, N s");
     if (!wrong.empty()) return wrong;
     wrong = off_by("pose_change", i, (mass * change.linear - pose.linear).norm(),
-                   relative * pose.size + before_last * pushes_[i].loose + mass * (kRounding * moved + settled),
+                   relative * pose.size + before_last * pushes_[i].loose + mass * (kOfSolution * moved + settled),
                    "m delta is the sum of the corrections, kg m");
     if (!wrong.empty()) return wrong;
 
@@ -217,12 +217,12 @@ class Balance {
     };
     const double spin = (inertia * before.angular).norm() + (inertia * after.angular).norm();
     wrong = off_by("angular_velocity", i, (turning - velocity.angular).norm(),
-                   arms(velocity, turning.norm()) + kRounding * spin, "I (w - w*) is the sum of the moments, N m s");
+                   arms(velocity, turning.norm()) + kOfSolution * spin, "I (w - w*) is the sum of the moments, N m s");
     if (!wrong.empty()) return wrong;
     const Vector3 displaced = inertia * change.angular;
     return off_by("pose_change", i, (displaced - pose.angular).norm(),
-                  arms(pose, displaced.norm()) + before_last * pushes_[i].loose_moment + kRounding * displaced.norm() +
-                      inertia.norm() * settled,
+                  arms(pose, displaced.norm()) + before_last * pushes_[i].loose_moment +
+                      kOfSolution * displaced.norm() + inertia.norm() * settled,
                   "I delta is the sum of the corrections' moments, kg m^2");
   }
 
@@ -267,7 +267,7 @@ class Balance {
         turned += turn_of(body).norm();
         coordinates += position.norm();
       }
-      const double allowed = request_.contact_depth()[i] + (1e-3 + turned) * sizes + kOfCoordinates * coordinates;
+      const double allowed = request_.contact_depth()[i] + (1e-3 + turned) * sizes + kOfSolvedCoordinates * coordinates;
       if (apart <= allowed) continue;
       char text[160];
       std::snprintf(text, sizeof text, "contact_correction of row %zu moves apart by %.3g m what overlaps by %.3g m", i,

@@ -26,7 +26,7 @@ using stage::v1::Outcome;
 constexpr std::uint64_t kAssetBytes = 65536;
 constexpr std::uint64_t kAssetPart = 1 << 20;
 // A waiting kernel looks whether the worker's process lives this often.
-constexpr std::uint64_t kLookNs = 50'000'000;
+constexpr std::uint64_t kLookAtProcessNs = 50'000'000;
 
 const MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
 
@@ -117,7 +117,7 @@ void GrpcCarrier::report_broken(Stream* stream) {
 void GrpcCarrier::wait(Stream* stream, Patience* patience) {
   for (;;) {
     const std::uint64_t now = channel::now_ns();
-    const std::uint64_t look = std::min({patience->until, patience->cap, now + kLookNs});
+    const std::uint64_t look = std::min({patience->until, patience->cap, now + kLookAtProcessNs});
     const auto until = std::chrono::system_clock::now() + std::chrono::nanoseconds(look - std::min(look, now));
     void* tag = nullptr;
     bool ok = false;

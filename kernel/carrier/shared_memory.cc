@@ -23,7 +23,7 @@ using channel::SegmentRole;
 // A waiting kernel looks at the worker's marks of progress this often.
 constexpr std::uint64_t kLookNs = 50'000'000;
 
-constexpr std::uint64_t kPage = 4096;
+constexpr std::uint64_t kPageSize = 4096;
 constexpr std::uint64_t aligned(std::uint64_t bytes, std::uint64_t unit) { return (bytes + unit - 1) / unit * unit; }
 
 class SharedMemoryCarrier final : public Carrier {
@@ -81,9 +81,9 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
       slot_deadline_ns_(
           static_cast<std::uint64_t>((slot.defences.deadline ? slot.deadline : kAttachedDeadline) * 1e9)) {
   boxes_->kernel_segment =
-      Segment::create("gravitas kernel mailbox", aligned(sizeof(Mailbox), kPage), channel::Sharing::kReadersOnly);
+      Segment::create("gravitas kernel mailbox", aligned(sizeof(Mailbox), kPageSize), channel::Sharing::kReadersOnly);
   boxes_->worker_segment =
-      Segment::create("gravitas worker mailbox", aligned(sizeof(Mailbox), kPage), channel::Sharing::kWriters);
+      Segment::create("gravitas worker mailbox", aligned(sizeof(Mailbox), kPageSize), channel::Sharing::kWriters);
   boxes_->mine = reinterpret_cast<Mailbox*>(boxes_->kernel_segment.data());
   boxes_->theirs = reinterpret_cast<Mailbox*>(boxes_->worker_segment.data());
   boxes_->theirs->cpu = ~0U;
@@ -127,7 +127,7 @@ void SharedMemoryCarrier::make_rooms(const StageCall& call, const Arena& arena, 
   if (derivatives != nullptr)
     for (const ColumnId column : derivatives->trial_columns()) add(arena.count(column));
   if (offset <= response_.size()) return;
-  response_ = Segment::create("gravitas response", aligned(std::max(offset, 2 * response_.size()), kPage),
+  response_ = Segment::create("gravitas response", aligned(std::max(offset, 2 * response_.size()), kPageSize),
                               channel::Sharing::kWriters);
   ++response_generation_;
 }

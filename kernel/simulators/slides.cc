@@ -15,7 +15,7 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostTrials = 30;
+constexpr int kMostSlideTrials = 30;
 constexpr double kShortestSlide = 1e-6;  // of the step
 constexpr double kSlideShare = 1e-9;     // of the slide: how closely its end is met
 
@@ -70,7 +70,7 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
     has_found_contacts = false;
     const double end = first_end(*length);
     const bool slides_on = end > *length;
-    if (i == kMostTrials || (slides_on ? *length == whole : end >= (1.0 - kSlideShare) * *length)) return solution;
+    if (i == kMostSlideTrials || (slides_on ? *length == whole : end >= (1.0 - kSlideShare) * *length)) return solution;
     (slides_on ? clear : stopped) = *length;
     // a little beyond the end, so that the trial has it
     const double next = (1.0 + 0.1 * kSlideShare) * end;

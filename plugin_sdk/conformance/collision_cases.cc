@@ -18,16 +18,16 @@ namespace gravitas::conformance {
 namespace {
 
 constexpr stage::Method kManifolds = stage::Method::kCollisionManifolds;
-constexpr double kAccuracy = 1e-6;    // m
-constexpr double kPreference = 0.03;  // of the depth
-constexpr double kDeepest = 0.01;     // of the depth: a manifold may miss the very deepest point of a round edge
-constexpr std::uint32_t kForeign = 1000000;
+constexpr double kContactAccuracy = 1e-6;  // m
+constexpr double kPreference = 0.03;       // of the depth
+constexpr double kDeepest = 0.01;          // of the depth: a manifold may miss the very deepest point of a round edge
+constexpr std::uint32_t kForeignBody = 1000000;
 
 Pose at(const Vector3& position) { return {position, Quaternion::Identity()}; }
 
 std::string shown_pair(const Solids& world) { return world.solids[0].type + " and " + world.solids[1].type; }
 
-std::vector<TypeDeclaration> types_of(Subject& subject) {
+std::vector<TypeDeclaration> shape_types_of(Subject& subject) {
   constexpr const char* kKnown[] = {"Sphere", "Box", "Cylinder", "Halfspace", "Capsule", "Cone"};
   return askable_types(subject.declaration(), kKnown, [&](const TypeDeclaration& type, Draw* draw) {
     const Solid solid = random_solid(subject.declaration(), type, draw);
@@ -45,7 +45,7 @@ bool is_convex(const Solid& solid) {
 template <typename Judge>
 void for_each_overlap(Subject& subject, std::uint64_t seed, int repeats, Judge&& judge) {
   const PluginDeclaration& declaration = subject.declaration();
-  const std::vector<TypeDeclaration> types = types_of(subject);
+  const std::vector<TypeDeclaration> types = shape_types_of(subject);
   Draw draw(seed);
   for (const TypeDeclaration& type_a : types) {
     for (const TypeDeclaration& type_b : types) {
@@ -82,11 +82,11 @@ std::optional<Touch> overlap(Inquiry* inquiry, const Solids& world) {
 
 // ---- laws
 
-void judge_nothing(Subject& subject) {
+void judge_collision_nothing(Subject& subject) {
   Inquiry inquiry(subject, "no bodies");
   inquiry.expect(Solids{}.ask(&inquiry).empty(), "has a contact");
   Draw draw(61);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : shape_types_of(subject)) {
     const Solid solid = random_solid(subject.declaration(), type, &draw);
     Solids world = Solids::two(solid, {}, solid, {});
     world.pairs.clear();
@@ -97,7 +97,7 @@ void judge_nothing(Subject& subject) {
 
 void judge_separated(Subject& subject) {
   const PluginDeclaration& declaration = subject.declaration();
-  const std::vector<TypeDeclaration> types = types_of(subject);
+  const std::vector<TypeDeclaration> types = shape_types_of(subject);
   Draw draw(62);
   for (const TypeDeclaration& type_a : types) {
     for (const TypeDeclaration& type_b : types) {
@@ -134,13 +134,13 @@ void judge_apart(Subject& subject) {
     const std::string first =
         "overlap by " + number_text(touch->depth) + " m along " + shown(touch->normal) + " from a to b; ";
     inquiry->expect_at_most(first + "depth left after b moved that way by as much",
-                            moved(touch->depth + kAccuracy, 0.0), kAccuracy + kDeepest * touch->depth);
+                            moved(touch->depth + kContactAccuracy, 0.0), kContactAccuracy + kDeepest * touch->depth);
     inquiry->expect(moved(0.5 * touch->depth, 0.0) > 0.0,
                     first + "after b moved half of it there is no contact with depth > 0");
     // the gap that is left is reported within the margin, but for what the depth was not the least
-    const double slack = kPreference * touch->depth + kAccuracy;
+    const double slack = kPreference * touch->depth + kContactAccuracy;
     const double reported = moved(touch->depth + gap, 2.0 * gap + slack);
-    inquiry->expect(reported >= -gap - slack && reported <= -gap + kPreference * gap + kAccuracy,
+    inquiry->expect(reported >= -gap - slack && reported <= -gap + kPreference * gap + kContactAccuracy,
                     first + "after b moved 0.02 m more than that the depth is " + number_text(reported) +
                         ", should be -0.02 (at most " + number_text(slack) + " less)");
   });
@@ -154,11 +154,11 @@ void judge_swap(Subject& subject) {
     exchanged.pairs = {1, 0};
     const std::optional<Touch> other = overlap(inquiry, exchanged);
     inquiry->expect(other.has_value(), "asked as (b, a) instead of (a, b) there is no contact");
-    inquiry->expect_near("depth as (b, a)", other->depth, one->depth, kPreference * one->depth + kAccuracy);
+    inquiry->expect_near("depth as (b, a)", other->depth, one->depth, kPreference * one->depth + kContactAccuracy);
   });
 }
 
-void judge_frames(Subject& subject) {
+void judge_collision_frames(Subject& subject) {
   Draw draw(65);
   for_each_overlap(subject, 66, 8, [&draw](Inquiry* inquiry, const Solids& world) {
     const std::optional<Touch> one = overlap(inquiry, world);
@@ -172,7 +172,7 @@ void judge_frames(Subject& subject) {
     const std::optional<Touch> other = overlap(inquiry, shifted);
     inquiry->expect(other.has_value(), "in a world that is shifted and turned there is no contact");
     inquiry->expect_near("depth in a world that is shifted and turned", other->depth, one->depth,
-                         kPreference * one->depth + kAccuracy);
+                         kPreference * one->depth + kContactAccuracy);
   });
 }
 
@@ -207,7 +207,7 @@ void judge_velocity(Subject& subject) {
 
 // Bodies of all types in a lattice, each with its neighbours.
 Solids crowd(Subject& subject, std::uint32_t count, Draw* draw) {
-  const std::vector<TypeDeclaration> types = types_of(subject);
+  const std::vector<TypeDeclaration> types = shape_types_of(subject);
   Solids world;
   if (types.empty()) return world;
   world.margin = 0.02;
@@ -227,7 +227,7 @@ Solids crowd(Subject& subject, std::uint32_t count, Draw* draw) {
   return world;
 }
 
-void judge_independence(Subject& subject) {
+void judge_collision_independence(Subject& subject) {
   Draw draw(69);
   const Solids all = crowd(subject, 16, &draw);
   const auto count = static_cast<std::uint32_t>(all.pairs.size() / 2);
@@ -357,9 +357,10 @@ void judge_known(Subject& subject) {
     const Touch* most = deepest(touches);
     inquiry.expect(most != nullptr,
                    "no contact came; depth " + number_text(one.depth) + " along " + shown(one.normal) + " is right");
-    inquiry.expect_near("depth", most->depth, one.depth, kAccuracy);
-    inquiry.expect_near("normal (from a to b)", most->normal, one.normal, kAccuracy);
-    inquiry.expect_near("distance of the point along the normal", one.normal.dot(most->point), one.plane, kAccuracy);
+    inquiry.expect_near("depth", most->depth, one.depth, kContactAccuracy);
+    inquiry.expect_near("normal (from a to b)", most->normal, one.normal, kContactAccuracy);
+    inquiry.expect_near("distance of the point along the normal", one.normal.dot(most->point), one.plane,
+                        kContactAccuracy);
   }
 }
 
@@ -367,13 +368,13 @@ void judge_known(Subject& subject) {
 
 // One body of each type over another, all of them in pairs.
 Solids everything(Subject& subject, Draw* draw) {
-  Solids world = crowd(subject, static_cast<std::uint32_t>(2 * types_of(subject).size()), draw);
+  Solids world = crowd(subject, static_cast<std::uint32_t>(2 * shape_types_of(subject).size()), draw);
   world.pairs.clear();
   for (std::uint32_t i = 1; i < world.bodies.size(); ++i) world.pairs.insert(world.pairs.end(), {i - 1, i});
   return world;
 }
 
-void judge_refusals(Subject& subject) {
+void judge_collision_refusals(Subject& subject) {
   Draw draw(70);
   const Solids world = everything(subject, &draw);
   expect_foreign_indices_refused(subject, "a body of each type", kManifolds, world.request());
@@ -382,7 +383,7 @@ void judge_refusals(Subject& subject) {
   Solids bare = world;
   bare.bodies[0].solid = kNone;
   inquiry.demand_refusal(kManifolds, bare.request());
-  bare.bodies[0].solid = kForeign;
+  bare.bodies[0].solid = kForeignBody;
   inquiry.now_asked("a pair of a body whose shape does not exist");
   inquiry.demand_refusal(kManifolds, bare.request());
   Solids foreign = world;
@@ -391,7 +392,7 @@ void judge_refusals(Subject& subject) {
   inquiry.demand_refusal(kManifolds, foreign.request());
 }
 
-void judge_hostile(Subject& subject) {
+void judge_collision_hostile(Subject& subject) {
   Draw draw(71);
   Solids world = everything(subject, &draw);
   for (SolidBody& body : world.bodies) body.twist = {draw.vector(1.0), draw.vector(1.0)};
@@ -411,9 +412,9 @@ void judge_hostile(Subject& subject) {
 }
 
 // In one place, of one size: no direction is better than another, and one must be taken.
-void judge_coincident(Subject& subject) {
+void judge_collision_coincident(Subject& subject) {
   Draw draw(72);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : shape_types_of(subject)) {
     const Solid solid = random_solid(subject.declaration(), type, &draw);
     const Pose pose = draw.pose(2.0);
     const Solids world = Solids::two(solid, pose, solid, pose);
@@ -427,20 +428,23 @@ void judge_coincident(Subject& subject) {
 
 std::vector<Case> collision_cases(const PluginDeclaration& declaration) {
   std::vector<Case> cases = {
-      make_types_case("collision/types", types_of),
-      make_case("collision/nothing", "Without a pair there is no contact.", judge_nothing),
+      make_types_case("collision/types", shape_types_of),
+      make_case("collision/nothing", "Without a pair there is no contact.", judge_collision_nothing),
       make_case("collision/known", "Closed forms: depth, normal and place of touching shapes.", judge_known),
       make_case("collision/separated", "Bodies further apart than the margin do not touch.", judge_separated),
       make_case("collision/apart", "Moved along the normal by the depth, bodies touch no more.", judge_apart),
       make_case("collision/swap", "The pair (b, a) overlaps as deeply as (a, b).", judge_swap),
-      make_case("collision/frames", "The overlap is the same in a shifted and turned world.", judge_frames),
+      make_case("collision/frames", "The overlap is the same in a shifted and turned world.", judge_collision_frames),
       make_case("collision/surface", "The point is midway between the two surfaces.", judge_surface),
       make_case("collision/velocity", "The relative velocity is that of b against a at the point.", judge_velocity),
-      make_case("collision/independence", "Each pair is answered for itself, bit for bit.", judge_independence),
-      make_case("collision/coincident", "Equal bodies in one place touch along some unit normal.", judge_coincident),
-      make_case("collision/refusals", "Bodies, shapes and types that do not exist are refused.", judge_refusals),
+      make_case("collision/independence", "Each pair is answered for itself, bit for bit.",
+                judge_collision_independence),
+      make_case("collision/coincident", "Equal bodies in one place touch along some unit normal.",
+                judge_collision_coincident),
+      make_case("collision/refusals", "Bodies, shapes and types that do not exist are refused.",
+                judge_collision_refusals),
       make_case("collision/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
-                judge_hostile),
+                judge_collision_hostile),
   };
   std::ranges::move(moving_collision_cases(declaration), std::back_inserter(cases));
   return cases;

@@ -5,7 +5,7 @@
 namespace gravitas::conformance {
 namespace {
 
-constexpr stage::Method kSolve = stage::Method::kSolverSolve;
+constexpr stage::Method kSolverSolve = stage::Method::kSolverSolve;
 
 Vector3 inverse_moments(const ConstrainedBody& body) {
   Vector3 inverse = Vector3::Zero();
@@ -105,7 +105,7 @@ void ConstrainedBodies::append_contacts(MessageColumns* request) const {
 }
 
 MessageColumns ConstrainedBodies::request() const {
-  MessageColumns columns = empty_request(kSolve);
+  MessageColumns columns = empty_request(kSolverSolve);
   columns.f64("time_step") = {time_step};
   columns.f64("theta") = {theta};
   append_bodies(&columns);
@@ -115,7 +115,7 @@ MessageColumns ConstrainedBodies::request() const {
 }
 
 Solution ConstrainedBodies::ask(Inquiry* inquiry) const {
-  const MessageColumns reply = inquiry->answer(kSolve, request());
+  const MessageColumns reply = inquiry->answer(kSolverSolve, request());
   inquiry->expect_unit("contact_direction", reply.f64("contact_direction"), 3);
   Solution solution(reply);
   for (std::size_t i = 0; i < bodies.size(); ++i) {

@@ -15,7 +15,7 @@ namespace gravitas::conformance {
 namespace {
 
 // Rounding of points within ten metres, carried through some rotations.
-constexpr double kRounding = 1e-13;
+constexpr double kJointRounding = 1e-13;
 constexpr const char* kPointJoints[] = {"Spherical",    "Revolute",  "Rigid",
                                         "AngularMotor", "Universal", "ConstantVelocity"};
 
@@ -27,7 +27,7 @@ Joints joined(const TypeDeclaration& type, Draw* draw) {
   return world;
 }
 
-std::vector<TypeDeclaration> types_of(Subject& subject) {
+std::vector<TypeDeclaration> joint_types_of(Subject& subject) {
   constexpr const char* kKnown[] = {"Spherical", "AngularMotor"};
   return askable_types(subject.declaration(), kKnown, [&](const TypeDeclaration& type, Draw* draw) {
     return subject.ask(stage::Method::kConstraintBind, joined(type, draw).bind_request());
@@ -52,7 +52,7 @@ double largest_error(const std::vector<DescribedJoint>& described) {
 
 void judge_bind(Subject& subject) {
   Draw draw(41);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     for (const Ends& ends : {Ends{0, 1}, Ends{1, 0}, Ends{kNone, 1}, Ends{0, kNone}}) {
       for (int repeat = 0; repeat < 5; ++repeat) {
         Joints world = joined(type, &draw);
@@ -63,7 +63,7 @@ void judge_bind(Subject& subject) {
         inquiry.expect(!described.empty(), "has no discrepancy");
         for (std::size_t i = 0; i < described.size(); ++i)
           inquiry.expect_near("joint error of discrepancy " + std::to_string(i), error_of(described[i].discrepancy),
-                              0.0, kRounding);
+                              0.0, kJointRounding);
       }
     }
   }
@@ -79,7 +79,7 @@ bool is_held(const Discrepancy& d, int axis) {
 void judge_rows(Subject& subject) {
   constexpr double kTime = 1e-6;
   Draw draw(42);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     Joints world = joined(type, &draw);
     Inquiry inquiry(subject, type.name + " where it was bound, and 1e-6 s later");
     world.bind(&inquiry);
@@ -108,9 +108,9 @@ void judge_rows(Subject& subject) {
 }
 
 // Both bodies moved as one: nothing that a solver sees changes but its direction.
-void judge_frames(Subject& subject) {
+void judge_constraint_frames(Subject& subject) {
   Draw draw(43);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     Joints world = joined(type, &draw);
     Inquiry inquiry(subject, type.name + " out of place, and the same in a world that is shifted and turned");
     world.bind(&inquiry);
@@ -128,12 +128,12 @@ void judge_frames(Subject& subject) {
     for (std::size_t i = 0; i < plain.size(); ++i) {
       const Discrepancy &a = plain[i].discrepancy, &b = other[i].discrepancy;
       const std::string of = " of discrepancy " + std::to_string(i);
-      inquiry.expect_near("joint error" + of, error_of(b), error_of(a), 10 * kRounding);
-      inquiry.expect_near("desired speed" + of, b.velocity.norm(), a.velocity.norm(), 10 * kRounding);
+      inquiry.expect_near("joint error" + of, error_of(b), error_of(a), 10 * kJointRounding);
+      inquiry.expect_near("desired speed" + of, b.velocity.norm(), a.velocity.norm(), 10 * kJointRounding);
       inquiry.expect(a.modes == b.modes,
                      "modes" + of + " are " + std::to_string(b.modes) + " instead of " + std::to_string(a.modes));
-      inquiry.expect_near("compliance" + of, b.compliance, a.compliance, kRounding);
-      inquiry.expect_near("damping" + of, b.damping, a.damping, kRounding);
+      inquiry.expect_near("compliance" + of, b.compliance, a.compliance, kJointRounding);
+      inquiry.expect_near("damping" + of, b.damping, a.damping, kJointRounding);
     }
   }
 }
@@ -141,7 +141,7 @@ void judge_frames(Subject& subject) {
 // The world is a body at the origin that does not move.
 void judge_world(Subject& subject) {
   Draw draw(44);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     Joints by_world = joined(type, &draw);
     by_world.bodies[0] = {};
     Joints by_body = by_world;
@@ -155,20 +155,20 @@ void judge_world(Subject& subject) {
                    "has " + std::to_string(a.size()) + " discrepancies instead of " + std::to_string(b.size()));
     for (std::size_t i = 0; i < a.size(); ++i) {
       const std::string of = " of discrepancy " + std::to_string(i);
-      inquiry.expect_near("point1" + of, a[i].discrepancy.point1, b[i].discrepancy.point1, kRounding);
-      inquiry.expect_near("point2" + of, a[i].discrepancy.point2, b[i].discrepancy.point2, kRounding);
-      inquiry.expect_near("velocity" + of, a[i].discrepancy.velocity, b[i].discrepancy.velocity, 10 * kRounding);
+      inquiry.expect_near("point1" + of, a[i].discrepancy.point1, b[i].discrepancy.point1, kJointRounding);
+      inquiry.expect_near("point2" + of, a[i].discrepancy.point2, b[i].discrepancy.point2, kJointRounding);
+      inquiry.expect_near("velocity" + of, a[i].discrepancy.velocity, b[i].discrepancy.velocity, 10 * kJointRounding);
     }
   }
 }
 
 // Many joints at once, one of them broken: each as if it were alone.
-void judge_independence(Subject& subject) {
+void judge_constraint_independence(Subject& subject) {
   Draw draw(45);
   Joints all;
   for (int i = 0; i < 5; ++i) all.bodies.push_back({draw.pose(3.0), {draw.vector(2.0), draw.vector(2.0)}});
   for (std::uint32_t copy = 0; copy < 3; ++copy)
-    for (const TypeDeclaration& type : types_of(subject))
+    for (const TypeDeclaration& type : joint_types_of(subject))
       all.joints.push_back({.type = type_id(type.name),
                             .body1 = copy == 2 ? kNone : copy,
                             .body2 = copy + 2,
@@ -208,7 +208,7 @@ void judge_independence(Subject& subject) {
                  "has " + std::to_string(together.size()) + " discrepancies, should have " + std::to_string(next));
 }
 
-void judge_nothing(Subject& subject) {
+void judge_constraint_nothing(Subject& subject) {
   Inquiry inquiry(subject, "no joints");
   Joints world;
   world.bodies = {JointedBody{}};
@@ -216,9 +216,9 @@ void judge_nothing(Subject& subject) {
   inquiry.expect(world.describe(&inquiry).empty(), "has a discrepancy");
 }
 
-void judge_refusals(Subject& subject) {
+void judge_constraint_refusals(Subject& subject) {
   Draw draw(46);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     Joints world = joined(type, &draw);
     Inquiry inquiry(subject, type.name);
     world.bind(&inquiry);
@@ -231,9 +231,9 @@ void judge_refusals(Subject& subject) {
   }
 }
 
-void judge_hostile(Subject& subject) {
+void judge_constraint_hostile(Subject& subject) {
   Draw draw(47);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     Joints world = joined(type, &draw);
     Inquiry inquiry(subject, type.name);
     world.bind(&inquiry);
@@ -253,17 +253,17 @@ void judge_hostile(Subject& subject) {
 // Joints that share a point: body 2 moved by d is |d| wrong.
 void judge_displacement(Subject& subject) {
   Draw draw(48);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : joint_types_of(subject)) {
     if (std::ranges::find(kPointJoints, type.name) == std::end(kPointJoints)) continue;
     Joints world = joined(type, &draw);
     const Vector3 shift(0.1, -0.2, 0.3);
     Inquiry inquiry(subject, type.name + " after body 2 was moved by (0.1, -0.2, 0.3)");
     world.bind(&inquiry);
     world.bodies[1].pose.position += shift;
-    inquiry.expect_near("largest joint error", largest_error(world.describe(&inquiry)), shift.norm(), kRounding);
+    inquiry.expect_near("largest joint error", largest_error(world.describe(&inquiry)), shift.norm(), kJointRounding);
     world.bodies[0].pose.position += shift;
     inquiry.now_asked(type.name + " after both bodies were moved by (0.1, -0.2, 0.3)");
-    inquiry.expect_near("largest joint error", largest_error(world.describe(&inquiry)), 0.0, kRounding);
+    inquiry.expect_near("largest joint error", largest_error(world.describe(&inquiry)), 0.0, kJointRounding);
   }
 }
 
@@ -284,8 +284,8 @@ void judge_spherical(Subject& subject) {
     world.bind(&inquiry);
     turn_about(point, turn, &world.bodies[1]);
     for (const DescribedJoint& d : world.describe(&inquiry)) {
-      inquiry.expect_near("joint error", error_of(d.discrepancy), 0.0, kRounding);
-      inquiry.expect_near("point1", d.discrepancy.point1, point, kRounding);
+      inquiry.expect_near("joint error", error_of(d.discrepancy), 0.0, kJointRounding);
+      inquiry.expect_near("point1", d.discrepancy.point1, point, kJointRounding);
     }
   }
 }
@@ -311,14 +311,14 @@ void judge_motor(Subject& subject) {
     other.twist.linear = at_point - other.twist.angular.cross(point1 - other.pose.position);
     bool driven = false;
     for (const DescribedJoint& d : world.describe(&inquiry)) {
-      inquiry.expect_near("joint error", error_of(d.discrepancy), 0.0, kRounding);
+      inquiry.expect_near("joint error", error_of(d.discrepancy), 0.0, kJointRounding);
       const Matrix3 axes = to_rotation_matrix(d.discrepancy.axes);
       for (int k = 0; k < 3; ++k) {
         const AxisMode mode = axis_mode(d.discrepancy.modes, k);
         driven = driven || mode == AxisMode::kDriven;
         if (mode == AxisMode::kFree) continue;
         inquiry.expect_near("velocity of a row along " + shown(axes.col(k)), world.row_velocity(d, axes.col(k)),
-                            d.discrepancy.velocity.dot(axes.col(k)), 10 * kRounding);
+                            d.discrepancy.velocity.dot(axes.col(k)), 10 * kJointRounding);
       }
     }
     inquiry.expect(driven, "has no driven axis");
@@ -329,20 +329,20 @@ void judge_motor(Subject& subject) {
 
 std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
   std::vector<Case> cases = {
-      make_types_case("constraint/types", types_of),
-      make_case("constraint/nothing", "Without joints there is no discrepancy.", judge_nothing),
+      make_types_case("constraint/types", joint_types_of),
+      make_case("constraint/nothing", "Without joints there is no discrepancy.", judge_constraint_nothing),
       make_case("constraint/bind", "A joint has no error where it was bound, to a body or to the world.", judge_bind),
       make_case("constraint/rows", "The rows of the held axes are the rate of the joint error.", judge_rows),
-      make_case("constraint/frames", "A joint knows no frame but those of its bodies.", judge_frames),
+      make_case("constraint/frames", "A joint knows no frame but those of its bodies.", judge_constraint_frames),
       make_case("constraint/world", "The world is a body at the origin, at rest.", judge_world),
       make_case("constraint/independence", "Each joint is described for itself; a broken one not at all.",
-                judge_independence),
+                judge_constraint_independence),
       make_case("constraint/displacement", "A body moved from its joint is as wrong as it was moved.",
                 judge_displacement),
       make_case("constraint/refusals", "Bodies that do not exist and types that were not declared are refused.",
-                judge_refusals),
+                judge_constraint_refusals),
       make_case("constraint/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
-                judge_hostile)};
+                judge_constraint_hostile)};
   if (find_type(declaration, "Spherical") != nullptr)
     cases.push_back(make_case("constraint/spherical", "Bodies turn freely about their shared point.", judge_spherical));
   if (find_type(declaration, "AngularMotor") != nullptr)
@@ -354,7 +354,7 @@ std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
 // The discrepancies of joints that the subject itself has bound.
 std::vector<Question> constraint_questions(Subject& subject, Draw* draw) {
   std::vector<Question> questions;
-  const std::vector<TypeDeclaration> types = types_of(subject);
+  const std::vector<TypeDeclaration> types = joint_types_of(subject);
   if (types.empty()) return questions;
   for (const std::uint32_t count : {1U, 12U, 100U}) {
     Joints chain;

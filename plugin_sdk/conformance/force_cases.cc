@@ -103,7 +103,7 @@ Answer probe(Subject& subject, const TypeDeclaration& type, Draw* draw) {
   return subject.ask(kWrenches, forces.request());
 }
 
-std::vector<TypeDeclaration> types_of(Subject& subject) {
+std::vector<TypeDeclaration> force_types_of(Subject& subject) {
   constexpr const char* kKnown[] = {"Gravity", "Basic"};
   return askable_types(subject.declaration(), kKnown,
                        [&](const TypeDeclaration& type, Draw* draw) { return probe(subject, type, draw); });
@@ -111,7 +111,7 @@ std::vector<TypeDeclaration> types_of(Subject& subject) {
 
 // Forces of all types, two of each, on some bodies.
 Forces mixture(Subject& subject, std::size_t bodies, Draw* draw) {
-  const std::vector<TypeDeclaration> types = types_of(subject);
+  const std::vector<TypeDeclaration> types = force_types_of(subject);
   Forces forces;
   forces.time = 0.4;
   for (std::size_t i = 0; i < bodies; ++i) forces.bodies.push_back(random_body(draw));
@@ -131,7 +131,7 @@ void expect_wrench(const Inquiry& inquiry, const std::string& what, const Wrench
 
 // ---- laws of every type
 
-void judge_nothing(Subject& subject) {
+void judge_force_nothing(Subject& subject) {
   Draw draw(31);
   Inquiry inquiry(subject, "no force and no body");
   inquiry.expect(ask(&inquiry, Forces{}).empty(), "answered rows that nobody asked for");
@@ -141,7 +141,7 @@ void judge_nothing(Subject& subject) {
   inquiry.expect(ask(&inquiry, idle).empty(), "answered rows that nobody asked for");
 }
 
-void judge_independence(Subject& subject) {
+void judge_force_independence(Subject& subject) {
   Draw draw(32);
   const Forces forces = mixture(subject, 7, &draw);
   const std::size_t count = forces.applications.size() / 2;
@@ -171,7 +171,7 @@ void judge_independence(Subject& subject) {
 // A wrench that is said to be constant is taken once and for ever.
 void judge_constant(Subject& subject) {
   Draw draw(33);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : force_types_of(subject)) {
     Forces forces;
     forces.bodies = {random_body(&draw)};
     forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
@@ -195,7 +195,7 @@ void judge_constant(Subject& subject) {
 // f = -dU/dx and torque = -dU/dturn, by central differences, at rest.
 void judge_potential(Subject& subject) {
   Draw draw(34);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : force_types_of(subject)) {
     Forces forces;
     forces.bodies = {random_body(&draw)};
     forces.bodies[0].twist = {};
@@ -227,9 +227,9 @@ void judge_potential(Subject& subject) {
   }
 }
 
-void judge_hostile(Subject& subject) {
+void judge_force_hostile(Subject& subject) {
   Draw draw(35);
-  for (const TypeDeclaration& type : types_of(subject)) {
+  for (const TypeDeclaration& type : force_types_of(subject)) {
     Forces forces;
     forces.bodies = {random_body(&draw), random_body(&draw)};
     forces.add_force(type_id(type.name), sample_values(type.properties, &draw));
@@ -358,14 +358,14 @@ void judge_basic_table(Subject& subject) {
 
 std::vector<Case> force_cases(const PluginDeclaration& declaration) {
   std::vector<Case> cases = {
-      make_types_case("force/types", types_of),
-      make_case("force/nothing", "Without an application there is no row.", judge_nothing),
+      make_types_case("force/types", force_types_of),
+      make_case("force/nothing", "Without an application there is no row.", judge_force_nothing),
       make_case("force/independence", "Each application is answered for itself, in any order, bit for bit.",
-                judge_independence),
+                judge_force_independence),
       make_case("force/constant", "A wrench said to be constant is the same in every state.", judge_constant),
       make_case("force/potential", "Force and torque are the slope of the potential.", judge_potential),
       make_case("force/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
-                judge_hostile)};
+                judge_force_hostile)};
   if (find_type(declaration, "Gravity") != nullptr)
     cases.push_back(make_case("force/gravity", "Gravity pulls with m g at the centre of mass.", judge_gravity));
   if (find_type(declaration, "Basic") != nullptr) {

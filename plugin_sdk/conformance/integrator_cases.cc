@@ -45,13 +45,13 @@ FreeBodies random_bodies(std::size_t count, Draw* draw) {
   return free;
 }
 
-std::string of_body(const char* what, std::size_t body) {
+std::string of_moving_body(const char* what, std::size_t body) {
   return std::string(what) + " of body " + std::to_string(body);
 }
 
 // ---- exact laws
 
-void judge_nothing(Subject& subject) {
+void judge_integrator_nothing(Subject& subject) {
   Inquiry inquiry(subject, "no bodies");
   const MessageColumns reply = FreeBodies{}.ask(&inquiry);
   inquiry.expect(reply.f64("position").empty(), "answered positions of bodies that do not exist");
@@ -72,12 +72,12 @@ void judge_rest(Subject& subject) {
     for (std::size_t i = 0; i < 8; ++i) {
       const BodyState& came = free.bodies[i].state;
       const BodyState& right = start.bodies[i].state;
-      inquiry.expect_near(of_body("position", i), came.pose.position, right.pose.position, 0.0);
+      inquiry.expect_near(of_moving_body("position", i), came.pose.position, right.pose.position, 0.0);
       inquiry.expect(came.pose.orientation.coeffs() == right.pose.orientation.coeffs(),
-                     of_body("orientation", i) + " is " + shown(came.pose.orientation) + ", should be " +
+                     of_moving_body("orientation", i) + " is " + shown(came.pose.orientation) + ", should be " +
                          shown(right.pose.orientation) + " bit for bit");
-      inquiry.expect_near(of_body("linear velocity", i), came.twist.linear, Vector3::Zero(), 0.0);
-      inquiry.expect_near(of_body("angular velocity", i), came.twist.angular, Vector3::Zero(), 0.0);
+      inquiry.expect_near(of_moving_body("linear velocity", i), came.twist.linear, Vector3::Zero(), 0.0);
+      inquiry.expect_near(of_moving_body("angular velocity", i), came.twist.angular, Vector3::Zero(), 0.0);
     }
   }
 }
@@ -100,16 +100,16 @@ void judge_straight_line(Subject& subject) {
       const BodyState& first = start.bodies[i].state;
       const double size = first.pose.position.norm() + first.twist.linear.norm();
       // a method that keeps positions has its velocity from their difference
-      inquiry.expect_near(of_body("linear velocity", i), came.twist.linear, first.twist.linear,
+      inquiry.expect_near(of_moving_body("linear velocity", i), came.twist.linear, first.twist.linear,
                           kRounding * (size + size / h));
-      inquiry.expect_near(of_body("position", i), came.pose.position,
+      inquiry.expect_near(of_moving_body("position", i), came.pose.position,
                           first.pose.position + 3.0 * h * first.twist.linear, kRounding * size);
-      inquiry.expect_near(of_body("orientation", i), came.pose.orientation, first.pose.orientation, kRounding);
+      inquiry.expect_near(of_moving_body("orientation", i), came.pose.orientation, first.pose.orientation, kRounding);
     }
   }
 }
 
-void judge_immovable(Subject& subject) {
+void judge_integrator_immovable(Subject& subject) {
   FreeBodies free;
   FreeBody ground{.damping = 2.0, .wrench = {Vector3(5, 5, 5), Vector3(1, 2, 3)}, .flags = kHasShape};
   ground.state.pose.position = Vector3(-0.0, std::numeric_limits<double>::denorm_min(), 3);
@@ -281,7 +281,7 @@ void judge_unit(Subject& subject) {
 
 // ---- symmetries
 
-void judge_permutation(Subject& subject) {
+void judge_integrator_permutation(Subject& subject) {
   Draw draw(26);
   const std::size_t count = 13;
   const FreeBodies plain = random_bodies(count, &draw);
@@ -303,7 +303,7 @@ void judge_permutation(Subject& subject) {
   }
 }
 
-void judge_frames(Subject& subject) {
+void judge_integrator_frames(Subject& subject) {
   Draw draw(27);
   const FreeBodies plain = random_bodies(9, &draw);
   const Pose moved = draw.pose(5.0);
@@ -320,14 +320,14 @@ void judge_frames(Subject& subject) {
   const double tolerance = 1e-11 + accuracy_of(subject.declaration());
   for (std::size_t i = 0; i < plain.bodies.size(); ++i) {
     const BodyState one = FreeBodies::state_in(a, i), turned = FreeBodies::state_in(b, i);
-    inquiry.expect_near(of_body("linear velocity", i), turned.twist.linear, moved.orientation * one.twist.linear,
+    inquiry.expect_near(of_moving_body("linear velocity", i), turned.twist.linear, moved.orientation * one.twist.linear,
                         tolerance);
-    inquiry.expect_near(of_body("angular velocity", i), turned.twist.angular, moved.orientation * one.twist.angular,
+    inquiry.expect_near(of_moving_body("angular velocity", i), turned.twist.angular,
+                        moved.orientation * one.twist.angular, tolerance);
+    inquiry.expect_near(of_moving_body("position", i), turned.pose.position, transform_point(moved, one.pose.position),
                         tolerance);
-    inquiry.expect_near(of_body("position", i), turned.pose.position, transform_point(moved, one.pose.position),
-                        tolerance);
-    inquiry.expect_near(of_body("orientation", i), turned.pose.orientation, moved.orientation * one.pose.orientation,
-                        tolerance);
+    inquiry.expect_near(of_moving_body("orientation", i), turned.pose.orientation,
+                        moved.orientation * one.pose.orientation, tolerance);
   }
 }
 
@@ -439,7 +439,7 @@ void judge_changed(Subject& subject) {
   }
 }
 
-void judge_hostile(Subject& subject) {
+void judge_integrator_hostile(Subject& subject) {
   Draw draw(28);
   FreeBodies free = random_bodies(3, &draw);
   free.bodies[2].flags = kKinematic;
@@ -466,10 +466,11 @@ void judge_hostile(Subject& subject) {
 
 std::vector<Case> integrator_cases(const PluginDeclaration&) {
   return {
-      make_case("integrator/nothing", "Of no bodies there is no motion.", judge_nothing),
+      make_case("integrator/nothing", "Of no bodies there is no motion.", judge_integrator_nothing),
       make_case("integrator/rest", "What rests without a wrench stays, bit for bit.", judge_rest),
       make_case("integrator/straight-line", "A free body moves in a straight line, exactly.", judge_straight_line),
-      make_case("integrator/immovable", "An immovable body's state is copied, bit for bit.", judge_immovable),
+      make_case("integrator/immovable", "An immovable body's state is copied, bit for bit.",
+                judge_integrator_immovable),
       make_case("integrator/kinematic", "A kinematic body goes on with its velocities, whatever acts on it.",
                 judge_kinematic),
       make_case("integrator/constant-force", "A constant force gives the velocity exactly, the parabola to the order.",
@@ -483,15 +484,15 @@ std::vector<Case> integrator_cases(const PluginDeclaration&) {
                 judge_principal_axis),
       make_case("integrator/unit", "Attitudes stay unit at any speed.", judge_unit),
       make_case("integrator/permutation", "The order of the bodies changes no bit of a body's motion.",
-                judge_permutation),
-      make_case("integrator/frames", "The motion is the same in a shifted and turned world.", judge_frames),
+                judge_integrator_permutation),
+      make_case("integrator/frames", "The motion is the same in a shifted and turned world.", judge_integrator_frames),
       make_case("integrator/oscillator", "The error of an oscillator shrinks with the declared order.",
                 judge_oscillator),
       make_case("integrator/forced", "So does that of a motion under a force of time.", judge_forced),
       make_case("integrator/rotor", "And a free rotor keeps its angular momentum to that order.", judge_rotor),
       make_case("integrator/changed", "A body changed from outside goes on without its history.", judge_changed),
       make_case("integrator/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
-                judge_hostile),
+                judge_integrator_hostile),
   };
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 // A plugin may ask for more room as often as its reply has parts that it learns of in turn, not for ever.
 constexpr int kMostRounds = 16;
-constexpr std::uint64_t kMostElements = std::uint64_t{1} << 28;
+constexpr std::uint64_t kMostColumnElements = std::uint64_t{1} << 28;
 
 struct Call {
   ThreadPool* threads;
@@ -81,7 +81,7 @@ Answer LibrarySubject::ask(stage::Method method, const MessageColumns& request, 
     answer.text = error.text;
     if (answer.status != GRAVITAS_OK && answer.status != GRAVITAS_NEEDS_CAPACITY) return answer;
     for (const gravitas_reply_column& room : rooms) {
-      if (room.count <= kMostElements) continue;
+      if (room.count <= kMostColumnElements) continue;
       answer.fault = "it wants room for " + std::to_string(room.count) + " elements";
       return answer;
     }

@@ -9,7 +9,7 @@
 namespace gravitas::conformance {
 namespace {
 
-constexpr stage::Method kManifolds = stage::Method::kCollisionManifolds;
+constexpr stage::Method kManifoldsOfSolids = stage::Method::kCollisionManifolds;
 
 const TypeDeclaration& type_named(const PluginDeclaration& declaration, const char* name) {
   const TypeDeclaration* type = find_type(declaration, name);
@@ -175,7 +175,7 @@ Solids Solids::two(const Solid& a, const Pose& pose_a, const Solid& b, const Pos
 }
 
 MessageColumns Solids::request() const {
-  MessageColumns columns = empty_request(kManifolds);
+  MessageColumns columns = empty_request(kManifoldsOfSolids);
   columns.f64("margin") = {margin};
   columns.u32("shape_parameter_begin") = {0};
   for (const Solid& solid : solids) {
@@ -199,7 +199,7 @@ MessageColumns Solids::request() const {
 }
 
 std::vector<Touch> Solids::ask(Inquiry* inquiry) const {
-  const MessageColumns reply = inquiry->answer(kManifolds, request());
+  const MessageColumns reply = inquiry->answer(kManifoldsOfSolids, request());
   inquiry->expect_unit("normal", reply.f64("normal"), 3);
   std::vector<Touch> touches;
   for (std::size_t i = 0; i < reply.f64("depth").size(); ++i) {

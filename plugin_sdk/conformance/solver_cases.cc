@@ -46,7 +46,7 @@ void judge_free(Subject& subject) {
 }
 
 // Contacts and joints between bodies that nothing can push do nothing.
-void judge_immovable(Subject& subject) {
+void judge_solver_immovable(Subject& subject) {
   ConstrainedBodies world;
   const std::uint32_t ground = world.add_ground(), wall = world.add_ground();
   const std::uint32_t lift = world.add({.twist = {Vector3(0, 2, 0), Vector3(0, 0, 1)}, .kinematic = true});
@@ -417,7 +417,7 @@ void expect_same(const Inquiry& inquiry, const std::string& how, const Solution&
   }
 }
 
-void judge_permutation(Subject& subject) {
+void judge_solver_permutation(Subject& subject) {
   const std::vector<std::uint32_t> plain = {0, 1, 2, 3, 4}, mixed = {3, 0, 4, 2, 1};
   Inquiry inquiry(subject, "a chain of three that two balls hit, written in two orders");
   const Solution one = struck_chain(plain).ask(&inquiry), other = struck_chain(mixed).ask(&inquiry);
@@ -463,7 +463,7 @@ ConstrainedBodies small_scene() {
   return world;
 }
 
-void judge_refusals(Subject& subject) {
+void judge_solver_refusals(Subject& subject) {
   const ConstrainedBodies world = small_scene();
   expect_foreign_indices_refused(subject, "joints and contacts", kSolve, world.request());
   struct Trial {
@@ -486,7 +486,7 @@ void judge_refusals(Subject& subject) {
   }
 }
 
-void judge_hostile(Subject& subject) {
+void judge_solver_hostile(Subject& subject) {
   const ConstrainedBodies world = small_scene();
   expect_hostile_numbers_survived(subject, "joints and contacts", kSolve, world.request());
   struct Trial {
@@ -539,10 +539,12 @@ BodyContact ball_contact(const ConstrainedBodies& world, std::uint32_t lower, st
 std::vector<Case> solver_cases(const PluginDeclaration& declaration) {
   std::vector<Case> cases = {
       make_case("solver/free", "Without joints and contacts the trial state stands, bit for bit.", judge_free),
-      make_case("solver/immovable", "What nothing can push stays, and pushes nothing elsewhere.", judge_immovable),
-      make_case("solver/refusals", "Bodies that do not exist and numbers that are none are refused.", judge_refusals),
+      make_case("solver/immovable", "What nothing can push stays, and pushes nothing elsewhere.",
+                judge_solver_immovable),
+      make_case("solver/refusals", "Bodies that do not exist and numbers that are none are refused.",
+                judge_solver_refusals),
       make_case("solver/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
-                judge_hostile)};
+                judge_solver_hostile)};
   const auto add = [&](const char* name, const char* claim, void (*judge)(Subject&)) {
     cases.push_back(make_case(name, claim, judge));
   };
@@ -557,7 +559,7 @@ std::vector<Case> solver_cases(const PluginDeclaration& declaration) {
   add("solver/complementarity", "Contacts push or part, never both, and never approach.", judge_complementarity);
   add("solver/joint", "Joints hold: their points move as one and stay together.", judge_joint);
   add("solver/axes", "Axes are held, free, driven and limited as their modes say.", judge_axes);
-  add("solver/permutation", "The order of the bodies is no physics.", judge_permutation);
+  add("solver/permutation", "The order of the bodies is no physics.", judge_solver_permutation);
   add("solver/warm-start", "The warm start is no physics.", judge_warm_start);
   return cases;
 }

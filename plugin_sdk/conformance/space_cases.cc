@@ -14,7 +14,7 @@ namespace gravitas::conformance {
 namespace {
 
 constexpr stage::Method kPairs = stage::Method::kSpacePairs;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfiniteLength = std::numeric_limits<double>::infinity();
 constexpr std::uint32_t kBall = kMovable | kHasShape;
 constexpr std::uint64_t kEverything = ~std::uint64_t{0};
 
@@ -32,7 +32,7 @@ class Bodies {
     add(centre - Vector3::Constant(radius), centre + Vector3::Constant(radius));
   }
   void add_ground(std::uint32_t flags = kHasShape | kUnbounded) {
-    add(Vector3::Constant(-kInfinity), Vector3(kInfinity, 0.0, kInfinity), flags);
+    add(Vector3::Constant(-kInfiniteLength), Vector3(kInfiniteLength, 0.0, kInfiniteLength), flags);
   }
   std::uint32_t count() const { return static_cast<std::uint32_t>(request.u32("flags").size()); }
 
@@ -112,7 +112,7 @@ void judge_few(Subject& subject) {
   expect_brute_force(subject, "alone in the world", bodies.request);
 }
 
-void judge_coincident(Subject& subject) {
+void judge_space_coincident(Subject& subject) {
   Bodies same, points;
   for (int i = 0; i < 20; ++i) {
     same.add_ball(Vector3(0.3, -0.2, 7.0), 0.5);
@@ -141,7 +141,7 @@ void judge_unbounded(Subject& subject) {
   Draw draw(12);
   Bodies bodies = crowd(30, &draw);
   bodies.add_ground();
-  bodies.add(Vector3::Constant(-kInfinity), Vector3::Constant(kInfinity), kHasShape | kUnbounded);
+  bodies.add(Vector3::Constant(-kInfiniteLength), Vector3::Constant(kInfiniteLength), kHasShape | kUnbounded);
   bodies.add_ground(kHasShape | kUnbounded | kKinematic);
   bodies.add_ball(Vector3(0, 1e6, 0), 1.0);
   expect_brute_force(subject, "a crowd between unbounded bodies", bodies.request);
@@ -217,7 +217,7 @@ void judge_nan(Subject& subject) {
   }
 }
 
-void judge_hostile(Subject& subject) {
+void judge_space_hostile(Subject& subject) {
   Draw draw(17);
   Bodies bodies = crowd(8, &draw);
   bodies.add_ground();
@@ -238,7 +238,7 @@ std::vector<Case> space_cases(const PluginDeclaration&) {
   return {
       make_case("space/few", "Of no body or one there is no pair.", judge_few),
       make_case("space/random", "A crowd has exactly the pairs of brute force.", judge_random),
-      make_case("space/coincident", "Bodies in one place are all pairs.", judge_coincident),
+      make_case("space/coincident", "Bodies in one place are all pairs.", judge_space_coincident),
       make_case("space/touching",
                 "Bounds are closed: shared faces, edges and corners make pairs, a gap of rounding does not.",
                 judge_touching),
@@ -247,7 +247,7 @@ std::vector<Case> space_cases(const PluginDeclaration&) {
       make_case("space/filters", "Filters, flags and shapes decide as the pair rule says.", judge_filters),
       make_case("space/changing", "An answer does not depend on the questions before it.", judge_changing),
       make_case("space/nan", "Bounds that are no numbers are refused, or pair with nothing.", judge_nan),
-      make_case("space/hostile", "Hostile bounds are refused, or answered by the rule.", judge_hostile),
+      make_case("space/hostile", "Hostile bounds are refused, or answered by the rule.", judge_space_hostile),
   };
 }
 

@@ -10,8 +10,6 @@
 namespace gravitas {
 namespace {
 
-using Kind = SceneShape::Kind;
-
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The part of a line inside a convex solid: an intersection of such parts.
@@ -182,32 +180,32 @@ std::optional<RayHit> cast_ray(const SceneShape& shape, const Ray& ray) {
   const Vector3& size = shape.size;
   Inside part;
   switch (shape.kind) {
-    case Kind::kSphere:
+    case SceneShape::Kind::kSphere:
       return inside_ball(ray, Vector3::Zero(), size.x()).hit(ray);
-    case Kind::kBox:
+    case SceneShape::Kind::kBox:
       for (int i = 0; i < 3; ++i) {
         part.clip(ray, Vector3::Unit(i), size[i]);
         part.clip(ray, -Vector3::Unit(i), size[i]);
       }
       return part.hit(ray);
-    case Kind::kCylinder:
+    case SceneShape::Kind::kCylinder:
       part = inside_tube(ray, size.x());
       part.clip(ray, Vector3::UnitY(), size.y());
       part.clip(ray, -Vector3::UnitY(), size.y());
       return part.hit(ray);
-    case Kind::kHalfspace:
+    case SceneShape::Kind::kHalfspace:
       part.clip(ray, Vector3::UnitY(), 0.0);
       return part.hit(ray);
-    case Kind::kCapsule:
+    case SceneShape::Kind::kCapsule:
       return inside_capsule(ray, size.x(), size.y()).hit(ray);
-    case Kind::kCone:
+    case SceneShape::Kind::kCone:
       return inside_cone(ray, size.x(), size.y()).hit(ray);
-    case Kind::kConvexPolyhedron:
+    case SceneShape::Kind::kConvexPolyhedron:
       for (const ConvexPolyhedron::Face& face : shape.polyhedron->faces) part.clip(ray, face.normal, face.offset);
       return part.hit(ray);
-    case Kind::kTriangleMesh:
+    case SceneShape::Kind::kTriangleMesh:
       return hit_mesh(*shape.mesh, ray);
-    case Kind::kCompound:
+    case SceneShape::Kind::kCompound:
       break;
   }
   std::optional<RayHit> first;

@@ -9,8 +9,6 @@
 namespace gravitas {
 namespace {
 
-using Kind = SceneShape::Kind;
-
 constexpr int kDeepestNesting = 8;
 constexpr std::uint32_t kChildColumns = 11;
 
@@ -179,33 +177,33 @@ SceneShape read(std::uint64_t type, std::span<const double> parameters, int dept
   if (kind == types.size()) throw Wrong{"is of a type that this plugin does not know"};
   PropertyCursor cursor(parameters);
   SceneShape shape;
-  shape.kind = static_cast<Kind>(kind);
+  shape.kind = static_cast<SceneShape::Kind>(kind);
   switch (shape.kind) {
-    case Kind::kSphere:
+    case SceneShape::Kind::kSphere:
       shape.size = Vector3::Constant(cursor.number());
       break;
-    case Kind::kBox:
+    case SceneShape::Kind::kBox:
       shape.size = cursor.vector();
       break;
-    case Kind::kHalfspace:
+    case SceneShape::Kind::kHalfspace:
       shape.size.setOnes();
       break;
-    case Kind::kCylinder:
-    case Kind::kCapsule:
-    case Kind::kCone: {
+    case SceneShape::Kind::kCylinder:
+    case SceneShape::Kind::kCapsule:
+    case SceneShape::Kind::kCone: {
       const double radius = cursor.number();
       shape.size = Vector3(radius, 0.5 * cursor.number(), radius);
       break;
     }
-    case Kind::kConvexPolyhedron:
+    case SceneShape::Kind::kConvexPolyhedron:
       shape.polyhedron = read_polyhedron(&cursor);
       shape.size.setOnes();
       break;
-    case Kind::kTriangleMesh:
+    case SceneShape::Kind::kTriangleMesh:
       shape.mesh = read_mesh(&cursor);
       shape.size.setOnes();
       break;
-    case Kind::kCompound:
+    case SceneShape::Kind::kCompound:
       shape.children = read_children(&cursor, depth);
       shape.size.setOnes();
       break;
@@ -221,31 +219,31 @@ SceneShape read(std::uint64_t type, std::span<const double> parameters, int dept
 double support_value(const SceneShape& shape, const Vector3& d) {
   const double radial = std::sqrt(d.x() * d.x() + d.z() * d.z());
   switch (shape.kind) {
-    case Kind::kSphere:
+    case SceneShape::Kind::kSphere:
       return shape.size.x();
-    case Kind::kBox:
+    case SceneShape::Kind::kBox:
       return shape.size.dot(d.cwiseAbs());
-    case Kind::kCylinder:
+    case SceneShape::Kind::kCylinder:
       return shape.size.x() * radial + shape.size.y() * std::fabs(d.y());
-    case Kind::kCapsule:
+    case SceneShape::Kind::kCapsule:
       return shape.size.x() + shape.size.y() * std::fabs(d.y());
-    case Kind::kCone:
+    case SceneShape::Kind::kCone:
       return std::max(shape.size.y() * d.y(), shape.size.x() * radial - shape.size.y() * d.y());
-    case Kind::kConvexPolyhedron:
+    case SceneShape::Kind::kConvexPolyhedron:
       return d.dot(shape.polyhedron->vertices[shape.polyhedron->support(d)]);
-    case Kind::kTriangleMesh: {
+    case SceneShape::Kind::kTriangleMesh: {
       double farthest = -std::numeric_limits<double>::infinity();
       for (const Vector3& v : shape.mesh->vertices()) farthest = std::max(farthest, d.dot(v));
       return farthest;
     }
-    case Kind::kCompound: {
+    case SceneShape::Kind::kCompound: {
       double farthest = -std::numeric_limits<double>::infinity();
       for (const SceneShape::Child& child : shape.children)
         farthest = std::max(
             farthest, d.dot(child.pose.position) + support_value(*child.shape, child.pose.orientation.conjugate() * d));
       return farthest;
     }
-    case Kind::kHalfspace:
+    case SceneShape::Kind::kHalfspace:
       break;
   }
   return std::numeric_limits<double>::infinity();
@@ -255,34 +253,34 @@ double support_value(const SceneShape& shape, const Vector3& d) {
 double farthest_from(const SceneShape& shape, const Vector3& c) {
   const double radial = std::sqrt(c.x() * c.x() + c.z() * c.z()), height = std::fabs(c.y());
   switch (shape.kind) {
-    case Kind::kSphere:
+    case SceneShape::Kind::kSphere:
       return std::sqrt(c.squaredNorm()) + shape.size.x();
-    case Kind::kBox:
+    case SceneShape::Kind::kBox:
       return std::sqrt((c.cwiseAbs() + shape.size).squaredNorm());
-    case Kind::kCylinder:
+    case SceneShape::Kind::kCylinder:
       return std::sqrt((radial + shape.size.x()) * (radial + shape.size.x()) +
                        (height + shape.size.y()) * (height + shape.size.y()));
-    case Kind::kCapsule:
+    case SceneShape::Kind::kCapsule:
       return shape.size.x() + std::sqrt(radial * radial + (height + shape.size.y()) * (height + shape.size.y()));
-    case Kind::kCone: {
+    case SceneShape::Kind::kCone: {
       const double below = c.y() + shape.size.y(), above = shape.size.y() - c.y();
       return std::sqrt(std::max(radial * radial + above * above,
                                 (radial + shape.size.x()) * (radial + shape.size.x()) + below * below));
     }
-    case Kind::kConvexPolyhedron:
-    case Kind::kTriangleMesh: {
+    case SceneShape::Kind::kConvexPolyhedron:
+    case SceneShape::Kind::kTriangleMesh: {
       double farthest = 0.0;
       const auto& vertices = shape.polyhedron ? shape.polyhedron->vertices : shape.mesh->vertices();
       for (const Vector3& v : vertices) farthest = std::max(farthest, (v - c).squaredNorm());
       return std::sqrt(farthest);
     }
-    case Kind::kCompound: {
+    case SceneShape::Kind::kCompound: {
       double farthest = 0.0;
       for (const SceneShape::Child& child : shape.children)
         farthest = std::max(farthest, farthest_from(*child.shape, inverse_transform_point(child.pose, c)));
       return farthest;
     }
-    case Kind::kHalfspace:
+    case SceneShape::Kind::kHalfspace:
       break;
   }
   return std::numeric_limits<double>::infinity();
@@ -318,20 +316,20 @@ std::vector<double> flattened_shape(const SceneShape& shape) {
     for (const std::uint32_t i : triangles) out.push_back(i);
   };
   switch (shape.kind) {
-    case Kind::kSphere:
+    case SceneShape::Kind::kSphere:
       return {shape.size.x()};
-    case Kind::kBox:
+    case SceneShape::Kind::kBox:
       return {shape.size.x(), shape.size.y(), shape.size.z()};
-    case Kind::kCylinder:
-    case Kind::kCapsule:
-    case Kind::kCone:
+    case SceneShape::Kind::kCylinder:
+    case SceneShape::Kind::kCapsule:
+    case SceneShape::Kind::kCone:
       return {shape.size.x(), 2.0 * shape.size.y()};
-    case Kind::kHalfspace:
+    case SceneShape::Kind::kHalfspace:
       return {};
-    case Kind::kConvexPolyhedron:
+    case SceneShape::Kind::kConvexPolyhedron:
       put_table(shape.polyhedron->vertices, shape.polyhedron->triangles());
       return out;
-    case Kind::kTriangleMesh: {
+    case SceneShape::Kind::kTriangleMesh: {
       std::vector<std::uint32_t> triangles;
       for (const TriangleMesh::Triangle& t : shape.mesh->triangles())
         triangles.insert(triangles.end(), t.begin(), t.end());
@@ -341,7 +339,7 @@ std::vector<double> flattened_shape(const SceneShape& shape) {
                  {1.0, static_cast<double>(options.maximum_depth), static_cast<double>(options.minimum_node_size)});
       return out;
     }
-    case Kind::kCompound: {
+    case SceneShape::Kind::kCompound: {
       std::vector<double> parameters;
       out.push_back(static_cast<double>(shape.children.size()));
       for (const SceneShape::Child& child : shape.children) {
@@ -364,33 +362,33 @@ std::vector<double> flattened_shape(const SceneShape& shape) {
 
 MassProperties mass_properties(const SceneShape& shape, double density) {
   switch (shape.kind) {
-    case Kind::kSphere:
+    case SceneShape::Kind::kSphere:
       return sphere_mass_properties(shape.size.x(), density);
-    case Kind::kBox:
+    case SceneShape::Kind::kBox:
       return box_mass_properties(shape.size, density);
-    case Kind::kCylinder:
+    case SceneShape::Kind::kCylinder:
       return cylinder_mass_properties(shape.size.x(), 2.0 * shape.size.y(), density);
-    case Kind::kCapsule:
+    case SceneShape::Kind::kCapsule:
       return capsule_mass_properties(shape.size.x(), 2.0 * shape.size.y(), density);
-    case Kind::kCone:
+    case SceneShape::Kind::kCone:
       return cone_mass_properties(shape.size.x(), 2.0 * shape.size.y(), density);
-    case Kind::kConvexPolyhedron:
+    case SceneShape::Kind::kConvexPolyhedron:
       return solid_mass_properties(shape.polyhedron->vertices, shape.polyhedron->triangles(), density);
-    case Kind::kTriangleMesh: {
+    case SceneShape::Kind::kTriangleMesh: {
       std::vector<std::uint32_t> triangles;
       for (const TriangleMesh::Triangle& t : shape.mesh->triangles())
         triangles.insert(triangles.end(), t.begin(), t.end());
       return shape.mesh->is_closed() ? solid_mass_properties(shape.mesh->vertices(), triangles, density)
                                      : shell_mass_properties(shape.mesh->vertices(), triangles, density);
     }
-    case Kind::kCompound: {
+    case SceneShape::Kind::kCompound: {
       std::vector<MassProperties> parts;
       for (const SceneShape::Child& child : shape.children)
         parts.push_back(
             transformed(mass_properties(*child.shape, child.density > 0.0 ? child.density : density), child.pose));
       return combined(parts);
     }
-    case Kind::kHalfspace:
+    case SceneShape::Kind::kHalfspace:
       break;
   }
   return {};

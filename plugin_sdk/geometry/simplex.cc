@@ -12,7 +12,7 @@ const SimplexPoint& nearer(const SimplexPoint& x, const SimplexPoint& y) {
 
 // Squares of sines below which a triangle is its edges, and a tetrahedron its faces: what their normals say is rounding.
 constexpr double kSliver = 1e-22;
-constexpr double kFlat = 1e-24;
+constexpr double kFlatSimplex = 1e-24;
 
 // A point of a side as one of the whole: `rows` says which corners the side has.
 template <std::size_t N>
@@ -65,7 +65,7 @@ SimplexPoint closest_on_tetrahedron(const Vector3& a, const Vector3& b, const Ve
     const double long_1 = (x[face[1]] - p).squaredNorm(), long_2 = (x[face[2]] - p).squaredNorm();
     const double area = normal.squaredNorm();
     const bool is_flat = !(area > kSliver * long_1 * long_2) ||
-                         !(side_of_fourth * side_of_fourth > kFlat * area * (x[face[3]] - p).squaredNorm());
+                         !(side_of_fourth * side_of_fourth > kFlatSimplex * area * (x[face[3]] - p).squaredNorm());
     if (!is_flat && side_of_origin * side_of_fourth > 0.0) {
       inside[face[3]] = side_of_origin / side_of_fourth;
       continue;

@@ -10,15 +10,15 @@
 namespace gravitas {
 namespace {
 
-double length_of(const Vector3& v) { return std::sqrt(v.squaredNorm()); }
+double norm_of(const Vector3& v) { return std::sqrt(v.squaredNorm()); }
 
 // The core of a solid about the centre of its body, in world axes.
 class TurningCore {
  public:
   explicit TurningCore(const MovingSolid& solid)
-      : solid_(solid), map_(*solid.map), spin_(solid.motion.rotation), rate_(length_of(spin_)) {
+      : solid_(solid), map_(*solid.map), spin_(solid.motion.rotation), rate_(norm_of(spin_)) {
     place(0.0);
-    reach_ = length_of(solid.geometry.position) + map_.radius() - map_.rounding();
+    reach_ = norm_of(solid.geometry.position) + map_.radius() - map_.rounding();
     if (!(rate_ > 0.0)) return;
     axis_ = spin_ / rate_;
     const TangentBasis basis = orthonormal_basis(axis_);
@@ -41,11 +41,11 @@ class TurningCore {
   double swept_support(const Vector3& m) const {
     if (!(rate_ > 0.0)) return support(m);
     const double along = axis_.dot(m);
-    return (along > 0.0 ? along * up_ : -along * down_) + off_axis_ * length_of(m - along * axis_);
+    return (along > 0.0 ? along * up_ : -along * down_) + off_axis_ * norm_of(m - along * axis_);
   }
   // How m turns with the body, and what its support leaves out, per second and per half of its square.
   Vector3 turning(const Vector3& n) const { return n.cross(spin_); }
-  double remainder(const Vector3& n) const { return length_of(n.cross(spin_)) * rate_ * off_axis_; }
+  double remainder(const Vector3& n) const { return norm_of(n.cross(spin_)) * rate_ * off_axis_; }
 
   const SupportMap& map() const { return map_; }
   const Matrix3& axes() const { return R_; }
@@ -161,8 +161,8 @@ class HalfspaceApproach {
     tilts_ = !spin.isZero(0.0);
     if (!tilts_) return;
     // no point of the solid comes nearer to the plane faster than this
-    const double farthest = std::max(length_of(offset_), length_of(offset_ + velocity_)) + b_.reach();
-    speed_ = (length_of(velocity_) + length_of(spin) * (farthest + length_of(ground.geometry.position)) + b_.travel()) *
+    const double farthest = std::max(norm_of(offset_), norm_of(offset_ + velocity_)) + b_.reach();
+    speed_ = (norm_of(velocity_) + norm_of(spin) * (farthest + norm_of(ground.geometry.position)) + b_.travel()) *
              (1.0 + 1e-12);
   }
 
@@ -220,7 +220,7 @@ class CornersMap final : public SupportMap {
     radius_ = 0.0;
     for (std::size_t i = 0; i < count_; ++i) {
       corners_[i] = (corners.start[i] - origin) + t * (corners.end[i] - corners.start[i]);
-      radius_ = std::max(radius_, length_of(corners_[i]));
+      radius_ = std::max(radius_, norm_of(corners_[i]));
     }
     centre_ = corners_[0];
   }
@@ -241,7 +241,7 @@ class CornersApproach {
   CornersApproach(const MovingCorners& a, const MovingCorners& b) : a_(a), b_(b), origin_(a.start[0]) {
     for (const MovingCorners* side : {&a, &b})
       for (std::size_t i = 0; i < side->count; ++i)
-        size_ = std::max({size_, length_of(side->start[i] - origin_), length_of(side->end[i] - origin_)});
+        size_ = std::max({size_, norm_of(side->start[i] - origin_), norm_of(side->end[i] - origin_)});
   }
   double sizes() const { return size_; }
   void look(double t) {
@@ -316,8 +316,8 @@ double greatest_travel(const MovingSolid& solid, const MovingSolid& other) {
   const Vector3 offset = solid.start.position - other.start.position;
   const Vector3 velocity = solid.motion.displacement - other.motion.displacement;
   const TurningCore core(solid);
-  const double farthest = std::max(length_of(offset), length_of(offset + velocity)) + core.reach();
-  return (length_of(velocity) + core.travel() + length_of(other.motion.rotation) * farthest) * (1.0 + 1e-12);
+  const double farthest = std::max(norm_of(offset), norm_of(offset + velocity)) + core.reach();
+  return (norm_of(velocity) + core.travel() + norm_of(other.motion.rotation) * farthest) * (1.0 + 1e-12);
 }
 
 }  // namespace gravitas

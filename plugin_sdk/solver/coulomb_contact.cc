@@ -14,7 +14,7 @@ constexpr int kDirections = 64;
 // cos and sin of 2 pi / 64
 constexpr double kStepCosine = 0.99518472667219688624;
 constexpr double kStepSine = 0.098017140329560601994;
-constexpr double kRounding = 2.220446049250313e-16;
+constexpr double kEpsilon = 2.220446049250313e-16;
 
 double cross(const Vector2& a, const Vector2& b) { return a.x() * b.y() - a.y() * b.x(); }
 Vector2 turned(const Vector2& v) { return {-v.y(), v.x()}; }
@@ -50,7 +50,7 @@ struct Slide {
 
 // Newton, at most an eighth of a turn at once.
 bool refine(const Slide& slide, Vector2* direction) {
-  const double still = 4.0 * kRounding * slide.size();
+  const double still = 4.0 * kEpsilon * slide.size();
   Vector2 d = *direction;
   for (int i = 0; i < 12; ++i) {
     const double value = slide.misalignment(d);
@@ -59,7 +59,7 @@ bool refine(const Slide& slide, Vector2* direction) {
     const double step = -value / slope;
     if (!(std::fabs(step) < 0.75)) return false;
     d = (d + step * turned(d)).normalized();
-    if (std::fabs(step) <= 2.0 * kRounding || std::fabs(value) <= still) {
+    if (std::fabs(step) <= 2.0 * kEpsilon || std::fabs(value) <= still) {
       *direction = d;
       return slide.holds(d);
     }

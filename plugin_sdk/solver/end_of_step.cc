@@ -15,7 +15,7 @@
 namespace gravitas {
 namespace {
 
-constexpr double kRounding = std::numeric_limits<double>::epsilon();
+constexpr double kEndRounding = std::numeric_limits<double>::epsilon();
 
 class IslandSolver {
  public:
@@ -254,7 +254,7 @@ class IslandSolver {
       move_to_end();
       stiffen();
       build_pose();
-      const double representable = 0.25 * kRounding * coordinates_;
+      const double representable = 0.25 * kEndRounding * coordinates_;
       const BodyMotion x0 = start_of_step();
       const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_);
       note(solved);
@@ -472,7 +472,7 @@ class IslandSolver {
     const double change = largest_change(next, offset_);
     const double size = std::max(largest(next), largest(displacement_));
     offset_ = std::move(next);
-    return change > std::max(kRounding * coordinates_, 1e-14 * size) ? change : 0.0;
+    return change > std::max(kEndRounding * coordinates_, 1e-14 * size) ? change : 0.0;
   }
 
   // ---- sizes, m

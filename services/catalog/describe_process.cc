@@ -19,7 +19,7 @@ extern char** environ;
 namespace gravitas {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using DescribeClock = std::chrono::steady_clock;
 
 // An answer of this size would be wrong anyway.
 constexpr std::size_t kLargestAnswer = std::size_t{64} << 20;
@@ -79,9 +79,9 @@ void drain(int* end, std::string* text) {
 }
 
 // Reads both pipes to their ends. False if time ran out before.
-bool read_all(Pipe* out, Pipe* err, Clock::time_point until, std::string* answer, std::string* messages) {
+bool read_all(Pipe* out, Pipe* err, DescribeClock::time_point until, std::string* answer, std::string* messages) {
   while (out->read >= 0 || err->read >= 0) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - DescribeClock::now()).count();
     if (left <= 0) return false;
     std::array<pollfd, 2> ends = {pollfd{out->read, POLLIN, 0}, pollfd{err->read, POLLIN, 0}};
     if (::poll(ends.data(), ends.size(), static_cast<int>(left)) < 0 && errno != EINTR) return false;
@@ -92,10 +92,10 @@ bool read_all(Pipe* out, Pipe* err, Clock::time_point until, std::string* answer
 }
 
 // The status of a process that has ended or is about to; it is killed if time runs out.
-int wait_for(pid_t pid, Clock::time_point until, bool* is_in_time) {
+int wait_for(pid_t pid, DescribeClock::time_point until, bool* is_in_time) {
   const int handle = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));
   while (*is_in_time && handle >= 0) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - Clock::now()).count();
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - DescribeClock::now()).count();
     pollfd end = {handle, POLLIN, 0};
     const int ready = left > 0 ? ::poll(&end, 1, static_cast<int>(left)) : 0;
     if (ready > 0) break;
@@ -136,7 +136,7 @@ bool describe(const std::string& what, const std::vector<std::string>& words, in
   Pipe::close_end(&err.write);
 
   std::string bytes, messages;
-  const Clock::time_point until = Clock::now() + timeout;
+  const DescribeClock::time_point until = DescribeClock::now() + timeout;
   bool is_complete = read_all(&out, &err, until, &bytes, &messages);
   const int status = wait_for(pid, until, &is_complete);
   if (!is_complete) {

@@ -30,7 +30,7 @@ constexpr std::uint64_t kFirstRoom = 64;
 constexpr std::chrono::milliseconds kLook{20};
 
 constexpr auto kIntegrate = static_cast<std::size_t>(stage::Method::kIntegratorIntegrate);
-constexpr auto kDerivative = static_cast<std::size_t>(stage::Method::kIntegratorDerivative);
+constexpr auto kDerivativeMethod = static_cast<std::size_t>(stage::Method::kIntegratorDerivative);
 
 }  // namespace
 
@@ -39,21 +39,21 @@ class CarrierSubject::Derivatives final : public kernel::DerivativeSource {
  public:
   Derivatives(CarrierSubject* subject, const DerivativeFunction& function) : subject_(*subject), function_(function) {}
 
-  std::span<const ColumnId> trial_columns() const override { return subject_.request_columns_[kDerivative]; }
-  ColumnId wrench_column() const override { return subject_.reply_columns_[kDerivative][0]; }
+  std::span<const ColumnId> trial_columns() const override { return subject_.request_columns_[kDerivativeMethod]; }
+  ColumnId wrench_column() const override { return subject_.reply_columns_[kDerivativeMethod][0]; }
   void evaluate() override {
-    const std::span<const stage::ColumnInfo> infos = stage::kMethods[kDerivative].request;
+    const std::span<const stage::ColumnInfo> infos = stage::kMethods[kDerivativeMethod].request;
     const MessageColumns trial = subject_.take(trial_columns(), infos);
     const std::vector<gravitas_column> columns = trial.plain();
-    MessageColumns wrench(stage::kMethods[kDerivative].reply);
+    MessageColumns wrench(stage::kMethods[kDerivativeMethod].reply);
     wrench.f64("wrench") = function_(stage::IntegratorDerivativeRequest(columns.data()));
     const std::array<ColumnId, 1> to = {wrench_column()};
-    subject_.put(to, wrench, stage::kMethods[kDerivative].reply);
+    subject_.put(to, wrench, stage::kMethods[kDerivativeMethod].reply);
   }
 
   // Room for a trial state of as many bodies as are asked for.
   void make_room(std::uint64_t bodies) const {
-    const std::span<const stage::ColumnInfo> infos = stage::kMethods[kDerivative].request;
+    const std::span<const stage::ColumnInfo> infos = stage::kMethods[kDerivativeMethod].request;
     kernel::Arena& arena = subject_.arena_;
     for (std::size_t i = 0; i < infos.size(); ++i) {
       const std::uint64_t count = infos[i].rows_index == stage::kScalar ? 1 : bodies * infos[i].components;

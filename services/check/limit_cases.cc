@@ -18,7 +18,7 @@ using conformance::Question;
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using LimitClock = std::chrono::steady_clock;
 
 // What a process may grow by between the end of the warm-up and the last call: an allocator's and a stack's pages.
 // Over 100,000 calls, ten bytes a call are found.
@@ -45,12 +45,12 @@ Series run_series(Examination& examination, kernel::Hosting hosting, std::uint64
   const std::unique_ptr<CarrierSubject> subject = examination.fresh(hosting);
   const std::uint64_t rounds = kWarmUpRounds * questions.size();
   const std::uint64_t warm_up = examination.options.quick ? rounds : std::max(calls / kWarmUpPart, rounds);
-  Clock::time_point end = Clock::time_point::max();
+  LimitClock::time_point end = LimitClock::time_point::max();
   Series series;
-  for (std::uint64_t i = 0; i < std::max(calls, warm_up + questions.size()) && Clock::now() < end; ++i) {
+  for (std::uint64_t i = 0; i < std::max(calls, warm_up + questions.size()) && LimitClock::now() < end; ++i) {
     if (i == warm_up) {
       series.before = use_of(subject->process_id());
-      if (examination.options.quick) end = Clock::now() + kQuickTime;
+      if (examination.options.quick) end = LimitClock::now() + kQuickTime;
     }
     if (i % 256 == 0) examination.show(i, calls);
     const Question& question = questions[i % questions.size()];
@@ -87,9 +87,9 @@ class AllSeries {
   std::vector<Series> series_;
 };
 
-using Judge = std::string (*)(const Series&);
+using JudgeLimit = std::string (*)(const Series&);
 
-CheckCase of_series(const std::shared_ptr<AllSeries>& all, std::string name, std::string claim, Judge judge) {
+CheckCase of_series(const std::shared_ptr<AllSeries>& all, std::string name, std::string claim, JudgeLimit judge) {
   const auto judge_each = [all, judge](Examination& examination) -> std::string {
     for (const Series& series : all->of(examination)) {
       const std::string finding = judge(series);
@@ -117,7 +117,7 @@ std::string judge_descriptors(const Series& series) {
                      series.after.descriptors, series.calls);
 }
 
-std::string judge_threads(const Series& series) {
+std::string judge_thread_count(const Series& series) {
   if (!series.finding.empty() || series.after.threads <= series.before.threads + kSpareThreads) return {};
   return fmt::format("its process had {} threads, and {} after {} calls", series.before.threads, series.after.threads,
                      series.calls);
@@ -147,7 +147,7 @@ std::vector<CheckCase> limit_cases() {
       of_series(all, "answers", "Each of many calls is answered in time, and as the first.", judge_answers),
       of_series(all, "memory", "Many calls take no more memory than few.", judge_memory),
       of_series(all, "descriptors", "Many calls leave no descriptor open.", judge_descriptors),
-      of_series(all, "threads", "Many calls leave no thread behind.", judge_threads),
+      of_series(all, "threads", "Many calls leave no thread behind.", judge_thread_count),
       {Level::kLimits, "limits/large", "A large question is answered in time.", judge_large, true},
   };
 }

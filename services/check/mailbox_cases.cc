@@ -92,10 +92,11 @@ class FrameAbuser {
   Answer good_{GRAVITAS_OK, {}, {}, conformance::empty_reply(question_.method)};
 };
 
-using Workers = std::map<stage::Method, std::unique_ptr<FrameAbuser>>;
-using Judge = std::string (*)(FrameAbuser*);
+using FrameAbusers = std::map<stage::Method, std::unique_ptr<FrameAbuser>>;
+using JudgeFrames = std::string (*)(FrameAbuser*);
 
-CheckCase for_each_method(const std::shared_ptr<Workers>& workers, std::string name, std::string claim, Judge judge) {
+CheckCase for_each_method(const std::shared_ptr<FrameAbusers>& workers, std::string name, std::string claim,
+                          JudgeFrames judge) {
   const auto judge_all = [workers, judge](Examination& examination) -> std::string {
     // a command is reached by gRPC only
     if (examination.examinee.is_command()) return {};
@@ -213,7 +214,7 @@ std::string judge_other_slot(FrameAbuser* worker) {
 }  // namespace
 
 std::vector<CheckCase> mailbox_cases() {
-  const auto workers = std::make_shared<Workers>();
+  const auto workers = std::make_shared<FrameAbusers>();
   return {
       for_each_method(workers, "header", "A frame with a wrong header fails.", judge_header),
       for_each_method(workers, "digest", "A frame whose digest does not fit fails.", judge_digest),

@@ -97,10 +97,11 @@ class AbusedWorker {
 };
 
 // One worker per method serves all cases, until one of them has a finding.
-using Workers = std::map<stage::Method, std::unique_ptr<AbusedWorker>>;
-using Judge = std::string (*)(AbusedWorker*, const Question&);
+using AbusedWorkers = std::map<stage::Method, std::unique_ptr<AbusedWorker>>;
+using JudgeStream = std::string (*)(AbusedWorker*, const Question&);
 
-CheckCase for_each_method(const std::shared_ptr<Workers>& workers, std::string name, std::string claim, Judge judge) {
+CheckCase for_each_method(const std::shared_ptr<AbusedWorkers>& workers, std::string name, std::string claim,
+                          JudgeStream judge) {
   const auto judge_all = [workers, judge](Examination& examination) -> std::string {
     for (const Question* question : examination.one_of_each_method()) {
       // taken out, so that an exception ends it
@@ -310,7 +311,7 @@ std::string judge_assets(AbusedWorker* worker, const Question& question) {
 }  // namespace
 
 std::vector<CheckCase> stream_cases() {
-  const auto workers = std::make_shared<Workers>();
+  const auto workers = std::make_shared<AbusedWorkers>();
   const auto uneven = [](AbusedWorker* worker, const Question& question) {
     return judge_requests(worker, question, with_uneven_rows(question));
   };

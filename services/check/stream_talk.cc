@@ -15,7 +15,7 @@ using stage::v1::Outcome;
 
 namespace {
 
-const stage::MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
+const stage::MethodInfo& kDerivativeInfo = stage::method_info(stage::Method::kIntegratorDerivative);
 
 std::string submessage(wire::Field field, const std::string& bytes) {
   std::string out(wire::submessage_head_size(field, bytes.size()), '\0');
@@ -152,14 +152,14 @@ StreamReply StreamTalk::receive(const Question& question, const Call& call) {
       throw std::runtime_error("its reply has no outcome");
     if (outcome.marks() != 0) continue;
     if (reader.derivative().has) {
-      wire::ColumnsReader trial(kDerivative.request);
+      wire::ColumnsReader trial(kDerivativeInfo.request);
       if (!question.derivative || !trial.parse(reader.derivative().bytes).empty())
         throw std::runtime_error("it asks for a derivative that cannot be answered");
-      const MessageColumns columns = columns_of(trial, kDerivative.request);
-      MessageColumns wrench(kDerivative.reply);
+      const MessageColumns columns = columns_of(trial, kDerivativeInfo.request);
+      MessageColumns wrench(kDerivativeInfo.reply);
       wrench.f64("wrench") = question.derivative(stage::IntegratorDerivativeRequest(columns.plain().data()));
       send(submessage(wire::kHeader, call.SerializeAsString()) +
-           submessage(wire::kDerivative, columns_bytes(kDerivative.reply, wrench)));
+           submessage(wire::kDerivative, columns_bytes(kDerivativeInfo.reply, wrench)));
       continue;
     }
     reply.epoch = outcome.epoch();

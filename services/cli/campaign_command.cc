@@ -17,7 +17,7 @@
 namespace gravitas::cli {
 namespace {
 
-struct Arguments {
+struct CampaignArguments {
   campaign::Options options;
   std::string tier = "real", hosting = "both", shard = "1/1";
   double endurance = 0.0;
@@ -26,7 +26,7 @@ struct Arguments {
 };
 
 // I/K, 1 to K.
-void read_shard(Arguments* arguments) {
+void read_shard(CampaignArguments* arguments) {
   unsigned first = 0, all = 0;
   char rest = 0;
   const bool is_read = std::sscanf(arguments->shard.c_str(), "%u/%u%c", &first, &all, &rest) == 2;
@@ -36,7 +36,7 @@ void read_shard(Arguments* arguments) {
   arguments->options.shards = all;
 }
 
-int endure(const Arguments& arguments) {
+int endure(const CampaignArguments& arguments) {
   campaign::EnduranceResult result;
   {
     StatusLine line;
@@ -64,7 +64,7 @@ int endure(const Arguments& arguments) {
   return interrupted() ? kInterrupted : kDone;
 }
 
-int run_campaign(Arguments* arguments) {
+int run_campaign(CampaignArguments* arguments) {
   campaign::Options& options = arguments->options;
   options.draw.tier = arguments->tier == "real" ? campaign::Tier::kReal : campaign::Tier::kSimulated;
   if (arguments->hosting == "shm" || options.draw.tier == campaign::Tier::kSimulated)
@@ -103,7 +103,7 @@ int run_campaign(Arguments* arguments) {
 }  // namespace
 
 void add_campaign(CLI::App* app, Action* action) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CampaignArguments>();
   campaign::Options& options = arguments->options;
   CLI::App* command =
       app->add_subcommand("campaign", "Inject faults into many short runs and judge each by the bits of the quiet run");

@@ -21,7 +21,7 @@ std::string text_of(const check::Progress& progress) {
   return text;
 }
 
-struct Arguments {
+struct CheckArguments {
   std::string plugin;
   check::Options options;
   bool json = false;
@@ -38,7 +38,7 @@ void demand_known(const check::Options& options, const PluginDeclaration& declar
   throw BadInput(fmt::format("--case {}: this plugin has no such case; allowed:{}", options.only_case, names));
 }
 
-int check_plugin(const Arguments& arguments) {
+int check_plugin(const CheckArguments& arguments) {
   listen_to_interrupts();
   check::Examinee examinee = check::find_examinee(arguments.plugin);
   check::complete(&examinee, arguments.options.quick);
@@ -58,7 +58,7 @@ int check_plugin(const Arguments& arguments) {
 }  // namespace
 
 void add_check(CLI::App* app, Action* action) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<CheckArguments>();
   CLI::App* command = app->add_subcommand("check", "Judge a plugin by the contract that every plugin keeps");
   command->footer(
       "Levels: C0 handshake, C1 wire, C2 purity, C3 state, C4 limits, C5 numbers. Exit code 0: it conforms, 4: it does "

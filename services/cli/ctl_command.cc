@@ -20,7 +20,7 @@ namespace {
 namespace api = control_api::v1;
 using control::ControlClient;
 
-struct CommandLine {
+struct CtlLine {
   std::string socket;
   bool json = false, no_wait = false;
   std::uint32_t steps = 1, captured_steps = 100;
@@ -28,9 +28,9 @@ struct CommandLine {
   std::string out;
 };
 
-using Order = std::function<int(const CommandLine&, ControlClient*)>;
+using Order = std::function<int(const CtlLine&, ControlClient*)>;
 
-std::string socket_of(const CommandLine& line) {
+std::string socket_of(const CtlLine& line) {
   if (!line.socket.empty()) return line.socket;
   const std::vector<std::string> found = control::find_servers();
   if (found.size() == 1) return found[0];
@@ -40,7 +40,7 @@ std::string socket_of(const CommandLine& line) {
   throw BadInput(text);
 }
 
-int perform(const CommandLine& line, const Order& order) {
+int perform(const CtlLine& line, const Order& order) {
   try {
     ControlClient client(socket_of(line));
     return order(line, &client);
@@ -52,17 +52,17 @@ int perform(const CommandLine& line, const Order& order) {
   }
 }
 
-void print_line(const CommandLine& line, const api::Status& status) {
+void print_line(const CtlLine& line, const api::Status& status) {
   std::cout << (line.json ? to_json(status, JsonForm::kPage) : control::status_line(status) + "\n");
 }
 
-int show_status(const CommandLine& line, ControlClient* client) {
+int show_status(const CtlLine& line, ControlClient* client) {
   const api::Status status = client->status();
   std::cout << (line.json ? to_json(status, JsonForm::kPage) : control::status_page(status));
   return kDone;
 }
 
-int make_steps(const CommandLine& line, ControlClient* client) {
+int make_steps(const CtlLine& line, ControlClient* client) {
   const api::Status status = client->step(line.steps);
   print_line(line, status);
   if (status.state() != "faulted") return kDone;
@@ -71,7 +71,7 @@ int make_steps(const CommandLine& line, ControlClient* client) {
 }
 
 // Waits for the end of a swap, and says what became of it.
-int follow_swap(const CommandLine& line, ControlClient* client, const api::SwapOrdered& ordered) {
+int follow_swap(const CtlLine& line, ControlClient* client, const api::SwapOrdered& ordered) {
   if (line.no_wait) {
     if (line.json) {
       std::cout << to_json(ordered, JsonForm::kPage);
@@ -95,15 +95,15 @@ int follow_swap(const CommandLine& line, ControlClient* client, const api::SwapO
   return status.state() == "faulted" ? kPaused : kDone;
 }
 
-int swap(const CommandLine& line, ControlClient* client) {
+int swap(const CtlLine& line, ControlClient* client) {
   return follow_swap(line, client, client->swap(control::parse_swap_request(line.text)));
 }
 
-int set_property(const CommandLine& line, ControlClient* client) {
+int set_property(const CtlLine& line, ControlClient* client) {
   return follow_swap(line, client, client->set_property(control::parse_set_request(line.text)));
 }
 
-int inject(const CommandLine& line, ControlClient* client) {
+int inject(const CtlLine& line, ControlClient* client) {
   const api::InjectOrdered ordered = client->inject(line.text);
   if (line.json) {
     std::cout << to_json(ordered, JsonForm::kPage);
@@ -114,7 +114,7 @@ int inject(const CommandLine& line, ControlClient* client) {
   return kDone;
 }
 
-int capture(const CommandLine& line, ControlClient* client) {
+int capture_calls(const CtlLine& line, ControlClient* client) {
   api::CaptureRequest request;
   request.set_slot(line.text);
   request.set_path(std::filesystem::absolute(line.out).lexically_normal().string());
@@ -132,7 +132,7 @@ int capture(const CommandLine& line, ControlClient* client) {
 }
 
 // A page that is rewritten in place on a terminal, a line per second elsewhere.
-int watch(const CommandLine& line, ControlClient* client) {
+int watch(const CtlLine& line, ControlClient* client) {
   const bool is_terminal = isatty(STDOUT_FILENO) == 1 && !line.json;
   std::ptrdiff_t rows = 0;
   client->watch(is_terminal ? 250 : 1000, [&](const api::Status& status) {
@@ -156,7 +156,7 @@ int watch(const CommandLine& line, ControlClient* client) {
 }  // namespace
 
 void add_ctl(CLI::App* app, Action* action) {
-  const auto line = std::make_shared<CommandLine>();
+  const auto line = std::make_shared<CtlLine>();
   CLI::App* ctl = app->add_subcommand("ctl", "Watch and control a run of `gravitas serve`");
   ctl->require_subcommand(1);
   ctl->footer("Example: gravitas ctl status");
@@ -172,7 +172,7 @@ void add_ctl(CLI::App* app, Action* action) {
     return command;
   };
   const auto then_line = [](api::Status (ControlClient::*call)()) {
-    return [call](const CommandLine& now, ControlClient* client) {
+    return [call](const CtlLine& now, ControlClient* client) {
       print_line(now, (client->*call)());
       return kDone;
     };
@@ -201,7 +201,7 @@ void add_ctl(CLI::App* app, Action* action) {
             "SLOT:KIND[@step=N][,ARGUMENT=VALUE]...: at step N, or the next");
   CLI::App* capture_command =
       add_order("capture", "Keep a slot's calls in the next steps as a capsule, for gravitas replay and bisect",
-                "capture solver --out solver.capsule --steps 50", capture, "SLOT",
+                "capture solver --out solver.capsule --steps 50", capture_calls, "SLOT",
                 "space, collision, constraint, force, solver or integrator");
   capture_command->add_option("--out", line->out, "The capsule's file, on the server's machine")->required();
   capture_command->add_option("--steps", line->captured_steps, "For so many steps")

@@ -130,7 +130,7 @@ int describe(const std::string& name, bool json) {
   return kDone;
 }
 
-struct Arguments {
+struct PluginsArguments {
   std::string name;
   bool json = false;
   bool reference = false;
@@ -139,7 +139,7 @@ struct Arguments {
 }  // namespace
 
 void add_plugins(CLI::App* app, Action* action) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<PluginsArguments>();
   CLI::App* command = app->add_subcommand("plugins", "List the installed plugins");
   command->footer("Example: gravitas plugins --json");
   command->add_flag("--json", arguments->json, "Print JSON");
@@ -147,7 +147,7 @@ void add_plugins(CLI::App* app, Action* action) {
 }
 
 void add_describe(CLI::App* app, Action* action) {
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<PluginsArguments>();
   CLI::App* command = app->add_subcommand("describe", "A plugin's kind, version, capabilities and properties");
   command->footer("Example: gravitas describe Sequential");
   CLI::Option* reference = command->add_flag("--reference", arguments->reference,

@@ -17,7 +17,7 @@
 namespace gravitas::cli {
 namespace {
 
-struct CommandLine {
+struct RunLine {
   RunOptions options;
   SceneOptions scene{&options};
   bool progress = false, quiet = false, json = false;
@@ -58,7 +58,7 @@ void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warni
   for (const std::string& warning : warnings) std::cerr << warning << '\n';
 }
 
-int run_scene(CommandLine* line) {
+int run_scene(RunLine* line) {
   line->scene.apply();
   listen_to_interrupts();
   // a file beyond the limit of its size is an error of that write, as a full disk is
@@ -96,7 +96,7 @@ int run_scene(CommandLine* line) {
   return kOurFault;
 }
 
-int plan_scene(CommandLine* line) {
+int plan_scene(RunLine* line) {
   line->scene.apply();
   std::vector<std::string> warnings;
   const kernel::EnvironmentDescription description = load(line->options, &warnings);
@@ -119,7 +119,7 @@ int plan_scene(CommandLine* line) {
 }  // namespace
 
 void add_run(CLI::App* app, Action* action) {
-  const auto line = std::make_shared<CommandLine>();
+  const auto line = std::make_shared<RunLine>();
   CLI::App* command = app->add_subcommand("run", "Simulate a scene");
   command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n\nFaults:\n" +
                   fault_help());
@@ -153,7 +153,7 @@ void add_run(CLI::App* app, Action* action) {
 }
 
 void add_plan(CLI::App* app, Action* action) {
-  const auto line = std::make_shared<CommandLine>();
+  const auto line = std::make_shared<RunLine>();
   CLI::App* command =
       app->add_subcommand("plan", "Print the pipeline that a scene needs, and what is left out and why");
   command->footer("Example: gravitas plan deploy/scenes/two_spheres_motor.gravitas");

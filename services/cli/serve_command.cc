@@ -19,14 +19,14 @@
 namespace gravitas::cli {
 namespace {
 
-struct CommandLine {
+struct ServeLine {
   control::ServeOptions options;
   SceneOptions scene{&options.run};
   std::string socket, listen;
   bool headless = false, remote = false;
 };
 
-int serve(CommandLine* line) {
+int serve(ServeLine* line) {
   if (!line->headless) throw BadInput("gravitas serve: the page comes later; allowed: --headless");
   if (!std::isfinite(line->options.speed) || line->options.speed < 0.0)
     throw BadInput(
@@ -63,7 +63,7 @@ int serve(CommandLine* line) {
 }  // namespace
 
 void add_serve(CLI::App* app, Action* action) {
-  const auto line = std::make_shared<CommandLine>();
+  const auto line = std::make_shared<ServeLine>();
   CLI::App* command = app->add_subcommand("serve", "Simulate a scene in real time, controlled by `gravitas ctl`");
   command->footer(
       "Example: gravitas serve deploy/scenes/two_spheres_motor.gravitas --headless --duration 3600 &\n"

@@ -10,7 +10,7 @@ namespace {
 namespace api = control_api::v1;
 
 // Swaps and faults that a page shows.
-constexpr int kMostShown = 5;
+constexpr int kMostListed = 5;
 
 std::string duration_text(double microseconds) {
   return microseconds < 1000.0 ? fmt::format("{:.1f} us", microseconds) : fmt::format("{:.1f} ms", 1e-3 * microseconds);
@@ -56,13 +56,13 @@ std::string status_page(const api::Status& status) {
   text += fmt::format("  state hash {}\n  chain hash {}\n", status.state_hash(), status.chain_hash());
   text += plan_table(status.plan());
   const auto heading = [&](const char* what, std::uint32_t count) {
-    if (count > 0) text += fmt::format("{}: {}{}\n", what, count, count > kMostShown ? ", the last ones" : "");
+    if (count > 0) text += fmt::format("{}: {}{}\n", what, count, count > kMostListed ? ", the last ones" : "");
   };
   heading("swaps", status.swap_count());
-  for (int i = std::max(0, status.swaps_size() - kMostShown); i < status.swaps_size(); ++i)
+  for (int i = std::max(0, status.swaps_size() - kMostListed); i < status.swaps_size(); ++i)
     text += fmt::format("  {}\n", swap_line(status.swaps(i)));
   heading("faults", status.fault_count());
-  for (int i = std::max(0, status.faults_size() - kMostShown); i < status.faults_size(); ++i) {
+  for (int i = std::max(0, status.faults_size() - kMostListed); i < status.faults_size(); ++i) {
     const report::v1::FaultRecord& fault = status.faults(i);
     text += fmt::format("  step {}, {} {}: {}; {}, {}\n", fault.step(), fault.slot(), fault.plugin(), fault.kind(),
                         fault.recovered_by(), duration_text(fault.recovery_us()));

@@ -17,20 +17,20 @@
 namespace gravitas {
 namespace {
 
-constexpr std::array<unsigned char, 8> kMagic = {0x89, 'G', 'R', 'V', 'J', '\r', '\n', 0x1a};
-constexpr std::uint32_t kVersion = 1;
+constexpr std::array<unsigned char, 8> kJournalMagic = {0x89, 'G', 'R', 'V', 'J', '\r', '\n', 0x1a};
+constexpr std::uint32_t kJournalVersion = 1;
 
 // What waits in memory is written at this size, or when it has waited so long.
 constexpr std::size_t kLargestBuffer = 64 * 1024;
 constexpr std::chrono::milliseconds kLongestWait{50};
 
-struct Header {
+struct JournalHeader {
   std::array<unsigned char, 8> magic;
   std::uint32_t version, zero;
   kernel::Hash run;
   std::uint64_t check;
 };
-static_assert(sizeof(Header) == 40);
+static_assert(sizeof(JournalHeader) == 40);
 
 constexpr std::uint8_t kCommit = 1, kDecision = 2;
 
@@ -55,9 +55,9 @@ constexpr std::uint64_t word(const std::array<std::uint32_t, 4>& halves, std::si
   return halves[first] | static_cast<std::uint64_t>(halves[first + 1]) << 32;
 }
 
-Header header_of(const kernel::Hash& run) {
-  Header header{kMagic, kVersion, 0, run, 0};
-  header.check = XXH3_64bits(&header, offsetof(Header, check));
+JournalHeader header_of(const kernel::Hash& run) {
+  JournalHeader header{kJournalMagic, kJournalVersion, 0, run, 0};
+  header.check = XXH3_64bits(&header, offsetof(JournalHeader, check));
   return header;
 }
 
@@ -82,8 +82,8 @@ bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uin
 
 JournalReading read_journal(std::span<const std::byte> bytes, const kernel::Hash& run, std::uint32_t after) {
   JournalReading reading;
-  Header header;
-  const Header expected = header_of(run);
+  JournalHeader header;
+  const JournalHeader expected = header_of(run);
   if (bytes.size() < sizeof header) {
     reading.note = "it has no whole header";
     return reading;
@@ -133,7 +133,7 @@ JournalWriter::JournalWriter(const std::string& path, const kernel::Hash& run, c
   }
   if (ftruncate(file_, static_cast<off_t>(known.end)) != 0 || lseek(file_, 0, SEEK_END) < 0) fail();
   if (known.end > 0) return;
-  const Header header = header_of(run);
+  const JournalHeader header = header_of(run);
   check_ = header.check;
   const auto* bytes = reinterpret_cast<const std::byte*>(&header);
   buffer_.assign(bytes, bytes + sizeof header);

@@ -9,7 +9,6 @@ namespace gravitas::scene {
 namespace {
 
 namespace pb = google::protobuf;
-using Kind = PropertyValue::Kind;
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
@@ -26,7 +25,7 @@ void trim(const Entry& entry, const TextPosition& position, std::string* text, D
 // Checks one text of a property; trims ids.
 bool check_text(const Entry& entry, PropertyValue* value, Diagnostics* diagnostics) {
   const bool is_list = entry.form == Form::kTexts;
-  if (value->kind != Kind::kText) {
+  if (value->kind != PropertyValue::Kind::kText) {
     diagnostics->error(value->position, (is_list ? "an element of " : "") + entry.name + " is " + shown(*value) +
                                             "; allowed: " + (is_list ? "texts" : "a text") + " in double quotes");
     return false;
@@ -54,7 +53,7 @@ bool check_text(const Entry& entry, PropertyValue* value, Diagnostics* diagnosti
 }
 
 bool set_texts(const Entry& entry, PropertyValue* value, pb::Message* block, Diagnostics* diagnostics) {
-  if (value->kind != Kind::kList) {
+  if (value->kind != PropertyValue::Kind::kList) {
     diagnostics->error(value->position, entry.name + " is " + shown(*value) + "; allowed: a list of texts, { \"…\" }");
     return false;
   }
@@ -164,16 +163,16 @@ void to_message(PropertyValue value, v1::Value* message) {
   message->set_line(value.position.line);
   message->set_column(value.position.column);
   switch (value.kind) {
-    case Kind::kNumber:
+    case PropertyValue::Kind::kNumber:
       message->set_number(value.number);
       break;
-    case Kind::kText:
+    case PropertyValue::Kind::kText:
       message->set_text(std::move(value.text));
       break;
-    case Kind::kFlag:
+    case PropertyValue::Kind::kFlag:
       message->set_flag(value.flag);
       break;
-    case Kind::kList:
+    case PropertyValue::Kind::kList:
       message->mutable_list()->clear_value();
       message->mutable_list()->mutable_value()->Reserve(static_cast<int>(value.list.size()));
       for (PropertyValue& element : value.list) to_message(std::move(element), message->mutable_list()->add_value());
@@ -191,7 +190,7 @@ PropertyValue from_message(const v1::Value& message) {
       value = PropertyValue::of(message.flag());
       break;
     case v1::Value::kList:
-      value.kind = Kind::kList;
+      value.kind = PropertyValue::Kind::kList;
       value.list.reserve(static_cast<std::size_t>(message.list().value_size()));
       for (const v1::Value& element : message.list().value()) value.list.push_back(from_message(element));
       break;

@@ -8,8 +8,6 @@
 namespace gravitas::scene {
 namespace {
 
-using Kind = PropertyValue::Kind;
-
 NamedValue* find(std::vector<NamedValue>* values, const char* name) {
   const auto found =
       std::find_if(values->begin(), values->end(), [&](const NamedValue& value) { return value.name == name; });
@@ -26,17 +24,17 @@ bool refuse(const TextPosition& position, std::string text, std::vector<Property
 // Rows of indices of any length >= 3; false, with a problem, where one is none.
 bool read_faces(const PropertyValue& given, std::vector<std::vector<std::uint32_t>>* faces,
                 std::vector<PropertyProblem>* problems) {
-  if (given.kind != Kind::kList)
+  if (given.kind != PropertyValue::Kind::kList)
     return refuse(given.position, "Faces is " + shown(given) + "; allowed: a list of rows of indices", problems);
   for (const PropertyValue& row : given.list) {
     const std::string what = "face " + std::to_string(faces->size());
-    if (row.kind != Kind::kList || row.list.size() < 3)
+    if (row.kind != PropertyValue::Kind::kList || row.list.size() < 3)
       return refuse(row.position, what + " is " + shown(row) + "; allowed: a list of at least 3 indices of Vertices",
                     problems);
     std::vector<std::uint32_t>& face = faces->emplace_back();
     for (const PropertyValue& index : row.list) {
-      const bool is_index = index.kind == Kind::kNumber && index.number >= 0.0 && index.number < 4294967295.0 &&
-                            index.number == std::floor(index.number);
+      const bool is_index = index.kind == PropertyValue::Kind::kNumber && index.number >= 0.0 &&
+                            index.number < 4294967295.0 && index.number == std::floor(index.number);
       if (!is_index)
         return refuse(index.position, what + " has " + shown(index) + "; allowed: an index of Vertices", problems);
       face.push_back(static_cast<std::uint32_t>(index.number));
@@ -62,9 +60,9 @@ PropertyValue triangles_of(const std::vector<std::vector<std::uint32_t>>& faces,
 std::vector<Vector3> vertices_of(const std::vector<NamedValue>& values) {
   std::vector<Vector3> vertices;
   for (const NamedValue& value : values) {
-    if (value.name != "Vertices" || value.value.kind != Kind::kList) continue;
+    if (value.name != "Vertices" || value.value.kind != PropertyValue::Kind::kList) continue;
     for (const PropertyValue& row : value.value.list) {
-      if (row.kind != Kind::kList || row.list.size() != 3) return {};
+      if (row.kind != PropertyValue::Kind::kList || row.list.size() != 3) return {};
       vertices.emplace_back(row.list[0].number, row.list[1].number, row.list[2].number);
     }
   }
@@ -105,7 +103,7 @@ bool expand_mesh(const std::string& folder, std::vector<NamedValue>* values, Sha
     return true;
   }
   const TextPosition position = file->value.position;
-  if (file->value.kind != Kind::kText)
+  if (file->value.kind != PropertyValue::Kind::kText)
     return refuse(position, "File is " + shown(file->value) + "; allowed: the path of an OBJ file in double quotes",
                   problems);
   if (given != nullptr || find(values, "Vertices") != nullptr)
@@ -125,9 +123,9 @@ bool expand_mesh(const std::string& folder, std::vector<NamedValue>* values, Sha
 // ---- compounds
 
 bool numbers_of(const PropertyValue& value, std::size_t count, std::vector<double>* out) {
-  if (value.kind != Kind::kList || value.list.size() != count) return false;
+  if (value.kind != PropertyValue::Kind::kList || value.list.size() != count) return false;
   for (const PropertyValue& element : value.list) {
-    if (element.kind != Kind::kNumber) return false;
+    if (element.kind != PropertyValue::Kind::kNumber) return false;
     out->push_back(element.number);
   }
   return true;
@@ -136,7 +134,7 @@ bool numbers_of(const PropertyValue& value, std::size_t count, std::vector<doubl
 bool expand_compound(SiblingShapes* siblings, std::vector<NamedValue>* values, ShapeExpansion* expansion,
                      std::vector<PropertyProblem>* problems) {
   NamedValue* given = find(values, "Children");
-  if (given == nullptr || given->value.kind != Kind::kList) return true;
+  if (given == nullptr || given->value.kind != PropertyValue::Kind::kList) return true;
   if (const NamedValue* parameters = find(values, "Parameters"))
     return refuse(parameters->position, "Parameters stands in a scene; allowed: Children alone", problems);
   expansion->position = given->value.position;
@@ -145,10 +143,11 @@ bool expand_compound(SiblingShapes* siblings, std::vector<NamedValue>* values, S
   for (const PropertyValue& row : given->value.list) {
     const std::string what = "child " + std::to_string(compound.children.size());
     std::vector<double> numbers;
-    const bool is_child = row.kind == Kind::kList && (row.list.size() == 3 || row.list.size() == 4) &&
-                          row.list[0].kind == Kind::kText && numbers_of(row.list[1], 3, &numbers) &&
-                          numbers_of(row.list[2], 4, &numbers) &&
-                          (row.list.size() == 3 || (row.list[3].kind == Kind::kNumber && row.list[3].number > 0.0));
+    const bool is_child =
+        row.kind == PropertyValue::Kind::kList && (row.list.size() == 3 || row.list.size() == 4) &&
+        row.list[0].kind == PropertyValue::Kind::kText && numbers_of(row.list[1], 3, &numbers) &&
+        numbers_of(row.list[2], 4, &numbers) &&
+        (row.list.size() == 3 || (row.list[3].kind == PropertyValue::Kind::kNumber && row.list[3].number > 0.0));
     if (!is_child)
       return refuse(row.position,
                     what + " is " + shown(row) +

@@ -58,7 +58,7 @@ class Call {
 // The pairs of one body: nothing to send and nothing to do.
 void empty_call(benchmark::State& state, Hosting hosting) {
   Call call(stage::Method::kSpacePairs, 1);
-  const auto carrier = make_carrier(hosting, testing::plugin_path("space_basic"));
+  const auto carrier = make_carrier(hosting, harness::plugin_path("space_basic"));
   for (int i = 0; i < 100; ++i) call.make(carrier.get(), &state);
   for (auto _ : state) call.make(carrier.get(), &state);
 }
@@ -66,7 +66,7 @@ void empty_call(benchmark::State& state, Hosting hosting) {
 // The same after a pause in which the worker has gone to sleep.
 void sleeping_call(benchmark::State& state, Hosting hosting) {
   Call call(stage::Method::kSpacePairs, 1);
-  const auto carrier = make_carrier(hosting, testing::plugin_path("space_basic"));
+  const auto carrier = make_carrier(hosting, harness::plugin_path("space_basic"));
   for (auto _ : state) {
     const timespec pause = {0, 1'000'000};
     nanosleep(&pause, nullptr);
@@ -93,7 +93,7 @@ void integrate_call(benchmark::State& state, Hosting hosting) {
       call.f64(Request::kAngularVelocity)[3 * i + k] = 0.2;
     }
   }
-  const auto carrier = make_carrier(hosting, testing::plugin_path("integrator_semi_implicit_euler"));
+  const auto carrier = make_carrier(hosting, harness::plugin_path("integrator_semi_implicit_euler"));
   for (int i = 0; i < 20; ++i) call.make(carrier.get(), &state);
   for (auto _ : state) call.make(carrier.get(), &state);
 }

@@ -170,9 +170,9 @@ class NoDispatcher final : public btDispatcher {
   void freeCollisionAlgorithm(void*) override {}
 };
 
-class BulletUnderLoad {
+class BulletSpaceUnderLoad {
  public:
-  BulletUnderLoad(const std::string& name, const Crowd& crowd) {
+  BulletSpaceUnderLoad(const std::string& name, const Crowd& crowd) {
     const auto far = static_cast<btScalar>(2.0 * crowd.half_edge() + 10.0);
     const auto most = static_cast<unsigned>(crowd.count() + 2);
     if (name == "dbvt") {
@@ -206,7 +206,7 @@ class BulletUnderLoad {
 #endif
 
 // Of this thread: what else the machine does falls out of a comparison.
-double processor_seconds() {
+double thread_seconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
@@ -219,9 +219,9 @@ void find_pairs(benchmark::State& state, const std::string& name, const Layout& 
   std::size_t pairs = 0;
   const auto timed_call = [&] {
     crowd.step();
-    const double start = processor_seconds();
+    const double start = thread_seconds();
     pairs = space.find_pairs(crowd);
-    return processor_seconds() - start;
+    return thread_seconds() - start;
   };
   // room, caches, and velocities known
   for (int i = 0; i < 4; ++i) timed_call();
@@ -242,16 +242,16 @@ void add(const std::string& name, const std::string& library, std::int64_t most)
   }
 }
 
-const bool kAreAdded = [] {
+const bool kSpacesAreAdded = [] {
   add<SpaceUnderLoad>("Basic", "basic", 10'000);
   add<SpaceUnderLoad>("Grid", "grid", 100'000);
   add<SpaceUnderLoad>("KDTree", "kd_tree", 100'000);
   add<SpaceUnderLoad>("SweepAndPrune", "sweep_and_prune", 100'000);
   add<SpaceUnderLoad>("DynamicBVH", "dynamic_bvh", 100'000);
 #ifdef GRAVITAS_HAS_BULLET
-  add<BulletUnderLoad>("BulletDbvt", "dbvt", 100'000);
+  add<BulletSpaceUnderLoad>("BulletDbvt", "dbvt", 100'000);
   // putting 100,000 bodies in takes it minutes
-  add<BulletUnderLoad>("BulletSweep", "sweep", 10'000);
+  add<BulletSpaceUnderLoad>("BulletSweep", "sweep", 10'000);
 #endif
   return true;
 }();

@@ -22,9 +22,9 @@ extern char** environ;
 namespace gravitas {
 namespace {
 
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Hosting;
-using testing::WorldBuilder;
 
 constexpr std::uint32_t kEndless = 1U << 31;
 

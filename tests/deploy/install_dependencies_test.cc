@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "plugin_sdk/channel/private_folder.h"
 #include "tests/paths.h"
 
 namespace gravitas {
@@ -18,23 +19,18 @@ namespace fs = std::filesystem;
 class Machine {
  public:
   Machine() {
-    std::string pattern = (fs::temp_directory_path() / "gravitas-test-XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
     put("apt-get", "echo \"$@\" >>" + path("apt"));
     put("sudo", "exec \"$@\"");
   }
-  ~Machine() { fs::remove_all(folder_); }
-  Machine(const Machine&) = delete;
-  Machine& operator=(const Machine&) = delete;
 
-  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  std::string path(const std::string& name) const { return folder_.path() + "/" + name; }
   void put(const std::string& program, const std::string& script) const {
     std::ofstream(path(program)) << "#!/bin/bash\n" << script << '\n';
     chmod(path(program).c_str(), 0755);
   }
   int install(const std::string& what) const {
-    const std::string command = "PATH=" + folder_ + ":$PATH " + in_source("/deploy/install_dependencies ") + what +
-                                " >" + path("out") + " 2>&1";
+    const std::string command = "PATH=" + folder_.path() + ":$PATH " + in_source("/deploy/install_dependencies ") +
+                                what + " >" + path("out") + " 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));
   }
   std::string text(const std::string& name) const {
@@ -44,7 +40,7 @@ class Machine {
   }
 
  private:
-  std::string folder_;
+  const channel::PrivateFolder folder_;
 };
 
 // dpkg-query fails as a whole where it knows one of the packages not at all.

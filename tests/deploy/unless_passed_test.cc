@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "plugin_sdk/channel/private_folder.h"
 #include "tests/paths.h"
 
 namespace gravitas {
@@ -17,35 +18,28 @@ namespace fs = std::filesystem;
 
 class Shard {
  public:
-  Shard() {
-    std::string pattern = (fs::temp_directory_path() / "gravitas-test-XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
-    set_program("echo run >>runs; echo results >results.xml");
-  }
-  ~Shard() { fs::remove_all(folder_); }
-  Shard(const Shard&) = delete;
-  Shard& operator=(const Shard&) = delete;
+  Shard() { set_program("echo run >>runs; echo results >results.xml"); }
 
   void set_program(const std::string& script) const {
-    std::ofstream(folder_ + "/program") << "#!/bin/bash\n" << script << '\n';
-    chmod((folder_ + "/program").c_str(), 0755);
+    std::ofstream(folder_.path() + "/program") << "#!/bin/bash\n" << script << '\n';
+    chmod((folder_.path() + "/program").c_str(), 0755);
   }
   // Returns the exit code.
   int test(const std::string& inputs, const std::string& arguments = "") const {
-    const std::string command = "cd " + folder_ + " && GRAVITAS_TEST_INPUTS='" + inputs + "' " +
+    const std::string command = "cd " + folder_.path() + " && GRAVITAS_TEST_INPUTS='" + inputs + "' " +
                                 in_source("/tests/unless_passed results.xml ./program ") + arguments + " >out 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));
   }
   int runs() const {
-    std::ifstream file(folder_ + "/runs");
+    std::ifstream file(folder_.path() + "/runs");
     int count = 0;
     for (std::string line; std::getline(file, line);) ++count;
     return count;
   }
-  void forget_results() const { fs::remove(folder_ + "/results.xml"); }
+  void forget_results() const { fs::remove(folder_.path() + "/results.xml"); }
 
  private:
-  std::string folder_;
+  const channel::PrivateFolder folder_;
 };
 
 TEST(UnlessPassed, WhatPassedIsNotRunAgain) {

@@ -17,11 +17,11 @@ namespace {
 
 using campaign::v1::Table;
 using campaign::v1::Trial;
+using harness::ProgramResult;
+using harness::read_file;
+using harness::run_program;
+using harness::ScratchFolder;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::read_file;
-using testing::run_program;
-using testing::ScratchFolder;
 
 struct Outcome {
   ProgramResult program;

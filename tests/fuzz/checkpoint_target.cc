@@ -13,7 +13,7 @@ namespace gravitas::fuzz {
 namespace {
 
 kernel::EnvironmentDescription small_world() {
-  testing::WorldBuilder builder(kernel::Hosting::kDirect);
+  harness::WorldBuilder builder(kernel::Hosting::kDirect);
   builder.steps(100, 0.01).ground().sphere(0.5, 1.0, Vector3(0, 0.5, 0)).sphere(0.5, 1.0, Vector3(3, 0.5, 0));
   return builder.gravity(Vector3(0, -10, 0)).description();
 }

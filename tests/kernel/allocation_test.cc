@@ -59,7 +59,7 @@ TEST(Allocation, TheCounterCounts) {
 }
 
 TEST(Allocation, AStepAllocatesNothingAfterWarmUp) {
-  testing::WorldBuilder builder(kernel::Hosting::kDirect);
+  harness::WorldBuilder builder(kernel::Hosting::kDirect);
   builder.steps(1000, 1.0 / 60.0).ground();
   builder.box(Vector3(0.5, 0.5, 0.5), 1.0, Vector3(0, 0.5, 0))
       .sphere(0.5, 1.0, Vector3(3, 2, 0))

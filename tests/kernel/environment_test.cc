@@ -5,23 +5,19 @@
 
 #include <cmath>
 
+#include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas {
 namespace {
 
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Hosting;
 using kernel::StepOutcome;
-using testing::WorldBuilder;
 
 constexpr double kG = 9.81;
 const Vector3 kDown(0.0, -kG, 0.0);
-
-void run_to_end(Environment* world) {
-  while (world->step_count() < world->total_steps())
-    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.what();
-}
 
 Vector3 position(const Environment& world, std::size_t body) { return vector_at(world.state().position, body); }
 Vector3 velocity(const Environment& world, std::size_t body) { return vector_at(world.state().linear_velocity, body); }

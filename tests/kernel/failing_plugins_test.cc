@@ -15,12 +15,12 @@
 namespace gravitas {
 namespace {
 
+using harness::faulty_plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::FaultKind;
 using kernel::Hosting;
 using kernel::StepOutcome;
-using testing::faulty_plugin_path;
-using testing::WorldBuilder;
 
 struct Expected {
   const char* library;

@@ -24,6 +24,10 @@
 namespace gravitas {
 namespace {
 
+using harness::Integration;
+using harness::OneCall;
+using harness::PairSearch;
+using harness::start_worker;
 using kernel::CallResult;
 using kernel::Carrier;
 using kernel::FaultKind;
@@ -32,10 +36,6 @@ using kernel::StageFault;
 using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
-using testing::Integration;
-using testing::OneCall;
-using testing::PairSearch;
-using testing::start_worker;
 using ::testing::StartsWith;
 
 // Far more than any call here takes, even under a sanitizer on a busy machine; and as long as one that never ends

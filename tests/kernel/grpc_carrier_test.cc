@@ -19,16 +19,16 @@
 namespace gravitas {
 namespace {
 
+using harness::OneCall;
+using harness::plugin_path;
+using harness::start_worker;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::FaultKind;
 using kernel::Hosting;
 using kernel::StageFault;
 using kernel::StepOutcome;
 using ::testing::HasSubstr;
-using testing::OneCall;
-using testing::plugin_path;
-using testing::start_worker;
-using testing::WorldBuilder;
 
 WorldBuilder balls(std::uint32_t count) {
   WorldBuilder builder(Hosting::kDirect);
@@ -39,7 +39,7 @@ WorldBuilder balls(std::uint32_t count) {
 }
 
 // The worker's bits, or why there are none.
-std::string chain_of(const WorldBuilder& builder) {
+std::string chain_by_grpc_of(const WorldBuilder& builder) {
   Environment world(builder.description());
   while (world.step_count() < world.total_steps())
     if (world.step() == StepOutcome::kPaused) return world.fault()->fault.text;
@@ -98,10 +98,10 @@ class ListeningWorker {
 TEST(GrpcCarrier, AListeningWorkerServesOneKernelAfterTheOther) {
   const ListeningWorker worker(plugin_path("solver_sequential"));
   WorldBuilder builder = balls(3);
-  const std::string direct = chain_of(builder);
+  const std::string direct = chain_by_grpc_of(builder);
   builder.description().solver.plugins[0].address = worker.address();
-  EXPECT_EQ(chain_of(builder), direct);
-  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
   Environment world(builder.description());
   bool found = false;
   for (const kernel::PlannedSlot& slot : world.plan().slots) {
@@ -156,12 +156,12 @@ TEST(GrpcCarrier, AnAddressWithoutWorkerIsAnError) {
 TEST(GrpcCarrier, ACommandStartsAWorkerBesideTheSlotsLibraries) {
   WorldBuilder builder = balls(3);
   builder.force("Basic", "force_basic", {0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
-  const std::string direct = chain_of(builder);
+  const std::string direct = chain_by_grpc_of(builder);
   kernel::PluginChoice& gravity = builder.description().force.plugins[0];
   gravity.command = kernel::worker_program() + " " + gravity.library;
-  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
   builder.hosting(Slot::kForce, Hosting::kSharedMemory);
-  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
 }
 
 TEST(GrpcCarrier, ACommandThatIsNoWorkerIsAnError) {
@@ -176,9 +176,9 @@ TEST(GrpcCarrier, ACommandThatIsNoWorkerIsAnError) {
 TEST(GrpcCarrier, LargeColumnsTravelAsAssets) {
   WorldBuilder builder = balls(9000);
   builder.steps(2, 0.01);
-  const std::string direct = chain_of(builder);
+  const std::string direct = chain_by_grpc_of(builder);
   builder.hosting(Slot::kCollision, Hosting::kGrpc);
-  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
 }
 
 // A worker that listens keeps nothing of the kernel before: the same asset is sent, and taken, again.
@@ -186,10 +186,10 @@ TEST(GrpcCarrier, AListeningWorkerTakesTheAssetsOfEveryKernel) {
   const ListeningWorker worker(plugin_path("collision_standard"));
   WorldBuilder builder = balls(9000);
   builder.steps(1, 0.01);
-  const std::string direct = chain_of(builder);
+  const std::string direct = chain_by_grpc_of(builder);
   builder.description().collision.plugins[0].address = worker.address();
-  EXPECT_EQ(chain_of(builder), direct);
-  EXPECT_EQ(chain_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
 }
 
 // Takes three of the asker's deadlines to answer.

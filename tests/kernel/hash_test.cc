@@ -14,7 +14,7 @@ TEST(Hash, IsThirtyTwoHexadecimalDigits) { EXPECT_EQ((Hash{0xABC, 0x1}.text()), 
 
 TEST(Hash, EveryBitOfEveryBodyCounts) {
   const auto hash_of = [](double y, double w) {
-    testing::WorldBuilder builder;
+    harness::WorldBuilder builder;
     builder.sphere(1, 1, Vector3(1, y, 3)).sphere(1, 1, Vector3(9, 9, 9));
     builder.body().twist.angular.z() = w;
     return Environment(builder.description()).state_hash();
@@ -27,7 +27,7 @@ TEST(Hash, EveryBitOfEveryBodyCounts) {
 
 TEST(Hash, TheSignOfAZeroDoesNotCount) {
   const auto hash_of = [](double zero) {
-    testing::WorldBuilder builder;
+    harness::WorldBuilder builder;
     builder.sphere(1, 1, Vector3(zero, 0, 0));
     return Environment(builder.description()).state_hash();
   };

@@ -14,6 +14,9 @@
 namespace gravitas {
 namespace {
 
+using harness::busy_world;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Carrier;
 using kernel::Environment;
 using kernel::FaultKind;
@@ -21,13 +24,10 @@ using kernel::Hosting;
 using kernel::SlotDescription;
 using kernel::StageFault;
 using kernel::StepOutcome;
-using testing::busy_world;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
-constexpr std::uint32_t kSteps = 12, kManySteps = 20'000;
+constexpr std::uint32_t kLadderSteps = 12, kManySteps = 20'000;
 
 enum class Fate {
   kServes,
@@ -81,17 +81,17 @@ class Ladder : public ::testing::Test {
     };
   }
   static WorldBuilder world(std::uint32_t standbys) {
-    WorldBuilder builder = busy_world(Hosting::kSharedMemory).steps(kSteps, 0.01);
+    WorldBuilder builder = busy_world(Hosting::kSharedMemory).steps(kLadderSteps, 0.01);
     builder.description().solver.standbys = standbys;
     return builder;
   }
   static kernel::Hash quiet_chain() {
-    Environment quiet(busy_world(Hosting::kDirect).steps(kSteps, 0.01).description());
-    while (quiet.step_count() < kSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
+    Environment quiet(busy_world(Hosting::kDirect).steps(kLadderSteps, 0.01).description());
+    while (quiet.step_count() < kLadderSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
     return quiet.chain_hash();
   }
   static void run(Environment* world) {
-    while (world->step_count() < kSteps)
+    while (world->step_count() < kLadderSteps)
       ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
   }
 
@@ -114,7 +114,7 @@ class Ladder : public ::testing::Test {
 TEST_F(Ladder, ARequestThatKillsTwoHostsIsPoison) {
   Environment poisoned(world(1).description(),
                        starter({Fate::kDiesAtFourthCall, Fate::kDiesOfItsFirstCall, Fate::kServes}));
-  while (poisoned.step() == StepOutcome::kCommitted && poisoned.step_count() < kSteps) {
+  while (poisoned.step() == StepOutcome::kCommitted && poisoned.step_count() < kLadderSteps) {
   }
   ASSERT_TRUE(poisoned.fault());
   EXPECT_EQ(poisoned.step_count(), 3U);
@@ -159,7 +159,7 @@ TEST_F(Ladder, PoisonStaysPoisonWhenTheFallbackDoesNotStart) {
   Environment world(builder.description(), starter(fates));
   PoisonWitness witness;
   world.set_commit_listener(&witness);
-  while (world.step() == StepOutcome::kCommitted && world.step_count() < kSteps) {
+  while (world.step() == StepOutcome::kCommitted && world.step_count() < kLadderSteps) {
   }
   ASSERT_TRUE(world.fault());
   EXPECT_EQ(witness.verdicts, 1);

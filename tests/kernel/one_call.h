@@ -16,7 +16,7 @@
 #include "plugin_sdk/library.h"
 #include "tests/kernel/world_builder.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 
 // Columns of so many bodies, all zero but for what is set. Columns of other rows are empty, single values are there.
 // All calls go to one carrier, which knows one arena. Each column of the reply has room for `reply_room` elements at
@@ -120,4 +120,4 @@ inline std::unique_ptr<kernel::Carrier> start_worker(kernel::Hosting hosting, co
   return hosting == kernel::Hosting::kGrpc ? start_grpc_carrier(slot, 1) : start_shared_memory_carrier(slot, 1);
 }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -9,7 +9,7 @@
 namespace gravitas::kernel {
 namespace {
 
-using testing::WorldBuilder;
+using harness::WorldBuilder;
 
 std::vector<Slot> planned(WorldBuilder builder) {
   std::vector<Slot> slots;

@@ -16,17 +16,17 @@
 namespace gravitas {
 namespace {
 
+using harness::busy_world;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Hosting;
 using kernel::SavedColumn;
 using kernel::SavedState;
 using kernel::StepOutcome;
-using testing::busy_world;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using testing::WorldBuilder;
 
-constexpr std::uint32_t kSteps = 60;
+constexpr std::uint32_t kRestoreSteps = 60;
 
 // A saved state that owns its columns, so that it outlives its environment and can be spoilt.
 class OwnedState {
@@ -101,7 +101,7 @@ TEST_P(FromTo, EveryStepAfterARestoreHasTheBitsOfTheUninterruptedRun) {
   Environment whole(busy_world(Hosting::kDirect, kLoadOfLanding).description());
   std::vector<kernel::Hash> chain = {whole.chain_hash()};
   bool breaks = false, touches = false;
-  while (whole.step_count() < kSteps) {
+  while (whole.step_count() < kRestoreSteps) {
     steps(&whole, 1);
     chain.push_back(whole.chain_hash());
     breaks = breaks || !whole.is_intact(0);
@@ -111,13 +111,13 @@ TEST_P(FromTo, EveryStepAfterARestoreHasTheBitsOfTheUninterruptedRun) {
   ASSERT_TRUE(breaks && touches);
   ASSERT_EQ(OwnedState(whole.saved_state()).u32("intact"), std::vector<std::uint32_t>{0});
 
-  for (const std::uint32_t stop : {0U, 1U, 2U, 17U, 40U, kSteps}) {
+  for (const std::uint32_t stop : {0U, 1U, 2U, 17U, 40U, kRestoreSteps}) {
     const OwnedState saved = state_after(busy_world(GetParam().first, kLoadOfLanding), stop);
     Environment resumed(busy_world(GetParam().second, kLoadOfLanding).description());
     ASSERT_EQ(resumed.restore(saved.view()), "");
     EXPECT_EQ(resumed.step_count(), stop);
     EXPECT_EQ(resumed.chain_hash(), chain[stop]);
-    while (resumed.step_count() < kSteps) {
+    while (resumed.step_count() < kRestoreSteps) {
       steps(&resumed, 1);
       ASSERT_EQ(resumed.chain_hash(), chain[resumed.step_count()]) << "resumed at " << stop;
     }
@@ -200,7 +200,7 @@ const std::vector<Spoilt>& ways_to_spoil() {
        "pairs that touch, pair of row 0 is not two bodies"},
       {"moved", [](OwnedState* s) { s->f64("position")[3] += 1e-15; }, "not those of its hash"},
       {"negative_zero", [](OwnedState* s) { s->f64("linear_velocity")[0] = -0.0; }, "immovable body 'body0'"},
-      {"beyond", [](OwnedState* s) { s->head.step = kSteps + 1; }, "after step 61, and the run has 60"},
+      {"beyond", [](OwnedState* s) { s->head.step = kRestoreSteps + 1; }, "after step 61, and the run has 60"},
       {"step_length", [](OwnedState* s) { s->head.step_length = 0.001; }, "shortened last step"},
       {"nan_length", [](OwnedState* s) { s->head.step_length = kNan; }, "shortened last step"},
       {"figure", [](OwnedState* s) { s->head.figures.penetration = -1.0; }, "impossible"},

@@ -12,13 +12,13 @@
 namespace gravitas {
 namespace {
 
+using harness::busy_world;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Hosting;
 using kernel::Simulator;
 using kernel::StepOutcome;
-using testing::busy_world;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
 constexpr double kGravity = 9.81;
 

@@ -12,6 +12,8 @@
 namespace gravitas {
 namespace {
 
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::EventKind;
 using kernel::Hosting;
@@ -20,14 +22,12 @@ using kernel::Stage;
 using kernel::StepOutcome;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
 const Vector3 kDown(0, -9.81, 0);
 constexpr double kTimeStep = 0.01;
 constexpr std::uint32_t kAsleepBy = 60;  // the default is half a second
 
-class Listener final : public kernel::EventListener {
+class SleepListener final : public kernel::EventListener {
  public:
   void on_event(const kernel::Event& event) override { events.push_back(event); }
   std::vector<std::uint32_t> bodies(EventKind kind) const {
@@ -67,7 +67,7 @@ WorldBuilder boxes_and_ball(Hosting hosting = Hosting::kDirect) {
 
 TEST(Sleep, WhatRestsFallsAsleepAndStaysBitForBit) {
   Environment world(boxes_and_ball().description());
-  Listener listener;
+  SleepListener listener;
   world.set_listener(&listener);
   run(&world, kAsleepBy);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), ElementsAre(1, 2, 3));
@@ -86,7 +86,7 @@ TEST(Sleep, WhatRestsFallsAsleepAndStaysBitForBit) {
 
 TEST(Sleep, AContactWakesTheIslandAndNoOther) {
   Environment world(boxes_and_ball().description());
-  Listener listener;
+  SleepListener listener;
   world.set_listener(&listener);
   run(&world, 200);
   EXPECT_THAT(listener.bodies(EventKind::kWake), ElementsAre(1, 2));
@@ -150,7 +150,7 @@ TEST(Sleep, AChainWakesOneAfterTheOther) {
   builder.sphere(0.5, 1.0, Vector3(-4, 0.5, 0), Vector3(3, 0, 0));
   may_sleep(&builder).gravity(kDown);
   Environment world(builder.description());
-  Listener listener;
+  SleepListener listener;
   world.set_listener(&listener);
   run(&world, 400);
   EXPECT_THAT(listener.bodies(EventKind::kWake), ElementsAre(1, 2, 3, 4, 5));
@@ -167,7 +167,7 @@ TEST(Sleep, AJointMakesAnIsland) {
   builder.joint("Spherical", "constraint_spherical", 1, 2, {0.6, 0.25, 0});
   may_sleep(&builder).gravity(kDown);
   Environment world(builder.description());
-  Listener listener;
+  SleepListener listener;
   world.set_listener(&listener);
   run(&world, kAsleepBy);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), ElementsAre(1, 2));
@@ -218,7 +218,7 @@ TEST(Sleep, WhereAllSleepNothingIsAskedAndTimeGoesOn) {
 
 TEST(Sleep, AUserWakes) {
   Environment world(boxes_and_ball().description());
-  Listener listener;
+  SleepListener listener;
   world.set_listener(&listener);
   run(&world, kAsleepBy);
   world.wake(2);
@@ -299,14 +299,14 @@ WorldBuilder pushed_boxes(Hosting hosting) {
 
 TEST(Sleep, HasTheSameBitsInEveryHostingAndAfterKills) {
   Environment direct(pushed_boxes(Hosting::kDirect).description());
-  Listener quiet;
+  SleepListener quiet;
   direct.set_listener(&quiet);
   run(&direct, 150);
   EXPECT_THAT(quiet.bodies(EventKind::kSleep), ElementsAre(1, 2, 3));
   EXPECT_THAT(quiet.bodies(EventKind::kWake), ElementsAre(1, 2));
   for (const Hosting hosting : {Hosting::kSharedMemory, Hosting::kGrpc}) {
     Environment world(pushed_boxes(hosting).threads(2).description());
-    Listener heard;
+    SleepListener heard;
     world.set_listener(&heard);
     std::uint32_t step = 70;
     for (const Slot slot : {Slot::kIntegrator, Slot::kForce, Slot::kSpace, Slot::kCollision, Slot::kSolver})
@@ -351,7 +351,7 @@ TEST(Sleep, AForceThatChangesWakes) {
                                            0.0, 0,    0, 0, 1.0, 0, 0, 0, 1.01, push, 0, 0,  //
                                            9.0, push, 0, 0, 0});
     Environment world(builder.description());
-    Listener listener;
+    SleepListener listener;
     world.set_listener(&listener);
     run(&world, 100);
     EXPECT_TRUE(world.is_asleep(1));
@@ -374,7 +374,7 @@ TEST(Sleep, NothingSleepsUnderAForceThatKeepsChanging) {
   may_sleep(&builder).gravity(kDown);
   builder.force("Basic", "force_basic", {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0.0, 0, 0, 0, 100.0, 0.1, 0, 0, 0});
   Environment world(builder.description());
-  Listener listener;
+  SleepListener listener;
   world.set_listener(&listener);
   run(&world, 300);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), IsEmpty());

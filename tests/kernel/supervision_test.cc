@@ -7,28 +7,23 @@
 #include <vector>
 
 #include "kernel/environment.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas {
 namespace {
 
+using harness::busy_world;
+using harness::faulty_plugin_path;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::FaultKind;
 using kernel::Hosting;
 using kernel::StepOutcome;
-using testing::busy_world;
-using testing::faulty_plugin_path;
 using ::testing::HasSubstr;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 constexpr std::uint32_t kSteps = 20;
-
-void run_to_end(Environment* world) {
-  while (world->step_count() < kSteps) ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
-}
 
 const kernel::Hash& quiet_chain() {
   static const kernel::Hash chain = [] {

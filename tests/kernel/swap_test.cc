@@ -10,34 +10,29 @@
 #include <vector>
 
 #include "kernel/environment.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/paths.h"
 
 namespace gravitas {
 namespace {
 
+using harness::busy_world;
+using harness::faulty_plugin_path;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Hosting;
 using kernel::StepOutcome;
 using kernel::SwapOrder;
 using kernel::SwapRecord;
 using kernel::SwapState;
-using testing::busy_world;
-using testing::faulty_plugin_path;
 using ::testing::HasSubstr;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
-constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                           Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
-constexpr std::uint32_t kSteps = 40;
+constexpr std::uint32_t kSwapSteps = 40;
 
-void run_to_end(Environment* world) {
-  while (world->step_count() < kSteps) ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
-}
-
-kernel::Hash quiet_chain() {
-  Environment world(busy_world(Hosting::kDirect).steps(kSteps, 1.0 / 120.0).description());
+kernel::Hash chain_without_swaps() {
+  Environment world(busy_world(Hosting::kDirect).steps(kSwapSteps, 1.0 / 120.0).description());
   run_to_end(&world);
   return world.chain_hash();
 }
@@ -54,7 +49,7 @@ kernel::PluginChoice plugin_of(Slot slot) { return busy_world(Hosting::kDirect).
 
 class Swapped : public ::testing::TestWithParam<Hosting> {
  protected:
-  WorldBuilder builder() const { return busy_world(GetParam()).steps(kSteps, 1.0 / 120.0); }
+  WorldBuilder builder() const { return busy_world(GetParam()).steps(kSwapSteps, 1.0 / 120.0); }
 };
 INSTANTIATE_TEST_SUITE_P(In, Swapped, ::testing::Values(Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc),
                          [](const auto& one) { return std::string(kernel::hosting_name(one.param)); });
@@ -64,7 +59,7 @@ TEST_P(Swapped, AnotherInstanceInEverySlotChangesNoBit) {
   std::uint32_t step = 2;
   for (const Slot slot : kSlots) world.order_swap({slot, plugin_of(slot), std::nullopt, step += 3});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   ASSERT_EQ(world.swaps().size(), std::size(kSlots));
   for (const SwapRecord& swap : world.swaps()) {
     EXPECT_EQ(swap.state, SwapState::kCommitted) << swap.reason;
@@ -80,7 +75,7 @@ TEST_P(Swapped, AnotherHostingChangesNoBit) {
   world.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), next, 5});
   world.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), GetParam(), 25});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   ASSERT_EQ(world.swaps().size(), 2U);
   EXPECT_EQ(world.swaps()[0].to, std::string("Sequential (") + kernel::hosting_name(next) + ")");
   EXPECT_EQ(world.swaps()[1].state, SwapState::kCommitted);
@@ -123,7 +118,7 @@ TEST_P(Swapped, APluginThatFailsInShadowIsRefused) {
   ASSERT_EQ(world.step(), StepOutcome::kCommitted);
   while (!is_prepared) std::this_thread::yield();
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   ASSERT_EQ(world.swaps().size(), 1U);
   EXPECT_EQ(world.swaps()[0].state, SwapState::kRefused);
   EXPECT_THAT(world.swaps()[0].reason, HasSubstr("in shadow: its worker process"));
@@ -136,7 +131,7 @@ TEST_P(Swapped, APluginThatCannotBePreparedIsRefused) {
   missing.library = in_source("/README.md");
   world.order_swap({Slot::kSolver, missing, std::nullopt, 7});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   EXPECT_EQ(world.swaps()[0].state, SwapState::kRefused);
   EXPECT_THAT(world.swaps()[0].reason, HasSubstr("README.md"));
 }
@@ -163,7 +158,7 @@ TEST_P(Swapped, ALaterSwapEndsProbationAsCommitted) {
   for (std::uint32_t step = 3; step < 13; ++step)
     world.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), std::nullopt, step});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   ASSERT_EQ(world.swaps().size(), 10U);
   for (std::uint32_t i = 0; i < 10; ++i) {
     EXPECT_EQ(world.swaps()[i].step, 3 + i);
@@ -177,7 +172,7 @@ TEST_P(Swapped, TheSolverGetsOtherSettings) {
   weaker.settings = {1.0, 0.5};
   world.order_swap({Slot::kSolver, weaker, std::nullopt, 10});
   run_to_end(&world);
-  EXPECT_NE(world.chain_hash(), quiet_chain());
+  EXPECT_NE(world.chain_hash(), chain_without_swaps());
   EXPECT_EQ(world.swaps()[0].state, SwapState::kCommitted);
 }
 
@@ -187,12 +182,12 @@ TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
                    true);
   world.set_rerun_every(Slot::kSolver, 4);
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   ASSERT_EQ(world.swaps().size(), 1U);
   EXPECT_TRUE(world.swaps()[0].only_compared);
   const Comparison compared = world.swaps()[0].shadow;
-  EXPECT_EQ(compared.calls, kSteps);
-  EXPECT_EQ(compared.differing_calls, kSteps);
+  EXPECT_EQ(compared.calls, kSwapSteps);
+  EXPECT_EQ(compared.differing_calls, kSwapSteps);
   ASSERT_FALSE(compared.disagreements.empty());
   EXPECT_STREQ(compared.disagreements[0].column->name, "position");
   EXPECT_EQ(world.plan().slots[0].plugins[0], "SemiImplicitEuler");
@@ -220,11 +215,11 @@ TEST(Swap, WhatCannotTakeThePlaceIsRefusedAtOnce) {
 
 // One process of three answers otherwise: it is outvoted, whichever it is.
 TEST(Rerun, AWrongAnswerThatLooksRightIsOutvoted) {
-  Environment world(busy_world(Hosting::kSharedMemory).steps(kSteps, 1.0 / 120.0).description());
+  Environment world(busy_world(Hosting::kSharedMemory).steps(kSwapSteps, 1.0 / 120.0).description());
   world.set_rerun_every(Slot::kSolver, 1);
   world.inject({Slot::kSolver, "ulp", 9});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
   ASSERT_EQ(world.faults().size(), 1U);
   EXPECT_EQ(world.faults()[0].fault.kind, kernel::FaultKind::kDisagreement);
   EXPECT_EQ(world.faults()[0].step, 9U);

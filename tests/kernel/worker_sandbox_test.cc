@@ -22,19 +22,19 @@
 namespace gravitas {
 namespace {
 
+using harness::faulty_plugin_path;
+using harness::Integration;
+using harness::WorldBuilder;
 using kernel::Carrier;
 using kernel::Environment;
 using kernel::Hosting;
 using ::testing::Contains;
 using ::testing::EndsWith;
-using testing::faulty_plugin_path;
 using ::testing::HasSubstr;
-using testing::Integration;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
 using ::testing::UnorderedElementsAre;
-using testing::WorldBuilder;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kSanitized = true;

@@ -7,7 +7,7 @@
 #include "plugin_sdk/library.h"
 #include "tests/paths.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 namespace {
 
 // Declarations are read once per library and kept.
@@ -179,4 +179,4 @@ WorldBuilder busy_world(kernel::Hosting hosting, double breaking_force) {
   return builder;
 }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -7,7 +7,7 @@
 #include "kernel/description.h"
 #include "plugin_sdk/solver.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 
 // Path of a shipped plugin library, by folder name ("solver_sequential").
 std::string plugin_path(const std::string& name);
@@ -63,4 +63,4 @@ class WorldBuilder {
 // in every step and one that acts once.
 WorldBuilder busy_world(kernel::Hosting hosting, double breaking_force = 0.0);
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -10,6 +10,7 @@
 #include "kernel/environment.h"
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/math/rotation.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/numerics/motion_problem.h"
 #include "tests/numerics/reached.h"
@@ -17,13 +18,13 @@
 namespace gravitas {
 namespace {
 
+using harness::CpuClock;
+using harness::expect_reached;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Simulator;
 using kernel::StepOutcome;
-using testing::CpuClock;
-using testing::expect_reached;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
 constexpr double kGravity = 9.81;
 
@@ -34,18 +35,12 @@ class Listener final : public kernel::EventListener {
 };
 
 // Exact in free flight, and a solver that closes contacts to rounding.
-WorldBuilder contact_world(std::uint32_t steps, double time_step, const testing::Material& material) {
+WorldBuilder contact_world(std::uint32_t steps, double time_step, const harness::Material& material) {
   WorldBuilder world;
   world.steps(steps, time_step).integrator("integrator_verlet").material(material);
   world.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 500});
   world.description().simulator = Simulator::kContinuous;
   return world;
-}
-
-void step(Environment* world) { ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text; }
-
-void run(Environment* world) {
-  while (world->step_count() < world->total_steps()) ASSERT_NO_FATAL_FAILURE(step(world));
 }
 
 Vector3 position(const Environment& world, std::size_t body) { return vector_at(world.state().position, body); }
@@ -191,7 +186,7 @@ double sum_of_squared_overlaps(const Environment& world) {
 }
 
 TEST(ContactProblems, BallsOf666DoNotOverlap) {
-  const std::uint32_t seconds = testing::runs_long_problems() ? 10 : 1;
+  const std::uint32_t seconds = harness::runs_long_problems() ? 10 : 1;
   for (const std::uint32_t substeps : {1U, 10U}) {
     WorldBuilder builder = box_of_balls(contact_world(100 * seconds, 0.01, {0.0, 0.0, 0.0, 0.0}), 0.101);
     builder.description().simulator = Simulator::kSubstepping;
@@ -212,7 +207,7 @@ TEST(ContactProblems, BallsOf666DoNotOverlap) {
 
 // All of the first impacts of 36 columns, and hundreds of those within them, fall into twelve steps.
 TEST(ContactProblems, ElasticBallsOf666KeepTheirEnergy) {
-  const std::uint32_t steps = testing::runs_long_problems() ? 10000 : 600;
+  const std::uint32_t steps = harness::runs_long_problems() ? 10000 : 600;
   const WorldBuilder builder = box_of_balls(contact_world(steps, 0.001, {1.0, 0.0, 0.0, 0.0}), 1.101);
   const CpuClock clock;
   Environment world(builder.description());
@@ -236,7 +231,7 @@ TEST(ContactProblems, ASlidingBallComesToRoll) {
     builder.ground().sphere(0.2, 1.5, {0, 0.2, 0}, {5.0, 0, 0}).gravity({0, -kGravity, 0});
     const CpuClock clock;
     Environment world(builder.description());
-    ASSERT_NO_FATAL_FAILURE(run(&world));
+    ASSERT_NO_FATAL_FAILURE(run_to_end(&world));
     const double time = 0.485413329450026698, way = 2.08034284050011442, speed = 25.0 / 7.0;
     const double error = std::fabs(position(world, 1).x() - (way + speed * (world.time() - time)));
     const double turn = std::fabs(spin(world, 1).z() + speed / 0.2);
@@ -280,7 +275,7 @@ TEST(ContactProblems, ACubeSlidesAtThirtyDegrees) {
   builder.gravity({0, -kGravity, 0});
   const CpuClock clock;
   Environment world(builder.description());
-  ASSERT_NO_FATAL_FAILURE(run(&world));
+  ASSERT_NO_FATAL_FAILURE(run_to_end(&world));
   const Vector3 end = position(world, 1);
   const double degrees = std::fabs(std::atan2(end.z(), end.x()) - angle) * 180.0 / std::numbers::pi;
   const char* method = "Continuous, Verlet, Newton, 1/60 s";
@@ -298,7 +293,7 @@ TEST(ContactProblems, ABoxThatSlidesUpASlopeComesBack) {
   builder.gravity(kGravity * Vector3(-std::sin(slope), -std::cos(slope), 0));
   const CpuClock clock;
   Environment world(builder.description());
-  ASSERT_NO_FATAL_FAILURE(run(&world));
+  ASSERT_NO_FATAL_FAILURE(run_to_end(&world));
   const double turn = 3.0 / up, back = world.time() - turn;
   expect_reached({"up a slope and back", "Continuous, Verlet, Newton, 1/60 s", "place, m", 1e-9,
                   std::fabs(position(world, 1).x() - (9.0 / (2.0 * up) - 0.5 * down * back * back)), clock.seconds()});
@@ -372,9 +367,9 @@ TEST(ContactProblems, EulersDiskRollsToFirstOrder) {
     builder.gravity({0, -kGravity, 0});
     const CpuClock clock;
     Environment world(builder.description());
-    const double start = testing::energy_of(&world);
-    ASSERT_NO_FATAL_FAILURE(run(&world));
-    errors.push_back(std::fabs(testing::energy_of(&world) / start - 1.0));
+    const double start = harness::energy_of(&world);
+    ASSERT_NO_FATAL_FAILURE(run_to_end(&world));
+    errors.push_back(std::fabs(harness::energy_of(&world) / start - 1.0));
     const std::string method =
         time_step == 1e-3 ? "Continuous, Verlet, Newton, 1 ms" : "Continuous, Verlet, Newton, 0.1 ms";
     expect_reached(

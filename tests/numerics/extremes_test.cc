@@ -10,28 +10,24 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/math/rotation.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/numerics/motion_problem.h"
 #include "tests/numerics/reached.h"
 
 namespace gravitas {
 namespace {
 
+using harness::CpuClock;
+using harness::expect_reached;
+using harness::MotionMethod;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
 using kernel::Simulator;
-using testing::CpuClock;
-using testing::expect_reached;
-using testing::MotionMethod;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
-constexpr double kGravity = 9.81;
+constexpr double kG = 9.81;
 
-std::uint32_t many_steps() { return testing::runs_long_problems() ? 1'000'000 : 100'000; }
-
-void run(Environment* world) {
-  while (world->step_count() < world->total_steps())
-    ASSERT_EQ(world->step(), kernel::StepOutcome::kCommitted) << world->fault()->fault.text;
-}
+std::uint32_t many_steps() { return harness::runs_long_problems() ? 1'000'000 : 100'000; }
 
 WorldBuilder world_of(const MotionMethod& method, std::uint32_t steps, double time_step) {
   WorldBuilder world;
@@ -49,14 +45,14 @@ void expect_rotor_keeps(const std::string& problem, const Vector3& moments, cons
   builder.body().twist.angular = spin;
   const CpuClock clock;
   Environment world(builder.description());
-  const double energy = testing::energy_of(&world);
-  const Vector3 momentum = testing::angular_momentum_of(world);
-  ASSERT_NO_FATAL_FAILURE(run(&world));
+  const double energy = harness::energy_of(&world);
+  const Vector3 momentum = harness::angular_momentum_of(world);
+  ASSERT_NO_FATAL_FAILURE(run_to_end(&world));
   const std::string method = kExactRotor.name + ", " + std::to_string(steps) + " steps";
-  expect_reached({problem, method, "energy, relative", target, std::fabs(testing::energy_of(&world) / energy - 1.0),
+  expect_reached({problem, method, "energy, relative", target, std::fabs(harness::energy_of(&world) / energy - 1.0),
                   clock.seconds()});
   expect_reached({problem, method, "angular momentum, relative", target,
-                  (testing::angular_momentum_of(world) - momentum).norm() / momentum.norm(), clock.seconds()});
+                  (harness::angular_momentum_of(world) - momentum).norm() / momentum.norm(), clock.seconds()});
 }
 
 TEST(Extremes, AFastRotorKeepsWhatItHas) {
@@ -81,11 +77,11 @@ TEST(Extremes, StepsFromANanosecondToASecond) {
       WorldBuilder builder = world_of(method, 100, time_step);
       builder.point(1.0, {1, 2, 3}, {0, 0, 0});
       builder.body().twist = {{3, 4, 0}, {0, 0, 0.5}};
-      builder.gravity({0, -kGravity, 0});
+      builder.gravity({0, -kG, 0});
       Environment world(builder.description());
-      ASSERT_NO_FATAL_FAILURE(run(&world)) << method.name;
+      ASSERT_NO_FATAL_FAILURE(run_to_end(&world)) << method.name;
       const double t = world.time();
-      const Vector3 place(3 * t, 4 * t - 0.5 * kGravity * t * t, 0);
+      const Vector3 place(3 * t, 4 * t - 0.5 * kG * t * t, 0);
       worst = std::max(worst, (vector_at(world.state().position, 0) - place).norm() / place.norm());
       const Quaternion turn = exp_rotation(Vector3(0, 0, 0.5 * t));
       // Cayley's map turns by 2 atan(w h / 2)
@@ -108,9 +104,9 @@ TEST(Extremes, AHundredThousandKilometresFromTheOrigin) {
     builder.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 500}).material({0.0, 0.3, 0.3, 0.0});
     builder.description().simulator = Simulator::kContinuous;
     builder.ground().box({0.3, 0.2, 0.25}, 2.0, origin + Vector3(0, 0.2, 0), {3, 0, 4});
-    builder.sphere(0.2, 1.5, origin + Vector3(0, 0.2, -4), {5, 0, 0}).gravity({0, -kGravity, 0});
+    builder.sphere(0.2, 1.5, origin + Vector3(0, 0.2, -4), {5, 0, 0}).gravity({0, -kG, 0});
     Environment world(builder.description());
-    ASSERT_NO_FATAL_FAILURE(run(&world));
+    ASSERT_NO_FATAL_FAILURE(run_to_end(&world));
     for (const std::size_t body : {1U, 2U}) way[run_of].push_back(vector_at(world.state().position, body) - origin);
   }
   double worst = 0.0;
@@ -127,7 +123,7 @@ WorldBuilder swing(const MotionMethod& method, std::uint32_t steps, double time_
   WorldBuilder builder = world_of(method, steps, time_step);
   builder.point(1.0, {1, 2, 3}, {1, 0, 0});
   builder.body().twist.linear = {0, 1.5, 0};
-  testing::spring_between(&builder, {10.0, 0.0, 0.6}, Vector3::Zero(), kNone, Vector3::Zero());
+  harness::spring_between(&builder, {10.0, 0.0, 0.6}, Vector3::Zero(), kNone, Vector3::Zero());
   return builder;
 }
 
@@ -148,12 +144,12 @@ TEST(Extremes, SymmetricMethodsGoThereAndBack) {
     if (method.name != "Verlet") builder.body().twist.angular = {0.5, 1.0, 0.3};
     const Vector3 start = builder.body().pose.position;
     Environment there(builder.description());
-    ASSERT_NO_FATAL_FAILURE(run(&there)) << method.name;
+    ASSERT_NO_FATAL_FAILURE(run_to_end(&there)) << method.name;
     const kernel::StateView end = there.state();
     builder.body().pose = {vector_at(end.position, 0), quaternion_at(end.orientation, 0)};
     builder.body().twist = {-vector_at(end.linear_velocity, 0), -vector_at(end.angular_velocity, 0)};
     Environment back(builder.description());
-    ASSERT_NO_FATAL_FAILURE(run(&back)) << method.name;
+    ASSERT_NO_FATAL_FAILURE(run_to_end(&back)) << method.name;
     const double place = (vector_at(back.state().position, 0) - start).norm();
     const double attitude = log_rotation(shorter_arc(quaternion_at(back.state().orientation, 0))).norm();
     // roundings change the energy a little more with each step, and what that changes in the phase grows with the square
@@ -170,12 +166,12 @@ TEST(Extremes, EnergyOfSymplecticMethodsHasNoSlope) {
     const CpuClock clock;
     Environment world(swing(method, steps, 0.01).description());
     // means over the first and last tenth; each holds the same swings but for a part of one
-    const double start = testing::energy_of(&world);
+    const double start = harness::energy_of(&world);
     double first = 0.0, last = 0.0, swing_of_energy = 0.0;
     for (std::uint32_t i = 0; i < steps; ++i) {
       ASSERT_EQ(world.step(), kernel::StepOutcome::kCommitted);
       if (i >= steps / 10 && i < steps - steps / 10) continue;
-      const double error = testing::energy_of(&world) / start - 1.0;
+      const double error = harness::energy_of(&world) / start - 1.0;
       swing_of_energy = std::max(swing_of_energy, std::fabs(error));
       (i < steps / 10 ? first : last) += error / (steps / 10);
     }
@@ -191,7 +187,7 @@ TEST(Extremes, EnergyOfSymplecticMethodsHasNoSlope) {
 TEST(Extremes, AForceThatOverflowsIsRefusedWithItsBody) {
   WorldBuilder builder;
   builder.steps(5, 0.01).point(1.0, {1, 1, 1}, {1, 0, 0}).point(1.0, {1, 1, 1}, {1e10, 0, 0});
-  testing::spring_between(&builder, {1e300, 0.0, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
+  harness::spring_between(&builder, {1e300, 0.0, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
   try {
     const Environment world(builder.description());
     ADD_FAILURE() << "it was accepted";
@@ -206,7 +202,7 @@ TEST(Extremes, AMotionThatOverflowsIsRefusedWithItsBody) {
   for (const char* library : {"integrator_euler", "integrator_verlet", "integrator_rk4", "integrator_rkmk4"}) {
     WorldBuilder builder = world_of({"", library, {}}, 200, 0.01);
     builder.point(1.0, {1, 1, 1}, {0, 0, 0}).point(1.0, {1, 1, 1}, {1, 0, 0});
-    testing::spring_between(&builder, {1e14, 0.0, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
+    harness::spring_between(&builder, {1e14, 0.0, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
     Environment world(builder.description());
     while (world.step_count() < world.total_steps() && world.step() == kernel::StepOutcome::kCommitted) {
     }

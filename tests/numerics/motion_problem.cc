@@ -10,7 +10,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/math/rotation.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 namespace {
 
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
@@ -325,4 +325,4 @@ MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method
   return result;
 }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -8,7 +8,7 @@
 #include "kernel/environment.h"
 #include "tests/kernel/world_builder.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 
 // An integrator as it is shown and started.
 struct MotionMethod {
@@ -72,4 +72,4 @@ struct MotionResult {
 MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps,
                         kernel::Simulator simulator = kernel::Simulator::kSmooth);
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

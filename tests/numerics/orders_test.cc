@@ -17,8 +17,8 @@
 namespace gravitas {
 namespace {
 
-using testing::MotionMethod;
-using testing::MotionProblem;
+using harness::MotionMethod;
+using harness::MotionProblem;
 
 // A method on a problem: the coarsest of four steps that halve, small enough for the leading term, large enough for
 // errors above rounding.
@@ -35,7 +35,7 @@ struct Row {
 };
 
 MotionMethod method_named(const std::string& name) {
-  for (const MotionMethod& method : testing::fixed_step_methods())
+  for (const MotionMethod& method : harness::fixed_step_methods())
     if (method.name == name) return method;
   throw std::out_of_range(name);
 }
@@ -50,14 +50,14 @@ void expect_orders(const MotionProblem& problem, const std::vector<Case>& cases)
     const MotionMethod method = method_named(one.method);
     Row row{problem.name, method.name, method.order, {}};
     for (std::uint32_t steps = one.steps; steps <= 8 * one.steps; steps *= 2)
-      row.errors.push_back(testing::run_motion(problem, method, steps).error);
+      row.errors.push_back(harness::run_motion(problem, method, steps).error);
     EXPECT_NEAR(row.order(), row.theory, 0.1) << problem.name << ", " << method.name;
     all_rows().push_back(row);
   }
 }
 
 TEST(Orders, OfFreeMotionAreThoseOfTheTheory) {
-  expect_orders(testing::spring_and_spin(), {{"Euler", 20000},
+  expect_orders(harness::spring_and_spin(), {{"Euler", 20000},
                                              {"SemiImplicitEuler", 2000},
                                              {"Verlet", 200},
                                              {"BasicVerlet", 200},
@@ -70,7 +70,7 @@ TEST(Orders, OfFreeMotionAreThoseOfTheTheory) {
 }
 
 TEST(Orders, OfJointedMotionAreThoseOfTheTheory) {
-  expect_orders(testing::double_pendulum(), {{"SemiImplicitEuler", 2000},
+  expect_orders(harness::double_pendulum(), {{"SemiImplicitEuler", 2000},
                                              {"Verlet", 500},
                                              {"BasicVerlet", 500},
                                              {"ImplicitMidpoint", 500},
@@ -81,7 +81,7 @@ TEST(Orders, OfJointedMotionAreThoseOfTheTheory) {
 }
 
 TEST(Orders, OfARodInSpaceAreThoseOfTheTheory) {
-  expect_orders(testing::spherical_pendulum(), {{"ImplicitMidpoint", 1000},
+  expect_orders(harness::spherical_pendulum(), {{"ImplicitMidpoint", 1000},
                                                 {"RK4", 800},
                                                 {"RKMK4", 800},
                                                 {"SymplecticSplitting 4", 800},
@@ -91,10 +91,10 @@ TEST(Orders, OfARodInSpaceAreThoseOfTheTheory) {
 // The error of a method of order five per step falls like the accuracy asked for.
 TEST(Orders, AdaptiveMethodsKeepWhatIsAskedOfThem) {
   for (const MotionProblem& problem :
-       {testing::double_pendulum(), testing::spherical_pendulum(), testing::point_pendulum()}) {
+       {harness::double_pendulum(), harness::spherical_pendulum(), harness::point_pendulum()}) {
     for (const double accuracy : {1e-6, 1e-8, 1e-10}) {
-      for (const MotionMethod& method : testing::adaptive_methods(accuracy)) {
-        const double error = testing::run_motion(problem, method, 100).error;
+      for (const MotionMethod& method : harness::adaptive_methods(accuracy)) {
+        const double error = harness::run_motion(problem, method, 100).error;
         // errors of a hundred steps add up, and grow along the motion
         EXPECT_LT(error, 100.0 * accuracy) << problem.name << ", " << method.name << ", " << accuracy;
         all_rows().push_back({problem.name, method.name + " " + std::to_string(accuracy), 0.0, {error}});
@@ -105,11 +105,11 @@ TEST(Orders, AdaptiveMethodsKeepWhatIsAskedOfThem) {
 
 // With the simulator Basic the same integrator is of first order: what Smooth is for.
 TEST(Orders, WithoutReactionsInTheDerivativeAreOne) {
-  const MotionProblem problem = testing::double_pendulum();
+  const MotionProblem problem = harness::double_pendulum();
   const MotionMethod method = method_named("RK4");
-  const double basic = testing::run_motion(problem, method, 1000, kernel::Simulator::kBasic).error;
+  const double basic = harness::run_motion(problem, method, 1000, kernel::Simulator::kBasic).error;
   EXPECT_GT(basic, 1e-3);
-  EXPECT_LT(testing::run_motion(problem, method, 1000).error, 1e-5 * basic);
+  EXPECT_LT(harness::run_motion(problem, method, 1000).error, 1e-5 * basic);
 }
 
 // Last, since it writes what the others found.

@@ -10,10 +10,10 @@
 namespace gravitas {
 namespace {
 
-using testing::expect_reached;
-using testing::MotionMethod;
-using testing::MotionProblem;
-using testing::MotionResult;
+using harness::expect_reached;
+using harness::MotionMethod;
+using harness::MotionProblem;
+using harness::MotionResult;
 
 const MotionMethod kRk4{"RK4", "integrator_rk4", {}};
 const MotionMethod kSecond{"SymplecticSplitting 2", "integrator_symplectic_splitting", {2}};
@@ -38,7 +38,7 @@ struct Wanted {
 
 void expect_run(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps, const Wanted& wanted,
                 const Wanted& missed = {}) {
-  const MotionResult result = testing::run_motion(problem, method, steps);
+  const MotionResult result = harness::run_motion(problem, method, steps);
   char text[96];
   std::snprintf(text, sizeof text, "%s, %.3g ms", method.name.c_str(), 1e3 * problem.duration / steps);
   const auto row = [&](const char* figure, double target, double bound, double value) {
@@ -53,7 +53,7 @@ void expect_run(const MotionProblem& problem, const MotionMethod& method, std::u
 // ---- free
 
 TEST(Problems, TumblingBox) {
-  const MotionProblem problem = testing::tumbling_box();
+  const MotionProblem problem = harness::tumbling_box();
   // 1e-12 of the largest kinetic energy, 41 kJ
   expect_run(problem, kSecond, 10000, {.error = 1e-8, .energy = 4e-8});
   expect_run(problem, kSecond, 100, {.error = 1e-11, .energy = 4e-8});
@@ -62,66 +62,66 @@ TEST(Problems, TumblingBox) {
 TEST(Problems, MuJoCosBox) {
   // energy: 0.49 J, momentum 0.09
   for (const MotionMethod& method : {kSecond, kFourth})
-    expect_run(testing::mujoco_box(), method, 500, {.error = 1e-6, .energy = 0.5e-8, .momentum = 1e-12});
-  expect_run(testing::mujoco_box(), dormand_prince(1e-10), 500, {.error = 1e-6, .energy = 0.5e-8});
+    expect_run(harness::mujoco_box(), method, 500, {.error = 1e-6, .energy = 0.5e-8, .momentum = 1e-12});
+  expect_run(harness::mujoco_box(), dormand_prince(1e-10), 500, {.error = 1e-6, .energy = 0.5e-8});
 }
 
 TEST(Problems, SymmetricRotor) {
   for (const std::uint32_t steps : {100U, 10000U})
-    expect_run(testing::symmetric_rotor(), kSecond, steps, {.error = 1e-12, .energy = 92e-12, .momentum = 6e-12});
+    expect_run(harness::symmetric_rotor(), kSecond, steps, {.error = 1e-12, .energy = 92e-12, .momentum = 6e-12});
 }
 
 // ---- jointed
 
 // IFToMM A01.
 TEST(Problems, PointPendulum) {
-  const MotionProblem problem = testing::point_pendulum();
+  const MotionProblem problem = harness::point_pendulum();
   expect_run(problem, kRk4, 10000, {.error = 1e-6, .joint_error = 1e-13});
   expect_run(problem, kSixth, 4000, {.error = 1e-11, .joint_error = 1e-13});
 }
 
 TEST(Problems, SphericalPendulum) {
-  expect_run(testing::spherical_pendulum(), dormand_prince(1e-12), 200, {.error = 1e-10});
+  expect_run(harness::spherical_pendulum(), dormand_prince(1e-12), 200, {.error = 1e-10});
 }
 
 // Bruels and Cardona.
 TEST(Problems, HeavyTop) {
-  expect_run(testing::heavy_top(), kRk4, 2000, {.error = 1e-4});
-  expect_run(testing::heavy_top(), dormand_prince(1e-12), 100, {.error = 1e-9, .joint_error = 1e-13});
+  expect_run(harness::heavy_top(), kRk4, 2000, {.error = 1e-4});
+  expect_run(harness::heavy_top(), dormand_prince(1e-12), 100, {.error = 1e-9, .joint_error = 1e-13});
 }
 
 TEST(Problems, LagrangeTop) {
-  expect_run(testing::lagrange_top(), kRk4, 2000, {.error = 1e-4});
-  expect_run(testing::lagrange_top(), dormand_prince(1e-12), 200, {.error = 1e-9});
+  expect_run(harness::lagrange_top(), kRk4, 2000, {.error = 1e-4});
+  expect_run(harness::lagrange_top(), dormand_prince(1e-12), 200, {.error = 1e-9});
 }
 
 // Chaotic, so that 1e-12 at 5 s is some roundings at the start.
-TEST(Problems, DoublePendulum) { expect_run(testing::double_pendulum(), dormand_prince(1e-12), 100, {.error = 1e-11}); }
+TEST(Problems, DoublePendulum) { expect_run(harness::double_pendulum(), dormand_prince(1e-12), 100, {.error = 1e-11}); }
 
 // IFToMM A02: two loops of rods that are redundant in space and singular twice a turn. The step must be small enough that
 // the state at the singularity is nearer to its own branch than to the other.
 TEST(Problems, FourBarPassesItsSingularities) {
-  expect_run(testing::four_bar(10.0), kRk4, 6400, {.error = 1e-3, .joint_error = 1e-12});
-  expect_run(testing::four_bar(10.0), kRk4, 25600, {.error = 1e-8, .joint_error = 1e-12});
-  expect_run(testing::four_bar(20.0), kRk4, 12800, {.error = 1e-3, .joint_error = 1e-12});
-  if (testing::runs_long_problems())
-    expect_run(testing::four_bar(20.0), kRk4, 51200, {.error = 1e-8, .joint_error = 1e-12});
+  expect_run(harness::four_bar(10.0), kRk4, 6400, {.error = 1e-3, .joint_error = 1e-12});
+  expect_run(harness::four_bar(10.0), kRk4, 25600, {.error = 1e-8, .joint_error = 1e-12});
+  expect_run(harness::four_bar(20.0), kRk4, 12800, {.error = 1e-3, .joint_error = 1e-12});
+  if (harness::runs_long_problems())
+    expect_run(harness::four_bar(20.0), kRk4, 51200, {.error = 1e-8, .joint_error = 1e-12});
 }
 
 // IFToMM A04.
 TEST(Problems, BricardMovesThoughItsRowsAreTooMany) {
-  expect_run(testing::bricard(), kRk4, 10000, {.joint_error = 1e-12, .energy = 1e-9});
+  expect_run(harness::bricard(), kRk4, 10000, {.joint_error = 1e-12, .energy = 1e-9});
 }
 
 // Mueller's pendulum challenge: frames of 1/60 s. Chaotic: what it keeps is asked for.
 TEST(Problems, PendulumChallenge) {
-  expect_run(testing::triple_pendulum(), dormand_prince(1e-10), 600, {.joint_error = 1e-12, .energy = 1e-6});
+  expect_run(harness::triple_pendulum(), dormand_prince(1e-10), 600, {.joint_error = 1e-12, .energy = 1e-6});
 }
 
 // IFToMM A05: stiff, some 2.7e4/s.
 TEST(Problems, FlyballGovernor) {
-  expect_run(testing::flyball_governor(), rosenbrock(1e-5), 1000, {.error = 1e-4});
-  if (testing::runs_long_problems()) expect_run(testing::flyball_governor(), rosenbrock(1e-7), 1000, {.error = 1e-8});
+  expect_run(harness::flyball_governor(), rosenbrock(1e-5), 1000, {.error = 1e-4});
+  if (harness::runs_long_problems()) expect_run(harness::flyball_governor(), rosenbrock(1e-7), 1000, {.error = 1e-8});
 }
 
 }  // namespace

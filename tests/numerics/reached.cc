@@ -7,7 +7,7 @@
 #include <fstream>
 #include <vector>
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 namespace {
 
 std::vector<Reached>& rows() {
@@ -52,4 +52,4 @@ const char* table_folder() { return std::getenv("GRAVITAS_TABLES"); }
 
 bool runs_long_problems() { return std::getenv("GRAVITAS_LONG_PROBLEMS") != nullptr; }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

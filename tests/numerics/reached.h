@@ -5,7 +5,7 @@
 #include <ctime>
 #include <string>
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 
 struct Reached {
   std::string problem, method, figure;  // "bounce", "Continuous, Verlet, 10 ms", "energy, relative RMS"
@@ -33,4 +33,4 @@ const char* table_folder();
 // Whether runs that take minutes are wanted: GRAVITAS_LONG_PROBLEMS is set.
 bool runs_long_problems();
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

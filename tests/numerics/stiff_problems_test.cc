@@ -8,23 +8,20 @@
 #include <vector>
 
 #include "plugin_sdk/body.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/numerics/motion_problem.h"
 #include "tests/numerics/reached.h"
 
 namespace gravitas {
 namespace {
 
+using harness::CpuClock;
+using harness::expect_reached;
+using harness::plugin_path;
+using harness::WorldBuilder;
 using kernel::Environment;
-using testing::CpuClock;
-using testing::expect_reached;
-using testing::plugin_path;
-using testing::WorldBuilder;
 
 constexpr std::uint32_t kSteps = 60;  // of 1/60 s: one second
-
-void step(Environment* world) {
-  ASSERT_EQ(world->step(), kernel::StepOutcome::kCommitted) << world->fault()->fault.text;
-}
 
 WorldBuilder world_with(const std::string& integrator, std::vector<double> settings) {
   WorldBuilder world;
@@ -51,7 +48,7 @@ TEST(StiffProblems, DampedSpringsFollowTheirClosedForms) {
     for (int exponent = 2; exponent <= 14; ++exponent) {
       const double w = std::pow(10.0, 0.5 * exponent);
       WorldBuilder builder = world_with("integrator_rosenbrock", {1e-6});
-      testing::spring_between(&builder, {w * w, 2.0 * zeta * w, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
+      harness::spring_between(&builder, {w * w, 2.0 * zeta * w, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
       Environment world(builder.description());
       while (world.step_count() < kSteps) {
         ASSERT_NO_FATAL_FAILURE(step(&world)) << exponent;
@@ -71,11 +68,11 @@ TEST(StiffProblems, UndampedSpringsKeepTheirEnergyAtAnyStiffness) {
   for (int exponent = 2; exponent <= 14; ++exponent) {
     const double stiffness = std::pow(10.0, exponent);
     WorldBuilder builder = world_with("integrator_implicit_midpoint", {});
-    testing::spring_between(&builder, {stiffness, 0.0, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
+    harness::spring_between(&builder, {stiffness, 0.0, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
     Environment world(builder.description());
     while (world.step_count() < kSteps) {
       ASSERT_NO_FATAL_FAILURE(step(&world)) << exponent;
-      worst = std::max(worst, std::fabs(testing::energy_of(&world) / (0.5 * stiffness) - 1.0));
+      worst = std::max(worst, std::fabs(harness::energy_of(&world) / (0.5 * stiffness) - 1.0));
     }
   }
   expect_reached(
@@ -128,14 +125,14 @@ std::vector<Vector3> corners_of_lattice(double stiffness, double* momentum_error
     builder.point(0.125, {1, 1, 1}, at);
     builder.body().twist.linear = corners.spin.cross(at);
     for (std::uint32_t k = 0; k < i; ++k)
-      testing::spring_between(&builder, {stiffness, 0.0, (at - corners.at_rest[k]).norm()}, Vector3::Zero(), k,
+      harness::spring_between(&builder, {stiffness, 0.0, (at - corners.at_rest[k]).norm()}, Vector3::Zero(), k,
                               Vector3::Zero());
   }
   Environment world(builder.description());
-  const Vector3 momentum = testing::angular_momentum_of(world);
+  const Vector3 momentum = harness::angular_momentum_of(world);
   while (world.step_count() < world.total_steps() && world.step() == kernel::StepOutcome::kCommitted) {
   }
-  *momentum_error = (testing::angular_momentum_of(world) - momentum).norm() / momentum.norm();
+  *momentum_error = (harness::angular_momentum_of(world) - momentum).norm() / momentum.norm();
   std::vector<Vector3> places;
   for (std::size_t i = 0; i < 8; ++i) places.push_back(vector_at(world.state().position, i));
   return places;

@@ -13,13 +13,13 @@
 namespace gravitas {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 TEST(FirstNotFinite, FindsTheFirst) {
   std::vector<double> numbers(100, 1.0);
   EXPECT_EQ(first_not_finite(numbers), kNoRow);
   EXPECT_EQ(first_not_finite({}), kNoRow);
-  for (const double bad : {kInfinity, -kInfinity, std::nan(""), -std::nan("1")}) {
+  for (const double bad : {kInfinite, -kInfinite, std::nan(""), -std::nan("1")}) {
     for (const std::size_t place : {0U, 37U, 99U}) {
       std::vector<double> spoiled = numbers;
       spoiled[place] = bad;
@@ -47,7 +47,7 @@ TEST(FirstNotUnit, FindsTheFirstRowWithAnotherNorm) {
   EXPECT_EQ(first_not_unit(bad, 4), 1U);
   EXPECT_EQ(first_not_unit(std::vector<double>{0, 0, 0}, 3), 0U);
   EXPECT_EQ(first_not_unit(std::vector<double>{0, 1, 0, 0, std::nan(""), 1}, 3), 1U);
-  EXPECT_EQ(first_not_unit(std::vector<double>{kInfinity, 0, 0}, 3), 0U);
+  EXPECT_EQ(first_not_unit(std::vector<double>{kInfinite, 0, 0}, 3), 0U);
   EXPECT_EQ(first_not_unit({}, 3), kNoRow);
 }
 

@@ -22,7 +22,7 @@ using Request = stage::IntegratorIntegrateRequest;
 using Reply = stage::IntegratorIntegrateReply;
 
 template <typename T>
-gravitas_column column_of(const std::vector<T>& numbers) {
+gravitas_column request_column_of(const std::vector<T>& numbers) {
   return {numbers.data(), numbers.size()};
 }
 
@@ -48,20 +48,20 @@ class Step {
     trial.resize(n);
 
     using C = Request::Column;
-    request_[C::kTime] = column_of(time);
-    request_[C::kTimeStep] = column_of(time_step);
-    request_[C::kWrenchIsConstant] = column_of(constant);
-    request_[C::kFlags] = column_of(flags);
-    request_[C::kInverseMass] = column_of(inverse_mass);
-    request_[C::kInertia] = column_of(inertia);
-    request_[C::kInverseInertia] = column_of(inverse_inertia);
-    request_[C::kDamping] = column_of(damping);
-    request_[C::kWrench] = column_of(wrench);
-    request_[C::kPosition] = column_of(state.position);
-    request_[C::kOrientation] = column_of(state.orientation);
-    request_[C::kLinearVelocity] = column_of(state.linear_velocity);
-    request_[C::kAngularVelocity] = column_of(state.angular_velocity);
-    request_[C::kStateChanged] = column_of(changed);
+    request_[C::kTime] = request_column_of(time);
+    request_[C::kTimeStep] = request_column_of(time_step);
+    request_[C::kWrenchIsConstant] = request_column_of(constant);
+    request_[C::kFlags] = request_column_of(flags);
+    request_[C::kInverseMass] = request_column_of(inverse_mass);
+    request_[C::kInertia] = request_column_of(inertia);
+    request_[C::kInverseInertia] = request_column_of(inverse_inertia);
+    request_[C::kDamping] = request_column_of(damping);
+    request_[C::kWrench] = request_column_of(wrench);
+    request_[C::kPosition] = request_column_of(state.position);
+    request_[C::kOrientation] = request_column_of(state.orientation);
+    request_[C::kLinearVelocity] = request_column_of(state.linear_velocity);
+    request_[C::kAngularVelocity] = request_column_of(state.angular_velocity);
+    request_[C::kStateChanged] = request_column_of(changed);
     const auto room = [](std::vector<double>& numbers) {
       return gravitas_reply_column{numbers.data(), numbers.size(), 0};
     };

@@ -11,15 +11,15 @@
 namespace gravitas {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnlimitedValue = std::numeric_limits<double>::infinity();
 
 TEST(Property, IsUnboundedAndOptionalUnlessSaidOtherwise) {
   const Property length = Property::number("Length", "m");
   EXPECT_EQ(length.name, "Length");
   EXPECT_EQ(length.kind, PropertyKind::kNumber);
   EXPECT_EQ(length.unit, "m");
-  EXPECT_EQ(length.minimum, -kInfinity);
-  EXPECT_EQ(length.maximum, kInfinity);
+  EXPECT_EQ(length.minimum, -kUnlimitedValue);
+  EXPECT_EQ(length.maximum, kUnlimitedValue);
   EXPECT_FALSE(length.exclusive_minimum || length.is_required || length.is_live);
   EXPECT_TRUE(length.default_numbers.empty());
 }
@@ -31,7 +31,7 @@ TEST(Property, SaysItsBounds) {
   EXPECT_FALSE(closed.exclusive_minimum);
   const Property open = Property::number("B", "1").above(0.0);
   EXPECT_EQ(open.minimum, 0.0);
-  EXPECT_EQ(open.maximum, kInfinity);
+  EXPECT_EQ(open.maximum, kUnlimitedValue);
   EXPECT_TRUE(open.exclusive_minimum);
 }
 
@@ -96,7 +96,7 @@ TEST(PropertyCursor, AnAbsentNumberIsNanAndNoOtherKindTakesIt) {
 }
 
 TEST(PropertyCursor, RefusesNumbersThatAreNotOfTheKind) {
-  for (const double number : {0.5, 1e16, -1e16, kInfinity, -kInfinity}) {
+  for (const double number : {0.5, 1e16, -1e16, kUnlimitedValue, -kUnlimitedValue}) {
     const std::vector<double> one = {number};
     EXPECT_THROW(PropertyCursor(one).integer(), std::out_of_range) << number;
     EXPECT_THROW(PropertyCursor(one).choice(), std::out_of_range) << number;

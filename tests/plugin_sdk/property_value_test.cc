@@ -13,7 +13,7 @@ namespace {
 
 using Values = std::vector<PropertyValue>;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfiniteValue = std::numeric_limits<double>::infinity();
 
 PropertyValue list(std::vector<double> numbers) { return PropertyValue::numbers(numbers); }
 
@@ -44,7 +44,7 @@ TEST(PropertyValue, TakesNumbersWithinBounds) {
 }
 
 TEST(PropertyValue, RefusesNumbersThatAreNotFinite) {
-  for (const double number : {kInfinity, -kInfinity, std::nan("")}) {
+  for (const double number : {kInfiniteValue, -kInfiniteValue, std::nan("")}) {
     EXPECT_FALSE(take(Property::number("X", "m"), PropertyValue::of(number)).good);
     EXPECT_FALSE(take(Property::vector("X", "m", "world"), list({0.0, number, 0.0})).good);
     EXPECT_FALSE(take(Property::quaternion("X", "world"), list({number, 0.0, 0.0, 0.0})).good);

@@ -13,14 +13,11 @@
 namespace gravitas {
 namespace {
 
-using testing::angle_between;
-using testing::literal;
-using testing::SceneRun;
-using testing::set;
-using testing::turned;
-
-constexpr double kG = 9.81;
-const double kPi = std::acos(-1.0);
+using harness::angle_between;
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
+using harness::turned;
 
 std::string scene(const std::string& declarations, const std::string& bodies, const std::string& joints,
                   double time_step, double duration, const Vector3& gravity = {0, -kG, 0}) {

@@ -12,10 +12,10 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
+using harness::SceneRun;
+using harness::set;
 
-constexpr double kG = 9.81, kRadius = 0.5, kHeight = 1.0;
+constexpr double kRadius = 0.5, kHeight = 1.0;
 
 struct Case {
   const char* integrator;
@@ -117,15 +117,15 @@ double last_motion_of(SceneRun* run) {
   return last;
 }
 
-class Rest : public ::testing::TestWithParam<Case> {};
+class RestReached : public ::testing::TestWithParam<Case> {};
 
 // Explicit Euler gains g h in every flight (its position lags behind), so it cannot come below the rest speed with more
 // than e = 1/2: see the next test.
-INSTANTIATE_TEST_SUITE_P(EachIntegratorAndRestitution, Rest,
+INSTANTIATE_TEST_SUITE_P(EachIntegratorAndRestitution, RestReached,
                          ::testing::Values(Case{"Euler", 0.0}, Case{"Euler", 0.3}, Case{"SemiImplicitEuler", 0.0},
                                            Case{"SemiImplicitEuler", 0.5}, Case{"SemiImplicitEuler", 0.8}));
 
-TEST_P(Rest, IsReachedInTimeAndIsExact) {
+TEST_P(RestReached, IsReachedInTimeAndIsExact) {
   const double e = GetParam().restitution, h = 0.001;
   SceneRun run("bounce.gravitas", overrides(GetParam(), h));
   const double last_motion = last_motion_of(&run);

@@ -16,11 +16,11 @@
 namespace gravitas {
 namespace {
 
-using testing::random_bodies;
-using testing::RandomBody;
-using testing::SceneRun;
-using testing::set;
-using testing::Shapes;
+using harness::random_bodies;
+using harness::RandomBody;
+using harness::SceneRun;
+using harness::set;
+using harness::Shapes;
 
 constexpr std::uint64_t kSeeds = 10;
 
@@ -123,7 +123,7 @@ double difference(const SceneRun& a, const Pose& by, const SceneRun& b) {
     const SceneRun::Motion one = a.body(id), two = b.body(id);
     const Pose moved = compose(by, one.pose);
     largest = std::max({largest, (moved.position - two.pose.position).norm(),
-                        testing::angle_between(moved.orientation, two.pose.orientation),
+                        harness::angle_between(moved.orientation, two.pose.orientation),
                         (by.orientation * one.twist.linear - two.twist.linear).norm(),
                         (by.orientation * one.twist.angular - two.twist.angular).norm()});
   }
@@ -147,11 +147,11 @@ TEST_P(Conservation, TheOrderOfTheBodiesInTheSceneDoesNotMatter) {
 }
 
 TEST_P(Conservation, AMovedAndTurnedSceneMovesAlike) {
-  const Pose by{Vector3(3, -2, 5), testing::turned(Vector3(1, 2, -1), 1.1)};
+  const Pose by{Vector3(3, -2, 5), harness::turned(Vector3(1, 2, -1), 1.1)};
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     std::vector<RandomBody> bodies = random_bodies(seed, std::get<1>(GetParam()));
     SceneRun one(scene_text(bodies, 1.0 / 240, 1.0), {set("Integrator", integrator())});
-    for (RandomBody& body : bodies) body = testing::displaced(body, by);
+    for (RandomBody& body : bodies) body = harness::displaced(body, by);
     SceneRun other(scene_text(bodies, 1.0 / 240, 1.0), {set("Integrator", integrator())});
     one.to_end();
     other.to_end();

@@ -10,8 +10,8 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
+using harness::SceneRun;
+using harness::set;
 
 TEST(CollisionFilter, DecidesWhoFallsThrough) {
   for (const std::string space : {"Basic", "Grid", "KDTree", "SweepAndPrune", "DynamicBVH"}) {

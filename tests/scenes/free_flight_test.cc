@@ -11,9 +11,9 @@
 namespace gravitas {
 namespace {
 
-using testing::literal;
-using testing::SceneRun;
-using testing::set;
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
 
 const Vector3 kDown(0.0, -9.81, 0.0);
 const Vector3 kStart(1.0, 2.0, 3.0), kThrown(3.0, 4.0, -1.0);
@@ -42,7 +42,7 @@ TEST_P(FreeFlight, FollowsItsClosedForm) {
     ASSERT_NEAR((ball.twist.linear - (kThrown + n * h * kDown)).norm(), 0.0, kRounding);
     ASSERT_NEAR((ball.pose.position - (kStart + n * h * kThrown + h * h * sum * kDown)).norm(), 0.0, kRounding);
     ASSERT_NEAR((ball.twist.angular - Vector3(0, 0, 2)).norm(), 0.0, kRounding);
-    ASSERT_NEAR(testing::angle_between(ball.pose.orientation, testing::turned(Vector3::UnitZ(), 2.0 * n * h)), 0.0,
+    ASSERT_NEAR(harness::angle_between(ball.pose.orientation, harness::turned(Vector3::UnitZ(), 2.0 * n * h)), 0.0,
                 kRounding);
   }
   EXPECT_EQ(run.step_count(), 128U);

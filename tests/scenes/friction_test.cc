@@ -12,12 +12,9 @@
 namespace gravitas {
 namespace {
 
-using testing::angle_between;
-using testing::SceneRun;
-using testing::set;
-
-constexpr double kG = 9.81;
-const double kPi = std::acos(-1.0);
+using harness::angle_between;
+using harness::SceneRun;
+using harness::set;
 
 struct Method {
   const char* integrator;
@@ -87,14 +84,14 @@ TEST(Sliding, StopsAlikeInSixteenDirections) {
     SceneRun run("box_on_plane.gravitas",
                  {set("Body.Box.LinearVelocity", Vector3(v * direction)),
                   // corner first, edge first and all between
-                  set("Body.Box.Orientation", testing::turned(Vector3::UnitY(), 0.1)), set("Simulator.Duration", 2.5)});
+                  set("Body.Box.Orientation", harness::turned(Vector3::UnitY(), 0.1)), set("Simulator.Duration", 2.5)});
     run.to_end();
     const SceneRun::Motion box = run.body("Box");
     const Vector3 way = box.pose.position - Vector3(0, 0.1, 0);
     if (i == 0) first = way.norm();
     EXPECT_NEAR(way.norm(), first, 1e-9 * first) << "direction " << i;
     EXPECT_NEAR((way - way.norm() * direction).norm(), 0.0, 1e-9 * first) << "direction " << i;
-    EXPECT_NEAR(angle_between(box.pose.orientation, testing::turned(Vector3::UnitY(), 0.1)), 0.0, 1e-9) << i;
+    EXPECT_NEAR(angle_between(box.pose.orientation, harness::turned(Vector3::UnitY(), 0.1)), 0.0, 1e-9) << i;
     EXPECT_LE(box.twist.linear.norm(), 1e-9) << "direction " << i;
   }
   EXPECT_NEAR(first, v * v / (2.0 * 0.3 * kG), 0.5 * v * 0.01 + 0.5 * 0.3 * kG * 1e-4);

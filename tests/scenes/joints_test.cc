@@ -13,12 +13,10 @@
 namespace gravitas {
 namespace {
 
-using testing::angle_between;
-using testing::literal;
-using testing::SceneRun;
-using testing::set;
-
-constexpr double kG = 9.81;
+using harness::angle_between;
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
 
 std::string body(const std::string& id, const Vector3& at, const std::string& more = "", const std::string& motion = "",
                  const Vector3& moments = {0.1, 0.2, 0.25}) {

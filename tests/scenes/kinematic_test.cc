@@ -10,10 +10,10 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
+using harness::SceneRun;
+using harness::set;
 
-constexpr double kG = 9.81, kSpeed = 1.0, kFriction = 0.5;
+constexpr double kSpeed = 1.0, kFriction = 0.5;
 
 class Kinematic : public ::testing::TestWithParam<const char*> {
  protected:

@@ -10,9 +10,9 @@
 namespace gravitas {
 namespace {
 
-using testing::angle_between;
-using testing::SceneRun;
-using testing::set;
+using harness::angle_between;
+using harness::SceneRun;
+using harness::set;
 
 // ---- free bodies
 
@@ -22,7 +22,7 @@ std::string tumbling_box(const std::string& integrator, double time_step) {
 Geometries { Geometry { Type = "Box" Id = "Box" CustomProperties { HalfExtents = {0.05, 0.2, 0.45} } } }
 Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, 0, -9.8} } } }
 Simulator { CustomProperties { TimeStep = )" +
-         testing::literal(time_step) + R"( Duration = 10 } }
+         harness::literal(time_step) + R"( Duration = 10 } }
 Environment {
   Space { Bodies { Body { Id = "Box" GeometryId = "Box" Mass = 10 Forces = { "Down" }
     KineticProperties { LinearVelocity = {-2, 2, 8} AngularVelocity = {0.1, 5, 0.1} } } } }
@@ -89,10 +89,10 @@ TEST(TumblingBox, IsFollowedByTheOthersToTheirOrder) {
 std::string two_on_a_spring(const std::string& integrator, double stiffness, double damping, double time_step) {
   return R"(
 Forces { Force { Type = "Spring" Id = "Link" CustomProperties { Stiffness = )" +
-         testing::literal(stiffness) + " Damping = " + testing::literal(damping) +
+         harness::literal(stiffness) + " Damping = " + harness::literal(damping) +
          R"( RestLength = 1 AnchorBody = "B" } } }
 Simulator { CustomProperties { TimeStep = )" +
-         testing::literal(time_step) + R"( Duration = 1 } }
+         harness::literal(time_step) + R"( Duration = 1 } }
 Environment {
   Space { Bodies {
     Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = { "Link" }

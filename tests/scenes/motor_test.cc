@@ -12,10 +12,8 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
-
-constexpr double kG = 9.81;
+using harness::SceneRun;
+using harness::set;
 
 class Motor : public ::testing::TestWithParam<const char*> {
  protected:

@@ -12,11 +12,10 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
+using harness::SceneRun;
+using harness::set;
 
-constexpr double kG = 9.81, kArm = 1.0, kRadius = 0.1;
-const double kPi = std::acos(-1.0);
+constexpr double kArm = 1.0, kBobRadius = 0.1;
 
 // K(k) pi/2 times its inverse is the arithmetic-geometric mean of 1 and k'.
 double arithmetic_geometric_mean(double a, double b) {
@@ -30,7 +29,7 @@ double arithmetic_geometric_mean(double a, double b) {
 
 // Period of the compound pendulum of pendulum.gravitas with an amplitude.
 double exact_period(double amplitude) {
-  const double inertia = kArm * kArm + 0.4 * kRadius * kRadius;
+  const double inertia = kArm * kArm + 0.4 * kBobRadius * kBobRadius;
   return 2.0 * kPi * std::sqrt(inertia / (kG * kArm)) / arithmetic_geometric_mean(1.0, std::cos(0.5 * amplitude));
 }
 

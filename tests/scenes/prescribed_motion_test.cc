@@ -10,18 +10,18 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
+using harness::SceneRun;
+using harness::set;
 
 // A lift that is at t^2/2 at time t, a turning door whose hinge stays, and a crate on the lift.
 std::string lift(const std::string& integrator) {
   std::string rows, door;
   for (int i = 0; i <= 10; ++i) {
     const double t = 0.2 * i;
-    rows += (i > 0 ? ", " : "") + std::string("{") + testing::literal(t) + ", " +
-            testing::literal(Vector3(0, 0.5 * t * t - 0.25, 0)) + ", {1, 0, 0, 0}}";
-    door += (i > 0 ? ", " : "") + std::string("{") + testing::literal(t) + ", {9, 0, 0}, " +
-            testing::literal(testing::turned({0, 1, 0}, 0.8 * t)) + "}";
+    rows += (i > 0 ? ", " : "") + std::string("{") + harness::literal(t) + ", " +
+            harness::literal(Vector3(0, 0.5 * t * t - 0.25, 0)) + ", {1, 0, 0, 0}}";
+    door += (i > 0 ? ", " : "") + std::string("{") + harness::literal(t) + ", {9, 0, 0}, " +
+            harness::literal(harness::turned({0, 1, 0}, 0.8 * t)) + "}";
   }
   return R"(
 Geometries {
@@ -63,7 +63,7 @@ TEST_P(PrescribedMotion, IsWhereItsTableHasItWithTheVelocitiesThere) {
     // rounding of the table's numbers, and of their quotients over 0.2 s
     ASSERT_NEAR(now.pose.position.y(), 0.5 * t * t - 0.25, 1e-14);
     ASSERT_NEAR(now.twist.linear.y(), t, 1e-13);
-    ASSERT_LT(testing::angle_between(door.pose.orientation, testing::turned({0, 1, 0}, 0.8 * t)), 1e-13);
+    ASSERT_LT(harness::angle_between(door.pose.orientation, harness::turned({0, 1, 0}, 0.8 * t)), 1e-13);
     ASSERT_LT((door.twist.angular - Vector3(0, 0.8, 0)).norm(), 1e-13);
   }
 }

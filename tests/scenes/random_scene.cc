@@ -7,7 +7,7 @@
 
 #include "tests/scenes/scene_run.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 namespace {
 
 // std::uniform_real_distribution may differ between libraries; the engine does not.
@@ -104,4 +104,4 @@ std::string scene_text(const std::vector<RandomBody>& bodies, double time_step, 
       geometries, materials, literal(time_step), literal(duration), all);
 }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -8,7 +8,7 @@
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/pose.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 
 enum class Shapes {
   kSpheres,
@@ -32,4 +32,4 @@ RandomBody displaced(const RandomBody& body, const Pose& by);
 // Scene text with these bodies, in this order, without forces.
 std::string scene_text(const std::vector<RandomBody>& bodies, double time_step, double duration);
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

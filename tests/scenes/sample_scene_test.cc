@@ -12,9 +12,9 @@
 namespace gravitas {
 namespace {
 
+using harness::SceneRun;
+using harness::set;
 using ::testing::HasSubstr;
-using testing::SceneRun;
-using testing::set;
 
 const std::string kSample = in_source("/deploy/scenes/two_spheres_motor.gravitas");
 

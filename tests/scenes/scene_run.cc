@@ -11,7 +11,7 @@
 
 #include "tests/paths.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 namespace {
 
 // A text under a name that files are opened by, while this lives.
@@ -162,4 +162,4 @@ std::uint32_t SceneRun::count_events(kernel::EventKind kind) const {
   return static_cast<std::uint32_t>(std::ranges::count(events_, kind, &kernel::Event::kind));
 }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,14 @@
 #include "services/run/figures.h"
 #include "services/run/session.h"
 
-namespace gravitas::testing {
+namespace gravitas {
+
+inline constexpr double kG = 9.81;  // m/s^2
+inline constexpr double kPi = std::numbers::pi;
+
+}  // namespace gravitas
+
+namespace gravitas::harness {
 
 // One override, "PATH=VALUE", with numbers that are read back bit for bit.
 std::string set(const std::string& path, double value);
@@ -92,4 +100,4 @@ class SceneRun final : private kernel::EventListener {
   report::v1::Report report_;
 };
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

@@ -12,11 +12,9 @@
 namespace gravitas {
 namespace {
 
-using testing::SceneRun;
-using testing::set;
-using testing::turned;
-
-const double kPi = std::acos(-1.0);
+using harness::SceneRun;
+using harness::set;
+using harness::turned;
 
 // Grounds whose upper surface is at y = 0 when their frame is at `height`.
 struct Ground {

@@ -11,9 +11,9 @@
 namespace gravitas {
 namespace {
 
+using harness::SceneRun;
+using harness::set;
 using ::testing::HasSubstr;
-using testing::SceneRun;
-using testing::set;
 using ::testing::ThrowsMessage;
 
 std::vector<std::string> smooth(const std::vector<std::string>& more) {

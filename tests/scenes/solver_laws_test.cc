@@ -14,13 +14,13 @@
 namespace gravitas {
 namespace {
 
-using testing::random_bodies;
-using testing::RandomBody;
-using testing::SceneRun;
-using testing::set;
-using testing::Shapes;
+using harness::random_bodies;
+using harness::RandomBody;
+using harness::SceneRun;
+using harness::set;
+using harness::Shapes;
 
-constexpr std::uint64_t kSeeds = 6;
+constexpr std::uint64_t kLawSeeds = 6;
 
 class SolverLaws : public ::testing::TestWithParam<std::tuple<const char*, Shapes>> {
  protected:
@@ -38,7 +38,7 @@ INSTANTIATE_TEST_SUITE_P(OfEach, SolverLaws,
 
 TEST_P(SolverLaws, MomentumStaysToRoundingAndEnergyNeverRises) {
   std::uint32_t impacts = 0;
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kLawSeeds; ++seed) {
     SceneRun run = scene(bodies(seed), 1.5);
     const Vector3 momentum = run.momentum();
     double size = 0.0;
@@ -56,7 +56,7 @@ TEST_P(SolverLaws, MomentumStaysToRoundingAndEnergyNeverRises) {
     EXPECT_LE(run.report().max_penetration(), 1e-4) << "seed " << seed;
     impacts += run.count_events(kernel::EventKind::kCollisionStart);
   }
-  EXPECT_GE(impacts, 5 * kSeeds);
+  EXPECT_GE(impacts, 5 * kLawSeeds);
 }
 
 // Seen in a mirror at x = 0: positions and velocities are vectors, turning is not.
@@ -68,15 +68,15 @@ SceneRun::Motion mirrored(const SceneRun::Motion& m) {
 
 double difference(const SceneRun::Motion& one, const SceneRun::Motion& two) {
   return std::max({(one.pose.position - two.pose.position).norm(),
-                   testing::angle_between(one.pose.orientation, two.pose.orientation),
+                   harness::angle_between(one.pose.orientation, two.pose.orientation),
                    (one.twist.linear - two.twist.linear).norm(), (one.twist.angular - two.twist.angular).norm()});
 }
 
 // Rounding grows by a factor of some ten in each of the few impacts that a body has in this time.
-constexpr double kGrownRounding = 1e-9;
+constexpr double kLawRounding = 1e-9;
 
 TEST_P(SolverLaws, AnotherOrderOfTheBodiesGivesTheSameMotion) {
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kLawSeeds; ++seed) {
     std::vector<RandomBody> all = bodies(seed);
     SceneRun one = scene(all, 0.8);
     std::reverse(all.begin(), all.end());
@@ -85,12 +85,12 @@ TEST_P(SolverLaws, AnotherOrderOfTheBodiesGivesTheSameMotion) {
     one.to_end();
     other.to_end();
     for (const std::string& id : one.movable_bodies())
-      EXPECT_LE(difference(one.body(id), other.body(id)), kGrownRounding) << "seed " << seed << ", " << id;
+      EXPECT_LE(difference(one.body(id), other.body(id)), kLawRounding) << "seed " << seed << ", " << id;
   }
 }
 
 TEST_P(SolverLaws, AMirroredSceneMovesMirrored) {
-  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+  for (std::uint64_t seed = 1; seed <= kLawSeeds; ++seed) {
     std::vector<RandomBody> all = bodies(seed);
     SceneRun one = scene(all, 0.8);
     for (RandomBody& body : all) {
@@ -101,7 +101,7 @@ TEST_P(SolverLaws, AMirroredSceneMovesMirrored) {
     one.to_end();
     other.to_end();
     for (const std::string& id : one.movable_bodies())
-      EXPECT_LE(difference(mirrored(one.body(id)), other.body(id)), kGrownRounding) << "seed " << seed << ", " << id;
+      EXPECT_LE(difference(mirrored(one.body(id)), other.body(id)), kLawRounding) << "seed " << seed << ", " << id;
   }
 }
 

@@ -13,20 +13,20 @@
 namespace gravitas {
 namespace {
 
-using testing::angle_between;
-using testing::SceneRun;
-using testing::set;
+using harness::angle_between;
+using harness::SceneRun;
+using harness::set;
 
-const double kPi = std::acos(-1.0);
-
-struct Method {
+struct StandingMethod {
   const char* integrator;
   double time_step;
 };
 
-void PrintTo(const Method& method, std::ostream* out) { *out << method.integrator << ", dt = " << method.time_step; }
+void PrintTo(const StandingMethod& method, std::ostream* out) {
+  *out << method.integrator << ", dt = " << method.time_step;
+}
 
-class Standing : public ::testing::TestWithParam<Method> {
+class Standing : public ::testing::TestWithParam<StandingMethod> {
  protected:
   std::vector<std::string> method() const {
     return {set("Integrator", std::string(GetParam().integrator)), set("Simulator.TimeStep", GetParam().time_step)};
@@ -34,9 +34,9 @@ class Standing : public ::testing::TestWithParam<Method> {
 };
 
 INSTANTIATE_TEST_SUITE_P(EachMethod, Standing,
-                         ::testing::Values(Method{"Euler", 1.0 / 60}, Method{"Euler", 1.0 / 240},
-                                           Method{"SemiImplicitEuler", 1.0 / 60},
-                                           Method{"SemiImplicitEuler", 1.0 / 240}));
+                         ::testing::Values(StandingMethod{"Euler", 1.0 / 60}, StandingMethod{"Euler", 1.0 / 240},
+                                           StandingMethod{"SemiImplicitEuler", 1.0 / 60},
+                                           StandingMethod{"SemiImplicitEuler", 1.0 / 240}));
 
 // Runs to the end and gives the largest distances that the bodies had from where they started.
 struct Drift {
@@ -106,7 +106,7 @@ TEST_P(Standing, ACubeOnItsEdgeFallsToTheSideItLeansTo) {
     const double height = 0.5 * (std::cos(angle) + std::sin(angle));
     std::vector<std::string> scene = method();
     scene.push_back(set("Body.Tipped.Position", Vector3(6, height, 0)));
-    scene.push_back(set("Body.Tipped.Orientation", testing::turned(Vector3::UnitZ(), angle)));
+    scene.push_back(set("Body.Tipped.Orientation", harness::turned(Vector3::UnitZ(), angle)));
     SceneRun run("standing.gravitas", scene);
     run.to_end();
     const SceneRun::Motion cube = run.body("Tipped");
@@ -115,7 +115,7 @@ TEST_P(Standing, ACubeOnItsEdgeFallsToTheSideItLeansTo) {
     // a positive turn about z is one towards -x, and 45 degrees more end on the next face
     const double expected = lean > 0.0 ? kPi / 2.0 : 0.0;
     // about the vertical it may turn a little: the edge's friction is shared between two contacts by relaxation
-    EXPECT_NEAR(angle_between(cube.pose.orientation, testing::turned(Vector3::UnitZ(), expected)), 0.0, 1e-5) << lean;
+    EXPECT_NEAR(angle_between(cube.pose.orientation, harness::turned(Vector3::UnitZ(), expected)), 0.0, 1e-5) << lean;
     EXPECT_NEAR((cube.pose.orientation * Vector3::UnitX()).cwiseAbs().maxCoeff(), 1.0, 1e-9) << lean;
     EXPECT_LE(run.report().max_penetration(), 1e-9) << "lean " << lean;
     EXPECT_LT(run.energy(), run.report().energy().initial());

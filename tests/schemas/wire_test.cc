@@ -328,7 +328,7 @@ struct Golden {
   fs::path hex;
 };
 
-std::string read_file(const fs::path& path) {
+std::string file_text(const fs::path& path) {
   std::ostringstream text;
   text << std::ifstream(path).rdbuf();
   return text.str();
@@ -338,7 +338,7 @@ std::vector<Golden> all_golden() {
   std::vector<Golden> all;
   for (const fs::directory_entry& entry : fs::directory_iterator(kGolden)) {
     if (entry.path().extension() != ".txt") continue;
-    Golden golden{entry.path().stem().string(), "", read_file(entry.path()), entry.path()};
+    Golden golden{entry.path().stem().string(), "", file_text(entry.path()), entry.path()};
     golden.hex.replace_extension(".hex");
     constexpr std::string_view kMark = "# proto-message: ";
     const std::size_t at = golden.text.find(kMark) + kMark.size();
@@ -368,7 +368,7 @@ std::string from_hex(const std::string& hex) {
   return bytes;
 }
 
-std::string bytes_of(const Golden& golden) { return from_hex(read_file(golden.hex)); }
+std::string bytes_of(const Golden& golden) { return from_hex(file_text(golden.hex)); }
 
 // The columns of a golden message's type; none for a message of the control stream.
 Infos infos_of(const Golden& golden) {
@@ -388,7 +388,7 @@ TEST(GoldenMessages, AreTheBytesOfTheirTexts) {
     ASSERT_TRUE(pb::TextFormat::ParseFromString(golden.text, message.get()));
     const std::string hex = to_hex(serialized(*message));
     if (std::getenv("GRAVITAS_WRITE_GOLDEN") != nullptr) std::ofstream(golden.hex) << hex;
-    EXPECT_EQ(read_file(golden.hex), hex)
+    EXPECT_EQ(file_text(golden.hex), hex)
         << "if the text was meant to change: GRAVITAS_WRITE_GOLDEN=1 build/release/bin/test_schemas";
     hex_files.insert(golden.hex.filename().string());
   }
@@ -421,7 +421,7 @@ TEST(GoldenMessages, AreReadAndWrittenByTheCodecByteForByte) {
 // What the texts say the columns are, number by number.
 TEST(GoldenMessages, TheForcesRequestHasItsColumnsAndItsDigest) {
   const stage::MethodInfo& method = stage::method_info(stage::Method::kForceWrenches);
-  const std::string bytes = from_hex(read_file(kGolden / "force_wrenches_request.hex"));
+  const std::string bytes = from_hex(file_text(kGolden / "force_wrenches_request.hex"));
   wire::ColumnsReader reader(method.request);
   ASSERT_EQ(reader.parse(bytes_of(bytes)), "");
   const MessageColumns columns = columns_read(method.request, reader);

@@ -16,10 +16,8 @@
 namespace gravitas {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 // some roundings, relative to the largest number involved
-constexpr double kRounding = 1e-14;
+constexpr double kMassRounding = 1e-14;
 
 double difference(const Matrix3& a, const Matrix3& b) { return (a - b).cwiseAbs().maxCoeff(); }
 
@@ -48,22 +46,22 @@ MassProperties sum_over_cells(double extent, int cells, double density, Inside i
 
 TEST(MassProperties, SphereHasItsClosedForm) {
   const MassProperties sphere = sphere_mass_properties(2.0, 3.0);
-  EXPECT_NEAR(sphere.mass, 32.0 * kPi, 100 * kRounding);
-  const double moment = 0.4 * 32.0 * kPi * 4.0;
-  EXPECT_LE(difference(sphere.inertia, moment * Matrix3::Identity()), 200 * kRounding);
+  EXPECT_NEAR(sphere.mass, 32.0 * std::numbers::pi, 100 * kMassRounding);
+  const double moment = 0.4 * 32.0 * std::numbers::pi * 4.0;
+  EXPECT_LE(difference(sphere.inertia, moment * Matrix3::Identity()), 200 * kMassRounding);
   EXPECT_EQ(sphere.centre_of_mass, Vector3::Zero());
 }
 
 TEST(MassProperties, BoxTakesHalfExtents) {
   const MassProperties box = box_mass_properties(Vector3(1.0, 2.0, 3.0), 0.5);
   EXPECT_EQ(box.mass, 24.0);
-  EXPECT_LE(difference(box.inertia, diagonal(104.0, 80.0, 40.0)), 100 * kRounding);
+  EXPECT_LE(difference(box.inertia, diagonal(104.0, 80.0, 40.0)), 100 * kMassRounding);
 }
 
 TEST(MassProperties, CylinderStandsAlongY) {
   const MassProperties cylinder = cylinder_mass_properties(2.0, 3.0, 1.0);
-  EXPECT_NEAR(cylinder.mass, 12.0 * kPi, 40 * kRounding);
-  EXPECT_LE(difference(cylinder.inertia, 12.0 * kPi * diagonal(1.75, 2.0, 1.75)), 100 * kRounding);
+  EXPECT_NEAR(cylinder.mass, 12.0 * std::numbers::pi, 40 * kMassRounding);
+  EXPECT_LE(difference(cylinder.inertia, 12.0 * std::numbers::pi * diagonal(1.75, 2.0, 1.75)), 100 * kMassRounding);
 }
 
 // Independent of the formulas: the integrals themselves. The midpoint rule errs by the boundary
@@ -88,7 +86,7 @@ TEST(MassProperties, ScaledToMassKeepsTheShape) {
   const MassProperties box = box_mass_properties(Vector3(1.0, 2.0, 3.0), 0.5);
   const MassProperties heavy = scaled_to_mass(box, 240.0);
   EXPECT_EQ(heavy.mass, 240.0);
-  EXPECT_LE(difference(heavy.inertia, 10.0 * box.inertia), 1000 * kRounding);
+  EXPECT_LE(difference(heavy.inertia, 10.0 * box.inertia), 1000 * kMassRounding);
 }
 
 TEST(MassProperties, ParallelAxisTheoremIsTheSumOverPoints) {
@@ -104,7 +102,7 @@ TEST(MassProperties, ParallelAxisTheoremIsTheSumOverPoints) {
     const Vector3 q = p - d;
     about_d += m * (q.squaredNorm() * Matrix3::Identity() - q * q.transpose());
   }
-  EXPECT_LE(difference(translated_inertia(about_centre, 4 * m, d), about_d), 1000 * kRounding);
+  EXPECT_LE(difference(translated_inertia(about_centre, 4 * m, d), about_d), 1000 * kMassRounding);
 }
 
 TEST(MassProperties, TwoHalfBoxesMakeTheBox) {
@@ -114,9 +112,9 @@ TEST(MassProperties, TwoHalfBoxesMakeTheBox) {
   const std::array<MassProperties, 2> parts = {lower, upper};
   const MassProperties both = combined(parts);
   const MassProperties box = box_mass_properties(Vector3(1.0, 2.0, 3.0), 0.7);
-  EXPECT_NEAR(both.mass, box.mass, 100 * kRounding);
-  EXPECT_LE((both.centre_of_mass - Vector3(5.0, 1.0, 2.0)).norm(), 10 * kRounding);
-  EXPECT_LE(difference(both.inertia, box.inertia), 1000 * kRounding);
+  EXPECT_NEAR(both.mass, box.mass, 100 * kMassRounding);
+  EXPECT_LE((both.centre_of_mass - Vector3(5.0, 1.0, 2.0)).norm(), 10 * kMassRounding);
+  EXPECT_LE(difference(both.inertia, box.inertia), 1000 * kMassRounding);
   // the products of inertia are rounding errors, and do not turn the axes
   EXPECT_EQ(principal_axes(both).orientation.coeffs(), Quaternion::Identity().coeffs());
 }
@@ -130,9 +128,9 @@ TEST(MassProperties, CombiningCommutesWithMoving) {
   const MassProperties expected = transformed(combined(parts), move);
   for (MassProperties& part : parts) part = transformed(part, move);
   const MassProperties moved = combined(parts);
-  EXPECT_NEAR(moved.mass, expected.mass, 20 * kRounding);
-  EXPECT_LE((moved.centre_of_mass - expected.centre_of_mass).norm(), 10 * kRounding);
-  EXPECT_LE(difference(moved.inertia, expected.inertia), 100 * kRounding);
+  EXPECT_NEAR(moved.mass, expected.mass, 20 * kMassRounding);
+  EXPECT_LE((moved.centre_of_mass - expected.centre_of_mass).norm(), 10 * kMassRounding);
+  EXPECT_LE(difference(moved.inertia, expected.inertia), 100 * kMassRounding);
   EXPECT_EQ(moved.inertia, moved.inertia.transpose());
 }
 
@@ -175,7 +173,7 @@ TEST(MassProperties, PrincipalAxesRebuildTheInertia) {
       const Vector3 v(std::sin(3.0 * i), std::sin(5.0 * i + 1.0), std::sin(7.0 * i + 2.0));
       const MassProperties turned = transformed(box, Pose{Vector3::Zero(), exp_rotation(3.0 * v)});
       const PrincipalAxes axes = principal_axes(turned);
-      EXPECT_NEAR(axes.orientation.norm(), 1.0, kRounding);
+      EXPECT_NEAR(axes.orientation.norm(), 1.0, kMassRounding);
       // 2^-48 of the largest moment may be left beside the diagonal, and some roundings
       EXPECT_LE(difference(rebuilt(axes), turned.inertia), 2e-14 * largest);
     }
@@ -199,10 +197,10 @@ TEST(MassProperties, PrincipalAxesOfTheAllOnesTensor) {
   body.mass = 1.0;
   body.inertia = Matrix3::Identity() + Matrix3::Ones();
   const PrincipalAxes axes = principal_axes(body);
-  EXPECT_NEAR(axes.moments.maxCoeff(), 4.0, kRounding);
-  EXPECT_NEAR(axes.moments.minCoeff(), 1.0, kRounding);
-  EXPECT_NEAR(axes.moments.sum(), 6.0, kRounding);
-  EXPECT_LE(difference(rebuilt(axes), body.inertia), kRounding);
+  EXPECT_NEAR(axes.moments.maxCoeff(), 4.0, kMassRounding);
+  EXPECT_NEAR(axes.moments.minCoeff(), 1.0, kMassRounding);
+  EXPECT_NEAR(axes.moments.sum(), 6.0, kMassRounding);
+  EXPECT_LE(difference(rebuilt(axes), body.inertia), kMassRounding);
 }
 
 TEST(MassProperties, PrincipalAxesOfNonsenseAreNaN) {

@@ -13,8 +13,6 @@
 namespace gravitas {
 namespace {
 
-using Kind = SceneShape::Kind;
-
 // The least h(n) that random directions and a random descent from the best of them find: an upper bound of the depth.
 double searched_depth(const PlacedPair& pair, const Vector3& start, test::RandomShapes* random) {
   double depth = std::numeric_limits<double>::infinity();
@@ -37,8 +35,8 @@ double searched_depth(const PlacedPair& pair, const Vector3& start, test::Random
 
 TEST(Penetration, IsTheLeastOverAllDirections) {
   test::RandomShapes random(31);
-  for (const Kind kind_a : test::kConvexKinds) {
-    for (const Kind kind_b : test::kConvexKinds) {
+  for (const SceneShape::Kind kind_a : test::kConvexKinds) {
+    for (const SceneShape::Kind kind_b : test::kConvexKinds) {
       for (int i = 0; i < 30; ++i) {
         const SceneShape a = random.convex(kind_a), b = random.convex(kind_b);
         const auto map_a = make_support_map(a), map_b = make_support_map(b);
@@ -62,9 +60,10 @@ TEST(Penetration, IsTheLeastOverAllDirections) {
 // Flat faces: exact to rounding.
 TEST(Penetration, OfPolyhedraIsExact) {
   test::RandomShapes random(32);
-  for (const Kind kind_b : {Kind::kSphere, Kind::kBox, Kind::kCapsule, Kind::kConvexPolyhedron}) {
+  for (const SceneShape::Kind kind_b : {SceneShape::Kind::kSphere, SceneShape::Kind::kBox, SceneShape::Kind::kCapsule,
+                                        SceneShape::Kind::kConvexPolyhedron}) {
     for (int i = 0; i < 200; ++i) {
-      const SceneShape a = random.convex(Kind::kConvexPolyhedron), b = random.convex(kind_b);
+      const SceneShape a = random.convex(SceneShape::Kind::kConvexPolyhedron), b = random.convex(kind_b);
       const auto map_a = make_support_map(a), map_b = make_support_map(b);
       const PlacedPair pair{*map_a, *map_b, random.rotation().toRotationMatrix(),
                             random.uniform(0.0, 2.5) * random.direction()};
@@ -80,9 +79,10 @@ TEST(Penetration, OfPolyhedraIsExact) {
 TEST(Penetration, ScalesWithTheSolids) {
   test::RandomShapes random(33);
   for (const double scale : {1e-6, 1e-3, 1e3, 1e6}) {
-    for (const Kind kind : {Kind::kBox, Kind::kCapsule, Kind::kCone, Kind::kCylinder}) {
+    for (const SceneShape::Kind kind :
+         {SceneShape::Kind::kBox, SceneShape::Kind::kCapsule, SceneShape::Kind::kCone, SceneShape::Kind::kCylinder}) {
       for (int i = 0; i < 40; ++i) {
-        SceneShape a = random.convex(kind), b = random.convex(Kind::kCone);
+        SceneShape a = random.convex(kind), b = random.convex(SceneShape::Kind::kCone);
         const Matrix3 R = random.rotation().toRotationMatrix();
         const Vector3 p = random.uniform(0.2, 2.0) * random.direction();
         const auto map_a = make_support_map(a), map_b = make_support_map(b);
@@ -98,17 +98,17 @@ TEST(Penetration, ScalesWithTheSolids) {
 }
 
 TEST(Penetration, OfCoincidentSolidsHasADirection) {
-  for (const Kind kind : test::kConvexKinds) {
+  for (const SceneShape::Kind kind : test::kConvexKinds) {
     test::RandomShapes random(34);
     const SceneShape shape = random.convex(kind);
     const auto map = make_support_map(shape);
     const Separation found = find_separation({*map, *map, Matrix3::Identity(), Vector3::Zero()}, 0.0);
     EXPECT_NEAR(found.normal.norm(), 1.0, 1e-14);
     EXPECT_GT(found.depth, 0.0);
-    if (kind == Kind::kBox) {
+    if (kind == SceneShape::Kind::kBox) {
       EXPECT_NEAR(found.depth, 2.0 * shape.size.minCoeff(), 1e-14);
     }
-    if (kind == Kind::kSphere) {
+    if (kind == SceneShape::Kind::kSphere) {
       EXPECT_NEAR(found.depth, 2.0 * shape.size.x(), 1e-14);
     }
   }
@@ -130,7 +130,7 @@ TEST(Penetration, OfFlatAndThinSolids) {
   EXPECT_NEAR(find_separation({triangle, triangle, upright, Vector3(0.1, 0.05, 0.3)}, 0.0).depth, 0.05, 1e-15);
   // a needle and a sheet, 1 : 1e6
   SceneShape needle, sheet;
-  needle.kind = sheet.kind = Kind::kBox;
+  needle.kind = sheet.kind = SceneShape::Kind::kBox;
   needle.size = Vector3(1e-6, 1, 1e-6), sheet.size = Vector3(1, 1e-6, 1);
   const auto needle_map = make_support_map(needle), sheet_map = make_support_map(sheet);
   const Separation touch = find_separation({*sheet_map, *needle_map, Matrix3::Identity(), Vector3(0.3, 1.0, 0.2)}, 0.0);

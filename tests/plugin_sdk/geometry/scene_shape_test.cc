@@ -13,16 +13,14 @@
 namespace gravitas {
 namespace {
 
-using Kind = SceneShape::Kind;
-
 // A cube of 2 m as polyhedron (by hull) or closed mesh, moved by `offset`.
-SceneShape cube(Kind kind, const Vector3& offset = Vector3::Zero()) {
+SceneShape cube(SceneShape::Kind kind, const Vector3& offset = Vector3::Zero()) {
   std::vector<double> numbers{8};
   for (int i = 0; i < 8; ++i)
     for (int k = 0; k < 3; ++k) numbers.push_back(((i >> k) & 1 ? 1.0 : -1.0) + offset[k]);
   const double faces[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
                                {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  if (kind == Kind::kTriangleMesh) {
+  if (kind == SceneShape::Kind::kTriangleMesh) {
     numbers.push_back(12);
     for (const auto& face : faces) numbers.insert(numbers.end(), face, face + 3);
     numbers.insert(numbers.end(), {1.0, 48.0, 4.0});
@@ -30,15 +28,15 @@ SceneShape cube(Kind kind, const Vector3& offset = Vector3::Zero()) {
     numbers.push_back(0);
   }
   std::string why;
-  auto shape =
-      read_scene_shape(type_id(kind == Kind::kTriangleMesh ? "TriangleMesh" : "ConvexPolyhedron"), numbers, &why);
+  auto shape = read_scene_shape(type_id(kind == SceneShape::Kind::kTriangleMesh ? "TriangleMesh" : "ConvexPolyhedron"),
+                                numbers, &why);
   EXPECT_TRUE(shape) << why;
   return *shape;
 }
 
 SceneShape compound_of(const SceneShape& a, const Pose& X_a, const SceneShape& b, const Pose& X_b, double density_b) {
   SceneShape whole;
-  whole.kind = Kind::kCompound;
+  whole.kind = SceneShape::Kind::kCompound;
   whole.children.push_back({std::make_shared<SceneShape>(a), X_a, 0.0});
   whole.children.push_back({std::make_shared<SceneShape>(b), X_b, density_b});
   return whole;
@@ -59,11 +57,11 @@ MassProperties sampled(const SceneShape& shape, int n) {
         const Vector3 p(x, y, z);
         const double radial = std::hypot(x, z);
         bool is_inside = false;
-        if (shape.kind == Kind::kCapsule)
+        if (shape.kind == SceneShape::Kind::kCapsule)
           is_inside = (p - Vector3(0, std::clamp(y, -shape.size.y(), shape.size.y()), 0)).norm() < shape.size.x();
-        if (shape.kind == Kind::kCone)
+        if (shape.kind == SceneShape::Kind::kCone)
           is_inside = radial < shape.size.x() * (shape.size.y() - y) / (2.0 * shape.size.y());
-        if (shape.kind == Kind::kConvexPolyhedron)
+        if (shape.kind == SceneShape::Kind::kConvexPolyhedron)
           is_inside = std::all_of(shape.polyhedron->faces.begin(), shape.polyhedron->faces.end(),
                                   [&](const auto& face) { return face.normal.dot(p) < face.offset; });
         if (!is_inside) continue;
@@ -80,7 +78,8 @@ MassProperties sampled(const SceneShape& shape, int n) {
 
 TEST(SceneShapeMass, AgreesWithPointSampling) {
   test::RandomShapes random(21);
-  for (const Kind kind : {Kind::kCapsule, Kind::kCone, Kind::kConvexPolyhedron}) {
+  for (const SceneShape::Kind kind :
+       {SceneShape::Kind::kCapsule, SceneShape::Kind::kCone, SceneShape::Kind::kConvexPolyhedron}) {
     for (int i = 0; i < 3; ++i) {
       const SceneShape shape = random.convex(kind);
       const MassProperties exact = mass_properties(shape, 1000.0), counted = sampled(shape, 80);
@@ -93,7 +92,7 @@ TEST(SceneShapeMass, AgreesWithPointSampling) {
 
 TEST(SceneShapeMass, OfACubeIsThatOfABoxWhereverItLies) {
   const MassProperties box = box_mass_properties(Vector3::Ones(), 500.0);
-  for (const Kind kind : {Kind::kConvexPolyhedron, Kind::kTriangleMesh}) {
+  for (const SceneShape::Kind kind : {SceneShape::Kind::kConvexPolyhedron, SceneShape::Kind::kTriangleMesh}) {
     for (const Vector3& offset : {Vector3(0, 0, 0), Vector3(3, -2, 1), Vector3(1e6, 0, 0)}) {
       const MassProperties mass = mass_properties(cube(kind, offset), 500.0);
       // the coordinates are exact; what is left is the rounding of the origin of the sums
@@ -133,7 +132,7 @@ TEST(SceneShapeMass, OfAnOpenMeshIsThatOfItsTriangles) {
 }
 
 TEST(SceneShapeMass, OfACompoundIsThatOfItsParts) {
-  const SceneShape block = cube(Kind::kConvexPolyhedron);
+  const SceneShape block = cube(SceneShape::Kind::kConvexPolyhedron);
   const SceneShape whole = compound_of(block, {Vector3(-1, 0, 0), Quaternion::Identity()}, block,
                                        {Vector3(1, 0, 0), Quaternion::Identity()}, 0);
   const MassProperties expected = box_mass_properties({2, 1, 1}, 300.0), mass = mass_properties(whole, 300.0);
@@ -146,7 +145,7 @@ TEST(SceneShapeMass, OfACompoundIsThatOfItsParts) {
 
 TEST(SceneShapeBounds, AreTight) {
   test::RandomShapes random(22);
-  for (const Kind kind : test::kConvexKinds) {
+  for (const SceneShape::Kind kind : test::kConvexKinds) {
     for (int i = 0; i < 20; ++i) {
       const SceneShape shape = random.convex(kind);
       const auto map = make_support_map(shape);
@@ -175,7 +174,7 @@ TEST(SceneShapeBounds, AreTight) {
 TEST(SceneShapeBounds, OfACompoundHoldItsParts) {
   test::RandomShapes random(23);
   for (int i = 0; i < 30; ++i) {
-    const SceneShape a = random.convex(Kind::kCone), b = random.convex(Kind::kCapsule);
+    const SceneShape a = random.convex(SceneShape::Kind::kCone), b = random.convex(SceneShape::Kind::kCapsule);
     const Pose X_a{random.vector(-1, 1), random.rotation()}, X_b{random.vector(-1, 1), random.rotation()};
     const SceneShape whole = compound_of(a, X_a, b, X_b, 0.0);
     const auto map = make_support_map(a);
@@ -191,10 +190,10 @@ TEST(SceneShapeBounds, OfACompoundHoldItsParts) {
 
 TEST(SceneShape, GoesThereAndBack) {
   test::RandomShapes random(24);
-  for (const Kind kind : test::kConvexKinds) {
+  for (const SceneShape::Kind kind : test::kConvexKinds) {
     const SceneShape shape = random.convex(kind);
     const SceneShape whole =
-        compound_of(shape, {random.vector(-1, 1), random.rotation()}, cube(Kind::kTriangleMesh), {}, 3.0);
+        compound_of(shape, {random.vector(-1, 1), random.rotation()}, cube(SceneShape::Kind::kTriangleMesh), {}, 3.0);
     for (const SceneShape& one : {shape, whole}) {
       const std::vector<double> numbers = flattened_shape(one);
       std::string why;
@@ -219,10 +218,10 @@ TEST(SceneShape, SaysWhatIsWrong) {
             "face 0 has an index that is none");
   EXPECT_THROW(refusal("Cone", {1}), std::out_of_range);
   // nested in itself more often than allowed
-  SceneShape whole = cube(Kind::kConvexPolyhedron);
+  SceneShape whole = cube(SceneShape::Kind::kConvexPolyhedron);
   for (int i = 0; i < 10; ++i) {
     SceneShape outer;
-    outer.kind = Kind::kCompound;
+    outer.kind = SceneShape::Kind::kCompound;
     outer.children.push_back({std::make_shared<SceneShape>(whole), {}, 0.0});
     whole = outer;
   }
@@ -233,7 +232,7 @@ TEST(SceneShape, SaysWhatIsWrong) {
 
 // A compound's child passes through its flattened properties on its way to a plugin.
 TEST(SceneShapeFlattened, AMeshKeepsTheOptionsOfItsTree) {
-  std::vector<double> numbers = flattened_shape(cube(Kind::kTriangleMesh));
+  std::vector<double> numbers = flattened_shape(cube(SceneShape::Kind::kTriangleMesh));
   numbers[numbers.size() - 2] = 1.0;
   numbers[numbers.size() - 1] = 3.0;
   std::string why;

@@ -13,7 +13,6 @@
 namespace gravitas {
 namespace {
 
-using Kind = SceneShape::Kind;
 constexpr double kTarget = 1e-6;
 
 struct Body {
@@ -25,14 +24,14 @@ struct Body {
       : shape(std::move(made)), map(make_support_map(shape)), solid{map.get(), geometry, start, motion} {}
 };
 
-SceneShape shape_of(Kind kind, const Vector3& size) {
+SceneShape moving_shape_of(SceneShape::Kind kind, const Vector3& size) {
   SceneShape shape;
   shape.kind = kind, shape.size = size;
   return shape;
 }
-SceneShape ball(double radius) { return shape_of(Kind::kSphere, Vector3::Constant(radius)); }
-SceneShape box(double x, double y, double z) { return shape_of(Kind::kBox, {x, y, z}); }
-SceneShape ground() { return shape_of(Kind::kHalfspace, Vector3::Ones()); }
+SceneShape ball(double radius) { return moving_shape_of(SceneShape::Kind::kSphere, Vector3::Constant(radius)); }
+SceneShape box(double x, double y, double z) { return moving_shape_of(SceneShape::Kind::kBox, {x, y, z}); }
+SceneShape ground() { return moving_shape_of(SceneShape::Kind::kHalfspace, Vector3::Ones()); }
 Pose at(double x, double y, double z) { return {Vector3(x, y, z), Quaternion::Identity()}; }
 Motion by(double x, double y, double z, const Vector3& rotation = Vector3::Zero()) { return {{x, y, z}, rotation}; }
 
@@ -139,9 +138,10 @@ TEST(TimeOfImpact, OfABodyThatTurnsAboutAPointOutsideItsShape) {
 }
 
 TEST(TimeOfImpact, AClearanceOfATenthOfAMillimetreIsPassedAt100MetresPerSecond) {
-  for (const Kind kind : test::kConvexKinds) {
-    if (kind == Kind::kConvexPolyhedron) continue;
-    const SceneShape flying = shape_of(kind, kind == Kind::kSphere ? Vector3::Constant(0.1) : Vector3(0.1, 0.1, 0.1));
+  for (const SceneShape::Kind kind : test::kConvexKinds) {
+    if (kind == SceneShape::Kind::kConvexPolyhedron) continue;
+    const SceneShape flying =
+        moving_shape_of(kind, kind == SceneShape::Kind::kSphere ? Vector3::Constant(0.1) : Vector3(0.1, 0.1, 0.1));
     const auto map = make_support_map(flying);
     const double half = map->support(Vector3(0, -1, 0)).y() * -1.0 + map->rounding();
     const auto pass = [&](double clearance) {
@@ -222,7 +222,7 @@ struct RandomFlight {
   Body a, b;
 };
 
-RandomFlight random_flight(test::RandomShapes* random, Kind kind_a, Kind kind_b, double spin) {
+RandomFlight random_flight(test::RandomShapes* random, SceneShape::Kind kind_a, SceneShape::Kind kind_b, double spin) {
   const Vector3 way = random->direction();
   const auto geometry = [&] { return Pose{0.4 * random->direction(), random->rotation()}; };
   return {Body(random->convex(kind_a), {random->vector(-1, 1), random->rotation()},
@@ -234,8 +234,8 @@ RandomFlight random_flight(test::RandomShapes* random, Kind kind_a, Kind kind_b,
 TEST(TimeOfImpact, NothingOverlapsBeforeItAndNothingIsMissed) {
   test::RandomShapes random(52);
   int found_count = 0, none_count = 0;
-  for (const Kind kind_a : test::kConvexKinds) {
-    for (const Kind kind_b : test::kConvexKinds) {
+  for (const SceneShape::Kind kind_a : test::kConvexKinds) {
+    for (const SceneShape::Kind kind_b : test::kConvexKinds) {
       for (const double spin : {0.0, 3.0, 40.0}) {
         for (int i = 0; i < 8; ++i) {
           const RandomFlight flight = random_flight(&random, kind_a, kind_b, spin);
@@ -264,7 +264,7 @@ TEST(TimeOfImpact, NothingOverlapsBeforeItAndNothingIsMissed) {
 TEST(TimeOfImpact, OfAGroundThatTilts) {
   test::RandomShapes random(53);
   int found_count = 0;
-  for (const Kind kind : test::kConvexKinds) {
+  for (const SceneShape::Kind kind : test::kConvexKinds) {
     for (int i = 0; i < 20; ++i) {
       const Body plane(ground(), {Vector3::Zero(), Quaternion::Identity()}, {Vector3::Zero(), random.vector(-0.5, 0.5)},
                        at(random.uniform(-1, 1), -0.2, 0));
@@ -312,8 +312,8 @@ TEST(TimeOfImpact, OfNeedlesAndSheets) {
 
 TEST(TimeOfImpact, IsTheSameForTheExchangedPairAndInAMovedWorld) {
   test::RandomShapes random(54);
-  for (const Kind kind_a : test::kConvexKinds) {
-    for (const Kind kind_b : test::kConvexKinds) {
+  for (const SceneShape::Kind kind_a : test::kConvexKinds) {
+    for (const SceneShape::Kind kind_b : test::kConvexKinds) {
       for (int i = 0; i < 6; ++i) {
         const RandomFlight flight = random_flight(&random, kind_a, kind_b, 5.0);
         const std::optional<Impact> one = impact_of(flight.a, flight.b), other = impact_of(flight.b, flight.a);
@@ -345,7 +345,8 @@ TEST(TimeOfImpact, ScalesWithTheWorld) {
   test::RandomShapes random(55);
   for (const double scale : {1e-6, 1e-3, 1e3, 1e6}) {
     for (int i = 0; i < 40; ++i) {
-      const RandomFlight flight = random_flight(&random, Kind::kBox, i % 2 == 0 ? Kind::kCone : Kind::kCylinder, 6.0);
+      const RandomFlight flight = random_flight(
+          &random, SceneShape::Kind::kBox, i % 2 == 0 ? SceneShape::Kind::kCone : SceneShape::Kind::kCylinder, 6.0);
       const auto scaled = [&](const Body& body) {
         SceneShape shape = body.shape;
         shape.size *= scale;

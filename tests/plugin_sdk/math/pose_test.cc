@@ -13,7 +13,7 @@ namespace gravitas {
 namespace {
 
 // a dozen roundings of numbers up to 10
-constexpr double kRounding = 2e-14;
+constexpr double kPoseRounding = 2e-14;
 
 const Pose kX_AB{Vector3(1.0, -2.0, 3.0), exp_rotation(Vector3(0.4, -1.9, 0.8))};
 const Pose kX_BC{Vector3(-0.5, 4.0, 2.5), exp_rotation(Vector3(-2.2, 0.1, 1.3))};
@@ -27,26 +27,26 @@ TEST(Pose, DefaultIsTheIdentity) {
 
 TEST(Pose, ComposeIsTheMatrixProduct) {
   const Matrix4 product = to_matrix(kX_AB) * to_matrix(kX_BC);
-  EXPECT_LE((to_matrix(compose(kX_AB, kX_BC)) - product).cwiseAbs().maxCoeff(), kRounding);
+  EXPECT_LE((to_matrix(compose(kX_AB, kX_BC)) - product).cwiseAbs().maxCoeff(), kPoseRounding);
 }
 
 TEST(Pose, QuarterTurnThenShiftOfAPoint) {
   // B stands at (1, 0, 0) in A, its x axis along A's y axis
   const double half = std::sqrt(0.5);
   const Pose X_AB{Vector3(1.0, 0.0, 0.0), Quaternion(half, 0.0, 0.0, half)};
-  EXPECT_LE((transform_point(X_AB, Vector3(2.0, 0.0, 0.0)) - Vector3(1.0, 2.0, 0.0)).norm(), kRounding);
+  EXPECT_LE((transform_point(X_AB, Vector3(2.0, 0.0, 0.0)) - Vector3(1.0, 2.0, 0.0)).norm(), kPoseRounding);
 }
 
 TEST(Pose, InverseUndoes) {
-  EXPECT_LE(difference(compose(kX_AB, inverse(kX_AB)), Pose{}), kRounding);
-  EXPECT_LE(difference(compose(inverse(kX_AB), kX_AB), Pose{}), kRounding);
+  EXPECT_LE(difference(compose(kX_AB, inverse(kX_AB)), Pose{}), kPoseRounding);
+  EXPECT_LE(difference(compose(inverse(kX_AB), kX_AB), Pose{}), kPoseRounding);
   const Vector3 p(0.3, 7.0, -2.0);
-  EXPECT_LE((inverse_transform_point(kX_AB, transform_point(kX_AB, p)) - p).norm(), kRounding);
-  EXPECT_LE((transform_point(inverse(kX_AB), p) - inverse_transform_point(kX_AB, p)).norm(), kRounding);
+  EXPECT_LE((inverse_transform_point(kX_AB, transform_point(kX_AB, p)) - p).norm(), kPoseRounding);
+  EXPECT_LE((transform_point(inverse(kX_AB), p) - inverse_transform_point(kX_AB, p)).norm(), kPoseRounding);
 }
 
 TEST(Pose, RelativeRecoversTheSecondFactor) {
-  EXPECT_LE(difference(relative(kX_AB, compose(kX_AB, kX_BC)), kX_BC), kRounding);
+  EXPECT_LE(difference(relative(kX_AB, compose(kX_AB, kX_BC)), kX_BC), kPoseRounding);
 }
 
 TEST(Pose, RelativeKeepsItsDigitsFarFromTheOrigin) {
@@ -54,7 +54,7 @@ TEST(Pose, RelativeKeepsItsDigitsFarFromTheOrigin) {
   Pose b = a;
   b.position.x() += 0.5;
   const Vector3 expected = a.orientation.conjugate() * Vector3(0.5, 0.0, 0.0);
-  EXPECT_LE((relative(a, b).position - expected).norm(), kRounding);
+  EXPECT_LE((relative(a, b).position - expected).norm(), kPoseRounding);
 }
 
 TEST(Pose, MatrixRoundTrip) {
@@ -62,7 +62,7 @@ TEST(Pose, MatrixRoundTrip) {
     const auto back = from_matrix(to_matrix(X));
     ASSERT_TRUE(back.has_value());
     EXPECT_EQ(back->position, X.position);
-    EXPECT_LE(difference(*back, X), kRounding);
+    EXPECT_LE(difference(*back, X), kPoseRounding);
     EXPECT_GE(back->orientation.w(), 0.0);
   }
 }

@@ -18,11 +18,11 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::run_program;
+using harness::ScratchFolder;
+using harness::shipped_scene;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::run_program;
-using testing::ScratchFolder;
-using testing::shipped_scene;
 
 // Writes the first steps of a scene in which the slot is asked.
 std::string capture(const std::string& slot, const ScratchFolder& folder, const std::vector<std::string>& more = {}) {

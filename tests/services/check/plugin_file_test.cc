@@ -12,7 +12,7 @@
 namespace gravitas::check {
 namespace {
 
-using testing::ScratchFolder;
+using harness::ScratchFolder;
 
 const std::string kLibrary = in_build("/lib/gravitas/hello.so");
 
@@ -34,7 +34,7 @@ TEST(PluginFile, IsTellingPluginsFromOtherFiles) {
 
 TEST(PluginFile, CutAnywhereIsReadWithoutHarm) {
   const ScratchFolder folder;
-  const std::string whole = testing::read_file(kLibrary);
+  const std::string whole = harness::read_file(kLibrary);
   for (const std::size_t size : {std::size_t{4}, std::size_t{63}, std::size_t{64}, whole.size() / 2}) {
     // its table of sections stands behind its middle
     EXPECT_NE(kind_of_file(folder.write("cut", whole.substr(0, size))), FileKind::kPlugin) << size;

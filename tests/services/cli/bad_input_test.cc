@@ -8,13 +8,11 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::run_program;
+using harness::ScratchFolder;
+using harness::shipped_scene;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::run_program;
-using testing::ScratchFolder;
-using testing::shipped_scene;
-
-const std::string kSample = shipped_scene("two_spheres_motor");
 
 struct BadScene {
   const char* name;

@@ -10,10 +10,10 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::run_program;
+using harness::ScratchFolder;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::run_program;
-using testing::ScratchFolder;
 
 const std::string kGood = in_build("/lib/gravitas/hello.so");
 const std::string kBad = in_build("/lib/gravitas-faulty/wrong_magic.so");

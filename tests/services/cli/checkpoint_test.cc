@@ -25,14 +25,12 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::read_file;
+using harness::run_program;
+using harness::ScratchFolder;
+using harness::shipped_scene;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::read_file;
-using testing::run_program;
-using testing::ScratchFolder;
-using testing::shipped_scene;
-
-const std::string kSample = shipped_scene("two_spheres_motor");
 
 std::string chain_of(const std::string& report_file) {
   report::v1::Report report;
@@ -72,14 +70,14 @@ TEST(Checkpoints, AnInterruptedRunGoesOn) {
   const ScratchFolder folder;
   const std::string pipe = folder.path("motion.csv"), kept = folder.path("kept");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const pid_t process = testing::start_program(
+  const pid_t process = harness::start_program(
       {"run", kSample, "--hosting", "direct", "--duration", "500", "--trajectory", pipe, "--checkpoint", kept}, folder);
   std::ifstream rows(pipe);
   std::string line;
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(std::getline(rows, line));
   kill(process, SIGTERM);
   while (std::getline(rows, line)) continue;
-  const ProgramResult result = testing::finish_program(process, folder);
+  const ProgramResult result = harness::finish_program(process, folder);
   EXPECT_EQ(result.exit_code, 130) << result.err;
   EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step "));
   const int step = std::stoi(result.err.substr(result.err.find("holds step ") + 11));
@@ -174,14 +172,14 @@ TEST_P(Kills, AtAnyMomentLeaveWhatResumesToTheSameChain) {
   while (killed < kills) {
     for (int i = 0; i < kKillsPerRun && killed < kills; ++i) {
       const std::string before = read_file(kept);
-      const pid_t process = testing::start_program(with_resume(), folder);
+      const pid_t process = harness::start_program(with_resume(), folder);
       // the end of the program or a moment by chance, whichever is first
       pollfd end = {static_cast<int>(syscall(SYS_pidfd_open, process, 0)), POLLIN, 0};
       const timespec moment = {0, 1000 * microseconds(chance)};
       const bool ends_by_itself = ppoll(&end, 1, &moment, nullptr) > 0;
       if (!ends_by_itself) kill(process, SIGKILL);
       close(end.fd);
-      const ProgramResult result = testing::finish_program(process, folder);
+      const ProgramResult result = harness::finish_program(process, folder);
       if (result.exit_code == 137) {
         ++killed;
         got_on += read_file(kept) == before ? 0 : 1;

@@ -15,14 +15,12 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::read_file;
+using harness::read_report;
+using harness::run_program;
+using harness::ScratchFolder;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::read_file;
-using testing::read_report;
-using testing::run_program;
-using testing::ScratchFolder;
-
-const std::string kSample = testing::shipped_scene("two_spheres_motor");
 
 struct Outcome {
   ProgramResult program;

@@ -18,8 +18,8 @@
 namespace gravitas {
 namespace {
 
-using testing::ProgramResult;
-using testing::ScratchFolder;
+using harness::ProgramResult;
+using harness::ScratchFolder;
 
 // Processes that a process has started and that are still there.
 std::vector<pid_t> children_of(pid_t process) {
@@ -43,7 +43,7 @@ Interrupted interrupt(int number) {
   const ScratchFolder folder;
   const std::string pipe = folder.path("motion.csv");
   EXPECT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const pid_t process = testing::start_program({"run", testing::shipped_scene("two_spheres_motor"), "--duration", "500",
+  const pid_t process = harness::start_program({"run", harness::shipped_scene("two_spheres_motor"), "--duration", "500",
                                                 "--trajectory", pipe, "--report", folder.path("report.json")},
                                                folder);
   std::ifstream rows(pipe);
@@ -54,9 +54,9 @@ Interrupted interrupt(int number) {
   for (const pid_t worker : children_of(process)) seen.groups.push_back(getpgid(worker));
   kill(process, number);
   while (std::getline(rows, line)) seen.last_row = line;
-  seen.result = testing::finish_program(process, folder);
+  seen.result = harness::finish_program(process, folder);
   EXPECT_TRUE(
-      google::protobuf::util::JsonStringToMessage(testing::read_file(folder.path("report.json")), &seen.report).ok());
+      google::protobuf::util::JsonStringToMessage(harness::read_file(folder.path("report.json")), &seen.report).ok());
   return seen;
 }
 

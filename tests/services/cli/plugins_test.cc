@@ -12,11 +12,11 @@ namespace gravitas {
 namespace {
 
 using google::protobuf::util::JsonStringToMessage;
+using harness::ProgramResult;
+using harness::run_program;
+using harness::ScratchFolder;
+using harness::shipped_scene;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::run_program;
-using testing::ScratchFolder;
-using testing::shipped_scene;
 
 TEST(Plan, NamesWhatIsNeededAndWhyTheRestIsNot) {
   const ScratchFolder folder;

@@ -19,7 +19,7 @@
 
 extern char** environ;
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 namespace {
 
 constexpr int kLimitMs = 60'000;
@@ -93,4 +93,4 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Scrat
 
 std::string shipped_scene(const std::string& name) { return in_source("/deploy/scenes/") + name + ".gravitas"; }
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness

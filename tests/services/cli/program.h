@@ -8,7 +8,7 @@
 
 #include "gravitas/report/v1/report.pb.h"
 
-namespace gravitas::testing {
+namespace gravitas::harness {
 
 struct ProgramResult {
   int exit_code = -1;  // 128 + signal if it was killed
@@ -45,4 +45,10 @@ ProgramResult run_program(const std::vector<std::string>& arguments, const Scrat
 // A shipped scene.
 std::string shipped_scene(const std::string& name);
 
-}  // namespace gravitas::testing
+}  // namespace gravitas::harness
+
+namespace gravitas {
+
+inline const std::string kSample = harness::shipped_scene("two_spheres_motor");
+
+}  // namespace gravitas

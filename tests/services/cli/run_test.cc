@@ -17,16 +17,14 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::read_file;
+using harness::read_report;
+using harness::run_program;
+using harness::ScratchFolder;
+using harness::shipped_scene;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::read_file;
-using testing::read_report;
-using testing::run_program;
-using testing::ScratchFolder;
-using testing::shipped_scene;
 using ::testing::StartsWith;
-
-const std::string kSample = shipped_scene("two_spheres_motor");
 
 std::vector<std::vector<std::string>> read_csv(const std::string& path) {
   std::vector<std::vector<std::string>> rows;
@@ -203,7 +201,7 @@ TEST(Run, AnInterruptKeepsWhatWasComputed) {
   const ScratchFolder folder;
   const std::string pipe = folder.path("motion.csv");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  const pid_t process = testing::start_program({"run", kSample, "--hosting", "direct", "--duration", "1e6",
+  const pid_t process = harness::start_program({"run", kSample, "--hosting", "direct", "--duration", "1e6",
                                                 "--trajectory", pipe, "--report", folder.path("report.json")},
                                                folder);
   // rows come out: the run is under way
@@ -213,7 +211,7 @@ TEST(Run, AnInterruptKeepsWhatWasComputed) {
   kill(process, SIGINT);
   std::string last;
   while (std::getline(rows, line)) last = line;
-  const ProgramResult result = testing::finish_program(process, folder);
+  const ProgramResult result = harness::finish_program(process, folder);
   EXPECT_EQ(result.exit_code, 130);
   const report::v1::Report report = read_report(read_file(folder.path("report.json")));
   EXPECT_EQ(report.outcome(), "interrupted");

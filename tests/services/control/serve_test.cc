@@ -19,12 +19,10 @@
 namespace gravitas {
 namespace {
 
+using harness::ProgramResult;
+using harness::read_file;
+using harness::ScratchFolder;
 using ::testing::HasSubstr;
-using testing::ProgramResult;
-using testing::read_file;
-using testing::ScratchFolder;
-
-const std::string kSample = testing::shipped_scene("two_spheres_motor");
 
 // A server whose socket is found in a folder of this test's own.
 class Served {
@@ -32,7 +30,7 @@ class Served {
   explicit Served(const std::vector<std::string>& options) {
     std::vector<std::string> words = {"serve", kSample, "--headless"};
     words.insert(words.end(), options.begin(), options.end());
-    process_ = testing::start_program(words, folder_);
+    process_ = harness::start_program(words, folder_);
     // it says so when it listens
     for (int i = 0; i < 3000 && said().empty() && kill(process_, 0) == 0; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -54,7 +52,7 @@ class Served {
   ProgramResult ctl(std::vector<std::string> words) const {
     words.insert(words.begin(), {"ctl", "--socket", socket_});
     const ScratchFolder own;
-    return testing::run_program(words, own);
+    return harness::run_program(words, own);
   }
   control_api::v1::Status status() const {
     control_api::v1::Status status;
@@ -65,7 +63,7 @@ class Served {
   }
   ProgramResult end(int number) {
     kill(process_, number);
-    const ProgramResult result = testing::finish_program(process_, folder_);
+    const ProgramResult result = harness::finish_program(process_, folder_);
     process_ = -1;
     return result;
   }
@@ -146,11 +144,11 @@ TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   Served served({"--duration", "3600"});
   ASSERT_FALSE(served.socket().empty());
   const ScratchFolder own;
-  const pid_t watch = testing::start_program({"ctl", "watch", "--socket", served.socket()}, own);
+  const pid_t watch = harness::start_program({"ctl", "watch", "--socket", served.socket()}, own);
   for (int i = 0; i < 3000 && read_file(own.path("stdout")).empty(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(served.end(SIGTERM).exit_code, 0);
-  const ProgramResult result = testing::finish_program(watch, own);
+  const ProgramResult result = harness::finish_program(watch, own);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, ::testing::StartsWith("step "));
   EXPECT_THAT(result.out, HasSubstr("running"));
@@ -166,34 +164,34 @@ TEST(Serve, CtlReachesItAtAnAddressAndCapturesCalls) {
   const ScratchFolder folder;
   const std::string file = folder.path("solver.capsule");
   ProgramResult result =
-      testing::run_program({"ctl", "--socket", address, "capture", "solver", "--out", file, "--steps", "15"}, folder);
+      harness::run_program({"ctl", "--socket", address, "capture", "solver", "--out", file, "--steps", "15"}, folder);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("15 calls of slot solver in 15 steps"));
-  result = testing::run_program({"replay", file}, folder);
+  result = harness::run_program({"replay", file}, folder);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("15 calls: 15 same, 0 different"));
 }
 
 TEST(Serve, WhatCannotBeIsExitCode2) {
   const ScratchFolder folder;
-  ProgramResult result = testing::run_program({"serve", kSample}, folder);
+  ProgramResult result = harness::run_program({"serve", kSample}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("the page comes later; allowed: --headless"));
-  result = testing::run_program({"serve", kSample, "--headless", "--speed", "-1"}, folder);
+  result = harness::run_program({"serve", kSample, "--headless", "--speed", "-1"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("--speed -1"));
-  result = testing::run_program({"serve", kSample, "--headless", "--listen", "0.0.0.0:4711"}, folder);
+  result = harness::run_program({"serve", kSample, "--headless", "--listen", "0.0.0.0:4711"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("others with --allow-remote"));
-  result = testing::run_program({"serve", folder.path("none.gravitas"), "--headless"}, folder);
+  result = harness::run_program({"serve", folder.path("none.gravitas"), "--headless"}, folder);
   EXPECT_EQ(result.exit_code, 2);
-  result = testing::run_program({"ctl", "--socket", folder.path("none.sock"), "status"}, folder);
+  result = harness::run_program({"ctl", "--socket", folder.path("none.sock"), "status"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("no server answers"));
-  EXPECT_EQ(testing::run_program({"ctl"}, folder).exit_code, 2);
+  EXPECT_EQ(harness::run_program({"ctl"}, folder).exit_code, 2);
   for (const char* command :
        {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "capture", "watch"}) {
-    result = testing::run_program({"ctl", command, "--help"}, folder);
+    result = harness::run_program({"ctl", command, "--help"}, folder);
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ctl ") + command));
   }

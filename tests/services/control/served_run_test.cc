@@ -29,7 +29,7 @@ constexpr std::uint32_t kSteps = 120;
 
 ServeOptions sample(const std::string& hosting = "shm") {
   ServeOptions options;
-  options.run.scenes = {gravitas::testing::shipped_scene("two_spheres_motor")};
+  options.run.scenes = {gravitas::harness::shipped_scene("two_spheres_motor")};
   options.run.steps = kSteps;
   options.run.hosting = {
       {std::nullopt, hosting == "direct" ? kernel::Hosting::kDirect : kernel::Hosting::kSharedMemory}};
@@ -40,7 +40,7 @@ ServeOptions sample(const std::string& hosting = "shm") {
 
 // A server and a client of it.
 struct Served {
-  gravitas::testing::ScratchFolder folder;
+  gravitas::harness::ScratchFolder folder;
   ServedRun run;
   ServerSocket socket{folder.path("control.sock")};
   ControlServer server{&run, socket.path()};
@@ -253,7 +253,7 @@ class CurrentFolder {
 
  private:
   const std::filesystem::path before_ = std::filesystem::current_path();
-  const gravitas::testing::ScratchFolder scratch_;
+  const gravitas::harness::ScratchFolder scratch_;
 };
 
 TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
@@ -279,7 +279,7 @@ TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
 }
 
 TEST(ServedRun, TheCallsOfItsNextStepsAreCaptured) {
-  const gravitas::testing::ScratchFolder folder;
+  const gravitas::harness::ScratchFolder folder;
   for (const char* hosting : {"shm", "direct"}) {
     Served served(sample(hosting));
     served.client.step(5);
@@ -304,7 +304,7 @@ TEST(ServedRun, TheCallsOfItsNextStepsAreCaptured) {
 }
 
 TEST(ServedRun, ACaptureThatTheRunOutlivesIsKeptAsFarAsItCame) {
-  const gravitas::testing::ScratchFolder folder;
+  const gravitas::harness::ScratchFolder folder;
   Served served(sample("direct"));
   api::CaptureRequest request;
   request.set_slot("integrator");
@@ -324,7 +324,7 @@ TEST(ServedRun, ACaptureThatTheRunOutlivesIsKeptAsFarAsItCame) {
 }
 
 TEST(ServedRun, ItListensAtAnAddress) {
-  const gravitas::testing::ScratchFolder folder;
+  const gravitas::harness::ScratchFolder folder;
   ServedRun run(sample("direct"));
   const ControlServer server(&run, folder.path("one"), "127.0.0.1:0");
   EXPECT_THAT(server.address(), ::testing::MatchesRegex("127.0.0.1:[1-9][0-9]*"));
@@ -389,7 +389,7 @@ TEST(ServedRun, WhatIsNoSpecificationIsRefusedAtHome) {
 TEST(ServedRun, TheServerEndsCallsThatWait) {
   ServeOptions options = sample("direct");
   options.run.steps = 100'000'000;
-  const gravitas::testing::ScratchFolder folder;
+  const gravitas::harness::ScratchFolder folder;
   ServedRun run(options);
   const ServerSocket socket(folder.path("control.sock"));
   auto server = std::make_optional<ControlServer>(&run, socket.path());
@@ -429,9 +429,9 @@ TEST(ServerSocket, IsPrivateAndRemovesWhatItMade) {
     EXPECT_THROW(ServerSocket second(path), BadInput);
   }
   EXPECT_NE(access(path.substr(0, path.rfind('/')).c_str(), F_OK), 0);
-  const gravitas::testing::ScratchFolder folder;
+  const gravitas::harness::ScratchFolder folder;
   EXPECT_THROW(ServerSocket(folder.write("file", "kept")), BadInput);
-  EXPECT_EQ(gravitas::testing::read_file(folder.path("file")), "kept");
+  EXPECT_EQ(gravitas::harness::read_file(folder.path("file")), "kept");
   EXPECT_THROW(ServerSocket(folder.path(std::string(120, 'x'))), BadInput);
   EXPECT_THROW(ServerSocket(folder.path("none/control.sock")), BadInput);
 }

@@ -27,7 +27,7 @@ constexpr std::size_t kHeader = 32, kChecksum = 16;
 
 kernel::EnvironmentDescription description_of(const std::string& scene, std::vector<std::string> overrides = {}) {
   RunOptions options;
-  options.scenes = {testing::shipped_scene(scene)};
+  options.scenes = {harness::shipped_scene(scene)};
   options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
   options.overrides = std::move(overrides);
   std::vector<std::string> warnings;

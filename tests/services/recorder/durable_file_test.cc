@@ -17,8 +17,8 @@
 namespace gravitas {
 namespace {
 
+using harness::ScratchFolder;
 using ::testing::HasSubstr;
-using testing::ScratchFolder;
 
 std::vector<std::byte> bytes_of(std::size_t count, unsigned char value) {
   return std::vector<std::byte>(count, std::byte{value});

@@ -16,10 +16,10 @@
 namespace gravitas {
 namespace {
 
+using harness::ScratchFolder;
 using kernel::Event;
 using kernel::EventKind;
 using ::testing::ElementsAre;
-using testing::ScratchFolder;
 
 // Ground (fixed), Ball and Cube (movable), Lift (kinematic), and a joint that hangs Ball from the world.
 kernel::EnvironmentDescription description() {
@@ -54,7 +54,7 @@ TEST(EventLog, WritesALineOfJsonPerEvent) {
   log.on_event({EventKind::kBreak, 5, 0.5, kNone, 1, 0, 0.0, 0.0});
   log.on_event({EventKind::kSleep, 6, 0.6, 1, kNone, kNone, 0.0, 0.0});
   log.close();
-  std::istringstream text(testing::read_file(folder.path("events")));
+  std::istringstream text(harness::read_file(folder.path("events")));
   std::vector<events::v1::Event> events;
   for (std::string line; std::getline(text, line);)
     ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &events.emplace_back()).ok()) << line;

@@ -17,11 +17,11 @@
 namespace gravitas {
 namespace {
 
+using harness::ScratchFolder;
 using ::testing::HasSubstr;
-using testing::ScratchFolder;
 
 const kernel::Hash kRun{11, 22};
-constexpr std::size_t kHeader = 40, kRecord = 36;
+constexpr std::size_t kJournalHeader = 40, kRecord = 36;
 
 JournalEntry entry(std::uint32_t step) { return {step, {step * 1000003ULL, ~std::uint64_t{step}}}; }
 
@@ -51,7 +51,7 @@ TEST(Journal, GivesBackTheStepsBeyondTheOneThatIsKnown) {
   const std::string path = folder.path("j");
   write_steps(path, {}, 1, 20);
   const std::vector<std::byte> bytes = read_whole_file(path);
-  EXPECT_EQ(bytes.size(), kHeader + 20 * kRecord);
+  EXPECT_EQ(bytes.size(), kJournalHeader + 20 * kRecord);
   EXPECT_EQ(steps_of(read_journal(bytes, kRun, 0)), range(1, 20));
   EXPECT_EQ(steps_of(read_journal(bytes, kRun, 12)), range(13, 20));
   EXPECT_TRUE(steps_of(read_journal(bytes, kRun, 20)).empty());
@@ -77,9 +77,9 @@ TEST(Journal, ATornTailIsLeftAsideAndOverwritten) {
   const std::vector<std::byte> whole = read_whole_file(path);
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const JournalReading reading = read_journal(std::span(whole).first(size), kRun, 0);
-    const std::size_t records = size < kHeader ? 0 : (size - kHeader) / kRecord;
+    const std::size_t records = size < kJournalHeader ? 0 : (size - kJournalHeader) / kRecord;
     ASSERT_EQ(reading.commits.size(), records) << size;
-    ASSERT_EQ(reading.note.empty(), size >= kHeader && (size - kHeader) % kRecord == 0) << size;
+    ASSERT_EQ(reading.note.empty(), size >= kJournalHeader && (size - kJournalHeader) % kRecord == 0) << size;
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(whole.data()), static_cast<std::streamsize>(size));
     write_steps(path, reading, static_cast<std::uint32_t>(records) + 1, 10);
@@ -96,7 +96,7 @@ TEST(Journal, NoFlippedBitPasses) {
     const std::byte mask{static_cast<unsigned char>(1U << bit % 8)};
     bytes[bit / 8] ^= mask;
     const JournalReading reading = read_journal(bytes, kRun, 0);
-    const std::size_t sound = bit / 8 < kHeader ? 0 : (bit / 8 - kHeader) / kRecord;
+    const std::size_t sound = bit / 8 < kJournalHeader ? 0 : (bit / 8 - kJournalHeader) / kRecord;
     EXPECT_EQ(steps_of(reading), range(1, static_cast<std::uint32_t>(sound))) << bit;
     EXPECT_NE(reading.note, "") << bit;
     bytes[bit / 8] ^= mask;
@@ -108,9 +108,11 @@ TEST(Journal, RecordsCannotBeExchangedOrRepeated) {
   const std::string path = folder.path("j");
   write_steps(path, {}, 1, 4);
   std::vector<std::byte> bytes = read_whole_file(path);
-  const auto record = [&](std::size_t i) { return bytes.begin() + static_cast<std::ptrdiff_t>(kHeader + i * kRecord); };
+  const auto record = [&](std::size_t i) {
+    return bytes.begin() + static_cast<std::ptrdiff_t>(kJournalHeader + i * kRecord);
+  };
   std::vector<std::byte> cut = bytes;
-  cut.erase(cut.begin() + kHeader + kRecord, cut.begin() + kHeader + 2 * kRecord);
+  cut.erase(cut.begin() + kJournalHeader + kRecord, cut.begin() + kJournalHeader + 2 * kRecord);
   EXPECT_EQ(steps_of(read_journal(cut, kRun, 0)), range(1, 1));
   std::swap_ranges(record(1), record(2), record(2));
   EXPECT_EQ(steps_of(read_journal(bytes, kRun, 0)), range(1, 1));

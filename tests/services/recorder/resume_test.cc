@@ -20,10 +20,10 @@
 namespace gravitas {
 namespace {
 
+using harness::ScratchFolder;
 using kernel::Hosting;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::ScratchFolder;
 
 struct Case {
   const char* scene;
@@ -37,7 +37,7 @@ void PrintTo(const Case& one, std::ostream* out) { *out << one.scene; }
 RunOptions options_of(const std::string& scene, Hosting hosting, std::uint32_t steps,
                       const std::vector<std::string>& overrides = {}) {
   RunOptions options;
-  options.scenes = {scene.starts_with('/') ? scene : testing::shipped_scene(scene)};
+  options.scenes = {scene.starts_with('/') ? scene : harness::shipped_scene(scene)};
   options.hosting = {{std::nullopt, hosting}};
   options.steps = steps;
   options.overrides = overrides;
@@ -200,7 +200,7 @@ TEST_F(Killed, ATrajectoryBeginsWithTheResumedState) {
   RunOptions options = go_on();
   options.trajectory = folder_.path("motion.csv");
   ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
-  std::istringstream text(testing::read_file(options.trajectory));
+  std::istringstream text(harness::read_file(options.trajectory));
   std::string header, first;
   std::getline(text, header), std::getline(text, first);
   EXPECT_EQ(std::stod(first), 120 * (1.0 / 60.0));

@@ -18,12 +18,12 @@
 namespace gravitas {
 namespace {
 
+using harness::ScratchFolder;
 using ::testing::ElementsAre;
 using ::testing::Eq;
-using testing::ScratchFolder;
 using ::testing::StartsWith;
 
-constexpr const char* kHeader = "time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
+constexpr const char* kTrajectoryHeader = "time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz";
 
 // A body whose centre of mass lies 1 m along y of its geometry's frame, with principal axes that are turned by a quarter
 // about z; one whose id CSV would misread; one that cannot move.
@@ -61,7 +61,7 @@ std::vector<std::string> trajectory_of(const ScratchFolder& folder, double inter
   // an end that was offered before is not written again
   writer.offer(*environment, true);
   writer.close();
-  std::istringstream text(testing::read_file(folder.path("out.csv")));
+  std::istringstream text(harness::read_file(folder.path("out.csv")));
   std::vector<std::string> lines;
   for (std::string line; std::getline(text, line);) lines.push_back(line);
   return lines;
@@ -77,7 +77,7 @@ TEST(Trajectory, HasARowPerBodyThatCanMove) {
   const ScratchFolder folder;
   const std::vector<std::string> lines = trajectory_of(folder, 0.0);
   ASSERT_EQ(lines.size(), 1U + 11 * 2);
-  EXPECT_EQ(lines[0], kHeader);
+  EXPECT_EQ(lines[0], kTrajectoryHeader);
   for (std::size_t i = 1; i < lines.size(); i += 2) {
     EXPECT_NE(lines[i].find(",Offset,"), std::string::npos) << lines[i];
     EXPECT_NE(lines[i + 1].find(",\"a,\"\"b\"\"\","), std::string::npos) << lines[i + 1];
@@ -109,7 +109,7 @@ TEST(Trajectory, NumbersReadBackBitForBit) {
   for (int i = 0; i < 3; ++i) ASSERT_EQ(environment->step(), kernel::StepOutcome::kCommitted);
   writer.offer(*environment, false);
   writer.close();
-  const std::string text = testing::read_file(folder.path("out.csv"));
+  const std::string text = harness::read_file(folder.path("out.csv"));
   const std::string row = text.substr(text.find("\"a,\"\"b\"\"\",") + 10);
   std::istringstream cells(row);
   std::vector<double> read;

@@ -14,9 +14,9 @@
 namespace gravitas {
 namespace {
 
+using harness::ScratchFolder;
 using ::testing::DoubleNear;
 using ::testing::ElementsAre;
-using testing::ScratchFolder;
 
 report::v1::Report figures_of(const std::string& scene, int steps) {
   const ScratchFolder folder;

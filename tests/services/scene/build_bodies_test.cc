@@ -31,7 +31,7 @@ BodyDescription body(const std::string& properties) {
   return built.description->bodies[0];
 }
 
-std::vector<std::string> errors_of(const std::string& properties) {
+std::vector<std::string> body_errors_of(const std::string& properties) {
   return build(scene_with_body(properties)).errors();
 }
 
@@ -77,17 +77,17 @@ TEST(BuildBodies, WithoutAGeometryTheyMustBeGiven) {
   const BodyDescription point = body("Mass = 3 PrincipalMoments = {1, 2, 3}");
   EXPECT_EQ(point.shape, kNone);
   EXPECT_EQ(point.flags, kMovable | kCanSleep);
-  EXPECT_THAT(errors_of("MassDensity = 1"),
+  EXPECT_THAT(body_errors_of("MassDensity = 1"),
               ElementsAre("scene:1:71: error: Body \"Ball\" has no geometry to take its moments "
                           "from; required: Mass "
                           "and PrincipalMoments"));
-  EXPECT_THAT(errors_of("Mass = 1"), ElementsAre("scene:2:8: error: Body \"Ball\" has no geometry "
-                                                 "to take its moments from; required: Mass "
-                                                 "and PrincipalMoments"));
+  EXPECT_THAT(body_errors_of("Mass = 1"), ElementsAre("scene:2:8: error: Body \"Ball\" has no geometry "
+                                                      "to take its moments from; required: Mass "
+                                                      "and PrincipalMoments"));
 }
 
 TEST(BuildBodies, AShapeOfThePluginsOwnNeedsThem) {
-  EXPECT_THAT(errors_of("GeometryId = \"Blob\" MassDensity = 1"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Blob\" MassDensity = 1"),
               ElementsAre("scene:2:14: error: Body \"Ball\" has a geometry whose mass is not known here; required: "
                           "Mass and PrincipalMoments"));
   const BodyDescription blob = body("GeometryId = \"Blob\" Mass = 2 PrincipalMoments = {1, 1, 1}");
@@ -110,28 +110,28 @@ TEST(BuildBodies, UnspecifiedDensityIsThatOfWater) {
 }
 
 TEST(BuildBodies, RefuseContradictoryMasses) {
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 1 MassDensity = 1"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" Mass = 1 MassDensity = 1"),
               ElementsAre("scene:2:28: error: Body \"Ball\" has Mass and MassDensity; allowed: one of them"));
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 0"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" Mass = 0"),
               ElementsAre("scene:2:28: error: Body \"Ball\" is movable and has Mass 0; allowed: a number > 0, or "
                           "Immovable = true"));
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" PrincipalMoments = {1, 1, 1}"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" PrincipalMoments = {1, 1, 1}"),
               ElementsAre("scene:2:40: error: Body \"Ball\" has PrincipalMoments without Mass; "
                           "allowed: both together"));
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 1 CentreOfMass = {0, 0, 0}"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" Mass = 1 CentreOfMass = {0, 0, 0}"),
               ElementsAre("scene:2:45: error: Body \"Ball\" has CentreOfMass or PrincipalAxes without "
                           "PrincipalMoments; allowed: with Mass and PrincipalMoments"));
-  EXPECT_THAT(errors_of("Mass = 1 PrincipalMoments = {1, 1, 1} CentreOfMass = {1, 0, 0}"),
+  EXPECT_THAT(body_errors_of("Mass = 1 PrincipalMoments = {1, 1, 1} CentreOfMass = {1, 0, 0}"),
               ElementsAre("scene:2:54: error: Body \"Ball\" has no geometry, so its Position is "
                           "the centre of mass; "
                           "allowed: leave CentreOfMass out"));
 }
 
 TEST(BuildBodies, RefuseMassesThatNoSolidHas) {
-  EXPECT_THAT(errors_of("Mass = 1 PrincipalMoments = {1, 1, 3}"),
+  EXPECT_THAT(body_errors_of("Mass = 1 PrincipalMoments = {1, 1, 3}"),
               ElementsAre(testing::StartsWith("scene:2:29: error: Body \"Ball\" has a mass that no solid can have: ")));
-  EXPECT_THAT(errors_of("GeometryId = \"Brick\" MassDensity = 1e308"), testing::SizeIs(1));
-  EXPECT_THAT(errors_of("Mass = 1 PrincipalMoments = {1, 0, 1}"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Brick\" MassDensity = 1e308"), testing::SizeIs(1));
+  EXPECT_THAT(body_errors_of("Mass = 1 PrincipalMoments = {1, 0, 1}"),
               ElementsAre("scene:2:33: error: an element of PrincipalMoments is 0; allowed: a list "
                           "of 3 numbers, each "
                           "> 0"));
@@ -146,7 +146,7 @@ TEST(BuildBodies, UnboundedGeometryIsImmovable) {
   EXPECT_EQ(ground.mass, 0.0);
   EXPECT_EQ(ground.inertia, Vector3::Zero());
   EXPECT_EQ(ground.bound.kind, BoundKind::kEverywhere);
-  EXPECT_THAT(errors_of("GeometryId = \"Ground\" Immovable = false"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Ground\" Immovable = false"),
               ElementsAre("scene:2:35: error: Body \"Ball\" has an unbounded geometry and is movable; allowed: "
                           "Immovable = true, or Kinematic = true"));
 }
@@ -165,7 +165,7 @@ TEST(BuildBodies, KinematicKeepsItsVelocities) {
   EXPECT_EQ(belt.mass, 0.0);
   EXPECT_EQ(belt.twist.linear, Vector3(1, 0, 0));
   EXPECT_EQ(body("GeometryId = \"Ground\" Kinematic = true").flags, kKinematic | kUnbounded | kHasShape);
-  EXPECT_THAT(errors_of("GeometryId = \"Brick\" Kinematic = true Immovable = true"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Brick\" Kinematic = true Immovable = true"),
               ElementsAre("scene:2:51: error: Body \"Ball\" is Immovable and Kinematic; allowed: one of them"));
 }
 
@@ -270,15 +270,16 @@ TEST(BuildBodies, StartWhereTheirMotionHasThem) {
 TEST(BuildBodies, RefuseAMotionThatCannotBeFollowed) {
   const std::string row = "{0, {0, 0, 0}, {1, 0, 0, 0}}",
                     kinematic = "GeometryId = \"Unit\" Kinematic = true Motion = ";
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" Mass = 1 Motion = {" + row + "}"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" Mass = 1 Motion = {" + row + "}"),
               ElementsAre(HasSubstr("has a Motion and is not kinematic; required: Kinematic = true")));
-  EXPECT_THAT(errors_of(kinematic + "{" + row + "} KineticProperties { Position = {0, 0, 1} }"),
+  EXPECT_THAT(body_errors_of(kinematic + "{" + row + "} KineticProperties { Position = {0, 0, 1} }"),
               ElementsAre(HasSubstr("starts where its Motion is at time 0; allowed: leave out pose and velocities")));
-  EXPECT_THAT(errors_of(kinematic + "{}"), ElementsAre(HasSubstr("Motion is a list of 0; allowed: {{t, {px, py, pz}")));
-  EXPECT_THAT(errors_of(kinematic + "{{0, {0, 0, 0}}}"), ElementsAre(HasSubstr("row 0 of Motion is a list of 2")));
-  EXPECT_THAT(errors_of(kinematic + "{" + row + ", " + row + "}"),
+  EXPECT_THAT(body_errors_of(kinematic + "{}"),
+              ElementsAre(HasSubstr("Motion is a list of 0; allowed: {{t, {px, py, pz}")));
+  EXPECT_THAT(body_errors_of(kinematic + "{{0, {0, 0, 0}}}"), ElementsAre(HasSubstr("row 0 of Motion is a list of 2")));
+  EXPECT_THAT(body_errors_of(kinematic + "{" + row + ", " + row + "}"),
               ElementsAre(HasSubstr("the time of row 1 of Motion is 0; allowed")));
-  EXPECT_THAT(errors_of(kinematic + "{{0, {0, 0, 0}, {2, 0, 0, 0}}}"),
+  EXPECT_THAT(body_errors_of(kinematic + "{{0, {0, 0, 0}, {2, 0, 0, 0}}}"),
               ElementsAre(HasSubstr("the orientation of row 0 of Motion")));
 }
 
@@ -288,18 +289,18 @@ TEST(BuildBodies, RefuseAMotionThatCannotBeFollowed) {
 TEST(BuildBodies, NameForcesInTheirOrder) {
   EXPECT_THAT(body("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Down\"}").forces, ElementsAre(1, 0));
   EXPECT_THAT(body("GeometryId = \"Unit\" MassDensity = 1 Forces = {}").forces, IsEmpty());
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Air\"}"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Air\", \"Air\"}"),
               ElementsAre("scene:2:46: error: Forces names \"Air\" twice; allowed: each force once"));
 }
 
 TEST(BuildBodies, RefuseNamesOfNothing) {
-  EXPECT_THAT(errors_of("GeometryId = \"Unti\" MassDensity = 1"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unti\" MassDensity = 1"),
               ElementsAre("scene:2:14: error: GeometryId names no Geometry: \"Unti\"; did you mean "
                           "\"Unit\"? Allowed: "
                           "\"Blob\", \"Brick\", \"Ground\", \"Rod\", \"Unit\""));
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" MassDensity = 1 Material = \"Steel\""),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" MassDensity = 1 Material = \"Steel\""),
               ElementsAre("scene:2:48: error: Material names no Material: \"Steel\"; allowed: \"Ice\""));
-  EXPECT_THAT(errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Dwon\"}"),
+  EXPECT_THAT(body_errors_of("GeometryId = \"Unit\" MassDensity = 1 Forces = {\"Dwon\"}"),
               ElementsAre("scene:2:46: error: Forces names no Force: \"Dwon\"; did you mean "
                           "\"Down\"? Allowed: \"Air\", "
                           "\"Down\""));

@@ -242,32 +242,33 @@ TEST(BuildFilter, RefusesWhatItsBitsCannotHold) {
 
 // ---- mistakes
 
-std::vector<std::string> errors_of(const std::string& rule) {
+std::vector<std::string> filter_errors_of(const std::string& rule) {
   return build(scene_text(few_bodies(), "CollisionFilter { Rules {\n" + rule + "\n} }")).errors();
 }
 
 TEST(BuildFilter, RefusesRulesThatNameNothing) {
   EXPECT_THAT(
-      errors_of("Rule { Allow = false }"),
+      filter_errors_of("Rule { Allow = false }"),
       ElementsAre("scene:11:1: error: a Rule names its pairs by one of Body, Bodies, Group, Groups; here are 0"));
-  EXPECT_THAT(errors_of("Rule { Allow = false Body = \"A\" Group = \"G\" }"), ElementsAre(HasSubstr("here are 2")));
-  EXPECT_THAT(errors_of("Rule { Allow = false Bodies = {\"A\"} }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Body = \"A\" Group = \"G\" }"),
+              ElementsAre(HasSubstr("here are 2")));
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Bodies = {\"A\"} }"),
               ElementsAre("scene:11:31: error: Bodies is a list of 1; required: 2 names"));
-  EXPECT_THAT(errors_of("Rule { Allow = false Groups = {\"G\", \"H\", \"G\"} }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Groups = {\"G\", \"H\", \"G\"} }"),
               ElementsAre("scene:11:31: error: Groups is a list of 3; required: 2 names"));
-  EXPECT_THAT(errors_of("Rule { Allow = false Bodies = {\"A\", \"A\"} }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Bodies = {\"A\", \"A\"} }"),
               ElementsAre("scene:11:31: error: Bodies names \"A\" twice; required: two bodies"));
-  EXPECT_THAT(errors_of("Rule { Body = \"A\" }"), ElementsAre(HasSubstr("Rule without Allow")));
+  EXPECT_THAT(filter_errors_of("Rule { Body = \"A\" }"), ElementsAre(HasSubstr("Rule without Allow")));
 }
 
 TEST(BuildFilter, RefusesNamesThatAreNotThere) {
-  EXPECT_THAT(errors_of("Rule { Allow = false Body = \"Nine\" }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Body = \"Nine\" }"),
               ElementsAre(HasSubstr("Body names no Body: \"Nine\"; did you mean \"None\"?")));
-  EXPECT_THAT(errors_of("Rule { Allow = false Bodies = {\"A\", \"X9\"} }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Bodies = {\"A\", \"X9\"} }"),
               ElementsAre(HasSubstr("Bodies names no Body: \"X9\"")));
-  EXPECT_THAT(errors_of("Rule { Allow = false Group = \"K\" }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Group = \"K\" }"),
               ElementsAre(HasSubstr("Group names no group of any body's CollisionGroups: \"K\"; ")));
-  EXPECT_THAT(errors_of("Rule { Allow = false Groups = {\"G\", \"Hh\"} }"),
+  EXPECT_THAT(filter_errors_of("Rule { Allow = false Groups = {\"G\", \"Hh\"} }"),
               ElementsAre(HasSubstr("\"Hh\"; did you mean \"H\"? Allowed: \"G\", \"H\"")));
 }
 

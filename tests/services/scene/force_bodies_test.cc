@@ -13,7 +13,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-Catalog catalog() {
+Catalog force_catalog() {
   std::vector<InstalledPlugin> plugins = declared_plugins();
   PluginDeclaration forces;
   forces.name = "Forces";
@@ -37,7 +37,7 @@ BuiltScene built_with(const std::string& forces, const std::string& a, const std
                    "Environment { Space { Type = \"Grid\" Bodies {" +
                    body("A", a) + body("B", b) +
                    "Body { Id = \"Ground\" Immovable = true } } } KineticIntegrator = \"Euler\" }",
-               {}, catalog());
+               {}, force_catalog());
 }
 
 TEST(ForceBodies, AreRowsAndFeelTheReaction) {

@@ -29,30 +29,31 @@ const char* const kScene =
     "CustomProperties "
     "{ BindPoint = {0, 0, 0} } } } }\n";
 
-kernel::EnvironmentDescription built(const std::vector<std::string>& overrides) {
+kernel::EnvironmentDescription overridden(const std::vector<std::string>& overrides) {
   const BuiltScene result = build(kScene, overrides);
   EXPECT_THAT(result.errors(), IsEmpty());
   EXPECT_TRUE(result.description.has_value());
   return result.description.value_or(kernel::EnvironmentDescription{});
 }
 
-std::vector<std::string> errors_of(const std::string& one) { return build(kScene, {one}).errors(); }
+std::vector<std::string> override_errors_of(const std::string& one) { return build(kScene, {one}).errors(); }
 
 TEST(Overrides, ChooseThePluginsOfTheSlots) {
-  EXPECT_EQ(built({"Integrator=RK4"}).integrator.plugins[0].declaration.name, "RK4");
-  EXPECT_EQ(built({"KineticIntegrator=\"RK4\""}).integrator.plugins[0].declaration.name, "RK4");
-  EXPECT_EQ(built({"Integrator.Type=RK4"}).integrator.plugins[0].declaration.name, "RK4");
-  EXPECT_EQ(built({"Solver=LCP"}).solver.plugins[0].declaration.name, "LCP");
-  EXPECT_EQ(built({"Environment.ConstraintSolver=LCP"}).solver.plugins[0].declaration.name, "LCP");
-  EXPECT_EQ(built({"Collision=Standard"}).collision.plugins[0].declaration.name, "Standard");
+  EXPECT_EQ(overridden({"Integrator=RK4"}).integrator.plugins[0].declaration.name, "RK4");
+  EXPECT_EQ(overridden({"KineticIntegrator=\"RK4\""}).integrator.plugins[0].declaration.name, "RK4");
+  EXPECT_EQ(overridden({"Integrator.Type=RK4"}).integrator.plugins[0].declaration.name, "RK4");
+  EXPECT_EQ(overridden({"Solver=LCP"}).solver.plugins[0].declaration.name, "LCP");
+  EXPECT_EQ(overridden({"Environment.ConstraintSolver=LCP"}).solver.plugins[0].declaration.name, "LCP");
+  EXPECT_EQ(overridden({"Collision=Standard"}).collision.plugins[0].declaration.name, "Standard");
 }
 
 TEST(Overrides, SetThePropertiesOfPlugins) {
-  EXPECT_THAT(built({"Solver.Iterations=50"}).solver.plugins[0].settings, ElementsAre(50, 1));
-  EXPECT_THAT(built({"Solver.CustomProperties.Iterations=50", "Solver.Iterations = 60"}).solver.plugins[0].settings,
-              ElementsAre(60, 1));
-  EXPECT_THAT(built({"Space.CellSize=3"}).space.plugins[0].settings, ElementsAre(3));
-  EXPECT_THAT(built({"Collision.Margin=0.5"}).collision.plugins[0].settings, ElementsAre(0.5));
+  EXPECT_THAT(overridden({"Solver.Iterations=50"}).solver.plugins[0].settings, ElementsAre(50, 1));
+  EXPECT_THAT(
+      overridden({"Solver.CustomProperties.Iterations=50", "Solver.Iterations = 60"}).solver.plugins[0].settings,
+      ElementsAre(60, 1));
+  EXPECT_THAT(overridden({"Space.CellSize=3"}).space.plugins[0].settings, ElementsAre(3));
+  EXPECT_THAT(overridden({"Collision.Margin=0.5"}).collision.plugins[0].settings, ElementsAre(0.5));
 }
 
 TEST(Overrides, DropThePropertiesOfAnotherType) {
@@ -62,22 +63,22 @@ TEST(Overrides, DropThePropertiesOfAnotherType) {
   EXPECT_THAT(result.description->space.plugins[0].settings, ElementsAre(8));
   EXPECT_THAT(result.warnings(), ElementsAre("--set Space=KDTree: warning: the CustomProperties written for \"Grid\" "
                                              "are dropped"));
-  EXPECT_THAT(built({"Space=Grid"}).space.plugins[0].settings, ElementsAre(2));
+  EXPECT_THAT(overridden({"Space=Grid"}).space.plugins[0].settings, ElementsAre(2));
 }
 
 TEST(Overrides, SetTimes) {
-  const kernel::EnvironmentDescription description = built({"Simulator.TimeStep=0.5", "Simulator.Duration=2"});
+  const kernel::EnvironmentDescription description = overridden({"Simulator.TimeStep=0.5", "Simulator.Duration=2"});
   EXPECT_EQ(description.time_step, 0.5);
   EXPECT_EQ(description.steps, 4U);
-  EXPECT_EQ(built({"Simulator.CustomProperties.TimeStep=0.25"}).time_step, 0.25);
+  EXPECT_EQ(overridden({"Simulator.CustomProperties.TimeStep=0.25"}).time_step, 0.25);
 }
 
 TEST(Overrides, SetPropertiesOfBlocksWithIds) {
-  const kernel::EnvironmentDescription description =
-      built({"Body.Ball01.LinearVelocity={1,0,0}", "Body.Ball01.KineticProperties.Position={0, 2, 0}",
-             "Body.Ball.02.MassDensity=500", "Geometry.Unit.Radius=2", "Material.Ice.StaticFrictionCoefficient=0.25",
-             "Body.Ball01.Material=Ice", "Force.Down.Acceleration={0,-1,0}", "Body.Ball01.Forces={Down}",
-             "Constraint.Joint.BindPoint={0,1,0}", "Constraint.Joint.Body2=Ball.02"});
+  const kernel::EnvironmentDescription description = overridden(
+      {"Body.Ball01.LinearVelocity={1,0,0}", "Body.Ball01.KineticProperties.Position={0, 2, 0}",
+       "Body.Ball.02.MassDensity=500", "Geometry.Unit.Radius=2", "Material.Ice.StaticFrictionCoefficient=0.25",
+       "Body.Ball01.Material=Ice", "Force.Down.Acceleration={0,-1,0}", "Body.Ball01.Forces={Down}",
+       "Constraint.Joint.BindPoint={0,1,0}", "Constraint.Joint.Body2=Ball.02"});
   EXPECT_EQ(description.bodies[0].twist.linear, Vector3(1, 0, 0));
   EXPECT_EQ(description.bodies[0].pose.position, Vector3(0, 2, 0));
   EXPECT_EQ(description.bodies[0].mass, 2.0 * description.bodies[1].mass);
@@ -91,7 +92,7 @@ TEST(Overrides, SetPropertiesOfBlocksWithIds) {
 
 TEST(Overrides, SetHostingAndDeadlines) {
   const kernel::EnvironmentDescription description =
-      built({"Plugin.solver.Deadline=5", "Plugin.solver.Hosting=direct"});
+      overridden({"Plugin.solver.Deadline=5", "Plugin.solver.Hosting=direct"});
   EXPECT_EQ(description.solver.deadline, 5.0);
   EXPECT_EQ(description.solver.hosting, kernel::Hosting::kDirect);
 }
@@ -104,38 +105,39 @@ TEST(Overrides, CreateTheBlockThatIsNotWritten) {
 }
 
 TEST(Overrides, TakeTextsWithAndWithoutQuotes) {
-  EXPECT_EQ(built({"Environment.Id=a b"}).id, "a b");
-  EXPECT_EQ(built({"Environment.Id=\"a \\\" b\""}).id, "a \" b");
-  EXPECT_EQ(built({"Environment.Id=2nd"}).id, "2nd");
-  EXPECT_EQ(built({"Environment.Id=true"}).id, "true");
+  EXPECT_EQ(overridden({"Environment.Id=a b"}).id, "a b");
+  EXPECT_EQ(overridden({"Environment.Id=\"a \\\" b\""}).id, "a \" b");
+  EXPECT_EQ(overridden({"Environment.Id=2nd"}).id, "2nd");
+  EXPECT_EQ(overridden({"Environment.Id=true"}).id, "true");
 }
 
 TEST(Overrides, NameTheirMistakes) {
-  EXPECT_THAT(errors_of("Solver"), ElementsAre("--set Solver: there is no \"=\"; allowed: PATH=VALUE"));
-  EXPECT_THAT(errors_of("=1"), ElementsAre("--set =1: the path is empty; allowed: PATH=VALUE"));
-  EXPECT_THAT(errors_of("Solver="),
+  EXPECT_THAT(override_errors_of("Solver"), ElementsAre("--set Solver: there is no \"=\"; allowed: PATH=VALUE"));
+  EXPECT_THAT(override_errors_of("=1"), ElementsAre("--set =1: the path is empty; allowed: PATH=VALUE"));
+  EXPECT_THAT(override_errors_of("Solver="),
               ElementsAre("--set Solver=: the value is empty; allowed: a value, \"\" for no text"));
-  EXPECT_THAT(errors_of("Solver.=1"), ElementsAre("--set Solver.=1: the path ends with a dot; allowed: PATH=VALUE"));
-  EXPECT_THAT(errors_of("Slover=LCP"),
+  EXPECT_THAT(override_errors_of("Solver.=1"),
+              ElementsAre("--set Solver.=1: the path ends with a dot; allowed: PATH=VALUE"));
+  EXPECT_THAT(override_errors_of("Slover=LCP"),
               ElementsAre(testing::StartsWith("--set Slover=LCP: the path begins with \"Slover\"; did you mean "
                                               "\"Solver\"? Allowed: \"Integrator\", \"Solver\", ")));
-  EXPECT_THAT(errors_of("Body.Ball03.Mass=1"),
+  EXPECT_THAT(override_errors_of("Body.Ball03.Mass=1"),
               ElementsAre("--set Body.Ball03.Mass=1: no Body \"Ball03\"; did you mean \"Ball01\"? "
                           "Allowed: \"Ball01\", "
                           "\"Ball.02\""));
-  EXPECT_THAT(errors_of("Body.Ball01=1"),
+  EXPECT_THAT(override_errors_of("Body.Ball01=1"),
               ElementsAre(testing::StartsWith("--set Body.Ball01=1: a property must follow \"Ball01\"; allowed: ")));
-  EXPECT_THAT(errors_of("Body.Ball01.LinearVelcity={0,0,0}"),
+  EXPECT_THAT(override_errors_of("Body.Ball01.LinearVelcity={0,0,0}"),
               ElementsAre(testing::StartsWith("--set Body.Ball01.LinearVelcity={0,0,0}: no property \"LinearVelcity\"; "
                                               "did you mean \"LinearVelocity\"? Allowed: ")));
-  EXPECT_THAT(errors_of("Simulator.TimeStep=-1"),
+  EXPECT_THAT(override_errors_of("Simulator.TimeStep=-1"),
               ElementsAre("--set Simulator.TimeStep=-1: TimeStep is -1; allowed: a number > 0"));
-  EXPECT_THAT(errors_of("Simulator.TimeStep=fast"),
+  EXPECT_THAT(override_errors_of("Simulator.TimeStep=fast"),
               ElementsAre("--set Simulator.TimeStep=fast: TimeStep is \"fast\"; allowed: a number > 0"));
-  EXPECT_THAT(errors_of("Simulator=Basik"),
+  EXPECT_THAT(override_errors_of("Simulator=Basik"),
               ElementsAre(testing::StartsWith("--set Simulator=Basik: Type is \"Basik\"; did you mean \"Basic\"?")));
-  EXPECT_THAT(errors_of("Space.Bodies=1"), ElementsAre(testing::HasSubstr("\"Bodies\" is no property")));
-  EXPECT_THAT(errors_of("Plugin.solvr.Deadline=1"),
+  EXPECT_THAT(override_errors_of("Space.Bodies=1"), ElementsAre(testing::HasSubstr("\"Bodies\" is no property")));
+  EXPECT_THAT(override_errors_of("Plugin.solvr.Deadline=1"),
               ElementsAre(testing::HasSubstr("no slot \"solvr\"; did you mean \"solver\"?")));
   EXPECT_THAT(build("", {"Solver=LCP"}).errors(),
               ElementsAre("--set Solver=LCP: the scene has no Environment; add one"));
@@ -151,17 +153,17 @@ TEST(Overrides, ErrorsKnowTheirColumn) {
 }
 
 TEST(Overrides, MistakesThatOnlyBuildingFindsNameThemToo) {
-  EXPECT_THAT(errors_of("Solver=LPC"),
+  EXPECT_THAT(override_errors_of("Solver=LPC"),
               ElementsAre("--set Solver=LPC: no solver plugin \"LPC\" is installed; did you mean \"LCP\"? Allowed: "
                           "\"LCP\", \"Sequential\""));
-  EXPECT_THAT(errors_of("Solver.Iteration=5"),
+  EXPECT_THAT(override_errors_of("Solver.Iteration=5"),
               ElementsAre("--set Solver.Iteration=5: solver plugin \"Sequential\": unknown property "
                           "\"Iteration\"; did "
                           "you mean \"Iterations\"? Allowed: \"Iterations\", \"CorrectionFactor\""));
-  EXPECT_THAT(errors_of("Body.Ball01.GeometryId=Unti"),
+  EXPECT_THAT(override_errors_of("Body.Ball01.GeometryId=Unti"),
               ElementsAre("--set Body.Ball01.GeometryId=Unti: GeometryId names no Geometry: \"Unti\"; did you mean "
                           "\"Unit\"? Allowed: \"Unit\""));
-  EXPECT_THAT(errors_of("Simulator.TimeStep=1e-300"),
+  EXPECT_THAT(override_errors_of("Simulator.TimeStep=1e-300"),
               ElementsAre(::testing::StartsWith("--set Simulator.TimeStep=1e-300: Duration/TimeStep is 9.99")));
 }
 

@@ -18,11 +18,11 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-std::vector<std::string> errors_of(const std::string& text) { return texts(read(text).problems.errors); }
+std::vector<std::string> read_errors_of(const std::string& text) { return texts(read(text).problems.errors); }
 std::vector<std::string> warnings_of(const std::string& text) { return texts(read(text).problems.warnings); }
 
 // A body at line 1; its properties begin at column 41.
-std::string body(const std::string& properties) {
+std::string read_body(const std::string& properties) {
   return "Environment { Space { Bodies { Body {   " + properties + " } } } }";
 }
 const v1::Body& first_body(ReadScene& read) { return read.scene().environment(0).space().bodies().body(0); }
@@ -41,7 +41,7 @@ TEST(Reader, TakesAnEmptyScene) {
 }
 
 TEST(Reader, FillsTheDefaultsOfABody) {
-  ReadScene scene = read(body("Id = \"A\""));
+  ReadScene scene = read(read_body("Id = \"A\""));
   ASSERT_TRUE(scene.is_good);
   const v1::Body& a = first_body(scene);
   EXPECT_THAT(a.kinetic_properties().position(), ElementsAre(0, 0, 0));
@@ -100,8 +100,8 @@ TEST(Reader, JoinsListsOfElements) {
 }
 
 TEST(Reader, AcceptsWhatChangesNoResult) {
-  ReadScene scene = read(body("Id = \"A\" VisualFile = \"a.obj\" VisualTransform = {{0, 0, 0}, {1, 0, 0, 0}} "
-                              "CollisionGroups = {\"G\"}") +
+  ReadScene scene = read(read_body("Id = \"A\" VisualFile = \"a.obj\" VisualTransform = {{0, 0, 0}, {1, 0, 0, 0}} "
+                                   "CollisionGroups = {\"G\"}") +
                          "Plugins { Plugin { Slot = \"solver\" Standby = 2 } }");
   EXPECT_THAT(texts(scene.problems.errors), IsEmpty());
 }
@@ -110,14 +110,14 @@ TEST(Reader, AcceptsWhatChangesNoResult) {
 // ---------------------------------------------------------------------------------------------
 
 TEST(Reader, SuggestsNamesForUnknownOnes) {
-  EXPECT_THAT(errors_of("Material { }"),
+  EXPECT_THAT(read_errors_of("Material { }"),
               ElementsAre("scene:1:1: error: unknown block \"Material\"; it belongs into Materials { … }"));
-  EXPECT_THAT(errors_of("Environmnt { Nonsense { a = { 1 } } }"),
+  EXPECT_THAT(read_errors_of("Environmnt { Nonsense { a = { 1 } } }"),
               ElementsAre("scene:1:1: error: unknown block \"Environmnt\"; did you mean \"Environment\"? Allowed: "
                           "\"Geometries\", \"Materials\", \"Forces\", \"Simulator\", \"Environment\", "
                           "\"Plugins\""));
   EXPECT_THAT(
-      errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
+      read_errors_of("Simulator { CustomProperties { TimeStp = 1 } }"),
       ElementsAre(
           "scene:1:32: error: unknown property \"TimeStp\" in CustomProperties; did you mean "
           "\"TimeStep\"? Allowed: \"TimeStep\", \"Duration\", \"Substeps\", \"Accuracy\", \"CheckPhysicsEvery\", "
@@ -125,113 +125,116 @@ TEST(Reader, SuggestsNamesForUnknownOnes) {
 }
 
 TEST(Reader, SaysWhereANameBelongs) {
-  EXPECT_THAT(errors_of(body("Id = \"A\" Position = {0, 0, 0}")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" Position = {0, 0, 0}")),
               ElementsAre("scene:1:50: error: unknown property \"Position\" in Body; it belongs into "
                           "KineticProperties { … }"));
-  EXPECT_THAT(errors_of("Geometries { Geometry { Type = \"Sphere\" Id = \"A\" Radius = 1 } }"),
+  EXPECT_THAT(read_errors_of("Geometries { Geometry { Type = \"Sphere\" Id = \"A\" Radius = 1 } }"),
               ElementsAre("scene:1:50: error: unknown property \"Radius\" in Geometry; allowed: \"Type\", \"Id\", "
                           "\"CustomProperties\"; properties of its type go into CustomProperties { … }"));
 }
 
 TEST(Reader, IsCaseSensitive) {
-  EXPECT_THAT(errors_of(body("Id = \"A\" massdensity = 1")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" massdensity = 1")),
               ElementsAre(testing::StartsWith("scene:1:50: error: unknown property \"massdensity\" in Body; did you "
                                               "mean \"MassDensity\"? Allowed: ")));
 }
 
 TEST(Reader, RefusesWrongKindsOfValues) {
-  EXPECT_THAT(errors_of(body("Id = 1")), ElementsAre("scene:1:46: error: Id is 1; allowed: a text in double quotes"));
-  EXPECT_THAT(errors_of(body("Id = \"A\" MassDensity = \"heavy\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = 1")),
+              ElementsAre("scene:1:46: error: Id is 1; allowed: a text in double quotes"));
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" MassDensity = \"heavy\"")),
               ElementsAre("scene:1:64: error: MassDensity is \"heavy\"; allowed: a number >= 0"));
-  EXPECT_THAT(errors_of(body("Id = \"A\" Immovable = 1")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" Immovable = 1")),
               ElementsAre("scene:1:62: error: Immovable is 1; allowed: true or false"));
-  EXPECT_THAT(errors_of(body("Id = \"A\" Forces = \"G\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" Forces = \"G\"")),
               ElementsAre("scene:1:59: error: Forces is \"G\"; allowed: a list of texts, { \"…\" }"));
-  EXPECT_THAT(errors_of(body("Id = \"A\" Forces = {\"G\", 2}")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" Forces = {\"G\", 2}")),
               ElementsAre("scene:1:65: error: an element of Forces is 2; allowed: texts in double quotes"));
-  EXPECT_THAT(errors_of("Environment { ConstraintSolver = 1 }"),
+  EXPECT_THAT(read_errors_of("Environment { ConstraintSolver = 1 }"),
               ElementsAre("scene:1:34: error: ConstraintSolver is 1; allowed: a text in double "
                           "quotes, or a block { … }"));
 }
 
 TEST(Reader, RefusesPropertiesAsBlocksAndBlocksAsProperties) {
-  EXPECT_THAT(errors_of(body("Id = \"A\" MassDensity { }")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" MassDensity { }")),
               ElementsAre("scene:1:50: error: MassDensity is a property, no block; allowed: MassDensity = value"));
-  EXPECT_THAT(errors_of(body("Id = \"A\" KineticProperties = { }")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" KineticProperties = { }")),
               ElementsAre("scene:1:50: error: KineticProperties is a block, no property; allowed: "
                           "KineticProperties "
                           "{ … }"));
 }
 
 TEST(Reader, RefusesValuesOutOfRange) {
-  const auto kinetic = [](const std::string& text) { return body("Id = \"A\" KineticProperties { " + text + " }"); };
-  EXPECT_THAT(errors_of(kinetic("Position = {0, 2e15, 0}")),
+  const auto kinetic = [](const std::string& text) {
+    return read_body("Id = \"A\" KineticProperties { " + text + " }");
+  };
+  EXPECT_THAT(read_errors_of(kinetic("Position = {0, 2e15, 0}")),
               ElementsAre("scene:1:85: error: an element of Position is 2e+15; allowed: a list of "
                           "3 numbers, each in "
                           "[-1e+15, 1e+15]"));
-  EXPECT_THAT(errors_of(kinetic("Position = {0, 1e15, 0}")), IsEmpty());
-  EXPECT_THAT(errors_of(kinetic("Position = {0, 1}")),
+  EXPECT_THAT(read_errors_of(kinetic("Position = {0, 1e15, 0}")), IsEmpty());
+  EXPECT_THAT(read_errors_of(kinetic("Position = {0, 1}")),
               ElementsAre("scene:1:81: error: Position is a list of 2; allowed: a list of 3 "
                           "numbers, each in [-1e+15, "
                           "1e+15]"));
-  EXPECT_THAT(errors_of(kinetic("DampingCoefficient = -1")),
+  EXPECT_THAT(read_errors_of(kinetic("DampingCoefficient = -1")),
               ElementsAre("scene:1:91: error: DampingCoefficient is -1; allowed: a number >= 0"));
-  EXPECT_THAT(errors_of("Simulator { CustomProperties { TimeStep = 0 Duration = -1 Substeps = 1.5 } }"),
+  EXPECT_THAT(read_errors_of("Simulator { CustomProperties { TimeStep = 0 Duration = -1 Substeps = 1.5 } }"),
               ElementsAre("scene:1:43: error: TimeStep is 0; allowed: a number > 0",
                           "scene:1:56: error: Duration is -1; allowed: a number >= 0",
                           "scene:1:70: error: Substeps is 1.5; allowed: a whole number in [1, 4294967295]"));
-  EXPECT_THAT(errors_of("Materials { Material { Id = \"M\" RestitutionCoefficient = 1.1 } }"),
+  EXPECT_THAT(read_errors_of("Materials { Material { Id = \"M\" RestitutionCoefficient = 1.1 } }"),
               ElementsAre("scene:1:58: error: RestitutionCoefficient is 1.1; allowed: a number in [0, 1]"));
 }
 
 TEST(Reader, RefusesUnknownChoices) {
-  EXPECT_THAT(errors_of(body("Id = \"A\" BoundingVolumeType = \"Spere\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" BoundingVolumeType = \"Spere\"")),
               ElementsAre("scene:1:71: error: BoundingVolumeType is \"Spere\"; did you mean \"Sphere\"? Allowed: "
                           "\"None\", \"Sphere\", \"AxisAlignedBox\", \"OrientedBox\""));
-  EXPECT_THAT(errors_of(body("Id = \"A\" Type = \"Soft\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\" Type = \"Soft\"")),
               ElementsAre("scene:1:57: error: Type is \"Soft\"; allowed: \"Rigid\""));
 }
 
 TEST(Reader, NormalisesOrientationsWithinATolerance) {
   const auto turned = [](const char* q) {
-    return body("Id = \"A\" KineticProperties { Orientation = " + std::string(q) + " }");
+    return read_body("Id = \"A\" KineticProperties { Orientation = " + std::string(q) + " }");
   };
   EXPECT_THAT(warnings_of(turned("{0.7071, 0.7071, 0, 0}")),
               ElementsAre("scene:1:84: warning: Orientation has the norm 0.9999904099540154 and was normalised"));
-  EXPECT_THAT(errors_of(turned("{1, 1, 0, 0}")),
+  EXPECT_THAT(read_errors_of(turned("{1, 1, 0, 0}")),
               ElementsAre("scene:1:84: error: Orientation has the norm 1.4142135623730951; "
                           "allowed: a list of 4 numbers "
                           "(w, x, y, z) with norm 1 (within 1e-3)"));
 }
 
 TEST(Reader, RefusesNamesGivenTwice) {
-  EXPECT_THAT(errors_of(body("Id = \"A\"\nId = \"B\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"A\"\nId = \"B\"")),
               ElementsAre("scene:2:1: error: Id is given twice, first at scene:1:46; allowed: once"));
-  EXPECT_THAT(errors_of("Simulator { }\nSimulator { }"),
+  EXPECT_THAT(read_errors_of("Simulator { }\nSimulator { }"),
               ElementsAre("scene:2:1: error: Simulator is given twice, first at scene:1:1; allowed: once"));
-  EXPECT_THAT(errors_of("Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = 1\nA = 2 } } }"),
+  EXPECT_THAT(read_errors_of("Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = 1\nA = 2 } } }"),
               ElementsAre("scene:2:1: error: A is given twice, first at scene:1:57; allowed: once"));
-  EXPECT_THAT(errors_of("Environment { ConstraintSolver = \"A\"\nConstraintSolver { Type = \"B\" } }"),
+  EXPECT_THAT(read_errors_of("Environment { ConstraintSolver = \"A\"\nConstraintSolver { Type = \"B\" } }"),
               ElementsAre("scene:2:1: error: ConstraintSolver is given twice, first at scene:1:15; allowed: once"));
 }
 
 TEST(Reader, RefusesMissingNames) {
-  EXPECT_THAT(errors_of("Geometries {\n Geometry { } }"),
+  EXPECT_THAT(read_errors_of("Geometries {\n Geometry { } }"),
               ElementsAre("scene:2:2: error: Geometry without Id; required: a text",
                           "scene:2:2: error: Geometry without Type; required: a text"));
-  EXPECT_THAT(errors_of(body("Id = \"\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"\"")),
               ElementsAre("scene:1:46: error: Id is empty; required: a text of at least one character"));
-  EXPECT_THAT(errors_of("Environment { KineticIntegrator { } }"),
+  EXPECT_THAT(read_errors_of("Environment { KineticIntegrator { } }"),
               ElementsAre("scene:1:15: error: KineticIntegrator without Type; required: a text"));
 }
 
 TEST(Reader, RefusesWhatThisVersionDoesNotSupport) {
-  EXPECT_THAT(errors_of("Plugins { Plugin { Slot = \"solver\"\nProcess = \"x\" } }"),
+  EXPECT_THAT(read_errors_of("Plugins { Plugin { Slot = \"solver\"\nProcess = \"x\" } }"),
               ElementsAre("scene:2:1: error: Process is not supported by this version; allowed: leave it out"));
 }
 
 TEST(Reader, TrimsBlanksAroundIds) {
-  ReadScene scene = read(body("Id = \" Ball01\" GeometryId = \" Unit Sphere \" Forces = {\"G \"}"));
+  ReadScene scene = read(read_body("Id = \" Ball01\" GeometryId = \" Unit Sphere \" Forces = {\"G \"}"));
   ASSERT_TRUE(scene.is_good);
   EXPECT_EQ(first_body(scene).id(), "Ball01");
   EXPECT_EQ(first_body(scene).geometry_id(), "Unit Sphere");
@@ -242,9 +245,9 @@ TEST(Reader, TrimsBlanksAroundIds) {
                           "are "
                           "dropped",
                           "scene:1:95: warning: Forces is \"G \"; the blanks around \"G\" are dropped"));
-  EXPECT_THAT(errors_of(body("Id = \"  \"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"  \"")),
               ElementsAre("scene:1:46: error: Id is empty; required: a text of at least one character"));
-  EXPECT_THAT(errors_of(body("Id = \"a\\nb\"")),
+  EXPECT_THAT(read_errors_of(read_body("Id = \"a\\nb\"")),
               ElementsAre("scene:1:46: error: Id holds a tab, a line end or the like; allowed: "
                           "visible characters and "
                           "blanks inside"));
@@ -254,49 +257,49 @@ TEST(Reader, TrimsBlanksAroundIds) {
 // ------------------------------------------------------------------------------------------------------
 
 TEST(Reader, RefusesBadLists) {
-  const auto forces = [](const char* list) { return body("Id = \"A\" Forces = " + std::string(list)); };
-  EXPECT_THAT(errors_of(forces("{\"a\" \"b\"}")),
+  const auto forces = [](const char* list) { return read_body("Id = \"A\" Forces = " + std::string(list)); };
+  EXPECT_THAT(read_errors_of(forces("{\"a\" \"b\"}")),
               ElementsAre("scene:1:64: error: a list goes on with the text \"b\"; allowed: a comma and the next "
                           "element, or \"}\""));
-  EXPECT_THAT(errors_of(forces("{\"a\",}")),
+  EXPECT_THAT(read_errors_of(forces("{\"a\",}")),
               ElementsAre("scene:1:64: error: an element is missing after the comma; allowed: a value"));
-  EXPECT_THAT(errors_of(forces("{,}")), ElementsAre("scene:1:60: error: a value was expected, not "
-                                                    "a comma; allowed: a number, a text in double "
-                                                    "quotes, true, false, a list { v, v }"));
-  EXPECT_THAT(errors_of(forces("nan")),
+  EXPECT_THAT(read_errors_of(forces("{,}")), ElementsAre("scene:1:60: error: a value was expected, not "
+                                                         "a comma; allowed: a number, a text in double "
+                                                         "quotes, true, false, a list { v, v }"));
+  EXPECT_THAT(read_errors_of(forces("nan")),
               ElementsAre("scene:1:59: error: a value was expected, not the word \"nan\"; allowed: "
                           "a number, a text in "
                           "double quotes, true, false, a list { v, v }"));
 }
 
 TEST(Reader, RefusesUnbalancedBraces) {
-  EXPECT_THAT(errors_of("Environment {\n Space {\n"),
+  EXPECT_THAT(read_errors_of("Environment {\n Space {\n"),
               ElementsAre("scene:3:1: error: the file ends inside the block Space opened in line "
                           "2; a \"}\" is missing"));
-  EXPECT_THAT(errors_of("Environment { } }"),
+  EXPECT_THAT(read_errors_of("Environment { } }"),
               ElementsAre("scene:1:17: error: a \"}\" that closes nothing; allowed: Name { … }"));
-  EXPECT_THAT(errors_of("Forces { Force { CustomProperties {"),
+  EXPECT_THAT(read_errors_of("Forces { Force { CustomProperties {"),
               ElementsAre("scene:1:36: error: the file ends inside the block CustomProperties opened in line 1; a "
                           "\"}\" is missing"));
-  EXPECT_THAT(errors_of("Bogus {\n"),
+  EXPECT_THAT(read_errors_of("Bogus {\n"),
               ElementsAre(testing::HasSubstr("unknown block \"Bogus\""),
                           "scene:2:1: error: the file ends inside the block opened in line 1; a \"}\" is missing"));
 }
 
 TEST(Reader, RefusesOtherSyntax) {
-  EXPECT_THAT(errors_of("Environment ="),
+  EXPECT_THAT(read_errors_of("Environment ="),
               ElementsAre("scene:1:1: error: Environment is a block, no property; allowed: Environment { … }",
                           "scene:1:14: error: a value was expected, not the end of the file; allowed: a number, a "
                           "text "
                           "in double quotes, true, false, a list { v, v }"));
-  EXPECT_THAT(errors_of("Environment Id"),
+  EXPECT_THAT(read_errors_of("Environment Id"),
               ElementsAre("scene:1:13: error: \"Environment\" is followed by the word \"Id\"; "
                           "allowed: \"=\" or \"{\""));
-  EXPECT_THAT(errors_of("Environment { 1 }"),
+  EXPECT_THAT(read_errors_of("Environment { 1 }"),
               ElementsAre("scene:1:15: error: a name was expected, not the number 1; allowed: Name "
                           "= value, Name { … }, "
                           "or \"}\""));
-  EXPECT_THAT(errors_of("Forces { Force { CustomProperties { A { } } } }"),
+  EXPECT_THAT(read_errors_of("Forces { Force { CustomProperties { A { } } } }"),
               ElementsAre("scene:1:39: error: \"A\" is followed by \"{\"; allowed inside "
                           "CustomProperties: \"=\" and a "
                           "value"));
@@ -305,22 +308,23 @@ TEST(Reader, RefusesOtherSyntax) {
 TEST(Reader, RefusesDeepNesting) {
   std::string blocks, lists = "Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = ";
   for (int i = 0; i < 100000; ++i) blocks += "B { ", lists += '{';
-  EXPECT_THAT(errors_of(blocks), ElementsAre(testing::HasSubstr("unknown block \"B\""),
-                                             "scene:1:259: error: braces are nested too deep; allowed: 64 levels"));
-  EXPECT_THAT(errors_of(lists), ElementsAre("scene:1:122: error: braces are nested too deep; allowed: 64 levels"));
+  EXPECT_THAT(read_errors_of(blocks),
+              ElementsAre(testing::HasSubstr("unknown block \"B\""),
+                          "scene:1:259: error: braces are nested too deep; allowed: 64 levels"));
+  EXPECT_THAT(read_errors_of(lists), ElementsAre("scene:1:122: error: braces are nested too deep; allowed: 64 levels"));
 }
 
 TEST(Reader, TakesNestingUpToTheLimit) {
   // three blocks around 61 lists
   const std::string text = "Forces { Force { Type = \"F\" Id = \"f\" CustomProperties { A = " + std::string(61, '{') +
                            std::string(61, '}') + " } } }";
-  EXPECT_THAT(errors_of(text), IsEmpty());
+  EXPECT_THAT(read_errors_of(text), IsEmpty());
 }
 
 TEST(Reader, ReportsSeveralErrorsUpToALimit) {
   std::string text;
   for (int i = 0; i < 100; ++i) text += "Bogus { }\n";
-  EXPECT_EQ(errors_of(text).size(), 20U);
+  EXPECT_EQ(read_errors_of(text).size(), 20U);
   text.clear();
   for (int i = 0; i < 50; ++i) text += "Body { Id = \" b" + std::to_string(i) + "\" }\n";
   const std::vector<std::string> warnings = warnings_of("Environment { Space { Bodies {\n" + text + "} } }");

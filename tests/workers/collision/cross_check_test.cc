@@ -20,7 +20,7 @@ namespace gravitas::test {
 namespace {
 
 using Kind = SceneShape::Kind;
-constexpr stage::Method kManifolds = stage::Method::kCollisionManifolds;
+constexpr stage::Method kAskManifolds = stage::Method::kCollisionManifolds;
 constexpr double kMargin = 0.5;
 
 struct Placed {
@@ -29,7 +29,7 @@ struct Placed {
 };
 
 MessageColumns request_of(const std::vector<Placed>& bodies) {
-  MessageColumns request = PluginUnderTest::request_of(kManifolds);
+  MessageColumns request = PluginUnderTest::request_of(kAskManifolds);
   request.f64("margin") = {kMargin};
   request.u32("shape_parameter_begin") = {0};
   for (std::uint32_t i = 0; i < bodies.size(); ++i) {
@@ -59,7 +59,7 @@ MessageColumns request_of(const std::vector<Placed>& bodies) {
 
 // The deepest contact of every pair, -infinity where there is none.
 std::vector<double> depths_of(PluginUnderTest* plugin, const MessageColumns& request, std::size_t pairs) {
-  MessageColumns reply = plugin->ask(kManifolds, request);
+  MessageColumns reply = plugin->ask(kAskManifolds, request);
   std::vector<double> depths(pairs, -std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < reply.f64("depth").size(); ++i) {
     double& deepest = depths[reply.u32("contact_pair")[i]];
@@ -109,7 +109,7 @@ TEST(CollisionCrossCheck, StandardAndGjkOnlyAgree) {
             touching += deeper > 0.0 ? 1 : 0;
           }
           if (is_near) break;
-          const MessageColumns reply = standard.ask(kManifolds, request);
+          const MessageColumns reply = standard.ask(kAskManifolds, request);
           std::vector<bool> moved(pairs, false);
           for (std::size_t k = 0; k < reply.f64("depth").size(); ++k) {
             const std::size_t i = reply.u32("contact_pair")[k];

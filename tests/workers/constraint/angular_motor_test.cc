@@ -12,7 +12,7 @@ namespace gravitas::test {
 namespace {
 
 // Rounding of transforms of points within ten metres.
-constexpr double kRounding = 1e-14;
+constexpr double kMotorRounding = 1e-14;
 const double kAbsent = std::nan("");
 
 class AngularMotor : public testing::Test {
@@ -59,9 +59,9 @@ TEST_F(AngularMotor, IsTwoAnchorsAndFourDrivingPoints) {
 TEST_F(AngularMotor, HasNoErrorWhereItWasBound) {
   joint_.bind(properties(3.0));
   const std::vector<Discrepancy> all = joint_.describe();
-  EXPECT_LT((all[0].point1 - point1_).norm(), kRounding);
-  EXPECT_LT((all[1].point1 - point2_).norm(), kRounding);
-  for (const Discrepancy& d : all) EXPECT_LT((d.point2 - d.point1).norm(), kRounding);
+  EXPECT_LT((all[0].point1 - point1_).norm(), kMotorRounding);
+  EXPECT_LT((all[1].point1 - point2_).norm(), kMotorRounding);
+  for (const Discrepancy& d : all) EXPECT_LT((d.point2 - d.point1).norm(), kMotorRounding);
 }
 
 TEST_F(AngularMotor, ItsErrorIsHowFarABodyWasMoved) {
@@ -70,8 +70,8 @@ TEST_F(AngularMotor, ItsErrorIsHowFarABodyWasMoved) {
   joint_.bodies[1].pose.position += shift;
   const std::vector<Discrepancy> all = joint_.describe();
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_LT((all[i].point2 - all[i].point1 - shift).norm(), kRounding);
-    EXPECT_NEAR(joint_error(all[i], shift), shift.norm(), kRounding);
+    EXPECT_LT((all[i].point2 - all[i].point1 - shift).norm(), kMotorRounding);
+    EXPECT_NEAR(joint_error(all[i], shift), shift.norm(), kMotorRounding);
   }
   // a drive holds velocities only
   for (std::size_t i = 2; i < 6; ++i) EXPECT_EQ(joint_error(all[i], all[i].point2 - all[i].point1), 0.0);
@@ -82,7 +82,7 @@ TEST_F(AngularMotor, TurningAboutTheAxisIsNoError) {
   const Quaternion turn = exp_rotation(2.0 * axis());
   Pose& pose = joint_.bodies[1].pose;
   pose = {middle() + turn * (pose.position - middle()), turn * pose.orientation};
-  for (const Discrepancy& d : joint_.describe()) EXPECT_LT((d.point2 - d.point1).norm(), kRounding);
+  for (const Discrepancy& d : joint_.describe()) EXPECT_LT((d.point2 - d.point1).norm(), kMotorRounding);
 }
 
 TEST_F(AngularMotor, DrivesAlongTangentsOnly) {
@@ -93,17 +93,17 @@ TEST_F(AngularMotor, DrivesAlongTangentsOnly) {
     const Vector3 tangent = d.axes.toRotationMatrix().col(0);
     const Vector3 out = d.point1 - middle();
     sum += out;
-    EXPECT_NEAR(out.norm(), lever(), kRounding);
-    EXPECT_NEAR(out.dot(axis()), 0.0, kRounding);
-    EXPECT_NEAR(tangent.dot(axis()), 0.0, kRounding);
-    EXPECT_NEAR(tangent.dot(out), 0.0, kRounding);
-    EXPECT_NEAR(tangent.norm(), 1.0, kRounding);
+    EXPECT_NEAR(out.norm(), lever(), kMotorRounding);
+    EXPECT_NEAR(out.dot(axis()), 0.0, kMotorRounding);
+    EXPECT_NEAR(tangent.dot(axis()), 0.0, kMotorRounding);
+    EXPECT_NEAR(tangent.dot(out), 0.0, kMotorRounding);
+    EXPECT_NEAR(tangent.norm(), 1.0, kMotorRounding);
     // right-handed about the axis, at the speed of a point so far out (2.85)
-    EXPECT_LT((d.velocity - 3.0 * axis().cross(out)).norm(), 10 * kRounding);
-    EXPECT_NEAR(d.velocity.dot(tangent), 3.0 * lever(), 10 * kRounding);
+    EXPECT_LT((d.velocity - 3.0 * axis().cross(out)).norm(), 10 * kMotorRounding);
+    EXPECT_NEAR(d.velocity.dot(tangent), 3.0 * lever(), 10 * kMotorRounding);
   }
   // the points lie opposite each other
-  EXPECT_LT(sum.norm(), kRounding);
+  EXPECT_LT(sum.norm(), kMotorRounding);
 }
 
 TEST_F(AngularMotor, ARigidTurnAtTheSetSpeedIsWhatEveryRowWants) {
@@ -153,8 +153,8 @@ TEST_F(AngularMotor, TheDriveStaysInBody1) {
   for (JointedBody& body : joint_.bodies) body.pose = compose(moved, body.pose);
   const std::vector<Discrepancy> after = joint_.describe();
   for (std::size_t i = 0; i < 6; ++i) {
-    EXPECT_LT((after[i].point1 - transform_point(moved, before[i].point1)).norm(), 10 * kRounding);
-    EXPECT_LT((after[i].velocity - moved.orientation * before[i].velocity).norm(), 10 * kRounding);
+    EXPECT_LT((after[i].point1 - transform_point(moved, before[i].point1)).norm(), 10 * kMotorRounding);
+    EXPECT_LT((after[i].velocity - moved.orientation * before[i].velocity).norm(), 10 * kMotorRounding);
   }
 }
 
@@ -164,7 +164,7 @@ TEST_F(AngularMotor, TheAxisStaysMidwayWhenTheBodiesDriftApart) {
   Vector3 centre = Vector3::Zero();
   for (const Discrepancy& d : joint_.describe())
     if (is_drive(d)) centre += 0.25 * d.point1;
-  EXPECT_LT((centre - (middle() + Vector3(0.01, 0, 0))).norm(), kRounding);
+  EXPECT_LT((centre - (middle() + Vector3(0.01, 0, 0))).norm(), kMotorRounding);
 }
 
 TEST_F(AngularMotor, SharesItsTorqueAmongTheDrivingPoints) {
@@ -177,7 +177,7 @@ TEST_F(AngularMotor, SharesItsTorqueAmongTheDrivingPoints) {
       EXPECT_EQ(d.maximum_force, Vector3::Constant(kUnlimited));
     }
   }
-  EXPECT_NEAR(torque, 8.0, 10 * kRounding);
+  EXPECT_NEAR(torque, 8.0, 10 * kMotorRounding);
 }
 
 TEST_F(AngularMotor, IsUnlimitedWithoutATorque) {

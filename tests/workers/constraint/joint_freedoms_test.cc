@@ -16,8 +16,8 @@ namespace gravitas::test {
 namespace {
 
 // Rounding of transforms of points within ten metres, some of them in a row.
-constexpr double kRounding = 2e-14;
-const double kAbsent = std::nan("");
+constexpr double kFreedomRounding = 2e-14;
+const double kNoValue = std::nan("");
 const Vector3 kPoint(0.3, -0.2, 0.5);
 const Vector3 kAxis = Vector3(1.0, 2.0, -0.5).normalized();
 const Vector3 kAcross = kAxis.cross(Vector3::UnitZ()).normalized();
@@ -32,7 +32,7 @@ std::vector<double> numbers(const std::vector<Vector3>& vectors, const std::vect
 
 // A motion of body 2 against body 1 about or along world axes of the start, applied in order: what is later is fixed in
 // body 1 if `in_body1`, else moves with body 2.
-struct Motion {
+struct JointMotion {
   Vector3 axis;
   bool turns = true;
   bool in_body1 = true;
@@ -45,7 +45,7 @@ struct JointCase {
   long rows;
   long rank;
   // Freedoms left: rank + freedoms = 6.
-  std::vector<Motion> freedoms;
+  std::vector<JointMotion> freedoms;
 };
 
 void PrintTo(const JointCase& joint, std::ostream* out) { *out << joint.type; }
@@ -54,15 +54,20 @@ const std::vector<JointCase>& cases() {
   static const std::vector<JointCase> all = {
       {"Spherical",
        "constraint_spherical",
-       numbers({kPoint}, {kAbsent, 0, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent}),
+       numbers({kPoint}, {kNoValue, 0, kNoValue, kNoValue, kNoValue, kNoValue, kNoValue}),
        3,
        3,
        {{Vector3::UnitX()}, {Vector3::UnitY()}, {Vector3::UnitZ()}}},
-      {"Revolute", "constraint_revolute", numbers({kPoint, kPoint + 0.4 * kAxis}, {kAbsent, kAbsent}), 6, 5, {{kAxis}}},
+      {"Revolute",
+       "constraint_revolute",
+       numbers({kPoint, kPoint + 0.4 * kAxis}, {kNoValue, kNoValue}),
+       6,
+       5,
+       {{kAxis}}},
       {"Rigid", "constraint_rigid", numbers({kPoint}), 6, 6, {}},
       {"Slider",
        "constraint_slider",
-       numbers({kPoint, 3.0 * kAxis}, {kAbsent, kAbsent, kAbsent, kAbsent}),
+       numbers({kPoint, 3.0 * kAxis}, {kNoValue, kNoValue, kNoValue, kNoValue}),
        5,
        5,
        {{kAxis, false}}},
@@ -74,7 +79,7 @@ const std::vector<JointCase>& cases() {
        {{kAcross, true, false}, {kAxis, true, true}}},
       {"Axle",
        "constraint_axle",
-       numbers({kPoint, kAxis, kAcross}, {kAbsent, kAbsent}),
+       numbers({kPoint, kAxis, kAcross}, {kNoValue, kNoValue}),
        4,
        4,
        {{kAcross, true, false}, {kAxis, true, true}}},
@@ -95,7 +100,7 @@ class JointFreedoms : public testing::TestWithParam<JointCase> {
     joint_.bodies = start_;
     Pose& pose = joint_.bodies[1].pose;
     Pose moved = {};  // of body 2 since the start, world
-    for (const Motion& m : GetParam().freedoms) {
+    for (const JointMotion& m : GetParam().freedoms) {
       const double by = random_.uniform(-size, size);
       Pose next;
       if (m.turns) {
@@ -137,7 +142,8 @@ TEST_P(JointFreedoms, RowsHaveTheRankOfTheProof) {
 TEST_P(JointFreedoms, WhatIsLeftFreeIsNoError) {
   for (int i = 0; i < 20; ++i) {
     move(1.0);
-    for (const Discrepancy& d : joint_.describe()) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kRounding);
+    for (const Discrepancy& d : joint_.describe())
+      EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kFreedomRounding);
   }
 }
 
@@ -214,10 +220,10 @@ TEST_F(JointPair, ARevolutesAngleIsThatOfBody2AboutItsAxis) {
     const Discrepancy& limit = all[2];
     EXPECT_TRUE(limit.is_angular());
     const Vector3 axis = to_rotation_matrix(limit.axes).col(0);
-    EXPECT_LT((axis - kAxis).norm(), kRounding);
+    EXPECT_LT((axis - kAxis).norm(), kFreedomRounding);
     // limits of -1 and 5 span 6 of 6.28 rad: the turn nearest to 2
     const double seen = angle < 2.0 - 3.14159 ? angle + 6.283185307179586 : angle;
-    EXPECT_NEAR(axis.dot(limit.point2 - limit.point1), seen, kRounding);
+    EXPECT_NEAR(axis.dot(limit.point2 - limit.point1), seen, kFreedomRounding);
     EXPECT_EQ(limit.lower.x(), -1.0);
     EXPECT_EQ(limit.upper.x(), 5.0);
   }
@@ -230,10 +236,10 @@ TEST_F(JointPair, ASlidersWayLimitsAndDriveAreAlongItsAxis) {
   const std::vector<Discrepancy> all = slider.describe();
   ASSERT_EQ(all.size(), 5U);
   const Discrepancy &limit = all[3], &drive = all[4];
-  EXPECT_NEAR(to_rotation_matrix(limit.axes).col(0).dot(limit.point2 - limit.point1), 1.25, kRounding);
+  EXPECT_NEAR(to_rotation_matrix(limit.axes).col(0).dot(limit.point2 - limit.point1), 1.25, kFreedomRounding);
   EXPECT_EQ(limit.lower.x(), -0.5);
   EXPECT_EQ(limit.upper.x(), 2.0);
-  EXPECT_LT((drive.velocity - 0.7 * kAxis).norm(), kRounding);
+  EXPECT_LT((drive.velocity - 0.7 * kAxis).norm(), kFreedomRounding);
   EXPECT_EQ(drive.maximum_force.x(), 30.0);
   EXPECT_EQ(rank(slider.jacobian(all)), 6);
 }
@@ -241,9 +247,9 @@ TEST_F(JointPair, ASlidersWayLimitsAndDriveAreAlongItsAxis) {
 TEST_F(JointPair, ADistancesRowIsTheRateOfTheDistance) {
   PluginUnderTest plugin("constraint_distance");
   const Vector3 other = kPoint + 1.7 * kBent;
-  JointProblem rod = joint(&plugin, "Distance", numbers({kPoint, other}, {kAbsent, kAbsent}));
+  JointProblem rod = joint(&plugin, "Distance", numbers({kPoint, other}, {kNoValue, kNoValue}));
   ASSERT_EQ(rod.describe().size(), 1U);
-  EXPECT_NEAR(rod.describe()[0].lower.x(), 1.7, kRounding);
+  EXPECT_NEAR(rod.describe()[0].lower.x(), 1.7, kFreedomRounding);
   EXPECT_EQ(rod.describe()[0].lower.x(), rod.describe()[0].upper.x());
   EXPECT_EQ(rank(rod.jacobian(rod.describe())), 1);
   for (int i = 0; i < 20; ++i) {
@@ -252,8 +258,8 @@ TEST_F(JointPair, ADistancesRowIsTheRateOfTheDistance) {
               {random_.vector(1.0), random_.vector(1.0)}};
     const Discrepancy d = rod.describe()[0];
     const Vector3 axis = to_rotation_matrix(d.axes).col(0);
-    EXPECT_NEAR(axis.dot(d.point2 - d.point1), (d.point2 - d.point1).norm(), kRounding);
-    EXPECT_NEAR(joint_error(d, d.point2 - d.point1), std::fabs((d.point2 - d.point1).norm() - 1.7), kRounding);
+    EXPECT_NEAR(axis.dot(d.point2 - d.point1), (d.point2 - d.point1).norm(), kFreedomRounding);
+    EXPECT_NEAR(joint_error(d, d.point2 - d.point1), std::fabs((d.point2 - d.point1).norm() - 1.7), kFreedomRounding);
     const auto distance_after = [&](double time) {
       Vector3 point[2];
       for (std::size_t b = 0; b < 2; ++b) {
@@ -269,11 +275,11 @@ TEST_F(JointPair, ADistancesRowIsTheRateOfTheDistance) {
 
 TEST_F(JointPair, ARopeIsSlackWithinItsLength) {
   PluginUnderTest plugin("constraint_distance");
-  const Discrepancy d = joint(&plugin, "Distance", numbers({kPoint, kPoint + kAxis}, {kAbsent, 2.5})).describe().at(0);
+  const Discrepancy d = joint(&plugin, "Distance", numbers({kPoint, kPoint + kAxis}, {kNoValue, 2.5})).describe().at(0);
   EXPECT_EQ(d.lower.x(), 0.0);
   EXPECT_EQ(d.upper.x(), 2.5);
   EXPECT_EQ(joint_error(d, d.point2 - d.point1), 0.0);
-  EXPECT_NEAR(joint_error(d, Vector3(0, 3.0, 0)), 0.5, kRounding);
+  EXPECT_NEAR(joint_error(d, Vector3(0, 3.0, 0)), 0.5, kFreedomRounding);
 }
 
 TEST_F(JointPair, ConstantVelocityLeavesEveryBendFreeAndNoTwist) {
@@ -287,17 +293,17 @@ TEST_F(JointPair, ConstantVelocityLeavesEveryBendFreeAndNoTwist) {
     const std::vector<Discrepancy> all = shafts.describe();
     ASSERT_EQ(all.size(), 2U);
     EXPECT_EQ(rank(shafts.jacobian(all)), 4);
-    for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kRounding);
+    for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kFreedomRounding);
     // equal speeds about the shafts are what the row wants
     const Vector3 shaft2 = exp_rotation(1.2 * across) * kAxis;
     shafts.bodies[0].twist.angular = 3.0 * kAxis;
     shafts.bodies[1].twist.angular = 3.0 * shaft2;
-    EXPECT_NEAR(shafts.row_velocity(all[1], to_rotation_matrix(all[1].axes).col(0)), 0.0, kRounding);
+    EXPECT_NEAR(shafts.row_velocity(all[1], to_rotation_matrix(all[1].axes).col(0)), 0.0, kFreedomRounding);
     // a twist about the second shaft is seen as cos(bend/2) of it
     turn(&shafts, 0.01 * shaft2);
     const Discrepancy twisted = shafts.describe()[1];
     EXPECT_NEAR(joint_error(twisted, twisted.point2 - twisted.point1), 0.01 * std::sqrt(0.5 * (1 + kAxis.dot(shaft2))),
-                kRounding);
+                kFreedomRounding);
   }
 }
 
@@ -308,8 +314,8 @@ TEST_F(JointPair, ASuspensionIsASpringAlongTheSteeringAxisAndNoError) {
   const std::vector<Discrepancy> all = wheel.describe();
   ASSERT_EQ(all.size(), 3U);
   EXPECT_EQ(rank(wheel.jacobian({all[0], all[1]})), 3);
-  for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kRounding);
-  EXPECT_NEAR(to_rotation_matrix(all[2].axes).col(0).dot(all[2].point2 - all[2].point1), 0.07, kRounding);
+  for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kFreedomRounding);
+  EXPECT_NEAR(to_rotation_matrix(all[2].axes).col(0).dot(all[2].point2 - all[2].point1), 0.07, kFreedomRounding);
   EXPECT_EQ(all[2].compliance.x(), 1.0 / 2000.0);
   EXPECT_EQ(all[2].damping.x(), 50.0);
 }
@@ -317,10 +323,10 @@ TEST_F(JointPair, ASuspensionIsASpringAlongTheSteeringAxisAndNoError) {
 // Reach cones and twist: the row's error is the way to the limit, and its rate is the row's, near the limit.
 TEST_F(JointPair, AReachConesRowPointsToTheCone) {
   PluginUnderTest plugin("constraint_spherical");
-  const std::vector<double> round = numbers({kPoint}, {0.5, 0, kAxis.x(), kAxis.y(), kAxis.z(), kAbsent, kAbsent});
-  std::vector<double> irregular = numbers({kPoint}, {kAbsent, 4});
+  const std::vector<double> round = numbers({kPoint}, {0.5, 0, kAxis.x(), kAxis.y(), kAxis.z(), kNoValue, kNoValue});
+  std::vector<double> irregular = numbers({kPoint}, {kNoValue, 4});
   for (const double number : {0.3, 0.4, 1.8, 0.7, 3.5, 0.35, 5.0, 0.6}) irregular.push_back(number);
-  for (const double number : {kAxis.x(), kAxis.y(), kAxis.z(), kAbsent, kAbsent}) irregular.push_back(number);
+  for (const double number : {kAxis.x(), kAxis.y(), kAxis.z(), kNoValue, kNoValue}) irregular.push_back(number);
   for (const bool is_round : {true, false}) {
     int inside = 0, outside = 0;
     for (int i = 0; i < 200; ++i) {
@@ -354,7 +360,7 @@ TEST_F(JointPair, AReachConesRowPointsToTheCone) {
 
 TEST_F(JointPair, ATwistIsLimitedAtAnySwing) {
   PluginUnderTest plugin("constraint_spherical");
-  const std::vector<double> properties = numbers({kPoint}, {kAbsent, 0, kAxis.x(), kAxis.y(), kAxis.z(), -0.3, 0.8});
+  const std::vector<double> properties = numbers({kPoint}, {kNoValue, 0, kAxis.x(), kAxis.y(), kAxis.z(), -0.3, 0.8});
   for (int i = 0; i < 20; ++i) {
     JointProblem socket = joint(&plugin, "Spherical", properties);
     const double twist = random_.uniform(-1.0, 1.0);
@@ -366,9 +372,9 @@ TEST_F(JointPair, ATwistIsLimitedAtAnySwing) {
     ASSERT_EQ(all.size(), 2U);
     const Discrepancy& d = all[1];
     const double scale = d.upper.x() / 0.8;
-    EXPECT_NEAR(scale, std::cos(0.5 * across.norm()), kRounding);
-    EXPECT_NEAR(d.lower.x(), -0.3 * scale, kRounding);
-    EXPECT_NEAR(to_rotation_matrix(d.axes).col(0).dot(d.point2 - d.point1), scale * twist, kRounding);
+    EXPECT_NEAR(scale, std::cos(0.5 * across.norm()), kFreedomRounding);
+    EXPECT_NEAR(d.lower.x(), -0.3 * scale, kFreedomRounding);
+    EXPECT_NEAR(to_rotation_matrix(d.axes).col(0).dot(d.point2 - d.point1), scale * twist, kFreedomRounding);
   }
 }
 
@@ -380,32 +386,33 @@ TEST_F(JointPair, ContradictionsAreRefusedWithTheField) {
     const char* field;
   };
   const std::vector<Trial> trials = {
-      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint}, {kAbsent, kAbsent}), "BindAxisPoint1"},
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint}, {kNoValue, kNoValue}), "BindAxisPoint1"},
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {0.5, -0.5}), "LowerLimit"},
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {0.1, 0.5}), "LowerLimit"},
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-0.5, -0.1}), "UpperLimit"},
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-4.0, 4.0}), "UpperLimit"},
-      {"constraint_slider", "Slider", numbers({kPoint, Vector3::Zero()}, {kAbsent, kAbsent, kAbsent, kAbsent}), "Axis"},
-      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {1.0, -1.0, kAbsent, kAbsent}), "LowerLimit"},
-      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {kAbsent, kAbsent, kAbsent, 5.0}), "MaximumForce"},
+      {"constraint_slider", "Slider", numbers({kPoint, Vector3::Zero()}, {kNoValue, kNoValue, kNoValue, kNoValue}),
+       "Axis"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {1.0, -1.0, kNoValue, kNoValue}), "LowerLimit"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {kNoValue, kNoValue, kNoValue, 5.0}), "MaximumForce"},
       {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {2.0, 1.0}), "MinimumDistance"},
       {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {2.0, 3.0}), "MinimumDistance"},
-      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {kAbsent, 0.5}), "MaximumDistance"},
-      {"constraint_distance", "Distance", numbers({kPoint, kPoint}, {kAbsent, kAbsent}), "MaximumDistance"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {kNoValue, 0.5}), "MaximumDistance"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint}, {kNoValue, kNoValue}), "MaximumDistance"},
       {"constraint_universal", "Universal", numbers({kPoint, kAxis, -2.0 * kAxis}), "Axis2"},
       {"constraint_universal", "Universal", numbers({kPoint, Vector3::Zero(), kAxis}), "Axis1"},
       {"constraint_constant_velocity", "ConstantVelocity", numbers({kPoint, kAxis, -kAxis}), "Axis2"},
-      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAxis}, {kAbsent, kAbsent}), "RollingAxis"},
-      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAcross}, {kAbsent, 3.0}), "SuspensionDamping"},
-      {"constraint_spherical", "Spherical", numbers({kPoint}, {0.5, 0, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent}),
-       "Axis"},
-      {"constraint_spherical", "Spherical", numbers({kPoint}, {kAbsent, 0, 0, 0, 0, -0.1, 0.1}), "Axis"},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAxis}, {kNoValue, kNoValue}), "RollingAxis"},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAcross}, {kNoValue, 3.0}), "SuspensionDamping"},
       {"constraint_spherical", "Spherical",
-       numbers({kPoint}, {0.5, 3, 0.0, 0.5, 1.0, 0.5, 2.0, 0.5, 1, 0, 0, kAbsent, kAbsent}), "ReachConeAngle"},
+       numbers({kPoint}, {0.5, 0, kNoValue, kNoValue, kNoValue, kNoValue, kNoValue}), "Axis"},
+      {"constraint_spherical", "Spherical", numbers({kPoint}, {kNoValue, 0, 0, 0, 0, -0.1, 0.1}), "Axis"},
       {"constraint_spherical", "Spherical",
-       numbers({kPoint}, {kAbsent, 2, 0.0, 0.5, 1.0, 0.5, 1, 0, 0, kAbsent, kAbsent}), "ReachCone"},
+       numbers({kPoint}, {0.5, 3, 0.0, 0.5, 1.0, 0.5, 2.0, 0.5, 1, 0, 0, kNoValue, kNoValue}), "ReachConeAngle"},
       {"constraint_spherical", "Spherical",
-       numbers({kPoint}, {kAbsent, 3, 0.0, 0.5, 2.0, 0.5, 1.0, 0.5, 1, 0, 0, kAbsent, kAbsent}), "ReachCone"},
+       numbers({kPoint}, {kNoValue, 2, 0.0, 0.5, 1.0, 0.5, 1, 0, 0, kNoValue, kNoValue}), "ReachCone"},
+      {"constraint_spherical", "Spherical",
+       numbers({kPoint}, {kNoValue, 3, 0.0, 0.5, 2.0, 0.5, 1.0, 0.5, 1, 0, 0, kNoValue, kNoValue}), "ReachCone"},
   };
   for (const Trial& trial : trials) {
     PluginUnderTest plugin(trial.plugin);

@@ -9,7 +9,7 @@ namespace gravitas::test {
 namespace {
 
 // Rounding of transforms of points within ten metres.
-constexpr double kRounding = 1e-14;
+constexpr double kSphericalRounding = 1e-14;
 
 class Spherical : public testing::Test {
  protected:
@@ -36,8 +36,8 @@ TEST_F(Spherical, HasNoErrorWhereItWasBound) {
     for (JointedBody& body : joint_.bodies) body.pose = random_.pose(3.0);
     bind();
     const Discrepancy d = only();
-    EXPECT_LT((d.point1 - point_).norm(), kRounding);
-    EXPECT_LT((d.point2 - point_).norm(), kRounding);
+    EXPECT_LT((d.point1 - point_).norm(), kSphericalRounding);
+    EXPECT_LT((d.point2 - point_).norm(), kSphericalRounding);
   }
 }
 
@@ -56,12 +56,12 @@ TEST_F(Spherical, ItsErrorIsHowFarABodyWasMoved) {
   const Vector3 shift(0.1, -0.2, 0.3);
   joint_.bodies[1].pose.position += shift;
   Discrepancy d = only();
-  EXPECT_LT((d.point2 - d.point1 - shift).norm(), kRounding);
-  EXPECT_NEAR(joint_error(d, d.point2 - d.point1), shift.norm(), kRounding);
+  EXPECT_LT((d.point2 - d.point1 - shift).norm(), kSphericalRounding);
+  EXPECT_NEAR(joint_error(d, d.point2 - d.point1), shift.norm(), kSphericalRounding);
   // moved along, body 1 makes it right again
   joint_.bodies[0].pose.position += shift;
   d = only();
-  EXPECT_LT((d.point2 - d.point1).norm(), kRounding);
+  EXPECT_LT((d.point2 - d.point1).norm(), kSphericalRounding);
 }
 
 TEST_F(Spherical, TurningAboutThePointIsNoError) {
@@ -70,7 +70,7 @@ TEST_F(Spherical, TurningAboutThePointIsNoError) {
   Pose& pose = joint_.bodies[1].pose;
   pose = {point_ + turn * (pose.position - point_), turn * pose.orientation};
   const Discrepancy d = only();
-  EXPECT_LT((d.point2 - d.point1).norm(), kRounding);
+  EXPECT_LT((d.point2 - d.point1).norm(), kSphericalRounding);
 }
 
 TEST_F(Spherical, TurningAboutTheCentreIsTheErrorOfTheArm) {
@@ -80,8 +80,8 @@ TEST_F(Spherical, TurningAboutTheCentreIsTheErrorOfTheArm) {
   pose.orientation = rotate_by(pose.orientation, Vector3(0, 0, 0.3));
   const Discrepancy d = only();
   const Vector3 moved = exp_rotation(Vector3(0, 0, 0.3)) * arm - arm;
-  EXPECT_LT((d.point1 - point_ - moved).norm(), kRounding);
-  EXPECT_LT((d.point2 - d.point1 + moved).norm(), kRounding);
+  EXPECT_LT((d.point1 - point_ - moved).norm(), kSphericalRounding);
+  EXPECT_LT((d.point2 - d.point1 + moved).norm(), kSphericalRounding);
 }
 
 TEST_F(Spherical, TakesThreeFreedoms) {
@@ -99,7 +99,7 @@ TEST_F(Spherical, ItsRowsAreTheRelativeVelocityOfThePoint) {
   };
   const Vector3 relative = velocity(joint_.bodies[1]) - velocity(joint_.bodies[0]);
   for (const Vector3& axis : {Vector3(1, 0, 0), Vector3(0, 1, 0), Vector3(0, 0, 1)})
-    EXPECT_NEAR(joint_.row_velocity(d, axis), axis.dot(relative), 10 * kRounding);
+    EXPECT_NEAR(joint_.row_velocity(d, axis), axis.dot(relative), 10 * kSphericalRounding);
 }
 
 TEST_F(Spherical, HangsFromTheWorld) {
@@ -107,14 +107,14 @@ TEST_F(Spherical, HangsFromTheWorld) {
     joint_.ends = ends;
     bind();
     Discrepancy d = only();
-    EXPECT_LT((d.point2 - d.point1).norm(), kRounding);
+    EXPECT_LT((d.point2 - d.point1).norm(), kSphericalRounding);
     const std::size_t moving = ends[0] == kNone ? 1 : 0;
     joint_.bodies[moving].pose.position += Vector3(0, 1, 0);
     d = only();
     const Vector3 error = d.point2 - d.point1;
-    EXPECT_LT((error - Vector3(0, moving == 1 ? 1 : -1, 0)).norm(), kRounding);
+    EXPECT_LT((error - Vector3(0, moving == 1 ? 1 : -1, 0)).norm(), kSphericalRounding);
     // the world's end stays where it was bound
-    EXPECT_LT(((moving == 1 ? d.point1 : d.point2) - point_).norm(), kRounding);
+    EXPECT_LT(((moving == 1 ? d.point1 : d.point2) - point_).norm(), kSphericalRounding);
   }
 }
 

@@ -12,7 +12,7 @@ namespace gravitas::test {
 namespace {
 
 // Rounding of a few products of numbers below a thousand.
-constexpr double kRounding = 1e-12;
+constexpr double kFieldRounding = 1e-12;
 
 // ---- Drag
 
@@ -40,18 +40,18 @@ TEST(Vortex, IsStrongestAtItsRadius) {
   body.pose.position = Vector3(1 + 2, 50, 3);
   // the way out is +x, around +y leads to -z
   const ForceAnswer at = ask_wrench(&force, "Vortex", vortex({1, 0, 3}, {0, 5, 0}, 10, 4, 3, 2), body);
-  EXPECT_LT((at.wrench.force - Vector3(-3, 2, -10)).norm(), kRounding);
+  EXPECT_LT((at.wrench.force - Vector3(-3, 2, -10)).norm(), kFieldRounding);
   EXPECT_EQ(at.wrench.torque, Vector3::Zero());
   for (const double r : {0.1, 1.0, 1.9, 2.1, 5.0, 100.0}) {
     body.pose.position = Vector3(1 + r, 0, 3);
     const Vector3 f = ask_wrench(&force, "Vortex", vortex({1, 0, 3}, {0, 1, 0}, 10, 0, 0, 2), body).wrench.force;
     const double rho = r / 2;
-    EXPECT_NEAR(f.norm(), 10 * 2 * rho / (1 + rho * rho), kRounding);
+    EXPECT_NEAR(f.norm(), 10 * 2 * rho / (1 + rho * rho), kFieldRounding);
     EXPECT_LT(f.norm(), 10.0);
   }
   body.pose.position = Vector3(1, -7, 3);
   const Vector3 on_axis = ask_wrench(&force, "Vortex", vortex({1, 0, 3}, {0, 1, 0}, 10, 4, 3, 2), body).wrench.force;
-  EXPECT_LT((on_axis - Vector3(0, 4, 0)).norm(), kRounding);
+  EXPECT_LT((on_axis - Vector3(0, 4, 0)).norm(), kFieldRounding);
 }
 
 TEST(Vortex, RefusesAnAxisWithoutDirection) {
@@ -87,15 +87,15 @@ TEST_F(Spring, PullsToItsAnchor) {
   ForcedBody body;
   body.pose.position = Vector3(3, 4, 0);
   const ForceAnswer smooth = ask({}, body);
-  EXPECT_LT((smooth.wrench.force - Vector3(-30, -40, 0)).norm(), kRounding);
-  EXPECT_NEAR(smooth.potential, 125.0, kRounding);
+  EXPECT_LT((smooth.wrench.force - Vector3(-30, -40, 0)).norm(), kFieldRounding);
+  EXPECT_NEAR(smooth.potential, 125.0, kFieldRounding);
   EXPECT_EQ(smooth.flags, std::uint32_t{kHasPotential});
   const ForceAnswer stretched = ask({.rest_length = 3}, body);
-  EXPECT_LT((stretched.wrench.force - Vector3(-12, -16, 0)).norm(), kRounding);
-  EXPECT_NEAR(stretched.potential, 20.0, kRounding);
+  EXPECT_LT((stretched.wrench.force - Vector3(-12, -16, 0)).norm(), kFieldRounding);
+  EXPECT_NEAR(stretched.potential, 20.0, kFieldRounding);
   const ForceAnswer pressed = ask({.rest_length = 7}, body);
-  EXPECT_LT((pressed.wrench.force - Vector3(12, 16, 0)).norm(), kRounding);
-  EXPECT_LT((ask({.anchor = {3, 0, 0}}, body).wrench.force - Vector3(0, -40, 0)).norm(), kRounding);
+  EXPECT_LT((pressed.wrench.force - Vector3(12, 16, 0)).norm(), kFieldRounding);
+  EXPECT_LT((ask({.anchor = {3, 0, 0}}, body).wrench.force - Vector3(0, -40, 0)).norm(), kFieldRounding);
 }
 
 TEST_F(Spring, DampsAlongItself) {
@@ -103,9 +103,9 @@ TEST_F(Spring, DampsAlongItself) {
   body.pose.position = Vector3(0, 2, 0);
   body.twist.linear = Vector3(5, 3, 0);
   EXPECT_LT((ask({.stiffness = 0, .damping = 2, .rest_length = 2}, body).wrench.force - Vector3(0, -6, 0)).norm(),
-            kRounding);
+            kFieldRounding);
   // the smooth form resists all of it
-  EXPECT_LT((ask({.stiffness = 0, .damping = 2}, body).wrench.force - Vector3(-10, -6, 0)).norm(), kRounding);
+  EXPECT_LT((ask({.stiffness = 0, .damping = 2}, body).wrench.force - Vector3(-10, -6, 0)).norm(), kFieldRounding);
 }
 
 TEST_F(Spring, OfNoLengthHasNoDirection) {
@@ -119,8 +119,8 @@ TEST_F(Spring, TurnsABodyByItsPoint) {
   body.twist.angular = Vector3(0, 0, 2);
   // the point, 1 m out along the body's x, is at (0, 1, 0) and moves along -x at 2 m/s
   const ForceAnswer answer = ask({.stiffness = 10, .damping = 3, .attachment = {0.5, 0, 0}, .anchor = {1, 1, 0}}, body);
-  EXPECT_LT((answer.wrench.force - Vector3(10 + 6, 0, 0)).norm(), kRounding);
-  EXPECT_LT((answer.wrench.torque - Vector3(0, 0, -16)).norm(), kRounding);
+  EXPECT_LT((answer.wrench.force - Vector3(10 + 6, 0, 0)).norm(), kFieldRounding);
+  EXPECT_LT((answer.wrench.torque - Vector3(0, 0, -16)).norm(), kFieldRounding);
 }
 
 // Action is reaction, about any point, and the energy is counted once.
@@ -147,8 +147,8 @@ TEST_F(Spring, PullsBothBodiesAlike) {
       force += answers[k].wrench.force;
       torque += answers[k].wrench.torque + problem.bodies[k].pose.position.cross(answers[k].wrench.force);
     }
-    EXPECT_LT(force.norm(), kRounding);
-    EXPECT_LT(torque.norm(), 10 * kRounding);
+    EXPECT_LT(force.norm(), kFieldRounding);
+    EXPECT_LT(torque.norm(), 10 * kFieldRounding);
     EXPECT_EQ(answers[1].potential, 0.0);
   }
 }

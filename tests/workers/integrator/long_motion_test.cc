@@ -17,7 +17,7 @@ double energy(const FreeBody& body) {
 Vector3 spin(const FreeBody& body) {
   return angular_momentum(body.mass, body.moments, {Vector3::Zero(), body.state.pose.orientation}, body.state.twist);
 }
-double apart(const Quaternion& a, const Quaternion& b) { return log_rotation(a * b.conjugate()).norm(); }
+double angle_apart(const Quaternion& a, const Quaternion& b) { return log_rotation(a * b.conjugate()).norm(); }
 
 FreeBody tumbling_box() {
   FreeBody body{.mass = 10.0, .moments = Vector3(0.97 / 1.2, 0.82 / 1.2, 0.17 / 1.2)};
@@ -48,7 +48,7 @@ TEST(SymplecticSplitting, MeetsTheTumblingBox) {
     const FreeBody start = problem.bodies[0];
     problem.steps(10000);
     const FreeBody& end = problem.bodies[0];
-    EXPECT_LT(apart(end.state.pose.orientation, kTumbled), 1e-8);
+    EXPECT_LT(angle_apart(end.state.pose.orientation, kTumbled), 1e-8);
     const double rounding = 1e-12;
     EXPECT_LT((spin(end) - spin(start)).norm() / spin(start).norm(), rounding);
     const auto turning = [&](FreeBody b) {
@@ -70,7 +70,7 @@ TEST(SymplecticSplitting, IsExactInOneStep) {
   problem.bodies = {tumbling_box()};
   problem.time_step = 10.0;
   problem.step();
-  EXPECT_LT(apart(problem.bodies[0].state.pose.orientation, kTumbled), 1e-12);
+  EXPECT_LT(angle_apart(problem.bodies[0].state.pose.orientation, kTumbled), 1e-12);
 }
 
 TEST(SymplecticSplitting, SpinsFastForManySteps) {
@@ -101,7 +101,7 @@ TEST(SymplecticSplitting, IsExactForADampedRotor) {
   undamped.bodies[0].wrench = {};
   undamped.time_step = (1.0 - std::exp(-2.0)) / 0.5;
   undamped.step();
-  EXPECT_LT(apart(problem.bodies[0].state.pose.orientation, undamped.bodies[0].state.pose.orientation), 1e-11);
+  EXPECT_LT(angle_apart(problem.bodies[0].state.pose.orientation, undamped.bodies[0].state.pose.orientation), 1e-11);
   EXPECT_LT((problem.bodies[0].state.twist.angular - std::exp(-2.0) * undamped.bodies[0].state.twist.angular).norm(),
             1e-11);
 }
@@ -148,7 +148,7 @@ TEST(SymplecticSplitting, RunsBackToItsStart) {
     // 40,000 roundings that act on phases for 2000 s
     EXPECT_LT((problem.bodies[0].state.pose.position - start.state.pose.position).norm(), 1e-9);
     // ... and of the spin, of 1e-12, on an angle of 4000 rad
-    EXPECT_LT(apart(problem.bodies[0].state.pose.orientation, start.state.pose.orientation), 1e-7);
+    EXPECT_LT(angle_apart(problem.bodies[0].state.pose.orientation, start.state.pose.orientation), 1e-7);
   }
 }
 
@@ -166,7 +166,7 @@ TEST(SymplecticSplitting, TurnsPointMassesAsTheyTurn) {
   request.f64("inertia") = {0, 0, 0};
   request.f64("inverse_inertia") = {0, 0, 0};
   const MessageColumns reply = problem.plugin.ask(stage::Method::kIntegratorIntegrate, request);
-  EXPECT_LT(apart(quaternion_at(reply.f64("orientation"), 0), exp_rotation(Vector3(0, 0, 0.3))), 1e-15);
+  EXPECT_LT(angle_apart(quaternion_at(reply.f64("orientation"), 0), exp_rotation(Vector3(0, 0, 0.3))), 1e-15);
   EXPECT_EQ(vector_at(reply.f64("angular_velocity"), 0), Vector3(0, 0, 3));
 }
 
@@ -270,7 +270,7 @@ TEST(DormandPrince54, MeetsTheTumblingBoxWithin2000Evaluations) {
   };
   problem.time_step = 10.0;
   problem.step();
-  EXPECT_LT(apart(problem.bodies[0].state.pose.orientation, kTumbled), 1e-9);
+  EXPECT_LT(angle_apart(problem.bodies[0].state.pose.orientation, kTumbled), 1e-9);
   EXPECT_LE(problem.error_estimate, 1.0);
   RecordProperty("derivatives", problem.plugin.derivatives_asked);
 }

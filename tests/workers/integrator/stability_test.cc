@@ -12,7 +12,7 @@
 namespace gravitas::test {
 namespace {
 
-struct Method {
+struct StabilityMethod {
   const char* library;
   std::vector<double> settings;
   double limit;  // of h w without damping; 0: never stable, infinite: always
@@ -22,7 +22,7 @@ struct Method {
   }
 };
 
-std::vector<Method> methods() {
+std::vector<StabilityMethod> stability_methods() {
   return {{"integrator_euler", {}, 0.0},
           {"integrator_semi_implicit_euler", {}, 2.0},
           {"integrator_verlet", {}, 2.0},
@@ -39,7 +39,7 @@ std::vector<Method> methods() {
 }
 
 // By how much the energy of a 1 kg oscillator grows in some steps of one second; infinite where a step is refused.
-double growth(const Method& method, double frequency, double ratio, int steps) {
+double growth(const StabilityMethod& method, double frequency, double ratio, int steps) {
   IntegratorProblem problem(method.library, method.settings);
   problem.wrench_is_constant = false;
   problem.time_step = 1.0;
@@ -62,7 +62,7 @@ double growth(const Method& method, double frequency, double ratio, int steps) {
 }
 
 TEST(Stability, EndsWhereTheHeadsSay) {
-  for (const Method& method : methods()) {
+  for (const StabilityMethod& method : stability_methods()) {
     if (method.limit == 0.0) {
       EXPECT_GT(growth(method, 0.1, 0.0, 3000), 1e6) << method.name();
     } else if (std::isinf(method.limit)) {
@@ -82,7 +82,7 @@ TEST(Stability, Map) {
     std::printf("zeta = %-5g h w =        ", ratio);
     for (const double frequency : frequencies) std::printf("%7g", frequency);
     std::printf("\n");
-    for (const Method& method : methods()) {
+    for (const StabilityMethod& method : stability_methods()) {
       std::printf("%-28s", method.name().c_str());
       for (const double frequency : frequencies) {
         const bool holds = growth(method, frequency, ratio, 400) < 1e3;

@@ -10,10 +10,10 @@
 namespace gravitas {
 namespace {
 
-constexpr double kGravity = 9.81;
-const Vector3 kDown(0.0, -kGravity, 0.0);
+constexpr double kG = 9.81;
+const Vector3 kDownwards(0.0, -kG, 0.0);
 
-SequentialSolver solver_with(std::uint32_t iterations, double correction_factor = 1.0) {
+SequentialSolver contact_solver_with(std::uint32_t iterations, double correction_factor = 1.0) {
   return SequentialSolver(SequentialSettings{iterations, correction_factor});
 }
 
@@ -52,7 +52,7 @@ TEST(SequentialImpact, HeadOnSpheresFollowTheClosedForm) {
   for (const double e : {0.0, 0.3, 1.0}) {
     const double ma = 2.0, mb = 0.5, ua = 3.0, ub = -1.0;
     Pair pair = touching_spheres(ma, mb, {ua, 0, 0}, {ub, 0, 0}, Vector3::UnitX(), e, 0.0);
-    const SolverAnswer answer = pair.problem.solve(solver_with(100));
+    const SolverAnswer answer = pair.problem.solve(contact_solver_with(100));
     const double centre = (ma * ua + mb * ub) / (ma + mb);
     const double va = centre - e * mb * (ua - ub) / (ma + mb);
     const double vb = centre + e * ma * (ua - ub) / (ma + mb);
@@ -75,7 +75,7 @@ TEST(SequentialImpact, ObliqueSpheresFollowTheClosedForm) {
   const Vector3 va(2.0, 0.4, -0.3), vb(-1.0, -0.2, 0.5);
   for (const double mu : {0.0, 0.05, 5.0}) {
     Pair pair = touching_spheres(ma, mb, va, vb, Vector3::UnitX(), e, mu);
-    const SolverAnswer answer = pair.problem.solve(solver_with(200));
+    const SolverAnswer answer = pair.problem.solve(contact_solver_with(200));
     const Vector3 n = vector_at(pair.problem.contact_normal, 0);
     const Vector3 relative = vb - va;
     const double normal = -(1.0 + e) * relative.dot(n) / (1.0 / ma + 1.0 / mb);
@@ -104,7 +104,7 @@ SolverProblem falling_ball(double height, double speed, double restitution, doub
   const auto ground = problem.add_immovable();
   const auto ball = problem.add_body(
       {.mass = 2.0, .pose = {{0.3, 0.5 + height, 0.0}, Quaternion::Identity()}, .linear = {0, speed, 0}});
-  problem.make_trial(kDown);
+  problem.make_trial(kDownwards);
   const double gap = problem.trial_pose(ball).position.y() - 0.5;
   problem.add_contact(
       {.body1 = ground, .body2 = ball, .point = {0.3, 0.5 * gap, 0.0}, .depth = -gap, .restitution = restitution});
@@ -113,7 +113,7 @@ SolverProblem falling_ball(double height, double speed, double restitution, doub
 
 TEST(SequentialImpact, AnElasticBallOnTheGroundKeepsItsSpeed) {
   SolverProblem problem = falling_ball(0.0, -3.0, 1.0, 0.01);
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(contact_solver_with(100));
   // gap 0 at S_n: s = |v_n|; one rounding of v* + lambda/m
   EXPECT_NEAR(answer.velocity(1).y(), 3.0, 5e-16);
   EXPECT_EQ(answer.velocity(1).x(), 0.0);
@@ -122,19 +122,19 @@ TEST(SequentialImpact, AnElasticBallOnTheGroundKeepsItsSpeed) {
 
 TEST(SequentialImpact, ABallThatArrivesWithinTheStepHasItsSpeedOfArrival) {
   const double height = 0.02, speed = -3.0;
-  const SolverAnswer answer = falling_ball(height, speed, 0.5, 0.01).solve(solver_with(100));
+  const SolverAnswer answer = falling_ball(height, speed, 0.5, 0.01).solve(contact_solver_with(100));
   // energy at the ground: v^2 + 2 g height
-  EXPECT_NEAR(answer.velocity(1).y(), 0.5 * std::sqrt(speed * speed + 2.0 * kGravity * height), 1e-14);
+  EXPECT_NEAR(answer.velocity(1).y(), 0.5 * std::sqrt(speed * speed + 2.0 * kG * height), 1e-14);
 }
 
 TEST(SequentialImpact, BelowTheRestSpeedNothingBounces) {
-  const SolverAnswer answer = falling_ball(0.0, -0.1, 1.0, 0.01).solve(solver_with(100));
+  const SolverAnswer answer = falling_ball(0.0, -0.1, 1.0, 0.01).solve(contact_solver_with(100));
   EXPECT_NEAR(answer.velocity(1).y(), 0.0, 1e-16);
 }
 
 TEST(SequentialImpact, ABallThatLeavesIsLeftAlone) {
   SolverProblem problem = falling_ball(0.0, 2.0, 1.0, 0.01);
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(contact_solver_with(100));
   EXPECT_EQ(answer.linear_velocity, problem.trial_linear_velocity);
   EXPECT_EQ(answer.pose_change, std::vector<double>(12, 0.0));
 }
@@ -145,7 +145,7 @@ TEST(SequentialImpact, AKinematicPaddleHitsAndKeepsItsOwnMotion) {
   const auto ball = problem.add_body({.pose = {{0, 0.5, 0}, Quaternion::Identity()}});
   problem.make_trial(Vector3::Zero());
   problem.add_contact({.body1 = paddle, .body2 = ball, .point = {0, 0.02, 0}, .depth = 0.04, .restitution = 1.0});
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(contact_solver_with(100));
   // elastic against an infinite mass: leaves at twice its speed
   EXPECT_NEAR(answer.velocity(ball).y(), 8.0, 2e-15);
   EXPECT_EQ(answer.velocity(paddle), Vector3(0, 4.0, 0));
@@ -163,7 +163,7 @@ SolverProblem box_on_ground(const Vector3& half, double mass, double overlap_at_
   const Vector3 moments = mass / 3.0 * Vector3(s.y() + s.z(), s.x() + s.z(), s.x() + s.y());
   const auto box = problem.add_body(
       {.mass = mass, .moments = moments, .pose = {{0.0, half.y() - overlap_at_start, 0.0}, Quaternion::Identity()}});
-  problem.make_trial(kDown);
+  problem.make_trial(kDownwards);
   const double depth = half.y() - problem.trial_pose(box).position.y();
   for (int corner = 0; corner < 4; ++corner) {
     TestContact contact = material;
@@ -181,7 +181,7 @@ TEST(SequentialRest, ABoxOnFourContactsRests) {
   for (const Vector3& half : {Vector3(0.5, 0.5, 0.5), Vector3(1.0, 0.05, 0.3), Vector3(0.1, 2.0, 0.1)}) {
     const double mass = 7.0;
     SolverProblem problem = box_on_ground(half, mass, 0.0, {.static_friction = 0.5, .dynamic_friction = 0.4});
-    const SolverAnswer answer = problem.solve(solver_with(200));
+    const SolverAnswer answer = problem.solve(contact_solver_with(200));
     EXPECT_TRUE(answer.converged());
     // speeds of order g h = 0.1
     EXPECT_LE(answer.velocity(1).norm(), 1e-15);
@@ -194,7 +194,7 @@ TEST(SequentialRest, ABoxOnFourContactsRests) {
       sum += answer.impulse(i);
       EXPECT_GE(answer.impulse(i).y(), 0.0);
     }
-    EXPECT_LE((sum - Vector3(0, mass * kGravity * problem.time_step, 0)).norm(), 1e-14);
+    EXPECT_LE((sum - Vector3(0, mass * kG * problem.time_step, 0)).norm(), 1e-14);
   }
 }
 
@@ -202,7 +202,7 @@ TEST(SequentialRest, OldOverlapGoesByTheCorrectionFactorAndNewOverlapAtOnce) {
   const double overlap = 1e-3;
   for (const double factor : {1.0, 0.2, 0.0}) {
     SolverProblem problem = box_on_ground({0.5, 0.5, 0.5}, 1.0, overlap);
-    const SolverAnswer answer = problem.solve(solver_with(1000, factor));
+    const SolverAnswer answer = problem.solve(contact_solver_with(1000, factor));
     const double left = 0.5 - problem.committed(answer, 1).position.y();
     EXPECT_NEAR(left, (1.0 - factor) * overlap, 2e-16);
     EXPECT_NEAR(answer.velocity(1).y(), 0.0, 1e-15);
@@ -211,10 +211,10 @@ TEST(SequentialRest, OldOverlapGoesByTheCorrectionFactorAndNewOverlapAtOnce) {
 
 TEST(SequentialRest, WarmStartedRestIsReachedInFewerSweepsWithTheSameAnswer) {
   SolverProblem problem = box_on_ground({0.5, 0.3, 0.2}, 3.0, 0.0, {.static_friction = 0.5, .dynamic_friction = 0.5});
-  const SolverAnswer cold = problem.solve(solver_with(200));
+  const SolverAnswer cold = problem.solve(contact_solver_with(200));
   problem.contact_warm_impulse = cold.contact_impulse;
   problem.contact_warm_correction = cold.contact_correction;
-  const SolverAnswer warm = problem.solve(solver_with(200));
+  const SolverAnswer warm = problem.solve(contact_solver_with(200));
   EXPECT_LT(warm.iterations[0], cold.iterations[0]);
   EXPECT_LE((warm.velocity(1) - cold.velocity(1)).norm(), 1e-15);
   EXPECT_LE((warm.translation(1) - cold.translation(1)).norm(), 1e-17);
@@ -227,9 +227,9 @@ TEST(SequentialRest, AStackOfFiveRests) {
   for (int i = 0; i < 5; ++i)
     boxes.push_back(problem.add_body(
         {.mass = 1.0, .moments = Vector3::Constant(1.0 / 6.0), .pose = {{0, 0.5 + i, 0}, Quaternion::Identity()}}));
-  problem.make_trial(kDown);
+  problem.make_trial(kDownwards);
   for (std::size_t i = 0; i < boxes.size(); ++i) {
-    const double fall = kGravity * problem.time_step * problem.time_step;
+    const double fall = kG * problem.time_step * problem.time_step;
     for (int corner = 0; corner < 4; ++corner)
       problem.add_contact({.body1 = below,
                            .body2 = boxes[i],
@@ -241,7 +241,7 @@ TEST(SequentialRest, AStackOfFiveRests) {
                            .key = 4 * i + static_cast<std::uint64_t>(corner)});
     below = boxes[i];
   }
-  const SolverAnswer answer = problem.solve(solver_with(5000));
+  const SolverAnswer answer = problem.solve(contact_solver_with(5000));
   EXPECT_TRUE(answer.converged());
   for (const std::uint32_t box : boxes) {
     // the sweeps end at changes of 3e-15 m/s; the slowest mode of five boxes fades by some 0.9 a
@@ -264,7 +264,7 @@ TEST(SequentialRest, AFastRollingBallDoesNotBounce) {
                                         .pose = {{0, radius, 0}, Quaternion::Identity()},
                                         .linear = {spin * radius, 0, 0},
                                         .angular = {0, 0, -spin}});
-    problem.make_trial(kDown);
+    problem.make_trial(kDownwards);
     const double depth = radius - problem.trial_pose(ball).position.y();
     problem.add_contact({.body1 = ground,
                          .body2 = ball,
@@ -273,7 +273,7 @@ TEST(SequentialRest, AFastRollingBallDoesNotBounce) {
                          .restitution = 0.8,
                          .static_friction = 0.5,
                          .dynamic_friction = 0.5});
-    const SolverAnswer answer = problem.solve(solver_with(200));
+    const SolverAnswer answer = problem.solve(contact_solver_with(200));
     EXPECT_NEAR(answer.velocity(ball).y(), 0.0, 1e-15 * spin);
   }
 }
@@ -288,7 +288,7 @@ TEST(SequentialSurface, TheSameKeyDrawsTheSameTiltWithinItsCap) {
     SolverProblem problem = falling_ball(0.0, -3.0, 0.5, 0.01);
     problem.contact_material[kSurfacePerturbation] = epsilon;
     problem.contact_key[0] = key;
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(contact_solver_with(100));
     const Vector3 n = answer.direction(0);
     EXPECT_NEAR(n.norm(), 1.0, 1e-15);
     // asin(sqrt(3) epsilon) is the widest tilt
@@ -299,7 +299,7 @@ TEST(SequentialSurface, TheSameKeyDrawsTheSameTiltWithinItsCap) {
     const Vector3 arm = vector_at(problem.contact_point, 0) - problem.trial_pose(1).position;
     const Vector3 leaving = answer.velocity(1) + answer.turning(1).cross(arm);
     EXPECT_NEAR(leaving.dot(n), 0.5 * n.y() * 3.0, 1e-14);
-    EXPECT_EQ(answer.direction(0), problem.solve(solver_with(100)).direction(0));
+    EXPECT_EQ(answer.direction(0), problem.solve(contact_solver_with(100)).direction(0));
     drawn.push_back(n);
   }
   Vector3 mean = Vector3::Zero();
@@ -312,7 +312,7 @@ TEST(SequentialSurface, TheSameKeyDrawsTheSameTiltWithinItsCap) {
 TEST(SequentialSurface, RestIsNotTilted) {
   SolverProblem problem = falling_ball(0.0, 0.0, 0.5, 0.01);
   problem.contact_material[kSurfacePerturbation] = 0.1;
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(contact_solver_with(100));
   EXPECT_EQ(answer.direction(0), Vector3::UnitY());
   EXPECT_EQ(answer.velocity(1).x(), 0.0);
   EXPECT_EQ(answer.velocity(1).z(), 0.0);
@@ -331,7 +331,7 @@ TEST(SequentialSurface, AGrazingImpactNeverBecomesALeaving) {
                          .restitution = 0.5,
                          .perturbation = 0.2,
                          .key = key});
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(contact_solver_with(100));
     EXPECT_LT(Vector3(10, -0.5, 0).dot(answer.direction(0)), 0.0);
     EXPECT_GT(answer.impulse(0).y(), 0.0);
   }

@@ -12,9 +12,9 @@ namespace gravitas {
 namespace {
 
 // Numbers that are the same in every standard library.
-class Draw {
+class EnergyDraw {
  public:
-  explicit Draw(std::uint64_t seed) : engine_(seed) {}
+  explicit EnergyDraw(std::uint64_t seed) : engine_(seed) {}
   double between(double low, double high) {
     return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
   }
@@ -37,7 +37,7 @@ class Draw {
 
 // Boxes and balls of mixed masses, flying into each other and the ground at several points at once.
 SolverProblem random_impact(std::uint64_t seed, double friction, double restitution) {
-  Draw draw(seed);
+  EnergyDraw draw(seed);
   SolverProblem problem;
   const auto ground = problem.add_immovable();
   const std::uint32_t count = 2 + draw.below(4);

@@ -13,7 +13,7 @@ namespace {
 
 const Vector3 kDown(0.0, -9.81, 0.0);
 
-SequentialSolver solver_with(std::uint32_t iterations, double correction_factor = 1.0) {
+SequentialSolver joint_solver_with(std::uint32_t iterations, double correction_factor = 1.0) {
   return SequentialSolver(SequentialSettings{iterations, correction_factor});
 }
 
@@ -54,7 +54,7 @@ SolverProblem pendulum(const Vector3& spin = {0.3, -0.2, 2.0}) {
 
 TEST(SequentialJoint, APendulumsPointStandsStill) {
   const SolverProblem problem = pendulum();
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_LE(relative_velocity(problem, answer, 0).norm(), 1e-14);
   // one sweep of each relaxation solves it, the second sees nothing left
@@ -71,7 +71,7 @@ TEST(SequentialJoint, TheErrorGoesByTheCorrection) {
       d.point2 = {1e-3, -2e-3, 5e-4};
       d.correction = correction;
       problem.add_discrepancy(kNone, bob, d);
-      const SolverAnswer answer = problem.solve(solver_with(100, factor));
+      const SolverAnswer answer = problem.solve(joint_solver_with(100, factor));
       const Vector3 left = committed_error(problem, answer, 0);
       const Vector3 expected = (1.0 - factor * correction) * d.point2;
       // second order in the correction's turn of 1e-3 rad
@@ -93,7 +93,7 @@ TEST(SequentialJoint, TheErrorOfAStepIsOfSecondOrder) {
                                        .angular = {0, 0, 2.0}});
     problem.make_trial(kDown);
     problem.add_discrepancy(kNone, bob, problem.joint_at(kNone, bob, Vector3::Zero()));
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(joint_solver_with(100));
     const double left = committed_error(problem, answer, 0).norm();
     if (previous > 0.0) {
       EXPECT_LE(left, previous / 12.0);
@@ -120,7 +120,7 @@ TEST(SequentialJoint, TwoBodiesConserveMomentumWhateverTheirError) {
     d.point1 = {0.7, 0.1, 0.3};
     d.point2 = Vector3(0.7, 0.1, 0.3) + gap * Vector3(0.6, -0.8, 0.3);
     problem.add_discrepancy(a, b, d);
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(joint_solver_with(100));
     EXPECT_LE((problem.momentum(answer.linear_velocity) - problem.momentum(problem.trial_linear_velocity)).norm(),
               5e-15);
     EXPECT_LE((problem.turning_momentum(answer.linear_velocity, answer.angular_velocity) -
@@ -156,7 +156,7 @@ SolverProblem hinge(double apart, const Vector3& spin) {
 TEST(SequentialJoint, AHingeWithSixRowsOfRankFiveConverges) {
   for (const double apart : {1.0, 0.1, 0.001}) {
     const SolverProblem problem = hinge(apart, {0.5, 3.0, -0.4});
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(joint_solver_with(100));
     EXPECT_TRUE(answer.converged()) << apart;
     EXPECT_LE(answer.iterations[0], 8U);
     // the rows of points that lie close differ by their distance: rounding grows by its inverse
@@ -171,7 +171,7 @@ TEST(SequentialJoint, AHingeWithSixRowsOfRankFiveConverges) {
 TEST(SequentialJoint, ARigidJointOfThreePointsHoldsAllSixWays) {
   SolverProblem problem = hinge(0.5, {0.5, 3.0, -0.4});
   problem.add_discrepancy(0, 1, problem.joint_at(0, 1, {0.3, 0.0, 0.4}));
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_LE((answer.turning(1) - answer.turning(0)).norm(), 1e-13);
   for (std::size_t row = 0; row < 3; ++row) EXPECT_LE(relative_velocity(problem, answer, row).norm(), 1e-14);
@@ -192,7 +192,7 @@ Discrepancy turning_drive(const Vector3& axis, double speed, double torque) {
 TEST(SequentialJoint, AMotorReachesItsSpeed) {
   SolverProblem problem = hinge(0.2, {0, 0, 0});
   problem.add_discrepancy(0, 1, turning_drive(Vector3::UnitY(), 7.0, kUnlimited));
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_LE(answer.iterations[0], 16U);
   EXPECT_NEAR((answer.turning(1) - answer.turning(0)).y(), 7.0, 1e-13);
@@ -216,7 +216,7 @@ TEST(SequentialJoint, AMotorOfRedundantPointsReachesItsSpeed) {
     d.velocity = speed * tangent;
     problem.add_discrepancy(0, 1, d);
   }
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_NEAR((answer.turning(1) - answer.turning(0)).y(), speed, 1e-2);
   for (std::size_t row = 0; row < 2; ++row) EXPECT_LE(relative_velocity(problem, answer, row).norm(), 1e-13);
@@ -227,7 +227,7 @@ TEST(SequentialJoint, AMotorPushesNoHarderThanItMay) {
   const auto wheel = problem.add_body({.mass = 1.0, .moments = {0.2, 0.5, 0.2}});
   const double torque = 4.0;
   problem.add_discrepancy(kNone, wheel, turning_drive(Vector3::UnitY(), 100.0, torque));
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_NEAR(answer.turning(wheel).y(), torque * problem.time_step / 0.5, 1e-16);
   EXPECT_NEAR(answer.discrepancy_impulse[0], torque * problem.time_step, 1e-17);
 }
@@ -239,7 +239,7 @@ TEST(SequentialJoint, AWeakLockSlips) {
   Discrepancy d = problem.joint_at(kNone, body, Vector3::Zero());
   d.maximum_force = Vector3::Constant(10.0);
   problem.add_discrepancy(kNone, body, d);
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_NEAR(answer.velocity(body).x(), 1.0 - 10.0 * problem.time_step / 2.0, 1e-15);
   // F h^2/m of way
   EXPECT_NEAR(answer.translation(body).x(), -10.0 * 1e-4 / 2.0, 1e-17);
@@ -252,7 +252,7 @@ TEST(SequentialJoint, ADampedDriveIsALinearDamper) {
   d.modes = pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree);
   d.damping = {50.0, 0, 0};
   problem.add_discrepancy(kNone, body, d);
-  const SolverAnswer answer = problem.solve(solver_with(100));
+  const SolverAnswer answer = problem.solve(joint_solver_with(100));
   // implicit: v = v* / (1 + h d/m)
   EXPECT_NEAR(answer.velocity(body).x(), 3.0 / (1.0 + 0.01 * 50.0 / 2.0), 1e-15);
 }
@@ -272,7 +272,7 @@ TEST(SequentialJoint, ALimitStopsAndNeverPulls) {
     Discrepancy at = d;
     at.point2 = problem.trial_pose(body).position;
     problem.add_discrepancy(kNone, body, at);
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(joint_solver_with(100));
     return std::pair(problem.committed(answer, body).position.x(), answer.velocity(body).x());
   };
   // within: untouched, bit for bit
@@ -296,7 +296,7 @@ TEST(SequentialJoint, AUnilateralRowNeverPulls) {
     d.axes = axes_along(Vector3::UnitY());
     d.modes = pack_modes(AxisMode::kUnilateral, AxisMode::kFree, AxisMode::kFree);
     problem.add_discrepancy(kNone, body, d);
-    return problem.solve(solver_with(100));
+    return problem.solve(joint_solver_with(100));
   };
   EXPECT_EQ(solved(2.0).velocity(0).y(), 2.0);
   EXPECT_EQ(solved(2.0).discrepancy_impulse[0], 0.0);
@@ -317,7 +317,7 @@ TEST(SequentialJoint, ARodKeepsItsLengthAndARopeGoesSlack) {
     d.lower = {lower, 0, 0};
     d.upper = {1.0, 0, 0};
     problem.add_discrepancy(kNone, bob, d);
-    const SolverAnswer answer = problem.solve(solver_with(100));
+    const SolverAnswer answer = problem.solve(joint_solver_with(100));
     return std::pair(problem.committed(answer, bob).position.y(), answer.velocity(bob).y());
   };
   // a rod holds both ways
@@ -346,7 +346,7 @@ TEST(SequentialJoint, ACompliantRowIsTheImplicitSpring) {
       d.compliance = {1.0 / stiffness, 0, 0};
       d.damping = {damping, 0, 0};
       problem.add_discrepancy(kNone, body, d);
-      const SolverAnswer answer = problem.solve(solver_with(100));
+      const SolverAnswer answer = problem.solve(joint_solver_with(100));
       // m (v' - v) = -h (k (x + h v') + c v')
       const double expected = (v - h * stiffness * x / mass) / (1.0 + (h * damping + h * h * stiffness) / mass);
       EXPECT_NEAR(answer.velocity(body).x(), expected, 1e-13 * (1.0 + std::fabs(expected)))
@@ -368,7 +368,7 @@ TEST(SequentialJoint, ASoftLimitPushesOnlyOutsideIt) {
     d.upper = {1.0, 0, 0};
     d.compliance = {1e-3, 0, 0};
     problem.add_discrepancy(kNone, body, d);
-    return problem.solve(solver_with(100)).velocity(body).x();
+    return problem.solve(joint_solver_with(100)).velocity(body).x();
   };
   EXPECT_EQ(pushed(0.5), 0.0);
   // k e h/(m + k h^2)
@@ -387,7 +387,7 @@ TEST(SequentialJoint, AChainHangsAtItsTension) {
     const std::uint32_t above = i == 0 ? kNone : i - 1;
     problem.add_discrepancy(above, i, problem.joint_at(above, i, {0, -1.0 * i, 0}));
   }
-  const SolverAnswer answer = problem.solve(solver_with(20000));
+  const SolverAnswer answer = problem.solve(joint_solver_with(20000));
   EXPECT_TRUE(answer.converged());
   for (std::uint32_t i = 0; i < links; ++i) {
     EXPECT_LE(answer.velocity(i).norm(), 1e-12);

@@ -8,7 +8,7 @@
 namespace gravitas::test {
 namespace {
 
-const double kAbsent = std::nan("");
+const double kDefaultCell = std::nan("");
 
 // CellSize and CleanupInterval.
 std::vector<double> settings(double cell_size) { return {cell_size, 1.0}; }
@@ -22,7 +22,7 @@ TEST(GridSpace, NamesEachPairOnce) {
 }
 
 TEST(GridSpace, DeclaresItsSettings) {
-  PluginUnderTest grid("space_grid", settings(kAbsent));
+  PluginUnderTest grid("space_grid", settings(kDefaultCell));
   const PluginDeclaration& declared = grid.declaration();
   EXPECT_EQ(declared.name, "Grid");
   ASSERT_EQ(declared.properties.size(), 2U);

@@ -12,7 +12,7 @@ namespace gravitas::test {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-const double kAbsent = std::nan("");
+const double kAbsentSetting = std::nan("");
 
 struct Choice {
   std::string title, library;
@@ -22,7 +22,7 @@ struct Choice {
 const std::vector<Choice>& choices() {
   static const std::vector<Choice> all = {
       {"Basic", "space_basic", {}},
-      {"GridOfDefaultCells", "space_grid", {kAbsent, 60}},
+      {"GridOfDefaultCells", "space_grid", {kAbsentSetting, 60}},
       {"GridOfFineCells", "space_grid", {0.25, 3}},
       {"GridOfUnitCells", "space_grid", {1.0, 1}},
       {"GridOfCoarseCells", "space_grid", {1000.0, 1e9}},

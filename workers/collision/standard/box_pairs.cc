@@ -23,7 +23,7 @@
 namespace gravitas::collision {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
 constexpr std::array<int, 3> kNext = {1, 2, 0};
 constexpr std::array<int, 3> kAfterNext = {2, 0, 1};
@@ -225,7 +225,7 @@ class BoxPair {
     const double shortfall = face_preference(pair_, face.depth);
     EdgeAxis edges = axes_.shallowest_edges(face.depth - shortfall);
     if (edges.depth < -margin_) return;
-    if (edges.depth < kInfinity) {
+    if (edges.depth < kNoBound) {
       if (!add_edges(edges)) add_closest(edges.normal);
       return;
     }
@@ -236,7 +236,7 @@ class BoxPair {
     const FaceAxis& least = least_is_b ? of_b : of_a;
     edges = axes_.shallowest_edges(least.depth);
     if (edges.depth < -margin_) return;
-    if (edges.depth < kInfinity) {
+    if (edges.depth < kNoBound) {
       if (add_edges(edges)) return;
     } else if (least_is_b != prefers_b && add_face(least_is_b, least, tie)) {
       return;

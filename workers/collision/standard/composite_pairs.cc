@@ -17,7 +17,7 @@ namespace {
 // count as none.
 constexpr double kFlat = 0.03;
 constexpr double kLevel = 1e-7;
-constexpr double kFacePreference = 0.01;
+constexpr double kPatchPreference = 0.01;
 
 // ---- normals of a mesh
 
@@ -103,7 +103,9 @@ void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, con
 bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const TriangleSide* other, const Separation& least,
                    Vector3* normal, bool* is_least) {
   const double tie = std::max(1e-7 * pair.thinnest(), 1e-14 * pair.reach());
-  const auto within = [&](double depth) { return least.depth >= depth - tie - kFacePreference * std::max(depth, 0.0); };
+  const auto within = [&](double depth) {
+    return least.depth >= depth - tie - kPatchPreference * std::max(depth, 0.0);
+  };
   const auto allows = [&](const Vector3& n) {
     return a.kind(n) == NormalKind::kOwn && (other == nullptr || other->kind(-n) == NormalKind::kOwn);
   };

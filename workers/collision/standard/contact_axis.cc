@@ -16,7 +16,7 @@ namespace {
 
 // Cross products of unit vectors shorter than this are dropped. The edge contacts they stand for
 // are slivers: leaving one out costs less than 1e-8 of an edge length in depth.
-constexpr double kParallel = 1e-8;
+constexpr double kParallelEdges = 1e-8;
 
 constexpr double kFacePreference = 0.01;
 
@@ -46,7 +46,7 @@ void offer_edge_axes(ShallowestAxis* search) {
   const ConvexPair& pair = search->pair();
   for (int i = 0; i < 3; ++i) {
     if (!is_box(pair.a) && i != 1) continue;
-    search->offer(Vector3::Unit(i).cross(pair.R_AB.col(1)), kParallel);
+    search->offer(Vector3::Unit(i).cross(pair.R_AB.col(1)), kParallelEdges);
   }
 }
 
@@ -58,7 +58,7 @@ void offer_vertices_against_side(ShallowestAxis* search) {
     const Vector3 vertex((i & 1) ? -pair.a.size.x() : pair.a.size.x(), (i & 2) ? -pair.a.size.y() : pair.a.size.y(),
                          (i & 4) ? -pair.a.size.z() : pair.a.size.z());
     const Vector3 arm = vertex - pair.p_AB;
-    search->offer(arm - axis * axis.dot(arm), kParallel * pair.reach);
+    search->offer(arm - axis * axis.dot(arm), kParallelEdges * pair.reach);
   }
 }
 

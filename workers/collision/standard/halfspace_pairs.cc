@@ -15,14 +15,14 @@ namespace gravitas::collision {
 namespace {
 
 // The boundary plane in world axes, relative to the origin of the bounded body.
-struct Plane {
+struct Ground {
   Vector3 normal;
   Vector3 origin;
 
   double height(const Vector3& x) const { return normal.dot(x - origin); }
 };
 
-void add_point(const Plane& plane, const Vector3& x, FeatureCode code, ContactCandidates* out) {
+void add_point(const Ground& plane, const Vector3& x, FeatureCode code, ContactCandidates* out) {
   const double depth = -plane.height(x);
   out->add({x + (0.5 * depth) * plane.normal, -plane.normal, depth, contact_feature(code, 0)});
 }
@@ -33,7 +33,7 @@ ContactCandidates candidates_for(const Shape& bounded, double margin) {
 }
 
 // the four rim points of a cap
-void add_cap(const Plane& plane, const Rim& rim, bool bottom, ContactCandidates* out) {
+void add_cap(const Ground& plane, const Rim& rim, bool bottom, ContactCandidates* out) {
   const auto depth_towards = [&](const Vector3& direction) {
     return -plane.height(rim.centre + rim.radius * direction);
   };
@@ -46,7 +46,7 @@ void add_cap(const Plane& plane, const Rim& rim, bool bottom, ContactCandidates*
 }  // namespace
 
 void collide_box_halfspace(const Shape& a, const Shape&, const Placement& placement, double margin, Manifold* out) {
-  const Plane plane{placement.R_WB.col(1), placement.p_AB_W};
+  const Ground plane{placement.R_WB.col(1), placement.p_AB_W};
   const Vector3 down_A = -(placement.R_WA.transpose() * plane.normal);
   int facing = 0;
   down_A.cwiseAbs().maxCoeff(&facing);
@@ -67,7 +67,7 @@ void collide_box_halfspace(const Shape& a, const Shape&, const Placement& placem
 
 void collide_cylinder_halfspace(const Shape& a, const Shape&, const Placement& placement, double margin,
                                 Manifold* out) {
-  const Plane plane{placement.R_WB.col(1), placement.p_AB_W};
+  const Ground plane{placement.R_WB.col(1), placement.p_AB_W};
   const Vector3 axis = placement.R_WA.col(1);
   const double axis_rise = axis.dot(plane.normal);
   const bool bottom = axis_rise >= 0.0;

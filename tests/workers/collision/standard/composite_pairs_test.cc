@@ -11,7 +11,6 @@ namespace {
 
 using namespace test;  // NOLINT(google-build-using-namespace): the fixture of these tests
 using gravitas::test::RandomShapes;
-using Kind = SceneShape::Kind;
 
 // Every place of a path over the edges and corners of a level field, 1 mm deep: the normal is up, the depth 1 mm.
 TEST(Mesh, FlushTrianglesHaveNoEdges) {
@@ -59,7 +58,7 @@ TEST(Mesh, BoxOfTrianglesAnswersAsTheBox) {
   const Vector3 half(1.0, 0.7, 1.3);
   const Shape& mesh = shapes.box_mesh(half);
   const Shape solid = box(half.x(), half.y(), half.z());
-  for (const Kind kind : gravitas::test::kConvexKinds) {
+  for (const SceneShape::Kind kind : gravitas::test::kConvexKinds) {
     for (int i = 0; i < 150; ++i) {
       const Shape& other = shapes.random(kind, &random);
       // brought to touch the box, then 1 mm into it, or out

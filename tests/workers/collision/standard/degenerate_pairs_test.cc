@@ -15,7 +15,6 @@ namespace {
 using namespace test;  // NOLINT(google-build-using-namespace): the fixture of these tests
 using gravitas::test::kConvexKinds;
 using gravitas::test::RandomShapes;
-using Kind = SceneShape::Kind;
 
 constexpr double kRoot = 1.41421356237309504880;
 
@@ -37,24 +36,25 @@ double reach_along(const Shape& shape, const Quaternion& q, const Vector3& n) {
 }
 
 // Of each kind one that is 2 m high and reaches 0.5 m to the sides, standing on its end.
-const Shape& standing(Kind kind, Shapes* shapes) {
-  if (kind == Kind::kConvexPolyhedron) return shapes->box_hull({0.5, 1.0, 0.5});
-  if (kind == Kind::kSphere) return shapes->primitive(kind, Vector3::Constant(1.0));
-  return shapes->primitive(kind, kind == Kind::kCapsule ? Vector3(0.5, 0.5, 0.5) : Vector3(0.5, 1.0, 0.5));
+const Shape& standing(SceneShape::Kind kind, Shapes* shapes) {
+  if (kind == SceneShape::Kind::kConvexPolyhedron) return shapes->box_hull({0.5, 1.0, 0.5});
+  if (kind == SceneShape::Kind::kSphere) return shapes->primitive(kind, Vector3::Constant(1.0));
+  return shapes->primitive(kind, kind == SceneShape::Kind::kCapsule ? Vector3(0.5, 0.5, 0.5) : Vector3(0.5, 1.0, 0.5));
 }
 
 TEST(DegeneratePairs, WhatTouchesExactlyHasNoDepth) {
   Shapes shapes;
-  const Shape &ground = shapes.primitive(Kind::kBox, {4, 1, 4}), &hull = shapes.box_hull({4, 1, 4}),
-              &mesh = shapes.box_mesh({4, 1, 4}), &plane = shapes.primitive(Kind::kHalfspace, Vector3::Ones());
-  for (const Kind kind : kConvexKinds) {
+  const Shape &ground = shapes.primitive(SceneShape::Kind::kBox, {4, 1, 4}), &hull = shapes.box_hull({4, 1, 4}),
+              &mesh = shapes.box_mesh({4, 1, 4}),
+              &plane = shapes.primitive(SceneShape::Kind::kHalfspace, Vector3::Ones());
+  for (const SceneShape::Kind kind : kConvexKinds) {
     const Shape& body = standing(kind, &shapes);
     for (const Shape* const below : {&ground, &hull, &mesh, &plane}) {
       SCOPED_TRACE(testing::Message() << "kind " << static_cast<int>(kind) << " on " << static_cast<int>(below->type));
       const Pose X_below = below == &plane ? at(0, 1, 0) : at(0, 0, 0);
       const ContactList contacts = all_contacts(*below, X_below, body, at(0.25, 2, -0.125), 1e-9);
       ASSERT_GT(contacts.size(), 0U);
-      EXPECT_EQ(contacts.size(), kind == Kind::kSphere || kind == Kind::kCapsule ? 1U : 4U);
+      EXPECT_EQ(contacts.size(), kind == SceneShape::Kind::kSphere || kind == SceneShape::Kind::kCapsule ? 1U : 4U);
       for (std::size_t i = 0; i < contacts.size(); ++i) {
         EXPECT_NEAR(contacts[i].depth, 0.0, 4e-15);
         EXPECT_NEAR(contacts[i].normal.y(), 1.0, 1e-14);
@@ -66,7 +66,8 @@ TEST(DegeneratePairs, WhatTouchesExactlyHasNoDepth) {
 
 TEST(DegeneratePairs, CornerOnCorner) {
   Shapes shapes;
-  const Shape &box = shapes.primitive(Kind::kBox, Vector3::Ones()), &hull = shapes.box_hull(Vector3::Ones());
+  const Shape &box = shapes.primitive(SceneShape::Kind::kBox, Vector3::Ones()),
+              &hull = shapes.box_hull(Vector3::Ones());
   for (const auto& [a, b] : {std::pair(&box, &box), std::pair(&box, &hull), std::pair(&hull, &hull)}) {
     for (const double gap : {0.0, 1e-9, 1e-3}) {
       const ContactList contacts = all_contacts(*a, at(0, 0, 0), *b, at(2 + gap, 2 + gap, 2 + gap), 0.1);
@@ -88,7 +89,7 @@ TEST(DegeneratePairs, CornerOnCorner) {
 
 TEST(DegeneratePairs, ParallelEdges) {
   Shapes shapes;
-  const Shape &box = shapes.primitive(Kind::kBox, {1, 1, 2}), &hull = shapes.box_hull({1, 1, 2});
+  const Shape &box = shapes.primitive(SceneShape::Kind::kBox, {1, 1, 2}), &hull = shapes.box_hull({1, 1, 2});
   for (const auto& [a, b] : {std::pair(&box, &box), std::pair(&box, &hull), std::pair(&hull, &hull)}) {
     for (const double gap : {1e-3, 0.0, -1e-3}) {
       // edges along z, one above the other, overlapping over 3 m
@@ -113,7 +114,8 @@ TEST(DegeneratePairs, NearlyParallelEdges) {
   RandomShapes random(61);
   for (const double angle : {1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-12, 1e-16}) {
     for (int i = 0; i < 300; ++i) {
-      const Shape &a = shapes.random(Kind::kBox, &random), &b = shapes.random(Kind::kBox, &random);
+      const Shape &a = shapes.random(SceneShape::Kind::kBox, &random),
+                  &b = shapes.random(SceneShape::Kind::kBox, &random);
       const Pose X_A{random.vector(-3, 3), random.rotation()};
       Pose X_B{X_A.position + random.uniform(0.5, 3.0) * random.direction(),
                Quaternion(Eigen::AngleAxisd(angle, random.direction())) * X_A.orientation};
@@ -135,9 +137,9 @@ TEST(DegeneratePairs, NearlyParallelEdges) {
 TEST(DegeneratePairs, WhatIsInsideLeavesByTheShortestWay) {
   Shapes shapes;
   RandomShapes random(62);
-  const Shape &room = shapes.primitive(Kind::kBox, {20, 20, 20}), &hull = shapes.box_hull({20, 20, 20}),
-              &column = shapes.primitive(Kind::kCylinder, {20, 60, 20});
-  for (const Kind kind : kConvexKinds) {
+  const Shape &room = shapes.primitive(SceneShape::Kind::kBox, {20, 20, 20}), &hull = shapes.box_hull({20, 20, 20}),
+              &column = shapes.primitive(SceneShape::Kind::kCylinder, {20, 60, 20});
+  for (const SceneShape::Kind kind : kConvexKinds) {
     for (int i = 0; i < 40; ++i) {
       const Shape& inner = shapes.random(kind, &random);
       const Pose X_I{{17, random.uniform(-3, 3), random.uniform(-3, 3)}, random.rotation()};
@@ -159,12 +161,14 @@ TEST(DegeneratePairs, WhatIsInsideLeavesByTheShortestWay) {
 TEST(DegeneratePairs, NeedlesAndSheetsStandAndLie) {
   Shapes shapes;
   constexpr double kThin = 1e-6, kSunk = 1e-7;
-  const Shape& ground = shapes.primitive(Kind::kBox, {4, 1, 4});
-  const auto box_of = [&](Kind kind, const Vector3& half) -> const Shape& {
-    return kind == Kind::kConvexPolyhedron ? shapes.box_hull(half) : shapes.primitive(kind, half);
+  const Shape& ground = shapes.primitive(SceneShape::Kind::kBox, {4, 1, 4});
+  const auto box_of = [&](SceneShape::Kind kind, const Vector3& half) -> const Shape& {
+    return kind == SceneShape::Kind::kConvexPolyhedron ? shapes.box_hull(half) : shapes.primitive(kind, half);
   };
-  for (const Kind kind : {Kind::kBox, Kind::kConvexPolyhedron, Kind::kCylinder, Kind::kCone, Kind::kCapsule}) {
-    const bool is_round = kind == Kind::kCapsule;
+  for (const SceneShape::Kind kind :
+       {SceneShape::Kind::kBox, SceneShape::Kind::kConvexPolyhedron, SceneShape::Kind::kCylinder,
+        SceneShape::Kind::kCone, SceneShape::Kind::kCapsule}) {
+    const bool is_round = kind == SceneShape::Kind::kCapsule;
     // half heights: of the needle upright, of the sheet flat
     const Shape &needle = box_of(kind, {kThin, 1.0, kThin}), &sheet = box_of(kind, {1.0, kThin, 1.0});
     const double up = is_round ? 1.0 + kThin : 1.0, flat = is_round ? 1.0 + kThin : kThin;
@@ -174,7 +178,7 @@ TEST(DegeneratePairs, NeedlesAndSheetsStandAndLie) {
       EXPECT_NEAR(contacts.deepest(), kSunk, 1e-13) << static_cast<int>(kind);
       EXPECT_NEAR(contacts[0].normal.y(), 1.0, 1e-12);
     }
-    if (kind == Kind::kCone) continue;
+    if (kind == SceneShape::Kind::kCone) continue;
     // the needle lying, turned about the vertical
     const Quaternion lying = Quaternion(Eigen::AngleAxisd(0.7, Vector3::UnitY())) *
                              Quaternion(Eigen::AngleAxisd(0.5 * EIGEN_PI, Vector3::UnitZ()));
@@ -192,7 +196,8 @@ TEST(DegeneratePairs, NeedlesAndSheetsInAnyPoseHaveTheLeastDepth) {
   for (const Vector3& size_a : sizes) {
     for (const Vector3& size_b : sizes) {
       for (int i = 0; i < 400; ++i) {
-        const Shape &a = shapes.primitive(Kind::kBox, size_a), &b = shapes.primitive(Kind::kBox, size_b);
+        const Shape &a = shapes.primitive(SceneShape::Kind::kBox, size_a),
+                    &b = shapes.primitive(SceneShape::Kind::kBox, size_b);
         const Pose X_A{random.vector(-3, 3), random.rotation()};
         const Pose X_B{X_A.position + random.uniform(0.0, 2.0) * random.direction(), random.rotation()};
         const double least = least_depth(a, X_A, b, X_B);

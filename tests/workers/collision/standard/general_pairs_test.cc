@@ -12,7 +12,6 @@ namespace {
 
 using namespace test;  // NOLINT(google-build-using-namespace): the fixture of these tests
 using gravitas::test::RandomShapes;
-using Kind = SceneShape::Kind;
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -99,8 +98,9 @@ TEST(GeneralPairs, HullOfABoxAnswersAsTheBox) {
 TEST(GeneralPairs, SeparationByTheDepthLeavesThemTouching) {
   Shapes shapes;
   RandomShapes random(42);
-  for (const Kind kind_a : {Kind::kCapsule, Kind::kCone, Kind::kConvexPolyhedron}) {
-    for (const Kind kind_b : gravitas::test::kConvexKinds) {
+  for (const SceneShape::Kind kind_a :
+       {SceneShape::Kind::kCapsule, SceneShape::Kind::kCone, SceneShape::Kind::kConvexPolyhedron}) {
+    for (const SceneShape::Kind kind_b : gravitas::test::kConvexKinds) {
       for (int i = 0; i < 60; ++i) {
         const Shape &a = shapes.random(kind_a, &random), &b = shapes.random(kind_b, &random);
         const Pose X_A{random.vector(-5, 5), random.rotation()};
@@ -122,8 +122,9 @@ TEST(GeneralPairs, SeparationByTheDepthLeavesThemTouching) {
 TEST(GeneralPairs, SwapTurnAndShiftChangeNothing) {
   Shapes shapes;
   RandomShapes random(43);
-  for (const Kind kind_a : {Kind::kCapsule, Kind::kCone, Kind::kConvexPolyhedron}) {
-    for (const Kind kind_b : gravitas::test::kConvexKinds) {
+  for (const SceneShape::Kind kind_a :
+       {SceneShape::Kind::kCapsule, SceneShape::Kind::kCone, SceneShape::Kind::kConvexPolyhedron}) {
+    for (const SceneShape::Kind kind_b : gravitas::test::kConvexKinds) {
       for (int i = 0; i < 40; ++i) {
         const Shape &a = shapes.random(kind_a, &random), &b = shapes.random(kind_b, &random);
         const Pose X_A{random.vector(-5, 5), random.rotation()};
@@ -156,7 +157,8 @@ TEST(GeneralPairs, SwapTurnAndShiftChangeNothing) {
 TEST(GeneralPairs, AskTheHeapForNothing) {
   Shapes shapes;
   RandomShapes random(44);
-  const Shape &a = shapes.random(Kind::kCone, &random), &b = shapes.random(Kind::kConvexPolyhedron, &random);
+  const Shape &a = shapes.random(SceneShape::Kind::kCone, &random),
+              &b = shapes.random(SceneShape::Kind::kConvexPolyhedron, &random);
   Manifold manifold;
   const long before = gravitas::test::allocation_count();
   for (int i = 0; i < 50; ++i)

@@ -1,0 +1,62 @@
+#include "plugin_sdk/joint_load.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <numbers>
+#include <vector>
+
+#include "plugin_sdk/constraint.h"
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+namespace {
+
+TEST(JointLoad, HeldBackIsTheWayThatTheImpulseKeptFrom) {
+  Discrepancy d;
+  const JointBody world;
+  JointBody point, rod;
+  point.inverse_mass = rod.inverse_mass = 0.5;
+  // a point of 2 kg from the world: g h^2
+  const double h = 0.01, g = 9.81;
+  EXPECT_DOUBLE_EQ(held_back(d, Vector3(0, 2.0 * g * h, 0), world, point, h), g * h * h);
+  // across the end of a rod of length 1 a quarter of the mass is felt, along it all
+  rod.trial.position = Vector3(0.5, 0, 0);
+  rod.inverse_moments = Vector3(0, 6, 6);
+  EXPECT_NEAR(held_back(d, Vector3::UnitY(), world, rod, h), h * 4 * 0.5, 1e-16);
+  EXPECT_NEAR(held_back(d, Vector3::UnitX(), world, rod, h), h * 0.5, 1e-16);
+  // either end of a pair
+  EXPECT_NEAR(held_back(d, -Vector3::UnitY(), rod, rod, h), h * 8 * 0.5, 1e-16);
+  d.modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked, true);
+  EXPECT_EQ(held_back(d, Vector3::UnitY(), world, rod, h), 0.0);
+}
+
+// The principal axes turn with the body: the same rod along y.
+TEST(JointLoad, HeldBackKnowsHowTheBodyLies) {
+  JointBody rod;
+  rod.inverse_mass = 0.5;
+  rod.inverse_moments = Vector3(0, 6, 6);
+  rod.trial = {Vector3(0, 0.5, 0), exp_rotation(Vector3(0, 0, std::numbers::pi / 2))};
+  EXPECT_NEAR(held_back(Discrepancy{}, Vector3::UnitX(), JointBody{}, rod, 0.01), 0.01 * 4 * 0.5, 1e-16);
+  EXPECT_NEAR(held_back(Discrepancy{}, Vector3::UnitY(), JointBody{}, rod, 0.01), 0.01 * 0.5, 1e-16);
+}
+
+// A pair of rods end to end, held by two rows at one point that share the load; the second row is off by 1 mm.
+TEST(JointLoad, OfAJointIsItsWorstRowAndTheSumOfItsForces) {
+  const std::vector<double> point(6, 0.0), moved{0, 0, 0, 0, 1e-3, 0}, zero(6, 0.0), correction(2, 1.0);
+  const std::vector<double> axes{1, 0, 0, 0, 1, 0, 0, 0}, impulses{3, 0, 0, 0, 4, 0};
+  const std::vector<double> unlimited(6, kUnlimited);
+  const std::uint32_t locked = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked);
+  const std::vector<std::uint32_t> modes{locked, locked};
+  const DiscrepancyColumns columns{point, moved, zero, correction, axes, modes, zero, zero, zero, zero, unlimited};
+  JointBody one, two;
+  one.inverse_mass = two.inverse_mass = 0.5;
+  const JointRows rows{columns, impulses, 0, 2};
+  const JointLoad load = joint_load(rows, one, two, 0.01);
+  EXPECT_DOUBLE_EQ(load.error, 1e-3);
+  EXPECT_DOUBLE_EQ(load.force, 500.0);
+  EXPECT_DOUBLE_EQ(held_back(rows, one, two, 0.01), 4.0 * 0.01);
+}
+
+}  // namespace
+}  // namespace gravitas
