@@ -368,19 +368,6 @@ void judge_ray_hostile(Subject& subject) {
   expect_hostile_numbers_survived(subject, "rays at a row of bodies", kRays, many_rays(subject, 86), {}, hash_shapes);
 }
 
-// An optional method that is not declared.
-Case unknown_case(const char* name, stage::Method method) {
-  return make_case(name, "What is not declared is not answered.", [method](Subject& subject) {
-    const Answer answer = subject.ask(method, [&] {
-      MessageColumns nothing = empty_request(method);
-      nothing.u32("shape_parameter_begin") = {0};
-      return nothing;
-    }());
-    if (answer.fault.empty() && answer.status == GRAVITAS_UNKNOWN_METHOD) return;
-    throw Finding("a method whose capability is not declared: must be answered as unknown");
-  });
-}
-
 }  // namespace
 
 std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration) {
