@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "plugin_sdk/checks.h"
 
@@ -91,6 +92,11 @@ void check_request(const stage::CollisionRaysRequest& request) {
   }
 }
 
+void check_request(const stage::CollisionDebugGeometryRequest& request) {
+  if (!(request.extent() >= 0.0) || !std::isfinite(request.extent()))
+    throw Refusal("the extent is negative, or no finite number");
+}
+
 void write_contact(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
                    std::size_t pair, const ContactPoint& contact) {
   const auto velocity = [&](std::uint32_t body) {
@@ -128,6 +134,39 @@ void write_hit(const stage::CollisionRaysReply& reply, std::size_t candidate, co
   reply.hit_candidate().push(static_cast<std::uint32_t>(candidate));
   reply.distance().push(hit.distance);
   push(reply.normal(), hit.normal);
+}
+
+void write_outline(const stage::CollisionDebugGeometryReply& reply, std::size_t shape,
+                   std::span<const LineSegment> lines) {
+  for (const LineSegment& line : lines) {
+    if (!line[0].allFinite() || !line[1].allFinite())
+      throw Refusal("a line of shape " + std::to_string(shape) + " is not finite: sizes overflow");
+    reply.line_shape().push(shape);
+    push(reply.line_from(), line[0]);
+    push(reply.line_to(), line[1]);
+  }
+}
+
+void write_debug_geometry(const stage::CollisionDebugGeometryRequest& request,
+                          const stage::CollisionDebugGeometryReply& reply, std::size_t shape, const SceneShape& known) {
+  if ((request.kinds() & kOutlines) != 0) {
+    std::vector<LineSegment> lines;
+    append_outline(known, {}, request.extent(), &lines);
+    write_outline(reply, shape, lines);
+  }
+  if ((request.kinds() & kTrees) == 0) return;
+  std::vector<OutlineNode> nodes;
+  append_tree(known, {}, &nodes);
+  for (const OutlineNode& node : nodes) {
+    if (!node.pose.position.allFinite() || !node.half_extents.allFinite())
+      throw Refusal("a node of shape " + std::to_string(shape) + " is not finite: sizes overflow");
+    const Quaternion& q = node.pose.orientation;
+    reply.node_shape().push(shape);
+    reply.node_depth().push(node.depth);
+    push(reply.node_centre(), node.pose.position);
+    push(reply.node_half_extents(), node.half_extents);
+    reply.node_orientation().push(q.w(), q.x(), q.y(), q.z());
+  }
 }
 
 }  // namespace gravitas::collision

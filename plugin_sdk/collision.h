@@ -6,6 +6,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/geometry/manifold.h"
+#include "plugin_sdk/geometry/outline.h"
 #include "plugin_sdk/geometry/ray.h"
 #include "plugin_sdk/geometry/time_of_impact.h"
 #include "plugin_sdk/math/motion.h"
@@ -60,17 +61,26 @@ inline Ray ray_of(const stage::CollisionRaysRequest& request, std::uint32_t ray)
   return {vector_at(request.origin(), ray), vector_at(request.direction(), ray), request.length()[ray]};
 }
 
+// Bits of CollisionDebugGeometryRequest.kinds.
+enum DebugKind : std::uint32_t { kOutlines = 1U << 0, kTrees = 1U << 1 };
+
 // The pairs (or candidates) name bodies with shapes, the margin (or target) is one, and every number of a body is
 // finite; of rays, that they exist and have unit directions; of motions, that they turn
-// by no more than 1e4 rad and stay within 1e100 m.
+// by no more than 1e4 rad and stay within 1e100 m; the extent of debug geometry is finite and not negative.
 void check_request(const stage::CollisionManifoldsRequest& request);
 void check_request(const stage::CollisionTimesOfImpactRequest& request);
 void check_request(const stage::CollisionRaysRequest& request);
+void check_request(const stage::CollisionDebugGeometryRequest& request);
 
 // Appends a contact of a pair, with the velocity of b relative to a at its point.
 void write_contact(const stage::CollisionManifoldsRequest& request, const stage::CollisionManifoldsReply& reply,
                    std::size_t pair, const ContactPoint& contact);
 void write_impact(const stage::CollisionTimesOfImpactReply& reply, std::size_t pair, const Impact& impact);
 void write_hit(const stage::CollisionRaysReply& reply, std::size_t candidate, const RayHit& hit);
+// Appends what is asked for of a shape of the scene language, or the lines of another one.
+void write_debug_geometry(const stage::CollisionDebugGeometryRequest& request,
+                          const stage::CollisionDebugGeometryReply& reply, std::size_t shape, const SceneShape& known);
+void write_outline(const stage::CollisionDebugGeometryReply& reply, std::size_t shape,
+                   std::span<const LineSegment> lines);
 
 }  // namespace gravitas::collision

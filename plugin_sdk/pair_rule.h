@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "plugin_sdk/body.h"
@@ -24,6 +25,16 @@ constexpr bool may_touch(const TouchRights& a, const TouchRights& b) {
 
 // True if any two of the bodies may touch. Cost: n log n, and quadratic in how many differ.
 bool can_any_touch(std::vector<TouchRights> bodies);
+
+// True if a structure may rely on the bounds of a body: lower <= upper, and so far from the largest number that extents
+// can be multiplied. The rest (unbounded, upside down, not a number) is for the rules alone: such a body is tested
+// against all.
+inline bool has_regular_bounds(std::span<const double> lower, std::span<const double> upper, std::uint32_t body) {
+  constexpr double kFarthest = 1e100;  // m
+  for (std::size_t k = 3 * std::size_t{body}; k < 3 * std::size_t{body} + 3; ++k)
+    if (!(lower[k] <= upper[k] && lower[k] >= -kFarthest && upper[k] <= kFarthest)) return false;
+  return true;
+}
 
 // True if bodies a and b both have shapes, one of them can be pushed, their filters allow it, and their closed
 // bounds overlap.
@@ -51,16 +62,9 @@ class PairRule {
   std::uint32_t bodies() const { return static_cast<std::uint32_t>(flags_.size()); }
   bool has_shape(std::uint32_t body) const { return (flags_[body] & kHasShape) != 0; }
 
-  // True if a structure may rely on the bounds: lower <= upper, and so far from the largest number that extents can be
-  // multiplied. The rest (unbounded, upside down, not a number) is for the rule alone: such a body is tested against all.
-  bool is_regular(std::uint32_t body) const {
-    for (std::size_t k = 3 * std::size_t{body}; k < 3 * std::size_t{body} + 3; ++k)
-      if (!(lower_[k] <= upper_[k] && lower_[k] >= -kFarthest && upper_[k] <= kFarthest)) return false;
-    return true;
-  }
+  bool is_regular(std::uint32_t body) const { return has_regular_bounds(lower_, upper_, body); }
 
  private:
-  static constexpr double kFarthest = 1e100;  // m
   std::span<const double> lower_, upper_;
   std::span<const std::uint32_t> flags_;
   std::span<const std::uint64_t> group_, mask_;

@@ -27,9 +27,25 @@ const char* slot_name(Slot slot) {
 
 bool SpacePlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
                            Host& host) {
-  if (method != stage::Method::kSpacePairs) return false;
-  pairs(stage::SpacePairsRequest(request), stage::SpacePairsReply(reply), host);
-  return true;
+  switch (method) {
+    case stage::Method::kSpacePairs:
+      pairs(stage::SpacePairsRequest(request), stage::SpacePairsReply(reply), host);
+      return true;
+    case stage::Method::kSpaceRays:
+      rays(stage::SpaceRaysRequest(request), stage::SpaceRaysReply(reply), host);
+      return true;
+    case stage::Method::kSpaceDebugGeometry:
+      debug_geometry(stage::SpacePairsRequest(request), stage::SpaceDebugGeometryReply(reply), host);
+      return true;
+    default:
+      return false;
+  }
+}
+
+void SpacePlugin::rays(const stage::SpaceRaysRequest&, const stage::SpaceRaysReply&, Host&) { throw UnknownMethod(); }
+
+void SpacePlugin::debug_geometry(const stage::SpacePairsRequest&, const stage::SpaceDebugGeometryReply&, Host&) {
+  throw UnknownMethod();
 }
 
 bool CollisionPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
@@ -44,6 +60,9 @@ bool CollisionPlugin::dispatch(stage::Method method, const gravitas_column* requ
     case stage::Method::kCollisionRays:
       rays(stage::CollisionRaysRequest(request), stage::CollisionRaysReply(reply), host);
       return true;
+    case stage::Method::kCollisionDebugGeometry:
+      debug_geometry(stage::CollisionDebugGeometryRequest(request), stage::CollisionDebugGeometryReply(reply), host);
+      return true;
     default:
       return false;
   }
@@ -55,6 +74,11 @@ void CollisionPlugin::times_of_impact(const stage::CollisionTimesOfImpactRequest
 }
 
 void CollisionPlugin::rays(const stage::CollisionRaysRequest&, const stage::CollisionRaysReply&, Host&) {
+  throw UnknownMethod();
+}
+
+void CollisionPlugin::debug_geometry(const stage::CollisionDebugGeometryRequest&,
+                                     const stage::CollisionDebugGeometryReply&, Host&) {
   throw UnknownMethod();
 }
 

@@ -127,6 +127,10 @@ class SpacePlugin {
   static constexpr Slot kSlot = Slot::kSpace;
   virtual ~SpacePlugin() = default;
   virtual void pairs(const stage::SpacePairsRequest& request, const stage::SpacePairsReply& reply, Host& host) = 0;
+  // Optional: a plugin that overrides one of these declares the capability of its name, and is asked only then.
+  virtual void rays(const stage::SpaceRaysRequest& request, const stage::SpaceRaysReply& reply, Host& host);
+  virtual void debug_geometry(const stage::SpacePairsRequest& request, const stage::SpaceDebugGeometryReply& reply,
+                              Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 
@@ -140,6 +144,8 @@ class CollisionPlugin {
   virtual void times_of_impact(const stage::CollisionTimesOfImpactRequest& request,
                                const stage::CollisionTimesOfImpactReply& reply, Host& host);
   virtual void rays(const stage::CollisionRaysRequest& request, const stage::CollisionRaysReply& reply, Host& host);
+  virtual void debug_geometry(const stage::CollisionDebugGeometryRequest& request,
+                              const stage::CollisionDebugGeometryReply& reply, Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -198,6 +199,7 @@ std::uint64_t schema_hash(const std::vector<const pb::FileDescriptor*>& files) {
 int generate(const std::vector<const pb::FileDescriptor*>& files, const std::string& out_path) {
   std::ostringstream classes, infos, methods, table;
   unsigned method_number = 0;
+  std::set<std::string> written;
   for (const pb::FileDescriptor* file : files) {
     for (int s = 0; s < file->service_count(); ++s) {
       const pb::ServiceDescriptor& service = *file->service(s);
@@ -210,7 +212,9 @@ int generate(const std::vector<const pb::FileDescriptor*>& files, const std::str
           return 1;
         write_info(infos, "k" + name + "RequestColumns", request);
         write_info(infos, "k" + name + "ReplyColumns", reply);
-        write_request(classes, method.input_type()->name(), request);
+        // two methods may ask with the same message
+        if (written.insert(method.input_type()->name()).second)
+          write_request(classes, method.input_type()->name(), request);
         write_reply(classes, method.output_type()->name(), reply);
         methods << "  k" << name << " = " << method_number++ << ",\n";
         table << "    {\"" << service.name() << '.' << method.name() << "\", \"/" << service.full_name() << '/'

@@ -447,6 +447,7 @@ std::vector<Case> collision_cases(const PluginDeclaration& declaration) {
                 judge_collision_hostile),
   };
   std::ranges::move(moving_collision_cases(declaration), std::back_inserter(cases));
+  std::ranges::move(collision_geometry_cases(declaration), std::back_inserter(cases));
   return cases;
 }
 
@@ -457,6 +458,7 @@ std::vector<Question> collision_questions(Subject& subject, Draw* draw) {
     questions.push_back({"a lattice of " + std::to_string(count) + " bodies", kManifolds, world.request(), {}});
   }
   std::ranges::move(moving_collision_questions(subject), std::back_inserter(questions));
+  std::ranges::move(collision_geometry_questions(subject.declaration()), std::back_inserter(questions));
   return questions;
 }
 

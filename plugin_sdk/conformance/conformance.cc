@@ -49,7 +49,7 @@ std::vector<Question> questions_of_slot(Subject& subject, std::uint64_t seed) {
   Draw draw(seed);
   switch (subject.declaration().slot) {
     case Slot::kSpace:
-      return space_questions(&draw);
+      return space_questions(subject.declaration(), &draw);
     case Slot::kCollision:
       return collision_questions(subject, &draw);
     case Slot::kConstraint:

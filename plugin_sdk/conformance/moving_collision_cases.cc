@@ -14,7 +14,7 @@ namespace gravitas::conformance {
 namespace {
 
 constexpr stage::Method kTimes = stage::Method::kCollisionTimesOfImpact;
-constexpr stage::Method kRays = stage::Method::kCollisionRays;
+constexpr stage::Method kShapeRays = stage::Method::kCollisionRays;
 constexpr double kTarget = 1e-6;  // m
 constexpr const char* kConvex[] = {"Sphere", "Box", "Cylinder", "Capsule", "Cone", "ConvexPolyhedron"};
 
@@ -51,7 +51,7 @@ struct RayQuestion {
 };
 
 MessageColumns rays_request(const Solids& world, const std::vector<RayQuestion>& rays) {
-  MessageColumns columns = with_shapes(kRays, world);
+  MessageColumns columns = with_shapes(kShapeRays, world);
   for (std::uint32_t i = 0; i < rays.size(); ++i) {
     append(&columns.f64("origin"), rays[i].origin);
     append(&columns.f64("direction"), rays[i].direction);
@@ -330,7 +330,7 @@ void judge_known_hits(Subject& subject) {
       world.bodies = {{.solid = 0, .pose = frame}};
       const RayQuestion ray{transform_point(frame, one.ray.origin),
                             (frame.orientation * one.ray.direction).normalized(), one.ray.length};
-      const MessageColumns reply = inquiry.answer(kRays, rays_request(world, {ray}));
+      const MessageColumns reply = inquiry.answer(kShapeRays, rays_request(world, {ray}));
       inquiry.expect_unit("normal", reply.f64("normal"), 3);
       const std::vector<double>& distance = reply.f64("distance");
       inquiry.expect(distance.size() == (one.distance < 0.0 ? 0U : 1U),
@@ -351,34 +351,22 @@ MessageColumns many_rays(Subject& subject, std::uint64_t seed) {
   return rays_request(world, rays);
 }
 
-void judge_ray_refusals(Subject& subject) {
+void judge_shape_ray_refusals(Subject& subject) {
   const MessageColumns good = many_rays(subject, 85);
-  expect_foreign_indices_refused(subject, "rays at a row of bodies", kRays, good);
+  expect_foreign_indices_refused(subject, "rays at a row of bodies", kShapeRays, good);
   MessageColumns bad = good;
   Inquiry inquiry(subject, "a ray of negative length");
   bad.f64("length")[0] = -1.0;
-  inquiry.demand_refusal(kRays, bad);
+  inquiry.demand_refusal(kShapeRays, bad);
   bad = good;
   bad.f64("direction")[0] = 2.0;
   inquiry.now_asked("a ray whose direction is no unit vector");
-  inquiry.demand_refusal(kRays, bad);
+  inquiry.demand_refusal(kShapeRays, bad);
 }
 
 void judge_ray_hostile(Subject& subject) {
-  expect_hostile_numbers_survived(subject, "rays at a row of bodies", kRays, many_rays(subject, 86), {}, hash_shapes);
-}
-
-// An optional method that is not declared.
-Case unknown_case(const char* name, stage::Method method) {
-  return make_case(name, "What is not declared is not answered.", [method](Subject& subject) {
-    const Answer answer = subject.ask(method, [&] {
-      MessageColumns nothing = empty_request(method);
-      nothing.u32("shape_parameter_begin") = {0};
-      return nothing;
-    }());
-    if (answer.fault.empty() && answer.status == GRAVITAS_UNKNOWN_METHOD) return;
-    throw Finding("a method whose capability is not declared: must be answered as unknown");
-  });
+  expect_hostile_numbers_survived(subject, "rays at a row of bodies", kShapeRays, many_rays(subject, 86), {},
+                                  hash_shapes);
 }
 
 }  // namespace
@@ -405,13 +393,13 @@ std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration) {
   if (has_capability(declaration, "rays")) {
     cases.push_back(make_case("collision/rays_known", "Closed forms: where rays meet shapes, and that others miss.",
                               judge_known_hits));
-    cases.push_back(
-        make_case("collision/rays_refusals", "Rays and bodies that do not exist are refused.", judge_ray_refusals));
+    cases.push_back(make_case("collision/rays_refusals", "Rays and bodies that do not exist are refused.",
+                              judge_shape_ray_refusals));
     cases.push_back(make_case("collision/rays_hostile",
                               "Hostile numbers are refused with a reason, or answered with finite ones.",
                               judge_ray_hostile));
   } else {
-    cases.push_back(unknown_case("collision/rays_unknown", kRays));
+    cases.push_back(unknown_case("collision/rays_unknown", kShapeRays));
   }
   return cases;
 }
@@ -422,7 +410,7 @@ std::vector<Question> moving_collision_questions(Subject& subject) {
     questions.push_back(
         {"a row of bodies on their way", kTimes, times_request(mixed_flight(subject, 87), kTarget), {}});
   if (has_capability(subject.declaration(), "rays"))
-    questions.push_back({"rays at a row of bodies", kRays, many_rays(subject, 88), {}});
+    questions.push_back({"rays at a row of bodies", kShapeRays, many_rays(subject, 88), {}});
   return questions;
 }
 

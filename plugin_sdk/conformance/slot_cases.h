@@ -12,14 +12,22 @@ std::vector<Case> space_cases(const PluginDeclaration& declaration);
 std::vector<Case> collision_cases(const PluginDeclaration& declaration);
 // Of the optional methods of slot collision.
 std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration);
+// Of the optional question for debug geometry.
+std::vector<Case> collision_geometry_cases(const PluginDeclaration& declaration);
+std::vector<Case> space_geometry_cases(const PluginDeclaration& declaration);
 std::vector<Case> constraint_cases(const PluginDeclaration& declaration);
 std::vector<Case> force_cases(const PluginDeclaration& declaration);
 std::vector<Case> solver_cases(const PluginDeclaration& declaration);
 std::vector<Case> integrator_cases(const PluginDeclaration& declaration);
 
-std::vector<Question> space_questions(Draw* draw);
+// That an optional method is not answered whose capability is not declared.
+Case unknown_case(const char* name, stage::Method method);
+
+std::vector<Question> space_questions(const PluginDeclaration& declaration, Draw* draw);
 std::vector<Question> collision_questions(Subject& subject, Draw* draw);
 std::vector<Question> moving_collision_questions(Subject& subject);
+std::vector<Question> collision_geometry_questions(const PluginDeclaration& declaration);
+std::vector<Question> space_geometry_questions(const PluginDeclaration& declaration);
 std::vector<Question> constraint_questions(Subject& subject, Draw* draw);
 std::vector<Question> force_questions(Subject& subject, Draw* draw);
 std::vector<Question> solver_questions(Draw* draw);

@@ -1,5 +1,6 @@
-// Slot space: every answer against brute force with the one rule (plugin_sdk/pair_rule.h).
+// Slot space: every answer against brute force with the one rule (plugin_sdk/pair_rule.h; of rays, ray_rule.h).
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <set>
 #include <utility>
@@ -7,13 +8,16 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/conformance/hostile_numbers.h"
 #include "plugin_sdk/conformance/inquiry.h"
+#include "plugin_sdk/conformance/sample_values.h"
 #include "plugin_sdk/conformance/slot_cases.h"
 #include "plugin_sdk/pair_rule.h"
+#include "plugin_sdk/ray_rule.h"
 
 namespace gravitas::conformance {
 namespace {
 
 constexpr stage::Method kPairs = stage::Method::kSpacePairs;
+constexpr stage::Method kRays = stage::Method::kSpaceRays;
 constexpr double kInfiniteLength = std::numeric_limits<double>::infinity();
 constexpr std::uint32_t kBall = kMovable | kHasShape;
 constexpr std::uint64_t kEverything = ~std::uint64_t{0};
@@ -232,10 +236,84 @@ void judge_space_hostile(Subject& subject) {
   }
 }
 
+// ---- rays
+
+void add_ray(MessageColumns* request, const Vector3& origin, const Vector3& direction, double length) {
+  append(&request->f64("origin"), origin);
+  append(&request->f64("direction"), direction);
+  request->f64("length").push_back(length);
+}
+
+MessageColumns rays_at(const Bodies& bodies, std::uint32_t rays, Draw* draw) {
+  MessageColumns request = empty_request(kRays);
+  request.f64("lower") = bodies.request.f64("lower");
+  request.f64("upper") = bodies.request.f64("upper");
+  request.u32("flags") = bodies.request.u32("flags");
+  for (std::uint32_t i = 0; i < rays; ++i) {
+    // some along an axis, which takes another way through the rule
+    const Vector3 direction = i % 4 == 3 ? Vector3(Vector3::Unit(static_cast<int>(i / 4 % 3))) : draw->direction();
+    add_ray(&request, draw->vector(4.0), direction, draw->uniform(0.0, 8.0));
+  }
+  return request;
+}
+
+void expect_met(Subject& subject, const std::string& scene, const MessageColumns& request) {
+  const std::vector<gravitas_column> columns = request.plain();
+  const RayRule meets{stage::SpaceRaysRequest(columns.data())};
+  std::vector<std::uint32_t> right;
+  for (std::uint32_t ray = 0; ray < meets.rays(); ++ray)
+    for (std::uint32_t body = 0; body < meets.bodies(); ++body)
+      if (meets(ray, body)) right.insert(right.end(), {ray, body});
+  Inquiry inquiry(subject, std::to_string(meets.rays()) + " rays, " + std::to_string(meets.bodies()) +
+                               " bodies: " + scene + " (candidates as ray, body)");
+  inquiry.expect_equal("candidate", inquiry.answer(kRays, request).u32("candidate"), right);
+}
+
+void judge_rays(Subject& subject) {
+  Draw draw(19);
+  for (const std::uint32_t count : {0U, 1U, 10U, 300U}) {
+    Bodies bodies = crowd(count, &draw);
+    bodies.add_ground();
+    bodies.add(Vector3::Constant(-1.0), Vector3::Constant(1.0), kMovable);
+    expect_met(subject, "a random crowd over a ground, one without shape", rays_at(bodies, 40, &draw));
+  }
+  // what only touches a face, an edge or a corner is met, and an origin inside counts
+  Bodies lattice;
+  for (int x = 0; x < 3; ++x)
+    for (int y = 0; y < 3; ++y) lattice.add({1.0 * x, 1.0 * y, 0.0}, {x + 1.0, y + 1.0, 1.0});
+  MessageColumns request = rays_at(lattice, 0, &draw);
+  add_ray(&request, {-1, 1, 0.5}, Vector3::UnitX(), 10.0);
+  add_ray(&request, {-1, 1, 1}, Vector3::UnitX(), 2.0);
+  add_ray(&request, {1.5, 1.5, 0.5}, Vector3::UnitZ(), 0.0);
+  add_ray(&request, {-1, 0.5, 0.5}, -Vector3::UnitX(), 10.0);
+  expect_met(subject, "rays along the faces and edges of a lattice", request);
+}
+
+void judge_ray_refusals(Subject& subject) {
+  Draw draw(20);
+  const MessageColumns good = rays_at(crowd(8, &draw), 4, &draw);
+  Inquiry inquiry(subject, "a ray of negative length");
+  MessageColumns bad = good;
+  bad.f64("length")[1] = -1.0;
+  inquiry.demand_refusal(kRays, bad);
+  bad = good;
+  bad.f64("direction")[3] = 2.0;
+  inquiry.now_asked("a ray whose direction is no unit vector");
+  inquiry.demand_refusal(kRays, bad);
+  expect_hostile_numbers_survived(subject, "rays at 8 balls", kRays, good);
+}
+
+std::vector<Case> ray_cases(const PluginDeclaration& declaration) {
+  if (!has_capability(declaration, "rays")) return {unknown_case("space/rays_unknown", kRays)};
+  return {make_case("space/rays", "Rays meet exactly the bounds of brute force.", judge_rays),
+          make_case("space/rays_refusals", "Impossible rays are refused, hostile ones refused or answered.",
+                    judge_ray_refusals)};
+}
+
 }  // namespace
 
-std::vector<Case> space_cases(const PluginDeclaration&) {
-  return {
+std::vector<Case> space_cases(const PluginDeclaration& declaration) {
+  std::vector<Case> cases = {
       make_case("space/few", "Of no body or one there is no pair.", judge_few),
       make_case("space/random", "A crowd has exactly the pairs of brute force.", judge_random),
       make_case("space/coincident", "Bodies in one place are all pairs.", judge_space_coincident),
@@ -249,15 +327,21 @@ std::vector<Case> space_cases(const PluginDeclaration&) {
       make_case("space/nan", "Bounds that are no numbers are refused, or pair with nothing.", judge_nan),
       make_case("space/hostile", "Hostile bounds are refused, or answered by the rule.", judge_space_hostile),
   };
+  std::ranges::move(ray_cases(declaration), std::back_inserter(cases));
+  std::ranges::move(space_geometry_cases(declaration), std::back_inserter(cases));
+  return cases;
 }
 
-std::vector<Question> space_questions(Draw* draw) {
+std::vector<Question> space_questions(const PluginDeclaration& declaration, Draw* draw) {
   std::vector<Question> questions;
   for (const std::uint32_t count : {1U, 12U, 300U}) {
     Bodies bodies = crowd(count, draw);
     bodies.add_ground();
     questions.push_back({"a crowd of " + std::to_string(count) + " over a ground", kPairs, bodies.request, {}});
+    if (has_capability(declaration, "rays"))
+      questions.push_back({"rays at a crowd of " + std::to_string(count), kRays, rays_at(bodies, 2 * count, draw), {}});
   }
+  std::ranges::move(space_geometry_questions(declaration), std::back_inserter(questions));
   return questions;
 }
 

@@ -8,11 +8,14 @@
 #include <memory>
 
 #include "services/cli/commands.h"
+#include "services/cli/query_text.h"
 #include "services/control/client.h"
 #include "services/control/server_socket.h"
 #include "services/control/status_text.h"
+#include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
+#include "services/survey/picture.h"
 
 namespace gravitas::cli {
 namespace {
@@ -26,6 +29,8 @@ struct CtlLine {
   std::uint32_t steps = 1, captured_steps = 100;
   std::string text;  // what a swap, a setting, a fault or a slot is
   std::string out;
+  QueryText query;
+  std::vector<std::string> kinds;
 };
 
 using Order = std::function<int(const CtlLine&, ControlClient*)>;
@@ -131,6 +136,33 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
   return kExaminedFailed;
 }
 
+int query(const CommandLine& line, ControlClient* client) {
+  const query::v1::Batch batch = parse_query(line.query);
+  const query::v1::Answers answers = client->query(batch);
+  std::cout << (line.json ? to_json(answers, JsonForm::kPage) : answers_text(answers));
+  return kDone;
+}
+
+int show_instrumentation(const CommandLine& line, ControlClient* client) {
+  api::InstrumentationRequest request;
+  for (const std::string& kind : line.kinds) request.add_kinds(kind);
+  const instrumentation::v1::Frame frame = client->instrumentation(request);
+  for (const std::string& reason : frame.missing()) std::cerr << "gravitas ctl: missing: " << reason << '\n';
+  const bool is_picture = line.out.ends_with(".svg");
+  const std::string text =
+      is_picture ? survey::picture(frame, client->status().scene()) : to_json(frame, JsonForm::kLine);
+  if (line.out.empty()) {
+    std::cout << text;
+    return kDone;
+  }
+  try {
+    write_text_file(line.out, text, "instrumentation");
+  } catch (const std::system_error& problem) {
+    throw BadInput(problem.what());
+  }
+  return kDone;
+}
+
 // A page that is rewritten in place on a terminal, a line per second elsewhere.
 int watch(const CtlLine& line, ControlClient* client) {
   const bool is_terminal = isatty(STDOUT_FILENO) == 1 && !line.json;
@@ -207,6 +239,22 @@ void add_ctl(CLI::App* app, Action* action) {
   capture_command->add_option("--steps", line->captured_steps, "For so many steps")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  CLI::App* query_command =
+      add("query", "Ask about the bodies where they are now: rays, shape casts, overlap, closest points",
+          "query --ray 0,5,0,0,-1,0 --closest Ball01=0.5", query);
+  query_command->add_option("BATCH", line->query.batch,
+                            "A batch as JSON (schemas/gravitas/query/v1/query.proto), or @FILE that holds one");
+  const auto add_questions = [&](const char* name, std::vector<std::string>* values, const char* text) {
+    query_command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
+  };
+  add_questions("--ray", &line->query.rays, "X,Y,Z,DX,DY,DZ[,LENGTH]: from where, which way, how far; repeatable");
+  add_questions("--overlap", &line->query.overlaps, "BODY: what it overlaps; repeatable");
+  add_questions("--closest", &line->query.closest, "BODY=DISTANCE: what is within that distance, m; repeatable");
+  query_command->add_flag("--all", line->query.all, "All bodies that a ray meets, not the closest alone");
+  CLI::App* picture = add("instrumentation", "Debug geometry of the state, as JSON or as a picture",
+                          "instrumentation --kinds contact,shape --out now.svg", show_instrumentation);
+  picture->add_option("--kinds", line->kinds, "Kinds, separated by commas; all if absent")->delimiter(',');
+  picture->add_option("--out", line->out, "File: JSON, or a picture if its name ends in .svg");
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
 }
 

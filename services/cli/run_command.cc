@@ -13,6 +13,7 @@
 #include "services/run/fault_spec.h"
 #include "services/run/report.h"
 #include "services/run/session.h"
+#include "services/survey/instrumentation.h"
 
 namespace gravitas::cli {
 namespace {
@@ -127,9 +128,19 @@ void add_run(CLI::App* app, Action* action) {
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
   command->add_option("--sample-every", options.sample_every,
-                      "Interval of the trajectory's samples, s; every step if absent");
+                      "Interval of the samples of trajectory and instrumentation, s; every step if absent");
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
+  CLI::Option* instrumentation = command->add_option(
+      "--instrumentation", options.instrumentation,
+      "Write debug geometry to this file: JSON lines, a frame per sample; NAME.svg: a picture of the last state");
+  std::string kinds;
+  for (const survey::Kind kind : survey::all_kinds()) kinds += (kinds.empty() ? "" : ", ") + survey::kind_name(kind);
+  command
+      ->add_option("--instrumentation-kinds", options.instrumentation_kinds,
+                   "What it shows, separated by commas: " + kinds + "; all if absent")
+      ->delimiter(',')
+      ->needs(instrumentation);
   CLI::Option* checkpoint = command->add_option(
       "--checkpoint", options.checkpoint,
       "Keep a checkpoint in this file (replaced as a whole) and a journal in FILE.journal: at the start, where the run "

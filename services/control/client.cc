@@ -19,6 +19,8 @@ constexpr std::uint32_t kSwapIntervalMs = 20;
 grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // a frame of debug geometry may be large
+  arguments.SetMaxReceiveMessageSize(-1);
   return arguments;
 }
 
@@ -97,6 +99,14 @@ api::InjectOrdered ControlClient::inject(const std::string& fault) {
 
 api::Captured ControlClient::capture(const api::CaptureRequest& request) {
   return connection_->call(&api::Control::Stub::Capture, request);
+}
+
+query::v1::Answers ControlClient::query(const query::v1::Batch& batch) {
+  return connection_->call(&api::Control::Stub::Query, batch);
+}
+
+instrumentation::v1::Frame ControlClient::instrumentation(const api::InstrumentationRequest& request) {
+  return connection_->call(&api::Control::Stub::GetInstrumentation, request);
 }
 
 void ControlClient::watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show) {

@@ -39,6 +39,8 @@ class ControlClient {
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
   api::InjectOrdered inject(const std::string& fault);
   api::Captured capture(const api::CaptureRequest& request);
+  query::v1::Answers query(const query::v1::Batch& batch);
+  instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
   // Until `show` returns false, or the server ends.
   void watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show);
 

@@ -15,6 +15,7 @@
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/scene/parser.h"
+#include "services/survey/queries.h"
 
 namespace gravitas::control {
 namespace {
@@ -53,11 +54,7 @@ const Property* find_property(const kernel::PluginChoice& plugin, const std::str
 
 PropertyValue parse_value(const std::string& what, const std::string& text) {
   try {
-    scene::Parser parser(text, 0, scene::Parser::Words::kBare);
-    PropertyValue value = parser.value(0);
-    if (parser.current().kind == scene::TokenKind::kEnd) return value;
-    throw BadInput(
-        fmt::format("{}: after the value comes {}; allowed: one value", what, scene::shown(parser.current())));
+    return scene::bare_value(text);
   } catch (const scene::SyntaxError& error) {
     throw BadInput(fmt::format("{}: {}", what, error.text));
   }
@@ -85,6 +82,7 @@ void ServedRun::begin_environment() {
   // where the new one cannot be made the old one stays
   auto environment = start(description_, capsule::recording(tape_));
   close_capture();
+  survey_.reset();
   environment_ = std::move(environment);
   events_ = std::make_unique<EventLog>("", description_);
   figures_ = std::make_unique<Figures>(description_);
@@ -401,9 +399,46 @@ void ServedRun::close_capture() {
   }
 }
 
+survey::Surveyor& ServedRun::surveyor() {
+  if (!survey_) {
+    // those who answer now
+    kernel::EnvironmentDescription description = description_;
+    for (const Slot slot : kSlots) description.slot(slot) = active_.slot(slot);
+    survey_.reset(new Survey{survey::Surveyor(description)});
+  }
+  return survey_->surveyor;
+}
+
+query::v1::Answers ServedRun::query(const query::v1::Batch& batch) {
+  return between_steps([&] {
+    try {
+      return survey::answer(&surveyor(), *environment_, batch);
+    } catch (const survey::BadQuestion& problem) {
+      throw BadInput(fmt::format("query: {}", problem.what()));
+    } catch (const survey::NoAnswer& problem) {
+      throw NotNow(fmt::format("query: {}", problem.what()));
+    }
+  });
+}
+
+instrumentation::v1::Frame ServedRun::instrumentation(const api::InstrumentationRequest& request) {
+  std::vector<survey::Kind> kinds;
+  try {
+    for (const std::string& name : request.kinds()) kinds.push_back(survey::find_kind(name));
+  } catch (const std::invalid_argument& problem) {
+    throw BadInput(problem.what());
+  }
+  if (kinds.empty()) kinds = survey::all_kinds();
+  return between_steps([&] {
+    surveyor();
+    return survey_->instrumentation.frame(*environment_, kinds);
+  });
+}
+
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {
   recorder_->on_decision(environment, decision);
   active_.slot(decision.slot).plugins.at(decision.target) = *decision.plugin;
+  if (survey_) survey_->surveyor.follow(decision);
 }
 
 }  // namespace gravitas::control

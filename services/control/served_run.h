@@ -29,6 +29,7 @@
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
 #include "services/run/session.h"
+#include "services/survey/instrumentation.h"
 
 namespace gravitas::control {
 
@@ -70,6 +71,10 @@ class ServedRun final : private kernel::CommitListener {
   // Begins to keep calls. The future is ready when the steps are made, or end_capture() has ended it.
   std::future<api::Captured> capture(const api::CaptureRequest& request);
   void end_capture();
+
+  // Of the state that the last step committed (services/survey/); a run that stands can be asked, too.
+  query::v1::Answers query(const query::v1::Batch& batch);
+  instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -137,6 +142,13 @@ class ServedRun final : private kernel::CommitListener {
   std::optional<Capture> capture_;
 
   std::unique_ptr<kernel::Environment> environment_;
+  // Made with the first question, and anew after a reset; trajectories are drawn from frame to frame.
+  struct Survey {
+    survey::Surveyor surveyor;
+    survey::Instrumentation instrumentation{&surveyor};
+  };
+  survey::Surveyor& surveyor();
+  std::unique_ptr<Survey> survey_;
   State state_ = State::kPaused;
   std::string fault_, checkpoint_;
   std::vector<Order> orders_;

@@ -97,6 +97,13 @@ class ControlServer::Service final : public api::Control::Service {
       *reply = captured.get();
     });
   }
+  grpc::Status Query(grpc::ServerContext*, const query::v1::Batch* request, query::v1::Answers* reply) override {
+    return answered([&] { *reply = run_.query(*request); });
+  }
+  grpc::Status GetInstrumentation(grpc::ServerContext*, const api::InstrumentationRequest* request,
+                                  instrumentation::v1::Frame* reply) override {
+    return answered([&] { *reply = run_.instrumentation(*request); });
+  }
   grpc::Status Watch(grpc::ServerContext* context, const api::WatchRequest* request,
                      grpc::ServerWriter<api::Status>* writer) override {
     return answered([&] {

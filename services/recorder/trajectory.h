@@ -3,9 +3,9 @@
 //
 //   time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz
 //
-// SI units, world frame. Position and orientation are those of the geometry's frame (of the centre of mass where
-// there is no geometry), vx vy vz is the velocity of the centre of mass. Immovable bodies have no rows. Samples:
-// the initial state, then the first step boundary at or after k * interval, and the last state.
+// SI units, world frame. Position and orientation are those of the geometry's frame (of the centre of mass where there
+// is no geometry), vx vy vz is the velocity of the centre of mass. Immovable bodies have no rows. Samples: those of
+// sampling.h.
 #pragma once
 
 #include <cstdio>
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "kernel/environment.h"
+#include "services/recorder/sampling.h"
 
 namespace gravitas {
 
@@ -42,9 +43,7 @@ class TrajectoryWriter {
   std::string path_;
   std::FILE* file_;
   std::vector<Row> rows_;
-  double interval_;
-  std::uint64_t next_sample_ = 0;
-  std::int64_t last_written_ = -1;
+  Sampling sampling_;
 };
 
 }  // namespace gravitas

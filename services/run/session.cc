@@ -31,6 +31,7 @@
 #include "services/scene/build.h"
 #include "services/scene/overrides.h"
 #include "services/scene/reader.h"
+#include "services/survey/frame_file.h"
 
 namespace gravitas {
 namespace {
@@ -188,9 +189,11 @@ class Run final : private kernel::CommitListener {
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
     read_orders();
+    read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
     environment_ = start(begun, options_.starter);
+    if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
     environment_->set_commit_listener(this);
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
@@ -205,6 +208,9 @@ class Run final : private kernel::CommitListener {
       if (!options_.trajectory.empty())
         trajectory_ =
             std::make_unique<TrajectoryWriter>(options_.trajectory, description_, options_.sample_every.value_or(0.0));
+      if (surveyor_)
+        frames_ = std::make_unique<survey::FrameFile>(options_.instrumentation, &*surveyor_, kinds_,
+                                                      options_.sample_every.value_or(0.0));
     } catch (const std::system_error& error) {
       throw BadInput(error.what());
     }
@@ -215,7 +221,7 @@ class Run final : private kernel::CommitListener {
   void go(const std::function<bool()>& interrupted, const std::function<void(const Progress&)>& progress) {
     const Clock::time_point begin = Clock::now();
     guard([&] {
-      if (trajectory_) trajectory_->offer(*environment_, is_done());
+      offer_sample(is_done());
       while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
         if (interrupted()) {
           result_.outcome = RunOutcome::kInterrupted;
@@ -223,7 +229,7 @@ class Run final : private kernel::CommitListener {
           pause(*environment_->fault());
         } else {
           figures_->follow(environment_.get());
-          if (trajectory_) trajectory_->offer(*environment_, is_done());
+          offer_sample(is_done());
           progress({environment_->time(), environment_->time_step() * description_.steps, environment_->step_count(),
                     environment_->total_steps()});
         }
@@ -248,9 +254,10 @@ class Run final : private kernel::CommitListener {
 
   void finish() {
     guard([&] {
-      if (trajectory_ && result_.outcome != RunOutcome::kFailed) trajectory_->offer(*environment_, true);
+      if (result_.outcome != RunOutcome::kFailed) offer_sample(true);
       if (trajectory_) trajectory_->close();
     });
+    guard([&] { close_frames(); });
     guard([&] { events_->close(); });
     write_report();
     guard([&] {
@@ -263,6 +270,31 @@ class Run final : private kernel::CommitListener {
   RunResult take_result() { return std::move(result_); }
 
  private:
+  void read_kinds() {
+    try {
+      for (const std::string& name : options_.instrumentation_kinds) kinds_.push_back(survey::find_kind(name));
+    } catch (const std::invalid_argument& problem) {
+      throw BadInput(fmt::format("--instrumentation-kinds: {}", problem.what()));
+    }
+    if (kinds_.empty()) kinds_ = survey::all_kinds();
+  }
+
+  void offer_sample(bool last) {
+    if (trajectory_) trajectory_->offer(*environment_, last);
+    if (frames_) frames_->offer(*environment_, last);
+  }
+
+  void close_frames() {
+    if (!frames_) return;
+    for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
+    for (const Slot slot : kSlots)
+      for (const kernel::FaultRecord& failed : surveyor_->slot(slot).faults())
+        warnings_.push_back(fmt::format(
+            "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text,
+            failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
+    frames_->close();
+  }
+
   void resume(Resumption* from) {
     const std::string problem = environment_->restore(saved_state_of(&from->checkpoint));
     if (!problem.empty()) throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem));
@@ -330,6 +362,7 @@ class Run final : private kernel::CommitListener {
   }
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
     put_in_force(message_of(decision), &decisions_);
+    if (surveyor_) surveyor_->follow(decision);
     if (recorder_) recorder_->on_decision(environment, decision);
   }
 
@@ -423,6 +456,9 @@ class Run final : private kernel::CommitListener {
   JournalReading journal_;             // of the checkpoint
   std::unique_ptr<TrajectoryWriter> trajectory_;
   std::unique_ptr<EventLog> events_;
+  std::vector<survey::Kind> kinds_;
+  std::optional<survey::Surveyor> surveyor_;
+  std::unique_ptr<survey::FrameFile> frames_;
   std::optional<Recorder> recorder_;
   bool is_unrepeatable_ = false;
   double wall_seconds_ = 0.0;

@@ -104,4 +104,12 @@ void Parser::skip_block(unsigned depth) {
   advance();
 }
 
+PropertyValue bare_value(std::string_view text) {
+  Parser parser(text, 0, Parser::Words::kBare);
+  PropertyValue value = parser.value(0);
+  if (parser.current().kind == TokenKind::kEnd) return value;
+  throw SyntaxError{parser.current().position,
+                    "after the value comes " + shown(parser.current()) + "; allowed: one value"};
+}
+
 }  // namespace gravitas::scene

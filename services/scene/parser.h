@@ -43,4 +43,7 @@ class Parser {
   Words words_;
 };
 
+// One value as a person writes it on a command line, and nothing else. Throws SyntaxError.
+PropertyValue bare_value(std::string_view text);
+
 }  // namespace gravitas::scene

@@ -263,6 +263,20 @@ class MovingCollision final : public CollisionPlugin {
     asked += "times_of_impact ";
   }
   void rays(const stage::CollisionRaysRequest&, const stage::CollisionRaysReply&, Host&) override { asked += "rays "; }
+  void debug_geometry(const stage::CollisionDebugGeometryRequest&, const stage::CollisionDebugGeometryReply&,
+                      Host&) override {
+    asked += "debug_geometry ";
+  }
+};
+class ToySpace final : public SpacePlugin {
+  void pairs(const stage::SpacePairsRequest&, const stage::SpacePairsReply&, Host&) override { asked += "pairs "; }
+};
+class RaySpace final : public SpacePlugin {
+  void pairs(const stage::SpacePairsRequest&, const stage::SpacePairsReply&, Host&) override { asked += "pairs "; }
+  void rays(const stage::SpaceRaysRequest&, const stage::SpaceRaysReply&, Host&) override { asked += "rays "; }
+  void debug_geometry(const stage::SpacePairsRequest&, const stage::SpaceDebugGeometryReply&, Host&) override {
+    asked += "debug_geometry ";
+  }
 };
 class ToyConstraint final : public ConstraintPlugin {
   void bind(const stage::ConstraintBindRequest&, const stage::ConstraintBindReply&, Host&) override {
@@ -310,8 +324,11 @@ std::pair<std::string, int> try_every_method() {
 
 TEST(PluginSlots, EachAnswersItsOwnQuestionsOnly) {
   using Answer = std::pair<std::string, int>;
-  EXPECT_EQ(try_every_method<ToyCollision>(), Answer("manifolds (not the optional one) (not the optional one) ", 1));
-  EXPECT_EQ(try_every_method<MovingCollision>(), Answer("manifolds times_of_impact rays ", 3));
+  const std::string none = "(not the optional one) ";
+  EXPECT_EQ(try_every_method<ToySpace>(), Answer("pairs " + none + none, 1));
+  EXPECT_EQ(try_every_method<RaySpace>(), Answer("pairs rays debug_geometry ", 3));
+  EXPECT_EQ(try_every_method<ToyCollision>(), Answer("manifolds " + none + none + none, 1));
+  EXPECT_EQ(try_every_method<MovingCollision>(), Answer("manifolds times_of_impact rays debug_geometry ", 4));
   EXPECT_EQ(try_every_method<ToyConstraint>(), Answer("bind discrepancies ", 2));
   EXPECT_EQ(try_every_method<ToyForce>(), Answer("wrenches ", 1));
   EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve reactions ", 2));

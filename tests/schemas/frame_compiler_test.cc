@@ -318,9 +318,12 @@ TEST(StageFrames, MethodsAreNumberedAsTheyAreListed) {
     return std::string(stage::kMethods[static_cast<std::uint32_t>(method)].name);
   };
   EXPECT_EQ(name(stage::Method::kSpacePairs), "Space.Pairs");
+  EXPECT_EQ(name(stage::Method::kSpaceRays), "Space.Rays");
+  EXPECT_EQ(name(stage::Method::kSpaceDebugGeometry), "Space.DebugGeometry");
   EXPECT_EQ(name(stage::Method::kCollisionManifolds), "Collision.Manifolds");
   EXPECT_EQ(name(stage::Method::kCollisionTimesOfImpact), "Collision.TimesOfImpact");
   EXPECT_EQ(name(stage::Method::kCollisionRays), "Collision.Rays");
+  EXPECT_EQ(name(stage::Method::kCollisionDebugGeometry), "Collision.DebugGeometry");
   EXPECT_EQ(name(stage::Method::kConstraintBind), "Constraint.Bind");
   EXPECT_EQ(name(stage::Method::kConstraintDiscrepancies), "Constraint.Discrepancies");
   EXPECT_EQ(name(stage::Method::kForceWrenches), "Force.Wrenches");

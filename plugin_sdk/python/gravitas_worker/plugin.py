@@ -56,13 +56,20 @@ class Plugin:
 
 
 class Space(Plugin):
-    slot, methods = "space", {"Pairs": "pairs"}
+    # rays and debug_geometry are asked only of plugins that declare the capability of that name
+    slot = "space"
+    methods = {"Pairs": "pairs", "Rays": "rays", "DebugGeometry": "debug_geometry"}
 
 
 class Collision(Plugin):
-    # times_of_impact and rays are asked only of plugins that declare the capability of that name
+    # the last three are asked only of plugins that declare the capability of that name
     slot = "collision"
-    methods = {"Manifolds": "manifolds", "TimesOfImpact": "times_of_impact", "Rays": "rays"}
+    methods = {
+        "Manifolds": "manifolds",
+        "TimesOfImpact": "times_of_impact",
+        "Rays": "rays",
+        "DebugGeometry": "debug_geometry",
+    }
 
 
 class Constraint(Plugin):

@@ -436,5 +436,43 @@ TEST(ServerSocket, IsPrivateAndRemovesWhatItMade) {
   EXPECT_THROW(ServerSocket(folder.path("none/control.sock")), BadInput);
 }
 
+// Whatever is asked between two steps, the run ends where nobody asked it.
+TEST(ServedRun, AnswersQuestionsAboutItsState) {
+  Served served;
+  served.client.step(10);
+  query::v1::Batch batch;
+  query::v1::Ray* ray = batch.add_rays();
+  for (const double number : {0.0, 100.0, 0.0}) ray->add_origin(number);
+  for (const double number : {0.0, -1.0, 0.0}) ray->add_direction(number);
+  ray->set_hits(query::v1::HITS_ALL);
+  const query::v1::Answers answers = served.client.query(batch);
+  EXPECT_EQ(answers.step(), 10U);
+  ASSERT_EQ(answers.rays_size(), 1);
+  ASSERT_GT(answers.rays(0).hits_size(), 0);
+
+  // from the body that was met it is as far back
+  const query::v1::RayHit& hit = answers.rays(0).hits(0);
+  EXPECT_NEAR(hit.point(1), 100.0 - hit.distance(), 1e-9);
+
+  api::InstrumentationRequest kinds;
+  kinds.add_kinds("bounds");
+  const instrumentation::v1::Frame frame = served.client.instrumentation(kinds);
+  EXPECT_EQ(frame.step(), 10U);
+  EXPECT_GT(frame.boxes_size(), 0);
+  EXPECT_EQ(frame.lines_size(), 0);
+
+  batch.mutable_rays(0)->mutable_filter()->add_only("Nobody");
+  try {
+    served.client.query(batch);
+    FAIL();
+  } catch (const ControlError& error) {
+    EXPECT_EQ(error.kind, ControlError::Kind::kRefused);
+    EXPECT_THAT(error.what(), HasSubstr("rays[0].filter.only: there is no body 'Nobody'"));
+  }
+  kinds.add_kinds("bound");
+  EXPECT_THROW(served.client.instrumentation(kinds), ControlError);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
 }  // namespace
 }  // namespace gravitas::control

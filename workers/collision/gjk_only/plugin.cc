@@ -36,7 +36,7 @@ class GjkOnly final : public CollisionPlugin {
                                .version = "1.1",
                                .slot = Slot::kCollision,
                                .meaning = "Every convex shape by its support points alone.",
-                               .capabilities = {"times_of_impact", "rays"},
+                               .capabilities = {"times_of_impact", "rays", "debug_geometry"},
                                .types = scene_shape_types()};
     std::erase_if(declared.types,
                   [](const TypeDeclaration& type) { return type.name == "TriangleMesh" || type.name == "Compound"; });
@@ -90,6 +90,14 @@ class GjkOnly final : public CollisionPlugin {
       const std::optional<RayHit> hit = shape.exact ? cast_ray(*shape.exact, ray) : cast_ray(*shape.shape, ray);
       if (hit) collision::write_hit(reply, i, hit_from(placed, *hit));
     }
+  }
+
+  void debug_geometry(const stage::CollisionDebugGeometryRequest& request,
+                      const stage::CollisionDebugGeometryReply& reply, Host&) override {
+    collision::check_request(request);
+    const collision::ShapeColumns shapes = collision::shapes_of(request);
+    for (std::size_t i = 0; i < shapes.shape_type.size(); ++i)
+      collision::write_debug_geometry(request, reply, i, *make(shapes.shape_type[i], shapes.parameters(i), i).shape);
   }
 
  private:

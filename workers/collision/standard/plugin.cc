@@ -24,7 +24,7 @@ class Standard final : public CollisionPlugin {
             .meaning =
                 "Closed forms where there are any, separating axes and clipping, distance and expanding polytopes "
                 "elsewhere.",
-            .capabilities = {"times_of_impact", "rays"},
+            .capabilities = {"times_of_impact", "rays", "debug_geometry"},
             .types = declared_shapes()};
   }
   explicit Standard(PropertyCursor) {}
@@ -82,6 +82,24 @@ class Standard final : public CollisionPlugin {
     });
     for (std::size_t i = 0; i < hits_.size(); ++i)
       if (hits_[i]) write_hit(reply, i, *hits_[i]);
+  }
+
+  // Asked seldom, and once of each shape: nothing is kept.
+  void debug_geometry(const stage::CollisionDebugGeometryRequest& request,
+                      const stage::CollisionDebugGeometryReply& reply, Host& host) override {
+    check_request(request);
+    const ShapeColumns shapes = shapes_of(request);
+    for (std::size_t i = 0; i < shapes.shape_type.size(); ++i) {
+      host.mark_progress();
+      const StoredShape stored = read_shape(shapes.shape_type[i], shapes.parameters(i), i);
+      if (stored.scene_shape) {
+        write_debug_geometry(request, reply, i, *stored.scene_shape);
+      } else if ((request.kinds() & kOutlines) != 0) {
+        std::vector<LineSegment> lines;
+        append_outline(*stored.map, {}, &lines);
+        write_outline(reply, i, lines);
+      }
+    }
   }
 
  private:

@@ -2,6 +2,7 @@
 #include "plugin_sdk/plugin.h"
 
 #include "plugin_sdk/pair_rule.h"
+#include "plugin_sdk/ray_rule.h"
 
 namespace gravitas {
 namespace {
@@ -12,7 +13,8 @@ class BasicSpace final : public SpacePlugin {
     return {.name = "Basic",
             .version = "1.0",
             .slot = Slot::kSpace,
-            .meaning = "Tests every pair of bodies: O(n^2), the reference for all other spaces."};
+            .meaning = "Tests every pair of bodies: O(n^2), the reference for all other spaces.",
+            .capabilities = {"rays"}};
   }
   explicit BasicSpace(PropertyCursor) {}
 
@@ -25,6 +27,10 @@ class BasicSpace final : public SpacePlugin {
       for (std::uint32_t b = a + 1; b < bodies; ++b)
         if (is_pair(a, b)) pair.push(a, b);
     }
+  }
+
+  void rays(const stage::SpaceRaysRequest& request, const stage::SpaceRaysReply& reply, Host& host) override {
+    test_rays_against_all(request, reply, host);
   }
 };
 

@@ -63,6 +63,20 @@ class BoundingTree {
     node_mark_.assign(node_mark_.size(), 0);
   }
 
+  // Calls visit(level, box) for every node that holds bodies, level by level.
+  template <typename Visit>
+  void visit_nodes(Visit&& visit) const {
+    for (std::uint32_t level = 0; level <= levels_; ++level)
+      for (std::uint32_t i = 0; i < 1U << level; ++i)
+        if (place(level, i) < place(level, i + 1)) visit(level, node_box_[node(level, i)]);
+  }
+
+  // Calls found(body) for the bodies of all leaves that lie in nodes whose boxes meets(box) accepts.
+  template <typename Meets, typename Found>
+  void visit_met(Meets&& meets, Found&& found) const {
+    if (!body_.empty()) visit_met(0, 0, meets, found);
+  }
+
   // Sum of the edges of all nodes' boxes, m: what finding pairs costs grows with it. Written by build() and refit().
   double edges() const { return edges_; }
 
@@ -81,6 +95,17 @@ class BoundingTree {
   std::uint32_t node(std::uint32_t level, std::uint32_t i) const { return (1U << level) - 1 + i; }
 
   void split(std::uint32_t level, std::uint32_t i);
+
+  template <typename Meets, typename Found>
+  void visit_met(std::uint32_t level, std::uint32_t i, Meets& meets, Found& found) const {
+    if (!meets(node_box_[node(level, i)])) return;
+    if (level == levels_) {
+      for (std::uint32_t p = place(level, i); p < place(level, i + 1); ++p) found(body_[p]);
+      return;
+    }
+    visit_met(level + 1, 2 * i, meets, found);
+    visit_met(level + 1, 2 * i + 1, meets, found);
+  }
 
   template <typename Found>
   void visit_within(std::uint32_t level, std::uint32_t i, Found& found) {

@@ -6,6 +6,7 @@
 #include "plugin_sdk/plugin.h"
 
 #include "workers/space/dynamic_bvh/pair_finder.h"
+#include "workers/space/dynamic_bvh/ray_finder.h"
 
 namespace gravitas {
 namespace {
@@ -16,7 +17,8 @@ class DynamicBvhSpace final : public SpacePlugin {
     return {.name = "DynamicBVH",
             .version = "1.0",
             .slot = Slot::kSpace,
-            .meaning = "Hierarchy of bounding boxes, refitted as bodies move: the fast one for any mixture of sizes."};
+            .meaning = "Hierarchy of bounding boxes, refitted as bodies move: the fast one for any mixture of sizes.",
+            .capabilities = {"rays", "debug_geometry"}};
   }
   explicit DynamicBvhSpace(PropertyCursor) {}
 
@@ -24,8 +26,18 @@ class DynamicBvhSpace final : public SpacePlugin {
     finder_.find(request, reply, host);
   }
 
+  void rays(const stage::SpaceRaysRequest& request, const stage::SpaceRaysReply& reply, Host& host) override {
+    ray_finder_.find(request, reply, host);
+  }
+
+  void debug_geometry(const stage::SpacePairsRequest& request, const stage::SpaceDebugGeometryReply& reply,
+                      Host&) override {
+    dynamic_bvh::write_nodes(request, reply);
+  }
+
  private:
   dynamic_bvh::PairFinder finder_;
+  dynamic_bvh::RayFinder ray_finder_;
 };
 
 }  // namespace

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "plugin_sdk/pair_rule.h"
+#include "plugin_sdk/ray_rule.h"
 #include "plugin_sdk/space.h"
 
 namespace gravitas {
@@ -120,6 +121,7 @@ class GridSpace final : public SpacePlugin {
             .version = "2.0",
             .slot = Slot::kSpace,
             .meaning = "Uniform grid of cells: O(n) for bodies of about one size.",
+            .capabilities = {"rays", "debug_geometry"},
             .properties = {Property::number("CellSize", "m")
                                .above(0.0)
                                .means("Edge of a cell; about the largest extent of a bounded body if absent."),
@@ -150,7 +152,34 @@ class GridSpace final : public SpacePlugin {
     found_.write(reply.pair());
   }
 
+  void rays(const stage::SpaceRaysRequest& request, const stage::SpaceRaysReply& reply, Host& host) override {
+    test_rays_against_all(request, reply, host);
+  }
+
+  // The cells that hold bodies, by their places.
+  void debug_geometry(const stage::SpacePairsRequest& request, const stage::SpaceDebugGeometryReply& reply,
+                      Host&) override {
+    const PairRule rule(request);
+    GridSpace anew(given_cell_size_, cleanup_interval_);
+    anew.choose_cell_size(request, rule);
+    anew.put_bodies(request, rule);
+    std::vector<CellPlace> places;
+    for (const Cell& cell : anew.map_.cells())
+      if (!cell.bodies.empty()) places.push_back(cell.place);
+    std::ranges::sort(places);
+    for (const CellPlace& place : places) {
+      reply.depth().push(0);
+      for (const std::int32_t k : place) {
+        reply.node_lower().push(k * anew.cell_size_);
+        reply.node_upper().push((k + 1) * anew.cell_size_);
+      }
+    }
+  }
+
  private:
+  GridSpace(double given_cell_size, std::uint64_t cleanup_interval)
+      : given_cell_size_(given_cell_size), cleanup_interval_(cleanup_interval) {}
+
   // Empties the grid if its cells, or the bodies, are no longer the same.
   void choose_cell_size(const stage::SpacePairsRequest& request, const PairRule& rule) {
     double size = given_cell_size_;

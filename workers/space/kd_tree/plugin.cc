@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "plugin_sdk/pair_rule.h"
+#include "plugin_sdk/ray_rule.h"
 #include "plugin_sdk/space.h"
 
 namespace gravitas {
@@ -58,6 +59,7 @@ class KdTreeSpace final : public SpacePlugin {
             .version = "1.0",
             .slot = Slot::kSpace,
             .meaning = "Space cut in two again and again: for bodies that are spread unevenly.",
+            .capabilities = {"rays", "debug_geometry"},
             .properties = {Property::integer("MaximumDepth")
                                .at_least(0)
                                .at_most(40)
@@ -99,7 +101,40 @@ class KdTreeSpace final : public SpacePlugin {
     found_.write(reply.pair());
   }
 
+  void rays(const stage::SpaceRaysRequest& request, const stage::SpaceRaysReply& reply, Host& host) override {
+    test_rays_against_all(request, reply, host);
+  }
+
+  // The cells, as far as bodies reach.
+  void debug_geometry(const stage::SpacePairsRequest& request, const stage::SpaceDebugGeometryReply& reply,
+                      Host&) override {
+    const PairRule rule(request);
+    KdTreeSpace anew(maximum_depth_, minimum_bodies_);
+    anew.read_bounds(request, rule);
+    if (anew.members_.empty()) return;
+    anew.build(rule.bodies());
+    Bounds3 all = anew.bounds_[anew.members_[0]];
+    for (const std::uint32_t i : anew.members_) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        all.lower[k] = std::min(all.lower[k], anew.bounds_[i].lower[k]);
+        all.upper[k] = std::max(all.upper[k], anew.bounds_[i].upper[k]);
+      }
+    }
+    std::vector<std::uint32_t> depth;
+    for (const Node& node : anew.nodes_) {
+      depth.push_back(node.parent == kNone ? 0 : depth[node.parent] + 1);
+      reply.depth().push(depth.back());
+      for (std::size_t k = 0; k < 3; ++k) {
+        reply.node_lower().push(std::max(node.cell.lower[k], all.lower[k]));
+        reply.node_upper().push(std::min(node.cell.upper[k], all.upper[k]));
+      }
+    }
+  }
+
  private:
+  KdTreeSpace(std::size_t maximum_depth, std::size_t minimum_bodies)
+      : maximum_depth_(maximum_depth), minimum_bodies_(minimum_bodies) {}
+
   void read_bounds(const stage::SpacePairsRequest& request, const PairRule& rule) {
     members_.clear(), outsiders_.clear();
     bounds_.resize(rule.bodies());

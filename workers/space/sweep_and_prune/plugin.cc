@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "plugin_sdk/pair_rule.h"
+#include "plugin_sdk/ray_rule.h"
 #include "plugin_sdk/space.h"
 
 namespace gravitas {
@@ -36,6 +37,7 @@ class SweepAndPruneSpace final : public SpacePlugin {
             .version = "1.0",
             .slot = Slot::kSpace,
             .meaning = "Bodies sorted along an axis: for those that are spread along one, or few.",
+            .capabilities = {"rays"},
             .properties = {Property::integer("Axes").at_least(1).at_most(3).defaults_to({3}).means(
                 "How many of x, y, z it may sweep along: in each call the one of these along which bodies spread "
                 "most.")}};
@@ -56,6 +58,10 @@ class SweepAndPruneSpace final : public SpacePlugin {
     host.mark_progress();
     found_.sort(rule.bodies());
     found_.write(reply.pair());
+  }
+
+  void rays(const stage::SpaceRaysRequest& request, const stage::SpaceRaysReply& reply, Host& host) override {
+    test_rays_against_all(request, reply, host);
   }
 
  private:

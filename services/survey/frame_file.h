@@ -1,0 +1,48 @@
+// What `gravitas run --instrumentation FILE` writes: a Frame per sample as a line of JSON, or, if the file's name ends
+// in `.svg`, a picture of the last state with the trajectories that led there.
+#pragma once
+
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/recorder/sampling.h"
+#include "services/survey/instrumentation.h"
+
+namespace gravitas::survey {
+
+class FrameFile {
+ public:
+  // `interval` as in Sampling. Throws std::system_error if the file cannot be made.
+  FrameFile(const std::string& path, Surveyor* surveyor, std::vector<Kind> kinds, double interval);
+  ~FrameFile();
+  FrameFile(const FrameFile&) = delete;
+  FrameFile& operator=(const FrameFile&) = delete;
+
+  // Called for the initial state and after every commit; `last` forces a sample.
+  void offer(const kernel::Environment& environment, bool last);
+
+  // Writes out everything; throws std::system_error if that fails (a full disk).
+  void close();
+
+  // Different reasons why something was missing, in the order of their appearance.
+  const std::vector<std::string>& missing() const { return missing_; }
+
+ private:
+  bool is_picture() const { return path_.ends_with(".svg"); }
+  void note_missing(const Frame& frame);
+  void write(const std::string& text);
+
+  std::string path_;
+  std::FILE* file_;
+  Instrumentation instrumentation_;
+  std::vector<Kind> kinds_;
+  Sampling sampling_;
+  std::string title_;
+  Frame picture_;
+  std::optional<std::uint32_t> drawn_step_;
+  std::vector<std::string> missing_;
+};
+
+}  // namespace gravitas::survey
