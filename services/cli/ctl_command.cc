@@ -136,14 +136,14 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
   return kExaminedFailed;
 }
 
-int query(const CommandLine& line, ControlClient* client) {
+int query(const CtlLine& line, ControlClient* client) {
   const query::v1::Batch batch = parse_query(line.query);
   const query::v1::Answers answers = client->query(batch);
   std::cout << (line.json ? to_json(answers, JsonForm::kPage) : answers_text(answers));
   return kDone;
 }
 
-int show_instrumentation(const CommandLine& line, ControlClient* client) {
+int show_instrumentation(const CtlLine& line, ControlClient* client) {
   api::InstrumentationRequest request;
   for (const std::string& kind : line.kinds) request.add_kinds(kind);
   const instrumentation::v1::Frame frame = client->instrumentation(request);

@@ -20,10 +20,6 @@ namespace v1 = instrumentation::v1;
 constexpr std::string_view kPrefix = "KIND_";
 constexpr const char* kCapability = "debug_geometry";
 
-void write(const Quaternion& q, Numbers* out) {
-  for (const double number : {q.w(), q.x(), q.y(), q.z()}) out->Add(number + 0.0);
-}
-
 void add_line(Kind kind, const std::string& id, const Vector3& from, const Vector3& to, Frame* frame) {
   v1::Line* line = frame->add_lines();
   line->set_kind(kind);

@@ -14,4 +14,9 @@ inline void write(const Vector3& v, Numbers* out) {
   for (int k = 0; k < 3; ++k) out->Add(v[k] + 0.0);
 }
 
+// w, x, y, z.
+inline void write(const Quaternion& q, Numbers* out) {
+  for (const double number : {q.w(), q.x(), q.y(), q.z()}) out->Add(number + 0.0);
+}
+
 }  // namespace gravitas::survey

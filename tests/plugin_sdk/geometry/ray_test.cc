@@ -12,7 +12,7 @@
 namespace gravitas {
 namespace {
 
-SceneShape shape_of(SceneShape::Kind kind, const Vector3& size) {
+SceneShape struck_shape_of(SceneShape::Kind kind, const Vector3& size) {
   SceneShape shape;
   shape.kind = kind, shape.size = size;
   return shape;
@@ -25,7 +25,7 @@ SceneShape cube_mesh(bool is_closed) {
                                                {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
   if (!is_closed) faces.resize(10);
   std::string why;
-  SceneShape shape = shape_of(SceneShape::Kind::kTriangleMesh, Vector3::Ones());
+  SceneShape shape = struck_shape_of(SceneShape::Kind::kTriangleMesh, Vector3::Ones());
   shape.mesh = std::make_shared<TriangleMesh>(*TriangleMesh::make(corners, faces, {}, &why));
   return shape;
 }
@@ -38,18 +38,19 @@ void expect_hit(const std::optional<RayHit>& hit, double distance, const Vector3
 
 TEST(Ray, MeetsSolidsWhereTheyAre) {
   const Vector3 x = Vector3::UnitX(), y = Vector3::UnitY(), z = Vector3::UnitZ();
-  const SceneShape ball = shape_of(SceneShape::Kind::kSphere, Vector3::Ones()),
-                   can = shape_of(SceneShape::Kind::kCylinder, {1, 2, 1}),
-                   pill = shape_of(SceneShape::Kind::kCapsule, {1, 1, 1}),
-                   cone = shape_of(SceneShape::Kind::kCone, {1, 1, 1});
+  const SceneShape ball = struck_shape_of(SceneShape::Kind::kSphere, Vector3::Ones()),
+                   can = struck_shape_of(SceneShape::Kind::kCylinder, {1, 2, 1}),
+                   pill = struck_shape_of(SceneShape::Kind::kCapsule, {1, 1, 1}),
+                   cone = struck_shape_of(SceneShape::Kind::kCone, {1, 1, 1});
   expect_hit(cast_ray(ball, {{-5, 0.6, 0}, x, 10}), 4.2, {-0.8, 0.6, 0});
   EXPECT_FALSE(cast_ray(ball, {{-5, 0.6, 0}, x, 4.19}));
   EXPECT_FALSE(cast_ray(ball, {{-5, 0.6, 0}, -x, 10}));
   EXPECT_FALSE(cast_ray(ball, {{-5, 1.0000001, 0}, x, 10}));
   expect_hit(cast_ray(ball, {{0.2, 0.1, 0}, x, 10}), 0.0, -x);
-  expect_hit(cast_ray(shape_of(SceneShape::Kind::kBox, {1, 2, 3}), {{0.5, 9, -2}, -y, 10}), 7, y);
-  expect_hit(cast_ray(shape_of(SceneShape::Kind::kBox, {1, 2, 3}), {{3.5, 4, 0}, Vector3(-1, -1, 0).normalized(), 10}),
-             2.5 * std::sqrt(2.0), x);
+  expect_hit(cast_ray(struck_shape_of(SceneShape::Kind::kBox, {1, 2, 3}), {{0.5, 9, -2}, -y, 10}), 7, y);
+  expect_hit(
+      cast_ray(struck_shape_of(SceneShape::Kind::kBox, {1, 2, 3}), {{3.5, 4, 0}, Vector3(-1, -1, 0).normalized(), 10}),
+      2.5 * std::sqrt(2.0), x);
   expect_hit(cast_ray(can, {{-5, 1, 0.6}, x, 10}), 4.2, {-0.8, 0, 0.6});
   expect_hit(cast_ray(can, {{0.5, -7, 0.5}, y, 10}), 5, -y);
   EXPECT_FALSE(cast_ray(can, {{-5, 2.01, 0}, x, 10}));
@@ -59,9 +60,10 @@ TEST(Ray, MeetsSolidsWhereTheyAre) {
   expect_hit(cast_ray(cone, {{0.25, 5, 0}, -y, 10}), 4.5, {1, 0.5, 0});
   expect_hit(cast_ray(cone, {{0.25, -5, 0}, y, 10}), 4, -y);
   EXPECT_FALSE(cast_ray(cone, {{-5, 1.5, 0}, x, 10}));  // through the cone's mirror image
-  expect_hit(cast_ray(shape_of(SceneShape::Kind::kHalfspace, Vector3::Ones()), {{1, 3, 1}, Vector3(0.6, -0.8, 0), 5}),
-             3.75, y);
-  EXPECT_FALSE(cast_ray(shape_of(SceneShape::Kind::kHalfspace, Vector3::Ones()), {{1, 3, 1}, x, 1e300}));
+  expect_hit(
+      cast_ray(struck_shape_of(SceneShape::Kind::kHalfspace, Vector3::Ones()), {{1, 3, 1}, Vector3(0.6, -0.8, 0), 5}),
+      3.75, y);
+  EXPECT_FALSE(cast_ray(struck_shape_of(SceneShape::Kind::kHalfspace, Vector3::Ones()), {{1, 3, 1}, x, 1e300}));
 }
 
 TEST(Ray, MeetsAMeshFromEitherSideAndAClosedOneFromInsideAtOnce) {
@@ -74,9 +76,9 @@ TEST(Ray, MeetsAMeshFromEitherSideAndAClosedOneFromInsideAtOnce) {
 }
 
 TEST(Ray, MeetsTheFirstChildOfACompound) {
-  SceneShape whole = shape_of(SceneShape::Kind::kCompound, Vector3::Ones());
-  const auto ball = std::make_shared<SceneShape>(shape_of(SceneShape::Kind::kSphere, Vector3::Constant(0.5)));
-  const auto box = std::make_shared<SceneShape>(shape_of(SceneShape::Kind::kBox, {1, 1, 0.1}));
+  SceneShape whole = struck_shape_of(SceneShape::Kind::kCompound, Vector3::Ones());
+  const auto ball = std::make_shared<SceneShape>(struck_shape_of(SceneShape::Kind::kSphere, Vector3::Constant(0.5)));
+  const auto box = std::make_shared<SceneShape>(struck_shape_of(SceneShape::Kind::kBox, {1, 1, 0.1}));
   const double quarter = std::sqrt(0.5);
   whole.children = {{ball, {Vector3(4, 0, 0), Quaternion::Identity()}, 0.0},
                     {box, {Vector3(2, 0, 0), Quaternion(quarter, 0, quarter, 0)}, 0.0}};
@@ -114,7 +116,7 @@ TEST(Ray, ClosedFormsAgreeWithSupportPoints) {
 // Just before the hit the end of the ray is outside, just after it inside, and the normal leads out.
 TEST(Ray, EndsAtTheSurface) {
   test::RandomShapes random(92);
-  const SceneShape dot = shape_of(SceneShape::Kind::kSphere, Vector3::Constant(1e-12));
+  const SceneShape dot = struck_shape_of(SceneShape::Kind::kSphere, Vector3::Constant(1e-12));
   const auto point = make_support_map(dot);
   for (const SceneShape::Kind kind : test::kConvexKinds) {
     for (int i = 0; i < 500; ++i) {
@@ -139,7 +141,7 @@ TEST(Ray, EndsAtTheSurface) {
 }
 
 TEST(Ray, KeepsItsDigitsFarFromTheSolid) {
-  const SceneShape ball = shape_of(SceneShape::Kind::kSphere, Vector3::Ones());
+  const SceneShape ball = struck_shape_of(SceneShape::Kind::kSphere, Vector3::Ones());
   for (const double far : {1e3, 1e6, 1e8}) {
     const std::optional<RayHit> hit = cast_ray(ball, {{-far, 0.6, 0.0}, Vector3::UnitX(), 2.0 * far});
     ASSERT_TRUE(hit);

@@ -15,7 +15,6 @@
 namespace gravitas::survey {
 namespace {
 
-namespace v1 = query::v1;
 using harness::SurveyedScene;
 using harness::vector_of;
 using ::testing::ElementsAre;
@@ -29,23 +28,24 @@ void put(const Vector3& v, Numbers* out) {
   for (int k = 0; k < 3; ++k) out->Add(v[k]);
 }
 
-v1::Ray* add_ray(const Vector3& origin, const Vector3& direction, v1::Batch* batch, v1::Hits hits = v1::HITS_CLOSEST) {
-  v1::Ray* ray = batch->add_rays();
+query::v1::Ray* add_ray(const Vector3& origin, const Vector3& direction, query::v1::Batch* batch,
+                        query::v1::Hits hits = query::v1::HITS_CLOSEST) {
+  query::v1::Ray* ray = batch->add_rays();
   put(origin, ray->mutable_origin());
   put(direction, ray->mutable_direction());
   ray->set_hits(hits);
   return ray;
 }
 
-void set_ball(double radius, const Vector3& position, v1::Shape* shape) {
+void set_ball(double radius, const Vector3& position, query::v1::Shape* shape) {
   shape->set_type("Sphere");
-  v1::Property* property = shape->add_properties();
+  query::v1::Property* property = shape->add_properties();
   property->set_name("Radius");
   property->set_value(std::to_string(radius));
   put(position, shape->mutable_position());
 }
 
-v1::Answers ask(SurveyedScene* scene, const v1::Batch& batch) {
+query::v1::Answers ask(SurveyedScene* scene, const query::v1::Batch& batch) {
   return answer(&*scene->surveyor, *scene->environment, batch);
 }
 
@@ -73,15 +73,15 @@ Environment { Space { Bodies {
 
 TEST(Queries, RaysMeetWhatStandsInTheirWay) {
   SurveyedScene scene(kRow);
-  v1::Batch batch;
+  query::v1::Batch batch;
   add_ray({0, 2, 0}, {2, 0, 0}, &batch);
-  add_ray({0, 2, 0}, {1, 0, 0}, &batch, v1::HITS_ALL);
+  add_ray({0, 2, 0}, {1, 0, 0}, &batch, query::v1::HITS_ALL);
   add_ray({0, 2, 0}, {1, 0, 0}, &batch)->set_length(3.9);
   add_ray({0, 2, 0}, {1, 0, 0}, &batch)->mutable_filter()->add_except("A");
   add_ray({0, 2, 0}, {1, 0, 0}, &batch)->mutable_filter()->add_only("C");
   add_ray({0, 7, 0}, {0, -1, 0}, &batch);
-  add_ray({5, 2, 0}, {0, 1, 0}, &batch, v1::HITS_ANY);
-  const v1::Answers answers = ask(&scene, batch);
+  add_ray({5, 2, 0}, {0, 1, 0}, &batch, query::v1::HITS_ANY);
+  const query::v1::Answers answers = ask(&scene, batch);
   ASSERT_THAT(answers.rays(), SizeIs(7));
   ASSERT_THAT(bodies_of(answers.rays(0).hits()), ElementsAre("A"));
   EXPECT_NEAR(answers.rays(0).hits(0).distance(), 4.0, 1e-12);
@@ -100,9 +100,9 @@ TEST(Queries, RaysMeetWhatStandsInTheirWay) {
 
 TEST(Queries, CastsStopWhereShapesTouch) {
   SurveyedScene scene(kRow);
-  v1::Batch batch;
+  query::v1::Batch batch;
   const auto cast = [&](const Vector3& displacement) {
-    v1::Cast* one = batch.add_casts();
+    query::v1::Cast* one = batch.add_casts();
     put(displacement, one->mutable_displacement());
     return one;
   };
@@ -111,12 +111,12 @@ TEST(Queries, CastsStopWhereShapesTouch) {
   // the way to the ground: 1 m of 10
   cast({0, -10, 0})->mutable_shape()->set_body("B");
   // a cube of the scene, all that it meets: A at 5 - 2, B at 10 - 2, C at 15 - 2
-  v1::Cast* all = cast({20, 0, 0});
+  query::v1::Cast* all = cast({20, 0, 0});
   all->mutable_shape()->set_geometry("Cube");
   put({0, 2, 0}, all->mutable_shape()->mutable_position());
-  all->set_hits(v1::HITS_ALL);
+  all->set_hits(query::v1::HITS_ALL);
   set_ball(0.5, {0, 40, 0}, cast({10, 0, 0})->mutable_shape());
-  const v1::Answers answers = ask(&scene, batch);
+  const query::v1::Answers answers = ask(&scene, batch);
   ASSERT_THAT(bodies_of(answers.casts(0).hits()), ElementsAre("A"));
   EXPECT_NEAR(answers.casts(0).hits(0).fraction(), 0.35, 1e-9);
   EXPECT_TRUE(vector_of(answers.casts(0).hits(0).normal()).isApprox(Vector3(1, 0, 0), 1e-6));
@@ -132,15 +132,15 @@ TEST(Queries, CastsStopWhereShapesTouch) {
 
 TEST(Queries, OverlapAndDistanceAreThoseOfBalls) {
   SurveyedScene scene(kRow);
-  v1::Batch batch;
+  query::v1::Batch batch;
   set_ball(2.5, {7.5, 2, 0}, batch.add_overlaps()->mutable_shape());
   batch.add_overlaps()->mutable_shape()->set_body("A");
-  v1::ClosestPoints* near = batch.add_closest();
+  query::v1::ClosestPoints* near = batch.add_closest();
   near->mutable_shape()->set_body("A");
   near->set_distance(3.5);
   set_ball(0.25, {0, 10, 0}, (near = batch.add_closest())->mutable_shape());
   near->set_distance(1.0);
-  const v1::Answers answers = ask(&scene, batch);
+  const query::v1::Answers answers = ask(&scene, batch);
   ASSERT_THAT(bodies_of(answers.overlaps(0).hits()), ElementsAre("A", "B", "Ground"));
   EXPECT_NEAR(answers.overlaps(0).hits(0).depth(), 1.0, 1e-12);
   EXPECT_TRUE(vector_of(answers.overlaps(0).hits(0).normal()).isApprox(Vector3(-1, 0, 0), 1e-12));
@@ -159,23 +159,23 @@ TEST(Queries, DistanceOfABallFromABoxAnywhere) {
   SurveyedScene scene(kRow);
   std::mt19937_64 random(3);
   const auto draw = [&](double reach) { return std::uniform_real_distribution<double>(-reach, reach)(random); };
-  v1::Batch batch;
+  query::v1::Batch batch;
   std::vector<double> right;
   for (int i = 0; i < 300; ++i) {
     const Vector3 centre = Vector3(15, 2, 0) + Vector3(draw(4), draw(4), draw(4));
     const Vector3 nearest = (centre - Vector3(15, 2, 0)).cwiseMax(-1.0).cwiseMin(1.0) + Vector3(15, 2, 0);
     const double distance = (centre - nearest).norm() - 0.25;
     if (!(distance > 0.0)) continue;
-    v1::ClosestPoints* closest = batch.add_closest();
+    query::v1::ClosestPoints* closest = batch.add_closest();
     set_ball(0.25, centre, closest->mutable_shape());
     closest->set_distance(10.0);
     closest->mutable_filter()->add_only("C");
     right.push_back(distance);
   }
-  const v1::Answers answers = ask(&scene, batch);
+  const query::v1::Answers answers = ask(&scene, batch);
   for (std::size_t i = 0; i < right.size(); ++i) {
     ASSERT_THAT(answers.closest(static_cast<int>(i)).hits(), SizeIs(1));
-    const v1::ClosestHit& hit = answers.closest(static_cast<int>(i)).hits(0);
+    const query::v1::ClosestHit& hit = answers.closest(static_cast<int>(i)).hits(0);
     EXPECT_NEAR(hit.distance(), right[i], 1e-6);
     EXPECT_NEAR((vector_of(hit.point_on_body()) - vector_of(hit.point_on_shape())).norm(), right[i], 1e-6);
   }
@@ -184,12 +184,12 @@ TEST(Queries, DistanceOfABallFromABoxAnywhere) {
 // Boxes corner to corner: the closest points are the corners.
 TEST(Queries, BoxesAreClosestAtTheirCorners) {
   SurveyedScene scene(kRow);
-  v1::Batch batch;
-  v1::ClosestPoints* closest = batch.add_closest();
+  query::v1::Batch batch;
+  query::v1::ClosestPoints* closest = batch.add_closest();
   closest->mutable_shape()->set_geometry("Cube");
   put({18, 5, 3}, closest->mutable_shape()->mutable_position());
   closest->set_distance(3.0);
-  const v1::Answers answers = ask(&scene, batch);
+  const query::v1::Answers answers = ask(&scene, batch);
   ASSERT_THAT(bodies_of(answers.closest(0).hits()), ElementsAre("C"));
   EXPECT_NEAR(answers.closest(0).hits(0).distance(), std::sqrt(3.0), 1e-6);
 }
@@ -215,22 +215,22 @@ std::string crowd(int count, std::uint64_t seed, bool has_ground) {
   return text + (has_ground ? "Body { Id = \"Ground\" GeometryId = \"Plane\" }" : "") + "} } }";
 }
 
-v1::Batch many_rays(std::uint64_t seed, int count) {
+query::v1::Batch many_rays(std::uint64_t seed, int count) {
   std::mt19937_64 random(seed);
   const auto draw = [&] { return std::uniform_real_distribution<double>(-5, 5)(random); };
-  v1::Batch batch;
+  query::v1::Batch batch;
   for (int i = 0; i < count; ++i)
-    add_ray({draw(), 3 + draw(), draw()}, {draw(), draw(), draw()}, &batch, v1::HITS_ALL)->set_length(20.0);
+    add_ray({draw(), 3 + draw(), draw()}, {draw(), draw(), draw()}, &batch, query::v1::HITS_ALL)->set_length(20.0);
   return batch;
 }
 
 // Every ray with every body's own shape, one by one.
 TEST(Queries, RaysAgreeWithBruteForceInEverySpace) {
-  const v1::Batch batch = many_rays(5, 100);
+  const query::v1::Batch batch = many_rays(5, 100);
   int met = 0;
   for (const char* space : {"DynamicBVH", "Basic", "Grid", "KDTree", "SweepAndPrune"}) {
     SurveyedScene scene(crowd(60, 4, true), kernel::Hosting::kDirect, {std::string("Space=") + space});
-    const v1::Answers answers = ask(&scene, batch);
+    const query::v1::Answers answers = ask(&scene, batch);
     EXPECT_EQ(scene.surveyor->slot(Slot::kSpace).questions(), 1U);
     for (int i = 0; i < batch.rays_size(); ++i) {
       const Ray ray{vector_of(batch.rays(i).origin()), vector_of(batch.rays(i).direction()).normalized(), 20.0};
@@ -259,35 +259,35 @@ TEST(Queries, CastsOverlapAndDistanceAgree) {
   SurveyedScene scene(crowd(60, 8, true));
   std::mt19937_64 random(9);
   const auto draw = [&] { return std::uniform_real_distribution<double>(-4, 4)(random); };
-  v1::Batch batch;
+  query::v1::Batch batch;
   for (int i = 0; i < 60; ++i) {
     const Vector3 from(draw(), 3.5 + 0.8 * draw(), draw()), way(draw(), draw(), draw());
     set_ball(0.3, from, batch.add_overlaps()->mutable_shape());
-    v1::ClosestPoints* closest = batch.add_closest();
+    query::v1::ClosestPoints* closest = batch.add_closest();
     set_ball(0.3, from, closest->mutable_shape());
     closest->set_distance(0.5);
-    v1::Cast* cast = batch.add_casts();
+    query::v1::Cast* cast = batch.add_casts();
     set_ball(0.3, from, cast->mutable_shape());
     put(way, cast->mutable_displacement());
   }
-  const v1::Answers answers = ask(&scene, batch);
-  v1::Batch then;
+  const query::v1::Answers answers = ask(&scene, batch);
+  query::v1::Batch then;
   std::vector<std::string> touched;
   for (int i = 0; i < 60; ++i) {
     std::vector<std::string> near;
-    for (const v1::ClosestHit& hit : answers.closest(i).hits())
+    for (const query::v1::ClosestHit& hit : answers.closest(i).hits())
       if (hit.distance() <= 0.0) near.push_back(hit.body());
     std::ranges::sort(near);
     std::vector<std::string> overlapping = bodies_of(answers.overlaps(i).hits());
     std::ranges::sort(overlapping);
     EXPECT_EQ(near, overlapping);
     if (answers.casts(i).hits().empty()) continue;
-    const v1::CastHit& hit = answers.casts(i).hits(0);
+    const query::v1::CastHit& hit = answers.casts(i).hits(0);
     if (!overlapping.empty()) {
       EXPECT_EQ(hit.fraction(), 0.0);
       continue;
     }
-    v1::ClosestPoints* closest = then.add_closest();
+    query::v1::ClosestPoints* closest = then.add_closest();
     set_ball(0.3,
              vector_of(batch.casts(i).shape().position()) + hit.fraction() * vector_of(batch.casts(i).displacement()),
              closest->mutable_shape());
@@ -295,10 +295,10 @@ TEST(Queries, CastsOverlapAndDistanceAgree) {
     touched.push_back(hit.body());
   }
   ASSERT_GT(touched.size(), 10U);
-  const v1::Answers later = ask(&scene, then);
+  const query::v1::Answers later = ask(&scene, then);
   for (std::size_t i = 0; i < touched.size(); ++i) {
     ASSERT_THAT(later.closest(static_cast<int>(i)).hits(), ::testing::Not(IsEmpty()));
-    const v1::ClosestHit& hit = later.closest(static_cast<int>(i)).hits(0);
+    const query::v1::ClosestHit& hit = later.closest(static_cast<int>(i)).hits(0);
     EXPECT_EQ(hit.body(), touched[i]);
     EXPECT_NEAR(hit.distance(), 0.0, 1e-6);
   }
@@ -307,7 +307,7 @@ TEST(Queries, CastsOverlapAndDistanceAgree) {
 // ---- beside the run
 
 TEST(Queries, AreTheSameOnAnyHostingAlsoWhenTheirWorkerDies) {
-  const v1::Batch batch = many_rays(6, 20);
+  const query::v1::Batch batch = many_rays(6, 20);
   std::string right;
   kernel::Hash chain;
   for (const kernel::Hosting hosting :
@@ -337,9 +337,9 @@ TEST(Queries, AreTheSameOnAnyHostingAlsoWhenTheirWorkerDies) {
 // Nothing can touch here, so the plan has neither space nor collision; a ray finds what there is all the same.
 TEST(Queries, WorkWhereThePlanLeftTheSlotsOut) {
   SurveyedScene scene(crowd(1, 5, false), kernel::Hosting::kSharedMemory);
-  v1::Batch batch;
+  query::v1::Batch batch;
   add_ray(scene.description.bodies[0].pose.position + Vector3(0, 5, 0), {0, -1, 0}, &batch);
-  const v1::Answers answers = ask(&scene, batch);
+  const query::v1::Answers answers = ask(&scene, batch);
   ASSERT_THAT(bodies_of(answers.rays(0).hits()), ElementsAre("N0"));
   EXPECT_NEAR(answers.rays(0).hits(0).distance(), 4.6, 1e-9);
   EXPECT_EQ(scene.surveyor->slot(Slot::kSpace).process_id(), 0) << "the rule of the spaces is enough";
@@ -350,7 +350,7 @@ TEST(Queries, AMissingCapabilityIsNamed) {
   kernel::EnvironmentDescription without = scene.description;
   without.collision.plugins[0].declaration.capabilities.clear();
   Surveyor surveyor(without);
-  v1::Batch batch;
+  query::v1::Batch batch;
   add_ray({0, 2, 0}, {1, 0, 0}, &batch);
   try {
     answer(&surveyor, *scene.environment, batch);
@@ -363,7 +363,7 @@ TEST(Queries, AMissingCapabilityIsNamed) {
 
 TEST(Queries, MistakesNameTheirPlaceBeforeAnybodyIsAsked) {
   SurveyedScene scene(kRow, kernel::Hosting::kSharedMemory);
-  const auto problem = [&](const v1::Batch& batch) -> std::string {
+  const auto problem = [&](const query::v1::Batch& batch) -> std::string {
     try {
       ask(&scene, batch);
       return "";
@@ -371,7 +371,7 @@ TEST(Queries, MistakesNameTheirPlaceBeforeAnybodyIsAsked) {
       return bad.what();
     }
   };
-  v1::Batch batch;
+  query::v1::Batch batch;
   add_ray({0, 0, 0}, {1, 0, 0}, &batch);
   add_ray({0, 0, 0}, {0, 0, 0}, &batch);
   EXPECT_THAT(problem(batch), HasSubstr("rays[1].direction"));
