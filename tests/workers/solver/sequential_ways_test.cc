@@ -13,7 +13,7 @@
 namespace gravitas {
 namespace {
 
-constexpr double kGravity = 9.81;
+constexpr double kPull = 9.81;
 
 enum class Numbered { kUpwards, kDownwards };
 
@@ -32,11 +32,11 @@ struct Stack {
       cubes[i] = problem.add_body({.mass = all[i],
                                    .moments = Vector3::Constant(all[i] / 6.0),
                                    .pose = {{0, 0.5 + static_cast<double>(i), 0}, Quaternion::Identity()}});
-    problem.make_trial({0, -kGravity, 0});
+    problem.make_trial({0, -kPull, 0});
     // pairs in order, as a collision plugin answers them
     std::vector<TestContact> contacts;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      const double fall = kGravity * problem.time_step * problem.time_step;
+      const double fall = kPull * problem.time_step * problem.time_step;
       const std::uint32_t below = i == 0 ? ground : cubes[i - 1];
       for (int corner = 0; corner < 4; ++corner)
         contacts.push_back({.body1 = std::min(below, cubes[i]),
@@ -60,7 +60,7 @@ struct Stack {
     double largest = 0.0;
     double weight = 0.0;
     for (std::size_t i = cubes.size(); i-- > 0;) {
-      weight += masses[i] * kGravity * problem.time_step;
+      weight += masses[i] * kPull * problem.time_step;
       double load = 0.0;
       for (std::size_t c = 0; c < problem.contact_key.size(); ++c)
         if (problem.contact_key[c] / 4 == i) load += std::fabs(answer.impulse(c).y());
@@ -98,7 +98,7 @@ TEST(SequentialWays, TheDeepestFirstPushesOnceWhatOneContactHolds) {
   SolverProblem problem;
   for (int i = 0; i < 5; ++i) problem.add_immovable();
   const std::uint32_t ball = problem.add_body({.mass = 2.0});
-  problem.make_trial({0, -kGravity, 0});
+  problem.make_trial({0, -kPull, 0});
   for (std::uint32_t i = 0; i < 5; ++i)
     problem.add_contact({.body1 = i, .body2 = ball, .point = {0, -0.5, 0}, .depth = 1e-3 * (i + 1), .key = i});
   const SolverAnswer given = solve(problem, {.iterations = 1});
@@ -162,7 +162,7 @@ TEST(SequentialWays, SimultaneousSweepsKeepWhatIsSymmetric) {
   const std::uint32_t right = problem.add_body({.pose = {{2, 0.5, 0}, Quaternion::Identity()}});
   const std::uint32_t beam =
       problem.add_body({.mass = 10.0, .moments = {1.0, 30.0, 30.0}, .pose = {{0, 1.25, 0}, Quaternion::Identity()}});
-  problem.make_trial({0, -kGravity, 0});
+  problem.make_trial({0, -kPull, 0});
   std::uint64_t key = 0;
   for (const std::uint32_t post : {left, right}) {
     const double x = post == left ? -2.0 : 2.0;
@@ -185,7 +185,7 @@ TEST(SequentialWays, SimultaneousSweepsKeepWhatIsSymmetric) {
   const SolverAnswer end = solve(problem, {.iterations = 100000, .order = RelaxationOrder::kSimultaneous});
   EXPECT_TRUE(end.converged());
   for (const std::uint32_t body : {left, right, beam}) EXPECT_LE(end.velocity(body).norm(), 1e-13);
-  for (std::size_t i = 4; i < 8; ++i) EXPECT_NEAR(end.impulse(i).y(), 0.25 * 10 * kGravity * problem.time_step, 1e-12);
+  for (std::size_t i = 4; i < 8; ++i) EXPECT_NEAR(end.impulse(i).y(), 0.25 * 10 * kPull * problem.time_step, 1e-12);
 }
 
 TEST(SequentialWays, OverRelaxationTakesAFractionOfTheSweeps) {
@@ -215,7 +215,7 @@ TEST(SequentialWays, LayersCarryAnyRatioOfMassAtOnce) {
       EXPECT_LE(answer.iterations[0], 6U) << top;
       EXPECT_LE(stack.load_error(answer), 1e-12) << top;
       // the load's rounding moves what weighs 1 kg
-      const double rounding = 4e-16 * (10.0 + top) * kGravity * stack.problem.time_step;
+      const double rounding = 4e-16 * (10.0 + top) * kPull * stack.problem.time_step;
       EXPECT_LE(stack.speed(answer), 10.0 * rounding) << top;
       for (std::size_t i = 0; i < masses.size(); ++i)
         EXPECT_NEAR(stack.problem.committed(answer, stack.cubes[i]).position.y(), 0.5 + static_cast<double>(i),
@@ -272,7 +272,7 @@ TEST(SequentialWays, JointsEndAtTheSamePlace) {
   std::uint32_t before = kNone;
   std::vector<std::uint32_t> links;
   for (int i = 0; i < 8; ++i) links.push_back(problem.add_body({.pose = {{0, -0.5 - i, 0}, Quaternion::Identity()}}));
-  problem.make_trial({0, -kGravity, 0});
+  problem.make_trial({0, -kPull, 0});
   for (std::size_t i = 0; i < links.size(); ++i) {
     problem.add_discrepancy(before, links[i], problem.joint_at(before, links[i], {0, -static_cast<double>(i), 0}));
     before = links[i];
@@ -286,7 +286,7 @@ TEST(SequentialWays, JointsEndAtTheSamePlace) {
     const SolverAnswer answer = solve(problem, way);
     ASSERT_TRUE(answer.converged());
     for (std::size_t i = 0; i < links.size(); ++i) {
-      const double tension = kGravity * problem.time_step * static_cast<double>(links.size() - i);
+      const double tension = kPull * problem.time_step * static_cast<double>(links.size() - i);
       EXPECT_NEAR(answer.discrepancy_impulse[3 * i + 1], tension, 1e-10);
       EXPECT_NEAR(plain.discrepancy_impulse[3 * i + 1], tension, 1e-10);
     }
