@@ -84,11 +84,10 @@ void judge_kinds(Subject& subject) {
   inquiry.expect(std::ranges::is_sorted(reply.u32("line_shape")), "its shapes do not ascend");
   for (std::size_t i = 0; i < solids.size(); ++i) {
     const auto alone = inquiry.answer(kShapes, shapes_request({solids[i]}, collision::kOutlines));
-    const auto [begin, end] = std::ranges::equal_range(reply.u32("line_shape"), static_cast<std::uint32_t>(i));
-    const auto first = static_cast<std::size_t>(begin - reply.u32("line_shape").begin());
-    inquiry.expect_equal("the lines of shape " + std::to_string(i) + " among others",
-                         std::span(reply.f64("line_from")).subspan(3 * first, 3 * (end - begin)),
-                         alone.f64("line_from"));
+    std::vector<double> from;
+    for (std::size_t row = 0; row < reply.u32("line_shape").size(); ++row)
+      if (reply.u32("line_shape")[row] == i) append(&from, vector_at(reply.f64("line_from"), row));
+    inquiry.expect_equal("the lines of shape " + std::to_string(i) + " among others", from, alone.f64("line_from"));
   }
 }
 

@@ -83,7 +83,7 @@ void draw_mesh(const TriangleMesh& mesh, Pen* pen) {
   for (const TriangleMesh::Triangle& t : mesh.triangles())
     for (std::size_t k = 0; k < 3; ++k) edges.push_back(std::minmax({t[k], t[(k + 1) % 3]}));
   std::ranges::sort(edges);
-  edges.erase(std::ranges::unique(edges).begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
   for (const auto& [a, b] : edges) pen->line(mesh.vertices()[a], mesh.vertices()[b]);
 }
 

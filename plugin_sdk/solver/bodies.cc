@@ -40,6 +40,16 @@ SolverBodies SolverBodies::subset(const std::vector<std::uint32_t>& rows) const 
   return some;
 }
 
+SolverBodies SolverBodies::with_immovable_twins() const {
+  SolverBodies all = *this;
+  all.bodies_.insert(all.bodies_.end(), bodies_.begin(), bodies_.end());
+  for (std::size_t i = bodies_.size(); i < all.bodies_.size(); ++i) {
+    all.bodies_[i].inverse_mass = 0.0;
+    all.bodies_[i].inverse_inertia.setZero();
+  }
+  return all;
+}
+
 ConstraintDirection ConstraintDirection::through(const Vector3& point, const Vector3& axis, const SolverBody& body1,
                                                  const SolverBody& body2) {
   ConstraintDirection d;

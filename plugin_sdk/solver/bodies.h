@@ -39,6 +39,8 @@ class SolverBodies {
 
   // Some of them, in the order of their rows; the last row must be the world's.
   SolverBodies subset(const std::vector<std::uint32_t>& rows) const;
+  // These, and after them (the world included) each again as a body that nothing pushes, in the same order.
+  SolverBodies with_immovable_twins() const;
 
   // Without the world.
   std::size_t count() const { return bodies_.size() - 1; }

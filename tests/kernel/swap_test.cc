@@ -40,7 +40,7 @@ kernel::Hash chain_without_swaps() {
 // Another plugin of the slot, as the builder would choose it.
 kernel::PluginChoice other(Slot slot, const std::string& path) {
   WorldBuilder builder(Hosting::kDirect);
-  builder.plugin(slot, path, slot == Slot::kSolver ? std::vector<double>{200.0, 1.0} : std::vector<double>{});
+  builder.plugin(slot, path);
   return builder.description().slot(slot).plugins[0];
 }
 
@@ -169,7 +169,7 @@ TEST_P(Swapped, ALaterSwapEndsProbationAsCommitted) {
 TEST_P(Swapped, TheSolverGetsOtherSettings) {
   Environment world(builder().description());
   kernel::PluginChoice weaker = plugin_of(Slot::kSolver);
-  weaker.settings = {1.0, 0.5};
+  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0};
   world.order_swap({Slot::kSolver, weaker, std::nullopt, 10});
   run_to_end(&world);
   EXPECT_NE(world.chain_hash(), chain_without_swaps());

@@ -89,9 +89,12 @@ struct Recorder {
 
 // Energy, the friction cone and momentum, converged or not: with the normal law solved before
 // friction one impact in seven gains energy, up to 2.6 times what it had.
-TEST(SequentialEnergy, NeverRisesInRandomImpacts) {
+void expect_lawful_impacts(const SequentialSettings& way, std::uint32_t expected_of_200,
+                           std::uint32_t expected_of_2000) {
   for (const std::uint32_t iterations : {200U, 2000U}) {
-    Recorder recorder{SequentialSolver(SequentialSettings{iterations, 1.0})};
+    SequentialSettings settings = way;
+    settings.iterations = iterations;
+    Recorder recorder{SequentialSolver(settings)};
     std::uint32_t lowered = 0;
     std::uint32_t converged = 0;
     for (std::uint64_t seed = 1; seed <= 1000; ++seed) {
@@ -119,9 +122,20 @@ TEST(SequentialEnergy, NeverRisesInRandomImpacts) {
     // the bound is at work, and all but the problems with much friction at long arms have a
     // solution
     EXPECT_GT(lowered, 0U);
-    EXPECT_GE(converged, iterations == 200U ? 900U : 940U);
+    EXPECT_GE(converged, iterations == 200U ? expected_of_200 : expected_of_2000);
   }
 }
+
+TEST(SequentialEnergy, NeverRisesInRandomImpacts) { expect_lawful_impacts({}, 900, 940); }
+TEST(SequentialEnergy, NeverRisesDeepestFirst) {
+  expect_lawful_impacts({.order = RelaxationOrder::kDeepestFirst}, 900, 940);
+}
+TEST(SequentialEnergy, NeverRisesSimultaneously) {
+  expect_lawful_impacts({.order = RelaxationOrder::kSimultaneous}, 700, 920);
+}
+TEST(SequentialEnergy, NeverRisesOverRelaxed) { expect_lawful_impacts({.relaxation_factor = 1.5}, 700, 900); }
+TEST(SequentialEnergy, NeverRisesUnderRelaxed) { expect_lawful_impacts({.relaxation_factor = 0.5}, 800, 940); }
+TEST(SequentialEnergy, NeverRisesWithShockPropagation) { expect_lawful_impacts({.shock_propagation = true}, 900, 940); }
 
 TEST(SequentialEnergy, ConvergedImpactsObeyTheirLaws) {
   Recorder recorder{SequentialSolver(SequentialSettings{5000, 1.0})};

@@ -69,28 +69,39 @@ void ContactGaps::clear_multipliers() {
   for (Row& row : rows_) row.multiplier = 0.0;
 }
 
-double ContactGaps::sweep(const SolverBodies& bodies, BodyMotion& x) {
+double ContactGaps::relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) {
+  const Patch& patch = patches_[block];
   double change = 0.0;
-  for (const Patch& patch : patches_) {
-    if (sweep_whole(patch, bodies, x, &change)) continue;
-    for (std::size_t i = patch.first; i < patch.end; ++i) change = std::max(change, sweep_row(rows_[i], bodies, x));
-  }
+  if (relax_whole(patch, share, bodies, x, &change)) return change;
+  for (std::size_t i = patch.first; i < patch.end; ++i)
+    change = std::max(change, relax_row(rows_[i], share, bodies, x));
   return change;
 }
 
-double ContactGaps::sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x) {
+double ContactGaps::error_of(std::size_t block, const BodyMotion& x) const {
+  double error = 0.0;
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {
+    const Row& row = rows_[i];
+    const double missing = row.target - row.direction.along(x[row.body1], x[row.body2]);
+    error = std::max(error, row.multiplier > 0.0 ? std::fabs(missing) : missing);
+  }
+  return error;
+}
+
+double ContactGaps::relax_row(Row& row, double share, const SolverBodies& bodies, BodyMotion& x) {
   const double missing = row.target - row.direction.along(x[row.body1], x[row.body2]);
-  const double relaxed = std::max(0.0, row.multiplier + missing / row.response);
+  const double relaxed = std::max(0.0, row.multiplier + share * (missing / row.response));
   const double amount = relaxed - row.multiplier;
   if (amount == 0.0) return 0.0;
   row.multiplier = relaxed;
   row.direction.push(amount, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, x[row.body1],
                      x[row.body2]);
-  return std::fabs(row.response * amount);
+  return std::fabs(row.response * amount) / std::min(1.0, share);
 }
 
 // All rows of a patch as closed; false, with nothing done, if one would have to pull.
-bool ContactGaps::sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change) {
+bool ContactGaps::relax_whole(const Patch& patch, double share, const SolverBodies& bodies, BodyMotion& x,
+                              double* change) {
   if (!patch.has_whole) return false;
   const auto count = static_cast<int>(patch.end - patch.first);
   ContactPatch::Rows missing = ContactPatch::Rows::Zero();
@@ -102,6 +113,7 @@ bool ContactGaps::sweep_whole(const Patch& patch, const SolverBodies& bodies, Bo
   }
   ContactPatch::Rows amounts = ContactPatch::Rows::Zero();
   if (is_open || !patch.whole.solve(missing, &amounts)) return false;
+  amounts *= share;
   for (int i = 0; i < count; ++i)
     if (rows_[patch.first + static_cast<std::size_t>(i)].multiplier + amounts(i) < 0.0) return false;
   for (int i = 0; i < count; ++i) {
@@ -136,6 +148,45 @@ void ContactGaps::set_patches(const SolverBodies& bodies) {
     }
     first = end;
   }
+}
+
+bool ContactGaps::holds(std::size_t block) const {
+  return std::any_of(rows_.begin() + patches_[block].first, rows_.begin() + patches_[block].end,
+                     [](const Row& row) { return row.gap <= row.slop || row.multiplier > 0.0; });
+}
+
+double ContactGaps::largest_push() const {
+  double largest = 0.0;
+  for (const Row& row : rows_) largest = std::max(largest, row.response * row.multiplier);
+  return largest;
+}
+
+void ContactGaps::push_block(std::size_t block, const SolverBodies& bodies, BodyMotion& x) const {
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {
+    const Row& row = rows_[i];
+    row.direction.push(row.multiplier, bodies[row.body1].inverse_mass, bodies[row.body2].inverse_mass, x[row.body1],
+                       x[row.body2]);
+  }
+}
+
+void ContactGaps::take_block(std::size_t block, const ContactGaps& from) {
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i)
+    rows_[i].multiplier = from.rows_[i].multiplier;
+}
+
+void ContactGaps::replace_body(std::size_t block, int side, std::uint32_t offset) {
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {
+    Row& row = rows_[i];
+    (side == 0 ? row.body1 : row.body2) += offset;
+    (side == 0 ? row.direction.turn1 : row.direction.turn2).setZero();
+  }
+}
+
+void ContactGaps::set_responses(const SolverBodies& bodies) {
+  for (Row& row : rows_)
+    row.response =
+        row.direction.product(row.direction, bodies[row.body1].inverse_mass + bodies[row.body2].inverse_mass);
+  set_patches(bodies);
 }
 
 void ContactGaps::store(std::vector<double>& multipliers) const {

@@ -9,15 +9,17 @@
 // (contact_patch.h). Frictionless: friction moves the pose through theta (sequential.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "plugin_sdk/solver/bodies.h"
 #include "workers/solver/sequential/contact_patch.h"
+#include "workers/solver/sequential/relaxation_blocks.h"
 
 namespace gravitas {
 
-class ContactGaps {
+class ContactGaps final : public RelaxationBlocks {
  public:
   // Rows of all contacts with a body that can be pushed, starting from `warm` (one per contact of
   // the request).
@@ -30,8 +32,27 @@ class ContactGaps {
   double largest_violation(const BodyMotion& x) const;
   double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
-  // One sweep. Returns the largest change of a gap, m.
-  double sweep(const SolverBodies& bodies, BodyMotion& x);
+
+  std::size_t block_count() const override { return patches_.size(); }
+  std::array<std::uint32_t, 2> bodies_of(std::size_t block) const override {
+    const Row& row = rows_[patches_[block].first];
+    return {row.body1, row.body2};
+  }
+  double error_of(std::size_t block, const BodyMotion& x) const override;
+  double relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) override;
+
+  // ---- shock propagation (shock_propagation.h)
+
+  // Some contact of the block is closed at S*, or was pushed before.
+  bool holds(std::size_t block) const;
+  // Largest change of J x that one multiplier makes by itself, m: what rounding of x goes by.
+  double largest_push() const;
+  void push_block(std::size_t block, const SolverBodies& bodies, BodyMotion& x) const;
+  void take_block(std::size_t block, const ContactGaps& from);
+  // Puts twins, which nothing pushes, in the place of bodies: those of `bodies` that are `offset` rows further on.
+  void replace_body(std::size_t block, int side, std::uint32_t offset);
+  void set_responses(const SolverBodies& bodies);
+
   void store(std::vector<double>& multipliers) const;
 
   // Sets closed[i] to 1 for contacts whose gap after the displacement x is within closing_slop(),
@@ -59,8 +80,8 @@ class ContactGaps {
   };
 
   void set_patches(const SolverBodies& bodies);
-  bool sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change);
-  double sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x);
+  bool relax_whole(const Patch& patch, double share, const SolverBodies& bodies, BodyMotion& x, double* change);
+  double relax_row(Row& row, double share, const SolverBodies& bodies, BodyMotion& x);
 
   std::vector<Row> rows_;
   std::vector<Patch> patches_;

@@ -57,18 +57,20 @@ void ContactImpulses::set_response(Row& row, const SolverBodies& bodies) {
 void ContactImpulses::set_rolling(Row& row, const SolverBodies& bodies, double rolling_friction,
                                   double spinning_friction) {
   if (!(rolling_friction > 0.0) && !(spinning_friction > 0.0)) return;
-  const SolverBody& one = bodies[row.body1];
-  const SolverBody& two = bodies[row.body2];
-  const Matrix3 world = one.inverse_inertia + two.inverse_inertia;
-  const Matrix3 response = row.frame.transpose() * world * row.frame;
   Rolling rolling;
-  rolling.normal_response = response(0, 0);
-  rolling.disc = FrictionDisc::of(response.bottomRightCorner<2, 2>());
+  set_response(row, bodies, &rolling);
   rolling.rolling_friction = rolling_friction;
   rolling.spinning_friction = spinning_friction;
-  rolling.length = std::max(one.gyration(), two.gyration());
+  rolling.length = std::max(bodies[row.body1].gyration(), bodies[row.body2].gyration());
   row.rolling = static_cast<std::int32_t>(rolling_.size());
   rolling_.push_back(rolling);
+}
+
+void ContactImpulses::set_response(const Row& row, const SolverBodies& bodies, Rolling* rolling) {
+  const Matrix3 world = bodies[row.body1].inverse_inertia + bodies[row.body2].inverse_inertia;
+  const Matrix3 response = row.frame.transpose() * world * row.frame;
+  rolling->normal_response = response(0, 0);
+  rolling->disc = FrictionDisc::of(response.bottomRightCorner<2, 2>());
 }
 
 // ---- velocities and impulses
@@ -102,12 +104,14 @@ void ContactImpulses::push_turning(const Row& row, const Vector3& impulse, const
 }
 
 void ContactImpulses::push_all(const SolverBodies& bodies, BodyMotion& x) const {
-  for (const Row& row : rows_) {
-    if (!row.impulse.isZero(0.0)) push(row, row.impulse, bodies, x);
-    if (row.rolling < 0) continue;
-    const Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
-    if (!rolling.impulse.isZero(0.0)) push_turning(row, rolling.impulse, bodies, x);
-  }
+  for (const Row& row : rows_) push_row(row, bodies, x);
+}
+
+void ContactImpulses::push_row(const Row& row, const SolverBodies& bodies, BodyMotion& x) const {
+  if (!row.impulse.isZero(0.0)) push(row, row.impulse, bodies, x);
+  if (row.rolling < 0) return;
+  const Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
+  if (!rolling.impulse.isZero(0.0)) push_turning(row, rolling.impulse, bodies, x);
 }
 
 void ContactImpulses::push_friction(const SolverBodies& bodies, double factor, BodyMotion& x) const {
@@ -151,28 +155,60 @@ void ContactImpulses::clear_multipliers() {
 
 // ---- relaxation
 
-double ContactImpulses::sweep(const SolverBodies& bodies, BodyMotion& x) {
+double ContactImpulses::relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) {
+  const Patch& patch = patches_[block];
   double change = 0.0;
-  for (const Patch& patch : patches_) {
-    const bool solved = sweep_whole(patch, bodies, x, &change);
-    for (std::size_t i = patch.first; i < patch.end; ++i) {
-      if (!solved) change = std::max(change, sweep_row(rows_[i], bodies, x));
-      if (rows_[i].rolling >= 0) change = std::max(change, sweep_rolling(rows_[i], bodies, x));
-    }
+  const bool solved = relax_whole(patch, share, bodies, x, &change);
+  for (std::size_t i = patch.first; i < patch.end; ++i) {
+    if (!solved) change = std::max(change, relax_row(rows_[i], share, bodies, x));
+    if (rows_[i].rolling >= 0) change = std::max(change, relax_rolling(rows_[i], share, bodies, x));
   }
   return change;
 }
 
-double ContactImpulses::sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x) {
+double ContactImpulses::error_of(std::size_t block, const BodyMotion& x) const {
+  double error = 0.0;
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {
+    const Row& row = rows_[i];
+    const Vector3 velocity = velocity_of(row, x);
+    const double missing = row.target - velocity.x();
+    if (!(row.impulse.x() > 0.0)) {
+      error = std::max(error, missing);
+      continue;
+    }
+    error = std::max(error, std::fabs(missing));
+    if (!row.has_friction) continue;
+    Eigen::Vector2d slip = velocity.tail<2>();
+    const Eigen::Vector2d friction = row.impulse.tail<2>();
+    const double allowed = (row.slides ? row.dynamic_friction : row.static_friction) * row.impulse.x();
+    // at the cone's rim it may slip against the friction
+    if (friction.norm() >= allowed * (1.0 - 1e-9)) {
+      const Eigen::Vector2d along = friction.normalized();
+      slip -= std::min(0.0, slip.dot(along)) * along;
+    }
+    error = std::max(error, slip.norm());
+  }
+  return error;
+}
+
+double ContactImpulses::relax_row(Row& row, double share, const SolverBodies& bodies, BodyMotion& x) {
   const Vector3 velocity = velocity_of(row, x);
   // open and leaving: the commonest case costs no more than this
   if (velocity.x() >= row.target && row.impulse.isZero(0.0)) return 0.0;
-  const Vector3 impulse = relaxed(row, velocity);
+  Vector3 impulse = relaxed(row, velocity);
+  const Vector3 whole = impulse - row.impulse;
+  if (whole.isZero(0.0)) return 0.0;
+  if (share != 1.0) {
+    impulse = row.impulse + share * whole;
+    impulse.x() = std::max(0.0, impulse.x());
+    const double allowed = (row.slides ? row.dynamic_friction : row.static_friction) * impulse.x();
+    const double tangent = impulse.tail<2>().norm();
+    if (tangent > allowed) impulse.tail<2>() *= allowed / tangent;
+  }
   const Vector3 amount = impulse - row.impulse;
-  if (amount.isZero(0.0)) return 0.0;
   row.impulse = impulse;
   push(row, amount, bodies, x);
-  return (row.response * amount).cwiseAbs().maxCoeff();
+  return (row.response * whole).cwiseAbs().maxCoeff();
 }
 
 // The impulse that makes this contact right, all others as they are.
@@ -192,7 +228,7 @@ Vector3 ContactImpulses::relaxed(const Row& row, const Vector3& velocity) const 
   return impulse;
 }
 
-double ContactImpulses::sweep_rolling(const Row& row, const SolverBodies& bodies, BodyMotion& x) {
+double ContactImpulses::relax_rolling(const Row& row, double share, const SolverBodies& bodies, BodyMotion& x) {
   Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
   const Vector3 turning = turning_of(row, x);
   Vector3 impulse = rolling.impulse;
@@ -202,12 +238,56 @@ double ContactImpulses::sweep_rolling(const Row& row, const SolverBodies& bodies
   }
   impulse.tail<2>() =
       rolling.disc.updated(impulse.tail<2>(), turning.tail<2>(), rolling.rolling_friction * row.impulse.x());
+  const Vector3 whole = impulse - rolling.impulse;
+  if (whole.isZero(0.0)) return 0.0;
+  if (share < 1.0) {
+    // what the bounds of now leave of the old one
+    Vector3 old = rolling.impulse;
+    const double spin = rolling.spinning_friction * row.impulse.x();
+    const double roll = rolling.rolling_friction * row.impulse.x();
+    old.x() = std::clamp(old.x(), -spin, spin);
+    if (old.tail<2>().norm() > roll) old.tail<2>() *= roll / old.tail<2>().norm();
+    impulse = old + share * (impulse - old);
+  }
   const Vector3 amount = impulse - rolling.impulse;
-  if (amount.isZero(0.0)) return 0.0;
   rolling.impulse = impulse;
   push_turning(row, amount, bodies, x);
   const double response = std::max(rolling.normal_response, rolling.disc.largest);
-  return response * amount.norm() * rolling.length;
+  return response * whole.norm() * rolling.length;
+}
+
+// ---- shock propagation
+
+double ContactImpulses::largest_push() const {
+  double largest = 0.0;
+  for (const Row& row : rows_) largest = std::max(largest, (row.response * row.impulse).norm());
+  return largest;
+}
+
+void ContactImpulses::push_block(std::size_t block, const SolverBodies& bodies, BodyMotion& x) const {
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) push_row(rows_[i], bodies, x);
+}
+
+void ContactImpulses::take_block(std::size_t block, const ContactImpulses& from) {
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {
+    rows_[i].impulse = from.rows_[i].impulse;
+    if (rows_[i].rolling < 0) continue;
+    const auto place = static_cast<std::size_t>(rows_[i].rolling);
+    rolling_[place].impulse = from.rolling_[place].impulse;
+  }
+}
+
+void ContactImpulses::replace_body(std::size_t block, int side, std::uint32_t offset) {
+  for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i)
+    (side == 0 ? rows_[i].body1 : rows_[i].body2) += offset;
+}
+
+void ContactImpulses::set_responses(const SolverBodies& bodies) {
+  for (Row& row : rows_) {
+    set_response(row, bodies);
+    if (row.rolling >= 0) set_response(row, bodies, &rolling_[static_cast<std::size_t>(row.rolling)]);
+  }
+  set_patches(bodies);
 }
 
 bool ContactImpulses::let_slide(const BodyMotion& x, double slip) {

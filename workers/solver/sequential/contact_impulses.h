@@ -29,10 +29,11 @@
 #include "plugin_sdk/solver/contact_law.h"
 #include "workers/solver/sequential/contact_patch.h"
 #include "workers/solver/sequential/friction_disc.h"
+#include "workers/solver/sequential/relaxation_blocks.h"
 
 namespace gravitas {
 
-class ContactImpulses {
+class ContactImpulses final : public RelaxationBlocks {
  public:
   // Rows of the contacts with closed[i] != 0, starting from the impulses `warm` (world, on the
   // second body; three numbers per contact).
@@ -51,8 +52,23 @@ class ContactImpulses {
   double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
 
-  // One sweep. Returns the largest change of a contact's velocity, m/s.
-  double sweep(const SolverBodies& bodies, BodyMotion& x);
+  std::size_t block_count() const override { return patches_.size(); }
+  std::array<std::uint32_t, 2> bodies_of(std::size_t block) const override {
+    const Row& row = rows_[patches_[block].first];
+    return {row.body1, row.body2};
+  }
+  // Without rolling and spinning.
+  double error_of(std::size_t block, const BodyMotion& x) const override;
+  double relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) override;
+
+  // ---- shock propagation (shock_propagation.h), as for ContactGaps
+
+  static bool holds(std::size_t) { return true; }
+  double largest_push() const;
+  void push_block(std::size_t block, const SolverBodies& bodies, BodyMotion& x) const;
+  void take_block(std::size_t block, const ContactImpulses& from);
+  void replace_body(std::size_t block, int side, std::uint32_t offset);
+  void set_responses(const SolverBodies& bodies);
 
   // Makes contacts that slip faster than `slip` (m/s) slide with mu_d in the following sweeps;
   // returns whether any changed.
@@ -126,17 +142,19 @@ class ContactImpulses {
   Vector3 velocity_of(const Row& row, const BodyMotion& x) const;
   Vector3 turning_of(const Row& row, const BodyMotion& x) const;
   void push(const Row& row, const Vector3& impulse, const SolverBodies& bodies, BodyMotion& x) const;
+  void push_row(const Row& row, const SolverBodies& bodies, BodyMotion& x) const;
   void push_turning(const Row& row, const Vector3& impulse, const SolverBodies& bodies, BodyMotion& x) const;
   void set_response(Row& row, const SolverBodies& bodies);
   void set_rolling(Row& row, const SolverBodies& bodies, double rolling_friction, double spinning_friction);
+  static void set_response(const Row& row, const SolverBodies& bodies, Rolling* rolling);
   void set_patches(const SolverBodies& bodies);
   ContactPatch whole_of(const Patch& patch, const SolverBodies& bodies) const;
-  bool sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change);
+  bool relax_whole(const Patch& patch, double share, const SolverBodies& bodies, BodyMotion& x, double* change);
   bool is_flat(const Patch& patch) const;
   bool is_in_cones(const Patch& patch, const PatchImpulses& impulses) const;
   bool spread_friction(const Patch& patch, PatchImpulses* impulses) const;
-  double sweep_row(Row& row, const SolverBodies& bodies, BodyMotion& x);
-  double sweep_rolling(const Row& row, const SolverBodies& bodies, BodyMotion& x);
+  double relax_row(Row& row, double share, const SolverBodies& bodies, BodyMotion& x);
+  double relax_rolling(const Row& row, double share, const SolverBodies& bodies, BodyMotion& x);
   Vector3 relaxed(const Row& row, const Vector3& velocity) const;
   double work_of(const Row& row, const BodyMotion& before, const BodyMotion& after, double* size) const;
 

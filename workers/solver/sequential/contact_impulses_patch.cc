@@ -63,7 +63,8 @@ ContactPatch ContactImpulses::whole_of(const Patch& patch, const SolverBodies& b
 
 // All contacts of a patch as sticking and arriving at e s; false, with nothing done, if an impulse
 // would leave its cone.
-bool ContactImpulses::sweep_whole(const Patch& patch, const SolverBodies& bodies, BodyMotion& x, double* change) {
+bool ContactImpulses::relax_whole(const Patch& patch, double share, const SolverBodies& bodies, BodyMotion& x,
+                                  double* change) {
   if (!patch.has_whole) return false;
   const int width = rows_[patch.first].has_friction ? 3 : 1;
   const std::size_t count = patch.end - patch.first;
@@ -78,6 +79,7 @@ bool ContactImpulses::sweep_whole(const Patch& patch, const SolverBodies& bodies
   }
   ContactPatch::Rows amounts = ContactPatch::Rows::Zero();
   if (is_open || !patch.whole.solve(missing, &amounts)) return false;
+  amounts *= share;
 
   PatchImpulses impulses;
   for (std::size_t i = 0; i < count; ++i) {

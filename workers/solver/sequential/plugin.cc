@@ -7,6 +7,8 @@
 namespace gravitas {
 namespace {
 
+constexpr double kLargestFactor = 1.95;
+
 class Sequential final : public SolverPlugin {
  public:
   static PluginDeclaration declaration() {
@@ -29,7 +31,27 @@ class Sequential final : public SolverPlugin {
                                   .defaults_to({SequentialSettings{}.correction_factor})
                                   .live()
                                   .means("Share of the joint error and overlap of the step before that a step removes; "
-                                         "what one step adds is always removed whole.")};
+                                         "what one step adds is always removed whole."),
+                              Property::choice("Order", {"Given", "DeepestFirst", "Simultaneous"})
+                                  .defaults_to({static_cast<double>(SequentialSettings{}.order)})
+                                  .live()
+                                  .means("How a sweep goes: joints, then contacts, by their bodies; the largest error "
+                                         "first, kept up to date (what few sweeps leave does not go by how bodies are "
+                                         "numbered); or all from the velocities that the sweep began with "
+                                         "(what is symmetric stays so in every sweep; takes several times as many)."),
+                              Property::number("RelaxationFactor", "1")
+                                  .above(0.0)
+                                  .at_most(kLargestFactor)
+                                  .defaults_to({SequentialSettings{}.relaxation_factor})
+                                  .live()
+                                  .means("How far locks and contacts go, of the way to where they are right: below 1 "
+                                         "careful, 1.5 to 1.9 fewer sweeps for stacks and chains; sliding contacts "
+                                         "may not converge above 1."),
+                              Property::flag("ShockPropagation")
+                                  .defaults_to({0.0})
+                                  .live()
+                                  .means("Starts contacts layer by layer from what is immovable, where that is closer "
+                                         "than the step before: stacks under many times their mass stand.")};
     return declaration;
   }
 
@@ -45,7 +67,14 @@ class Sequential final : public SolverPlugin {
     const double correction_factor = settings.number();
     if (iterations < 1 || iterations > 100000) throw Refusal("Iterations is outside 1 ... 100000");
     if (!(correction_factor >= 0.0 && correction_factor <= 1.0)) throw Refusal("CorrectionFactor is outside 0 ... 1");
-    return {static_cast<std::uint32_t>(iterations), correction_factor};
+    const std::uint32_t order = settings.choice();
+    const double relaxation_factor = settings.number();
+    const bool shock_propagation = settings.flag();
+    if (order > 2) throw Refusal("Order is none of Given, DeepestFirst, Simultaneous");
+    if (!(relaxation_factor > 0.0 && relaxation_factor <= kLargestFactor))
+      throw Refusal("RelaxationFactor is outside 0 ... 1.95");
+    return {static_cast<std::uint32_t>(iterations), correction_factor, static_cast<RelaxationOrder>(order),
+            relaxation_factor, shock_propagation};
   }
 
   SequentialSolver solver_;

@@ -165,7 +165,7 @@ void RelaxationJoints::orthogonalise(Block& block, double inverse_masses) {
   }
 }
 
-double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, Twist& x1, Twist& x2) {
+double RelaxationJoints::relax_rigid(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2) {
   double change = 0.0;
   std::array<double, kBlock> residual{};
   for (std::size_t i = 0; i < static_cast<std::size_t>(block.rigid); ++i) {
@@ -176,6 +176,7 @@ double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, T
   for (int i = 0; i < block.rigid; ++i) {
     double amount = 0.0;
     for (int j = 0; j < block.rigid; ++j) amount += block.inverse(i, j) * residual[static_cast<std::size_t>(j)];
+    amount *= share;
     Row& row = rows_[block.first + static_cast<std::size_t>(i)];
     row.multiplier += amount;
     row.own.push(amount, w1, w2, x1, x2);
@@ -183,12 +184,14 @@ double RelaxationJoints::sweep_rigid(const Block& block, double w1, double w2, T
   return change;
 }
 
-double RelaxationJoints::sweep_others(const Block& block, double w1, double w2, Twist& x1, Twist& x2) {
+double RelaxationJoints::relax_others(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2) {
   double change = 0.0;
   for (std::size_t i = block.first + static_cast<std::size_t>(block.rigid); i < block.end; ++i) {
     Row& row = rows_[i];
     const double value = row.own.along(x1, x2) + row.law.gamma * row.multiplier;
-    const double relaxed = relaxed_multiplier(row.law, row.multiplier, value, row.response);
+    double relaxed = relaxed_multiplier(row.law, row.multiplier, value, row.response);
+    const double whole = relaxed - row.multiplier;
+    if (share < 1.0) relaxed = row.multiplier + share * whole;
     const double amount = relaxed - row.multiplier;
     if (amount == 0.0) continue;
     row.multiplier = relaxed;
@@ -196,23 +199,37 @@ double RelaxationJoints::sweep_others(const Block& block, double w1, double w2, 
     // what J' pushes through the lock is the lock's multiplier
     for (int k = 0; k < block.rigid; ++k)
       rows_[block.first + static_cast<std::size_t>(k)].multiplier -= row.share[static_cast<std::size_t>(k)] * amount;
-    const double moved = (row.response - row.law.gamma) * amount;
+    const double moved = (row.response - row.law.gamma) * whole;
     change = std::max(change, std::fabs(moved) * row.length);
   }
   return change;
 }
 
-double RelaxationJoints::sweep(const SolverBodies& bodies, BodyMotion& x) {
-  double change = 0.0;
-  for (const Block& block : blocks_) {
-    const double w1 = bodies[block.body1].inverse_mass;
-    const double w2 = bodies[block.body2].inverse_mass;
-    Twist& x1 = x[block.body1];
-    Twist& x2 = x[block.body2];
-    change = std::max(change, sweep_rigid(block, w1, w2, x1, x2));
-    change = std::max(change, sweep_others(block, w1, w2, x1, x2));
+double RelaxationJoints::relax(std::size_t number, double share, const SolverBodies& bodies, BodyMotion& x) {
+  const Block& block = blocks_[number];
+  const double w1 = bodies[block.body1].inverse_mass;
+  const double w2 = bodies[block.body2].inverse_mass;
+  Twist& x1 = x[block.body1];
+  Twist& x2 = x[block.body2];
+  const double rigid = relax_rigid(block, share, w1, w2, x1, x2);
+  return std::max(rigid, relax_others(block, share, w1, w2, x1, x2));
+}
+
+double RelaxationJoints::error_of(std::size_t number, const BodyMotion& x) const {
+  const Block& block = blocks_[number];
+  double error = 0.0;
+  for (std::size_t i = block.first; i < block.end; ++i) {
+    const Row& row = rows_[i];
+    const double value = row.own.along(x[block.body1], x[block.body2]);
+    if (i < block.first + static_cast<std::size_t>(block.rigid)) {
+      error = std::max(error, std::fabs(row.law.lower_target - value) * row.length);
+      continue;
+    }
+    const double relaxed =
+        relaxed_multiplier(row.law, row.multiplier, value + row.law.gamma * row.multiplier, row.response);
+    error = std::max(error, (row.response - row.law.gamma) * std::fabs(relaxed - row.multiplier) * row.length);
   }
-  return change;
+  return error;
 }
 
 void RelaxationJoints::push_all(const SolverBodies& bodies, BodyMotion& x) const {

@@ -32,6 +32,7 @@
 
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/joint_laws.h"
+#include "workers/solver/sequential/relaxation_blocks.h"
 
 namespace gravitas {
 
@@ -49,7 +50,7 @@ struct RelaxationDiscrepancy {
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
                                              const SolverBodies& bodies, double correction_factor);
 
-class RelaxationJoints {
+class RelaxationJoints final : public RelaxationBlocks {
  public:
   // Multipliers along the axes of every discrepancy; 3 per row.
   using Multipliers = std::vector<double>;
@@ -72,8 +73,13 @@ class RelaxationJoints {
   double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
 
-  // One sweep over the blocks. Returns the largest change of J x in m or m/s.
-  double sweep(const SolverBodies& bodies, BodyMotion& x);
+  // Of the rows, locks go a share of their way, others at most the whole.
+  std::size_t block_count() const override { return blocks_.size(); }
+  std::array<std::uint32_t, 2> bodies_of(std::size_t block) const override {
+    return {blocks_[block].body1, blocks_[block].body2};
+  }
+  double error_of(std::size_t block, const BodyMotion& x) const override;
+  double relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) override;
 
   // Overwrites the multipliers of all discrepancies; those of rows that are not there with zero.
   void store(Multipliers& multipliers) const;
@@ -118,8 +124,8 @@ class RelaxationJoints {
                std::size_t end, const Multipliers& warm);
   void factorise(Block& block, double inverse_masses);
   void orthogonalise(Block& block, double inverse_masses);
-  double sweep_rigid(const Block& block, double w1, double w2, Twist& x1, Twist& x2);
-  double sweep_others(const Block& block, double w1, double w2, Twist& x1, Twist& x2);
+  double relax_rigid(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2);
+  double relax_others(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2);
 
   std::vector<Row> rows_;
   std::vector<Block> blocks_;

@@ -11,6 +11,7 @@
 #include "plugin_sdk/solver.h"
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/request_check.h"
+#include "workers/solver/sequential/shock_propagation.h"
 
 namespace gravitas {
 namespace {
@@ -18,6 +19,8 @@ namespace {
 constexpr double kRounding = std::numeric_limits<double>::epsilon();
 // Changes of this many units of rounding count as none.
 constexpr double kStillness = 128.0 * kRounding;
+// With shock propagation: and so many of the largest load.
+constexpr double kLoadRounding = 8.0 * kRounding;
 
 // A contact slips if it does so this much faster than a sweep still changes it: what converges
 // slowly is further from its end than one change.
@@ -117,20 +120,43 @@ void SequentialSolver::solve_pose() {
     gaps_.clear_multipliers();
     return;
   }
+  double tolerance = std::max(representable, kStillness * std::max(violation, motion));
+  sweep_.begin(bodies_, {&pose_joints_, &gaps_});
   pose_joints_.push_all(bodies_, solution_.displacement);
-  gaps_.push_all(bodies_, solution_.displacement);
-  const double tolerance = std::max(representable, kStillness * std::max(violation, motion));
+  if (settings_.shock_propagation) {
+    tolerance = choose_start(BodyMotion(solution_.displacement), tolerance, &gaps_, &solution_.displacement);
+  } else {
+    gaps_.push_all(bodies_, solution_.displacement);
+  }
   bool converged = false;
   for (std::uint32_t i = 0; i < settings_.iterations && !converged; ++i) {
-    const double joints = pose_joints_.sweep(bodies_, solution_.displacement);
-    const double contacts = gaps_.sweep(bodies_, solution_.displacement);
-    converged = std::max(joints, contacts) <= tolerance;
+    converged = sweep_.sweep(bodies_, solution_.displacement) <= tolerance;
     ++summary_.sweeps;
   }
   used_up_ = used_up_ || !converged;
   solution_.displacement = offset_;
   pose_joints_.push_all(bodies_, solution_.displacement);
   gaps_.push_all(bodies_, solution_.displacement);
+}
+
+// Contacts' multipliers to begin with: those there are or, where they leave smaller errors, those by layers. x: `base`
+// without contacts, then with them. Returns the tolerance of the sweeps: what rests under many times its mass moves by the
+// rounding of that load, which no sweep makes less.
+template <typename Contacts>
+double SequentialSolver::choose_start(const BodyMotion& base, double tolerance, Contacts* contacts, BodyMotion* x) {
+  const auto with_load = [&] { return std::max(tolerance, kLoadRounding * contacts->largest_push()); };
+  contacts->push_all(bodies_, *x);
+  const double error = sweep_.largest_error(*x);
+  if (error <= with_load()) return with_load();
+  const Contacts known = *contacts;
+  BodyMotion by_layers = base;
+  start_by_layers(bodies_, tolerance, contacts, &by_layers);
+  if (sweep_.largest_error(by_layers) < error) {
+    *x = by_layers;
+  } else {
+    *contacts = known;
+  }
+  return with_load();
 }
 
 // Adds the contacts and limits that the pose change leaves closed to those that were, and makes the
@@ -195,9 +221,15 @@ void SequentialSolver::relax_velocity() {
     return;
   }
   impulses_.let_stick();
+  double tolerance = kStillness * std::max(violation, motion);
+  sweep_.begin(bodies_, {&velocity_joints_, &impulses_});
   velocity_joints_.push_all(bodies_, solution_.velocity);
-  impulses_.push_all(bodies_, solution_.velocity);
-  velocity_converged_ = sweep_velocity(kStillness * std::max(violation, motion));
+  if (settings_.shock_propagation) {
+    tolerance = choose_start(BodyMotion(solution_.velocity), tolerance, &impulses_, &solution_.velocity);
+  } else {
+    impulses_.push_all(bodies_, solution_.velocity);
+  }
+  velocity_converged_ = sweep_velocity(tolerance);
   used_up_ = used_up_ || !velocity_converged_;
   sum_velocity();
 }
@@ -206,9 +238,7 @@ void SequentialSolver::relax_velocity() {
 bool SequentialSolver::sweep_velocity(double tolerance) {
   const std::uint32_t cap = settings_.iterations;
   for (std::uint32_t done = 1; done <= cap; ++done) {
-    const double joints = velocity_joints_.sweep(bodies_, solution_.velocity);
-    const double contacts = impulses_.sweep(bodies_, solution_.velocity);
-    summary_.residual = std::max(joints, contacts);
+    summary_.residual = sweep_.sweep(bodies_, solution_.velocity);
     ++summary_.sweeps;
     const bool converged = summary_.residual <= tolerance;
     if (converged || done == cap / 2 || done == cap / 4 * 3) {

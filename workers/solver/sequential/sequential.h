@@ -44,12 +44,18 @@
 // loads on resting, sticking and bouncing bodies. Joint error after the step is of second order in
 // the step's turn.
 //
+// Ways of relaxing, each off unless asked for: the order of a sweep's blocks (relaxation_order.h); over-relaxation, in
+// which locks and contacts go `relaxation_factor` times the way to where they are right and are projected (of linear
+// systems it takes stacks and chains from n^2 sweeps to some n; sliding contacts may not converge with it); and a start
+// layer by layer from what nothing pushes (shock_propagation.h), used where it leaves smaller errors than last step's
+// multipliers. They change the way, not what is asked for: what converges obeys the same laws.
+//
 // Convergence is linear: one joint, one contact, or one patch of contacts that rests or sticks is
 // exact in one sweep; n bodies in a row take of the order of n^2 sweeps, times the mass ratio where
 // the heavy end hangs or lies on the light one; a box that slides or tips takes some tens.
-// Known failures: a chain of 20 links under 1000 times its mass and a stack of ten under a load of
-// 1000 stretch and sink for thousands of sweeps, tall stacks under the default 200 until the warm
-// start has caught up. Much friction at long arms (Painlevé; mu > 4/3 at a slender rod, less where
+// Known failures: a chain of 20 links under 1000 times its mass and (without shock propagation) a stack of
+// ten under a load of 1000 stretch and sink for thousands of sweeps, tall stacks under the default 200 until
+// the warm start has caught up. Much friction at long arms (Painlevé; mu > 4/3 at a slender rod, less where
 // several contacts drive each other) may have no solution or several, and then the sweeps run round
 // in circles. `stop_reason` and `residual` say so; a small residual in a slow case is a small
 // change, not a small error. Newton and Direct exist for these scenes.
@@ -62,12 +68,16 @@
 #include "workers/solver/sequential/contact_gaps.h"
 #include "workers/solver/sequential/contact_impulses.h"
 #include "workers/solver/sequential/relaxation_joints.h"
+#include "workers/solver/sequential/relaxation_order.h"
 
 namespace gravitas {
 
 struct SequentialSettings {
   std::uint32_t iterations = 200;  // largest number of sweeps of one relaxation, 1 ... 100000
   double correction_factor = 1.0;  // share of an old error that a step removes, 0 ... 1
+  RelaxationOrder order = RelaxationOrder::kGiven;
+  double relaxation_factor = 1.0;  // of the way of locks and contacts, 0 ... 2
+  bool shock_propagation = false;
 };
 
 // What a solution took. The reply carries the first three.
@@ -83,7 +93,8 @@ struct SequentialSummary {
 
 class SequentialSolver {
  public:
-  explicit SequentialSolver(const SequentialSettings& settings) : settings_(settings) {}
+  explicit SequentialSolver(const SequentialSettings& settings)
+      : settings_(settings), sweep_(settings.order, settings.relaxation_factor) {}
 
   // Answers the request. Throws Refusal for an impossible one (request_check.h), and where
   // the answer is not finite because the numbers overflow. What is kept between calls is room for
@@ -97,6 +108,8 @@ class SequentialSolver {
   void build_velocity(const stage::SolverSolveRequest& request);
   void solve_velocity();
   void relax_velocity();
+  template <typename Contacts>
+  double choose_start(const BodyMotion& base, double tolerance, Contacts* contacts, BodyMotion* x);
   bool sweep_velocity(double tolerance);
   void bound_energy();
   void group_bodies();
@@ -107,6 +120,7 @@ class SequentialSolver {
   void set_offset(double factor);
 
   SequentialSettings settings_;
+  RelaxationSweep sweep_;
   SequentialSummary summary_;
   bool velocity_converged_ = true;
   bool used_up_ = false;  // some relaxation ran out of sweeps

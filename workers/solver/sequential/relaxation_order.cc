@@ -1,0 +1,111 @@
+#include "workers/solver/sequential/relaxation_order.h"
+
+#include <algorithm>
+#include <queue>
+
+namespace gravitas {
+namespace {
+
+constexpr std::size_t kMostNeighbours = 64;
+
+}  // namespace
+
+void RelaxationSweep::begin(const SolverBodies& bodies, std::array<RelaxationBlocks*, 2> parts) {
+  parts_ = parts;
+  if (order_ == RelaxationOrder::kGiven) return;
+  places_.clear();
+  at_body_.assign(bodies.count() + 1, {});
+  for (RelaxationBlocks* part : parts_) {
+    for (std::size_t block = 0; block < part->block_count(); ++block) {
+      for (const std::uint32_t body : part->bodies_of(block))
+        if (bodies[body].is_pushed()) at_body_[body].push_back(static_cast<std::uint32_t>(places_.size()));
+      places_.push_back({part, block});
+    }
+  }
+}
+
+double RelaxationSweep::sweep(const SolverBodies& bodies, BodyMotion& x) {
+  switch (order_) {
+    case RelaxationOrder::kDeepestFirst:
+      return sweep_deepest_first(bodies, x);
+    case RelaxationOrder::kSimultaneous:
+      return sweep_simultaneously(bodies, x);
+    case RelaxationOrder::kGiven:
+      break;
+  }
+  return sweep_given(bodies, x);
+}
+
+double RelaxationSweep::largest_error(const BodyMotion& x) const {
+  double largest = 0.0;
+  for (const RelaxationBlocks* part : parts_)
+    for (std::size_t block = 0; block < part->block_count(); ++block)
+      largest = std::max(largest, part->error_of(block, x));
+  return largest;
+}
+
+double RelaxationSweep::sweep_given(const SolverBodies& bodies, BodyMotion& x) const {
+  double change = 0.0;
+  for (RelaxationBlocks* part : parts_)
+    for (std::size_t block = 0; block < part->block_count(); ++block)
+      change = std::max(change, part->relax(block, factor_, bodies, x));
+  return change;
+}
+
+double RelaxationSweep::sweep_deepest_first(const SolverBodies& bodies, BodyMotion& x) {
+  visited_.assign(places_.size(), 0);
+  error_.clear();
+  std::priority_queue<Candidate> candidates;
+  for (const Place& place : places_) {
+    const double error = place.part->error_of(place.block, x);
+    candidates.push({error, static_cast<std::uint32_t>(error_.size())});
+    error_.push_back(error);
+  }
+  double change = 0.0;
+  while (!candidates.empty()) {
+    const Candidate next = candidates.top();
+    candidates.pop();
+    // others of the same block have overtaken or replaced it
+    if (visited_[next.block] != 0 || next.error != error_[next.block]) continue;
+    visited_[next.block] = 1;
+    const Place& place = places_[next.block];
+    const double asked = place.part->relax(place.block, factor_, bodies, x);
+    change = std::max(change, asked);
+    if (asked == 0.0) continue;
+    for (const std::uint32_t body : place.part->bodies_of(place.block)) {
+      if (at_body_[body].size() > kMostNeighbours) continue;
+      for (const std::uint32_t neighbour : at_body_[body]) {
+        if (visited_[neighbour] != 0) continue;
+        const double error = places_[neighbour].part->error_of(places_[neighbour].block, x);
+        if (error == error_[neighbour]) continue;
+        error_[neighbour] = error;
+        candidates.push({error, neighbour});
+      }
+    }
+  }
+  return change;
+}
+
+double RelaxationSweep::sweep_simultaneously(const SolverBodies& bodies, BodyMotion& x) {
+  start_ = x;
+  double change = 0.0;
+  for (const Place& place : places_) {
+    const auto [body1, body2] = place.part->bodies_of(place.block);
+    const std::size_t sharing = std::max(at_body_[body1].size(), at_body_[body2].size());
+    const Twist sum1 = x[body1];
+    const Twist sum2 = x[body2];
+    x[body1] = start_[body1];
+    x[body2] = start_[body2];
+    const double share = factor_ / static_cast<double>(std::max<std::size_t>(1, sharing));
+    change = std::max(change, place.part->relax(place.block, share, bodies, x));
+    const auto add = [&](const Twist& sum, std::uint32_t body) {
+      x[body].linear = sum.linear + (x[body].linear - start_[body].linear);
+      x[body].angular = sum.angular + (x[body].angular - start_[body].angular);
+    };
+    add(sum1, body1);
+    add(sum2, body2);
+  }
+  return change;
+}
+
+}  // namespace gravitas
