@@ -10,6 +10,7 @@
 
 #include "plugin_sdk/geometry/ray.h"
 #include "services/recorder/json.h"
+#include "services/run/exchange_spec.h"
 #include "tests/services/survey/surveyed_scene.h"
 
 namespace gravitas::survey {
@@ -332,6 +333,36 @@ TEST(Queries, AreTheSameOnAnyHostingAlsoWhenTheirWorkerDies) {
   SurveyedScene quiet(crowd(20, 5, true));
   quiet.steps(8);
   EXPECT_EQ(quiet.environment->chain_hash(), chain) << "questions changed the run";
+}
+
+// After a swap the plugin that came in.
+TEST(Queries, AreAnsweredByWhoAnswersInTheRun) {
+  class Follower final : public kernel::CommitListener {
+   public:
+    explicit Follower(Surveyor* surveyor) : surveyor_(*surveyor) {}
+    void on_commit(const kernel::Environment&) override {}
+    void on_decision(const kernel::Environment&, const kernel::Decision& decision) override {
+      surveyor_.follow(decision);
+    }
+
+   private:
+    Surveyor& surveyor_;
+  };
+  SurveyedScene scene(kRow);
+  Follower follower(&*scene.surveyor);
+  scene.environment->set_commit_listener(&follower);
+  v1::Batch batch;
+  add_ray({0, 2, 0}, {1, 0, 0}, &batch);
+  ASSERT_THAT(bodies_of(ask(&scene, batch).rays(0).hits()), ElementsAre("A"));
+  scene.environment->order_swap(
+      resolve_swap(parse_swap("collision=GjkOnly@step=2"), scene.description, &scene.catalog));
+  scene.steps(3);
+  const AskedSlot& collision = scene.surveyor->slot(Slot::kCollision);
+  EXPECT_EQ(collision.description().plugins[0].declaration.name, "GjkOnly");
+  const v1::Answers answers = ask(&scene, batch);
+  ASSERT_THAT(bodies_of(answers.rays(0).hits()), ElementsAre("A"));
+  EXPECT_NEAR(answers.rays(0).hits(0).distance(), 4.0, 1e-8);
+  EXPECT_THAT(collision.faults(), IsEmpty());
 }
 
 // Nothing can touch here, so the plan has neither space nor collision; a ray finds what there is all the same.

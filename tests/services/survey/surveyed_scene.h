@@ -23,7 +23,7 @@ struct SurveyedScene {
     options.hosting = {{std::nullopt, hosting}};
     options.overrides = overrides;
     std::vector<std::string> warnings;
-    description = load(options, &warnings);
+    description = load(options, &warnings, &catalog);
     environment = start(description);
     surveyor.emplace(description);
   }
@@ -33,6 +33,7 @@ struct SurveyedScene {
   }
 
   ScratchFolder folder;
+  Catalog catalog;
   kernel::EnvironmentDescription description;
   std::unique_ptr<kernel::Environment> environment;
   std::optional<survey::Surveyor> surveyor;
