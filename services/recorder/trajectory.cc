@@ -9,9 +9,6 @@
 namespace gravitas {
 namespace {
 
-// A boundary counts as "at k * interval" within this share of a time step.
-constexpr double kTimeTolerance = 1e-9;
-
 [[noreturn]] void fail(const std::string& path) {
   throw std::system_error(errno, std::generic_category(), "trajectory '" + path + "'");
 }
@@ -28,7 +25,7 @@ std::string quoted(const std::string& id) {
 
 TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description,
                                    double interval)
-    : path_(path), file_(std::fopen(path.c_str(), "we")), interval_(interval) {
+    : path_(path), file_(std::fopen(path.c_str(), "we")), sampling_(interval) {
   if (file_ == nullptr) fail(path);
   for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
     const kernel::BodyDescription& body = description.bodies[i];
@@ -42,14 +39,7 @@ TrajectoryWriter::~TrajectoryWriter() {
 }
 
 void TrajectoryWriter::offer(const kernel::Environment& environment, bool last) {
-  const double time = environment.time();
-  const double tolerance = kTimeTolerance * environment.time_step();
-  const bool due = interval_ <= 0.0 || time >= static_cast<double>(next_sample_) * interval_ - tolerance;
-  if (!due && !last) return;
-  if (last_written_ == environment.step_count()) return;
-  while (interval_ > 0.0 && static_cast<double>(next_sample_) * interval_ - tolerance <= time) ++next_sample_;
-  write_sample(environment);
-  last_written_ = environment.step_count();
+  if (sampling_.takes(environment, last)) write_sample(environment);
 }
 
 void TrajectoryWriter::write_sample(const kernel::Environment& environment) {

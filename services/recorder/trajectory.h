@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "kernel/environment.h"
+#include "services/recorder/sampling.h"
 
 namespace gravitas {
 
@@ -42,9 +43,7 @@ class TrajectoryWriter {
   std::string path_;
   std::FILE* file_;
   std::vector<Row> rows_;
-  double interval_;
-  std::uint64_t next_sample_ = 0;
-  std::int64_t last_written_ = -1;
+  Sampling sampling_;
 };
 
 }  // namespace gravitas

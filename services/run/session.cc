@@ -20,6 +20,7 @@
 #include "services/recorder/event_log.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/json.h"
+#include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
 #include "services/run/exchange_spec.h"
@@ -205,6 +206,9 @@ class Run final : private kernel::CommitListener {
       if (!options_.trajectory.empty())
         trajectory_ =
             std::make_unique<TrajectoryWriter>(options_.trajectory, description_, options_.sample_every.value_or(0.0));
+      if (!options_.reactions.empty())
+        reactions_ =
+            std::make_unique<ReactionLog>(options_.reactions, description_, options_.sample_every.value_or(0.0));
     } catch (const std::system_error& error) {
       throw BadInput(error.what());
     }
@@ -216,6 +220,7 @@ class Run final : private kernel::CommitListener {
     const Clock::time_point begin = Clock::now();
     guard([&] {
       if (trajectory_) trajectory_->offer(*environment_, is_done());
+      if (reactions_) reactions_->offer(*environment_, is_done());
       while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
         if (interrupted()) {
           result_.outcome = RunOutcome::kInterrupted;
@@ -224,6 +229,7 @@ class Run final : private kernel::CommitListener {
         } else {
           figures_->follow(environment_.get());
           if (trajectory_) trajectory_->offer(*environment_, is_done());
+          if (reactions_) reactions_->offer(*environment_, is_done());
           progress({environment_->time(), environment_->time_step() * description_.steps, environment_->step_count(),
                     environment_->total_steps()});
         }
@@ -250,6 +256,10 @@ class Run final : private kernel::CommitListener {
     guard([&] {
       if (trajectory_ && result_.outcome != RunOutcome::kFailed) trajectory_->offer(*environment_, true);
       if (trajectory_) trajectory_->close();
+    });
+    guard([&] {
+      if (reactions_ && result_.outcome != RunOutcome::kFailed) reactions_->offer(*environment_, true);
+      if (reactions_) reactions_->close();
     });
     guard([&] { events_->close(); });
     write_report();
@@ -325,6 +335,10 @@ class Run final : private kernel::CommitListener {
     }
   }
 
+  void on_inner_step(const kernel::Environment& environment, const kernel::StepData& data,
+                     std::uint32_t inner) override {
+    if (reactions_) reactions_->add(environment, data, inner);
+  }
   void on_commit(const kernel::Environment& environment) override {
     if (recorder_) recorder_->on_commit(environment);
   }
@@ -422,6 +436,7 @@ class Run final : private kernel::CommitListener {
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
   JournalReading journal_;             // of the checkpoint
   std::unique_ptr<TrajectoryWriter> trajectory_;
+  std::unique_ptr<ReactionLog> reactions_;
   std::unique_ptr<EventLog> events_;
   std::optional<Recorder> recorder_;
   bool is_unrepeatable_ = false;
@@ -448,6 +463,8 @@ void Run::write_report() {
   write_swaps(*environment_, &report);
   write_stages(*environment_, &report);
   figures_->write(&report);
+  if (!reactions_) return;
+  for (report::v1::Reaction& reaction : reactions_->last(*environment_)) *report.add_reactions() = std::move(reaction);
 }
 
 }  // namespace

@@ -30,8 +30,8 @@ struct RunOptions {
   std::optional<double> time_step;     // s
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
-  std::string trajectory, report, events;
-  std::optional<double> sample_every;  // s; every step if absent
+  std::string trajectory, report, events, reactions;
+  std::optional<double> sample_every;  // of trajectory and reactions, s; every step if absent
   std::string checkpoint;              // file that is kept up to date; none if empty
   std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
   std::string resume;                  // checkpoint to go on from
