@@ -98,6 +98,7 @@ void Environment::end_inner_step() {
   if (listener_ != nullptr && model_.constraint_count > 0) raise_break_events();
   back().rested.assign(front().rested);
   back().rest_wrench.assign(front().rest_wrench);
+  if (commit_listener_ != nullptr) commit_listener_->on_inner_step(*this, data_, inner_);
   std::swap(front_, back_);
   if (inner_ == 0 && states_.size() > 2) std::swap(back_, start_);
   ++inner_;
@@ -226,14 +227,8 @@ double Environment::inner_end_time() const {
 void Environment::raise_collision_events() {
   std::size_t contact = 0;
   visit_changes(front().touching.span(), back().touching.span(), [&](bool starts, std::uint32_t a, std::uint32_t b) {
-    Event event{starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd,
-                step_count_ + 1,
-                inner_end_time(),
-                a,
-                b,
-                kNone,
-                0.0,
-                0.0};
+    const EventKind kind = starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd;
+    Event event{kind, step_count_ + 1, inner_end_time(), a, b, kNone, 0.0, 0.0};
     for (; starts && contact < data_.contact_key.size(); ++contact) {
       const std::pair bodies{data_.contact_body[2 * contact], data_.contact_body[2 * contact + 1]};
       if (bodies > std::pair{a, b}) break;

@@ -62,6 +62,9 @@ class CommitListener {
   // Others answer from now on; told before the commit that uses them.
   virtual void on_decision(const Environment&, const Decision&) {}
   virtual void on_poison(const Environment&, const PoisonedCall&) {}
+  // An inner step ends, number `inner` of its step, with what was worked out for it. At 0 those before count no longer: the
+  // step has been begun again.
+  virtual void on_inner_step(const Environment&, const StepData&, std::uint32_t /*inner*/) {}
   // Called at the end of a step, when S_{n+1} is the committed state and its events have been told. What it throws
   // comes out of step(); the commit stands.
   virtual void on_commit(const Environment& environment) = 0;

@@ -13,6 +13,20 @@ enum class StopReason : std::uint32_t {
   kContradiction = 3  // converged, but joints contradict each other: a least-squares compromise
 };
 
+constexpr const char* stop_reason_name(StopReason reason) {
+  switch (reason) {
+    case StopReason::kNothingToDo:
+      return "nothing to do";
+    case StopReason::kConverged:
+      return "converged";
+    case StopReason::kIterations:
+      return "iterations used up";
+    case StopReason::kContradiction:
+      return "contradiction";
+  }
+  return "unknown";
+}
+
 // Columns of `contact_material`.
 enum MaterialColumn : std::uint32_t {
   kRestitution = 0,

@@ -335,9 +335,15 @@ class IslandSolver {
   // ---- velocity
 
   void solve_velocity() {
+    const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
+    // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
+    if (may_turn() && !is_turned()) {
+      build_velocity(false);
+      note(cone_.solve(bodies_, trial, 0.0, settings_));
+      keep_impulses();
+    }
     for (int round = 0;; ++round) {
-      build_velocity();
-      const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
+      build_velocity(true);
       const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_);
       note(solved);
       has_velocity_ = solved.has_converged;
@@ -349,7 +355,16 @@ class IslandSolver {
     }
   }
 
-  void build_velocity() {
+  static bool has_turning(const ContactLaw& law) { return law.rolling_friction > 0.0 || law.spinning_friction > 0.0; }
+  bool may_turn() const {
+    return std::any_of(contacts_.begin(), contacts_.end(),
+                       [](const EndContact& c) { return c.is_closed && has_turning(c.law); });
+  }
+  bool is_turned() const {
+    return std::any_of(contacts_.begin(), contacts_.end(), [](const EndContact& c) { return !c.turning.isZero(0.0); });
+  }
+
+  void build_velocity(bool with_turning) {
     cone_.rows.clear();
     cone_.contacts.clear();
     for (const EndJoint& joint : joints_) {
@@ -365,17 +380,16 @@ class IslandSolver {
       }
     }
     for (const EndContact& contact : contacts_)
-      if (contact.is_closed) build_velocity(contact);
+      if (contact.is_closed) build_velocity(contact, with_turning);
   }
 
-  void build_velocity(const EndContact& contact) {
+  void build_velocity(const EndContact& contact, bool with_turning) {
     const Matrix3 &inverse1 = end_[contact.body1].inverse_inertia, &inverse2 = end_[contact.body2].inverse_inertia;
     const ContactLaw& law = contact.law;
     ConeContact& cone = cone_.contacts.emplace_back();
     cone.first = static_cast<std::uint32_t>(cone_.rows.size());
     cone.has_friction = law.static_friction > 0.0;
-    cone.has_turning =
-        (law.rolling_friction > 0.0 || law.spinning_friction > 0.0) && !(inverse1 + inverse2).isZero(0.0);
+    cone.has_turning = with_turning && has_turning(law) && !(inverse1 + inverse2).isZero(0.0);
     cone.target = law.target;
     cone.static_friction = law.static_friction, cone.dynamic_friction = law.dynamic_friction;
     cone.rolling_friction = law.rolling_friction, cone.spinning_friction = law.spinning_friction;
@@ -391,7 +405,7 @@ class IslandSolver {
       add(with_turns(direction_at(law.frame.col(k), contact.arm1, contact.arm2), inverse1, inverse2), 1.0, impulse[k]);
     const double length = std::max(bodies_[contact.body1].gyration(), bodies_[contact.body2].gyration());
     for (int k = 0; k < (cone.has_turning ? 3 : 0); ++k)
-      add(with_turns(turning_about(law.frame.col(k)), inverse1, inverse2), length, 0.0);
+      add(with_turns(turning_about(law.frame.col(k)), inverse1, inverse2), length, contact.turning[k]);
   }
 
   void keep_impulses() {
@@ -401,12 +415,15 @@ class IslandSolver {
         answer_.joint_impulse[3 * joint.row + k] =
             joint.velocity_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
     std::size_t cone = 0;
-    for (const EndContact& contact : contacts_) {
+    for (EndContact& contact : contacts_) {
       Vector3 impulse = Vector3::Zero();
+      contact.turning.setZero();
       if (contact.is_closed) {
         const ConeContact& rows = cone_.contacts[cone++];
         for (std::uint32_t k = 0; k < (rows.has_friction ? 3U : 1U); ++k)
           impulse += cone_.rows[rows.first + k].multiplier * contact.law.frame.col(static_cast<int>(k));
+        for (std::uint32_t k = 0; k < (rows.has_turning ? 3U : 0U); ++k)
+          contact.turning[k] = cone_.rows[rows.first + rows.count() - 3 + k].multiplier;
         set_vector(answer_.contact_direction, contact.row, contact.law.frame.col(0));
       }
       set_vector(answer_.contact_impulse, contact.row, impulse);

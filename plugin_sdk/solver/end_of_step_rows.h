@@ -38,7 +38,8 @@ struct EndContact {
   ConstraintDirection gap_row;
   double gap = 0.0, gap_target = 0.0, slop = 0.0;
   ContactLaw law;
-  Vector3 arm1, arm2;  // to the surface points
+  Vector3 arm1, arm2;                 // to the surface points
+  Vector3 turning = Vector3::Zero();  // impulses of rolling and spinning friction in the law's frame, N m s
   bool is_closed = false;
   std::uint32_t lowered = 0;
 };

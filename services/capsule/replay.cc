@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "plugin_sdk/solver.h"
 #include "services/capsule/capsule.h"
 #include "services/check/answer_text.h"
 #include "services/check/carrier_subject.h"
@@ -87,6 +88,20 @@ Answer recorded_answer(const v1::CapsuleCall& call) {
           .text = call.text(),
           .fault = call.fault(),
           .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
+}
+
+void add_solution(const v1::CapsuleCall& call, std::uint32_t number, const Answer& answer,
+                  report::v1::ReplayReport* report) {
+  const MessageColumns request = columns_of(call.request(), method_named(call.method())->request);
+  report::v1::SolverOutcome& outcome = *report->add_solutions();
+  outcome.set_call(number);
+  outcome.set_step(call.step());
+  outcome.set_bodies(static_cast<std::uint32_t>(request.u32("flags").size()));
+  outcome.set_discrepancies(static_cast<std::uint32_t>(request.u32("mode").size()));
+  outcome.set_contacts(static_cast<std::uint32_t>(request.u64("contact_key").size()));
+  outcome.set_iterations(answer.columns.u32("iterations")[0]);
+  outcome.set_residual(answer.columns.f64("residual")[0]);
+  outcome.set_stop_reason(stop_reason_name(static_cast<StopReason>(answer.columns.u32("stop_reason")[0])));
 }
 
 check::Examinee usable(const std::string& argument) {
@@ -180,6 +195,8 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
       try {
         const Answer came = player.ask(call, options.plugin);
         has_failed = !came.fault.empty();
+        if (i == 0 && came.ok() && method_of(call) == stage::Method::kSolverSolve)
+          add_solution(call, number, came, &report);
         if (was.fault.empty() || has_failed)
           text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
       } catch (const OtherDerivative& other) {

@@ -23,7 +23,7 @@ struct ReplayOptions {
 
 // Against what was answered in the run. `progress` gets the number of calls so far and may end it by returning false.
 // A derivative that a call asks for is answered as in the run; one that the run did not ask for makes a difference. A
-// poisoned request has no derivatives: they are zero. Throws BadInput for what cannot be used.
+// poisoned request has no derivatives: they are zero. Of solvers it says how each problem ended. Throws BadInput for what cannot be used.
 report::v1::ReplayReport replay(const ReplayOptions& options, const std::function<bool(std::uint32_t)>& progress);
 
 // The first call that two plugins answer differently: `options.plugin` is the first.

@@ -88,6 +88,16 @@ std::function<bool(std::uint32_t)> progress_of(StatusLine* line) {
   };
 }
 
+void print_solutions(const report::v1::ReplayReport& report) {
+  if (report.solutions().empty()) return;
+  std::cout << fmt::format("{:>6} {:>6} {:>6} {:>13} {:>8} {:>10} {:>12}  {}\n", "call", "step", "bodies",
+                           "discrepancies", "contacts", "iterations", "residual m/s", "stopped");
+  for (const report::v1::SolverOutcome& one : report.solutions())
+    std::cout << fmt::format("{:>6} {:>6} {:>6} {:>13} {:>8} {:>10} {:>12.3g}  {}\n", one.call(), one.step(),
+                             one.bodies(), one.discrepancies(), one.contacts(), one.iterations(), one.residual(),
+                             one.stop_reason());
+}
+
 int replay(ReplayLine* line) {
   line->options.hosting = parse_hosting_mode("--hosting", line->hosting, line->hosting);
   if (!line->plugin.empty()) line->options.plugin = line->plugin;
@@ -101,6 +111,7 @@ int replay(ReplayLine* line) {
     std::cout << to_json(report, JsonForm::kPage);
   } else {
     for (const std::string& plugin : report.plugins()) std::cout << plugin << '\n';
+    print_solutions(report);
     std::cout << fmt::format("{} calls: {} same, {} different", report.calls(), report.same(), report.different());
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed again", report.failed_again());
     if (report.answered_now() > 0)
@@ -166,6 +177,9 @@ void add_replay(CLI::App* app, Action* action) {
   command->footer(
       "Example: gravitas replay solver.capsule --plugin build/mine/solver_mine.so\n"
       "         gdb --args gravitas replay solver.capsule --hosting direct --call 17\n"
+      "         gravitas replay solver.capsule --plugin Newton --json\n"
+      "Of a solver it says how each problem ended: iterations, residual, why it stopped. The file is described in "
+      "schemas/gravitas/recorder/v1/capsule.proto.\n"
       "Exits with 4 if an answer differs from the run's, or if there is none.");
   add_replay_options(command, line.get());
   command->add_option("--plugin", line->plugin,

@@ -128,8 +128,11 @@ void add_run(CLI::App* app, Action* action) {
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
   command->add_option("--sample-every", options.sample_every,
-                      "Interval of the samples of trajectory and instrumentation, s; every step if absent");
+                      "Interval of the samples of trajectory, instrumentation and reactions, s; every step if absent");
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
+  command->add_option("--reactions", options.reactions,
+                      "Write the force and torque of every joint and contact to this file (JSON lines, the mean over "
+                      "the step that ends with the sample); the report then has those of the last step");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
   CLI::Option* instrumentation = command->add_option(
       "--instrumentation", options.instrumentation,

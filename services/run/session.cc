@@ -20,6 +20,7 @@
 #include "services/recorder/event_log.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/json.h"
+#include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
 #include "services/run/exchange_spec.h"
@@ -211,6 +212,9 @@ class Run final : private kernel::CommitListener {
       if (surveyor_)
         frames_ = std::make_unique<survey::FrameFile>(options_.instrumentation, &*surveyor_, kinds_,
                                                       options_.sample_every.value_or(0.0));
+      if (!options_.reactions.empty())
+        reactions_ =
+            std::make_unique<ReactionLog>(options_.reactions, description_, options_.sample_every.value_or(0.0));
     } catch (const std::system_error& error) {
       throw BadInput(error.what());
     }
@@ -255,9 +259,14 @@ class Run final : private kernel::CommitListener {
   void finish() {
     guard([&] {
       if (result_.outcome != RunOutcome::kFailed) offer_sample(true);
+    });
+    guard([&] {
       if (trajectory_) trajectory_->close();
     });
     guard([&] { close_frames(); });
+    guard([&] {
+      if (reactions_) reactions_->close();
+    });
     guard([&] { events_->close(); });
     write_report();
     guard([&] {
@@ -281,6 +290,7 @@ class Run final : private kernel::CommitListener {
 
   void offer_sample(bool last) {
     if (trajectory_) trajectory_->offer(*environment_, last);
+    if (reactions_) reactions_->offer(*environment_, last);
     if (frames_) frames_->offer(*environment_, last);
   }
 
@@ -357,6 +367,10 @@ class Run final : private kernel::CommitListener {
     }
   }
 
+  void on_inner_step(const kernel::Environment& environment, const kernel::StepData& data,
+                     std::uint32_t inner) override {
+    if (reactions_) reactions_->add(environment, data, inner);
+  }
   void on_commit(const kernel::Environment& environment) override {
     if (recorder_) recorder_->on_commit(environment);
   }
@@ -455,6 +469,7 @@ class Run final : private kernel::CommitListener {
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
   JournalReading journal_;             // of the checkpoint
   std::unique_ptr<TrajectoryWriter> trajectory_;
+  std::unique_ptr<ReactionLog> reactions_;
   std::unique_ptr<EventLog> events_;
   std::vector<survey::Kind> kinds_;
   std::optional<survey::Surveyor> surveyor_;
@@ -484,6 +499,8 @@ void Run::write_report() {
   write_swaps(*environment_, &report);
   write_stages(*environment_, &report);
   figures_->write(&report);
+  if (!reactions_) return;
+  for (report::v1::Reaction& reaction : reactions_->last(*environment_)) *report.add_reactions() = std::move(reaction);
 }
 
 }  // namespace

@@ -104,10 +104,11 @@ TEST_P(Accurate, AHangingChainCarriesAnyLoad) {
 
 // ---- stacks
 
-void expect_stands(const std::vector<double>& masses, double duration) {
+void expect_stands(const std::vector<double>& masses, double duration,
+                   const std::vector<std::string>& overrides = solver("Newton")) {
   std::string bodies = kFloor;
   for (std::size_t i = 0; i < masses.size(); ++i) bodies += cube(static_cast<int>(i), masses[i]);
-  SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, duration), ""), solver("Newton"));
+  SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, duration), ""), overrides);
   run.to_end();
   EXPECT_LE(run.report().max_penetration(), 1e-10);
   for (std::size_t i = 0; i < masses.size(); ++i) {
@@ -121,6 +122,17 @@ TEST(AccurateStack, TwoUnderAThousandTimesTheirMassStand) { expect_stands({1, 10
 TEST(AccurateStack, TenUnderAThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1000}, 1); }
 TEST(AccurateStack, TwentyStand) { expect_stands(std::vector<double>(20, 1.0), 3); }
 TEST(AccurateStack, TenUnderTenThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1e4}, 0.5); }
+
+// Sequential with its layers, and without: what the option is for.
+TEST(SequentialStack, WithShockPropagationTenUnderAThousandTimesTheirMassStand) {
+  const std::vector<double> masses = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1000};
+  expect_stands(masses, 5, {"Solver=Sequential", "Solver.ShockPropagation=true"});
+  std::string bodies = kFloor;
+  for (std::size_t i = 0; i < masses.size(); ++i) bodies += cube(static_cast<int>(i), masses[i]);
+  SceneRun plain(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, 1), ""), solver("Sequential"));
+  plain.to_end();
+  EXPECT_GT(plain.report().max_penetration(), 1e-3);
+}
 
 // ---- friction
 

@@ -86,6 +86,7 @@ class SceneRun final : private kernel::EventListener {
   std::uint32_t count_events(kernel::EventKind kind) const;
   const std::vector<std::string>& warnings() const { return warnings_; }
   kernel::Environment& environment() { return *environment_; }
+  const kernel::EnvironmentDescription& description() const { return description_; }
 
  private:
   void on_event(const kernel::Event& event) override { events_.push_back(event); }

@@ -3,6 +3,7 @@
 #include "services/capsule/capsule.h"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -11,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/report/v1/replay.pb.h"
+#include "plugin_sdk/solver.h"
 #include "services/run/session.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
@@ -104,6 +107,34 @@ TEST(Capsule, AnotherPluginIsComparedWithTheOneThatAnswered) {
   const ProgramResult foreign = run_program({"replay", file, "--plugin", "Sequential"}, folder);
   EXPECT_EQ(foreign.exit_code, 2);
   EXPECT_THAT(foreign.err, HasSubstr("is of slot solver, the capsule of slot integrator"));
+}
+
+// Problems of a run, solved alone: each says how it ended, by the solver that had it and by another one.
+TEST(Capsule, OfASolverSaysHowEachProblemEnded) {
+  const ScratchFolder folder;
+  const std::string file = capture("solver", folder);
+  const ProgramResult same = run_program({"replay", file, "--json", "--hosting", "direct"}, folder);
+  ASSERT_EQ(same.exit_code, 0) << same.err;
+  report::v1::ReplayReport report;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(same.out, &report).ok());
+  ASSERT_EQ(report.solutions_size(), 12);
+  capsule::Reader reader(file);
+  recorder::v1::CapsuleCall call;
+  for (int i = 0; i < 12; ++i) {
+    const report::v1::SolverOutcome& one = report.solutions(i);
+    EXPECT_EQ(one.call(), static_cast<std::uint32_t>(i + 1));
+    ASSERT_TRUE(reader.next(&call));
+    const MessageColumns reply =
+        capsule::columns_of(call.reply(), stage::method_info(stage::Method::kSolverSolve).reply);
+    EXPECT_EQ(one.iterations(), reply.u32("iterations")[0]);
+    EXPECT_EQ(one.residual(), reply.f64("residual")[0]);
+    EXPECT_EQ(one.stop_reason(), stop_reason_name(static_cast<StopReason>(reply.u32("stop_reason")[0])));
+  }
+  const ProgramResult other = run_program({"replay", file, "--plugin", "Newton"}, folder);
+  EXPECT_THAT(other.out, HasSubstr("iterations residual m/s  stopped\n"));
+  // nothing but solvers end like that
+  const ProgramResult integrator = run_program({"replay", capture("integrator", folder)}, folder);
+  EXPECT_EQ(integrator.out.find("stopped"), std::string::npos);
 }
 
 // It fails at the state of one step, whoever asks: the run pauses, and the request is kept.

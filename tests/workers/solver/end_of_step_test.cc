@@ -189,6 +189,49 @@ TEST(EndOfStep, EveryContactThreeTimesIsThatContact) {
   }
 }
 
+// Three bricks, one across two: rolling friction is no torque where nothing turns, so it changes neither the answer nor
+// what it costs, and the next step's guess is right as it stands.
+TEST(EndOfStep, RollingFrictionOfWhatRestsCostsNothing) {
+  const auto bricks = [](double rolling) {
+    SolverProblem p;
+    const auto ground = p.add_immovable();
+    const Vector3 at[] = {{-0.55, 0.25, 0}, {0.55, 0.25, 0}, {0, 0.75, 0}};
+    std::uint32_t brick[3];
+    for (int i = 0; i < 3; ++i)
+      brick[i] = p.add_body({.mass = 3.0, .moments = {0.1, 0.3, 0.3}, .pose = {at[i], Quaternion::Identity()}});
+    p.make_trial({0, -9.81, 0});
+    const double fall = 9.81 * p.time_step * p.time_step;
+    const auto lay = [&](std::uint32_t below, std::uint32_t above, double from, double to, double y, double depth) {
+      for (const double x : {from, to})
+        for (const double z : {-0.25, 0.25})
+          p.add_contact({.body1 = below,
+                         .body2 = above,
+                         .point = {x, y, z},
+                         .depth = depth,
+                         .static_friction = 0.6,
+                         .dynamic_friction = 0.5,
+                         .rolling = rolling,
+                         .spinning = rolling,
+                         .key = p.contact_key.size() + 1});
+    };
+    for (int i = 0; i < 2; ++i) lay(ground, brick[i], at[i].x() - 0.5, at[i].x() + 0.5, -0.5 * fall, fall);
+    lay(brick[0], brick[2], -0.5, -0.05, 0.5 - fall, 0.0);
+    lay(brick[1], brick[2], 0.05, 0.5, 0.5 - fall, 0.0);
+    return p;
+  };
+  for (const EndOfStepSolver& solver : {newton(), direct()}) {
+    const SolverAnswer without = bricks(0.0).solve(solver);
+    SolverProblem p = bricks(0.05);
+    const SolverAnswer with = p.solve(solver);
+    EXPECT_TRUE(with.converged());
+    EXPECT_LE(with.iterations[0], without.iterations[0]);
+    EXPECT_EQ(with.contact_impulse, without.contact_impulse);
+    p.contact_warm_impulse = with.contact_impulse;
+    p.contact_warm_correction = with.contact_correction;
+    EXPECT_EQ(p.solve(solver).iterations[0], 0U);
+  }
+}
+
 // Rolling and spinning friction end in finite time: a ball's turning is stopped by at most mu_r N each.
 TEST(EndOfStep, RollingAndSpinningFrictionAreBoundedTorques) {
   for (const double coefficient : {0.001, 10.0}) {

@@ -1,0 +1,62 @@
+// What joints and contacts did to their bodies in a step, and the file of it: JSON lines, an object per joint and contact
+// of each sampled step (Reaction of report.proto).
+//
+// Force = the solver's impulses of all inner steps of the step, over its length; so a joint's force is that of the
+// middle of a step to first order. With the simulator Smooth joints act within the derivatives: their force is that of
+// the last one asked for in the step, and the solver's impulses come on top.
+#pragma once
+
+#include <array>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gravitas/report/v1/report.pb.h"
+#include "kernel/environment.h"
+#include "services/recorder/sampling.h"
+
+namespace gravitas {
+
+class ReactionLog {
+ public:
+  // No file if `path` is empty. Samples as Sampling has them, without the initial state: no step led there. Throws
+  // std::system_error if the file cannot be made.
+  ReactionLog(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
+  ~ReactionLog();
+  ReactionLog(const ReactionLog&) = delete;
+  ReactionLog& operator=(const ReactionLog&) = delete;
+
+  // What kernel::CommitListener hears of an inner step.
+  void add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner);
+
+  // Of the step that led to the committed state: joints in the scene's order, then contacts by their pairs.
+  std::vector<report::v1::Reaction> last(const kernel::Environment& environment) const;
+
+  // Called after every commit; `is_last` forces a sample. Throws std::system_error if it cannot be written.
+  void offer(const kernel::Environment& environment, bool is_last);
+  // Writes out everything; throws std::system_error if that fails.
+  void close();
+
+ private:
+  struct Sum {
+    Vector3 point = Vector3::Zero();    // world, m
+    Vector3 impulse = Vector3::Zero();  // on the second body, N s
+    Vector3 turn = Vector3::Zero();     // about the point, N m s
+  };
+
+  void add_joints(const kernel::StepData& data);
+  report::v1::Reaction message(const kernel::Environment& environment, const Sum& sum) const;
+
+  const kernel::EnvironmentDescription& description_;
+  std::string path_;
+  std::FILE* file_ = nullptr;
+  Sampling sampling_;
+
+  std::uint32_t step_ = 0;  // that the sums are of
+  double length_ = 0.0;     // s
+  std::map<std::uint32_t, Sum> joints_;
+  std::map<std::array<std::uint32_t, 3>, Sum> contacts_;  // by bodies and feature
+};
+
+}  // namespace gravitas

@@ -1,0 +1,216 @@
+// Forces and torques of joints and contacts against closed forms, with every solver.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "services/recorder/reaction_log.h"
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using testing::literal;
+using testing::SceneRun;
+using testing::set;
+
+constexpr double kG = 9.81;
+
+// A run whose reactions are kept.
+class Watched final : private kernel::CommitListener {
+ public:
+  explicit Watched(const std::string& text, const std::vector<std::string>& overrides = {})
+      : run(text, overrides), log_("", run.description(), 0.0) {
+    run.environment().set_commit_listener(this);
+  }
+  std::vector<report::v1::Reaction> reactions() { return log_.last(run.environment()); }
+
+  SceneRun run;
+
+ private:
+  void on_inner_step(const kernel::Environment& environment, const kernel::StepData& data,
+                     std::uint32_t inner) override {
+    log_.add(environment, data, inner);
+  }
+  void on_commit(const kernel::Environment&) override {}
+
+  ReactionLog log_;
+};
+
+Vector3 vector_of(const google::protobuf::RepeatedField<double>& numbers) {
+  return {numbers.at(0), numbers.at(1), numbers.at(2)};
+}
+
+std::string scene(const std::string& shapes, const std::string& bodies, const std::string& joints) {
+  return shapes + R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } }
+         Force { Type = "Basic" Id = "Twist" CustomProperties { Force = {0, 0, 0} Torque = {0, -2, 0} } } }
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment { Space { Bodies { )" +
+         bodies + "} } Constraints {" + joints + "} }\n";
+}
+
+class Reactions : public ::testing::TestWithParam<const char*> {
+ protected:
+  std::vector<std::string> solver(std::vector<std::string> more = {}) const {
+    more.push_back(set("Solver", std::string(GetParam())));
+    more.emplace_back("Simulator.SleepEnergy=0");
+    return more;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Each, Reactions, ::testing::Values("Sequential", "Newton", "Direct"),
+                         [](const auto& which) { return std::string(which.param); });
+
+std::string pendulum(const Vector3& at) {
+  return scene(
+      "",
+      "Body { Id = \"Bob\" Mass = 3 PrincipalMoments = {1e-6, 1e-6, 1e-6} KineticProperties { Position = " +
+          literal(at) + " } Forces = { \"Down\" } }\n",
+      "Constraint { Type = \"Spherical\" Id = \"Pivot\" Body2 = \"Bob\" CustomProperties { BindPoint = {0, 0, 0} "
+      "} }\n");
+}
+
+TEST_P(Reactions, OfAPivotIsTheWeightThatHangsOnIt) {
+  for (const std::vector<std::string>& way :
+       {std::vector<std::string>{}, {"Simulator.Substeps=4"}, {"Integrator=Verlet"}}) {
+    Watched watched(pendulum({0, -1, 0}), solver(way));
+    EXPECT_TRUE(watched.reactions().empty());
+    watched.run.steps(50);
+    const auto reactions = watched.reactions();
+    ASSERT_EQ(reactions.size(), 1U);
+    EXPECT_EQ(reactions[0].constraint(), "Pivot");
+    EXPECT_EQ(reactions[0].bodies(0), "");
+    EXPECT_EQ(reactions[0].bodies(1), "Bob");
+    EXPECT_EQ(reactions[0].step(), 50U);
+    EXPECT_LE((vector_of(reactions[0].force()) - Vector3(0, 3 * kG, 0)).norm(), 1e-10);
+    EXPECT_LE(vector_of(reactions[0].torque()).norm(), 1e-12);
+    EXPECT_LE(vector_of(reactions[0].point()).norm(), 1e-12);
+  }
+}
+
+// From the horizontal: 3 m g sin(angle below it), along the rod. Mean over a step, so of first order.
+TEST_P(Reactions, OfASwingingPivotConverges) {
+  const auto error = [&](double h) {
+    Watched watched(pendulum({1, 0, 0}), solver({set("Simulator.TimeStep", h)}));
+    double largest = 0.0;
+    while (watched.run.time() < 0.5) {
+      const Vector3 before = watched.run.body("Bob").twist.linear;
+      watched.run.step();
+      const SceneRun::Motion bob = watched.run.body("Bob");
+      const Vector3 force = vector_of(watched.reactions().at(0).force());
+      // Newton's law over the step, to rounding
+      const Vector3 gained = 3.0 * ((bob.twist.linear - before) / h + Vector3(0, kG, 0));
+      EXPECT_LE((force - gained).norm(), 1e-9 / h);
+      const Vector3 along = bob.pose.position.normalized();
+      largest = std::max(largest, (force - 9.0 * kG * along.y() * along).norm());
+    }
+    return largest;
+  };
+  const double coarse = error(2e-3), fine = error(1e-3);
+  EXPECT_LE(fine, 0.5);
+  EXPECT_NEAR(std::log2(coarse / fine), 1.0, 0.2);
+}
+
+// A table on three round feet: each bears what the law of the lever says, wherever the centre of mass is.
+TEST_P(Reactions, OfATablesFeetFollowTheLever) {
+  const std::vector<Vector3> feet = {{1, 0, 0}, {-0.5, 0, 0.8}, {-0.5, 0, -0.8}};
+  for (const Vector3& share : {Vector3(1.0 / 3, 1.0 / 3, 1.0 / 3), Vector3(0.6, 0.3, 0.1)}) {
+    std::string children;
+    Vector3 centre(0, 0.3, 0);
+    for (std::size_t i = 0; i < 3; ++i) {
+      children += (i > 0 ? ", " : "") + ("{\"Foot\", " + literal(feet[i]) + ", {1, 0, 0, 0}}");
+      centre += share(static_cast<Eigen::Index>(i)) * feet[i];
+    }
+    Watched watched(
+        scene("Geometries { Geometry { Type = \"Sphere\" Id = \"Foot\" CustomProperties { Radius = 0.1 } } Geometry { "
+              "Type "
+              "= \"Compound\" Id = \"Table\" CustomProperties { Children = { " +
+                  children +
+                  " } } } Geometry { Type = \"Halfspace\" Id = \"Floor\" } }\nMaterials { Material { Id = \"Wood\" "
+                  "StaticFrictionCoefficient = 0.5 } }",
+              "Body { Id = \"Ground\" GeometryId = \"Floor\" Material = \"Wood\" Immovable = true }\nBody { Id = "
+              "\"Table\" "
+              "GeometryId = \"Table\" Material = \"Wood\" Mass = 10 PrincipalMoments = {2, 3, 2} CentreOfMass = " +
+                  literal(centre) + " KineticProperties { Position = {0, 0.1, 0} } Forces = { \"Down\" } }\n",
+              ""),
+        solver());
+    watched.run.steps(50);
+    const auto reactions = watched.reactions();
+    ASSERT_EQ(reactions.size(), 3U);
+    for (const report::v1::Reaction& reaction : reactions) {
+      EXPECT_TRUE(reaction.constraint().empty());
+      EXPECT_EQ(reaction.bodies(0), "Ground");
+      EXPECT_EQ(reaction.bodies(1), "Table");
+      EXPECT_EQ(reaction.torque_size(), 0);
+      std::size_t foot = 0;
+      while (foot < 2 && (vector_of(reaction.point()) - feet[foot]).norm() > 0.1) ++foot;
+      const Vector3 force = vector_of(reaction.force());
+      EXPECT_NEAR(force.y(), 10 * kG * share(static_cast<Eigen::Index>(foot)), 1e-8) << foot;
+      EXPECT_LE(std::hypot(force.x(), force.z()), 0.5 * force.y());
+    }
+  }
+}
+
+// How four corners share a weight is nobody's business; its sum and its centre are.
+TEST_P(Reactions, OfFourCornersSumUpToTheWeight) {
+  Watched watched(
+      scene(
+          "Geometries { Geometry { Type = \"Box\" Id = \"Crate\" CustomProperties { HalfExtents = {0.4, 0.2, 0.3} } } "
+          "Geometry { Type = \"Halfspace\" Id = \"Floor\" } }",
+          "Body { Id = \"Ground\" GeometryId = \"Floor\" Immovable = true }\nBody { Id = \"Crate\" GeometryId = "
+          "\"Crate\" "
+          "Mass = 7 KineticProperties { Position = {2, 0.2, 1} } Forces = { \"Down\" } }\n",
+          ""),
+      solver());
+  watched.run.steps(50);
+  Vector3 sum = Vector3::Zero(), turn = Vector3::Zero();
+  const auto reactions = watched.reactions();
+  EXPECT_GE(reactions.size(), 3U);
+  for (const report::v1::Reaction& reaction : reactions) {
+    sum += vector_of(reaction.force());
+    turn += (vector_of(reaction.point()) - Vector3(2, 0.2, 1)).cross(vector_of(reaction.force()));
+  }
+  EXPECT_LE((sum - Vector3(0, 7 * kG, 0)).norm(), 1e-9);
+  EXPECT_LE(turn.norm(), 1e-9);
+}
+
+// A motor that turns against 2 N m at constant speed gives 2 N m, and its hinge bears the weight.
+TEST_P(Reactions, OfAMotorIsItsTorque) {
+  Watched watched(
+      scene("",
+            "Body { Id = \"Disc\" Mass = 2 PrincipalMoments = {0.1, 0.2, 0.1} Forces = { \"Down\", \"Twist\" } "
+            "}\n",
+            "Constraint { Type = \"AngularMotor\" Id = \"Motor\" Body2 = \"Disc\" CustomProperties { "
+            "BindAxisPoint1 = {0, -0.5, 0} BindAxisPoint2 = {0, 0.5, 0} AngularSpeed = 3 } }\n"),
+      solver());
+  watched.run.steps(50);
+  const auto reactions = watched.reactions();
+  ASSERT_EQ(reactions.size(), 1U);
+  EXPECT_NEAR(watched.run.body("Disc").twist.angular.y(), 3.0, 1e-9);
+  EXPECT_LE((vector_of(reactions[0].torque()) - Vector3(0, 2, 0)).norm(), 1e-8);
+  EXPECT_LE((vector_of(reactions[0].force()) - Vector3(0, 2 * kG, 0)).norm(), 1e-8);
+}
+
+// Joints inside the derivative: the force is that of the last one.
+TEST_P(Reactions, OfSmoothMotionAreThoseOfTheDerivative) {
+  if (std::string(GetParam()) == "Sequential") GTEST_SKIP() << "has no answer to Solver.Reactions";
+  Watched watched(pendulum({1, 0, 0}), solver({"Simulator=Smooth", "Integrator=RK4", "Simulator.TimeStep=0.001"}));
+  watched.run.steps(400);
+  const Vector3 along = watched.run.body("Bob").pose.position.normalized();
+  const Vector3 force = vector_of(watched.reactions().at(0).force());
+  // the last stage of RK4 is not quite where the step ends
+  EXPECT_LE((force - 9.0 * kG * along.y() * along).norm(), 1e-4);
+}
+
+TEST_P(Reactions, OfABrokenJointAreNone) {
+  Watched watched(pendulum({0, -1, 0}), solver({set("Constraint.Pivot.BreakingForce", 20.0)}));
+  watched.run.step();
+  EXPECT_EQ(watched.reactions().size(), 1U);  // it held for its last step
+  watched.run.step();
+  EXPECT_TRUE(watched.reactions().empty());
+}
+
+}  // namespace
+}  // namespace gravitas
