@@ -107,6 +107,9 @@ std::string ControlSession::judge(const Hello& hello) {
   if (!std::equal(ours.cpu_features().begin(), ours.cpu_features().end(), theirs.cpu_features().begin(),
                   theirs.cpu_features().end()))
     return "it runs on a processor with other features";
+  const std::lock_guard lock(mutex_);
+  if (welcome_.build_id() != hello.build_id())
+    faults_.push_back("it is of another build, " + welcome_.build_id() + ": its bits may differ");
   return {};
 }
 

@@ -52,9 +52,12 @@ struct Defences {
 
 struct SlotDescription {
   Hosting hosting = Hosting::kSharedMemory;
-  double deadline = 2.0;              // s, for one call, counted from the last mark of progress
-  bool attached = false;              // a worker that somebody started by hand; see kAttachedDeadline
-  std::uint32_t standbys = 1;         // workers that wait, warm, to take over from one that fails; none if direct
+  double deadline = 2.0;       // s, for one call, counted from the last mark of progress
+  bool attached = false;       // a worker that somebody started by hand; see kAttachedDeadline
+  std::uint32_t standbys = 1;  // workers that wait, warm, to take over from one that fails; none if direct
+  // Slots that name the same process, and are hosted alike outside of this one, share it and its standbys; deadline and
+  // standbys are those of the first.
+  std::string process = {};
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
   Defences defences = {};
 };

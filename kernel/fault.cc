@@ -5,29 +5,9 @@
 namespace gravitas::kernel {
 
 const char* fault_kind_name(FaultKind kind) {
-  switch (kind) {
-    case FaultKind::kDeath:
-      return "death";
-    case FaultKind::kDeadline:
-      return "deadline";
-    case FaultKind::kRefusal:
-      return "refusal";
-    case FaultKind::kFailure:
-      return "failure";
-    case FaultKind::kBadFrame:
-      return "bad_frame";
-    case FaultKind::kBadStructure:
-      return "bad_structure";
-    case FaultKind::kBadNumbers:
-      return "bad_numbers";
-    case FaultKind::kBadPhysics:
-      return "bad_physics";
-    case FaultKind::kDisagreement:
-      return "disagreement";
-    case FaultKind::kHandshake:
-      return "handshake";
-  }
-  return "unknown";
+  static constexpr const char* kNames[] = {"death",         "deadline",    "refusal",     "failure",      "bad_frame",
+                                           "bad_structure", "bad_numbers", "bad_physics", "disagreement", "handshake"};
+  return kNames[static_cast<std::size_t>(kind)];
 }
 
 bool is_off(const Defences& defences, FaultKind kind) {

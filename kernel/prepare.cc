@@ -52,7 +52,8 @@ Environment::~Environment() {
 }
 
 void Environment::start_slots(const HostStarter& starter) {
-  for (StageSlot* slot : slots_) slot->start(description_.threads, starter, this, &faults_);
+  for (StageSlot* slot : slots_) slot->find_hosts(slots_, description_.threads, starter);
+  for (StageSlot* slot : slots_) slot->start(this, &faults_);
   for (StageSlot* slot : slots_) slot->finish_start();
 }
 

@@ -12,48 +12,61 @@ namespace {
 // More rounds than any honest plugin needs: each at least doubles the room.
 constexpr int kCapacityRounds = 64;
 
+bool is_same_plugin(const PluginChoice& a, const PluginChoice& b) {
+  return a.library == b.library && a.command == b.command && a.address == b.address && a.settings == b.settings;
+}
+
 }  // namespace
 
 StageSlot::StageSlot(Slot which, SlotDescription description) : which_(which), description_(std::move(description)) {}
 
-void StageSlot::assign_hosts(std::uint32_t threads, const HostStarter& starter) {
-  const auto same_host = [](const PluginChoice& a, const PluginChoice& b) {
-    return a.command.empty() && b.command.empty() && a.address == b.address;
-  };
-  std::vector<SlotDescription> hosts;
+void StageSlot::find_hosts(std::span<StageSlot* const> slots, std::uint32_t threads, const HostStarter& starter) {
+  slots_ = slots;
   for (const PluginChoice& plugin : description_.plugins) {
-    const auto found =
-        std::ranges::find_if(hosts, [&](const SlotDescription& host) { return same_host(host.plugins[0], plugin); });
-    const auto host = static_cast<std::size_t>(found - hosts.begin());
-    if (found == hosts.end()) {
-      hosts.push_back(description_);
-      hosts.back().plugins.clear();
-      if (!plugin.command.empty() || !plugin.address.empty()) hosts.back().hosting = Hosting::kGrpc;
+    const bool is_elsewhere = !plugin.command.empty() || !plugin.address.empty();
+    const auto shares = [&](const StageSlot* slot) {
+      return slot == this || (!description_.process.empty() && slot->description_.process == description_.process &&
+                              slot->description_.hosting == description_.hosting && !is_elsewhere &&
+                              description_.hosting != Hosting::kDirect);
+    };
+    const auto takes = [&](const std::shared_ptr<SlotHost>& one) {
+      const PluginChoice& first = one->description().plugins[0];
+      return first.command.empty() && plugin.command.empty() && first.address == plugin.address;
+    };
+    std::shared_ptr<SlotHost> host;
+    for (const StageSlot* slot : slots_) {
+      if (host || !shares(slot)) continue;
+      const auto found = std::ranges::find_if(slot->hosts_, takes);
+      if (found != slot->hosts_.end()) host = *found;
     }
-    routes_.push_back({host, static_cast<std::uint32_t>(hosts[host].plugins.size())});
-    hosts[host].plugins.push_back(plugin);
+    if (!host) {
+      SlotDescription description = description_;
+      description.plugins.clear();
+      if (is_elsewhere) description.hosting = Hosting::kGrpc;
+      host = std::make_shared<SlotHost>(std::move(description), threads, starter);
+    }
+    if (std::ranges::find(hosts_, host) == hosts_.end()) hosts_.push_back(host);
+    const auto place = std::ranges::find(hosts_, host) - hosts_.begin();
+    routes_.push_back({static_cast<std::size_t>(place), host->add(plugin)});
   }
-  for (SlotDescription& host : hosts) hosts_.emplace_back(std::move(host), threads, starter);
 }
 
-void StageSlot::start(std::uint32_t threads, const HostStarter& starter, SlotObserver* observer,
-                      std::vector<FaultRecord>* log) {
+void StageSlot::start(SlotObserver* observer, std::vector<FaultRecord>* log) {
   observer_ = observer;
   log_ = log;
-  assign_hosts(threads, starter);
-  for (SlotHost& host : hosts_) host.begin_start();
+  for (const std::shared_ptr<SlotHost>& host : hosts_) host->begin_start();
 }
 
 void StageSlot::finish_start() {
   for (std::size_t i = 0; i < hosts_.size(); ++i) {
     try {
-      hosts_[i].finish_start();
+      hosts_[i]->finish_start();
     } catch (StageFault& fault) {
       const auto first = std::ranges::find_if(routes_, [&](const Route& route) { return route.host == i; });
       name(&fault, static_cast<std::uint32_t>(first - routes_.begin()));
       throw;
     }
-    needs_attention_ |= hosts_[i].description().hosting != Hosting::kDirect;
+    needs_attention_ |= hosts_[i]->description().hosting != Hosting::kDirect;
   }
 }
 
@@ -63,31 +76,29 @@ void StageSlot::stop() {
 }
 
 void StageSlot::drain() {
-  for (SlotHost& host : hosts_) host.drain();
+  for (const std::shared_ptr<SlotHost>& host : hosts_) host->drain();
 }
 
 std::vector<std::string> StageSlot::take_complaints() {
   std::vector<std::string> all = std::exchange(complaints_, {});
-  if (slow_calls_ > 0)
-    all.push_back("it was slow " + std::to_string(std::exchange(slow_calls_, 0)) + " times: up to " +
-                  std::to_string(slowest_call_ns_ / 1'000'000) + " ms, over " + std::to_string(kSlowFactor) +
-                  " times as long as it usually takes");
-  for (SlotHost& host : hosts_)
-    for (std::string& one : host.take_complaints()) all.push_back(std::move(one));
+  if (std::string slow = slow_calls_.take_complaint(); !slow.empty()) all.push_back(std::move(slow));
+  for (const std::shared_ptr<SlotHost>& host : hosts_)
+    for (std::string& one : host->take_complaints()) all.push_back(std::move(one));
   return all;
 }
 
 std::vector<PlannedSlot> StageSlot::hosts() const {
   std::vector<PlannedSlot> planned;
-  for (const SlotHost& host : hosts_) {
+  for (const std::shared_ptr<SlotHost>& host : hosts_) {
     PlannedSlot& one = planned.emplace_back();
     one.slot = which_;
-    one.hosting = host.description().hosting;
-    one.process_id = host.process_id();
-    one.is_attached = host.description().attached;
-    one.standbys = host.wanted_standbys();
-    one.sandbox = host.sandbox();
-    for (const PluginChoice& plugin : host.description().plugins) one.plugins.push_back(plugin.declaration.name);
+    one.hosting = host->description().hosting;
+    one.process_id = host->process_id();
+    one.is_attached = host->description().attached;
+    one.standbys = host->wanted_standbys();
+    one.sandbox = host->sandbox();
+    for (const PluginChoice& plugin : host->description().plugins)
+      if (plugin.declaration.slot == which_) one.plugins.push_back(plugin.declaration.name);
   }
   return planned;
 }
@@ -123,10 +134,12 @@ void StageSlot::call_with_room(Carrier* carrier, const StageCall& call, Arena* a
   throw StageFault(FaultKind::kBadStructure, "structure", "it asks for more room again and again");
 }
 
-void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* derivatives, CallTimes* times) {
+void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* derivatives, Attempts* attempts,
+                        CallTimes* times) {
   const Route route = routes_[call.target];
   StageCall routed = call;
   routed.target = route.target;
+  routed.attempt = attempts->made;
   order_.clear();
   if (!armed_.empty()) {
     const auto due = std::ranges::find_if(armed_, [&](const FaultInjection& one) { return one.step == step_; });
@@ -137,7 +150,9 @@ void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* d
     }
   }
   if (derivatives != nullptr) derivatives->begin_attempt(true);
-  call_with_room(&hosts_[route.host].carrier(), routed, arena, derivatives, times);
+  // whom a nested call of the same process takes away must outlast this one
+  if (derivatives != nullptr) attempts->asked = hosts_[route.host]->carrier();
+  call_with_room(hosts_[route.host]->carrier().get(), routed, arena, derivatives, times);
 }
 
 void StageSlot::name(StageFault* fault, std::uint32_t target) const {
@@ -148,20 +163,22 @@ void StageSlot::name(StageFault* fault, std::uint32_t target) const {
 void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attempts) {
   // a nested call's ladder is at its end: nobody here is to blame
   if (!fault.plugin.empty()) throw StageFault(fault);
+  SlotHost& host = host_of(call.target);
+  // nor if its process failed in a call of another slot, which others answer by now
+  if (attempts->asked && attempts->asked != host.carrier()) return;
   if (!description_.defences.replay) {
     name(&fault, call.target);
     throw StageFault(fault);
   }
   attempts->noticed_ns.push_back(channel::now_ns());
   name(&fault, call.target);
-  const std::size_t host = routes_[call.target].host;
   const PluginChoice plugin = description_.plugins[call.target];
   log_->push_back({step_, fault});
   log_->back().injected = order_.substr(0, order_.find(','));
   Recovery recovery;
   bool poison = false;
   try {
-    recovery = hosts_[host].recover(fault, attempts, &poison);
+    recovery = host.recover(fault, attempts, &poison);
   } catch (StageFault& last) {
     if (poison) observer_->on_poison(call, plugin, fault);
     name(&last, call.target);
@@ -170,8 +187,8 @@ void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attem
   log_->back().recovered_by = recovery.how;
   if (poison) observer_->on_poison(call, plugin, fault);
   if (!recovery.plugins_changed) return;
-  if (recovery.how == "rollback") close_probation(host, SwapState::kRolledBack, fault.text);
-  adopt(host, recovery.how);
+  if (recovery.how == "rollback") close_all_probations(&host, SwapState::kRolledBack, fault.text);
+  let_all_adopt(host, recovery.how);
 }
 
 void StageSlot::note_recovery(const Attempts& attempts) {
@@ -184,14 +201,19 @@ void StageSlot::note_recovery(const Attempts& attempts) {
   }
 }
 
-void StageSlot::adopt(std::size_t host, const std::string& why) {
-  const SlotDescription& now = hosts_[host].description();
+void StageSlot::let_all_adopt(const SlotHost& host, const std::string& why) {
+  for (StageSlot* slot : slots_) slot->adopt(host, why, slot == this);
+}
+
+void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) {
+  const SlotDescription& now = host.description();
   for (std::uint32_t target = 0; target < routes_.size(); ++target) {
-    if (routes_[target].host != host) continue;
-    const PluginChoice before = std::exchange(description_.plugins[target], now.plugins[routes_[target].target]);
-    const PluginChoice& plugin = description_.plugins[target];
-    if (host == 0) description_.hosting = now.hosting;
-    observer_->on_decision({which_, target, step_, why, &now, &plugin});
+    if (hosts_.empty() || &host_of(target) != &host) continue;
+    const PluginChoice& plugin = now.plugins[routes_[target].target];
+    if (!by_us && now.hosting == description_.hosting && is_same_plugin(plugin, description_.plugins[target])) continue;
+    const PluginChoice before = std::exchange(description_.plugins[target], plugin);
+    if (routes_[target].host == 0) description_.hosting = now.hosting;
+    observer_->on_decision({which_, target, step_, why, &now, &description_.plugins[target]});
     observer_->on_plugin_change(*this, target, before);
   }
   needs_attention_ = true;

@@ -16,6 +16,7 @@
 #include "kernel/swap.h"
 #include "kernel/validate.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/slow_calls.h"
 
 namespace gravitas::kernel {
 
@@ -53,8 +54,10 @@ class StageSlot {
  public:
   StageSlot(Slot which, SlotDescription description);
 
-  // Starting is split so that the workers of all slots start side by side. `log` gets the failed calls.
-  void start(std::uint32_t threads, const HostStarter& starter, SlotObserver* observer, std::vector<FaultRecord>* log);
+  // Starting is split so that all of `slots`, this one too, have their hosts, which some share, before the workers start
+  // side by side. `log` gets the failed calls.
+  void find_hosts(std::span<StageSlot* const> slots, std::uint32_t threads, const HostStarter& starter);
+  void start(SlotObserver* observer, std::vector<FaultRecord>* log);
   void finish_start();
   // Lets the host end, and ends it: for a slot that is not asked any more.
   void stop();
@@ -83,10 +86,10 @@ class StageSlot {
       try {
         CallTimes times;
         if (attempts.made > 0) times.begin = channel::now_ns();
-        attempt(call, arena, derivatives, &times);
+        attempt(call, arena, derivatives, &attempts, &times);
         auto checked = check(Untrusted<StageCall>(call), &times);
         if (attempts.made > 0) note_recovery(attempts);
-        hosts_[routes_[call.target].host].count_good_answer();
+        host_of(call.target).count_good_answer(which_);
         if (is_watched_) watch(call, arena, derivatives, [&] { check(Untrusted<StageCall>(call), nullptr); });
         return checked;
       } catch (StageFault& fault) {
@@ -96,15 +99,7 @@ class StageSlot {
   }
 
   // How long a call took in all. One that takes far longer than the calls before is counted as slow.
-  void note_duration(std::uint64_t nanoseconds) {
-    longest_call_ns_ = std::max(longest_call_ns_, nanoseconds);
-    if (nanoseconds > kSlowNs && nanoseconds > kSlowFactor * usual_call_ns_ && usual_call_ns_ > 0) {
-      ++slow_calls_;
-      slowest_call_ns_ = std::max(slowest_call_ns_, nanoseconds);
-      return;
-    }
-    usual_call_ns_ = usual_call_ns_ == 0 ? nanoseconds : (15 * usual_call_ns_ + nanoseconds) / 16;
-  }
+  void note_duration(std::uint64_t nanoseconds) { slow_calls_.note(nanoseconds); }
 
   // A worker commits a fault; consumed by the first attempts at that step.
   void inject(FaultInjection fault) { armed_.push_back(std::move(fault)); }
@@ -119,14 +114,14 @@ class StageSlot {
   void set_rerun_every(std::uint32_t steps);
 
  private:
-  // The plugins of a slot live in one host, but for those that are commands or at an address.
+  // The plugins of a slot live in one host, but for those that are commands or at an address; hosts may be shared.
   struct Route {
     std::size_t host;
     std::uint32_t target;
   };
   // A swap that has cut over and may still be rolled back.
   struct Probation {
-    std::size_t host;
+    SlotHost* host;
     std::size_t record;
   };
   struct Rerun {
@@ -134,12 +129,13 @@ class StageSlot {
     std::vector<std::unique_ptr<Carrier>> checkers;  // per host
   };
 
-  void assign_hosts(std::uint32_t threads, const HostStarter& starter);
+  SlotHost& host_of(std::uint32_t target) { return *hosts_[routes_[target].host]; }
   // Makes room for as much as the columns' counts say, and leaves them empty.
   static void make_room(std::span<const ColumnId> columns, Arena* arena);
   static void call_with_room(Carrier* carrier, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
                              CallTimes* times);
-  void attempt(const StageCall& call, Arena* arena, DerivativeSource* derivatives, CallTimes* times);
+  void attempt(const StageCall& call, Arena* arena, DerivativeSource* derivatives, Attempts* attempts,
+               CallTimes* times);
   void recover(StageFault fault, const StageCall& call, Attempts* attempts);
   void note_recovery(const Attempts& attempts);
   void name(StageFault* fault, std::uint32_t target) const;
@@ -150,10 +146,12 @@ class StageSlot {
   bool advance_swap(PendingSwap* swap);
   void cut_over(PendingSwap* swap);
   void refuse(PendingSwap* swap, const std::string& reason);
-  void close_probation(std::size_t host, SwapState state, const std::string& reason);
+  void close_probation(const SlotHost* host, SwapState state, const std::string& reason);
+  void close_all_probations(SlotHost* host, SwapState state, const std::string& reason);
   void update_watch();
-  // The plugins of a host have changed: tells, and notes who serves the routes.
-  void adopt(std::size_t host, const std::string& why);
+  // The plugins of a host have changed: tells, and notes who serves the routes; `by_us`: for the sake of this slot.
+  void adopt(const SlotHost& host, const std::string& why, bool by_us);
+  void let_all_adopt(const SlotHost& host, const std::string& why);
 
   void watch(const StageCall& call, Arena* arena, DerivativeSource* derivatives, const std::function<void()>& recheck);
   bool watch_swap(PendingSwap* swap, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
@@ -164,7 +162,8 @@ class StageSlot {
   SlotDescription description_;
   SlotObserver* observer_ = nullptr;
   std::vector<FaultRecord>* log_ = nullptr;
-  std::vector<SlotHost> hosts_;
+  std::span<StageSlot* const> slots_;  // of the environment
+  std::vector<std::shared_ptr<SlotHost>> hosts_;
   std::vector<Route> routes_;  // per plugin of the slot
   std::uint32_t step_ = 0;
   bool needs_attention_ = false;
@@ -175,8 +174,7 @@ class StageSlot {
   std::vector<PendingSwap> pending_;
   std::vector<SwapRecord> swaps_;
   std::vector<Probation> probation_;
-  static constexpr std::uint64_t kSlowNs = 20'000'000, kSlowFactor = 10;
-  std::uint64_t longest_call_ns_ = 0, usual_call_ns_ = 0, slow_calls_ = 0, slowest_call_ns_ = 0;
+  SlowCalls slow_calls_;
   Rerun rerun_;
   std::vector<std::string> complaints_;
 };

@@ -17,9 +17,17 @@ SlotHost::SlotHost(SlotDescription description, std::uint32_t threads, const Hos
 
 SlotHost::~SlotHost() = default;
 
-void SlotHost::begin_start() { standbys_.push_back(prepare(description_)); }
+std::uint32_t SlotHost::add(const PluginChoice& plugin) {
+  description_.plugins.push_back(plugin);
+  return static_cast<std::uint32_t>(description_.plugins.size() - 1);
+}
+
+void SlotHost::begin_start() {
+  if (standbys_.empty()) standbys_.push_back(prepare(description_));
+}
 
 void SlotHost::finish_start() {
+  if (carrier_) return;
   const std::unique_ptr<Spare> first = std::move(standbys_.front());
   standbys_.clear();
   carrier_ = first->take();
@@ -47,11 +55,11 @@ void SlotHost::keep_standbys() {
 
 void SlotHost::drain() {
   for (const std::unique_ptr<Spare>& standby : standbys_) standby->give_up();
-  for (const std::unique_ptr<Carrier>* carrier : {&carrier_, &old_})
+  for (const std::shared_ptr<Carrier>* carrier : {&carrier_, &old_})
     if (*carrier) (*carrier)->drain();
 }
 
-void SlotHost::retire(std::unique_ptr<Carrier> carrier) {
+void SlotHost::retire(std::shared_ptr<Carrier> carrier) {
   std::erase_if(retired_, [](const std::future<void>& one) {
     return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
   });
@@ -96,24 +104,28 @@ std::string SlotHost::take_host() {
 void SlotHost::replace_description(SlotDescription description) {
   description_ = std::move(description);
   retire(std::exchange(standbys_, {}));
-  failures_ = failures_in_a_row_ = lost_standbys_ = 0;
+  budgets_ = {};
+  lost_standbys_ = 0;
+  ++revision_;
 }
 
-std::string SlotHost::next_rung() {
-  if (previous_) {
-    replace_description(std::move(*previous_));
-    previous_.reset();
+std::string SlotHost::next_rung(Slot slot) {
+  if (const auto previous = previous_.extract(slot)) {
+    SlotDescription next = description_;
+    next.hosting = previous.mapped().hosting;
+    for (std::size_t i = 0; i < next.plugins.size(); ++i)
+      if (next.plugins[i].declaration.slot == slot) next.plugins[i] = previous.mapped().plugins[i];
+    replace_description(std::move(next));
     return "previous build";
   }
-  const bool has_fallback =
-      std::ranges::any_of(description_.plugins, [](const PluginChoice& one) { return one.fallback != nullptr; });
-  if (!has_fallback) return {};
+  const auto has_fallback = [&](const PluginChoice& one) { return one.declaration.slot == slot && one.fallback; };
+  if (std::ranges::none_of(description_.plugins, has_fallback)) return {};
   SlotDescription next = description_;
   // what nobody vouches for does not come into this process
   if (next.hosting == Hosting::kDirect) next.hosting = Hosting::kSharedMemory;
   std::string names;
   for (PluginChoice& plugin : next.plugins) {
-    if (!plugin.fallback) continue;
+    if (!has_fallback(plugin)) continue;
     plugin = PluginChoice(*plugin.fallback);
     plugin.fallback = nullptr;
     names += (names.empty() ? "" : ", ") + plugin.declaration.name;
@@ -125,15 +137,15 @@ std::string SlotHost::next_rung() {
 Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* poison) {
   if (carrier_) carrier_->kill();
   retire(std::move(carrier_));
-  if (good_answers_ >= kGoodAnswers) failures_ = lost_standbys_ = 0;
-  failures_in_a_row_ = good_answers_ == 0 ? failures_in_a_row_ + 1 : 1;
-  good_answers_ = 0;
-  ++failures_;
+  Budget& budget = budget_of(fault.slot);
+  if (budget.good_answers >= kGoodAnswers) budget.failures = lost_standbys_ = 0;
+  budget.failures_in_a_row = budget.good_answers == 0 ? budget.failures_in_a_row + 1 : 1;
+  budget.good_answers = 0;
+  ++budget.failures;
   ++attempts->made;
   if (old_) {
     carrier_ = std::move(old_);
-    replace_description(std::move(*previous_));
-    previous_.reset();
+    replace_description(std::move(previous_.extract(swapped_).mapped()));
     return {"rollback", true};
   }
   if (fault.kind != FaultKind::kDeadline && !fault.is_unread) ++attempts->rejections;
@@ -142,18 +154,18 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
   StageFault last = fault;
   for (;;) {
     std::string rung;
-    if (attempts->rejections >= 2 || failures_ >= kBudget) {
+    if (attempts->rejections >= 2 || budget.failures >= kBudget) {
       const bool is_to_blame = attempts->rejections >= 2;
-      rung = next_rung();
+      rung = next_rung(fault.slot);
       *poison |= is_to_blame && rung != "previous build";
       if (rung.empty()) throw StageFault(last);
       recovery.plugins_changed = true;
       // one chance there
       attempts->rejections = 1;
     }
-    if (failures_in_a_row_ >= 2)
+    if (budget.failures_in_a_row >= 2)
       std::this_thread::sleep_for(
-          std::min(kLongestBackOff, kFirstBackOff * (1 << std::min(failures_in_a_row_ - 2, 10U))));
+          std::min(kLongestBackOff, kFirstBackOff * (1 << std::min(budget.failures_in_a_row - 2, 10U))));
     try {
       const std::string host = take_host();
       recovery.how = !rung.empty() ? rung : recovery.how.empty() ? host : recovery.how;
@@ -161,18 +173,18 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
     } catch (const StageFault& not_started) {
       if (!rung.empty()) recovery.how = rung;
       last = not_started;
-      ++failures_;
-      ++failures_in_a_row_;
+      ++budget.failures;
+      ++budget.failures_in_a_row;
     }
   }
 }
 
-void SlotHost::cut_over(std::unique_ptr<Carrier> carrier, SlotDescription description) {
+void SlotHost::cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description) {
   end_probation();
   old_ = std::exchange(carrier_, std::move(carrier));
-  previous_ = description_;
+  swapped_ = slot;
+  previous_.insert_or_assign(slot, description_);
   replace_description(std::move(description));
-  good_answers_ = 0;
 }
 
 void SlotHost::end_probation() { retire(std::move(old_)); }

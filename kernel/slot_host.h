@@ -1,22 +1,25 @@
-// One host of a slot: the worker that answers, those that stand by, and the ladder that a failed call climbs:
+// One host of a slot, or of several that share a process: the worker that answers, those that stand by, and the ladder that a failed call climbs:
 //
 //   replay on a standby -> cold start -> previous good build -> declared fallback -> the environment pauses
 //
 // A host that fails kBudget times with fewer than kGoodAnswers good answers between goes to the next rung, and so does
 // a request that two incarnations died of or answered wrongly (there a deadline alone does not count, nor a death
-// before the request was read, as far as the carrier can tell: in gRPC, before it was written).
+// before the request was read; a first death over gRPC counts once the request was written). What fails is charged to
+// the slot that was asked; the others that share the host go on with whoever comes next, all alike.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <future>
+#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/fault.h"
 #include "kernel/spare.h"
+#include "plugin_sdk/slots.h"
 
 namespace gravitas::kernel {
 
@@ -25,6 +28,7 @@ struct Attempts {
   std::uint32_t made = 0;
   std::uint32_t rejections = 0;  // by death or a wrong answer, on this rung
   std::vector<std::uint64_t> noticed_ns;
+  std::shared_ptr<Carrier> asked;  // where calls of the same process may be made during the call
 };
 
 // What a failed call led to.
@@ -40,11 +44,13 @@ class SlotHost {
   // Steps for which a swap is on probation.
   static constexpr std::uint32_t kProbation = 8;
 
+  // Without plugins: add() them before the start, and get their rows.
   SlotHost(SlotDescription description, std::uint32_t threads, const HostStarter& start);
   ~SlotHost();
-  SlotHost(SlotHost&&) = default;
+  std::uint32_t add(const PluginChoice& plugin);
 
-  // Starting is split so that the workers of all hosts start side by side. finish_start() throws StageFault.
+  // Starting is split so that the workers of all hosts start side by side. finish_start() throws StageFault. Each slot
+  // of a host asks for both.
   void begin_start();
   void finish_start();
   // Begins the standbys that are missing, unless kBudget of them were lost.
@@ -52,44 +58,51 @@ class SlotHost {
   void drain();
 
   const SlotDescription& description() const { return description_; }
-  Carrier& carrier() const { return *carrier_; }
+  const std::shared_ptr<Carrier>& carrier() const { return carrier_; }
+  // Counted up when the description changes.
+  std::uint32_t revision() const { return revision_; }
   int process_id() const { return carrier_ ? carrier_->process_id() : 0; }
   std::vector<std::string> sandbox() const { return carrier_ ? carrier_->sandbox() : std::vector<std::string>(); }
   std::uint32_t wanted_standbys() const;
   // What its processes, past ones included, said went wrong besides their answers; taken out.
   std::vector<std::string> take_complaints();
-  void count_good_answer() { ++good_answers_; }
+  void count_good_answer(Slot slot) { ++budget_of(slot).good_answers; }
 
-  // After a failed call: the next host is in place, for the same request again. Throws the last fault where the ladder
-  // ends. `poison` becomes true if the request itself is to blame, as far as anybody can tell.
+  // After a failed call of the fault's slot: the next host is in place, for the same request again. Throws the last
+  // fault where the ladder ends. `poison` becomes true if the request itself is to blame, as far as anybody can tell.
   Recovery recover(const StageFault& fault, Attempts* attempts, bool* poison);
 
   // A host for a swap, in preparation.
   std::unique_ptr<Spare> prepare(const SlotDescription& description) const;
-  // Lets `carrier` answer from now on; the old one stays warm until end_probation().
-  void cut_over(std::unique_ptr<Carrier> carrier, SlotDescription description);
+  // Lets `carrier`, with another plugin of the slot, answer from now on; the old one stays warm until end_probation().
+  void cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description);
   bool is_on_probation() const { return old_ != nullptr; }
   void end_probation();
   // Ends a host in the background: a dying process must not hold up a step.
-  void retire(std::unique_ptr<Carrier> carrier);
+  void retire(std::shared_ptr<Carrier> carrier);
   void retire(std::vector<std::unique_ptr<Spare>> spares);
 
  private:
+  struct Budget {
+    std::uint32_t failures = 0, failures_in_a_row = 0;
+    std::uint64_t good_answers = 0;  // since the last failure
+  };
+  Budget& budget_of(Slot slot) { return budgets_[static_cast<std::size_t>(slot)]; }
   std::string take_host();
   // Empty: there is none.
-  std::string next_rung();
+  std::string next_rung(Slot slot);
   void replace_description(SlotDescription description);
 
   SlotDescription description_;
   std::uint32_t threads_;
   HostStarter start_;
-  std::unique_ptr<Carrier> carrier_;
+  std::shared_ptr<Carrier> carrier_;
   std::vector<std::unique_ptr<Spare>> standbys_;
-  // During probation: what answered before. After it: what it was made of.
-  std::unique_ptr<Carrier> old_;
-  std::optional<SlotDescription> previous_;
-  std::uint32_t failures_ = 0, failures_in_a_row_ = 0, lost_standbys_ = 0;
-  std::uint64_t good_answers_ = 0;       // since the last failure
+  std::shared_ptr<Carrier> old_;                   // what answered before, during probation
+  Slot swapped_ = Slot::kSpace;                    // the last
+  std::map<Slot, SlotDescription> previous_;       // what a slot's last swap took the place of
+  std::array<Budget, kSlots.size() + 1> budgets_;  // by slot, which counts from 1
+  std::uint32_t revision_ = 0, lost_standbys_ = 0;
   std::vector<std::string> complaints_;  // of those that are gone
   std::vector<std::future<void>> retired_;
 };

@@ -1,8 +1,6 @@
 #include "kernel/supervisor.h"
 
-#include <fcntl.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/syscall.h>
@@ -13,7 +11,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
-#include <cstring>
 #include <deque>
 #include <map>
 #include <mutex>
@@ -21,11 +18,7 @@
 #include <thread>
 #include <utility>
 
-extern char** environ;
-
-#ifndef P_PIDFD
-#define P_PIDFD 3
-#endif
+#include "plugin_sdk/channel/spawn.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -34,61 +27,6 @@ namespace {
 constexpr std::size_t kPipeSize = 65536;
 // Pipes' worth that are read once a process has ended: a child that it left behind may write on for ever.
 constexpr int kLastReads = 16;
-
-std::string describe_ending(const siginfo_t& info) {
-  if (info.si_code == CLD_EXITED) return "ended by itself with exit code " + std::to_string(info.si_status);
-  return "killed by signal " + std::to_string(info.si_status) + " (" + strsignal(info.si_status) + ")";
-}
-
-// Runs posix_spawn with the descriptors in place, `descriptors[i]` as number i + 1; returns errno.
-int spawn_process(const std::vector<std::string>& arguments, const std::vector<int>& descriptors, pid_t* pid) {
-  std::vector<char*> argv;
-  for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-  argv.push_back(nullptr);
-
-  // copies above all targets, so that no dup2 overwrites a source
-  const int end = 1 + static_cast<int>(descriptors.size());
-  std::vector<int> copies;
-  int problem = 0;
-  for (const int descriptor : descriptors) {
-    copies.push_back(fcntl(descriptor, F_DUPFD_CLOEXEC, end));
-    if (copies.back() < 0 && problem == 0) problem = errno;
-  }
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  for (std::size_t i = 0; i < copies.size(); ++i)
-    posix_spawn_file_actions_adddup2(&actions, copies[i], static_cast<int>(i) + 1);
-  posix_spawn_file_actions_addclosefrom_np(&actions, end);
-
-  // signals as a fresh program expects them
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none, all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-
-  if (problem == 0) problem = posix_spawn(pid, argv[0], &actions, &attributes, argv.data(), environ);
-  posix_spawnattr_destroy(&attributes);
-  posix_spawn_file_actions_destroy(&actions);
-  for (const int copy : copies)
-    if (copy >= 0) close(copy);
-  return problem;
-}
-
-// The process writes as if to a file: only our end must not wait.
-bool make_output_pipe(int* ours, int* theirs) {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) return false;
-  fcntl(ends[0], F_SETFL, O_NONBLOCK);
-  *ours = ends[0];
-  *theirs = ends[1];
-  return true;
-}
 
 }  // namespace
 
@@ -208,11 +146,11 @@ void Supervisor::execute(Order* order) {
   order->done = true;
   std::array<int, 2> theirs = {-1, -1};
   for (std::size_t i = 0; i < 2 && order->problem == 0; ++i)
-    if (!make_output_pipe(&process->output_pipes_[i], &theirs[i])) order->problem = errno;
+    if (!channel::make_output_pipe(&process->output_pipes_[i], &theirs[i])) order->problem = errno;
   if (order->problem == 0) {
     std::vector<int> descriptors = {theirs[0], theirs[1]};
     descriptors.insert(descriptors.end(), order->descriptors.begin(), order->descriptors.end());
-    order->problem = spawn_process(order->arguments, descriptors, &process->process_id_);
+    order->problem = channel::spawn_process(order->arguments, descriptors, &process->process_id_);
   }
   for (const int end : theirs)
     if (end >= 0) close(end);
@@ -255,10 +193,8 @@ void Supervisor::close_output(WorkerProcess* process, std::size_t stream) {
 }
 
 void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {
-  siginfo_t info{};
-  if (waitid(static_cast<idtype_t>(P_PIDFD), static_cast<id_t>(process->pidfd_), &info, WEXITED | WNOHANG) != 0 ||
-      info.si_pid == 0)
-    return;
+  std::string ending = channel::take_ending(process->pidfd_);
+  if (ending.empty()) return;
   forget(process->pidfd_);
   for (std::size_t stream = 0; stream < process->output_pipes_.size(); ++stream) {
     for (int i = 0; i < kLastReads && read_output(process.get(), stream); ++i) {
@@ -267,7 +203,7 @@ void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {
   }
   {
     const std::lock_guard lock(process->mutex_);
-    process->ending_ = describe_ending(info);
+    process->ending_ = std::move(ending);
     process->ended_.store(true, std::memory_order_release);
   }
   process->reaped_.notify_all();

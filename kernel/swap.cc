@@ -60,18 +60,22 @@ void StageSlot::set_rerun_every(std::uint32_t steps) {
 void StageSlot::attend() {
   // the first step is not held up by what it does not need
   if (step_ > 1)
-    for (SlotHost& host : hosts_) host.keep_standbys();
+    for (const std::shared_ptr<SlotHost>& host : hosts_) host->keep_standbys();
   if (!pending_.empty() || !probation_.empty()) advance_swaps();
 }
 
-// A host's next swap is prepared as soon as the one before it has cut over, since it starts from there.
+// A host's next swap is prepared as soon as the one before it has cut over, since it starts from there; again, if the
+// host has changed meanwhile, for another slot that shares it, or by a fallback.
 void StageSlot::prepare_swaps() {
   std::vector<std::size_t> busy;
   for (PendingSwap& swap : pending_) {
     if (std::ranges::find(busy, swap.host) != busy.end()) continue;
     if (!swap.only_compare) busy.push_back(swap.host);
-    if (swap.spare || swap.candidate) continue;
-    const SlotDescription& now = hosts_[swap.host].description();
+    const bool is_stale = !swap.only_compare && swap.revision != hosts_[swap.host]->revision();
+    if ((swap.spare || swap.candidate) && !is_stale) continue;
+    if (swap.candidate) hosts_[swap.host]->retire(std::move(swap.candidate));
+    swap.revision = hosts_[swap.host]->revision();
+    const SlotDescription& now = hosts_[swap.host]->description();
     const std::uint32_t row = routes_[swap.target].target;
     swap.next = now;
     swap.next.plugins[row] = swap.order.plugin;
@@ -81,7 +85,7 @@ void StageSlot::prepare_swaps() {
     const bool shows_hosting = swap.next.hosting != now.hosting;
     swaps_[swap.record].from = shows_hosting ? shown(now.plugins[row], now) : now.plugins[row].declaration.name;
     if (shows_hosting) swaps_[swap.record].to = shown(swap.order.plugin, swap.next);
-    swap.spare = hosts_[swap.host].prepare(swap.next);
+    swap.spare = hosts_[swap.host]->prepare(swap.next);
   }
 }
 
@@ -89,7 +93,7 @@ void StageSlot::advance_swaps() {
   std::vector<Probation> over;
   for (const Probation& probation : probation_)
     if (step_ >= swaps_[probation.record].step + SlotHost::kProbation) over.push_back(probation);
-  for (const Probation& probation : over) close_probation(probation.host, SwapState::kCommitted, {});
+  for (const Probation& probation : over) close_all_probations(probation.host, SwapState::kCommitted, {});
   // a cut-over makes room for the preparation of the next
   for (bool again = true; again;) {
     prepare_swaps();
@@ -131,16 +135,16 @@ bool StageSlot::advance_swap(PendingSwap* swap) {
 
 void StageSlot::cut_over(PendingSwap* swap) {
   const std::uint64_t start = channel::now_ns();
-  SlotHost& host = hosts_[swap->host];
-  if (host.is_on_probation()) close_probation(swap->host, SwapState::kCommitted, {});
+  SlotHost& host = *hosts_[swap->host];
+  if (host.is_on_probation()) close_all_probations(&host, SwapState::kCommitted, {});
   SwapRecord& record = swaps_[swap->record];
   record.state = SwapState::kProbation;
   record.step = step_;
   swap->is_in_shadow = false;
   record.shadow = swap->shadow.result();
-  host.cut_over(std::move(swap->candidate), std::move(swap->next));
-  probation_.push_back({swap->host, swap->record});
-  adopt(swap->host, "swap");
+  host.cut_over(which_, std::move(swap->candidate), std::move(swap->next));
+  probation_.push_back({&host, swap->record});
+  let_all_adopt(host, "swap");
   swaps_[swap->record].pause_us = microseconds(start);
 }
 
@@ -151,18 +155,22 @@ void StageSlot::refuse(PendingSwap* swap, const std::string& reason) {
   record.shadow = swap->shadow.result();
   if (swap->candidate) {
     swap->candidate->kill();
-    hosts_[swap->host].retire(std::move(swap->candidate));
+    hosts_[swap->host]->retire(std::move(swap->candidate));
   }
 }
 
-void StageSlot::close_probation(std::size_t host, SwapState state, const std::string& reason) {
+void StageSlot::close_all_probations(SlotHost* host, SwapState state, const std::string& reason) {
+  for (StageSlot* slot : slots_) slot->close_probation(host, state, reason);
+  if (state == SwapState::kCommitted) host->end_probation();
+}
+
+void StageSlot::close_probation(const SlotHost* host, SwapState state, const std::string& reason) {
   std::erase_if(probation_, [&](const Probation& one) {
     if (one.host != host) return false;
     swaps_[one.record].state = state;
     swaps_[one.record].reason = reason;
     return true;
   });
-  if (state == SwapState::kCommitted) hosts_[host].end_probation();
 }
 
 void StageSlot::update_watch() {
@@ -192,7 +200,7 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, Arena* aren
                            const std::function<void()>& recheck) {
   StageCall routed = call;
   routed.target = routes_[call.target].target;
-  routed.deadline_ns = swap->only_compare ? 0 : std::max(kShadowNs, kShadowFactor * longest_call_ns_);
+  routed.deadline_ns = swap->only_compare ? 0 : std::max(kShadowNs, kShadowFactor * slow_calls_.longest());
   try {
     swap->shadow.compare(call, arena, [&] {
       CallTimes times;
@@ -210,8 +218,8 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, Arena* aren
     // slow is no reason to refuse; it was ended all the same, and goes on unseen until the cut-over
     complaints_.push_back("the swap to " + swap->order.plugin.declaration.name +
                           " goes on without a shadow: it takes over ten times as long");
-    hosts_[swap->host].retire(std::move(swap->candidate));
-    swap->spare = hosts_[swap->host].prepare(swap->next);
+    hosts_[swap->host]->retire(std::move(swap->candidate));
+    swap->spare = hosts_[swap->host]->prepare(swap->next);
     swap->may_shadow = swap->is_in_shadow = false;
     return true;
   }
@@ -241,7 +249,7 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   const auto is_doubted = [&](std::unique_ptr<Carrier>* carrier, bool unknown) {
     for (int tries = 0; !*carrier && tries < 2; ++tries) {
       try {
-        *carrier = hosts_[host].prepare(hosts_[host].description())->take();
+        *carrier = hosts_[host]->prepare(hosts_[host]->description())->take();
       } catch (const StageFault& fault) {
         complaints_.push_back("no other process for a re-run: " + fault.text);
       }
@@ -252,7 +260,7 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
     } catch (const StageFault& fault) {
       if (!fault.plugin.empty()) throw;
       (*carrier)->kill();
-      hosts_[host].retire(std::move(*carrier));
+      hosts_[host]->retire(std::move(*carrier));
       return true;
     }
   };
@@ -261,7 +269,7 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   const bool is_outvoted = is_doubted(&third, true);
   if (checker) {
     checker->kill();
-    hosts_[host].retire(std::move(checker));
+    hosts_[host]->retire(std::move(checker));
   }
   checker = std::move(third);
   if (is_outvoted)

@@ -50,10 +50,11 @@ inline constexpr std::uint32_t kShadowSteps = 8;
 // A swap on its way to the cut-over.
 struct PendingSwap {
   SwapOrder order;
-  std::size_t record;    // of the slot's records
-  std::size_t host;      // of the slot's hosts
-  std::uint32_t target;  // of the slot's plugins
-  SlotDescription next;  // what the host will be
+  std::size_t record;          // of the slot's records
+  std::size_t host;            // of the slot's hosts
+  std::uint32_t target;        // of the slot's plugins
+  SlotDescription next;        // what the host will be
+  std::uint32_t revision = 0;  // of the host, which `next` goes by
   std::unique_ptr<Spare> spare;
   std::unique_ptr<Carrier> candidate;  // prepared
   Shadow shadow;

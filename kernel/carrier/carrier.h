@@ -29,6 +29,8 @@ struct StageCall {
   std::string_view fault = {};
   // Instead of the slot's; 0: the slot's.
   std::uint64_t deadline_ns = 0;
+  // Of this request; from the second on a death counts only if the worker is known to have read it.
+  std::uint32_t attempt = 0;
 
   const stage::MethodInfo& info() const { return stage::method_info(method); }
 };

@@ -50,20 +50,23 @@ class GrpcCarrier final : public Carrier {
   std::vector<std::string> sandbox() const override { return link_.sandbox(); }
 
  private:
-  // The stream of a method.
+  // The stream of a method, which is the tag of its operations but for the last.
   struct Stream {
     grpc::ClientContext context;
     std::unique_ptr<grpc::GenericClientAsyncReaderWriter> io;
+    grpc::Status status;  // at its end, of whose operation it is the tag
   };
   // Time left of a call.
   struct Patience {
+    std::uint64_t deadline_ns;
     std::uint64_t until, cap;  // CLOCK_MONOTONIC, ns
+    bool is_unread;            // the worker will say that it has the request, and has not yet
   };
 
   Stream& stream_of(const MethodInfo& method, Patience* patience);
   void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
   void wait(Stream* stream, Patience* patience);
-  [[noreturn]] void report_broken(Stream* stream);
+  [[noreturn]] void report_broken(Stream* stream, bool is_unread);
   void send_assets(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
                    stage::v1::Call* header, Patience* patience);
   void answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header, Arena* arena,
@@ -72,8 +75,7 @@ class GrpcCarrier final : public Carrier {
                     const Outcome& outcome, Arena* arena);
 
   const std::uint64_t slot_deadline_ns_;
-  std::uint64_t deadline_ns_ = 0;  // of the call
-  std::uint64_t sequence_ = 0;
+  std::uint64_t sequence_ = 0;  // of the last call, which may be one inside another
   grpc::CompletionQueue queue_;
   WorkerLink link_;
   std::array<std::unique_ptr<Stream>, stage::kMethodCount> streams_;
@@ -100,20 +102,20 @@ GrpcCarrier::~GrpcCarrier() {
 }
 
 // Says why an operation on the stream failed: its worker ended the stream with a status, or is gone.
-void GrpcCarrier::report_broken(Stream* stream) {
-  grpc::Status status;
+void GrpcCarrier::report_broken(Stream* stream, bool is_unread) {
+  grpc::Status& status = stream->status;
   void* tag = nullptr;
   bool ok = false;
-  stream->io->Finish(&status, stream);
+  stream->io->Finish(&status, &status);
   const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(kDrainMilliseconds);
-  if (queue_.AsyncNext(&tag, &ok, until) != grpc::CompletionQueue::GOT_EVENT || status.ok() ||
-      status.error_code() == grpc::StatusCode::UNAVAILABLE || link_.has_ended())
-    link_.report_death();
+  while (tag != &status && queue_.AsyncNext(&tag, &ok, until) == grpc::CompletionQueue::GOT_EVENT) continue;
+  if (tag != &status || status.ok() || status.error_code() == grpc::StatusCode::UNAVAILABLE || link_.has_ended())
+    link_.report_death(is_unread);
   link_.kill();
   throw StageFault(FaultKind::kFailure, "stream", "it ended the stream of its method: " + status.error_message());
 }
 
-// Waits for the one operation that is under way.
+// Waits for the one operation that is under way; one of a call within this one may have been given up.
 void GrpcCarrier::wait(Stream* stream, Patience* patience) {
   for (;;) {
     const std::uint64_t now = channel::now_ns();
@@ -122,13 +124,14 @@ void GrpcCarrier::wait(Stream* stream, Patience* patience) {
     void* tag = nullptr;
     bool ok = false;
     if (queue_.AsyncNext(&tag, &ok, until) == grpc::CompletionQueue::GOT_EVENT) {
-      if (!ok) report_broken(stream);
+      if (tag != stream) continue;
+      if (!ok) report_broken(stream, patience->is_unread);
       return;
     }
-    if (link_.has_ended()) link_.report_death();
+    if (link_.has_ended()) link_.report_death(patience->is_unread);
     const std::uint64_t later = channel::now_ns();
     if (later < patience->until && later < patience->cap) continue;
-    link_.report_overdue(later >= patience->cap, deadline_ns_);
+    link_.report_overdue(later >= patience->cap, patience->deadline_ns);
   }
 }
 
@@ -179,14 +182,15 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
     columns[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
   const std::span<gravitas_column> request = std::span(columns).first(call.request.size());
 
-  deadline_ns_ = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
+  const std::uint64_t deadline_ns = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   const std::uint64_t start = channel::now_ns();
-  Patience patience{start + deadline_ns_, start + kDeadlineCap * deadline_ns_};
+  Patience patience{deadline_ns, start + deadline_ns, start + kDeadlineCap * deadline_ns, call.attempt > 0};
   stage::v1::Call header;
   header.set_epoch(link_.epoch());
   header.set_sequence(++sequence_);
+  header.set_attempt(call.attempt);
   header.set_target(call.target);
-  header.set_deadline_microseconds(deadline_ns_ / 1000);
+  header.set_deadline_microseconds(deadline_ns / 1000);
   header.set_digest(wire::columns_digest(method.request, request));
   if (!call.fault.empty()) header.set_fault(std::string(call.fault));
   Stream& stream = stream_of(method, &patience);
@@ -206,9 +210,10 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
         !outcome.ParseFromArray(reader.header().bytes.data(), static_cast<int>(reader.header().bytes.size())))
       link_.report_bad_frame("no outcome");
     // a late or foreign message is dropped
-    if (outcome.epoch() != link_.epoch() || outcome.sequence() != sequence_) continue;
+    if (outcome.epoch() != link_.epoch() || outcome.sequence() != header.sequence()) continue;
+    patience.is_unread = false;
     if (outcome.marks() != 0) {
-      patience.until = channel::now_ns() + deadline_ns_;
+      patience.until = channel::now_ns() + deadline_ns;
       continue;
     }
     if (reader.derivative().has) {

@@ -53,27 +53,33 @@ class SharedMemoryCarrier final : public Carrier {
   void post_frame(gravitas_frame_header header, std::span<const ColumnId> columns, const Arena& arena);
   gravitas_frame_header wait_for_message(std::uint64_t* spent_ns);
   [[noreturn]] void report_death() {
-    link_->report_death(boxes_->theirs->progress.load(std::memory_order_relaxed) == asked_at_mark_);
+    link_->report_death(boxes_->theirs->progress.load(std::memory_order_relaxed) == open_->asked_at_mark);
   }
   void take_columns(const gravitas_frame_header& header, std::span<const stage::ColumnInfo> infos,
                     std::span<const ColumnId> targets, std::size_t first_room, Arena* arena);
   void answer_callback(const gravitas_frame_header& header, std::size_t first_room, Arena* arena,
                        DerivativeSource* derivatives);
 
+  // What belongs to a call, and to those after it at the same depth: while an integrator asks, the kernel may call the
+  // same worker for another slot.
+  struct OpenCall {
+    std::uint64_t deadline_ns = 0;
+    std::uint64_t sequence = 0;
+    std::uint64_t asked_at_mark = 0;  // the worker's progress when the request was posted
+    Segment response;
+    std::uint64_t response_generation = 0, sent_response = 0;
+    std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms{};
+    std::size_t room_count = 0;
+  };
+
   const Defences defences_;
   const std::uint64_t slot_deadline_ns_;
-  std::uint64_t deadline_ns_ = 0;  // of the call
-  std::uint64_t sequence_ = 0;
-  std::uint64_t asked_at_mark_ = 0;  // the worker's progress when the request was posted
+  std::uint64_t sequence_ = 0, response_generation_ = 0, sent_state_ = 0;  // the last
+  std::array<OpenCall, 2> calls_;
+  OpenCall* open_ = calls_.data();
   std::uint32_t seen_ = 0;
   std::shared_ptr<Mailboxes> boxes_ = std::make_shared<Mailboxes>();
   std::unique_ptr<WorkerLink> link_;
-
-  Segment response_;
-  std::uint64_t response_generation_ = 0;
-  std::uint64_t sent_state_ = 0, sent_response_ = 0;
-  std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms_{};
-  std::size_t room_count_ = 0;
 };
 
 SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop)
@@ -118,27 +124,28 @@ SharedMemoryCarrier::~SharedMemoryCarrier() { drain(); }
 // states of derivative requests.
 void SharedMemoryCarrier::make_rooms(const StageCall& call, const Arena& arena, const DerivativeSource* derivatives) {
   std::uint64_t offset = 0;
-  room_count_ = 0;
+  open_->room_count = 0;
   const auto add = [&](std::uint64_t capacity) {
-    rooms_[room_count_++] = {offset, capacity};
+    open_->rooms[open_->room_count++] = {offset, capacity};
     offset += aligned(capacity * 8, GRAVITAS_COLUMN_ALIGNMENT);
   };
   for (const ColumnId column : call.reply) add(arena.capacity(column));
   if (derivatives != nullptr)
     for (const ColumnId column : derivatives->trial_columns()) add(arena.count(column));
-  if (offset <= response_.size()) return;
-  response_ = Segment::create("gravitas response", aligned(std::max(offset, 2 * response_.size()), kPageSize),
-                              channel::Sharing::kWriters);
-  ++response_generation_;
+  if (offset <= open_->response.size()) return;
+  open_->response =
+      Segment::create("gravitas response", aligned(std::max(offset, 2 * open_->response.size()), kPageSize),
+                      channel::Sharing::kWriters);
+  open_->response_generation = ++response_generation_;
 }
 
 void SharedMemoryCarrier::send_new_segments(const Arena& arena) {
   bool sent = true;
-  if (sent_response_ != response_generation_) {
+  if (open_->sent_response != open_->response_generation) {
     sent = channel::send_segment(link_->descriptor_socket(),
-                                 {SegmentRole::kResponse, 0, response_generation_, response_.size()},
-                                 response_.descriptor());
-    sent_response_ = response_generation_;
+                                 {SegmentRole::kResponse, 0, open_->response_generation, open_->response.size()},
+                                 open_->response.descriptor());
+    open_->sent_response = open_->response_generation;
   }
   if (sent && sent_state_ != arena.generation()) {
     sent = channel::send_segment(link_->descriptor_socket(),
@@ -155,10 +162,10 @@ void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<con
   header.magic = GRAVITAS_MAGIC;
   header.schema_hash = stage::kSchemaHash;
   header.epoch = link_->epoch();
-  header.sequence = sequence_;
+  header.sequence = open_->sequence;
   header.column_count = static_cast<std::uint32_t>(columns.size());
   header.state_generation = arena.generation();
-  header.response_generation = response_generation_;
+  header.response_generation = open_->response_generation;
   for (std::size_t i = 0; i < columns.size(); ++i)
     mine->columns[i] = {arena.offset(columns[i]), arena.count(columns[i]), arena.capacity(columns[i])};
   header.digest = channel::frame_digest(header, std::span(mine->columns).first(columns.size()), {}, nullptr);
@@ -168,23 +175,24 @@ void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<con
 
 CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
   if (link_->has_ended()) link_->report_death(true);
-  deadline_ns_ = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
+  open_->deadline_ns = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   make_rooms(call, *arena, derivatives);
   send_new_segments(*arena);
 
   gravitas_frame_header request{};
-  ++sequence_;
+  open_->sequence = ++sequence_;
   request.kind = GRAVITAS_FRAME_REQUEST;
   request.method = static_cast<std::uint32_t>(call.method);
   request.target = call.target;
-  request.reply_count = static_cast<std::uint32_t>(room_count_);
-  request.deadline_ns = channel::now_ns() + deadline_ns_;
-  for (std::size_t i = 0; i < room_count_; ++i) boxes_->mine->reply[i] = {rooms_[i].offset, 0, rooms_[i].capacity};
+  request.reply_count = static_cast<std::uint32_t>(open_->room_count);
+  request.deadline_ns = channel::now_ns() + open_->deadline_ns;
+  for (std::size_t i = 0; i < open_->room_count; ++i)
+    boxes_->mine->reply[i] = {open_->rooms[i].offset, 0, open_->rooms[i].capacity};
   if (!call.fault.empty()) {
     request.fault = 1;
     boxes_->mine->text[call.fault.copy(boxes_->mine->text, sizeof Mailbox::text - 1)] = '\0';
   }
-  asked_at_mark_ = boxes_->theirs->progress.load(std::memory_order_relaxed);
+  open_->asked_at_mark = boxes_->theirs->progress.load(std::memory_order_relaxed);
   post_frame(request, call.request, *arena);
 
   std::uint64_t spent_ns = 0;
@@ -216,8 +224,9 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
   Mailbox* mine = boxes_->mine;
   const Mailbox* theirs = boxes_->theirs;
   const std::uint64_t start = channel::now_ns();
-  const std::uint64_t cap = start + kDeadlineCap * deadline_ns_ - std::min(*spent_ns, kDeadlineCap * deadline_ns_);
-  std::uint64_t until = std::min(start + deadline_ns_, cap);
+  const std::uint64_t deadline_ns = open_->deadline_ns;
+  const std::uint64_t cap = start + kDeadlineCap * deadline_ns - std::min(*spent_ns, kDeadlineCap * deadline_ns);
+  std::uint64_t until = std::min(start + deadline_ns, cap);
   std::uint64_t marks = theirs->progress.load(std::memory_order_relaxed);
   for (;;) {
     // an end from here on counts the signal up; one before may have been seen together with the last message
@@ -230,7 +239,7 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
       if (header.kind == GRAVITAS_FRAME_CRASH && header.epoch == link_->epoch()) report_death();
       // a dead worker's last word may be a reply, but not a question, which may also be the one it asked before
       const bool is_dead_question = header.kind == GRAVITAS_FRAME_CALLBACK && link_->has_ended();
-      const bool is_late = header.epoch != link_->epoch() || header.sequence != sequence_;
+      const bool is_late = header.epoch != link_->epoch() || header.sequence != open_->sequence;
       if (!(is_late && defences_.epoch) && header.magic == GRAVITAS_MAGIC && !is_dead_question) {
         *spent_ns += channel::now_ns() - start;
         return header;
@@ -245,9 +254,9 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
     const std::uint64_t seen_marks = theirs->progress.load(std::memory_order_relaxed);
     if (seen_marks != marks) {
       marks = seen_marks;
-      until = std::min(now + deadline_ns_, cap);
+      until = std::min(now + deadline_ns, cap);
     } else if (now >= until) {
-      link_->report_overdue(now >= cap, deadline_ns_);
+      link_->report_overdue(now >= cap, deadline_ns);
     }
   }
 }
@@ -260,8 +269,8 @@ void SharedMemoryCarrier::take_columns(const gravitas_frame_header& header, std:
   std::memcpy(columns.data(), boxes_->theirs->columns, infos.size() * sizeof columns[0]);
   for (std::size_t i = 0; i < infos.size(); ++i) data[i] = arena->data(targets[i]);
   const std::string problem =
-      channel::read_reply_frame(header, columns, infos, std::span(rooms_).subspan(first_room), response_.data(),
-                                std::span(data).first(infos.size()), defences_.digest);
+      channel::read_reply_frame(header, columns, infos, std::span(open_->rooms).subspan(first_room),
+                                open_->response.data(), std::span(data).first(infos.size()), defences_.digest);
   if (!problem.empty()) link_->report_bad_frame(problem);
   for (std::size_t i = 0; i < infos.size(); ++i)
     if (header.status == GRAVITAS_OK || header.status == GRAVITAS_NEEDS_CAPACITY)
@@ -285,7 +294,15 @@ void SharedMemoryCarrier::answer_callback(const gravitas_frame_header& header, s
     link_->report_bad_frame("a trial state of the wrong size");
   }
 
-  derivatives->evaluate();
+  open_ = &calls_[1];
+  try {
+    derivatives->evaluate();
+  } catch (...) {
+    open_ = calls_.data();
+    throw;
+  }
+  open_ = calls_.data();
+  send_new_segments(*arena);
   gravitas_frame_header answer{};
   answer.kind = GRAVITAS_FRAME_ANSWER;
   answer.method = method;

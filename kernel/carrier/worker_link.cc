@@ -185,17 +185,17 @@ WorkerLink::~WorkerLink() {
 
 void WorkerLink::finish() {
   const std::stop_callback give_up(stop_, [this] { kill(); });
-  const std::string problem = control_->wait_until_ready(kStartLimit);
-  if (!problem.empty()) {
-    if (process_) process_->wait(kLastWordsMilliseconds);
-    fail_start(process_ ? problem + last_words(*process_) : problem);
-  }
+  std::string problem = control_->wait_until_ready(kStartLimit);
   const auto& served = control_->welcome().plugins();
-  if (served.size() != static_cast<int>(plugins_.size()))
-    fail_start("it serves another number of plugins than asked for");
-  for (int i = 0; i < served.size(); ++i)
-    if (served[i].name() != plugins_[static_cast<std::size_t>(i)])
-      fail_start("it serves plugin '" + served[i].name() + "', not '" + plugins_[static_cast<std::size_t>(i)] + "'");
+  if (problem.empty() && served.size() != static_cast<int>(plugins_.size()))
+    problem = "it serves another number of plugins than asked for";
+  for (int i = 0; i < served.size() && problem.empty(); ++i)
+    if (const std::string& name = plugins_[static_cast<std::size_t>(i)]; served[i].name() != name)
+      problem = "it serves plugin '" + served[i].name() + "', not '" + name + "'";
+  if (problem.empty()) return;
+  if (process_) process_->wait(kLastWordsMilliseconds);
+  kill();
+  fail_start(process_ ? problem + last_words(*process_) : problem);
 }
 
 void WorkerLink::kill() {

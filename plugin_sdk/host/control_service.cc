@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "plugin_sdk/floating_point.h"
+#include "plugin_sdk/host/handshake_lie.h"
 
 namespace gravitas::host {
 
@@ -64,6 +65,7 @@ WorkerMessage ControlService::welcome(const Hello& hello) const {
   welcome->set_process_id(getpid());
   for (const plugin::v1::Description& description : plugins_) *welcome->add_plugins() = description;
   for (const std::string& measure : sandbox) welcome->add_sandbox(measure);
+  tell_lie(lie, welcome);
   return message;
 }
 

@@ -37,6 +37,8 @@ class ControlService final : public control::v1::WorkerControl::Service {
   std::atomic<std::uint64_t> calls{0};
   // What the Welcome says of the sandbox (sandbox.h); set before the first session.
   std::vector<std::string> sandbox;
+  // What it lies about in the Welcome (handshake_lie.h); empty: nothing. Set before the first session.
+  std::string lie;
 
   // Something the kernel should hear of besides the answers of calls; goes out with the next heartbeat.
   void complain(std::string text);

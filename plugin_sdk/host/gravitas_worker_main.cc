@@ -10,12 +10,14 @@
 //                                                                     of this machine, data as gRPC messages
 //
 // Before it loads a library or starts a program it restricts itself (sandbox.h). `--no-sandbox` as the first word
-// leaves that out, for debuggers; `--memory-limit BYTES` (default 4 GiB) is what it may take of address space.
+// leaves that out, for debuggers; `--memory-limit BYTES` (default 4 GiB) is what it may take of address space;
+// `--lie WHAT` makes it a worker that its kernel must refuse (handshake_lie.h).
 #include <poll.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
@@ -35,6 +37,7 @@
 #include "plugin_sdk/host/control_service.h"
 #include "plugin_sdk/host/describe.h"
 #include "plugin_sdk/host/description_message.h"
+#include "plugin_sdk/host/handshake_lie.h"
 #include "plugin_sdk/host/listener.h"
 #include "plugin_sdk/host/mailbox_loop.h"
 #include "plugin_sdk/host/sandbox.h"
@@ -50,7 +53,7 @@ struct Arguments {
   int control = -1;
   int descriptors = -1;
   std::uint64_t memory_limit = host::kDefaultMemoryLimit;
-  std::string address;
+  std::string address, lie;
   std::vector<std::string> libraries;
 };
 
@@ -60,7 +63,10 @@ int usage() {
             << "       gravitas-worker --exec PROGRAM ARGUMENT...     as a kernel starts a command\n"
             << "       gravitas-worker --control-fd N [--descriptor-fd M] LIBRARY...     as a kernel starts it\n"
             << "       gravitas-worker --no-sandbox ...     for debuggers: the process does not restrict itself\n"
-            << "--memory-limit BYTES, beside the libraries: address space that it may take, 4 GiB if absent\n";
+            << "--memory-limit BYTES, beside the libraries: address space that it may take, 4 GiB if absent\n"
+            << "--lie WHAT, there too, to test who starts it: it says in the handshake that it is another, in its";
+  for (const std::string& what : host::handshake_lies()) std::cerr << ' ' << what;
+  std::cerr << '\n';
   return 2;
 }
 
@@ -80,6 +86,9 @@ bool parse(int argc, char** argv, Arguments* arguments) {
       (word == "--control-fd" ? arguments->control : arguments->descriptors) = std::atoi(argv[++i]);
     } else if (word == "--listen" && i + 1 < argc) {
       arguments->address = argv[++i];
+    } else if (word == "--lie" && i + 1 < argc) {
+      arguments->lie = argv[++i];
+      if (std::ranges::count(host::handshake_lies(), arguments->lie) == 0) return false;
     } else if (word == "--memory-limit" && i + 1 < argc) {
       if (!parse_bytes(argv[++i], &arguments->memory_limit)) return false;
     } else if (word.starts_with("--")) {
@@ -203,6 +212,7 @@ int serve(const Arguments& arguments) {
                                  return handshake.admit(hello);
                                });
   service.sandbox = std::move(sandbox);
+  service.lie = arguments.lie;
   service.on_end = [&](bool kernel_is_gone) {
     if (kernel_is_gone && !listens) std::_Exit(0);
     handshake.end();

@@ -68,12 +68,12 @@ bool MailboxLoop::receive_segments() {
       mine_ = reinterpret_cast<channel::Mailbox*>(worker_segment_.data());
       break;
     case SegmentRole::kState:
+      if (depth_ > 0) former_states_.push_back(std::move(state_));
       state_ = std::move(segment);
       state_generation_ = message.generation;
       break;
     case SegmentRole::kResponse:
-      response_ = std::move(segment);
-      response_generation_ = message.generation;
+      responses_[depth_] = {std::move(segment), message.generation};
       break;
     default:
       return false;
@@ -82,7 +82,7 @@ bool MailboxLoop::receive_segments() {
 }
 
 bool MailboxLoop::map_announced_segments(const gravitas_frame_header& header) {
-  while (state_generation_ != header.state_generation || response_generation_ != header.response_generation)
+  while (state_generation_ != header.state_generation || responses_[depth_].generation != header.response_generation)
     if (!receive_segments()) return false;
   return true;
 }
@@ -104,13 +104,19 @@ int MailboxLoop::serve(std::uint64_t epoch, const std::atomic<bool>& stopping, s
       complain("dropped a frame of kind " + std::to_string(header.kind) + " and epoch " + std::to_string(header.epoch));
       continue;
     }
-    mine_->progress.fetch_add(1, std::memory_order_relaxed);
-    if (!map_announced_segments(header)) return 1;
     leave_crowded_core();
-    answer(header);
+    if (!take_request(header)) return 1;
+    former_states_.clear();
     calls->fetch_add(1);
   }
   return 0;
+}
+
+bool MailboxLoop::take_request(const gravitas_frame_header& header) {
+  mine_->progress.fetch_add(1, std::memory_order_relaxed);
+  if (!map_announced_segments(header)) return false;
+  answer(header);
+  return true;
 }
 
 std::string MailboxLoop::read_request(const gravitas_frame_header& request, OpenCall* call) {
@@ -134,9 +140,10 @@ std::string MailboxLoop::read_request(const gravitas_frame_header& request, Open
   }
   for (std::size_t i = 0; i < request.reply_count; ++i) {
     const gravitas_frame_column& room = kernel_->reply[i];
-    if (!fits(response_, room.offset, room.capacity, 8)) return "room for a reply outside the response segment";
+    const channel::Segment& response = responses_[depth_].segment;
+    if (!fits(response, room.offset, room.capacity, 8)) return "room for a reply outside the response segment";
     call->room[i] = room.offset;
-    call->reply[i] = {response_.data() + room.offset, room.capacity, 0};
+    call->reply[i] = {response.data() + room.offset, room.capacity, 0};
   }
   return {};
 }
@@ -222,12 +229,21 @@ std::int32_t MailboxLoop::ask_derivative(OpenCall* call, const gravitas_column* 
   header.digest = channel::frame_digest(header, std::span(mine_->columns).first(columns), method.request, data.data());
   post(header);
 
-  // the kernel answers, or kills this process
-  while (channel::wait(mine_, kernel_, seen_, channel::now_ns() + kIdleNs) == channel::Waited::kTimeout) {
-  }
-  seen_ = kernel_->signal.load(std::memory_order_acquire);
+  // the kernel answers, or kills this process; for its answer it may ask another plugin here
   gravitas_frame_header answer;
-  std::memcpy(&answer, &kernel_->header, sizeof answer);
+  for (bool is_asked = true; is_asked;) {
+    while (channel::wait(mine_, kernel_, seen_, channel::now_ns() + kIdleNs) == channel::Waited::kTimeout) {
+    }
+    seen_ = kernel_->signal.load(std::memory_order_acquire);
+    std::memcpy(&answer, &kernel_->header, sizeof answer);
+    is_asked = answer.kind == GRAVITAS_FRAME_REQUEST && answer.epoch == epoch_ && depth_ + 1 < responses_.size();
+    if (!is_asked) break;
+    ++depth_;
+    const bool was_mapped = take_request(answer);
+    --depth_;
+    if (!was_mapped) return GRAVITAS_CALLBACK_FAILED;
+  }
+  if (!map_announced_segments(answer)) return GRAVITAS_CALLBACK_FAILED;
   const gravitas_frame_column& wrench = kernel_->columns[0];
   const std::size_t bytes = static_cast<std::size_t>(wrench.count) * sizeof(double);
   if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || answer.column_count != 1 ||

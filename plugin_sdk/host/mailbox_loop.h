@@ -7,10 +7,12 @@
 // plugin's own code only, and a plugin that hangs is seen to hang.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/channel/segment.h"
@@ -31,7 +33,15 @@ class MailboxLoop {
  private:
   struct OpenCall;
 
+  // Of the calls that are open: the first, and one inside it, while the plugin waits for derivatives.
+  struct Responses {
+    channel::Segment segment;
+    std::uint64_t generation = 0;
+  };
+
   bool receive_segments();
+  // False if a segment that it announces did not come.
+  bool take_request(const gravitas_frame_header& header);
   bool map_announced_segments(const gravitas_frame_header& header);
   void answer(const gravitas_frame_header& request);
   std::string read_request(const gravitas_frame_header& request, OpenCall* call);
@@ -45,8 +55,11 @@ class MailboxLoop {
   int descriptor_socket_;
   std::uint64_t epoch_ = 0;
 
-  channel::Segment kernel_segment_, worker_segment_, state_, response_;
-  std::uint64_t state_generation_ = 0, response_generation_ = 0;
+  channel::Segment kernel_segment_, worker_segment_, state_;
+  std::vector<channel::Segment> former_states_;  // which the open call still looks at
+  std::uint64_t state_generation_ = 0;
+  std::array<Responses, 2> responses_;
+  std::size_t depth_ = 0;  // calls that wait for derivatives
   const channel::Mailbox* kernel_ = nullptr;
   channel::Mailbox* mine_ = nullptr;
   std::uint32_t seen_ = 0;

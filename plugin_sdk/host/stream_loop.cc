@@ -81,14 +81,29 @@ struct StreamLoop::OpenCall final : CallServices {
     loop->write(stream, wire::to_byte_buffer({{}, {}, &outcome}));
   }
 
-  // The plugin's first thread asks; the kernel's next message is the answer.
-  std::int32_t derivative(const gravitas_column* asked, gravitas_reply_column* answer) override {
+  // Whoever dies of the request from here on has read it: so it must be out before anything can happen.
+  void say_taken() {
     const std::lock_guard lock(loop->io_);
+    Outcome outcome = head();
+    outcome.set_marks(++marks);
+    loop->write(stream, wire::to_byte_buffer({{}, {}, &outcome}), grpc::WriteOptions().set_write_through());
+    while (stream->open && stream->writing) loop->pump(kIdleMilliseconds);
+  }
+
+  // The plugin's first thread asks; the kernel's next message on this stream is the answer. On others it may ask other
+  // plugins of this process before.
+  std::int32_t derivative(const gravitas_column* asked, gravitas_reply_column* answer) override {
+    std::unique_lock lock(loop->io_);
     const Outcome outcome = head();
     const wire::MessageParts message{{}, {}, &outcome, kDerivative.request, {asked, kDerivative.request.size()}};
     if (!loop->write(stream, wire::to_byte_buffer(message))) return GRAVITAS_CALLBACK_FAILED;
     loop->read(stream);
-    while (stream->open && !stream->arrived) loop->pump(kIdleMilliseconds);
+    while (stream->open && !stream->arrived) {
+      loop->pump(kIdleMilliseconds);
+      lock.unlock();
+      loop->handle_arrived(stream);
+      lock.lock();
+    }
     if (!std::exchange(stream->arrived, false)) return GRAVITAS_CALLBACK_FAILED;
 
     const wire::FlatMessage message_bytes(stream->incoming);
@@ -199,20 +214,27 @@ void StreamLoop::serve(HostedPlugins* plugins, std::uint64_t epoch, const std::a
                        std::atomic<std::uint64_t>* calls) {
   plugins_ = plugins;
   epoch_ = epoch;
+  calls_ = calls;
   // the assets of the kernel before
   assets_.clear();
   if (accepting_ == nullptr) accept();
   while (!stopping.load()) {
     if (!pump(kIdleMilliseconds)) return;
-    while (!readable_.empty()) {
-      Stream* stream = readable_.front();
-      readable_.pop_front();
-      // what a derivative's answer was taken from
-      if (!std::exchange(stream->arrived, false)) continue;
-      handle(stream);
-      calls->fetch_add(1);
-    }
+    handle_arrived(nullptr);
     std::erase_if(streams_, [&](const auto& stream) { return stream->finished && !stream->writing; });
+  }
+}
+
+void StreamLoop::handle_arrived(const Stream* asking) {
+  for (std::unique_lock lock(io_); !readable_.empty();) {
+    Stream* stream = readable_.front();
+    readable_.pop_front();
+    // what a derivative's answer is, or was, taken from
+    if (stream == asking || !std::exchange(stream->arrived, false)) continue;
+    lock.unlock();
+    handle(stream);
+    calls_->fetch_add(1);
+    lock.lock();
   }
 }
 
@@ -288,6 +310,7 @@ void StreamLoop::handle(Stream* stream) {
 void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault) {
   const MethodInfo& method = stage::method_info(stream->method);
   OpenCall services(this, stream, call);
+  if (call.attempt() > 0) services.say_taken();
   if (fault != nullptr) fault->pass(Moment::kRead);
   CallEnd end;
   do {

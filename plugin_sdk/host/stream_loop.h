@@ -50,6 +50,8 @@ class StreamLoop {
   bool pump(int milliseconds);
   void read(Stream* stream);
   bool write(Stream* stream, const grpc::ByteBuffer& message, grpc::WriteOptions options = {});
+  // The messages that have come, but for those on the stream that waits for a derivative's answer.
+  void handle_arrived(const Stream* asking);
   void handle(Stream* stream);
   std::string take_asset(std::span<const std::byte> bytes);
   std::string read_request(Stream* stream, const wire::ColumnsReader& reader, stage::v1::Call* call);
@@ -66,6 +68,7 @@ class StreamLoop {
   std::deque<Stream*> readable_;
   std::map<std::uint64_t, std::vector<std::byte>> assets_;  // by hash
   std::uint64_t epoch_ = 0;
+  std::atomic<std::uint64_t>* calls_ = nullptr;
   std::mutex io_;  // of a call: the plugin's threads may mark progress
 };
 

@@ -20,9 +20,43 @@ namespace {
 struct BuiltIn {
   const char* name;
   const char* text;
+  const char* plugins = "";
 };
 
-constexpr std::array<BuiltIn, 3> kBuiltIn = {{
+// Contacts, joints, and a force that is asked in every step.
+constexpr const char* kAll = R"(
+Geometries {
+  Geometry { Type = "Halfspace" Id = "Plane" }
+  Geometry { Type = "Box" Id = "Block" CustomProperties { HalfExtents = {0.5, 0.4, 0.3} } }
+  Geometry { Type = "Sphere" Id = "Ball" CustomProperties { Radius = 0.5 } }
+}
+Forces {
+  Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } }
+  Force { Type = "Basic" Id = "Thrust" CustomProperties { ApplicationPoint = {0.1, 0, 0.2} Force = {0.5, 0.2, 3} Frame = "Body" } }
+}
+Simulator { Type = "Basic" Id = "Main" CustomProperties { TimeStep = 0.01 Duration = 5 } }
+Environment {
+  Id = "all"
+  Space { Type = "Grid" Id = "Pairs"
+    Bodies {
+      Body { Type = "Rigid" Id = "Ground" GeometryId = "Plane" BoundingVolumeType = "None" }
+      Body { Type = "Rigid" Id = "Sliding" GeometryId = "Block" Mass = 2 Forces = {"Down", "Thrust"}
+        KineticProperties { Position = {0, 0.4, 0} LinearVelocity = {2, 0, 0.5} } }
+      Body { Type = "Rigid" Id = "Left" GeometryId = "Ball" Mass = 1 Forces = {"Down", "Thrust"}
+        KineticProperties { Position = {3, 0.6, 0} } }
+      Body { Type = "Rigid" Id = "Right" GeometryId = "Ball" Mass = 1 Forces = {"Down"}
+        KineticProperties { Position = {4.5, 0.55, 0} LinearVelocity = {0, 0, 1} } }
+    }
+  }
+  Constraints {
+    Constraint { Type = "Spherical" Id = "Elbow" Body1 = "Left" Body2 = "Right" CustomProperties { BindPoint = {3.75, 0.6, 0} } }
+  }
+  KineticIntegrator = "SemiImplicitEuler"
+  ConstraintSolver = "Sequential"
+}
+)";
+
+constexpr std::array<BuiltIn, 4> kBuiltIn = {{
     {"contacts", R"(
 Geometries {
   Geometry { Type = "Halfspace" Id = "Plane" }
@@ -73,35 +107,12 @@ Environment {
   ConstraintSolver = "Sequential"
 }
 )"},
-    {"all", R"(
-Geometries {
-  Geometry { Type = "Halfspace" Id = "Plane" }
-  Geometry { Type = "Box" Id = "Block" CustomProperties { HalfExtents = {0.5, 0.4, 0.3} } }
-  Geometry { Type = "Sphere" Id = "Ball" CustomProperties { Radius = 0.5 } }
-}
-Forces {
-  Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } }
-  Force { Type = "Basic" Id = "Thrust" CustomProperties { ApplicationPoint = {0.1, 0, 0.2} Force = {0.5, 0.2, 3} Frame = "Body" } }
-}
-Simulator { Type = "Basic" Id = "Main" CustomProperties { TimeStep = 0.01 Duration = 5 } }
-Environment {
-  Id = "all"
-  Space { Type = "Grid" Id = "Pairs"
-    Bodies {
-      Body { Type = "Rigid" Id = "Ground" GeometryId = "Plane" BoundingVolumeType = "None" }
-      Body { Type = "Rigid" Id = "Sliding" GeometryId = "Block" Mass = 2 Forces = {"Down", "Thrust"}
-        KineticProperties { Position = {0, 0.4, 0} LinearVelocity = {2, 0, 0.5} } }
-      Body { Type = "Rigid" Id = "Left" GeometryId = "Ball" Mass = 1 Forces = {"Down", "Thrust"}
-        KineticProperties { Position = {3, 0.6, 0} } }
-      Body { Type = "Rigid" Id = "Right" GeometryId = "Ball" Mass = 1 Forces = {"Down"}
-        KineticProperties { Position = {4.5, 0.55, 0} LinearVelocity = {0, 0, 1} } }
-    }
-  }
-  Constraints {
-    Constraint { Type = "Spherical" Id = "Elbow" Body1 = "Left" Body2 = "Right" CustomProperties { BindPoint = {3.75, 0.6, 0} } }
-  }
-  KineticIntegrator = "SemiImplicitEuler"
-  ConstraintSolver = "Sequential"
+    {"all", kAll},
+    {"shared", kAll, R"(
+Plugins {
+  Plugin { Slot = "space" Process = "one" } Plugin { Slot = "collision" Process = "two" }
+  Plugin { Slot = "constraint" Process = "two" } Plugin { Slot = "solver" Process = "two" }
+  Plugin { Slot = "force" Process = "one" } Plugin { Slot = "integrator" Process = "one" }
 }
 )"},
 }};
@@ -124,11 +135,12 @@ kernel::EnvironmentDescription describe(const std::string& name, Catalog* catalo
   scene::SceneDocument document;
   const auto found = std::ranges::find_if(kBuiltIn, [&](const BuiltIn& one) { return name == one.name; });
   if (found != kBuiltIn.end()) {
-    const std::array<scene::SceneText, 1> texts = {{{name, found->text}}};
+    const std::array<scene::SceneText, 2> texts = {{{name, found->text}, {name + ", plugins", found->plugins}}};
     scene::read_texts(texts, &document, &problems);
   } else {
     if (!std::filesystem::exists(name))
-      throw BadInput(fmt::format("there is no scene '{}': neither a file, nor one of contacts, joints, all", name));
+      throw BadInput(
+          fmt::format("there is no scene '{}': neither a file, nor one of contacts, joints, all, shared", name));
     const std::array<std::string, 1> files = {name};
     scene::read_files(files, &document, &problems);
   }
@@ -154,6 +166,14 @@ void run_quietly(Scene* scene, std::uint32_t steps) {
 }
 
 }  // namespace
+
+std::vector<Slot> sharing(const Scene& scene, Slot slot) {
+  std::vector<Slot> all;
+  const std::string& process = scene.description.slot(slot).process;
+  for (const Slot other : scene.slots)
+    if (other == slot || (!process.empty() && scene.description.slot(other).process == process)) all.push_back(other);
+  return all;
+}
 
 std::vector<Scene> load_scenes(const std::vector<std::string>& names, std::uint32_t steps) {
   Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());

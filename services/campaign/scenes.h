@@ -19,8 +19,11 @@ struct Scene {
   std::vector<kernel::Hash> chains;  // of the quiet run, hosted direct: [n] after n steps
 };
 
-// Scenes by name or file; the built-in ones (contacts, joints, all) if there is none. Makes `steps` steps of each for its quiet run. Throws
-// BadInput.
+// Slots of the scene that share a worker process with this one, itself among them.
+std::vector<Slot> sharing(const Scene& scene, Slot slot);
+
+// Scenes by name or file; the built-in ones (contacts, joints, all, shared) if there is none. Makes `steps` steps of each for
+// its quiet run. Throws BadInput.
 std::vector<Scene> load_scenes(const std::vector<std::string>& names, std::uint32_t steps = kMostSteps);
 
 }  // namespace gravitas::campaign

@@ -73,6 +73,12 @@ class SimulatedCarrier final : public kernel::Carrier {
 
  private:
   class Derivatives;
+  // Of the calls that are open: while an integrator asks, another plugin of the same host may be called.
+  struct OpenCall {
+    std::uint64_t sequence = 0;
+    std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms{};
+    Reply reply, before;  // of this call and of the one before
+  };
 
   [[noreturn]] void die(const char* when, bool is_unread = false) {
     dead_ = true;
@@ -93,7 +99,9 @@ class SimulatedCarrier final : public kernel::Carrier {
   bool is_too_slow(const host::FaultOrder& order) const;
   std::int32_t misbehave(const host::FaultOrder& order, const stage::MethodInfo& method, const gravitas_column* request,
                          gravitas_reply_column* reply, std::string* text);
-  kernel::CallResult take(Reply* reply, const kernel::StageCall& call, std::string text, kernel::Arena* arena);
+  kernel::CallResult call(OpenCall* open, const kernel::StageCall& call, kernel::Arena* arena,
+                          kernel::DerivativeSource* derivatives);
+  kernel::CallResult take(OpenCall* open, const kernel::StageCall& call, std::string text, kernel::Arena* arena);
 
   const kernel::Hosting hosting_;
   const double deadline_;
@@ -101,8 +109,8 @@ class SimulatedCarrier final : public kernel::Carrier {
   host::HostedPlugins plugins_;
   std::uint64_t epoch_ = 0, sequence_ = 0;
   std::atomic<bool> dead_{false};
-  std::array<channel::Room, GRAVITAS_MAX_COLUMNS> rooms_{};
-  Reply reply_, before_;  // of this call and of the one before
+  std::array<OpenCall, 2> calls_;
+  std::size_t depth_ = 0;
 };
 
 // Answers the plugin's questions as the kernel's side of a carrier does.
@@ -175,6 +183,19 @@ std::int32_t SimulatedCarrier::misbehave(const host::FaultOrder& order, const st
 
 kernel::CallResult SimulatedCarrier::call(const kernel::StageCall& call, kernel::Arena* arena,
                                           kernel::DerivativeSource* derivatives) {
+  OpenCall* open = &calls_.at(depth_++);
+  try {
+    kernel::CallResult result = this->call(open, call, arena, derivatives);
+    --depth_;
+    return result;
+  } catch (...) {
+    --depth_;
+    throw;
+  }
+}
+
+kernel::CallResult SimulatedCarrier::call(OpenCall* open, const kernel::StageCall& call, kernel::Arena* arena,
+                                          kernel::DerivativeSource* derivatives) {
   if (dead_) die("between two calls", true);
   const stage::MethodInfo& method = call.info();
   std::optional<host::FaultOrder> order;
@@ -182,7 +203,7 @@ kernel::CallResult SimulatedCarrier::call(const kernel::StageCall& call, kernel:
   if (!call.fault.empty()) order = host::parse_fault_order(call.fault, &text);
   const bool is_process = order && order->info().group == "process";
   if (is_process && order->moment() == host::Moment::kRead) die("with the request read");
-  ++sequence_;
+  open->sequence = ++sequence_;
 
   // rooms and columns, as in a response segment
   std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> request;
@@ -191,35 +212,36 @@ kernel::CallResult SimulatedCarrier::call(const kernel::StageCall& call, kernel:
   for (std::size_t i = 0; i < call.request.size(); ++i)
     request[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
-    rooms_[i] = {8 * words, arena->capacity(call.reply[i])};
-    words += (rooms_[i].capacity + 7) / 8 * 8;
+    open->rooms[i] = {8 * words, arena->capacity(call.reply[i])};
+    words += (open->rooms[i].capacity + 7) / 8 * 8;
   }
-  if (!defences_.epoch) before_ = reply_;
-  if (reply_.data.size() < words) reply_.data.resize(words);
+  if (!defences_.epoch) open->before = open->reply;
+  if (open->reply.data.size() < words) open->reply.data.resize(words);
   for (std::size_t i = 0; i < call.reply.size(); ++i)
-    reply[i] = {reply_.bytes() + rooms_[i].offset, rooms_[i].capacity, 0};
+    reply[i] = {open->reply.bytes() + open->rooms[i].offset, open->rooms[i].capacity, 0};
 
   Derivatives services(arena, derivatives);
   host::CallEnd end = plugins_.call(call.target, call.method, request.data(), reply.data(), &services);
   services.rethrow();
+  if (dead_) die("while another plugin of its process was asked");
   if (end.status == GRAVITAS_OK && order)
     end.status = misbehave(*order, method, request.data(), reply.data(), &end.text);
 
   // the frame
-  gravitas_frame_header& header = reply_.header;
+  gravitas_frame_header& header = open->reply.header;
   header = {};
   header.magic = GRAVITAS_MAGIC;
   header.epoch = epoch_;
-  header.sequence = sequence_;
+  header.sequence = open->sequence;
   header.kind = GRAVITAS_FRAME_REPLY;
   header.method = static_cast<std::uint32_t>(call.method);
   header.target = call.target;
   header.status = end.status;
   header.column_count = static_cast<std::uint32_t>(call.reply.size());
-  const std::span columns = std::span(reply_.columns).first(call.reply.size());
+  const std::span columns = std::span(open->reply.columns).first(call.reply.size());
   std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    columns[i] = {rooms_[i].offset, reply[i].count, rooms_[i].capacity};
+    columns[i] = {open->rooms[i].offset, reply[i].count, open->rooms[i].capacity};
     data[i] = reply[i].data;
   }
   const bool is_spoilt = order && end.status == GRAVITAS_OK;
@@ -227,35 +249,38 @@ kernel::CallResult SimulatedCarrier::call(const kernel::StageCall& call, kernel:
   if (is_spoilt) {
     injection.emplace(*order);
     header.epoch = injection->epoch(epoch_);
-    header.sequence = injection->sequence(sequence_);
+    header.sequence = injection->sequence(open->sequence);
   }
   header.digest =
       channel::frame_digest(header, columns, method.reply, end.status == GRAVITAS_OK ? data.data() : nullptr);
   if (is_spoilt) injection->spoil_frame(&header, columns, method.reply, reply.data());
   if (is_process && order->moment() == host::Moment::kWrite) die("with its reply half written");
-  kernel::CallResult result = take(&reply_, call, std::move(end.text), arena);
+  kernel::CallResult result = take(open, call, std::move(end.text), arena);
   // who waits for it sees the reply first
   if (is_process && end.status == GRAVITAS_OK) dead_ = true;
   return result;
 }
 
 // The kernel's side: what is late is dropped, the rest copied and checked.
-kernel::CallResult SimulatedCarrier::take(Reply* reply, const kernel::StageCall& call, std::string text,
+kernel::CallResult SimulatedCarrier::take(OpenCall* open, const kernel::StageCall& call, std::string text,
                                           kernel::Arena* arena) {
+  Reply* reply = &open->reply;
   const gravitas_frame_header& header = reply->header;
-  const bool is_late = header.epoch != epoch_ || header.sequence != sequence_;
+  const bool is_late = header.epoch != epoch_ || header.sequence != open->sequence;
   if (header.epoch == epoch_ && header.magic != GRAVITAS_MAGIC) reject("a header without the magic");
   if (header.magic != GRAVITAS_MAGIC || (is_late && defences_.epoch)) be_overdue();
   // an answer to the call before, taken for one to this
   Reply* taken =
-      is_late && before_.header.method == header.method && before_.data.size() == reply->data.size() ? &before_ : reply;
+      is_late && open->before.header.method == header.method && open->before.data.size() == reply->data.size()
+          ? &open->before
+          : reply;
   if (taken->header.kind != GRAVITAS_FRAME_REPLY || taken->header.method != static_cast<std::uint32_t>(call.method))
     reject("another message");
   std::array<std::byte*, GRAVITAS_MAX_COLUMNS> targets;
   for (std::size_t i = 0; i < call.reply.size(); ++i) targets[i] = arena->data(call.reply[i]);
   const std::string problem =
       channel::read_reply_frame(taken->header, std::span(taken->columns).first(call.reply.size()), call.info().reply,
-                                std::span(rooms_).first(call.reply.size()), taken->bytes(),
+                                std::span(open->rooms).first(call.reply.size()), taken->bytes(),
                                 std::span(targets).first(call.reply.size()), defences_.digest);
   if (!problem.empty()) reject(problem);
   kernel::CallResult result;

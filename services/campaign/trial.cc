@@ -125,9 +125,6 @@ class Run {
   void judge_swaps();
   void step_neighbour(std::uint32_t step);
   void write();
-  // A standby was killed then, unseen: who asks it next may see a second death of the same request, as poison does,
-  // where the carrier cannot tell whether it was read.
-  Injected* killed_standby(std::uint32_t step);
   // A busy machine's deadlines have used up the slot's budget, with faults that it would have borne: what follows is right.
   bool is_worn_out(Slot slot) const;
   int process_of(Slot slot) const;
@@ -167,7 +164,9 @@ void Run::order_swap(const PlannedFault& fault) {
   order.slot = fault.slot;
   const std::vector<kernel::PluginChoice>& own = description_.slot(fault.slot).plugins;
   order.plugin = own[0];
-  if (fault.means == Means::kSwapRefused) order.plugin.library = "/dev/null";
+  if (fault.means == Means::kSwapRefused && fault.lie.empty()) order.plugin.library = "/dev/null";
+  if (!fault.lie.empty())
+    order.plugin.command = fmt::format("'{}' --lie {} '{}'", kernel::worker_program(), fault.lie, order.plugin.library);
   order.step = fault.step;
   world_->order_swap(order);
 }
@@ -260,22 +259,15 @@ void Run::go() {
 Run::Injected* Run::find(const FaultRecord& record) {
   Injected* later = nullptr;
   for (Injected& fault : faults_) {
-    if (!fault.happened || fault.plan->slot != record.fault.slot || fault.records.size() >= fault.plan->times) continue;
+    const std::vector<Slot> hit =
+        is_outside(fault.plan->means) ? sharing(scene_, fault.plan->slot) : std::vector<Slot>{fault.plan->slot};
+    const bool is_hit = std::ranges::find(hit, record.fault.slot) != hit.end();
+    if (!fault.happened || !is_hit || fault.records.size() >= fault.plan->times) continue;
     if (fault.plan->step == record.step) return &fault;
     // one that is seen in the next call
     if (fault.plan->step + 1 == record.step) later = &fault;
   }
   return later;
-}
-
-Run::Injected* Run::killed_standby(std::uint32_t step) {
-  for (Injected& fault : faults_) {
-    const bool kills = fault.plan->means == Means::kKillStandby || fault.plan->means == Means::kSwapKilled;
-    const bool is_told = description_.slot(fault.plan->slot).hosting != kernel::Hosting::kGrpc;
-    if (options_.tier != Tier::kReal || is_told) continue;
-    if (kills && fault.happened && fault.plan->step <= step && step <= fault.plan->step + 1) return &fault;
-  }
-  return nullptr;
 }
 
 bool Run::is_worn_out(Slot slot) const {
@@ -317,7 +309,6 @@ void Run::judge_pause(std::uint32_t step) {
   Injected* poison = nullptr;
   for (Injected& fault : faults_)
     if (fault.plan->duty == Duty::kPoison && fault.plan->step == step && fault.plan->slot == last.slot) poison = &fault;
-  if (poison == nullptr && last.kind == kernel::FaultKind::kDeath) poison = killed_standby(step);
   const bool is_tired = is_worn_out(last.slot);
   if ((poison == nullptr && !is_tired) || plan_.has_fallbacks) {
     for (Injected& fault : faults_)
@@ -356,7 +347,7 @@ void Run::judge_swaps() {
     for (const Injected& fault : faults_) {
       const bool is_it = fault.happened && fault.plan->means == Means::kSwapRefused && fault.plan->slot == swap.slot;
       if (is_it && swap.state != kernel::SwapState::kRefused)
-        forbid(fmt::format("a swap of slot {} to what is no library is {}", slot_name(swap.slot),
+        forbid(fmt::format("{} in slot {} is {}", fault.plan->order, slot_name(swap.slot),
                            kernel::swap_state_name(swap.state)));
     }
   }
@@ -379,8 +370,7 @@ void Run::write() {
       line->set_recovered_by(record.recovered_by);
       if (record.recovered_by.starts_with("fallback") && fault.outcome.empty()) outcome = "F";
     }
-    if (outcome == "F" && fault.plan->duty != Duty::kPoison && killed_standby(fault.plan->step) == nullptr &&
-        !is_worn_out(fault.plan->slot)) {
+    if (outcome == "F" && fault.plan->duty != Duty::kPoison && !is_worn_out(fault.plan->slot)) {
       outcome = "forbidden";
       forbid(fmt::format("the fallback took over at step {} from {}, which had to be recovered", fault.plan->step,
                          fault.plan->order));

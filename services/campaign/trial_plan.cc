@@ -10,6 +10,7 @@
 #include "kernel/slot_host.h"
 #include "plugin_sdk/host/fault_kinds.h"
 #include "plugin_sdk/host/faulty_reply.h"
+#include "plugin_sdk/host/handshake_lie.h"
 
 namespace gravitas::campaign {
 namespace {
@@ -203,10 +204,17 @@ void draw_order(Draw* draw, Tier tier, PlannedFault* fault) {
       if (fault->means == Means::kPause) fault->pause = 0.1 * static_cast<double>(1 + draw->below(15));
       const bool is_swap = fault->means >= Means::kSwapKilled;
       if (is_swap) fault->group = "swap";
+      if (fault->means == Means::kSwapRefused && draw->chance(75)) {
+        std::vector<std::string> lies = host::handshake_lies();
+        std::erase(lies, "build");  // which is taken, and said
+        fault->lie = draw->one_of(lies);
+        fault->group = "protocol";
+      }
       fault->order = fault->means == Means::kKill   ? "SIGKILL from outside"
                      : fault->means == Means::kStop ? "SIGSTOP from outside"
                      : fault->means == Means::kPause
                          ? fmt::format("SIGSTOP from outside, SIGCONT after {:.1f} deadlines", fault->pause)
+                     : !fault->lie.empty() ? "a swap to a worker that lies in its handshake: " + fault->lie
                      : fault->means == Means::kSwapRefused ? "a swap to what is no library"
                      : fault->means == Means::kKillStandby ? "SIGKILL to a standby"
                      : fault->means == Means::kSwapKilled  ? "a swap, killed in preparation"
@@ -235,7 +243,8 @@ PlannedFault draw_last(Draw* draw, Slot slot) {
 
 // Whose failures it may count as: a wrong wrench may be noticed by what the integrator makes of it, and is charged to
 // that.
-std::vector<Slot> slots_hit(const PlannedFault& fault) {
+std::vector<Slot> slots_hit(const PlannedFault& fault, const Scene& scene) {
+  if (is_outside(fault.means)) return sharing(scene, fault.slot);
   const bool is_wrong = fault.duty == Duty::kWrong || fault.duty == Duty::kInTolerance;
   if (fault.slot == Slot::kForce && is_wrong) return {Slot::kForce, Slot::kIntegrator};
   return {fault.slot};
@@ -287,11 +296,14 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
     const bool joins = !plan.faults.empty() && draw.chance(25);
     fault.step = joins ? plan.faults.back().step : static_cast<std::uint32_t>(2 + draw.below(last_step - 4));
     draw_order(&draw, options.tier, &fault);
-    const std::vector<Slot> hit = slots_hit(fault);
+    const std::vector<Slot> hit = slots_hit(fault, scenes[plan.scene]);
     if (!std::ranges::all_of(hit, [&](Slot slot) { return is_free(slot, fault.step); })) continue;
     const bool hits_anybody = fault.means == Means::kKillStandby || fault.means == Means::kSwapKilled;
     if (hits_anybody && !std::ranges::all_of(slots, has_room)) continue;
-    if (fault.group == "swap" && std::exchange(is_swapped[fault.slot], true)) continue;
+    if (fault.means >= Means::kSwapKilled) {
+      if (is_swapped[fault.slot]) continue;
+      for (const Slot slot : sharing(scenes[plan.scene], fault.slot)) is_swapped[slot] = true;
+    }
     for (const Slot slot : hit) taken[slot].push_back(fault.step);
     anywhere += hits_anybody ? 1 : 0;
     plan.faults.push_back(std::move(fault));

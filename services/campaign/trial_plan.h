@@ -21,7 +21,7 @@ enum class Means {
   kKillStandby,  // SIGKILL to a worker that stands by or is being started
   kSwapKilled,   // a swap whose new worker is killed while it is being prepared
   kSwapFaulty,   // a swap whose new worker fails on probation
-  kSwapRefused   // a swap to a library that is none
+  kSwapRefused   // a swap to a library that is none, or to a worker that lies in its handshake
 };
 
 // What has to become of it.
@@ -31,6 +31,11 @@ enum class Duty {
   kWrong,    // a wrong value that a re-run, or a check of the physics, has to find: recovered, or booked as not found
   kInTolerance  // the same, too small for any check but a re-run
 };
+
+// Whether it hits a process, in whichever slot's call that is noticed.
+constexpr bool is_outside(Means means) {
+  return means == Means::kKill || means == Means::kStop || means == Means::kPause;
+}
 
 struct PlannedFault {
   Means means = Means::kOrder;
@@ -42,6 +47,7 @@ struct PlannedFault {
   std::string group;
   bool rerun = false;  // another process is asked the same in this step
   double pause = 0.0;  // of kPause: SIGCONT after so many deadlines
+  std::string lie;     // of kSwapRefused: what about (plugin_sdk/host/handshake_lie.h); empty: it is no library
 };
 
 // What the machine does to all of a trial.

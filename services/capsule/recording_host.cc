@@ -29,8 +29,8 @@ class RecordingHost final : public kernel::Carrier {
   std::vector<std::string> sandbox() const override { return host_->sandbox(); }
 
  private:
-  bool is_kept() const {
-    return tape_->writer && plugins_[0].declaration.slot == tape_->slot && tape_->step >= tape_->first_step &&
+  bool is_kept(std::uint32_t target) const {
+    return tape_->writer && plugins_[target].declaration.slot == tape_->slot && tape_->step >= tape_->first_step &&
            tape_->writer->calls() < tape_->most_calls;
   }
   void keep(v1::CapsuleCall* record, std::uint32_t target);
@@ -70,7 +70,9 @@ void RecordingHost::keep(v1::CapsuleCall* record, std::uint32_t target) {
     if (known_to_ != tape_->writer) {
       known_to_ = tape_->writer;
       rows_.clear();
-      for (const kernel::PluginChoice& plugin : plugins_) rows_.push_back(known_to_->add_plugin(plugin));
+      // the others share the process alone
+      for (const kernel::PluginChoice& plugin : plugins_)
+        rows_.push_back(plugin.declaration.slot == tape_->slot ? known_to_->add_plugin(plugin) : 0);
     }
     record->set_plugin(rows_[target]);
     known_to_->add_call(*record);
@@ -82,7 +84,7 @@ void RecordingHost::keep(v1::CapsuleCall* record, std::uint32_t target) {
 
 kernel::CallResult RecordingHost::call(const kernel::StageCall& call, kernel::Arena* arena,
                                        kernel::DerivativeSource* derivatives) {
-  if (!is_kept()) return host_->call(call, arena, derivatives);
+  if (!is_kept(call.target)) return host_->call(call, arena, derivatives);
   v1::CapsuleCall record = begin_call(call, *arena);
   record.set_step(tape_->step);
   RecordedDerivatives recorded(derivatives, *arena, &record);

@@ -116,7 +116,7 @@ void add_campaign(CLI::App* app, Action* action) {
       "         gravitas campaign --tier simulated --faults 1000000 --seed 1\n"
       "         gravitas campaign --endurance 600");
   command->add_option("SCENE", options.scenes,
-                      "Scene files, or built-in scenes: contacts, joints, all (all three if absent)");
+                      "Scene files, or built-in scenes: contacts, joints, all, shared (these four if absent)");
   command->add_option("--faults", options.faults, "How many, at least, over all shards")
       ->check(CLI::Range(1ULL, 1'000'000'000'000ULL))
       ->capture_default_str();

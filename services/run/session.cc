@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
@@ -59,6 +60,22 @@ void apply_hosting(const std::vector<HostingChoice>& choices, kernel::Environmen
         for (kernel::PluginChoice& plugin : description->slot(slot).plugins) plugin.address = choice.address;
       }
   }
+}
+
+// What the command line moves elsewhere leaves its process; the scene itself hosts the slots of one process alike.
+void warn_of_split_processes(const kernel::EnvironmentDescription& description, std::vector<std::string>* warnings) {
+  std::set<std::string> split;
+  for (const Slot one : kSlots)
+    for (const Slot other : kSlots)
+      if (description.slot(one).process == description.slot(other).process &&
+          description.slot(one).hosting != description.slot(other).hosting)
+        split.insert(description.slot(one).process);
+  for (const std::string& process : split)
+    if (!process.empty())
+      warnings->push_back(
+          fmt::format("the slots of Process \"{}\" are hosted in different ways; those that are hosted "
+                      "alike share one",
+                      process));
 }
 
 std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
@@ -141,6 +158,7 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
   }
   description->threads = options.threads;
   apply_hosting(options.hosting, &*description);
+  warn_of_split_processes(*description, warnings);
   return std::move(*description);
 }
 

@@ -41,6 +41,7 @@ std::string in_folder(const std::filesystem::path& folder, const std::string& co
 
 PluginSelection::PluginSelection(BuildContext* context) : context_(*context) {
   for (const Plugin& message : context_.scene.plugins().plugin()) read_block(message);
+  for (const Plugin& message : context_.scene.plugins().plugin()) read_hosting(message);
 }
 
 // ---- the Plugins blocks
@@ -75,37 +76,63 @@ void PluginSelection::read_block(const Plugin& message) {
                                 "Fallback of an unnamed plugin; required: Name, Library or Command, since the slot " +
                                     quoted(message.slot()) + " may hold several");
   }
-  read_hosting(slot, message);
+  read_process(slot, message);
   check_place(message);
   of_slot.push_back({&message, nullptr, false});
   read_library(slot, &of_slot.back());
 }
 
-void PluginSelection::read_hosting(Slot slot, const Plugin& message) {
-  kernel::SlotDescription& description = context_.description.slot(slot);
-  // the plugins of a list slot share one place and one deadline
-  for (const Block& other : blocks(slot)) {
-    const bool hosting_differs = is_written(*other.message, Plugin::kHostingFieldNumber) &&
-                                 is_written(message, Plugin::kHostingFieldNumber) &&
-                                 other.message->hosting() != message.hosting();
-    const bool deadline_differs =
-        other.message->has_deadline() && message.has_deadline() && other.message->deadline() != message.deadline();
-    const bool standby_differs =
-        other.message->has_standby() && message.has_standby() && other.message->standby() != message.standby();
-    if (!hosting_differs && !deadline_differs && !standby_differs) continue;
-    const auto [field, name] = hosting_differs    ? std::pair{Plugin::kHostingFieldNumber, "Hosting"}
-                               : deadline_differs ? std::pair{Plugin::kDeadlineFieldNumber, "Deadline"}
-                                                  : std::pair{Plugin::kStandbyFieldNumber, "Standby"};
-    context_.diagnostics->error(place_of(message, field),
-                                std::string(name) + " differs from that at " +
-                                    context_.diagnostics->place_text(place_of(other.message->location())) +
+void PluginSelection::read_process(Slot slot, const Plugin& message) {
+  const std::string& process = context_.description.slot(slot).process;
+  if (message.process().empty()) return;
+  if (!process.empty() && process != message.process())
+    context_.diagnostics->error(place_of(message, Plugin::kProcessFieldNumber),
+                                "Process " + quoted(message.process()) + " differs from " + quoted(process) +
                                     "; allowed: one for the whole slot " + quoted(message.slot()));
+  context_.description.slot(slot).process = message.process();
+}
+
+// The plugins of a list slot, and slots that share a process, have one place and one deadline, in whichever of their
+// blocks it stands.
+void PluginSelection::read_hosting(const Plugin& message) {
+  const Slot slot = slot_of(message.slot());
+  kernel::SlotDescription& description = context_.description.slot(slot);
+  const std::string& process = description.process;
+  bool is_before = true;
+  for (const Plugin& other : context_.scene.plugins().plugin()) {
+    is_before &= &other != &message;
+    const bool is_here = other.slot() == message.slot();
+    const bool shares = !process.empty() && process == context_.description.slot(slot_of(other.slot())).process;
+    if (!is_here && !shares) continue;
+    if (is_before)
+      check_alike(message, other, is_here ? "slot " + quoted(message.slot()) : "process " + quoted(process));
+    if (other.hosting() == "direct") description.hosting = kernel::Hosting::kDirect;
+    if (other.hosting() == "shm") description.hosting = kernel::Hosting::kSharedMemory;
+    if (other.hosting() == "grpc") description.hosting = kernel::Hosting::kGrpc;
+    if (other.has_deadline()) description.deadline = other.deadline();
+    if (other.has_standby()) description.standbys = other.standby();
   }
-  if (message.hosting() == "direct") description.hosting = kernel::Hosting::kDirect;
-  if (message.hosting() == "shm") description.hosting = kernel::Hosting::kSharedMemory;
-  if (message.hosting() == "grpc") description.hosting = kernel::Hosting::kGrpc;
-  if (message.has_deadline()) description.deadline = message.deadline();
-  if (message.has_standby()) description.standbys = message.standby();
+  if (message.hosting() == "direct" && !process.empty())
+    context_.diagnostics->error(
+        place_of(message, Plugin::kHostingFieldNumber),
+        "Hosting \"direct\" of a slot with the Process " + quoted(process) + "; allowed: \"shm\", \"grpc\"");
+}
+
+void PluginSelection::check_alike(const Plugin& message, const Plugin& other, const std::string& whole) const {
+  const auto differ = [&](int field, const char* name, bool differs) {
+    if (differs)
+      context_.diagnostics->error(place_of(message, field),
+                                  std::string(name) + " differs from that at " +
+                                      context_.diagnostics->place_text(place_of(other.location())) +
+                                      "; allowed: one for the whole " + whole);
+  };
+  const auto both_write = [&](int field) { return is_written(message, field) && is_written(other, field); };
+  differ(Plugin::kHostingFieldNumber, "Hosting",
+         both_write(Plugin::kHostingFieldNumber) && other.hosting() != message.hosting());
+  differ(Plugin::kDeadlineFieldNumber, "Deadline",
+         both_write(Plugin::kDeadlineFieldNumber) && other.deadline() != message.deadline());
+  differ(Plugin::kStandbyFieldNumber, "Standby",
+         both_write(Plugin::kStandbyFieldNumber) && other.standby() != message.standby());
 }
 
 void PluginSelection::check_place(const Plugin& message) const {
@@ -119,6 +146,9 @@ void PluginSelection::check_place(const Plugin& message) const {
   if (has_command && has_address) error(Plugin::kAddressFieldNumber, "Address beside Command; allowed: one of them");
   if (has_command && is_written(message, Plugin::kLibraryFieldNumber))
     error(Plugin::kLibraryFieldNumber, "Library beside Command; allowed: one of them");
+  if (is_written(message, Plugin::kProcessFieldNumber))
+    error(Plugin::kProcessFieldNumber,
+          "Process beside " + name + ", which is a worker of its own; allowed: one of them");
   if (is_written(message, Plugin::kHostingFieldNumber) && message.hosting() != "grpc")
     error(Plugin::kHostingFieldNumber,
           name + " is reached by gRPC, not by Hosting " + quoted(message.hosting()) + "; allowed: \"grpc\"");

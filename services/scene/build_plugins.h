@@ -43,7 +43,9 @@ class PluginSelection {
   };
 
   void read_block(const v1::Plugin& message);
-  void read_hosting(Slot slot, const v1::Plugin& message);
+  void read_process(Slot slot, const v1::Plugin& message);
+  void read_hosting(const v1::Plugin& message);
+  void check_alike(const v1::Plugin& message, const v1::Plugin& other, const std::string& whole) const;
   void check_place(const v1::Plugin& message) const;
   void read_library(Slot slot, Block* block);
   void choose_named(Slot slot, const std::string& name, bool is_named, const TextPosition& name_place,

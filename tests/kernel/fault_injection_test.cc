@@ -1,11 +1,13 @@
 // Every fault that a worker can be ordered to commit, in one call to each process carrier: what the kernel makes of it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -14,6 +16,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "kernel/fault.h"
@@ -132,6 +135,52 @@ TEST_P(InjectedFaults, ThatEndTheProcessAfterTheReply) {
   const std::optional<StageFault> next = fault_of(&call, carrier.get(), "");
   ASSERT_TRUE(next.has_value());
   EXPECT_EQ(next->kind, FaultKind::kDeath) << next->text;
+}
+
+// Stopped, it is handed a request that another failed at, and dies: the request is not to blame, as it would be for one
+// that has read it.
+TEST_P(InjectedFaults, ThatEndTheProcessBeforeItHasReadARepeatedRequest) {
+  Integration call;
+  const std::unique_ptr<Carrier> carrier = integrator();
+  ASSERT_EQ(call.make(carrier.get()).status, GRAVITAS_OK);
+  const int process = carrier->process_id();
+  kill(process, SIGSTOP);
+  std::thread killer([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    kill(process, SIGKILL);
+  });
+  std::optional<StageFault> fault;
+  try {
+    call.make(carrier.get(), nullptr, "", 1);
+  } catch (const StageFault& one) {
+    fault = one;
+  }
+  killer.join();
+  ASSERT_TRUE(fault.has_value());
+  EXPECT_EQ(fault->kind, FaultKind::kDeath) << fault->text;
+  EXPECT_TRUE(fault->is_unread);
+}
+
+TEST_P(InjectedFaults, ThatEndTheProcessWithARepeatedRequestRead) {
+  for (const char* order : {"kill,at=read", "segv,at=read", "kill", "exit,at=write"}) {
+    SCOPED_TRACE(order);
+    Integration call;
+    const std::unique_ptr<Carrier> carrier = integrator();
+    try {
+      call.make(carrier.get(), nullptr, order, 1);
+      ADD_FAILURE() << "it was answered";
+    } catch (const StageFault& fault) {
+      EXPECT_EQ(fault.kind, FaultKind::kDeath) << fault.text;
+      EXPECT_FALSE(fault.is_unread);
+    }
+  }
+}
+
+TEST_P(InjectedFaults, AreNotNeededToAnswerARepeatedRequest) {
+  Integration first, again;
+  EXPECT_EQ(first.make(integrator().get()).status, GRAVITAS_OK);
+  EXPECT_EQ(again.make(integrator().get(), nullptr, "", 2).status, GRAVITAS_OK);
+  EXPECT_EQ(again.answers(), first.answers());
 }
 
 // ---- it takes long -----------------------------------------------------------------------------------------------

@@ -43,8 +43,8 @@ class OneCall {
   std::uint64_t* u64(std::uint32_t column) { return reinterpret_cast<std::uint64_t*>(arena.data(request[column])); }
 
   kernel::CallResult make(kernel::Carrier* carrier, kernel::DerivativeSource* derivatives = nullptr,
-                          std::string_view fault = {}) {
-    return carrier->call({method_, 0, request, reply, fault}, &arena, derivatives);
+                          std::string_view fault = {}, std::uint32_t attempt = 0) {
+    return carrier->call({method_, 0, request, reply, fault, 0, attempt}, &arena, derivatives);
   }
 
   // The elements of a column of the reply.

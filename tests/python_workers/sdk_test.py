@@ -312,6 +312,14 @@ class Talk(unittest.TestCase):
         self.assertEqual((mark.outcome.marks, mark.outcome.sequence), (1, 1))
         self.assertTrue(self.reply(stream.next()).HasField("derivative"))
 
+    def test_what_others_failed_at_is_said_to_be_taken(self):
+        _, stream = self.ready()
+        asked = self.request()
+        asked.call.attempt = 1
+        taken = self.reply(stream.send(asked))
+        self.assertEqual((taken.outcome.marks, taken.outcome.sequence), (1, 1))
+        self.assertTrue(self.reply(stream.next()).HasField("derivative"))
+
     def test_what_is_impossible_is_refused_and_what_is_broken_fails_and_the_worker_lives(self):
         _, stream = self.ready()
         uneven = self.request()

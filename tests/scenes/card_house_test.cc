@@ -11,10 +11,10 @@
 namespace gravitas {
 namespace {
 
-using testing::literal;
-using testing::SceneRun;
-using testing::set;
-using testing::turned;
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
+using harness::turned;
 
 constexpr double kThickness = 0.002, kHeight = 0.09, kWidth = 0.06;  // of a card, m
 const double kLean = std::acos(-1.0) / 9.0;                          // from the vertical, rad

@@ -12,9 +12,9 @@
 namespace gravitas {
 namespace {
 
-using testing::literal;
-using testing::SceneRun;
-using testing::set;
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
 
 constexpr double kG = 9.81;
 

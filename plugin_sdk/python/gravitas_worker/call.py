@@ -58,6 +58,12 @@ class Call(Host):
     def reply(self, columns, **outcome):
         self._send(Sent.REPLY, columns, outcome)
 
+    def say_taken(self):
+        """Others failed at this request: whoever dies of it from here on has read it."""
+        if self.head.attempt > 0:
+            self._marks += 1
+            self._send(Sent.MARK, None, {"marks": self._marks})
+
     def mark_progress(self):
         self._marks += 1
         now = time.monotonic()
@@ -141,6 +147,7 @@ class Session:
         while (job := self._jobs.get()) is not None:
             call, message = job
             start = time.perf_counter_ns()
+            call.say_taken()
             try:
                 columns = self._answer(call, message)
                 call.reply(columns, compute_nanoseconds=time.perf_counter_ns() - start)

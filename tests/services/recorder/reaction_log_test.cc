@@ -15,8 +15,8 @@
 namespace gravitas {
 namespace {
 
-using testing::read_file;
-using testing::ScratchFolder;
+using harness::read_file;
+using harness::ScratchFolder;
 
 // A crate that lands beside a pendulum.
 constexpr const char* kScene = R"(

@@ -228,11 +228,6 @@ TEST(Reader, RefusesMissingNames) {
               ElementsAre("scene:1:15: error: KineticIntegrator without Type; required: a text"));
 }
 
-TEST(Reader, RefusesWhatThisVersionDoesNotSupport) {
-  EXPECT_THAT(read_errors_of("Plugins { Plugin { Slot = \"solver\"\nProcess = \"x\" } }"),
-              ElementsAre("scene:2:1: error: Process is not supported by this version; allowed: leave it out"));
-}
-
 TEST(Reader, TrimsBlanksAroundIds) {
   ReadScene scene = read(read_body("Id = \" Ball01\" GeometryId = \" Unit Sphere \" Forces = {\"G \"}"));
   ASSERT_TRUE(scene.is_good);
