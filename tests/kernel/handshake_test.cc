@@ -31,7 +31,7 @@ using kernel::SwapState;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-constexpr std::uint32_t kSteps = 40;
+constexpr std::uint32_t kMeetingSteps = 40;
 constexpr const char* kBuild = "build";
 
 const std::map<std::string, std::string> kReasons = {{"magic", "no Gravitas worker"},
@@ -95,23 +95,23 @@ TEST_P(Handshake, TakesAnotherBuildAndSaysSo) {
   EXPECT_THAT(carrier->take_complaints(), Contains("it is of another build, another build: its bits may differ"));
 }
 
-kernel::Hash quiet_chain() {
-  Environment quiet(busy_world(Hosting::kDirect).steps(kSteps, 1.0 / 120.0).description());
-  while (quiet.step_count() < kSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
+kernel::Hash chain_without_lies() {
+  Environment quiet(busy_world(Hosting::kDirect).steps(kMeetingSteps, 1.0 / 120.0).description());
+  while (quiet.step_count() < kMeetingSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
   return quiet.chain_hash();
 }
 
 class LyingSolver : public Handshake {
  protected:
   harness::WorldBuilder builder(std::uint32_t standbys) const {
-    harness::WorldBuilder builder = busy_world(GetParam()).steps(kSteps, 1.0 / 120.0);
+    harness::WorldBuilder builder = busy_world(GetParam()).steps(kMeetingSteps, 1.0 / 120.0);
     builder.description().solver.standbys = standbys;
     return builder;
   }
   static void run_to_end(Environment* world) {
-    while (world->step_count() < kSteps)
+    while (world->step_count() < kMeetingSteps)
       ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
-    EXPECT_EQ(world->chain_hash(), quiet_chain());
+    EXPECT_EQ(world->chain_hash(), chain_without_lies());
   }
 };
 INSTANTIATE_TEST_SUITE_P(On, LyingSolver, ::testing::Values(Hosting::kSharedMemory, Hosting::kGrpc),

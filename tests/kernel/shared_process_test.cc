@@ -27,11 +27,11 @@ using kernel::StepOutcome;
 using kernel::SwapRecord;
 using kernel::SwapState;
 
-constexpr std::uint32_t kSteps = 40;
+constexpr std::uint32_t kSharedSteps = 40;
 
 // RK4 asks for forces four times in each call, so that two calls to a process that holds both are open at a time.
 WorldBuilder apart(Hosting hosting) {
-  return busy_world(hosting).steps(kSteps, 1.0 / 120.0).integrator("integrator_rk4");
+  return busy_world(hosting).steps(kSharedSteps, 1.0 / 120.0).integrator("integrator_rk4");
 }
 
 WorldBuilder together(Hosting hosting, const std::vector<Slot>& slots) {
@@ -44,10 +44,11 @@ const std::vector<Slot> kAll(kSlots.begin(), kSlots.end());
 const std::vector<Slot> kTwo = {Slot::kCollision, Slot::kSolver};
 
 void run_to_end(Environment* world) {
-  while (world->step_count() < kSteps) ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+  while (world->step_count() < kSharedSteps)
+    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
 }
 
-kernel::Hash quiet_chain() {
+kernel::Hash chain_of_own_processes() {
   static const kernel::Hash chain = [] {
     Environment world(apart(Hosting::kDirect).description());
     run_to_end(&world);
@@ -79,7 +80,7 @@ TEST_P(SharedProcess, HoldsTheSlotsThatNameItAndNoOthers) {
   for (const kernel::PlannedSlot& planned : world.plan().slots)
     EXPECT_EQ(planned.plugins.size(), planned.slot == Slot::kForce ? 2U : 1U);
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
 }
 
 // The forces are asked of the process that waits for their answer.
@@ -87,7 +88,7 @@ TEST_P(SharedProcess, MayHoldAllSlots) {
   Environment world(together(GetParam(), kAll).description());
   EXPECT_EQ(processes_of(world, kAll).size(), 1U);
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
   EXPECT_TRUE(world.faults().empty());
 }
 
@@ -98,7 +99,7 @@ TEST_P(SharedProcess, IsNotSharedByWhatIsHostedElsewhere) {
   EXPECT_EQ(process_of(world, Slot::kSolver), getpid());
   EXPECT_EQ(processes_of(world, kAll).size(), 2U);
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
 }
 
 // Its death, at any moment of a call of any slot, is a failure of that slot.
@@ -113,7 +114,7 @@ TEST_P(SharedProcess, DiesInACallOfAnySlot) {
     std::uint32_t step = 0;
     for (const Slot slot : kSlots) world.inject({slot, order, step += 6});
     run_to_end(&world);
-    EXPECT_EQ(world.chain_hash(), quiet_chain());
+    EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
     std::vector<Slot> charged;
     for (const FaultRecord& fault : world.faults()) {
       charged.push_back(fault.fault.slot);
@@ -133,7 +134,7 @@ TEST_P(SharedProcess, HangsInsideANestedCall) {
   world.inject({Slot::kForce, "hang", 5});
   world.inject({Slot::kIntegrator, "hang", 9});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
   ASSERT_EQ(world.faults().size(), 2U);
   EXPECT_EQ(world.faults()[0].fault.slot, Slot::kForce);
   EXPECT_EQ(world.faults()[0].fault.kind, FaultKind::kDeadline);
@@ -152,7 +153,7 @@ TEST_P(SharedProcess, ChargesTheSlotThatWasCalled) {
   for (std::uint32_t i = 0; i < kEach; ++i)
     for (std::uint32_t k = 0; k < kTwo.size(); ++k) world.inject({kTwo[k], "kill", 3 + 4 * i + 2 * k});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
   ASSERT_EQ(world.faults().size(), 2 * kEach);
   for (const FaultRecord& fault : world.faults()) EXPECT_EQ(fault.recovered_by.find("fallback"), std::string::npos);
 }
@@ -185,7 +186,7 @@ TEST_P(SharedProcess, IsExchangedForEachOfItsSlots) {
     world.order_swap({kSlots[i], apart(GetParam()).description().slot(kSlots[i]).plugins[0], std::nullopt, steps[i]});
   world.inject({Slot::kConstraint, "kill", 22});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
   ASSERT_EQ(world.swaps().size(), kSlots.size());
   for (const SwapRecord& swap : world.swaps()) {
     // the death in probation, though of another slot's call, brings the old process back
@@ -223,7 +224,7 @@ TEST_P(SharedProcess, IsLeftByAllOfItsSlots) {
   while (world.step_count() < 20) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
   EXPECT_EQ(processes_of(world, kTwo), std::set<int>{getpid()});
   run_to_end(&world);
-  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
   EXPECT_EQ(processes_of(world, kTwo).size(), 1U);
   EXPECT_FALSE(processes_of(world, kTwo).contains(getpid()));
 }
@@ -232,7 +233,10 @@ TEST_P(SharedProcess, IsLeftByAllOfItsSlots) {
 TEST_P(SharedProcess, GoesOnWithoutASlotThatIsNotAskedAnyMore) {
   const auto falling = [](Hosting hosting) {
     WorldBuilder builder(hosting);
-    builder.steps(kSteps, 1.0 / 120.0).ground().sphere(0.5, 1.0, Vector3(0, 0.6, 0)).gravity(Vector3(0, -9.81, 0));
+    builder.steps(kSharedSteps, 1.0 / 120.0)
+        .ground()
+        .sphere(0.5, 1.0, Vector3(0, 0.6, 0))
+        .gravity(Vector3(0, -9.81, 0));
     return builder;
   };
   Environment quiet(falling(Hosting::kDirect).description());

@@ -16,8 +16,8 @@ using harness::SceneRun;
 using harness::set;
 using harness::turned;
 
-constexpr double kThickness = 0.002, kHeight = 0.09, kWidth = 0.06;  // of a card, m
-const double kLean = std::acos(-1.0) / 9.0;                          // from the vertical, rad
+constexpr double kThickness = 0.002, kCardHeight = 0.09, kWidth = 0.06;  // of a card, m
+const double kLean = std::acos(-1.0) / 9.0;                              // from the vertical, rad
 
 std::string card(const std::string& id, const std::string& shape, const Vector3& at, double lean) {
   return "Body { Id = \"" + id + "\" GeometryId = \"" + shape +
@@ -32,13 +32,13 @@ std::string box(const std::string& id, const Vector3& half) {
 // Two cards that lean on each other, on a shelf that lies on two such pairs.
 std::string house() {
   const double c = std::cos(kLean), s = std::sin(kLean);
-  const double rise = 0.5 * (kThickness * s + kHeight * c), reach = 0.5 * (kThickness * c + kHeight * s);
+  const double rise = 0.5 * (kThickness * s + kCardHeight * c), reach = 0.5 * (kThickness * c + kCardHeight * s);
   const auto pair = [&](const std::string& id, double x, double y) {
     return card(id + "1", "Card", {x - reach, y + rise, 0}, -kLean) +
            card(id + "2", "Card", {x + reach, y + rise, 0}, kLean);
   };
-  const double apart = kHeight * s + 0.004;
-  return "Geometries { " + box("Card", {0.5 * kThickness, 0.5 * kHeight, 0.5 * kWidth}) +
+  const double apart = kCardHeight * s + 0.004;
+  return "Geometries { " + box("Card", {0.5 * kThickness, 0.5 * kCardHeight, 0.5 * kWidth}) +
          box("Shelf", {0.06, 0.5 * kThickness, 0.5 * kWidth}) +
          "Geometry { Type = \"Halfspace\" Id = \"Floor\" } }\n"
          "Materials { Material { Id = \"Paper\" StaticFrictionCoefficient = 0.6 } }\n"
@@ -68,7 +68,7 @@ TEST(CardHouse, FallsWhereItsEdgesSlide) {
   SceneRun run(house(), {set("Solver", std::string("Newton")), set("Material.Paper.StaticFrictionCoefficient", 0.1),
                          set("Simulator.Duration", 1.0)});
   run.to_end();
-  EXPECT_LT(run.body("Shelf").pose.position.y(), 0.5 * kHeight);
+  EXPECT_LT(run.body("Shelf").pose.position.y(), 0.5 * kCardHeight);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ using harness::read_file;
 using harness::ScratchFolder;
 
 // A crate that lands beside a pendulum.
-constexpr const char* kScene = R"(
+constexpr const char* kReactionScene = R"(
 Geometries { Geometry { Type = "Box" Id = "Cube" CustomProperties { HalfExtents = {0.5, 0.5, 0.5} } }
              Geometry { Type = "Halfspace" Id = "Plane" } }
 Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
@@ -36,7 +36,7 @@ Environment {
 RunResult run_with(const ScratchFolder& folder, kernel::Hosting hosting, const std::string& reactions,
                    std::optional<double> sample_every = std::nullopt) {
   RunOptions options;
-  options.scenes = {folder.write("scene", kScene)};
+  options.scenes = {folder.write("scene", kReactionScene)};
   options.hosting = {{std::nullopt, hosting}};
   options.reactions = reactions;
   options.sample_every = sample_every;
