@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/slots.h"
 
 namespace gravitas {
-
-inline constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
-                                  Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
 inline void step(kernel::Environment* world) {
   ASSERT_EQ(world->step(), kernel::StepOutcome::kCommitted) << world->fault()->fault.text;

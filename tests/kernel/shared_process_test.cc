@@ -11,6 +11,7 @@
 #include "kernel/environment.h"
 #include "kernel/slot_host.h"
 #include "plugin_sdk/slots.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas {
@@ -42,11 +43,6 @@ WorldBuilder together(Hosting hosting, const std::vector<Slot>& slots) {
 
 const std::vector<Slot> kAll(kSlots.begin(), kSlots.end());
 const std::vector<Slot> kTwo = {Slot::kCollision, Slot::kSolver};
-
-void run_to_end(Environment* world) {
-  while (world->step_count() < kSharedSteps)
-    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
-}
 
 kernel::Hash chain_of_own_processes() {
   static const kernel::Hash chain = [] {
