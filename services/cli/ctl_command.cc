@@ -253,7 +253,9 @@ void add_ctl(CLI::App* app, Action* action) {
   query_command->add_flag("--all", line->query.all, "All bodies that a ray meets, not the closest alone");
   CLI::App* picture = add("instrumentation", "Debug geometry of the state, as JSON or as a picture",
                           "instrumentation --kinds contact,shape --out now.svg", show_instrumentation);
-  picture->add_option("--kinds", line->kinds, "Kinds, separated by commas; all if absent")->delimiter(',');
+  picture->add_option("--kinds", line->kinds, "Kinds, separated by commas; all if absent")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   picture->add_option("--out", line->out, "File: JSON, or a picture if its name ends in .svg");
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
 }

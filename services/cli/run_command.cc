@@ -143,6 +143,7 @@ void add_run(CLI::App* app, Action* action) {
       ->add_option("--instrumentation-kinds", options.instrumentation_kinds,
                    "What it shows, separated by commas: " + kinds + "; all if absent")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->needs(instrumentation);
   CLI::Option* checkpoint = command->add_option(
       "--checkpoint", options.checkpoint,

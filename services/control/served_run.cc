@@ -437,7 +437,9 @@ instrumentation::v1::Frame ServedRun::instrumentation(const api::Instrumentation
 
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {
   recorder_->on_decision(environment, decision);
-  active_.slot(decision.slot).plugins.at(decision.target) = *decision.plugin;
+  kernel::SlotDescription& slot = active_.slot(decision.slot);
+  slot.plugins.at(decision.target) = *decision.plugin;
+  if (decision.target == 0) slot.hosting = decision.host->hosting;
   if (survey_) survey_->surveyor.follow(decision);
 }
 

@@ -40,6 +40,8 @@ class ControlServer::Service final : public api::Control::Service {
     // else two servers would share a port without a word
     builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
     builder.RegisterService(this);
+    // batches of queries are as long as one likes
+    builder.SetMaxReceiveMessageSize(-1);
     // nobody else may connect, wherever --socket puts it
     const mode_t before = umask(0177);
     server_ = builder.BuildAndStart();

@@ -11,7 +11,7 @@
 namespace gravitas {
 namespace {
 
-[[noreturn]] void fail(const std::string& path) {
+[[noreturn]] void fail_reactions(const std::string& path) {
   throw std::system_error(errno, std::generic_category(), "reactions '" + path + "'");
 }
 
@@ -34,7 +34,7 @@ ReactionLog::ReactionLog(const std::string& path, const kernel::EnvironmentDescr
     : description_(description), path_(path), sampling_(interval) {
   if (path.empty()) return;
   file_ = std::fopen(path.c_str(), "we");
-  if (file_ == nullptr) fail(path);
+  if (file_ == nullptr) fail_reactions(path);
 }
 
 ReactionLog::~ReactionLog() {
@@ -121,13 +121,13 @@ void ReactionLog::offer(const kernel::Environment& environment, bool is_last) {
   if (file_ == nullptr || !sampling_.is_due(environment, is_last)) return;
   for (const report::v1::Reaction& reaction : last(environment)) {
     const std::string line = to_json(reaction, JsonForm::kLine);
-    if (std::fwrite(line.data(), 1, line.size(), file_) != line.size()) fail(path_);
+    if (std::fwrite(line.data(), 1, line.size(), file_) != line.size()) fail_reactions(path_);
   }
 }
 
 void ReactionLog::close() {
   std::FILE* file = std::exchange(file_, nullptr);
-  if (file != nullptr && std::fclose(file) != 0) fail(path_);
+  if (file != nullptr && std::fclose(file) != 0) fail_reactions(path_);
 }
 
 }  // namespace gravitas

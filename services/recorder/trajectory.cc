@@ -9,7 +9,7 @@
 namespace gravitas {
 namespace {
 
-[[noreturn]] void fail(const std::string& path) {
+[[noreturn]] void fail_trajectory(const std::string& path) {
   throw std::system_error(errno, std::generic_category(), "trajectory '" + path + "'");
 }
 
@@ -26,12 +26,12 @@ std::string quoted(const std::string& id) {
 TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description,
                                    double interval)
     : path_(path), file_(std::fopen(path.c_str(), "we")), sampling_(interval) {
-  if (file_ == nullptr) fail(path);
+  if (file_ == nullptr) fail_trajectory(path);
   for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
     const kernel::BodyDescription& body = description.bodies[i];
     if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
   }
-  if (std::fputs("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", file_) < 0) fail(path);
+  if (std::fputs("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", file_) < 0) fail_trajectory(path);
 }
 
 TrajectoryWriter::~TrajectoryWriter() {
@@ -56,12 +56,12 @@ void TrajectoryWriter::write_sample(const kernel::Environment& environment) {
                    pose.orientation.w(), pose.orientation.x(), pose.orientation.y(), pose.orientation.z(), v.x(), v.y(),
                    v.z(), w.x(), w.y(), w.z());
   }
-  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail(path_);
+  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail_trajectory(path_);
 }
 
 void TrajectoryWriter::close() {
   std::FILE* file = std::exchange(file_, nullptr);
-  if (file != nullptr && std::fclose(file) != 0) fail(path_);
+  if (file != nullptr && std::fclose(file) != 0) fail_trajectory(path_);
 }
 
 }  // namespace gravitas

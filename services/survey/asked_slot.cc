@@ -68,8 +68,11 @@ AskedSlot::AskedSlot(Slot which, kernel::SlotDescription description, std::uint3
   arena_.seal();
 }
 
-AskedSlot::~AskedSlot() {
+AskedSlot::~AskedSlot() { stop(); }
+
+void AskedSlot::stop() {
   if (slot_) slot_->drain();
+  slot_.reset();
 }
 
 bool AskedSlot::has_capability(std::string_view name) const {
@@ -82,13 +85,14 @@ int AskedSlot::process_id() const { return slot_ && slot_->is_running() ? slot_-
 
 void AskedSlot::start() {
   slot_.emplace(which_, description_);
-  slot_->start(threads_, starter_, this, &faults_);
-  slot_->finish_start();
+  kernel::StageSlot* const alone = &*slot_;
+  alone->find_hosts({&alone, 1}, threads_, starter_);
+  alone->start(this, &faults_);
+  alone->finish_start();
 }
 
 void AskedSlot::replace(std::uint32_t target, const kernel::PluginChoice& plugin, const kernel::SlotDescription& host) {
-  if (slot_) slot_->drain();
-  slot_.reset();
+  stop();
   description_.plugins.at(target) = plugin;
   if (target == 0) description_.hosting = host.hosting;
 }
@@ -132,18 +136,23 @@ MessageColumns AskedSlot::ask(stage::Method method, std::uint32_t target, const 
     slot_->begin_step(questions_);
     copy_in(info, request, columns.request);
     for (const kernel::ColumnId column : columns.reply) arena_.set_count(column, 0);
-    return slot_->ask({method, target, columns.request, columns.reply}, &arena_, nullptr,
-                      [&](const auto&, const kernel::CallTimes*) {
-                        MessageColumns reply = copy_out(info, columns.reply);
-                        require_rows_and_numbers(info, request, reply);
-                        if (check) require(check(reply));
-                        return reply;
-                      });
+    MessageColumns answer = slot_->ask({method, target, columns.request, columns.reply}, &arena_, nullptr,
+                                       [&](const auto&, const kernel::CallTimes*) {
+                                         MessageColumns reply = copy_out(info, columns.reply);
+                                         require_rows_and_numbers(info, request, reply);
+                                         if (check) require(check(reply));
+                                         return reply;
+                                       });
+    if (std::exchange(is_substituted_, false)) stop();
+    return answer;
   } catch (const StageFault& fault) {
     slot_.reset();
     throw NoAnswer(fmt::format("slot {}, plugin {}: {}", slot_name(which_),
                                fault.plugin.empty() ? description_.plugins[target].declaration.name : fault.plugin,
                                fault.text));
+  } catch (...) {
+    slot_.reset();
+    throw;
   }
 }
 

@@ -1,8 +1,10 @@
 // A slot that is asked beside a run: the same plugins in a host of their own, started with the first question. So a run
-// whose workers are at work is not disturbed by questions, and a question that kills its worker harms no step.
+// whose workers are at work is not disturbed by questions, and a question that kills its worker harms no step. Where the
+// run hosts the slot directly, so does this: there, who dies of a question takes the run along.
 //
 // A failed call is answered elsewhere, as in a run (kernel/slot_host.h), but without standbys. Where that ladder ends
-// the question has no answer; the next one begins with a new host.
+// the question has no answer. After that, or after an answer of another plugin (a fallback's), the next question begins
+// with a new host of the plugin that the run has.
 #pragma once
 
 #include <functional>
@@ -61,12 +63,13 @@ class AskedSlot final : private kernel::SlotObserver {
   };
 
   void start();
+  void stop();
   void copy_in(const stage::MethodInfo& method, const MessageColumns& request,
                std::span<const kernel::ColumnId> columns);
   MessageColumns copy_out(const stage::MethodInfo& method, std::span<const kernel::ColumnId> columns) const;
 
   void on_plugin_change(const kernel::StageSlot&, std::uint32_t, const kernel::PluginChoice&) override {}
-  void on_decision(const kernel::Decision&) override {}
+  void on_decision(const kernel::Decision&) override { is_substituted_ = true; }
   void on_poison(const kernel::StageCall&, const kernel::PluginChoice&, const kernel::StageFault&) override {}
 
   const Slot which_;
@@ -79,6 +82,7 @@ class AskedSlot final : private kernel::SlotObserver {
   std::vector<kernel::FaultInjection> faults_to_come_;
   std::vector<kernel::FaultRecord> faults_;
   std::uint32_t questions_ = 0;
+  bool is_substituted_ = false;  // another plugin than the description's answers
 };
 
 }  // namespace gravitas::survey

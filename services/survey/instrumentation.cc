@@ -157,13 +157,21 @@ const std::string& Instrumentation::body_id(std::uint32_t body) const {
 
 void Instrumentation::add_contacts(const kernel::Environment& environment, bool shows_contacts, bool shows_reactions,
                                    Frame* frame) {
-  const std::vector<Contact> contacts = surveyor_.contacts(environment);
-  const Impulses impulses(environment);
   if (shows_reactions && surveyor_.description().simulator >= kernel::Simulator::kBisection) {
     frame->add_missing("reaction: this simulator makes inner steps of any length, and keeps the impulses of the last");
     shows_reactions = false;
   }
-  const double inner_length = impulses.step_length() / surveyor_.description().substeps;
+  if (!shows_contacts && !shows_reactions) return;
+  const std::vector<Contact> contacts = surveyor_.contacts(environment);
+  const Impulses impulses(environment);
+  // the last step may be a shorter one; what sleepers keep is of a whole one
+  const auto stands = [&](std::uint32_t body) {
+    return environment.is_asleep(body) || (environment.model().flags[body] & kMovable) == 0;
+  };
+  const auto inner_length = [&](const Contact& contact) {
+    const double step = stands(contact.a) && stands(contact.b) ? environment.time_step() : impulses.step_length();
+    return step / surveyor_.description().substeps;
+  };
   for (const Contact& contact : contacts) {
     const std::string id = body_id(contact.a) + "/" + body_id(contact.b);
     if (shows_contacts) {
@@ -175,7 +183,7 @@ void Instrumentation::add_contacts(const kernel::Environment& environment, bool 
     }
     const Vector3 impulse = impulses.of(contact);
     if (shows_reactions && !impulse.isZero(0.0))
-      add_arrow(v1::KIND_REACTION, id, contact.point, impulse / inner_length, frame);
+      add_arrow(v1::KIND_REACTION, id, contact.point, impulse / inner_length(contact), frame);
   }
 }
 
@@ -221,7 +229,7 @@ void Instrumentation::add_trajectories(const kernel::Environment& environment, F
 
 void Instrumentation::add_space(const kernel::Environment& environment, Frame* frame) {
   for (const kernel::LeftOut& left_out : environment.plan().left_out)
-    if (left_out.what == slot_name(Slot::kSpace)) return;
+    if (left_out.what == slot_name(Slot::kSpace)) throw NoAnswer("the plan left the space out: " + left_out.why);
   surveyor_.require(Slot::kSpace, kCapability, "nodes of the space");
   const double margin = contact_margin(environment.model().bound);
   const MessageColumns nodes =

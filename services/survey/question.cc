@@ -16,6 +16,8 @@
 namespace gravitas::survey {
 namespace {
 
+constexpr double kFarthest = 1e100;  // m: detectors take no more (plugin_sdk/collision.cc)
+
 [[noreturn]] void refuse(const std::string& place, const std::string& why) {
   throw BadQuestion(fmt::format("{}: {}", place, why));
 }
@@ -27,13 +29,14 @@ Vector3 QuestionReader::vector(const google::protobuf::RepeatedField<double>& nu
   if (numbers.empty() && !is_needed) return Vector3::Zero();
   if (numbers.size() != 3) refuse(place, fmt::format("{} numbers; allowed: 3", numbers.size()));
   const Vector3 v(numbers[0], numbers[1], numbers[2]);
-  if (!v.allFinite()) refuse(place, "a number that is not finite");
+  if (!(v.cwiseAbs().maxCoeff() <= kFarthest))
+    refuse(place, fmt::format("a number that is not finite, or beyond {:g}", kFarthest));
   return v;
 }
 
 double QuestionReader::length(double number, const std::string& place) const {
-  if (!std::isfinite(number) || number < 0.0)
-    refuse(place, fmt::format("{:g}; allowed: a finite number of metres >= 0", number));
+  if (!(number >= 0.0 && number <= kFarthest))
+    refuse(place, fmt::format("{:g}; allowed: 0 to {:g} m", number, kFarthest));
   return number;
 }
 
@@ -100,6 +103,9 @@ Probe QuestionReader::probe(const query::v1::Shape& shape, const std::string& pl
     if (!flatten(type.properties, values, &probe.parameters, &problems))
       refuse(place + ".properties", problems.at(0).text);
     probe.type = type_id(type.name);
+    std::string why;
+    if (is_scene_shape(type.name) && !read_scene_shape(probe.type, probe.parameters, &why))
+      refuse(place + ".properties", why);
     // as the kernel does it for a geometry of the scene, so that equal ones are made once
     channel::Digest content;
     content.add(type.name.data(), type.name.size());
