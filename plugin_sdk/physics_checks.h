@@ -106,6 +106,7 @@ struct SolutionColumns {
 //   restitution  where the solver says that it converged, no contact that pushes separates faster than it can have
 //              arrived
 //   touching   then, too, no contact that corrects moves its two surfaces further apart than they overlap
+//   closing    and what a joint locks is open at the end by something between nothing and what it was open at the start
 class SolutionCheck {
  public:
   std::string check(const stage::SolverSolveRequest& request, const SolutionColumns& answer);

@@ -25,6 +25,10 @@ constexpr double kOfSolution = 1e-13;
 constexpr double kSettled = 4e-16;
 // Rounding of a gap, of the coordinates that it is the difference of.
 constexpr double kOfSolvedCoordinates = 1e-12;
+// Share of a displacement that a method may leave undone, where it says that it is done.
+constexpr double kNearly = 1e-3;
+// The same by any turn, however large.
+constexpr double kMostLeft = 0.25;
 // Share of the largest correction that none is.
 constexpr double kNegligible = 1e-6;
 
@@ -57,6 +61,7 @@ class Balance {
     if (wrong = check_energy(); !wrong.empty()) return wrong;
     if (is_unfinished()) return {};
     if (wrong = check_touching(); !wrong.empty()) return wrong;
+    if (wrong = check_closing(); !wrong.empty()) return wrong;
     return check_separation();
   }
 
@@ -141,11 +146,14 @@ class Balance {
     return axes;
   }
 
+  DiscrepancyColumns discrepancies() const {
+    return {request_.point1(),     request_.point2(),  request_.velocity(),     request_.correction(),
+            request_.axes(),       request_.mode(),    request_.lower(),        request_.upper(),
+            request_.compliance(), request_.damping(), request_.maximum_force()};
+  }
+
   void add_discrepancies(Directions directions) {
-    const DiscrepancyColumns columns{request_.point1(),     request_.point2(),       request_.velocity(),
-                                     request_.correction(), request_.axes(),         request_.mode(),
-                                     request_.lower(),      request_.upper(),        request_.compliance(),
-                                     request_.damping(),    request_.maximum_force()};
+    const DiscrepancyColumns columns = discrepancies();
     const double share = request_.theta() * request_.time_step();
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const Discrepancy d = columns.at(i);
@@ -267,12 +275,77 @@ class Balance {
         turned += turn_of(body).norm();
         coordinates += position.norm();
       }
-      const double allowed = request_.contact_depth()[i] + (1e-3 + turned) * sizes + kOfSolvedCoordinates * coordinates;
+      const double allowed =
+          request_.contact_depth()[i] + (kNearly + turned) * sizes + kOfSolvedCoordinates * coordinates;
       if (apart <= allowed) continue;
       char text[160];
       std::snprintf(text, sizeof text, "contact_correction of row %zu moves apart by %.3g m what overlaps by %.3g m", i,
                     apart, request_.contact_depth()[i]);
       return text;
+    }
+    return {};
+  }
+
+  Pose pose_of(std::uint32_t body, std::span<const double> position, std::span<const double> orientation) const {
+    return body == kNone ? Pose{} : Pose{vector_at(position, body), quaternion_at(orientation, body)};
+  }
+  Pose end_pose(std::uint32_t body, const Pose& trial) const {
+    if (body == kNone) return trial;
+    return {trial.position + vector_at(answer_.pose_change, 2 * body), exp_rotation(turn_of(body)) * trial.orientation};
+  }
+  // By how much the pose change moves a point, both ways of moving taken for themselves.
+  double moved_by(std::uint32_t body, const Vector3& point) const {
+    if (body == kNone) return 0.0;
+    const Vector3 arm = point - vector_at(request_.trial_position(), body);
+    return vector_at(answer_.pose_change, 2 * body).norm() + turn_of(body).cross(arm).norm();
+  }
+  bool can_be_pushed(std::uint32_t body) const {
+    return body != kNone && (request_.flags()[body] & kMovable) != 0 && request_.inverse_mass()[body] > 0.0;
+  }
+
+  // error(S_{n+1}) = (1 - beta) error(S_n) along what is locked, with a beta of 0 ... 1 that the method may choose.
+  std::string check_closing() const {
+    const DiscrepancyColumns columns = discrepancies();
+    if (answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kContradiction)) return {};
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
+      if (!can_be_pushed(one) && !can_be_pushed(two)) continue;
+      const Discrepancy d = columns.at(i);
+      const Pose trial1 = pose_of(one, request_.trial_position(), request_.trial_orientation());
+      const Pose trial2 = pose_of(two, request_.trial_position(), request_.trial_orientation());
+      const Pose start1 = pose_of(one, request_.position(), request_.orientation());
+      const Pose start2 = pose_of(two, request_.position(), request_.orientation());
+      const Matrix3 axes = d.axes.toRotationMatrix();
+      const auto turned_axis = [&](int axis, const Pose& pose, const Vector3& error) -> Vector3 {
+        if (d.is_radial() && axis == 0) return error.normalized();
+        return pose.orientation * (trial1.orientation.conjugate() * axes.col(axis));
+      };
+      const Pose end1 = end_pose(one, trial1), end2 = end_pose(two, trial2);
+      const Vector3 at_end = error_at(d, trial1, trial2, end1, end2);
+      const Vector3 at_start = error_at(d, trial1, trial2, start1, start2);
+      // rows that are linear leave what is of second order in the turn
+      const double turned = turn_of(one).norm() + turn_of(two).norm();
+      const double left = kNearly + std::min(turned, kMostLeft);
+      double sizes = turned, coordinates = 0.0;
+      if (!d.is_angular()) {
+        sizes = moved_by(one, d.point1) + moved_by(two, d.point2);
+        coordinates = d.point1.norm() + trial1.position.norm() + trial2.position.norm();
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        const bool is_held = axis_mode(d.modes, axis) == AxisMode::kLocked && !(d.compliance[axis] > 0.0) &&
+                             d.maximum_force[axis] == kUnlimited;
+        if (!is_held) continue;
+        const double end = turned_axis(axis, end1, at_end).dot(at_end);
+        const double start = turned_axis(axis, start1, at_start).dot(at_start);
+        const double beyond = std::max(end - std::max(start, 0.0), std::min(start, 0.0) - end);
+        const double allowed = left * sizes + kOfSolvedCoordinates * (1.0 + coordinates);
+        if (beyond <= allowed) continue;
+        char text[160];
+        std::snprintf(text, sizeof text,
+                      "pose_change leaves row %zu of the joints open by %.3g, from %.3g (allowed %.3g)", i, end, start,
+                      allowed);
+        return text;
+      }
     }
     return {};
   }

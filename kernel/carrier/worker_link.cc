@@ -125,6 +125,8 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
   hello.set_nonce(channel::now_ns() ^ (static_cast<std::uint64_t>(getpid()) << 32));
   hello.set_threads(threads);
   for (const PluginChoice& plugin : slot.plugins) {
+    if (slot.plugins.size() > 1 && (!plugin.command.empty() || plugin.address != address_))
+      fail_start("a command or an address serves one plugin, and this process would hold others besides");
     control::v1::PluginSettings* settings = hello.add_plugins();
     settings->set_plugin(plugin.declaration.name);
     plugins_.push_back(plugin.declaration.name);

@@ -33,10 +33,10 @@ struct RunOptions {
   std::string trajectory, report, events, reactions;
   std::string instrumentation;                     // file of debug geometry (services/survey/frame_file.h)
   std::vector<std::string> instrumentation_kinds;  // all if empty
-  std::optional<double> sample_every;              // s, of trajectory, instrumentation and reactions; every step if absent
-  std::string checkpoint;                          // file that is kept up to date; none if empty
-  std::uint32_t checkpoint_every = 0;              // steps, counted from t = 0; 0: at the start and the end alone
-  std::string resume;                              // checkpoint to go on from
+  std::optional<double> sample_every;  // s, of trajectory, instrumentation and reactions; every step if absent
+  std::string checkpoint;              // file that is kept up to date; none if empty
+  std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
+  std::string resume;                  // checkpoint to go on from
   std::uint32_t threads = 1;
   std::vector<std::string> faults, swaps, comparisons, reruns;  // as on the command line
   kernel::HostStarter starter = kernel::start_host;

@@ -109,8 +109,9 @@ void PluginSelection::read_hosting(const Plugin& message) {
     if (other.hosting() == "direct") description.hosting = kernel::Hosting::kDirect;
     if (other.hosting() == "shm") description.hosting = kernel::Hosting::kSharedMemory;
     if (other.hosting() == "grpc") description.hosting = kernel::Hosting::kGrpc;
-    if (other.has_deadline()) description.deadline = other.deadline();
-    if (other.has_standby()) description.standbys = other.standby();
+    if (is_written(other, Plugin::kDeadlineFieldNumber)) description.deadline = other.deadline();
+    // where it is not written it has the default
+    if (is_written(other, Plugin::kStandbyFieldNumber)) description.standbys = other.standby();
   }
   if (message.hosting() == "direct" && !process.empty())
     context_.diagnostics->error(

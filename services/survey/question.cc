@@ -104,8 +104,10 @@ Probe QuestionReader::probe(const query::v1::Shape& shape, const std::string& pl
       refuse(place + ".properties", problems.at(0).text);
     probe.type = type_id(type.name);
     std::string why;
-    if (is_scene_shape(type.name) && !read_scene_shape(probe.type, probe.parameters, &why))
-      refuse(place + ".properties", why);
+    // types of a stranger's plugin are judged by it alone
+    const bool is_known =
+        std::ranges::find(scene_shape_types(), type.name, &TypeDeclaration::name) != scene_shape_types().end();
+    if (is_known && !read_scene_shape(probe.type, probe.parameters, &why)) refuse(place + ".properties", why);
     // as the kernel does it for a geometry of the scene, so that equal ones are made once
     channel::Digest content;
     content.add(type.name.data(), type.name.size());

@@ -362,6 +362,7 @@ struct Solution {
     request.u64(Request::kContactKey) = {7};
     request.f64(Request::kContactMaterial) = {0.5, 0.5, 0.5, 0, 0, 0};
     solve(theta);
+    close_joint();
   }
 
   void set(std::vector<double>* column, const Vector3& v, std::size_t row) { set_vector(*column, row, v); }
@@ -376,6 +377,16 @@ struct Solution {
     set(&angular, before.angular + (arm.cross(lambda) + joint_arm.cross(joint)).cwiseQuotient(inertia), 1);
     set(&change, 0.5 * (mu + friction + held), 2);
     set(&change, (arm.cross(mu + friction) + joint_arm.cross(held)).cwiseQuotient(inertia), 3);
+  }
+
+  // The joint is open in the trial state by as much as the pose change closes, and was closed when the step began.
+  void close_joint() {
+    const Quaternion turn = exp_rotation(vector_at(change, 3));
+    const Vector3 position = Vector3(0, 0.5, 0) + vector_at(change, 2);
+    set(&request.f64(Request::kPoint1), position + turn * (anchor - Vector3(0, 0.5, 0)), 0);
+    set(&request.f64(Request::kPosition), position, 1);
+    for (std::size_t k = 0; k < 4; ++k)
+      request.f64(Request::kOrientation)[4 + k] = k == 0 ? turn.w() : turn.vec()[static_cast<Eigen::Index>(k) - 1];
   }
 
   std::string check() {
@@ -431,11 +442,49 @@ TEST(CheckSolution, FindsAnImpulseThatPushesWhatIsSeparating) {
   s.request.f64(Solution::Request::kVelocity) = {0.1, 0, 0};  // no bound on energy
   s.request.f64(Solution::Request::kContactMaterial)[kRestitution] = 0.0;
   s.solve(1.0);
+  s.close_joint();
   EXPECT_THAT(s.check(), HasSubstr("contact_impulse of row 0"));
   s.request.f64(Solution::Request::kContactMaterial)[kRestitution] = 1.0;
   s.impulse = {0.0, 1.5, 0.0};
   s.solve(1.0);
+  s.close_joint();
   EXPECT_THAT(s.check(), IsEmpty());
+}
+
+// Its multipliers and its pose change are of one mind, and do to the joint what they should not.
+TEST(CheckSolution, FindsAJointThatIsLeftOpen) {
+  for (const double factor : {-1.0, 0.0, 0.5, 2.0, 1000.0}) {
+    SCOPED_TRACE(factor);
+    Solution s;
+    s.request.f64(Solution::Request::kContactDepth) = {10.0};  // no bound on what the contact corrects
+    for (double& number : s.joint_correction) number *= factor;
+    s.solve(1.0);
+    EXPECT_THAT(s.check(), HasSubstr("pose_change leaves row 0 of the joints open"));
+    s.reason = StopReason::kIterations;
+    EXPECT_THAT(s.check(), IsEmpty()) << "it does not say that it is done";
+    s.reason = StopReason::kContradiction;
+    EXPECT_THAT(s.check(), IsEmpty()) << "it says that joints cannot be closed";
+  }
+}
+
+// What it was open when the step began may be left, all of it or a share.
+TEST(CheckSolution, AllowsAJointToCloseSlowly) {
+  for (const double open : {1e-3, -1e-3}) {
+    for (const double share : {0.0, 0.5, 1.0, 1.5}) {
+      Solution s;
+      const Vector3 ahead(open, 0, 0);
+      // the joint was open by `ahead` when the step began, and is by a share of it at its end
+      const Vector3 closed = vector_at(s.request.f64(Solution::Request::kPoint1), 0);
+      s.set(&s.request.f64(Solution::Request::kPoint1), closed - share * ahead, 0);
+      const Vector3 position = vector_at(s.request.f64(Solution::Request::kPosition), 1);
+      s.set(&s.request.f64(Solution::Request::kPosition), position + (1.0 - share) * ahead, 1);
+      if (share <= 1.0) {
+        EXPECT_THAT(s.check(), IsEmpty()) << open << ' ' << share;
+      } else {
+        EXPECT_THAT(s.check(), HasSubstr("pose_change leaves row 0")) << open;
+      }
+    }
+  }
 }
 
 TEST(CheckSolution, FindsACorrectionBeyondTheOverlap) {

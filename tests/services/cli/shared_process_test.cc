@@ -69,7 +69,7 @@ TEST_F(SharedProcessRun, SurvivesFaultsAndSwapsInItsSlots) {
   for (const char* hosting : {"shm", "grpc"}) {
     const report::v1::Report hurt =
         go({"--steps", "60", "--hosting", hosting, "--fault", "force:kill@step=10", "--fault",
-            "integrator:segv@step=20", "--swap", "force=Basic@step=30", "--fault", "force:abort@step=50"});
+            "integrator:segv@step=20", "--swap", "force=BasicForce@step=30", "--fault", "force:abort@step=50"});
     EXPECT_EQ(hurt.chain_hash(), quiet) << hosting;
     ASSERT_EQ(hurt.faults_size(), 3) << hosting;
     EXPECT_EQ(hurt.faults(0).slot(), "force");

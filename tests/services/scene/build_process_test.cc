@@ -46,32 +46,34 @@ TEST(BuildProcess, AListOfPluginsIsInOneProcess) {
   EXPECT_THAT(with_plugins("Plugin { Slot = \"force\" Name = \"Gravity\" Process = \"one\" }\n"
                            "Plugin { Slot = \"force\" Name = \"Drag\" Process = \"two\" }")
                   .errors(),
-              ElementsAre("scene:4:40: error: Process \"two\" differs from \"one\"; allowed: one for the whole slot "
+              ElementsAre("scene:4:49: error: Process \"two\" differs from \"one\"; allowed: one for the whole slot "
                           "\"force\""));
 }
 
 TEST(BuildProcess, WhatIsSaidOfItMustNotDiffer) {
-  EXPECT_THAT(with_plugins("Plugin { Slot = \"solver\" Process = \"one\" Deadline = 1 }\n"
-                           "Plugin { Slot = \"collision\" Process = \"one\" Deadline = 2 }")
-                  .errors(),
-              ElementsAre("scene:4:46: error: Deadline differs from that at 3:1; allowed: one for the whole process "
-                          "\"one\""));
-  EXPECT_THAT(with_plugins("Plugin { Slot = \"solver\" Process = \"one\" Hosting = \"shm\" }\n"
-                           "Plugin { Slot = \"collision\" Process = \"one\" Hosting = \"grpc\" }")
-                  .errors(),
-              ElementsAre("scene:4:46: error: Hosting differs from that at 3:1; allowed: one for the whole process "
-                          "\"one\""));
+  EXPECT_THAT(
+      with_plugins("Plugin { Slot = \"solver\" Process = \"one\" Deadline = 1 }\n"
+                   "Plugin { Slot = \"collision\" Process = \"one\" Deadline = 2 }")
+          .errors(),
+      ElementsAre("scene:4:56: error: Deadline differs from that at scene:3:1; allowed: one for the whole process "
+                  "\"one\""));
+  EXPECT_THAT(
+      with_plugins("Plugin { Slot = \"solver\" Process = \"one\" Hosting = \"shm\" }\n"
+                   "Plugin { Slot = \"collision\" Process = \"one\" Hosting = \"grpc\" }")
+          .errors(),
+      ElementsAre("scene:4:55: error: Hosting differs from that at scene:3:1; allowed: one for the whole process "
+                  "\"one\""));
 }
 
 TEST(BuildProcess, IsNeitherTheKernelsNorACommands) {
   EXPECT_THAT(with_plugins("Plugin { Slot = \"solver\" Process = \"one\" Hosting = \"direct\" }").errors(),
-              ElementsAre("scene:3:42: error: Hosting \"direct\" of a slot with the Process \"one\"; allowed: \"shm\", "
+              ElementsAre("scene:3:52: error: Hosting \"direct\" of a slot with the Process \"one\"; allowed: \"shm\", "
                           "\"grpc\""));
   EXPECT_THAT(
       with_plugins("Plugin { Slot = \"solver\" Process = \"one\" Address = \"127.0.0.1:1\" }").errors(),
-      ElementsAre("scene:3:27: error: Process beside Address, which is a worker of its own; allowed: one of them"));
-  EXPECT_THAT(with_plugins("Plugin { Slot = \"solver\" Process = \"\" }").errors(),
-              ElementsAre("scene:3:27: error: Process is empty; required: a text of at least one character"));
+      ElementsAre("scene:3:36: error: Process beside Address, which is a worker of its own; allowed: one of them"));
+  // none
+  EXPECT_THAT(with_plugins("Plugin { Slot = \"solver\" Process = \"\" Hosting = \"direct\" }").errors(), IsEmpty());
 }
 
 }  // namespace
