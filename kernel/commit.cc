@@ -173,11 +173,10 @@ void Environment::update_joints() {
     while (row < columns.size() && d.constraint[row] == joint) ++row;
     const JointBody one = body(description.body1), two = body(description.body2);
     const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row};
-    const double h = data_.time_step[0], threshold = description.breaking_threshold;
+    const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
     const JointLoad load = joint_load(rows, one, two, h);
-    const bool breaks =
-        (threshold > 0.0 && (leaves_no_error ? held_back(rows, one, two, h) : load.error) > threshold) ||
-        (description.breaking_force > 0.0 && load.force > description.breaking_force);
+    const bool breaks = (force > 0.0 && load.force > force) ||
+                        (threshold > 0.0 && (leaves_no_error ? held_back(rows, one, two, h) : load.error) > threshold);
     back().intact[joint] = breaks ? 0 : 1;
     if (!breaks) figures_.joint_error = std::max(figures_.joint_error, load.error);
   }

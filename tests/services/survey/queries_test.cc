@@ -351,7 +351,7 @@ TEST(Queries, AreAnsweredByWhoAnswersInTheRun) {
   SurveyedScene scene(kRow);
   Follower follower(&*scene.surveyor);
   scene.environment->set_commit_listener(&follower);
-  v1::Batch batch;
+  query::v1::Batch batch;
   add_ray({0, 2, 0}, {1, 0, 0}, &batch);
   ASSERT_THAT(bodies_of(ask(&scene, batch).rays(0).hits()), ElementsAre("A"));
   scene.environment->order_swap(
@@ -359,7 +359,7 @@ TEST(Queries, AreAnsweredByWhoAnswersInTheRun) {
   scene.steps(3);
   const AskedSlot& collision = scene.surveyor->slot(Slot::kCollision);
   EXPECT_EQ(collision.description().plugins[0].declaration.name, "GjkOnly");
-  const v1::Answers answers = ask(&scene, batch);
+  const query::v1::Answers answers = ask(&scene, batch);
   ASSERT_THAT(bodies_of(answers.rays(0).hits()), ElementsAre("A"));
   EXPECT_NEAR(answers.rays(0).hits(0).distance(), 4.0, 1e-8);
   EXPECT_THAT(collision.faults(), IsEmpty());
