@@ -108,14 +108,16 @@ void start_to_first_step(benchmark::State& state) {
 }
 
 // The shipped pile of 1000 bodies, where it has come to rest, in workers: share of the step in which answers are
-// checked (wire, structure, numbers).
-void pile_in_workers(benchmark::State& state) {
+// checked (wire, structure, numbers; and every so many steps the physics).
+void pile_in_workers(benchmark::State& state, std::uint32_t check_physics_every) {
   RunOptions options;
   options.scenes = {in_source("/deploy/scenes/pile1000.gravitas")};
   options.hosting = {{std::nullopt, Hosting::kSharedMemory, ""}};
   options.steps = kEndless;
   std::vector<std::string> warnings;
-  const std::unique_ptr<Environment> world = start(load(options, &warnings));
+  kernel::EnvironmentDescription description = load(options, &warnings);
+  description.check_physics_every = check_physics_every;
+  const std::unique_ptr<Environment> world = start(description);
   for (int i = 0; i < 50; ++i) step(world.get(), &state);
   double before = 0.0, after = 0.0;
   const auto checked = [&] {
@@ -177,7 +179,8 @@ BENCHMARK_CAPTURE(resting, visited, SleepRule{}.energy, true)
     ->UseRealTime()
     ->Unit(benchmark::kMicrosecond);
 BENCHMARK(start_to_first_step)->UseRealTime()->Iterations(20)->Unit(benchmark::kMillisecond);
-BENCHMARK(pile_in_workers)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(pile_in_workers, cheap, 0)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(pile_in_workers, physics, 1)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);
 BENCHMARK(memory)->UseRealTime()->Iterations(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -35,7 +35,20 @@ BOUNDS = [
     ("resting/visited/10000/real_time", "the same, asleep but for a ball that flies past", None, None, "us"),
     ("start_to_first_step/iterations:20/real_time", "exec to the end of a run of one step, five workers", None, 150e3,
      "us"),
-    ("pile_in_workers/iterations:100/real_time", "validation in a step of pile1000, shm", "validation_percent", 3, "%"),
+    ("pile_in_workers/cheap/iterations:100/real_time", "validation in a step of pile1000, shm", "validation_percent", 3,
+     "%"),
+    ("pile_in_workers/physics/iterations:100/real_time", "the same with the physics checked in every step",
+     "validation_percent", None, "%"),
+    ("checkpoints/iterations:200/real_time", "a checkpoint every 100 steps of pile1000 and its journal, direct", "percent",
+     2, "%"),
+    *((f"recovery/{fault}/iterations:1", f"{what}, noticed to answered by a warm standby: {name}", counter, bound, "us")
+      for fault, what in (("kill", "killed in a call, shm"), ("segv", "the same, SIGSEGV"), ("abort", "the same, abort"),
+                          ("hang", "hanging, shm (its deadline not counted)"), ("nan", "answering NaN, shm"),
+                          ("kill_grpc", "killed in a call, gRPC"))
+      for name, counter, bound in (("median", "median_us", 2e3), ("p99", "p99_us", 10e3))),
+    *((f"swap_pause/{carrier}/iterations:1", f"pause of a swap, {carrier}: {name}", counter, bound, "us")
+      for carrier in ("direct", "shm", "grpc")
+      for name, counter, bound in (("median", "median_us", 200), ("p99", "p99_us", None))),
     ("memory/iterations:1/real_time", "memory of a body, all slots direct", "bytes_per_body", None, "B"),
     ("memory/iterations:1/real_time", "resident memory of a worker", "megabytes_per_worker", None, "MB"),
 ]
