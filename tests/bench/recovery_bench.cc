@@ -27,10 +27,10 @@ using kernel::Environment;
 using kernel::Hosting;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint32_t kEndless = 1U << 31;
+constexpr std::uint32_t kRecoverySteps = 1U << 31;
 constexpr int kTimes = 200;
 
-bool step(Environment* world, benchmark::State* state) {
+bool take_step(Environment* world, benchmark::State* state) {
   if (world->step() == kernel::StepOutcome::kCommitted) return true;
   state->SkipWithError(world->fault()->fault.text.c_str());
   return false;
@@ -49,17 +49,17 @@ void report(std::vector<double> microseconds, benchmark::State* state) {
 
 // The solver's worker fails in a call again and again, each time with a warm standby and a budget that is whole.
 void recovery(benchmark::State& state, Hosting hosting, const std::string& fault) {
-  kernel::EnvironmentDescription description = testing::busy_world(hosting).steps(kEndless, 1e-4).description();
+  kernel::EnvironmentDescription description = harness::busy_world(hosting).steps(kRecoverySteps, 1e-4).description();
   description.solver.deadline = 0.05;
   Environment world(description);
   for (auto _ : state) {
     for (int i = 0; i < kTimes; ++i) {
       for (std::uint32_t k = 0; k < kernel::SlotHost::kGoodAnswers + 10; ++k)
-        if (!step(&world, &state)) return;
+        if (!take_step(&world, &state)) return;
       // a standby takes as long as that to start
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
       world.inject({Slot::kSolver, fault, world.step_count() + 1});
-      if (!step(&world, &state)) return;
+      if (!take_step(&world, &state)) return;
     }
   }
   std::vector<double> times;
@@ -69,13 +69,13 @@ void recovery(benchmark::State& state, Hosting hosting, const std::string& fault
 }
 
 void swap_pause(benchmark::State& state, Hosting hosting) {
-  Environment world(testing::busy_world(hosting).steps(kEndless, 1e-4).description());
-  const kernel::PluginChoice solver = testing::busy_world(hosting).description().solver.plugins[0];
+  Environment world(harness::busy_world(hosting).steps(kRecoverySteps, 1e-4).description());
+  const kernel::PluginChoice solver = harness::busy_world(hosting).description().solver.plugins[0];
   for (auto _ : state) {
     for (int i = 0; i < kTimes; ++i) {
       world.order_swap({Slot::kSolver, solver, std::nullopt, world.step_count() + 2});
       for (std::uint32_t k = 0; k < kernel::SlotHost::kProbation + 4; ++k)
-        if (!step(&world, &state)) return;
+        if (!take_step(&world, &state)) return;
     }
   }
   std::vector<double> times;
@@ -105,7 +105,7 @@ void checkpoints(benchmark::State& state) {
   RunOptions options;
   options.scenes = {in_source("/deploy/scenes/pile1000.gravitas")};
   options.hosting = {{std::nullopt, Hosting::kDirect, ""}};
-  options.steps = kEndless;
+  options.steps = kRecoverySteps;
   std::vector<std::string> warnings;
   const kernel::EnvironmentDescription description = load(options, &warnings);
   const std::unique_ptr<Environment> world = start(description);
@@ -116,7 +116,7 @@ void checkpoints(benchmark::State& state) {
   world->set_commit_listener(&timed);
   const Clock::time_point start = Clock::now();
   for (auto _ : state)
-    if (!step(world.get(), &state)) return;
+    if (!take_step(world.get(), &state)) return;
   state.counters["percent"] = 100.0 * std::chrono::duration<double>(timed.took) / (Clock::now() - start);
 }
 
