@@ -260,7 +260,7 @@ Run::Injected* Run::find(const FaultRecord& record) {
   Injected* later = nullptr;
   for (Injected& fault : faults_) {
     const std::vector<Slot> hit =
-        is_outside(fault.plan->means) ? sharing(scene_, fault.plan->slot) : std::vector<Slot>{fault.plan->slot};
+        is_between_calls(*fault.plan) ? sharing(scene_, fault.plan->slot) : std::vector<Slot>{fault.plan->slot};
     const bool is_hit = std::ranges::find(hit, record.fault.slot) != hit.end();
     if (!fault.happened || !is_hit || fault.records.size() >= fault.plan->times) continue;
     if (fault.plan->step == record.step) return &fault;

@@ -242,9 +242,9 @@ PlannedFault draw_last(Draw* draw, Slot slot) {
 }
 
 // Whose failures it may count as: a wrong wrench may be noticed by what the integrator makes of it, and is charged to
-// that.
+// that; a worker that ends between two calls is missed by whoever of its process is asked next.
 std::vector<Slot> slots_hit(const PlannedFault& fault, const Scene& scene) {
-  if (is_outside(fault.means)) return sharing(scene, fault.slot);
+  if (is_between_calls(fault)) return sharing(scene, fault.slot);
   const bool is_wrong = fault.duty == Duty::kWrong || fault.duty == Duty::kInTolerance;
   if (fault.slot == Slot::kForce && is_wrong) return {Slot::kForce, Slot::kIntegrator};
   return {fault.slot};

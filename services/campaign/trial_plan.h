@@ -32,11 +32,6 @@ enum class Duty {
   kInTolerance  // the same, too small for any check but a re-run
 };
 
-// Whether it hits a process, in whichever slot's call that is noticed.
-constexpr bool is_outside(Means means) {
-  return means == Means::kKill || means == Means::kStop || means == Means::kPause;
-}
-
 struct PlannedFault {
   Means means = Means::kOrder;
   Duty duty = Duty::kRecover;
@@ -49,6 +44,12 @@ struct PlannedFault {
   double pause = 0.0;  // of kPause: SIGCONT after so many deadlines
   std::string lie;     // of kSwapRefused: what about (plugin_sdk/host/handshake_lie.h); empty: it is no library
 };
+
+// Whether it hits a process outside a call, and is noticed in the next one of whichever slot.
+inline bool is_between_calls(const PlannedFault& fault) {
+  return fault.means == Means::kKill || fault.means == Means::kStop || fault.means == Means::kPause ||
+         fault.order.ends_with("at=reply");
+}
 
 // What the machine does to all of a trial.
 enum class HostTrouble { kNone, kSignals, kSurroundings };

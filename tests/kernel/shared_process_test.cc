@@ -156,11 +156,11 @@ TEST_P(SharedProcess, ChargesTheSlotThatWasCalled) {
 
 TEST_P(SharedProcess, FallsBackInTheSlotThatFailedAlone) {
   WorldBuilder builder = together(GetParam(), kTwo);
-  builder.description().solver.plugins[0].fallback =
-      std::make_shared<kernel::PluginChoice>(WorldBuilder()
-                                                 .plugin(Slot::kSolver, plugin_path("solver_sequential"), {100.0, 1.0})
-                                                 .description()
-                                                 .solver.plugins[0]);
+  builder.description().solver.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(
+      WorldBuilder()
+          .plugin(Slot::kSolver, plugin_path("solver_sequential"), {100.0, 1.0, 0.0, 1.0, 0.0})
+          .description()
+          .solver.plugins[0]);
   builder.description().collision.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(
       WorldBuilder().plugin(Slot::kCollision, plugin_path("collision_gjk_only")).description().collision.plugins[0]);
   Environment world(builder.description());
