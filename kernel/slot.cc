@@ -141,13 +141,11 @@ void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* d
   routed.target = route.target;
   routed.attempt = attempts->made;
   order_.clear();
-  if (!armed_.empty()) {
-    const auto due = std::ranges::find_if(armed_, [&](const FaultInjection& one) { return one.step == step_; });
-    if (due != armed_.end()) {
-      order_ = due->order;
-      routed.fault = order_;
-      if (--due->times == 0) armed_.erase(due);
-    }
+  const auto due = std::ranges::find_if(armed_, [&](const FaultInjection& one) { return one.step == step_; });
+  if (due != armed_.end()) {
+    order_ = due->order;
+    routed.fault = order_;
+    if (--due->times == 0) armed_.erase(due);
   }
   if (derivatives != nullptr) derivatives->begin_attempt(true);
   // whom a nested call of the same process takes away must outlast this one
@@ -166,6 +164,7 @@ void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attem
   SlotHost& host = host_of(call.target);
   // nor if its process failed in a call of another slot, which others answer by now
   if (attempts->asked && attempts->asked != host.carrier()) return;
+  attempts->asked.reset();  // else its worker's end would be waited for here
   if (!description_.defences.replay) {
     name(&fault, call.target);
     throw StageFault(fault);

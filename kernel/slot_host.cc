@@ -69,10 +69,10 @@ void SlotHost::retire(std::shared_ptr<Carrier> carrier) {
   retired_.push_back(std::async(std::launch::async, [carrier = std::move(carrier)]() mutable { carrier.reset(); }));
 }
 
-void SlotHost::retire(std::vector<std::unique_ptr<Spare>> spares) {
-  if (spares.empty()) return;
-  for (const std::unique_ptr<Spare>& spare : spares) spare->give_up();
-  retired_.push_back(std::async(std::launch::async, [spares = std::move(spares)]() mutable { spares.clear(); }));
+void SlotHost::retire(std::unique_ptr<Spare> spare) {
+  if (!spare) return;
+  spare->give_up();
+  retired_.push_back(std::async(std::launch::async, [spare = std::move(spare)]() mutable { spare.reset(); }));
 }
 
 std::vector<std::string> SlotHost::take_complaints() {
@@ -103,7 +103,7 @@ std::string SlotHost::take_host() {
 
 void SlotHost::replace_description(SlotDescription description) {
   description_ = std::move(description);
-  retire(std::exchange(standbys_, {}));
+  for (std::unique_ptr<Spare>& standby : std::exchange(standbys_, {})) retire(std::move(standby));
   budgets_ = {};
   lost_standbys_ = 0;
   ++revision_;

@@ -80,7 +80,7 @@ class SlotHost {
   void end_probation();
   // Ends a host in the background: a dying process must not hold up a step.
   void retire(std::shared_ptr<Carrier> carrier);
-  void retire(std::vector<std::unique_ptr<Spare>> spares);
+  void retire(std::unique_ptr<Spare> spare);
 
  private:
   struct Budget {

@@ -74,6 +74,7 @@ void StageSlot::prepare_swaps() {
     const bool is_stale = !swap.only_compare && swap.revision != hosts_[swap.host]->revision();
     if ((swap.spare || swap.candidate) && !is_stale) continue;
     if (swap.candidate) hosts_[swap.host]->retire(std::move(swap.candidate));
+    hosts_[swap.host]->retire(std::move(swap.spare));
     swap.revision = hosts_[swap.host]->revision();
     const SlotDescription& now = hosts_[swap.host]->description();
     const std::uint32_t row = routes_[swap.target].target;

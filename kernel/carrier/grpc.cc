@@ -54,7 +54,8 @@ class GrpcCarrier final : public Carrier {
   struct Stream {
     grpc::ClientContext context;
     std::unique_ptr<grpc::GenericClientAsyncReaderWriter> io;
-    grpc::Status status;  // at its end, of whose operation it is the tag
+    grpc::ByteBuffer incoming;  // of a Read, which may end after its call was given up
+    grpc::Status status;        // at its end, of whose operation it is the tag
   };
   // Time left of a call.
   struct Patience {
@@ -198,10 +199,9 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
 
   for (;;) {
-    grpc::ByteBuffer message;
-    stream.io->Read(&message, &stream);
+    stream.io->Read(&stream.incoming, &stream);
     wait(&stream, &patience);
-    const wire::FlatMessage flat(message);
+    const wire::FlatMessage flat(stream.incoming);
     wire::ColumnsReader reader(method.reply);
     const std::string problem = reader.parse(flat.bytes());
     Outcome outcome;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "plugin_sdk/body.h"
@@ -12,6 +13,9 @@
 #include "schemas/stage_frames.h"
 
 namespace gravitas {
+
+// Distance of 1 to the next number.
+inline constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 struct SolverBody {
   double inverse_mass = 0.0;                  // 1/kg; 0 where nothing pushes the body

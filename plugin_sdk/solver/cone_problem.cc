@@ -10,14 +10,12 @@
 namespace gravitas {
 namespace {
 
-constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon();
-
 // Of the largest terms of a row's sum, what may be left by rounding.
-constexpr double kSumRounding = 16.0 * kUnitRoundoff;
+constexpr double kSumRounding = 16.0 * kEpsilon;
 
 // Of those terms, what a guess may be wrong by: as if its multipliers were, by 2e-13 of themselves. A stack at rest keeps
 // its impulses then, in place of finding them anew for what rounding moves its contacts.
-constexpr double kGuessRounding = 1024.0 * kUnitRoundoff;
+constexpr double kGuessRounding = 1024.0 * kEpsilon;
 
 // A contact slips if it does so this much faster than what counts as converged.
 constexpr double kSlip = 1e3;
@@ -196,7 +194,7 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
     y[o] = free_[r] / scale_[r];
   }
   if (count > 0) worst = std::max(worst, residual_of(Eigen::VectorXd::Zero(count), y));
-  return worst <= std::max(smallest, kUnitRoundoff * motion_);
+  return worst <= std::max(smallest, kEpsilon * motion_);
 }
 
 // The first guess, where it is right as it stands: with the one of the step before, what rests.
@@ -284,7 +282,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     double summed = 0.0;
     for (const std::uint32_t r : held_)
       summed = std::max(summed, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
-    summary.has_converged = summary.has_converged && missing <= std::max(tolerance, 64.0 * kUnitRoundoff * summed);
+    summary.has_converged = summary.has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * summed);
   }
   return summary;
 }

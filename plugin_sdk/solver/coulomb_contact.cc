@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "plugin_sdk/solver/bodies.h"
+
 namespace gravitas {
 namespace {
 
@@ -14,7 +16,6 @@ constexpr int kDirections = 64;
 // cos and sin of 2 pi / 64
 constexpr double kStepCosine = 0.99518472667219688624;
 constexpr double kStepSine = 0.098017140329560601994;
-constexpr double kEpsilon = 2.220446049250313e-16;
 
 double cross(const Vector2& a, const Vector2& b) { return a.x() * b.y() - a.y() * b.x(); }
 Vector2 turned(const Vector2& v) { return {-v.y(), v.x()}; }

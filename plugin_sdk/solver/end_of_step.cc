@@ -15,8 +15,6 @@
 namespace gravitas {
 namespace {
 
-constexpr double kEndRounding = std::numeric_limits<double>::epsilon();
-
 class IslandSolver {
  public:
   IslandSolver(const stage::SolverSolveRequest& request, const SolverBodies& all, const Island& island,
@@ -254,7 +252,7 @@ class IslandSolver {
       move_to_end();
       stiffen();
       build_pose();
-      const double representable = 0.25 * kEndRounding * coordinates_;
+      const double representable = 0.25 * kEpsilon * coordinates_;
       const BodyMotion x0 = start_of_step();
       const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_);
       note(solved);
@@ -339,8 +337,9 @@ class IslandSolver {
     // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
     if (may_turn() && !is_turned()) {
       build_velocity(false);
-      note(cone_.solve(bodies_, trial, 0.0, settings_));
-      keep_impulses();
+      const ConeSummary without = cone_.solve(bodies_, trial, 0.0, settings_);
+      note(without);
+      if (without.has_converged) keep_impulses();
     }
     for (int round = 0;; ++round) {
       build_velocity(true);
@@ -489,7 +488,7 @@ class IslandSolver {
     const double change = largest_change(next, offset_);
     const double size = std::max(largest(next), largest(displacement_));
     offset_ = std::move(next);
-    return change > std::max(kEndRounding * coordinates_, 1e-14 * size) ? change : 0.0;
+    return change > std::max(kEpsilon * coordinates_, 1e-14 * size) ? change : 0.0;
   }
 
   // ---- sizes, m

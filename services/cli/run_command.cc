@@ -131,7 +131,8 @@ void add_run(CLI::App* app, Action* action) {
                       "Interval of the samples of trajectory, instrumentation and reactions, s; every step if absent");
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option("--reactions", options.reactions,
-                      "Write the force and torque of every joint and contact to this file (JSON lines, the mean over "
+                      "Write the force of each joint and contact that is awake, and joints' torque, to this file (JSON "
+                      "lines, the mean over "
                       "the step that ends with the sample); the report then has those of the last step");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
   CLI::Option* instrumentation = command->add_option(

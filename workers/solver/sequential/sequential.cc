@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
 
 #include "plugin_sdk/body.h"
@@ -16,11 +15,10 @@
 namespace gravitas {
 namespace {
 
-constexpr double kRounding = std::numeric_limits<double>::epsilon();
 // Changes of this many units of rounding count as none.
-constexpr double kStillness = 128.0 * kRounding;
+constexpr double kStillness = 128.0 * kEpsilon;
 // With shock propagation: and so many of the largest load.
-constexpr double kLoadRounding = 8.0 * kRounding;
+constexpr double kLoadRounding = 8.0 * kEpsilon;
 
 // A contact slips if it does so this much faster than a sweep still changes it: what converges
 // slowly is further from its end than one change.
@@ -113,8 +111,8 @@ void SequentialSolver::solve_pose() {
   const double motion =
       std::max(pose_joints_.largest_motion(solution_.displacement), gaps_.largest_motion(solution_.displacement));
   check_range(violation, motion);
-  const double representable = 0.25 * kRounding * coordinates_;
-  if (violation <= std::max(representable, kRounding * motion)) {
+  const double representable = 0.25 * kEpsilon * coordinates_;
+  if (violation <= std::max(representable, kEpsilon * motion)) {
     // nothing is missing, so zero multipliers are the solution
     pose_joints_.clear_multipliers();
     gaps_.clear_multipliers();
@@ -214,7 +212,7 @@ void SequentialSolver::relax_velocity() {
   const double motion =
       std::max(velocity_joints_.largest_motion(solution_.velocity), impulses_.largest_motion(solution_.velocity));
   check_range(violation, motion);
-  if (violation <= kRounding * motion) {
+  if (violation <= kEpsilon * motion) {
     velocity_joints_.clear_multipliers();
     impulses_.clear_multipliers();
     velocity_converged_ = true;
