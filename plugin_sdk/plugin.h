@@ -109,6 +109,16 @@ class Host {
     if (parts.failure) std::rethrow_exception(parts.failure);
   }
 
+  // Calls body(i) for 0 … count - 1 likewise: for few items, of which each is work for a thread.
+  template <typename Body>
+  void parallel_for_each(std::uint64_t count, Body&& body) const {
+    // a part of parallel_for is of so many at least; whatever it is, each item is in one
+    constexpr std::uint64_t kPart = 64;
+    parallel_for(kPart * count, [&](std::uint64_t begin, std::uint64_t end) {
+      for (std::uint64_t i = (begin + kPart - 1) / kPart; i * kPart < end; ++i) body(i);
+    });
+  }
+
   // Wrenches of all bodies (six numbers each) in a trial state. `columns` are those of
   // Integrator.Derivative. Throws std::runtime_error when they cannot be had: let it pass.
   void derivative(const gravitas_column* request, gravitas_reply_column* reply) const {

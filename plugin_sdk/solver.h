@@ -5,7 +5,7 @@
 
 namespace gravitas {
 
-// Why a solver stopped: `stop_reason` of SolverSolveReply.
+// Why a solver stopped: `stop_reason` of SolverSolveReply. Of several islands the greatest.
 enum class StopReason : std::uint32_t {
   kNothingToDo = 0,   // no rows
   kConverged = 1,     // the last sweep changed no velocity by more than rounding's size

@@ -170,6 +170,8 @@ void write_request(std::ostream& out, const std::string& name, const std::vector
           << "*>(" << k << ".data), " << k << ".count}; }\n";
     }
   }
+  out << "  // As the C interface has them, in the order of Column.\n"
+         "  const gravitas_column* plain() const { return columns_; }\n";
   out << "\n private:\n  const gravitas_column* columns_;\n};\n\n";
 }
 

@@ -545,24 +545,16 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSetti
   SolverBodies bodies;
   bodies.load(request);
   SolverSolution answer;
-  answer.velocity.resize(bodies.count() + 1);
-  answer.displacement.resize(bodies.count() + 1);
-  for (std::uint32_t i = 0; i < bodies.count(); ++i) answer.velocity[i] = bodies[i].trial_velocity;
-  answer.joint_impulse.assign(3 * request.mode().size(), 0.0);
-  answer.joint_correction.assign(3 * request.mode().size(), 0.0);
-  answer.contact_impulse.assign(3 * request.contact_key().size(), 0.0);
-  answer.contact_correction.assign(request.contact_key().size(), 0.0);
-  answer.contact_direction.assign(request.contact_normal().begin(), request.contact_normal().end());
+  set_unpushed(request, bodies, &answer);
 
-  const std::vector<Island> islands = find_islands(request, bodies);
+  IslandFinder finder;
+  const std::span<const Island> islands = finder.find(request, bodies);
   std::vector<ConeSummary> summaries(islands.size());
-  host.parallel_for(islands.size(), [&](std::uint64_t begin, std::uint64_t end) {
+  host.parallel_for_each(islands.size(), [&](std::uint64_t i) {
     // its matrices are large; memory is all that stays of them
     thread_local ConeProblem cone;
-    for (std::uint64_t i = begin; i < end; ++i) {
-      summaries[i] = IslandSolver(request, bodies, islands[i], settings, &cone, &answer).solve();
-      host.mark_progress();
-    }
+    summaries[i] = IslandSolver(request, bodies, islands[i], settings, &cone, &answer).solve();
+    host.mark_progress();
   });
   SolverOutcome outcome;
   bool has_converged = true, contradicts = false;

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "plugin_sdk/solver/bodies.h"
@@ -30,8 +31,18 @@ struct Island {
   std::vector<std::uint32_t> contacts;
 };
 
-// In the order of their first bodies; bodies without joint or contact are in none, nor are rows that push no body.
-// The same islands in whatever order rows come.
-std::vector<Island> find_islands(const stage::SolverSolveRequest& request, const SolverBodies& bodies);
+// Keeps the memory of the islands that it finds.
+class IslandFinder {
+ public:
+  // In the order of their first bodies; bodies without joint or contact are in none, nor are rows that push no body.
+  // The same islands in whatever order rows come. Valid until the next find().
+  std::span<const Island> find(const stage::SolverSolveRequest& request, const SolverBodies& bodies);
+
+ private:
+  BodyUnion joined_{0};
+  std::vector<std::uint8_t> is_held_;
+  std::vector<std::uint32_t> island_of_;
+  std::vector<Island> islands_;  // those found, and memory of others
+};
 
 }  // namespace gravitas

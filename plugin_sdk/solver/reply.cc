@@ -14,6 +14,18 @@ DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
           r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
 }
 
+void set_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution) {
+  const std::size_t joints = request.mode().size(), contacts = request.contact_key().size();
+  solution->velocity.assign(bodies.count() + 1, Twist{});
+  for (std::uint32_t i = 0; i < bodies.count(); ++i) solution->velocity[i] = bodies[i].trial_velocity;
+  solution->displacement.assign(bodies.count() + 1, Twist{});
+  solution->joint_impulse.assign(3 * joints, 0.0);
+  solution->joint_correction.assign(3 * joints, 0.0);
+  solution->contact_impulse.assign(3 * contacts, 0.0);
+  solution->contact_correction.assign(contacts, 0.0);
+  solution->contact_direction.assign(request.contact_normal().begin(), request.contact_normal().end());
+}
+
 void write(const SolverSolution& solution, const SolverOutcome& outcome, const stage::SolverSolveReply& reply) {
   const std::size_t count = solution.velocity.size() - 1;
   const std::span<double> linear = reply.linear_velocity().resize(3 * count);

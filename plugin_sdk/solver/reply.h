@@ -17,6 +17,9 @@ struct SolverSolution {
   std::vector<double> contact_correction;                  // one a contact
 };
 
+// What holds where nobody is pushed: bodies keep v*.
+void set_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution);
+
 // How a solution ended.
 struct SolverOutcome {
   std::uint32_t iterations = 0;

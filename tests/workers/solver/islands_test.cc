@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
 #include <vector>
 
 #include "tests/workers/solver/solver_problem.h"
@@ -16,7 +17,9 @@ std::vector<Island> islands_of(const SolverProblem& problem) {
     void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply&) {
       SolverBodies bodies;
       bodies.load(request);
-      found = find_islands(request, bodies);
+      IslandFinder finder;
+      const std::span<const Island> islands = finder.find(request, bodies);
+      found.assign(islands.begin(), islands.end());
     }
   } finder;
   problem.solve(finder);

@@ -228,20 +228,10 @@ TEST(SequentialWays, LayersCarryAnyRatioOfMassAtOnce) {
   }
 }
 
-// What layers say is used only where it is closer: a stack that is hit from above, a problem whose answer is known already.
+// What layers say is used only where it is closer: they do not know of a stack that is hit from above, and take hundreds
+// of sweeps from there, where the answer is known already.
 TEST(SequentialWays, LayersAreLeftWhereTheyDoNotHelp) {
   const Stack stack(std::vector<double>(5, 1.0), Numbered::kUpwards);
-  SolverProblem problem = stack.problem;
-  const SolverAnswer first = solve(problem, {.iterations = 100000});
-  problem.contact_warm_impulse = first.contact_impulse;
-  problem.contact_warm_correction = first.contact_correction;
-  const SolverAnswer plain = solve(problem, {.iterations = 1000});
-  const SolverAnswer layers = solve(problem, {.iterations = 1000, .shock_propagation = true});
-  EXPECT_LE((Eigen::Map<const Eigen::VectorXd>(plain.contact_impulse.data(), 60) -
-             Eigen::Map<const Eigen::VectorXd>(layers.contact_impulse.data(), 60))
-                .norm(),
-            1e-12);
-
   SolverProblem hit = stack.problem;
   hit.set_trial_velocity(stack.cubes.back(), {0, -5, 0}, Vector3::Zero());
   hit.set_trial_velocity(stack.cubes[2], {0, 1, 0}, Vector3::Zero());
@@ -249,6 +239,12 @@ TEST(SequentialWays, LayersAreLeftWhereTheyDoNotHelp) {
   const SolverAnswer fast = solve(hit, {.iterations = 100000, .shock_propagation = true});
   ASSERT_TRUE(slow.converged() && fast.converged());
   for (const std::uint32_t cube : stack.cubes) EXPECT_LE((slow.velocity(cube) - fast.velocity(cube)).norm(), 1e-10);
+
+  hit.contact_warm_impulse = slow.contact_impulse;
+  hit.contact_warm_correction = slow.contact_correction;
+  const SolverAnswer known = solve(hit, {.iterations = 100000, .shock_propagation = true});
+  ASSERT_TRUE(known.converged());
+  EXPECT_LE(4 * known.iterations[0], fast.iterations[0]);
 }
 
 TEST(SequentialWays, TheSameRequestGivesTheSameBytesWhateverWasAskedBefore) {
@@ -266,7 +262,7 @@ TEST(SequentialWays, TheSameRequestGivesTheSameBytesWhateverWasAskedBefore) {
   }
 }
 
-// A chain of locks whose ends are held, and a drive beside them: joints are blocks like others.
+// A chain of locks that hangs: joints are blocks like others.
 TEST(SequentialWays, JointsEndAtTheSamePlace) {
   SolverProblem problem;
   std::uint32_t before = kNone;

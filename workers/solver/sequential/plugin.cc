@@ -2,7 +2,7 @@
 // sequential.h.
 #include "plugin_sdk/plugin.h"
 
-#include "workers/solver/sequential/sequential.h"
+#include "workers/solver/sequential/sequential_islands.h"
 
 namespace gravitas {
 namespace {
@@ -57,8 +57,8 @@ class Sequential final : public SolverPlugin {
 
   explicit Sequential(PropertyCursor settings) : solver_(settings_from(settings)) {}
 
-  void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host&) override {
-    solver_.solve(request, reply);
+  void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) override {
+    solver_.solve(request, reply, host);
   }
 
  private:
@@ -77,7 +77,7 @@ class Sequential final : public SolverPlugin {
             relaxation_factor, shock_propagation};
   }
 
-  SequentialSolver solver_;
+  SequentialIslands solver_;
 };
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "workers/solver/sequential/relaxation_order.h"
 
 #include <algorithm>
-#include <queue>
 
 namespace gravitas {
 namespace {
@@ -14,7 +13,8 @@ void RelaxationSweep::begin(const SolverBodies& bodies, std::array<RelaxationBlo
   parts_ = parts;
   if (order_ == RelaxationOrder::kGiven) return;
   places_.clear();
-  at_body_.assign(bodies.count() + 1, {});
+  at_body_.resize(bodies.count() + 1);
+  for (std::vector<std::uint32_t>& blocks : at_body_) blocks.clear();
   for (RelaxationBlocks* part : parts_) {
     for (std::size_t block = 0; block < part->block_count(); ++block) {
       for (const std::uint32_t body : part->bodies_of(block))
@@ -55,16 +55,18 @@ double RelaxationSweep::sweep_given(const SolverBodies& bodies, BodyMotion& x) c
 double RelaxationSweep::sweep_deepest_first(const SolverBodies& bodies, BodyMotion& x) {
   visited_.assign(places_.size(), 0);
   error_.clear();
-  std::priority_queue<Candidate> candidates;
+  candidates_.clear();
   for (const Place& place : places_) {
     const double error = place.part->error_of(place.block, x);
-    candidates.push({error, static_cast<std::uint32_t>(error_.size())});
+    candidates_.push_back({error, static_cast<std::uint32_t>(error_.size())});
     error_.push_back(error);
   }
+  std::make_heap(candidates_.begin(), candidates_.end());
   double change = 0.0;
-  while (!candidates.empty()) {
-    const Candidate next = candidates.top();
-    candidates.pop();
+  while (!candidates_.empty()) {
+    std::pop_heap(candidates_.begin(), candidates_.end());
+    const Candidate next = candidates_.back();
+    candidates_.pop_back();
     // others of the same block have overtaken or replaced it
     if (visited_[next.block] != 0 || next.error != error_[next.block]) continue;
     visited_[next.block] = 1;
@@ -79,7 +81,8 @@ double RelaxationSweep::sweep_deepest_first(const SolverBodies& bodies, BodyMoti
         const double error = places_[neighbour].part->error_of(places_[neighbour].block, x);
         if (error == error_[neighbour]) continue;
         error_[neighbour] = error;
-        candidates.push({error, neighbour});
+        candidates_.push_back({error, neighbour});
+        std::push_heap(candidates_.begin(), candidates_.end());
       }
     }
   }

@@ -28,6 +28,7 @@ enum class RelaxationOrder : std::uint32_t { kGiven = 0, kDeepestFirst = 1, kSim
 class RelaxationSweep {
  public:
   RelaxationSweep(RelaxationOrder order, double factor) : order_(order), factor_(factor) {}
+  void set(RelaxationOrder order, double factor) { order_ = order, factor_ = factor; }
 
   // The blocks of the sweeps that follow: joints, contacts.
   void begin(const SolverBodies& bodies, std::array<RelaxationBlocks*, 2> parts);
@@ -60,6 +61,7 @@ class RelaxationSweep {
   std::vector<Place> places_;
   std::vector<std::vector<std::uint32_t>> at_body_;  // blocks at each body that can be pushed
   std::vector<double> error_;
+  std::vector<Candidate> candidates_;  // a heap
   std::vector<std::uint8_t> visited_;
   BodyMotion start_;
 };

@@ -37,6 +37,12 @@ void check_range(double violation, double motion) {
 SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& request,
                                           const stage::SolverSolveReply& reply) {
   check_solver_request(request);
+  const SequentialSummary summary = solve(request);
+  write(solution_, summary.outcome(), reply);
+  return summary;
+}
+
+SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& request) {
   load(request);
   solve_pose();
   find_closed();
@@ -57,12 +63,10 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
 
   const bool has_rows =
       !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
-  StopReason reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
-  if (used_up_) reason = StopReason::kIterations;
-  summary_.stop_reason = static_cast<std::uint32_t>(reason);
+  summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
+  if (used_up_) summary_.stop_reason = StopReason::kIterations;
   pose_joints_.store(solution_.joint_correction);
   gaps_.store(solution_.contact_correction);
-  write(solution_, {summary_.sweeps, summary_.residual, reason}, reply);
   return summary_;
 }
 

@@ -50,6 +50,8 @@
 // layer by layer from what nothing pushes (shock_propagation.h), used where it leaves smaller errors than last step's
 // multipliers. They change the way, not what is asked for: what converges obeys the same laws.
 //
+// Islands are solved each by itself (sequential_islands.h).
+//
 // Convergence is linear: one joint, one contact, or one patch of contacts that rests or sticks is
 // exact in one sweep; n bodies in a row take of the order of n^2 sweeps, times the mass ratio where
 // the heavy end hangs or lies on the light one; a box that slides or tips takes some tens.
@@ -82,13 +84,15 @@ struct SequentialSettings {
 
 // What a solution took. The reply carries the first three.
 struct SequentialSummary {
-  std::uint32_t sweeps = 0;                // of all relaxations of the call
-  double residual = 0.0;                   // largest change of a velocity in the last one's last sweep, m/s
-  std::uint32_t stop_reason = 0;           // StopReason
+  std::uint32_t sweeps = 0;  // of all relaxations
+  double residual = 0.0;     // largest change of a velocity in the last one's last sweep, m/s
+  StopReason stop_reason = StopReason::kNothingToDo;
   std::uint32_t velocity_solutions = 0;    // relaxations of the velocities
   std::uint32_t restitutions_lowered = 0;  // times an e s was lowered for doing positive work
   std::uint32_t restitutions_dropped = 0;  // contacts set to e s = 0 for the energy of their bodies
   std::uint32_t groups_scaled_back = 0;    // sets of bodies whose unfinished solution gained energy
+
+  SolverOutcome outcome() const { return {sweeps, residual, stop_reason}; }
 };
 
 class SequentialSolver {
@@ -96,10 +100,19 @@ class SequentialSolver {
   explicit SequentialSolver(const SequentialSettings& settings)
       : settings_(settings), sweep_(settings.order, settings.relaxation_factor) {}
 
+  void set(const SequentialSettings& settings) {
+    settings_ = settings;
+    sweep_.set(settings.order, settings.relaxation_factor);
+  }
+
   // Answers the request. Throws Refusal for an impossible one (request_check.h), and where
   // the answer is not finite because the numbers overflow. What is kept between calls is room for
   // rows, nothing else.
   SequentialSummary solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply);
+
+  // The same for a request that has been checked, with the answer in solution().
+  SequentialSummary solve(const stage::SolverSolveRequest& request);
+  const SolverSolution& solution() const { return solution_; }
 
  private:
   void load(const stage::SolverSolveRequest& request);
