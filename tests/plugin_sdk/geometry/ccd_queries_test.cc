@@ -20,6 +20,7 @@
 #include "plugin_sdk/geometry/time_of_impact.h"
 #include "tests/paths.h"
 #include "tests/plugin_sdk/geometry/random_shapes.h"
+#include "tests/sanitized.h"
 
 namespace gravitas {
 namespace {
@@ -139,7 +140,7 @@ TEST(CcdQueries, WhatMeetsByConstructionIsFoundNoLater) {
   };
   int early = 0;
   double most = 0.0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < harness::unless_sanitized(20000); ++i) {
     const bool is_edges = i % 2 == 1;
     const double time = 0.25 * (1 + i % 3);
     Query query;
@@ -169,7 +170,7 @@ TEST(CcdQueries, WhatMeetsByConstructionIsFoundNoLater) {
 
 TEST(CcdQueries, WhatAPlaneKeepsApartIsNotFound) {
   test::RandomShapes random(96);
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < harness::unless_sanitized(20000); ++i) {
     const bool is_edges = i % 2 == 1;
     const Vector3 n = random.direction();
     Query query;

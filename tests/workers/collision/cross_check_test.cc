@@ -14,6 +14,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/geometry/scene_shape.h"
 #include "tests/plugin_sdk/geometry/random_shapes.h"
+#include "tests/sanitized.h"
 #include "tests/workers/plugin_fixture.h"
 
 namespace gravitas::test {
@@ -70,7 +71,7 @@ std::vector<double> depths_of(PluginUnderTest* plugin, const MessageColumns& req
 
 TEST(CollisionCrossCheck, StandardAndGjkOnlyAgree) {
   const char* wanted = std::getenv("GRAVITAS_CROSS_CHECK_POSES");
-  const std::size_t poses = wanted == nullptr ? 1500 : std::strtoull(wanted, nullptr, 10);
+  const std::size_t poses = wanted == nullptr ? harness::unless_sanitized(1500) : std::strtoull(wanted, nullptr, 10);
   constexpr std::size_t kBatch = 500;
   PluginUnderTest standard("collision_standard"), gjk_only("collision_gjk_only");
   const std::vector<Kind> kinds = {Kind::kSphere,   Kind::kBox,  Kind::kCylinder,

@@ -6,6 +6,7 @@
 
 #include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/transcendental.h"
+#include "tests/sanitized.h"
 #include "tests/workers/integrator/integrator_problem.h"
 
 namespace gravitas::test {
@@ -79,7 +80,7 @@ TEST(SymplecticSplitting, SpinsFastForManySteps) {
   body.state.twist.angular = Vector3(300, 500, 1e4);
   problem.bodies = {body};
   problem.time_step = 1e-3;
-  problem.steps(200000);
+  problem.steps(harness::unless_sanitized(200000));
   const FreeBody& end = problem.bodies[0];
   // 2e5 roundings, not all independent
   EXPECT_NEAR(energy(end) / energy(body), 1.0, 1e-11);
@@ -124,7 +125,7 @@ TEST(SymplecticSplitting, KeepsTheEnergyOfAForcedTop) {
     };
     const double before = total();
     problem.time_step = 0.05;
-    problem.steps(10000);
+    problem.steps(harness::unless_sanitized(10000));
     // what the order lets it wander, for good: (h w)^order / 12 and less
     EXPECT_NEAR(total() / before, 1.0, order == 2.0 ? 3e-3 : order == 4.0 ? 3e-6 : 1e-8) << order;
   }
@@ -142,9 +143,9 @@ TEST(SymplecticSplitting, RunsBackToItsStart) {
     };
     const FreeBody start = problem.bodies[0];
     problem.time_step = 0.05;
-    problem.steps(20000);
+    problem.steps(harness::unless_sanitized(20000));
     problem.bodies[0].state.twist = {-problem.bodies[0].state.twist.linear, -problem.bodies[0].state.twist.angular};
-    problem.steps(20000);
+    problem.steps(harness::unless_sanitized(20000));
     // 40,000 roundings that act on phases for 2000 s
     EXPECT_LT((problem.bodies[0].state.pose.position - start.state.pose.position).norm(), 1e-9);
     // ... and of the spin, of 1e-12, on an angle of 4000 rad
@@ -338,7 +339,7 @@ TEST(Rosenbrock, StaysBoundedWithoutDamping) {
     put_on_spring(&problem, k, 0.0);
     problem.bodies[0].state.pose.position = Vector3(1e-4, 0, 0);
     problem.time_step = 1.0 / 60.0;
-    problem.steps(10);
+    problem.steps(harness::unless_sanitized(10));
     const Vector3 x = problem.bodies[0].state.pose.position, v = problem.bodies[0].state.twist.linear;
     EXPECT_LE(v.squaredNorm() + k * x.squaredNorm(), 1.01e-8 * k) << k;
   }
@@ -384,7 +385,7 @@ TEST(Rosenbrock, SolvesForBodiesTogether) {
     return std::vector<double>{f.x(), f.y(), f.z(), 0, 0, 0, -f.x(), -f.y(), -f.z(), 0, 0, 0};
   };
   problem.time_step = 1.0 / 60.0;
-  problem.steps(30);
+  problem.steps(harness::unless_sanitized(30));
   const Vector3 d = problem.bodies[1].state.pose.position - problem.bodies[0].state.pose.position;
   const Vector3 u = problem.bodies[1].state.twist.linear - problem.bodies[0].state.twist.linear;
   EXPECT_NEAR(d.norm(), 1.0, 1e-6);

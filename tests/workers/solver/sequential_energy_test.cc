@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "tests/sanitized.h"
 #include "tests/workers/solver/solver_problem.h"
 #include "workers/solver/sequential/sequential.h"
 
@@ -91,13 +92,14 @@ struct Recorder {
 // friction one impact in seven gains energy, up to 2.6 times what it had.
 void expect_lawful_impacts(const SequentialSettings& way, std::uint32_t expected_of_200,
                            std::uint32_t expected_of_2000) {
+  const std::uint64_t seeds = harness::unless_sanitized(1000);
   for (const std::uint32_t iterations : {200U, 2000U}) {
     SequentialSettings settings = way;
     settings.iterations = iterations;
     Recorder recorder{SequentialSolver(settings)};
     std::uint32_t lowered = 0;
     std::uint32_t converged = 0;
-    for (std::uint64_t seed = 1; seed <= 1000; ++seed) {
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       const double friction = 0.1 * static_cast<double>(seed % 13);
       const SolverProblem problem = random_impact(seed, friction, seed % 3 == 0 ? 1.0 : 0.9);
       const SolverAnswer answer = problem.solve(recorder);
@@ -122,7 +124,9 @@ void expect_lawful_impacts(const SequentialSettings& way, std::uint32_t expected
     // the bound is at work, and all but the problems with much friction at long arms have a
     // solution
     EXPECT_GT(lowered, 0U);
-    EXPECT_GE(converged, iterations == 200U ? expected_of_200 : expected_of_2000);
+    if (seeds == 1000) {
+      EXPECT_GE(converged, iterations == 200U ? expected_of_200 : expected_of_2000);
+    }
   }
 }
 
