@@ -50,6 +50,9 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
   if (order.plugin.declaration.slot != order.slot)
     impossible(order, std::string("it is a plugin of slot ") + slot_name(order.plugin.declaration.slot));
   if (!slot.is_running()) impossible(order, why_left_out(order.slot));
+  if (order.hosting == Hosting::kDirect && !slot.description().process.empty())
+    impossible(order, "its worker process is shared (Process = \"" + slot.description().process +
+                          "\"), and what is hosted direct shares none");
   const std::vector<PluginChoice>& plugins = slot.description().plugins;
   const std::vector<std::string> in_use = types_in_use(description_, order.slot);
   std::string why;

@@ -163,7 +163,7 @@ void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attem
   if (!fault.plugin.empty()) throw StageFault(fault);
   SlotHost& host = host_of(call.target);
   // nor if its process failed in a call of another slot, which others answer by now
-  if (attempts->asked && attempts->asked != host.carrier()) return;
+  if (attempts->asked && attempts->asked != host.carrier() && ++attempts->made < SlotHost::kBudget) return;
   attempts->asked.reset();  // else its worker's end would be waited for here
   if (!description_.defences.replay) {
     name(&fault, call.target);
@@ -208,10 +208,13 @@ void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) 
   const SlotDescription& now = host.description();
   for (std::uint32_t target = 0; target < routes_.size(); ++target) {
     if (hosts_.empty() || &host_of(target) != &host) continue;
+    // who answers for comparison has the plugins of before
+    const std::size_t place = routes_[target].host;
+    if (place < rerun_.checkers.size()) hosts_[place]->retire(std::move(rerun_.checkers[place]));
     const PluginChoice& plugin = now.plugins[routes_[target].target];
     if (!by_us && now.hosting == description_.hosting && is_same_plugin(plugin, description_.plugins[target])) continue;
     const PluginChoice before = std::exchange(description_.plugins[target], plugin);
-    if (routes_[target].host == 0) description_.hosting = now.hosting;
+    if (place == 0) description_.hosting = now.hosting;
     observer_->on_decision({which_, target, step_, why, &now, &description_.plugins[target]});
     observer_->on_plugin_change(*this, target, before);
   }

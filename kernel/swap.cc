@@ -98,12 +98,9 @@ void StageSlot::advance_swaps() {
   // a cut-over makes room for the preparation of the next
   for (bool again = true; again;) {
     prepare_swaps();
-    again = false;
-    for (std::size_t i = 0; i < pending_.size() && !again; ++i) {
-      if (!advance_swap(&pending_[i])) continue;
-      pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
-      again = true;
-    }
+    const auto done = std::ranges::find_if(pending_, [&](PendingSwap& swap) { return advance_swap(&swap); });
+    again = done != pending_.end();
+    if (again) pending_.erase(done);
   }
   update_watch();
 }
@@ -184,14 +181,10 @@ void StageSlot::update_watch() {
 
 void StageSlot::watch(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
                       const std::function<void()>& recheck) {
-  for (std::size_t i = 0; i < pending_.size();) {
-    const bool is_lost = pending_[i].is_in_shadow && pending_[i].target == call.target &&
-                         !watch_swap(&pending_[i], call, arena, derivatives, recheck);
-    if (is_lost) {
-      pending_.erase(pending_.begin() + static_cast<std::ptrdiff_t>(i));
-    } else {
-      ++i;
-    }
+  for (auto swap = pending_.begin(); swap != pending_.end();) {
+    const bool is_lost =
+        swap->is_in_shadow && swap->target == call.target && !watch_swap(&*swap, call, arena, derivatives, recheck);
+    swap = is_lost ? pending_.erase(swap) : swap + 1;
   }
   if (rerun_.every > 0 && step_ % rerun_.every == 0) rerun(call, arena, derivatives, recheck);
 }

@@ -27,7 +27,7 @@ class SlowCalls {
   std::string take_complaint() {
     if (count_ == 0) return {};
     return "it was slow " + std::to_string(std::exchange(count_, 0)) + " times: up to " +
-           std::to_string(slowest_ / 1'000'000) + " ms, over " + std::to_string(kFactor) +
+           std::to_string(std::exchange(slowest_, 0) / 1'000'000) + " ms, over " + std::to_string(kFactor) +
            " times as long as it usually takes";
   }
 

@@ -184,6 +184,7 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
   request.kind = GRAVITAS_FRAME_REQUEST;
   request.method = static_cast<std::uint32_t>(call.method);
   request.target = call.target;
+  request.attempt = call.attempt;
   request.reply_count = static_cast<std::uint32_t>(open_->room_count);
   request.deadline_ns = channel::now_ns() + open_->deadline_ns;
   for (std::size_t i = 0; i < open_->room_count; ++i)

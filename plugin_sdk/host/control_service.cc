@@ -65,7 +65,7 @@ WorkerMessage ControlService::welcome(const Hello& hello) const {
   welcome->set_process_id(getpid());
   for (const plugin::v1::Description& description : plugins_) *welcome->add_plugins() = description;
   for (const std::string& measure : sandbox) welcome->add_sandbox(measure);
-  tell_lie(lie, welcome);
+  if (const HandshakeLie* told = find_handshake_lie(lie)) told->tell(welcome);
   return message;
 }
 

@@ -65,7 +65,7 @@ int usage() {
             << "       gravitas-worker --no-sandbox ...     for debuggers: the process does not restrict itself\n"
             << "--memory-limit BYTES, beside the libraries: address space that it may take, 4 GiB if absent\n"
             << "--lie WHAT, there too, to test who starts it: it says in the handshake that it is another, in its";
-  for (const std::string& what : host::handshake_lies()) std::cerr << ' ' << what;
+  for (const host::HandshakeLie& lie : host::handshake_lies()) std::cerr << ' ' << lie.what;
   std::cerr << '\n';
   return 2;
 }
@@ -88,7 +88,7 @@ bool parse(int argc, char** argv, Arguments* arguments) {
       arguments->address = argv[++i];
     } else if (word == "--lie" && i + 1 < argc) {
       arguments->lie = argv[++i];
-      if (std::ranges::count(host::handshake_lies(), arguments->lie) == 0) return false;
+      if (host::find_handshake_lie(arguments->lie) == nullptr) return false;
     } else if (word == "--memory-limit" && i + 1 < argc) {
       if (!parse_bytes(argv[++i], &arguments->memory_limit)) return false;
     } else if (word.starts_with("--")) {

@@ -11,6 +11,7 @@
 
 #include "kernel/environment.h"
 #include "kernel/slot_host.h"
+#include "plugin_sdk/host/handshake_lie.h"
 #include "plugin_sdk/near_miss.h"
 #include "plugin_sdk/slots.h"
 #include "services/campaign/host_trouble.h"
@@ -346,9 +347,11 @@ void Run::judge_swaps() {
     if (swap.pause_us > 0.0) trial_.add_swap_pause_us(swap.pause_us);
     for (const Injected& fault : faults_) {
       const bool is_it = fault.happened && fault.plan->means == Means::kSwapRefused && fault.plan->slot == swap.slot;
-      if (is_it && swap.state != kernel::SwapState::kRefused)
-        forbid(fmt::format("{} in slot {} is {}", fault.plan->order, slot_name(swap.slot),
-                           kernel::swap_state_name(swap.state)));
+      const host::HandshakeLie* lie = host::find_handshake_lie(fault.plan->lie);
+      const bool has_reason = lie == nullptr || swap.reason.find(lie->refusal) != std::string::npos;
+      if (is_it && (swap.state != kernel::SwapState::kRefused || !has_reason))
+        forbid(fmt::format("{} in slot {} is {}{}{}", fault.plan->order, slot_name(swap.slot),
+                           kernel::swap_state_name(swap.state), swap.reason.empty() ? "" : ": ", swap.reason));
     }
   }
 }

@@ -205,8 +205,9 @@ void draw_order(Draw* draw, Tier tier, PlannedFault* fault) {
       const bool is_swap = fault->means >= Means::kSwapKilled;
       if (is_swap) fault->group = "swap";
       if (fault->means == Means::kSwapRefused && draw->chance(75)) {
-        std::vector<std::string> lies = host::handshake_lies();
-        std::erase(lies, "build");  // which is taken, and said
+        std::vector<std::string> lies;
+        for (const host::HandshakeLie& lie : host::handshake_lies())
+          if (!lie.refusal.empty()) lies.emplace_back(lie.what);
         fault->lie = draw->one_of(lies);
         fault->group = "protocol";
       }
@@ -296,6 +297,8 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
     const bool joins = !plan.faults.empty() && draw.chance(25);
     fault.step = joins ? plan.faults.back().step : static_cast<std::uint32_t>(2 + draw.below(last_step - 4));
     draw_order(&draw, options.tier, &fault);
+    // the plugin of one slot cannot be put into a process that serves others
+    if (!fault.lie.empty() && sharing(scenes[plan.scene], fault.slot).size() > 1) continue;
     const std::vector<Slot> hit = slots_hit(fault, scenes[plan.scene]);
     if (!std::ranges::all_of(hit, [&](Slot slot) { return is_free(slot, fault.step); })) continue;
     const bool hits_anybody = fault.means == Means::kKillStandby || fault.means == Means::kSwapKilled;

@@ -1,19 +1,11 @@
 #include "services/recorder/reaction_log.h"
 
-#include <cerrno>
-#include <system_error>
-#include <utility>
-
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/discrepancy.h"
 #include "services/recorder/json.h"
 
 namespace gravitas {
 namespace {
-
-[[noreturn]] void fail_reactions(const std::string& path) {
-  throw std::system_error(errno, std::generic_category(), "reactions '" + path + "'");
-}
 
 // A point of a body at S*, where the step ends.
 Vector3 at_end(const kernel::StepData& data, std::uint32_t body, const Vector3& point) {
@@ -31,15 +23,7 @@ void put(const Vector3& vector, google::protobuf::RepeatedField<double>* numbers
 }  // namespace
 
 ReactionLog::ReactionLog(const std::string& path, const kernel::EnvironmentDescription& description, double interval)
-    : description_(description), path_(path), sampling_(interval) {
-  if (path.empty()) return;
-  file_ = std::fopen(path.c_str(), "we");
-  if (file_ == nullptr) fail_reactions(path);
-}
-
-ReactionLog::~ReactionLog() {
-  if (file_ != nullptr) std::fclose(file_);
-}
+    : description_(description), file_("reactions", path), sampling_(interval) {}
 
 void ReactionLog::add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner) {
   if (inner == 0) {
@@ -118,16 +102,8 @@ std::vector<report::v1::Reaction> ReactionLog::last(const kernel::Environment& e
 }
 
 void ReactionLog::offer(const kernel::Environment& environment, bool is_last) {
-  if (file_ == nullptr || !sampling_.is_due(environment, is_last)) return;
-  for (const report::v1::Reaction& reaction : last(environment)) {
-    const std::string line = to_json(reaction, JsonForm::kLine);
-    if (std::fwrite(line.data(), 1, line.size(), file_) != line.size()) fail_reactions(path_);
-  }
-}
-
-void ReactionLog::close() {
-  std::FILE* file = std::exchange(file_, nullptr);
-  if (file != nullptr && std::fclose(file) != 0) fail_reactions(path_);
+  if (!file_.is_open() || !sampling_.is_due(environment, is_last)) return;
+  for (const report::v1::Reaction& reaction : last(environment)) file_.write(to_json(reaction, JsonForm::kLine));
 }
 
 }  // namespace gravitas

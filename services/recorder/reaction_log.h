@@ -7,13 +7,13 @@
 #pragma once
 
 #include <array>
-#include <cstdio>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
+#include "services/recorder/output_file.h"
 #include "services/recorder/sampling.h"
 
 namespace gravitas {
@@ -23,9 +23,6 @@ class ReactionLog {
   // No file if `path` is empty. Samples as Sampling has them, without the initial state: no step led there. Throws
   // std::system_error if the file cannot be made.
   ReactionLog(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
-  ~ReactionLog();
-  ReactionLog(const ReactionLog&) = delete;
-  ReactionLog& operator=(const ReactionLog&) = delete;
 
   // What kernel::CommitListener hears of an inner step.
   void add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner);
@@ -36,7 +33,7 @@ class ReactionLog {
   // Called after every commit; `is_last` forces a sample. Throws std::system_error if it cannot be written.
   void offer(const kernel::Environment& environment, bool is_last);
   // Writes out everything; throws std::system_error if that fails.
-  void close();
+  void close() { file_.close(); }
 
  private:
   struct Sum {
@@ -49,8 +46,7 @@ class ReactionLog {
   report::v1::Reaction message(const kernel::Environment& environment, const Sum& sum) const;
 
   const kernel::EnvironmentDescription& description_;
-  std::string path_;
-  std::FILE* file_ = nullptr;
+  OutputFile file_;
   Sampling sampling_;
 
   std::uint32_t step_ = 0;  // that the sums are of

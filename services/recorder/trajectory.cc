@@ -2,16 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <system_error>
-#include <utility>
+#include <iterator>
 
 namespace gravitas {
 namespace {
-
-[[noreturn]] void fail_trajectory(const std::string& path) {
-  throw std::system_error(errno, std::generic_category(), "trajectory '" + path + "'");
-}
 
 // Ids are written as they are unless CSV would misread them.
 std::string quoted(const std::string& id) {
@@ -25,17 +19,12 @@ std::string quoted(const std::string& id) {
 
 TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description,
                                    double interval)
-    : path_(path), file_(std::fopen(path.c_str(), "we")), sampling_(interval) {
-  if (file_ == nullptr) fail_trajectory(path);
+    : file_("trajectory", path), sampling_(interval) {
   for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
     const kernel::BodyDescription& body = description.bodies[i];
     if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
   }
-  if (std::fputs("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", file_) < 0) fail_trajectory(path);
-}
-
-TrajectoryWriter::~TrajectoryWriter() {
-  if (file_ != nullptr) std::fclose(file_);
+  file_.write("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n");
 }
 
 void TrajectoryWriter::offer(const kernel::Environment& environment, bool last) {
@@ -56,12 +45,7 @@ void TrajectoryWriter::write_sample(const kernel::Environment& environment) {
                    pose.orientation.w(), pose.orientation.x(), pose.orientation.y(), pose.orientation.z(), v.x(), v.y(),
                    v.z(), w.x(), w.y(), w.z());
   }
-  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail_trajectory(path_);
-}
-
-void TrajectoryWriter::close() {
-  std::FILE* file = std::exchange(file_, nullptr);
-  if (file != nullptr && std::fclose(file) != 0) fail_trajectory(path_);
+  file_.write({text.data(), text.size()});
 }
 
 }  // namespace gravitas

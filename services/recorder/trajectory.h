@@ -8,11 +8,11 @@
 // sampling.h.
 #pragma once
 
-#include <cstdio>
 #include <string>
 #include <vector>
 
 #include "kernel/environment.h"
+#include "services/recorder/output_file.h"
 #include "services/recorder/sampling.h"
 
 namespace gravitas {
@@ -21,15 +21,12 @@ class TrajectoryWriter {
  public:
   // `interval` 0: every step. Throws std::system_error if the file cannot be made.
   TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
-  ~TrajectoryWriter();
-  TrajectoryWriter(const TrajectoryWriter&) = delete;
-  TrajectoryWriter& operator=(const TrajectoryWriter&) = delete;
 
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);
 
   // Writes out everything; throws std::system_error if that fails (a full disk).
-  void close();
+  void close() { file_.close(); }
 
  private:
   void write_sample(const kernel::Environment& environment);
@@ -40,8 +37,7 @@ class TrajectoryWriter {
     Pose geometry;  // of the geometry's frame in the body's
   };
 
-  std::string path_;
-  std::FILE* file_;
+  OutputFile file_;
   std::vector<Row> rows_;
   Sampling sampling_;
 };

@@ -120,7 +120,6 @@ class Grammar {
     entry.is_required = rules.GetExtension(options::required);
     entry.is_identifier = rules.GetExtension(options::identifier);
     entry.is_joined = rules.GetExtension(options::joined);
-    entry.is_unsupported = rules.GetExtension(options::unsupported);
     if (entry.form == Form::kBlock) entry.block = &rule(*field.message_type());
     if (rules.HasExtension(options::shorthand)) {
       entry.shorthand =

@@ -39,7 +39,6 @@ struct Entry {
   bool is_required = false;
   bool is_identifier = false;
   bool is_joined = false;
-  bool is_unsupported = false;
   bool has_default_block = false;              // there with its own defaults, written or not
   std::optional<PropertyValue> default_value;  // of a property, or the shorthand of a block
   const Entry* shorthand = nullptr;            // of a block: the property that `Name = value` sets

@@ -149,8 +149,6 @@ class Override {
     const Part rest = path.from(std::min(first.text.size() + 1, path.text.size()));
     const Entry* entry = rule.find(first.text);
     if (entry == nullptr) return indirect(rule, block, path);
-    if (entry->is_unsupported)
-      throw Refused{first.offset, entry->name + " is not supported by this version; allowed: leave it out"};
     const bool is_single_block = entry->is_block() && !entry->field->is_repeated() && !entry->is_joined;
     if (is_single_block && !rest.text.empty()) {
       if (entry->form == Form::kProperties) return free_property(*entry, block, rest);

@@ -90,9 +90,7 @@ class Reader {
   // Reports a name that cannot be taken here, whatever its value is.
   bool refused(const BlockRule& rule, const Entry& entry, const TextPosition& position, const pb::Message& block,
                std::uint64_t present, bool is_brace) {
-    if (entry.is_unsupported) {
-      diagnostics_->error(position, entry.name + " is not supported by this version; allowed: leave it out");
-    } else if (is_brace && !entry.is_block()) {
+    if (is_brace && !entry.is_block()) {
       diagnostics_->error(position, entry.name + " is a property, no block; allowed: " + entry.name + " = value");
     } else if (!is_brace && entry.is_block() && entry.shorthand == nullptr) {
       diagnostics_->error(position, entry.name + " is a block, no property; allowed: " + entry.name + " { … }");

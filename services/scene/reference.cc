@@ -66,9 +66,8 @@ void write_block(const BlockRule& block, std::set<std::string>* written, std::st
   *page += fmt::format("\n### {}\n\n{}", block.name, kTableHead);
   for (const std::string& name : block.names) {
     const Entry& entry = *block.find(name);
-    const std::string meaning =
-        entry.declared.meaning + (entry.is_unsupported ? " Not supported by this version." : "");
-    *page += row(name, value_of(entry), entry.declared.unit, entry.declared.frame, default_of(entry), meaning);
+    *page += row(name, value_of(entry), entry.declared.unit, entry.declared.frame, default_of(entry),
+                 entry.declared.meaning);
   }
   for (const std::string& name : block.names)
     if (const Entry& entry = *block.find(name); entry.form == Form::kBlock) write_block(*entry.block, written, page);

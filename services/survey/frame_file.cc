@@ -1,35 +1,19 @@
 #include "services/survey/frame_file.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <system_error>
 #include <utility>
 
 #include "services/recorder/json.h"
 #include "services/survey/picture.h"
 
 namespace gravitas::survey {
-namespace {
-
-[[noreturn]] void fail(const std::string& path) {
-  throw std::system_error(errno, std::generic_category(), "instrumentation '" + path + "'");
-}
-
-}  // namespace
 
 FrameFile::FrameFile(const std::string& path, Surveyor* surveyor, std::vector<Kind> kinds, double interval)
-    : path_(path),
-      file_(std::fopen(path.c_str(), "we")),
+    : file_("instrumentation", path),
       instrumentation_(surveyor),
       kinds_(std::move(kinds)),
       sampling_(interval),
-      title_(surveyor->description().id) {
-  if (file_ == nullptr) fail(path);
-}
-
-FrameFile::~FrameFile() {
-  if (file_ != nullptr) std::fclose(file_);
-}
+      title_(surveyor->description().id) {}
 
 void FrameFile::offer(const kernel::Environment& environment, bool last) {
   const bool is_due = sampling_.is_due(environment, last);
@@ -37,7 +21,7 @@ void FrameFile::offer(const kernel::Environment& environment, bool last) {
     if (!is_due) return;
     const Frame frame = instrumentation_.frame(environment, kinds_);
     note_missing(frame);
-    write(to_json(frame, JsonForm::kLine));
+    file_.write(to_json(frame, JsonForm::kLine));
     return;
   }
   // on the way the lines of trajectories alone
@@ -58,14 +42,9 @@ void FrameFile::note_missing(const Frame& frame) {
     if (std::ranges::find(missing_, reason) == missing_.end()) missing_.push_back(reason);
 }
 
-void FrameFile::write(const std::string& text) {
-  if (std::fwrite(text.data(), 1, text.size(), file_) != text.size()) fail(path_);
-}
-
 void FrameFile::close() {
-  if (file_ == nullptr) return;
-  if (is_picture()) write(picture(picture_, title_));
-  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail(path_);
+  if (file_.is_open() && is_picture()) file_.write(picture(picture_, title_));
+  file_.close();
 }
 
 }  // namespace gravitas::survey

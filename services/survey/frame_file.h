@@ -2,11 +2,11 @@
 // in `.svg`, a picture of the last state with the trajectories that led there.
 #pragma once
 
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "services/recorder/output_file.h"
 #include "services/recorder/sampling.h"
 #include "services/survey/instrumentation.h"
 
@@ -16,9 +16,6 @@ class FrameFile {
  public:
   // `interval` as in Sampling. Throws std::system_error if the file cannot be made.
   FrameFile(const std::string& path, Surveyor* surveyor, std::vector<Kind> kinds, double interval);
-  ~FrameFile();
-  FrameFile(const FrameFile&) = delete;
-  FrameFile& operator=(const FrameFile&) = delete;
 
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);
@@ -30,12 +27,10 @@ class FrameFile {
   const std::vector<std::string>& missing() const { return missing_; }
 
  private:
-  bool is_picture() const { return path_.ends_with(".svg"); }
+  bool is_picture() const { return file_.path().ends_with(".svg"); }
   void note_missing(const Frame& frame);
-  void write(const std::string& text);
 
-  std::string path_;
-  std::FILE* file_;
+  OutputFile file_;
   Instrumentation instrumentation_;
   std::vector<Kind> kinds_;
   Sampling sampling_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -215,14 +216,35 @@ TEST_P(SharedProcess, KeepsTheOtherSlotsSwap) {
 TEST_P(SharedProcess, IsLeftByAllOfItsSlots) {
   Environment world(together(GetParam(), kTwo).description());
   const kernel::PluginChoice solver = apart(GetParam()).description().solver.plugins[0];
-  world.order_swap({Slot::kSolver, solver, Hosting::kDirect, 10});
+  const Hosting elsewhere = GetParam() == Hosting::kGrpc ? Hosting::kSharedMemory : Hosting::kGrpc;
+  const auto hostings = [&] {
+    std::set<Hosting> all;
+    for (const kernel::PlannedSlot& planned : world.plan().slots)
+      if (planned.slot == Slot::kCollision || planned.slot == Slot::kSolver) all.insert(planned.hosting);
+    return all;
+  };
+  world.order_swap({Slot::kSolver, solver, elsewhere, 10});
   world.order_swap({Slot::kCollision, apart(GetParam()).description().collision.plugins[0], GetParam(), 25});
   while (world.step_count() < 20) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
-  EXPECT_EQ(processes_of(world, kTwo), std::set<int>{getpid()});
+  EXPECT_EQ(hostings(), std::set<Hosting>{elsewhere});
+  EXPECT_EQ(processes_of(world, kTwo).size(), 1U);
   run_to_end(&world);
   EXPECT_EQ(world.chain_hash(), chain_of_own_processes());
+  EXPECT_EQ(hostings(), std::set<Hosting>{GetParam()});
   EXPECT_EQ(processes_of(world, kTwo).size(), 1U);
-  EXPECT_FALSE(processes_of(world, kTwo).contains(getpid()));
+}
+
+TEST_P(SharedProcess, IsNotLeftForThisProcess) {
+  Environment world(together(GetParam(), kTwo).description());
+  const kernel::PluginChoice solver = apart(GetParam()).description().solver.plugins[0];
+  try {
+    world.order_swap({Slot::kSolver, solver, Hosting::kDirect, 10});
+    ADD_FAILURE() << "it was taken";
+  } catch (const std::invalid_argument& problem) {
+    EXPECT_STREQ(problem.what(),
+                 "swap solver=Sequential: its worker process is shared (Process = \"one\"), and what is hosted direct "
+                 "shares none");
+  }
 }
 
 // The force's host is let go where all forces are constant; who shares it stays.

@@ -28,6 +28,7 @@ using kernel::SwapOrder;
 using kernel::SwapRecord;
 using kernel::SwapState;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr std::uint32_t kSwapSteps = 40;
 
@@ -211,6 +212,19 @@ TEST(Swap, WhatCannotTakeThePlaceIsRefusedAtOnce) {
   free.point(1.0, Vector3::Ones(), Vector3::Zero());
   Environment alone(free.description());
   EXPECT_THROW(alone.order_swap({Slot::kSolver, plugin_of(Slot::kSolver), std::nullopt, 5}), std::invalid_argument);
+}
+
+// Who is asked again has the plugin that is in place, not the one of before.
+TEST_P(Swapped, ARerunAsksTheNewPluginToo) {
+  Environment world(builder().description());
+  kernel::PluginChoice weaker = plugin_of(Slot::kSolver);
+  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0};
+  world.order_swap({Slot::kSolver, weaker, std::nullopt, 10});
+  world.set_rerun_every(Slot::kSolver, 1);
+  run_to_end(&world);
+  EXPECT_EQ(world.swaps()[0].state, SwapState::kCommitted);
+  for (const kernel::FaultRecord& fault : world.faults()) ADD_FAILURE() << fault.step << ": " << fault.fault.text;
+  for (const std::string& warning : world.warnings()) EXPECT_THAT(warning, Not(HasSubstr("otherwise")));
 }
 
 // One process of three answers otherwise: it is outvoted, whichever it is.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <random>
@@ -44,26 +45,43 @@ TEST(RayRule, ClosedBoxesAreMetAtFacesEdgesAndCorners) {
   EXPECT_FALSE(meets({0, 0, 0}, x, 5, Vector3(std::nan(""), -1, -1), upper));
 }
 
-// A ray through a point of a box meets it, wherever both are, and every box around it; so rounding misses nothing.
+// How long a ray stays in a box, of its length; negative where it passes by. Slabs, in numbers of type T.
+template <typename T>
+T stay(const Vector3& origin, const Vector3& direction, double length, const Vector3& lower, const Vector3& upper) {
+  T enter = 0, leave = length;
+  for (int k = 0; k < 3; ++k) {
+    const T one = (static_cast<T>(lower[k]) - static_cast<T>(origin[k])) / static_cast<T>(direction[k]);
+    const T other = (static_cast<T>(upper[k]) - static_cast<T>(origin[k])) / static_cast<T>(direction[k]);
+    enter = std::max(enter, std::min(one, other));
+    leave = std::min(leave, std::max(one, other));
+  }
+  return (leave - enter) / static_cast<T>(length);
+}
+
+// Rays at the edges of boxes, so that half of them touch by as little as rounding: those that do, by a hundredth of a
+// unit of rounding and more in longer numbers, meet the box, and every box around it. Plain slabs miss some.
 TEST(RayRule, NothingIsMissedByRounding) {
   std::mt19937_64 random(7);
   const auto draw = [&](double reach) {
     std::uniform_real_distribution<double> one(-reach, reach);
     return Vector3(one(random), one(random), one(random));
   };
+  int touching = 0, missed_by_plain_slabs = 0;
   for (int i = 0; i < 20000; ++i) {
-    const Vector3 place = draw(1e8), corner = place + draw(1.0), other = place + draw(1.0);
+    const Vector3 place = draw(i % 2 == 0 ? 1.0 : 1e8), corner = place + draw(1.0), other = place + draw(1.0);
     const Vector3 lower = corner.cwiseMin(other), upper = corner.cwiseMax(other);
-    // a corner is the point that rounding loses first
-    const Vector3 origin = place + draw(100.0), direction = (lower - origin).normalized();
-    const double length = (lower - origin).norm() * (1.0 + 1e-12);
-    const double slack = 1e-7;  // of the ray itself, 1e8 m from the origin
-    ASSERT_TRUE(
-        meets(origin, direction, length + slack, lower - Vector3::Constant(slack), upper + Vector3::Constant(slack)));
-    if (meets(origin, direction, length, lower, upper)) {
-      ASSERT_TRUE(meets(origin, direction, length, lower - draw(1.0).cwiseAbs(), upper + draw(1.0).cwiseAbs()));
-    }
+    Vector3 aim = lower;
+    aim[i % 3] += 0.5 * (upper - lower)[i % 3];
+    const Vector3 origin = place + draw(100.0), direction = (aim - origin).normalized();
+    const double length = 2.0 * (aim - origin).norm();
+    if (stay<long double>(origin, direction, length, lower, upper) < 1e-18L) continue;
+    ++touching;
+    missed_by_plain_slabs += stay<double>(origin, direction, length, lower, upper) < 0.0 ? 1 : 0;
+    ASSERT_TRUE(meets(origin, direction, length, lower, upper)) << i;
+    ASSERT_TRUE(meets(origin, direction, length, lower - draw(1.0).cwiseAbs(), upper + draw(1.0).cwiseAbs())) << i;
   }
+  EXPECT_GT(touching, 5000);
+  EXPECT_GT(missed_by_plain_slabs, 50);
 }
 
 TEST(RayRule, ImpossibleRaysAreRefused) {

@@ -17,7 +17,7 @@ using harness::set;
 using harness::turned;
 
 constexpr double kThickness = 0.002, kCardHeight = 0.09, kWidth = 0.06;  // of a card, m
-const double kLean = std::acos(-1.0) / 9.0;                              // from the vertical, rad
+const double kLean = kPi / 9.0;                                          // from the vertical, rad
 
 std::string card(const std::string& id, const std::string& shape, const Vector3& at, double lean) {
   return "Body { Id = \"" + id + "\" GeometryId = \"" + shape +

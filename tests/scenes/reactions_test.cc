@@ -16,8 +16,6 @@ using harness::literal;
 using harness::SceneRun;
 using harness::set;
 
-constexpr double kG = 9.81;
-
 // A run whose reactions are kept.
 class Watched final : private kernel::CommitListener {
  public:

@@ -47,7 +47,9 @@ TEST(FrameFile, HasAFramePerSampleAndLeavesTheRunAsItIs) {
     EXPECT_EQ(frames[4].step(), 20U);
     EXPECT_GT(frames[4].arrows_size(), 0);
     EXPECT_GT(frames[4].boxes_size(), 0);
-    EXPECT_EQ(frames[4].lines_size() > 0 ? frames[4].lines(0).kind() : v1::KIND_CONTACT, v1::KIND_CONTACT);
+    for (const v1::Arrow& arrow : frames[4].arrows()) EXPECT_EQ(arrow.kind(), v1::KIND_CONTACT);
+    for (const v1::Box& box : frames[4].boxes()) EXPECT_EQ(box.kind(), v1::KIND_BOUNDS);
+    EXPECT_EQ(frames[4].lines_size(), 0);
   }
 }
 

@@ -1,0 +1,31 @@
+// A file that a run writes as it goes: none of it is lost unnoticed.
+#pragma once
+
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace gravitas {
+
+class OutputFile {
+ public:
+  // `what` names it in errors: "trajectory". No file if `path` is empty. Throws std::system_error if it cannot be made.
+  OutputFile(std::string what, std::string path);
+
+  bool is_open() const { return file_ != nullptr; }
+  const std::string& path() const { return path_; }
+
+  // Needs an open file. Throws std::system_error (a full disk).
+  void write(std::string_view text);
+  // Writes out everything; throws std::system_error if that fails. Does nothing the second time.
+  void close();
+
+ private:
+  [[noreturn]] void fail() const;
+
+  std::string what_, path_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, &std::fclose};
+};
+
+}  // namespace gravitas
