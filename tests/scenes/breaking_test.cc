@@ -1,0 +1,150 @@
+// Joints of every type break under every solver when, and only when, they bear more than their BreakingForce.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::literal;
+using harness::SceneRun;
+
+const char* const kBreakers[] = {"Sequential", "Newton", "Direct"};
+
+std::string scene_of(const std::string& forces, const std::string& bodies, const std::string& joints,
+                     const std::string& solver) {
+  return "Simulator { Type = \"Basic\" Id = \"Main\" CustomProperties { TimeStep = 0.01 Duration = 3 } }\n"
+         "Forces { " +
+         forces +
+         " }\n"
+         "Environment { Id = \"World\" Space { Type = \"Basic\" Id = \"All\" Bodies { " +
+         bodies +
+         " } }\n"
+         "Constraints { " +
+         joints +
+         " }\n"
+         "KineticIntegrator = \"SemiImplicitEuler\" ConstraintSolver = \"" +
+         solver + "\" }";
+}
+
+std::string body(const std::string& id, double mass, const Vector3& at, const std::string& forces) {
+  return "Body { Id = \"" + id + "\" Mass = " + literal(mass) + " PrincipalMoments = {0.1, 0.1, 0.1} Forces = { " +
+         forces + " } KineticProperties { Position = " + literal(at) + " CanSleep = false } }\n";
+}
+
+const std::string kGravityDown =
+    "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } }";
+
+struct JointType {
+  const char* type;
+  const char* properties;  // at the origin, against a pull along x
+};
+
+constexpr JointType kBreakable[] = {
+    {"Spherical", "BindPoint = {0, 0, 0}"},
+    {"Revolute", "BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1}"},
+    {"Rigid", "BindPoint = {0, 0, 0}"},
+    {"AngularMotor", "BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {1, 0, 0} AngularSpeed = 3"},
+    {"Slider", "BindPoint = {0, 0, 0} Axis = {0, 1, 0}"},
+    {"Distance", "BindPoint1 = {-1, 0, 0} BindPoint2 = {0, 0, 0}"},
+    {"Universal", "BindPoint = {0, 0, 0} Axis1 = {0, 1, 0} Axis2 = {0, 0, 1}"},
+    {"ConstantVelocity", "BindPoint = {0, 0, 0} Axis1 = {1, 0, 0} Axis2 = {1, 0, 0}"},
+    {"Axle", "BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = {0, 0, 1}"},
+};
+
+class Breaking : public ::testing::TestWithParam<std::tuple<JointType, const char*>> {};
+INSTANTIATE_TEST_SUITE_P(Each, Breaking,
+                         ::testing::Combine(::testing::ValuesIn(kBreakable), ::testing::ValuesIn(kBreakers)),
+                         [](const auto& one) {
+                           return std::string(std::get<0>(one.param).type) + std::get<1>(one.param);
+                         });
+
+// A pull that grows by 10 N/s, in steps of 0.1 N: the step from t_n bears 10 t_n, and the 78th is the first with more than
+// 7.65 N. What is free afterwards is pulled on.
+TEST_P(Breaking, ComesWithTheFirstStepThatBearsMore) {
+  const auto& [joint, solver] = GetParam();
+  const std::string pull =
+      "Force { Type = \"Basic\" Id = \"Pull\" CustomProperties { Force = {0, 0, 0} Table = {{0, {0,0,0}}, {10, "
+      "{100,0,0}}} } }";
+  const std::string held = std::string("Constraint { Type = \"") + joint.type +
+                           "\" Id = \"Joint\" Body2 = \"Ball\" BreakingForce = 7.65 CustomProperties { " +
+                           joint.properties + " } }";
+  SceneRun run(scene_of(pull, body("Ball", 2.0, Vector3::Zero(), "\"Pull\""), held, solver));
+  const double h = run.time_step();
+  double speed = 0.0;
+  while (run.step_count() < 200) {
+    const bool held_before = run.holds("Joint");
+    const double force = 10.0 * run.time();
+    run.step();
+    ASSERT_EQ(run.holds("Joint"), run.step_count() < 78) << run.step_count();
+    if (!held_before) speed += h * force / 2.0;
+    ASSERT_NEAR(run.body("Ball").twist.linear.x(), speed, 1e-9) << run.step_count();
+  }
+  ASSERT_EQ(run.count_events(kernel::EventKind::kBreak), 1U);
+  EXPECT_EQ(run.events()[0].step, 78U);
+  EXPECT_EQ(run.events()[0].constraint, 0U);
+  EXPECT_LE(run.report().max_joint_error(), 1e-9);
+}
+
+class BreakingOf : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Each, BreakingOf, ::testing::ValuesIn(kBreakers),
+                         [](const auto& one) { return std::string(one.param); });
+
+// Three weights on each other: the joint between the first two bears 30 N of weight, and is the only one too weak for its
+// own. What stays above hangs on; what falls keeps its joint.
+TEST_P(BreakingOf, TheWeakestLinkOfAChain) {
+  std::string bodies, joints;
+  const double forces[] = {100.0, 3.0 * kG - 0.001, 2.0 * kG};
+  for (int i = 0; i < 3; ++i) {
+    const std::string id = "Link" + std::to_string(i);
+    bodies += body(id, i == 0 ? 1.0 : 1.5, Vector3(0, -0.5 - i, 0), "\"Down\"");
+    joints += "Constraint { Type = \"Spherical\" Id = \"Joint" + std::to_string(i) + "\" Body1 = \"" +
+              (i == 0 ? "" : "Link" + std::to_string(i - 1)) + "\" Body2 = \"" + id +
+              "\" BreakingForce = " + literal(forces[i]) +
+              " CustomProperties { BindPoint = " + literal(Vector3(0, -i, 0)) + " } }\n";
+  }
+  SceneRun run(scene_of(kGravityDown, bodies, joints, GetParam()));
+  run.steps(50);
+  EXPECT_TRUE(run.holds("Joint0"));
+  EXPECT_FALSE(run.holds("Joint1"));
+  EXPECT_TRUE(run.holds("Joint2"));
+  ASSERT_EQ(run.count_events(kernel::EventKind::kBreak), 1U);
+  EXPECT_EQ(run.events()[0].step, 1U);
+  EXPECT_NEAR(run.body("Link0").pose.position.y(), -0.5, 1e-9);
+  const double h = run.time_step();
+  // 49 free steps: h^2 g (1 + 2 + ... + 49)
+  EXPECT_NEAR(run.body("Link1").pose.position.y(), -1.5 - kG * h * h * 49 * 50 / 2, 1e-9);
+  EXPECT_NEAR(run.body("Link2").pose.position.y(), -2.5 - kG * h * h * 49 * 50 / 2, 1e-9);
+}
+
+// A weight falls into a rope of 1 m: the step that tightens it takes all its speed, m g h n / h of force.
+TEST_P(BreakingOf, TheJerkOfARope) {
+  const double h = 0.01;
+  int n = 0;
+  while (kG * h * h * n * (n + 1) / 2 <= 1.0) ++n;
+  const double jerk = kG * n;
+  for (const double strength : {jerk * (1.0 + 1e-6), jerk * (1.0 - 1e-6)}) {
+    const std::string rope =
+        "Constraint { Type = \"Distance\" Id = \"Rope\" Body2 = \"Ball\" BreakingForce = " + literal(strength) +
+        " CustomProperties { BindPoint1 = {0, 0, 0} BindPoint2 = {0, 0, 0} MinimumDistance = 0 MaximumDistance = 1 } }";
+    SceneRun run(scene_of(kGravityDown, body("Ball", 1.0, Vector3::Zero(), "\"Down\""), rope, GetParam()));
+    run.steps(static_cast<std::uint32_t>(n - 1));
+    EXPECT_TRUE(run.holds("Rope"));
+    run.step();
+    EXPECT_EQ(run.holds("Rope"), strength > jerk);
+    // also the one that broke held through its last step
+    EXPECT_NEAR(run.body("Ball").pose.position.y(), -1.0, 1e-9);
+    EXPECT_NEAR(run.body("Ball").twist.linear.y(), 0.0, 1e-9);
+    run.steps(100);
+    EXPECT_EQ(run.holds("Rope"), strength > jerk);
+    EXPECT_EQ(run.body("Ball").pose.position.y() < -1.1, strength < jerk);
+  }
+}
+
+}  // namespace
+}  // namespace gravitas
