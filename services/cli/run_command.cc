@@ -102,18 +102,18 @@ int plan_scene(RunLine* line) {
   std::vector<std::string> warnings;
   const kernel::EnvironmentDescription description = load(line->options, &warnings);
   for (const std::string& warning : warnings) std::cerr << warning << '\n';
-  report::v1::Plan plan = plan_message(*start(description));
+  report::v1::Plan plan = plan_message(*start(description), description);
   // the workers that were started to find out are gone again
   for (report::v1::PlannedSlot& slot : *plan.mutable_slots()) slot.set_pid(0);
   if (line->json) {
     std::cout << to_json(plan, JsonForm::kPage);
     return kDone;
   }
-  std::cout << fmt::format("{:<12} {:<20} {}\n", "slot", "plugin", "hosting");
+  std::cout << fmt::format("{:<21} {:<20} {}\n", "slot", "plugin", "hosting");
   for (const report::v1::PlannedSlot& slot : plan.slots())
-    std::cout << fmt::format("{:<12} {:<20} {}\n", slot.slot(), slot.plugin(), slot.hosting());
+    std::cout << fmt::format("{:<21} {:<20} {}\n", slot.slot(), slot.plugin(), slot.hosting());
   for (const report::v1::LeftOut& out : plan.left_out())
-    std::cout << fmt::format("{:<12} left out: {}\n", out.what(), out.why());
+    std::cout << fmt::format("{:<21} left out: {}\n", out.what(), out.why());
   return kDone;
 }
 

@@ -96,7 +96,7 @@ api::Status ServedRun::status() {
 }
 
 void ServedRun::write_plan(api::Plan* plan) const {
-  const report::v1::Plan planned = plan_message(*environment_);
+  const report::v1::Plan planned = plan_message(*environment_, description_);
   for (const report::v1::PlannedSlot& one : planned.slots()) {
     api::PlannedSlot* slot = plan->add_slots();
     slot->set_slot(one.slot());

@@ -17,16 +17,16 @@ std::string duration_text(double microseconds) {
 }
 
 std::string plan_table(const api::Plan& plan) {
-  std::string text = fmt::format("{:<12} {:<20} {:<8} {:<8} {}\n", "slot", "plugin", "hosting", "pid", "settings");
+  std::string text = fmt::format("{:<21} {:<20} {:<8} {:<8} {}\n", "slot", "plugin", "hosting", "pid", "settings");
   for (const api::PlannedSlot& slot : plan.slots()) {
     std::string settings;
     for (const api::Setting& one : slot.settings())
       settings += fmt::format("{}{}={}", settings.empty() ? "" : " ", one.name(), one.value());
     text +=
-        fmt::format("{:<12} {:<20} {:<8} {:<8} {}\n", slot.slot(), slot.plugin(), slot.hosting(), slot.pid(), settings);
+        fmt::format("{:<21} {:<20} {:<8} {:<8} {}\n", slot.slot(), slot.plugin(), slot.hosting(), slot.pid(), settings);
   }
   for (const report::v1::LeftOut& out : plan.left_out())
-    text += fmt::format("{:<12} left out: {}\n", out.what(), out.why());
+    text += fmt::format("{:<21} left out: {}\n", out.what(), out.why());
   return text;
 }
 

@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <string_view>
+#include <vector>
+
+#include "services/run/omissions.h"
 
 namespace gravitas {
 namespace {
@@ -75,7 +80,8 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
   }
 }
 
-report::v1::Plan plan_message(const kernel::Environment& environment) {
+report::v1::Plan plan_message(const kernel::Environment& environment,
+                              const kernel::EnvironmentDescription& description) {
   report::v1::Plan message;
   for (const kernel::PlannedSlot& planned : environment.plan().slots) {
     for (const std::string& plugin : planned.plugins) {
@@ -89,10 +95,12 @@ report::v1::Plan plan_message(const kernel::Environment& environment) {
       for (const std::string& one : planned.sandbox) slot->add_sandbox(one);
     }
   }
-  for (const kernel::LeftOut& left_out : environment.plan().left_out) {
+  std::vector<kernel::LeftOut> left_out = environment.plan().left_out;
+  std::ranges::move(omissions(environment, description), std::back_inserter(left_out));
+  for (const kernel::LeftOut& one : left_out) {
     report::v1::LeftOut* out = message.add_left_out();
-    out->set_what(left_out.what);
-    out->set_why(left_out.why);
+    out->set_what(one.what);
+    out->set_why(one.why);
   }
   return message;
 }

@@ -6,8 +6,9 @@
 
 namespace gravitas {
 
-// The plan as the report shows it; process ids are those of the workers.
-report::v1::Plan plan_message(const kernel::Environment& environment);
+// The plan as the report shows it, with what plugins need not do (omissions.h); process ids are those of the workers.
+report::v1::Plan plan_message(const kernel::Environment& environment,
+                              const kernel::EnvironmentDescription& description);
 
 // Each adds its part.
 void write_stages(const kernel::Environment& environment, report::v1::Report* report);

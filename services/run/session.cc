@@ -509,7 +509,7 @@ void Run::write_report() {
   report.set_outcome(outcome_name(result_.outcome));
   report.set_state_hash(environment_->state_hash().text());
   report.set_chain_hash(environment_->chain_hash().text());
-  *report.mutable_plan() = plan_message(*environment_);
+  *report.mutable_plan() = plan_message(*environment_, description_);
   *report.mutable_events() = events_->counts();
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   for (std::string& warning : environment_->warnings()) report.add_warnings(std::move(warning));
