@@ -9,6 +9,7 @@
 
 #include "services/cli/commands.h"
 #include "services/cli/query_text.h"
+#include "services/cli/scene_options.h"
 #include "services/control/client.h"
 #include "services/control/server_socket.h"
 #include "services/control/status_text.h"
@@ -31,6 +32,8 @@ struct CtlLine {
   std::string out;
   QueryText query;
   std::vector<std::string> kinds;
+  std::optional<std::vector<std::string>> event_kinds;
+  std::optional<double> ongoing_rate;  // Hz
 };
 
 using Order = std::function<int(const CtlLine&, ControlClient*)>;
@@ -185,6 +188,20 @@ int watch(const CtlLine& line, ControlClient* client) {
   return kDone;
 }
 
+int show_events(const CtlLine& line, ControlClient* client) {
+  api::EventsRequest request;
+  for (const std::string& kind : line.event_kinds.value_or(std::vector<std::string>())) request.add_kinds(kind);
+  request.set_ongoing_rate(line.ongoing_rate.value_or(0.0));
+  client->watch_events(
+      request, [] {},
+      [](const events::v1::Event& event) {
+        std::cout << to_json(event, JsonForm::kLine) << std::flush;
+        return std::cout.good();
+      });
+  std::cerr << "gravitas ctl: the server has ended\n";
+  return kDone;
+}
+
 }  // namespace
 
 void add_ctl(CLI::App* app, Action* action) {
@@ -258,6 +275,9 @@ void add_ctl(CLI::App* app, Action* action) {
       ->allow_extra_args(false);
   picture->add_option("--out", line->out, "File: JSON, or a picture if its name ends in .svg");
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
+  CLI::App* events_command = add("events", "Print events from now on as JSON lines, until Ctrl-C or the server ends",
+                                 "events --kinds collision_start,fault,swap", show_events);
+  add_event_options(events_command, "--kinds", &line->event_kinds, &line->ongoing_rate);
 }
 
 }  // namespace gravitas::cli

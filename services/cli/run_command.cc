@@ -135,6 +135,7 @@ void add_run(CLI::App* app, Action* action) {
                       "lines, the mean over "
                       "the step that ends with the sample); the report then has those of the last step");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
+  add_event_options(command, "--event-kinds", &options.event_kinds, &options.ongoing_rate);
   CLI::Option* instrumentation = command->add_option(
       "--instrumentation", options.instrumentation,
       "Write debug geometry to this file: JSON lines, a frame per sample; NAME.svg: a picture of the last state");

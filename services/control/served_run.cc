@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 
@@ -92,8 +93,11 @@ void ServedRun::begin_environment() {
     events_->write(&tally);
     return tally;
   });
-  environment_->set_listener(events_.get());
+  event_source_.emplace(events_.get());
+  with_subscriptions([](Subscription* one) { one->source().begin_again(); });
   environment_->set_commit_listener(this);
+  pair_decisions_.forget();
+  if (listener_) attend_listener();
   active_ = slots_of(description_);
   forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
   orders_.clear();
@@ -186,6 +190,7 @@ void ServedRun::make_step() {
 // As a run does that pauses: what was computed is not lost with the server.
 void ServedRun::keep_faulted_state() {
   stand(State::kFaulted);
+  with_subscriptions([&](Subscription* one) { one->source().tell_incidents(*environment_); });
   try {
     const std::string path = std::filesystem::absolute(paused_checkpoint(options_));
     recorder_->save_to(path, *environment_);
@@ -433,6 +438,69 @@ instrumentation::v1::Frame ServedRun::instrumentation(const api::Instrumentation
     surveyor();
     return survey_->instrumentation.frame(*environment_, kinds);
   });
+}
+
+std::shared_ptr<Subscription> ServedRun::subscribe(const api::EventsRequest& request) {
+  const std::vector<std::string> names(request.kinds().begin(), request.kinds().end());
+  const double rate = request.ongoing_rate() == 0.0 ? kOngoingRate : request.ongoing_rate();
+  if (!std::isfinite(rate) || rate < 0.0)
+    throw BadInput(fmt::format("events: a rate of {:g} Hz; allowed: a finite number > 0", rate));
+  EventKinds kinds = default_event_kinds();
+  try {
+    if (!names.empty()) kinds = parse_event_kinds(names);
+  } catch (const std::invalid_argument& problem) {
+    throw BadInput(fmt::format("events: {}", problem.what()));
+  }
+  return between_steps([&] {
+    auto subscription = std::make_shared<Subscription>(description_, kinds, rate);
+    subscription->source().leave_out_past(*environment_);
+    subscriptions_.push_back(subscription);
+    return subscription;
+  });
+}
+
+void ServedRun::listen(std::shared_ptr<RemoteListener> listener, double deadline) {
+  const double seconds = deadline == 0.0 ? kListenerDeadline : deadline;
+  if (!(seconds > 0.0 && seconds <= 60.0))
+    throw BadInput(fmt::format("a deadline of {:g} s; allowed: more than 0, up to 60", deadline));
+  between_steps([&] {
+    if (listener_) throw NotNow("another client decides about pairs");
+    listener_ = std::move(listener);
+    pair_decisions_.listen(listener_, seconds);
+    attend_listener();
+  });
+}
+
+void ServedRun::end_listening(const std::shared_ptr<RemoteListener>& listener) {
+  between_steps([&] {
+    if (listener_ != listener) return;
+    pair_decisions_.leave();
+    listener_.reset();
+  });
+}
+
+void ServedRun::attend_listener() {
+  environment_->set_pair_arbiter(&pair_decisions_);
+  recorder_->note_listener();
+}
+
+void ServedRun::leave_aside(const std::string& why) {
+  warnings_.push_back(why);
+  Event event{EventKind::kListener, environment_->step_count() + 1, environment_->time()};
+  event.text = why;
+  with_subscriptions([&](Subscription* one) { one->tell(event); });
+  listener_->dismiss(why);
+  listener_.reset();
+}
+
+void ServedRun::on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  event_source_->on_inner_step(environment, inner);
+  with_subscriptions([&](Subscription* one) { one->source().on_inner_step(environment, inner); });
+}
+
+void ServedRun::on_commit(const kernel::Environment& environment) {
+  event_source_->on_commit(environment);
+  with_subscriptions([&](Subscription* one) { one->source().on_commit(environment); });
 }
 
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {

@@ -163,6 +163,8 @@ std::string find_obstacle(const Checkpoint& checkpoint, const recorder::v1::Iden
   if (checkpoint.build() != GRAVITAS_BUILD_ID)
     return fmt::format("it was made by build {}, and this is build {}: only the same build gives the same bits",
                        checkpoint.build(), GRAVITAS_BUILD_ID);
+  if (checkpoint.listener_decided())
+    return "a listener decided about pairs of bodies in that run, and what it decided is not kept";
   const std::string difference = find_difference(checkpoint.identity(), scene);
   return difference.empty() ? "" : "it belongs to another scene, which differs in: " + difference;
 }

@@ -41,8 +41,9 @@ ReactionLog::~ReactionLog() {
   if (file_ != nullptr) std::fclose(file_);
 }
 
-void ReactionLog::add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner) {
-  if (inner == 0) {
+void ReactionLog::add(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  const kernel::StepData& data = inner.data;
+  if (inner.number == 0) {
     step_ = environment.step_count() + 1;
     length_ = 0.0;
     joints_.clear();

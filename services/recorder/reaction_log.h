@@ -28,7 +28,7 @@ class ReactionLog {
   ReactionLog& operator=(const ReactionLog&) = delete;
 
   // What kernel::CommitListener hears of an inner step.
-  void add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner);
+  void add(const kernel::Environment& environment, const kernel::InnerStep& inner);
 
   // Of the step that led to the committed state: joints in the scene's order, then contacts by their pairs.
   std::vector<report::v1::Reaction> last(const kernel::Environment& environment) const;

@@ -75,7 +75,8 @@ void Recorder::save(const kernel::Environment& environment) {
 }
 
 void Recorder::save_to(const std::string& path, const kernel::Environment& environment) const {
-  const recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
+  recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
+  checkpoint.set_listener_decided(listener_decided_);
   try {
     replace_file(path, serialize_checkpoint(checkpoint));
   } catch (const std::system_error& error) {

@@ -38,6 +38,9 @@ class Recorder final : public kernel::CommitListener {
   // Who answers instead of the scene's own plugins, when the run begins.
   void set_decisions(std::vector<recorder::v1::Decision> decisions) { decisions_ = std::move(decisions); }
 
+  // A listener decides about pairs: nobody goes on from what is kept from now on.
+  void note_listener() { listener_decided_ = true; }
+
   // The next steps must have the chain hashes of this journal.
   void expect(const std::string& journal, std::vector<JournalEntry> commits);
 
@@ -68,6 +71,7 @@ class Recorder final : public kernel::CommitListener {
   std::function<recorder::v1::Tally()> tally_;
 
   std::vector<recorder::v1::Decision> decisions_;  // the last for each plugin of a slot
+  bool listener_decided_ = false;
   std::string expected_journal_;
   std::vector<JournalEntry> expected_;
   std::size_t next_expected_ = 0;

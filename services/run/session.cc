@@ -15,6 +15,7 @@
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
+#include "services/events/event_source.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
@@ -134,6 +135,8 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
   };
   if (options.time_step) require_positive("--dt", *options.time_step);
   if (options.sample_every) require_positive("--sample-every", *options.sample_every);
+  if (options.ongoing_rate && !(std::isfinite(*options.ongoing_rate) && *options.ongoing_rate > 0.0))
+    throw BadInput(fmt::format("--ongoing-rate {:g}: it must be a finite number of Hz > 0", *options.ongoing_rate));
   if (options.duration && !(std::isfinite(*options.duration) && *options.duration >= 0.0))
     throw BadInput(fmt::format("--duration {:g}: it must be a finite number of seconds >= 0", *options.duration));
   scene::Problems problems;
@@ -214,6 +217,7 @@ class Run final : private kernel::CommitListener {
     environment_ = start(begun, options_.starter);
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
     environment_->set_commit_listener(this);
+    if (options_.listener) begin_listening();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed);
@@ -237,7 +241,8 @@ class Run final : private kernel::CommitListener {
       throw BadInput(error.what());
     }
     events_->resume(resumed_tally_);
-    environment_->set_listener(events_.get());
+    if (!event_kinds_.is_empty())
+      event_source_.emplace(events_.get(), event_kinds_, options_.ongoing_rate.value_or(kOngoingRate));
   }
 
   void go(const std::function<bool()>& interrupted, const std::function<void(const Progress&)>& progress) {
@@ -285,6 +290,7 @@ class Run final : private kernel::CommitListener {
     guard([&] {
       if (reactions_) reactions_->close();
     });
+    if (event_source_) event_source_->tell_incidents(*environment_);
     guard([&] { events_->close(); });
     write_report();
     guard([&] {
@@ -298,6 +304,11 @@ class Run final : private kernel::CommitListener {
 
  private:
   void read_kinds() {
+    try {
+      if (options_.event_kinds) event_kinds_ = parse_event_kinds(*options_.event_kinds);
+    } catch (const std::invalid_argument& problem) {
+      throw BadInput(fmt::format("--event-kinds: {}", problem.what()));
+    }
     try {
       for (const std::string& name : options_.instrumentation_kinds) kinds_.push_back(survey::find_kind(name));
     } catch (const std::invalid_argument& problem) {
@@ -321,6 +332,18 @@ class Run final : private kernel::CommitListener {
             "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text,
             failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
     frames_->close();
+  }
+
+  void begin_listening() {
+    if (!options_.resume.empty()) throw BadInput("a run in which a listener decides about pairs is not resumed");
+    pair_decisions_.emplace([this](const std::string& why) {
+      warnings_.push_back(why);
+      Event event{EventKind::kListener, environment_->step_count() + 1, environment_->time()};
+      event.text = why;
+      if (event_kinds_.has(event.kind)) events_->on_event(event);
+    });
+    pair_decisions_->listen(options_.listener, options_.listener_deadline);
+    environment_->set_pair_arbiter(&*pair_decisions_);
   }
 
   void resume(Resumption* from) {
@@ -385,11 +408,12 @@ class Run final : private kernel::CommitListener {
     }
   }
 
-  void on_inner_step(const kernel::Environment& environment, const kernel::StepData& data,
-                     std::uint32_t inner) override {
-    if (reactions_) reactions_->add(environment, data, inner);
+  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
+    if (reactions_) reactions_->add(environment, inner);
+    if (event_source_) event_source_->on_inner_step(environment, inner);
   }
   void on_commit(const kernel::Environment& environment) override {
+    if (event_source_) event_source_->on_commit(environment);
     if (recorder_) recorder_->on_commit(environment);
   }
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
@@ -406,6 +430,7 @@ class Run final : private kernel::CommitListener {
   void keep_paused_state() {
     const std::string path = checkpoint_path_.empty() ? paused_checkpoint(options_) : checkpoint_path_;
     Recorder recorder(identity_of(description_), [this] { return tally(); });
+    if (options_.listener) recorder.note_listener();
     recorder.set_decisions(decisions_);
     recorder.save_to(path, *environment_);
     result_.checkpoint = path;
@@ -456,6 +481,7 @@ class Run final : private kernel::CommitListener {
     recorder_.emplace(identity_of(description_), [this] { return tally(); });
     recorder_->expect(journal_of(options_.resume), journal_.commits);
     recorder_->set_decisions(decisions_);
+    if (options_.listener) recorder_->note_listener();
     if (checkpoint_path_.empty()) return;
     // the journal of another file starts anew
     const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == checkpoint_path_;
@@ -482,6 +508,7 @@ class Run final : private kernel::CommitListener {
   std::vector<kernel::FaultInjection> faults_;
   std::vector<RerunSpec> reruns_;
   std::vector<recorder::v1::Decision> decisions_;  // in force
+  std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
@@ -489,6 +516,8 @@ class Run final : private kernel::CommitListener {
   std::unique_ptr<TrajectoryWriter> trajectory_;
   std::unique_ptr<ReactionLog> reactions_;
   std::unique_ptr<EventLog> events_;
+  EventKinds event_kinds_ = default_event_kinds();
+  std::optional<EventSource> event_source_;
   std::vector<survey::Kind> kinds_;
   std::optional<survey::Surveyor> surveyor_;
   std::unique_ptr<survey::FrameFile> frames_;
@@ -511,6 +540,9 @@ void Run::write_report() {
   report.set_chain_hash(environment_->chain_hash().text());
   *report.mutable_plan() = plan_message(*environment_);
   *report.mutable_events() = events_->counts();
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(EventKind::kCount); ++i)
+    if (const auto kind = static_cast<EventKind>(i); event_kinds_.has(kind))
+      report.add_event_kinds(event_kind_name(kind));
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   for (std::string& warning : environment_->warnings()) report.add_warnings(std::move(warning));
   write_faults(*environment_, &report);

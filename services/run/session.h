@@ -12,6 +12,7 @@
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
 #include "services/catalog/catalog.h"
+#include "services/listeners/pair_decisions.h"
 #include "services/scene/problem.h"
 
 namespace gravitas {
@@ -31,6 +32,9 @@ struct RunOptions {
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events, reactions;
+  // What is looked for, written to `events` and counted (services/events/event.h); default_event_kinds() if absent.
+  std::optional<std::vector<std::string>> event_kinds;
+  std::optional<double> ongoing_rate;              // Hz, of collision_ongoing; kOngoingRate if absent
   std::string instrumentation;                     // file of debug geometry (services/survey/frame_file.h)
   std::vector<std::string> instrumentation_kinds;  // all if empty
   std::optional<double> sample_every;  // s, of trajectory, instrumentation and reactions; every step if absent
@@ -40,6 +44,8 @@ struct RunOptions {
   std::uint32_t threads = 1;
   std::vector<std::string> faults, swaps, comparisons, reruns;  // as on the command line
   kernel::HostStarter starter = kernel::start_host;
+  std::shared_ptr<PairListener> listener;        // decides about pairs; then the run is not resumed
+  double listener_deadline = kListenerDeadline;  // s
 };
 
 // The caller's mistake, with a text that says where and what: exit code 2.

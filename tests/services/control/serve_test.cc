@@ -190,7 +190,7 @@ TEST(Serve, WhatCannotBeIsExitCode2) {
   EXPECT_THAT(result.err, HasSubstr("no server answers"));
   EXPECT_EQ(harness::run_program({"ctl"}, folder).exit_code, 2);
   for (const char* command :
-       {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "capture", "watch"}) {
+       {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "capture", "watch", "events"}) {
     result = harness::run_program({"ctl", command, "--help"}, folder);
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ctl ") + command));
