@@ -158,6 +158,11 @@ void add_run(CLI::App* app, Action* action) {
                       "Go on from this checkpoint; --steps and --duration count from t = 0");
   add_list(command, "--swap", &options.swaps,
            "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N; repeatable");
+  add_list(
+      command, "--edit", &options.edits,
+      "Change the scene while the simulation runs, before step N: \"add FILE@step=N\", \"remove Body.Ball@step=N\", "
+      "\"set Body.Ball.Position={0,1,0}@step=N\"; FILE holds Geometries, Materials, Forces, Bodies, Constraints; "
+      "changes before the same step are one; repeatable");
   add_list(command, "--compare", &options.comparisons,
            "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
   add_list(command, "--rerun", &options.reruns,

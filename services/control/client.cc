@@ -96,6 +96,16 @@ api::SwapOrdered ControlClient::set_property(const api::SetPropertyRequest& requ
   return connection_->call(&api::Control::Stub::SetProperty, request);
 }
 
+api::EditMade ControlClient::edit(const api::EditRequest& request) {
+  return connection_->call(&api::Control::Stub::EditScene, request);
+}
+
+api::Status ControlClient::wake(const std::string& body) {
+  api::WakeRequest request;
+  request.set_body(body);
+  return connection_->call(&api::Control::Stub::Wake, request);
+}
+
 api::InjectOrdered ControlClient::inject(const std::string& fault) {
   api::InjectRequest request;
   request.set_fault(fault);

@@ -37,6 +37,8 @@ class ControlClient {
   api::Status reset();
   api::SwapOrdered swap(const api::SwapRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
+  api::EditMade edit(const api::EditRequest& request);
+  api::Status wake(const std::string& body);
   api::InjectOrdered inject(const std::string& fault);
   api::Captured capture(const api::CaptureRequest& request);
   query::v1::Answers query(const query::v1::Batch& batch);

@@ -66,9 +66,9 @@ PropertyValue parse_value(const std::string& what, const std::string& text) {
 ServedRun::ServedRun(const ServeOptions& options)
     : options_(options.run),
       speed_(options.speed),
-      description_(load(options.run, &scene_warnings_, &catalog_)),
+      first_description_(load(options.run, &scene_warnings_, &catalog_, &first_scene_)),
       timer_(loop_) {
-  for (const std::string& path : options.run.scenes) scene_ += (scene_.empty() ? "" : " ") + path;
+  for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
   begin_environment();
   if (!options.is_paused && state_ == State::kPaused) go();
   thread_ = std::jthread([this] {
@@ -81,13 +81,17 @@ ServedRun::~ServedRun() { loop_.stop(); }
 
 void ServedRun::begin_environment() {
   // where the new one cannot be made the old one stays
-  auto environment = start(description_, capsule::recording(tape_));
+  auto environment = start(first_description_, capsule::recording(tape_));
   close_capture();
   survey_.reset();
   environment_ = std::move(environment);
+  scene_ = first_scene_;
+  description_ = first_description_;
+  past_.Clear();
+  past_swaps_.clear();
   events_ = std::make_unique<EventLog>("", description_);
   figures_ = std::make_unique<Figures>(description_);
-  recorder_ = std::make_unique<Recorder>(identity_of(description_), [this] {
+  recorder_ = std::make_unique<Recorder>(identity_of(first_description_), [this] {
     recorder::v1::Tally tally;
     figures_->write(&tally);
     events_->write(&tally);
@@ -262,13 +266,13 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   if (spec.plugin.empty()) throw BadInput(spec.text + ": allowed: the name of a plugin, or the path of a library");
   if (!request.hosting().empty()) spec.hosting = parse_hosting_mode("swap", word, request.hosting());
   // the settings of the moment, else those of the scene
-  const kernel::EnvironmentDescription active = between_steps([this] { return active_; });
+  const auto [active, scenes] = between_steps([this] { return std::pair(active_, slots_of(description_)); });
   const bool is_active = std::ranges::any_of(active.slot(spec.slot).plugins, [&](const kernel::PluginChoice& one) {
     return one.declaration.name == spec.plugin;
   });
   // a library is asked in a process, which the steps do not wait for; the copy keeps its name from staying known
   Catalog catalog = catalog_;
-  kernel::SwapOrder found = resolve_swap(spec, is_active ? active : description_, &catalog);
+  kernel::SwapOrder found = resolve_swap(spec, is_active ? active : scenes, &catalog);
   return between_steps([&] {
     found.step = next_step(spec.text, request.step());
     return order(std::move(found));

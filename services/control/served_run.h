@@ -57,7 +57,7 @@ class ServedRun final : private kernel::CommitListener {
   ServedRun(const ServedRun&) = delete;
   ServedRun& operator=(const ServedRun&) = delete;
 
-  const std::string& scene() const { return scene_; }
+  const std::string& scene() const { return scene_name_; }
   // Of the reader, for whoever started it.
   const std::vector<std::string>& scene_warnings() const { return scene_warnings_; }
 
@@ -70,6 +70,8 @@ class ServedRun final : private kernel::CommitListener {
 
   api::SwapOrdered swap(const api::SwapRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
+  api::EditMade edit(const api::EditRequest& request);
+  void wake(const api::WakeRequest& request);
   api::InjectOrdered inject(const api::InjectRequest& request);
   // Begins to keep calls. The future is ready when the steps are made, or end_capture() has ended it.
   std::future<api::Captured> capture(const api::CaptureRequest& request);
@@ -138,7 +140,8 @@ class ServedRun final : private kernel::CommitListener {
       if (const std::shared_ptr<Subscription> held = one.lock()) action(held.get());
   }
   void write_plan(api::Plan* plan) const;
-  void write_swaps(api::Status* status) const;
+  std::vector<api::ServedSwap> swap_messages() const;
+  void require_settled_swaps() const;
   std::string state_name() const;
 
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override;
@@ -147,12 +150,18 @@ class ServedRun final : private kernel::CommitListener {
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override;
 
   const RunOptions options_;
-  std::string scene_;
+  std::string scene_name_;
   double speed_;
   std::vector<std::string> scene_warnings_;
   Catalog catalog_;  // never changes, so any thread may read it
-  const kernel::EnvironmentDescription description_;
+  // Of the files, and with the edits that were made since the run began.
+  scene::v1::Scene first_scene_, scene_;
+  const kernel::EnvironmentDescription first_description_;
+  kernel::EnvironmentDescription description_;
   kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
+  // Faults and swaps of environments before the last edit.
+  report::v1::Report past_;
+  std::vector<api::ServedSwap> past_swaps_;
 
   // What a checkpoint holds besides the state.
   std::unique_ptr<EventLog> events_;

@@ -87,6 +87,12 @@ class ControlServer::Service final : public api::Control::Service {
                            api::SwapOrdered* reply) override {
     return answered([&] { *reply = run_.set_property(*request); });
   }
+  grpc::Status EditScene(grpc::ServerContext*, const api::EditRequest* request, api::EditMade* reply) override {
+    return answered([&] { *reply = run_.edit(*request); });
+  }
+  grpc::Status Wake(grpc::ServerContext*, const api::WakeRequest* request, api::Status* reply) override {
+    return then_status([&] { run_.wake(*request); }, reply);
+  }
   grpc::Status Inject(grpc::ServerContext*, const api::InjectRequest* request, api::InjectOrdered* reply) override {
     return answered([&] { *reply = run_.inject(*request); });
   }

@@ -41,6 +41,11 @@ ReactionLog::~ReactionLog() {
   if (file_ != nullptr) std::fclose(file_);
 }
 
+void ReactionLog::begin_again() {
+  joints_.clear();
+  contacts_.clear();
+}
+
 void ReactionLog::add(const kernel::Environment& environment, const kernel::InnerStep& inner) {
   const kernel::StepData& data = inner.data;
   if (inner.number == 0) {

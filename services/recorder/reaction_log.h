@@ -30,6 +30,9 @@ class ReactionLog {
   // What kernel::CommitListener hears of an inner step.
   void add(const kernel::Environment& environment, const kernel::InnerStep& inner);
 
+  // The description has changed; no step of it has been made.
+  void begin_again();
+
   // Of the step that led to the committed state: joints in the scene's order, then contacts by their pairs.
   std::vector<report::v1::Reaction> last(const kernel::Environment& environment) const;
 

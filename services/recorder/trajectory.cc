@@ -27,15 +27,20 @@ TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::Enviro
                                    double interval)
     : path_(path), file_(std::fopen(path.c_str(), "we")), sampling_(interval) {
   if (file_ == nullptr) fail_trajectory(path);
-  for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
-    const kernel::BodyDescription& body = description.bodies[i];
-    if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
-  }
+  follow(description);
   if (std::fputs("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n", file_) < 0) fail_trajectory(path);
 }
 
 TrajectoryWriter::~TrajectoryWriter() {
   if (file_ != nullptr) std::fclose(file_);
+}
+
+void TrajectoryWriter::follow(const kernel::EnvironmentDescription& description) {
+  rows_.clear();
+  for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
+    const kernel::BodyDescription& body = description.bodies[i];
+    if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
+  }
 }
 
 void TrajectoryWriter::offer(const kernel::Environment& environment, bool last) {

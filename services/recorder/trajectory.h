@@ -25,6 +25,9 @@ class TrajectoryWriter {
   TrajectoryWriter(const TrajectoryWriter&) = delete;
   TrajectoryWriter& operator=(const TrajectoryWriter&) = delete;
 
+  // The bodies are these from now on.
+  void follow(const kernel::EnvironmentDescription& description);
+
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);
 

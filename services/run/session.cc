@@ -6,15 +6,15 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
-#include <set>
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
+#include "services/edit/edit_schedule.h"
+#include "services/edit/edited_scene.h"
 #include "services/events/event_source.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
@@ -25,59 +25,19 @@
 #include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
+#include "services/run/edit_spec.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
-#include "services/scene/build.h"
-#include "services/scene/overrides.h"
-#include "services/scene/reader.h"
 #include "services/survey/frame_file.h"
 
 namespace gravitas {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string joined(const std::vector<scene::SceneError>& errors) {
-  std::string text;
-  for (const scene::SceneError& error : errors) text += (text.empty() ? "" : "\n") + scene::to_string(error);
-  return text;
-}
-
-void require(const scene::Problems& problems) {
-  if (!problems.ok()) throw BadInput(joined(problems.errors));
-}
-
-void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description) {
-  for (const HostingChoice& choice : choices) {
-    for (const Slot slot : kSlots)
-      if (!choice.slot || *choice.slot == slot) {
-        description->slot(slot).hosting = choice.hosting;
-        description->slot(slot).attached = choice.attached;
-        if (choice.attached) description->slot(slot).deadline = kernel::kAttachedDeadline;
-        for (kernel::PluginChoice& plugin : description->slot(slot).plugins) plugin.address = choice.address;
-      }
-  }
-}
-
-// What the command line moves elsewhere leaves its process; the scene itself hosts the slots of one process alike.
-void warn_of_split_processes(const kernel::EnvironmentDescription& description, std::vector<std::string>* warnings) {
-  std::set<std::string> split;
-  for (const Slot one : kSlots)
-    for (const Slot other : kSlots)
-      if (description.slot(one).process == description.slot(other).process &&
-          description.slot(one).hosting != description.slot(other).hosting)
-        split.insert(description.slot(one).process);
-  for (const std::string& process : split)
-    if (!process.empty())
-      warnings->push_back(
-          fmt::format("the slots of Process \"{}\" are hosted in different ways; those that are hosted "
-                      "alike share one",
-                      process));
-}
 
 std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
   return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
@@ -121,63 +81,6 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
   }
 }
 
-std::string installed_worker() { return kernel::worker_program(); }
-
-std::string installed_plugins() {
-  const std::filesystem::path bin = std::filesystem::path(kernel::worker_program()).parent_path();
-  return (bin.parent_path() / "lib" / "gravitas").string();
-}
-
-kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings, Catalog* plugins) {
-  const auto require_positive = [](const char* option, double value) {
-    if (!std::isfinite(value) || value <= 0.0)
-      throw BadInput(fmt::format("{} {:g}: it must be a finite number of seconds > 0", option, value));
-  };
-  if (options.time_step) require_positive("--dt", *options.time_step);
-  if (options.sample_every) require_positive("--sample-every", *options.sample_every);
-  if (options.ongoing_rate && !(std::isfinite(*options.ongoing_rate) && *options.ongoing_rate > 0.0))
-    throw BadInput(fmt::format("--ongoing-rate {:g}: it must be a finite number of Hz > 0", *options.ongoing_rate));
-  if (options.duration && !(std::isfinite(*options.duration) && *options.duration >= 0.0))
-    throw BadInput(fmt::format("--duration {:g}: it must be a finite number of seconds >= 0", *options.duration));
-  scene::Problems problems;
-  scene::SceneDocument document;
-  scene::read_files(options.scenes, &document, &problems);
-  require(problems);
-  std::vector<std::string> overrides = options.overrides;
-  if (options.time_step) overrides.push_back(fmt::format("Simulator.TimeStep={:.17g}", *options.time_step));
-  if (options.duration) overrides.push_back(fmt::format("Simulator.Duration={:.17g}", *options.duration));
-  for (const std::string& one : overrides) scene::apply_override(&document.scene(), one, &problems);
-  require(problems);
-
-  Catalog own;
-  Catalog& catalog = plugins != nullptr ? *plugins : own;
-  catalog = Catalog::installed(installed_worker(), installed_plugins());
-  std::optional<kernel::EnvironmentDescription> description = scene::build(document.scene(), &catalog, &problems);
-  require(problems);
-  for (const scene::SceneError& warning : problems.warnings) warnings->push_back(scene::to_string(warning));
-  if (options.steps) {
-    description->steps = *options.steps;
-    description->last_time_step = description->time_step;
-  }
-  description->threads = options.threads;
-  apply_hosting(options.hosting, &*description);
-  warn_of_split_processes(*description, warnings);
-  return std::move(*description);
-}
-
-std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
-                                           const kernel::HostStarter& starter) {
-  try {
-    auto environment = std::make_unique<kernel::Environment>(description, starter);
-    for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
-    return environment;
-  } catch (const kernel::StageFault& fault) {
-    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text));
-  } catch (const std::invalid_argument& problem) {
-    throw BadInput(problem.what());
-  }
-}
-
 namespace {
 
 const char* outcome_name(RunOutcome outcome) {
@@ -203,21 +106,25 @@ bool is_full(const std::error_code& code) {
 // A run in its phases. What fails on the way ends the stepping and is kept; the phases after it still do what they can.
 class Run final : private kernel::CommitListener {
  public:
-  explicit Run(const RunOptions& options) : options_(options), description_(load(options, &warnings_, &catalog_)) {}
+  explicit Run(const RunOptions& options)
+      : options_(options),
+        description_(load(options, &warnings_, &catalog_, &scene_)),
+        identity_(identity_of(description_)) {}
 
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
     std::optional<Resumption> resumed;
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
+    read_edits(resumed ? &*resumed : nullptr);
     read_orders();
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
     environment_ = start(begun, options_.starter);
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
-    environment_->set_commit_listener(this);
     if (options_.listener) begin_listening();
+    attend();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed);
@@ -252,6 +159,8 @@ class Run final : private kernel::CommitListener {
       while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
         if (interrupted()) {
           result_.outcome = RunOutcome::kInterrupted;
+        } else if (!make_due_edit()) {
+          break;
         } else if (environment_->step() == kernel::StepOutcome::kPaused) {
           pause(*environment_->fault());
         } else {
@@ -338,12 +247,9 @@ class Run final : private kernel::CommitListener {
     if (!options_.resume.empty()) throw BadInput("a run in which a listener decides about pairs is not resumed");
     pair_decisions_.emplace([this](const std::string& why) {
       warnings_.push_back(why);
-      Event event{EventKind::kListener, environment_->step_count() + 1, environment_->time()};
-      event.text = why;
-      if (event_kinds_.has(event.kind)) events_->on_event(event);
+      tell({EventKind::kListener, environment_->step_count() + 1, environment_->time()}, why);
     });
     pair_decisions_->listen(options_.listener, options_.listener_deadline);
-    environment_->set_pair_arbiter(&*pair_decisions_);
   }
 
   void resume(Resumption* from) {
@@ -371,16 +277,8 @@ class Run final : private kernel::CommitListener {
     const std::uint32_t step = resumed.checkpoint.step();
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
     try {
-      for (const recorder::v1::Decision& decision : resumed.checkpoint.decisions()) {
-        decisions_.push_back(decision);
-        const kernel::SwapOrder order = order_of(decision, catalog_);
-        kernel::SlotDescription& slot = begun->slot(order.slot);
-        if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
-        const auto fallback = slot.plugins[decision.target()].fallback;
-        slot.plugins[decision.target()] = order.plugin;
-        slot.plugins[decision.target()].fallback = fallback;
-        slot.hosting = *order.hosting;
-      }
+      decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
+      put_in_place(begun);
       for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
         kernel::SwapOrder order = order_of(decision, catalog_);
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
@@ -396,12 +294,102 @@ class Run final : private kernel::CommitListener {
     apply_hosting(options_.hosting, begun);
   }
 
+  // Those of the decisions in force.
+  void put_in_place(kernel::EnvironmentDescription* begun) const {
+    for (const recorder::v1::Decision& decision : decisions_) {
+      const kernel::SwapOrder order = order_of(decision, catalog_);
+      kernel::SlotDescription& slot = begun->slot(order.slot);
+      if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
+      const auto fallback = slot.plugins[decision.target()].fallback;
+      slot.plugins[decision.target()] = order.plugin;
+      slot.plugins[decision.target()].fallback = fallback;
+      slot.hosting = *order.hosting;
+    }
+  }
+
+  // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.
+  void read_edits(const Resumption* resumed) {
+    edits_.plan(parse_edits(options_.edits));
+    if (resumed != nullptr) {
+      for (edit::v1::Edit one : resumed->checkpoint.edits()) {
+        take(EditedScene(options_, scene_, description_, &catalog_, &one, nullptr));
+        edits_.note(one);
+      }
+      edits_.leave_out_past(resumed->checkpoint.step(), resumed->journal.edits);
+    }
+    if (!edits_.to_come().empty() && !options_.instrumentation.empty())
+      throw BadInput("--edit and --instrumentation do not go together");
+    edits_.rehearse(options_, scene_, description_, &catalog_);
+  }
+
+  void take(const EditedScene& edited) {
+    scene_ = edited.scene();
+    description_ = edited.description();
+  }
+
+  // False if an edit could not be made, which ends the run.
+  bool make_due_edit() {
+    std::optional<edit::v1::Edit> edit = edits_.take_due(environment_->step_count() + 1);
+    if (!edit) return true;
+    try {
+      make(&*edit);
+    } catch (const BadInput& problem) {
+      fail(problem.what());
+    }
+    return result_.outcome == RunOutcome::kCompleted;
+  }
+
+  // Another environment goes on; what this one has to tell is told now.
+  void make(edit::v1::Edit* edit) {
+    const EditedScene edited(options_, scene_, description_, &catalog_, edit, &*environment_);
+    kernel::EnvironmentDescription active = description_, begun = edited.description();
+    put_in_place(&active);
+    keep_who_answers(description_, active, &begun);
+    std::unique_ptr<kernel::Environment> next = start(begun, options_.starter);
+    edited.hand_over(*environment_, next.get());
+    for (const std::string& warning : edited.warnings())
+      if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
+    write_past();
+    settle_swaps(&result_.report);
+    translate_decisions(description_, edited.description(), &decisions_);
+    take(edited);
+    environment_ = std::move(next);
+    edits_.note(*edit);
+    if (recorder_) {
+      recorder_->set_decisions(decisions_);
+      recorder_->note_edit(*edit);
+    }
+    attend();
+    if (pair_decisions_) pair_decisions_->forget();
+    if (event_source_) event_source_->begin_again();
+    if (trajectory_) trajectory_->follow(description_);
+    if (reactions_) reactions_->begin_again();
+    figures_->begin_again(environment_.get());
+    give_orders();
+    tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
+         fmt::format("{} changes before step {}", edit->changes_size(), edit->step()));
+  }
+
+  void attend() {
+    environment_->set_commit_listener(this);
+    if (pair_decisions_) environment_->set_pair_arbiter(&*pair_decisions_);
+  }
+
+  void tell(Event event, const std::string& text) {
+    event.text = text;
+    if (event_kinds_.has(event.kind)) events_->on_event(event);
+  }
+
+  // Orders of steps that are made have been given.
   void give_orders() {
+    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) {
+      return environment_->step_count() > 0 && one.step <= environment_->step_count();
+    });
     try {
       for (const kernel::SwapOrder& order : swaps_) environment_->order_swap(order);
       for (const kernel::SwapOrder& order : comparisons_) environment_->order_swap(order, true);
-      for (kernel::FaultInjection& fault : faults_)
-        if (fault.step > environment_->step_count()) environment_->inject(std::move(fault));
+      for (const kernel::FaultInjection& fault : faults_)
+        if (fault.step > environment_->step_count()) environment_->inject(fault);
       for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
@@ -429,7 +417,8 @@ class Run final : private kernel::CommitListener {
   // Where no recorder keeps a checkpoint.
   void keep_paused_state() {
     const std::string path = checkpoint_path_.empty() ? paused_checkpoint(options_) : checkpoint_path_;
-    Recorder recorder(identity_of(description_), [this] { return tally(); });
+    Recorder recorder(identity_, [this] { return tally(); });
+    recorder.set_edits(edits_.made());
     if (options_.listener) recorder.note_listener();
     recorder.set_decisions(decisions_);
     recorder.save_to(path, *environment_);
@@ -478,7 +467,8 @@ class Run final : private kernel::CommitListener {
   // Listens if there is something to keep or to compare.
   void start_recorder() {
     if (checkpoint_path_.empty() && journal_.commits.empty()) return;
-    recorder_.emplace(identity_of(description_), [this] { return tally(); });
+    recorder_.emplace(identity_, [this] { return tally(); });
+    recorder_->set_edits(edits_.made());
     recorder_->expect(journal_of(options_.resume), journal_.commits);
     recorder_->set_decisions(decisions_);
     if (options_.listener) recorder_->note_listener();
@@ -497,11 +487,16 @@ class Run final : private kernel::CommitListener {
   }
 
   void write_report();
+  void write_past();
 
   const RunOptions& options_;
   std::vector<std::string> warnings_;
   Catalog catalog_;
-  const kernel::EnvironmentDescription description_;
+  scene::v1::Scene scene_;
+  // With the edits made so far, of which those that listen hold references.
+  kernel::EnvironmentDescription description_;
+  const recorder::v1::Identity identity_;  // of the scene before them
+  EditSchedule edits_;
   std::string checkpoint_path_;
   RunResult result_;
   std::vector<kernel::SwapOrder> swaps_, comparisons_;
@@ -526,6 +521,13 @@ class Run final : private kernel::CommitListener {
   double wall_seconds_ = 0.0;
 };
 
+// What the environment has done so far, once.
+void Run::write_past() {
+  for (std::string& warning : environment_->warnings()) warnings_.push_back(std::move(warning));
+  write_faults(*environment_, &result_.report);
+  write_swaps(*environment_, &result_.report);
+}
+
 void Run::write_report() {
   report::v1::Report& report = result_.report;
   for (const std::string& path : options_.scenes)
@@ -543,10 +545,9 @@ void Run::write_report() {
   for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(EventKind::kCount); ++i)
     if (const auto kind = static_cast<EventKind>(i); event_kinds_.has(kind))
       report.add_event_kinds(event_kind_name(kind));
+  write_past();
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
-  for (std::string& warning : environment_->warnings()) report.add_warnings(std::move(warning));
-  write_faults(*environment_, &report);
-  write_swaps(*environment_, &report);
+  if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");
   write_stages(*environment_, &report);
   figures_->write(&report);
   if (!reactions_) return;

@@ -7,8 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/edit/v1/edit.pb.h"
 #include "gravitas/recorder/v1/capsule.pb.h"
 #include "gravitas/report/v1/report.pb.h"
+#include "gravitas/scene/v1/scene.pb.h"
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
 #include "services/catalog/catalog.h"
@@ -42,7 +44,7 @@ struct RunOptions {
   std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
   std::string resume;                  // checkpoint to go on from
   std::uint32_t threads = 1;
-  std::vector<std::string> faults, swaps, comparisons, reruns;  // as on the command line
+  std::vector<std::string> faults, swaps, comparisons, reruns, edits;  // as on the command line
   kernel::HostStarter starter = kernel::start_host;
   std::shared_ptr<PairListener> listener;        // decides about pairs; then the run is not resumed
   double listener_deadline = kListenerDeadline;  // s
@@ -73,9 +75,16 @@ struct RunResult {
 };
 
 // The scene as the kernel's description. Throws BadInput. `warnings` gets the reader's warnings, `plugins` the plugins
-// that there are.
+// that there are, `read` the scene with its overrides.
 kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings,
-                                    Catalog* plugins = nullptr);
+                                    Catalog* plugins = nullptr, scene::v1::Scene* read = nullptr);
+
+// Its second half: the description of a scene that was read.
+kernel::EnvironmentDescription build_scene(const RunOptions& options, const scene::v1::Scene& scene, Catalog* catalog,
+                                           std::vector<std::string>* warnings);
+
+// Where a command line has the slots.
+void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description);
 
 // Slots whose answers no law of physics tells right from wrong (plugin_sdk/physics_checks.h): where the physics is checked
 // (CheckPhysicsEvery), another process confirms them.
