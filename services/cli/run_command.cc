@@ -122,8 +122,11 @@ int plan_scene(RunLine* line) {
 void add_run(CLI::App* app, Action* action) {
   const auto line = std::make_shared<RunLine>();
   CLI::App* command = app->add_subcommand("run", "Simulate a scene");
-  command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n\nFaults:\n" +
-                  fault_help());
+  command->footer(
+      "Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n"
+      "         gravitas run deploy/scenes/two_spheres_motor.gravitas --edit 'remove "
+      "Constraint.MyAngularMotor@step=200' --event-kinds all --events events.jsonl\n\nFaults:\n" +
+      fault_help());
   line->scene.add_to(command);
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");

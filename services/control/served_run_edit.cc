@@ -35,6 +35,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = start(begun, capsule::recording(tape_));
     edited.hand_over(*environment_, next.get());
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_);
 
     // from here on it is made
     past_swaps_ = swap_messages();
@@ -57,12 +58,16 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     recorder_->note_edit(edit);
     event_source_->begin_again();
     figures_->begin_again(environment_.get());
+    with_subscriptions([](Subscription* one) { one->source().begin_again(); });
+    const auto tell = [&](const Event& event) {
+      events_->on_event(event);
+      with_subscriptions([&](Subscription* one) { one->tell(event); });
+    };
     Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};
     event.text = fmt::format("{} changes before step {}", edit.changes_size(), edit.step());
-    with_subscriptions([&](Subscription* one) {
-      one->source().begin_again();
-      one->tell(event);
-    });
+    tell(event);
+    for (const std::uint32_t body : woken)
+      tell({EventKind::kWake, environment_->step_count(), environment_->time(), body});
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(scene_warnings_, warning) == scene_warnings_.end()) made.add_warnings(warning);
     made.set_pause_us(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/slots.h"
 
@@ -186,7 +187,10 @@ void EditedScene::write_places() {
 void EditedScene::place() {
   std::map<std::string, Pose> places;
   for (const edit::v1::Place& one : edit_.places()) {
-    if (one.position_size() != 3 || one.orientation_size() != 4)
+    const std::span position(one.position().data(), static_cast<std::size_t>(one.position_size()));
+    const std::span orientation(one.orientation().data(), static_cast<std::size_t>(one.orientation_size()));
+    if (position.size() != 3 || orientation.size() != 4 || first_not_finite(position) != kNoRow ||
+        first_not_unit(orientation, 4) != kNoRow)
       throw BadInput(fmt::format("edit before step {}: the place of '{}' is none", edit_.step(), one.body()));
     places[one.body()] = {Vector3(one.position(0), one.position(1), one.position(2)),
                           Quaternion(one.orientation(0), one.orientation(1), one.orientation(2), one.orientation(3))};
@@ -252,6 +256,13 @@ void translate(const std::vector<std::uint32_t>& rows, Numbers* numbers) {
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> EditedScene::woken(const kernel::Environment& now) const {
+  std::vector<std::uint32_t> bodies;
+  for (std::uint32_t i = 0; i < old_body_.size(); ++i)
+    if (old_body_[i] != kNone && now.is_asleep(old_body_[i])) bodies.push_back(i);
+  return bodies;
+}
 
 void EditedScene::hand_over(const kernel::Environment& now, kernel::Environment* next) const {
   const kernel::SavedState before = now.saved_state(), like = next->saved_state();

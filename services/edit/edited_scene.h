@@ -43,6 +43,9 @@ class EditedScene {
   // Of scene and builder.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
+  // Bodies that slept, and whom the edit wakes.
+  std::vector<std::uint32_t> woken(const kernel::Environment& now) const;
+
   // Precondition: `next` runs description(), whoever answers there. Throws std::logic_error if it does not take the state.
   void hand_over(const kernel::Environment& now, kernel::Environment* next) const;
 

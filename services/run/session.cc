@@ -347,6 +347,7 @@ class Run final : private kernel::CommitListener {
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = start(begun, options_.starter);
     edited.hand_over(*environment_, next.get());
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
     write_past();
@@ -368,6 +369,8 @@ class Run final : private kernel::CommitListener {
     give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
          fmt::format("{} changes before step {}", edit->changes_size(), edit->step()));
+    for (const std::uint32_t body : woken)
+      tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
   }
 
   void attend() {

@@ -88,7 +88,12 @@ class Changing {
     if (std::ranges::find(kElements, root) == kElements.end())
       return refuse("set " + text, "\"" + root + "\" is nothing that an edit sets; " + allowed_names(root, kElements) +
                                        "; a plugin and its properties are exchanged by a swap");
-    if (!apply_override(scene_, text, problems_)) return false;
+    const bool is_set = apply_override(scene_, text, problems_);
+    // it was not an option of a command line
+    for (std::vector<SceneError>* said : {&problems_->errors, &problems_->warnings})
+      for (SceneError& one : *said)
+        if (one.file == "--set " + text) one.file = "set " + text;
+    if (!is_set) return false;
     if (root == "Body") note_motion(text);
     return true;
   }

@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "services/recorder/checkpoint.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/recorder.h"
 #include "services/run/session.h"
@@ -283,6 +287,24 @@ TEST(EditedRun, ASwapStays) {
   EXPECT_EQ(run.run().report.chain_hash(), result.report.chain_hash());
 }
 
+// A ball that fell asleep on the ground is woken by the edit that takes the ground away, and falls.
+TEST(EditedRun, WhoSleepsWakesUp) {
+  EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" + ball("A", "Position = {0, 0.1, 0}", kFalls) +
+                      ball("B", "Position = {3, 0.1, 0}", kFalls)),
+                {"remove Body.Ground@step=81"}, {"Simulator.SleepEnergy=0.001", "Simulator.SleepTime=0.5"});
+  run.options.events = run.folder.path("events");
+  run.options.event_kinds = std::vector<std::string>{"sleep", "edit", "wake"};
+  const std::map<std::string, Row> end = run.end();
+  for (const char* id : {"A", "B"}) EXPECT_NEAR(end.at(id).velocity.y(), -10 * 20 * kStep, 1e-12);
+  std::vector<std::string> kinds;
+  std::istringstream text(harness::read_file(run.options.events));
+  for (std::string line; std::getline(text, line);) {
+    const std::size_t at = line.find("\"kind\":\"") + 8;
+    kinds.push_back(line.substr(at, line.find('"', at) - at));
+  }
+  EXPECT_THAT(kinds, ::testing::ElementsAre("sleep", "sleep", "edit", "wake", "wake"));
+}
+
 class StoppedAt : public ::testing::TestWithParam<std::uint32_t> {};
 
 INSTANTIATE_TEST_SUITE_P(Step, StoppedAt, ::testing::Values(10, 30, 31, 45, 46, 60, 80));
@@ -343,6 +365,39 @@ TEST(EditedRun, TheJournalKnowsTheEdits) {
   EXPECT_THAT(other.fault, HasSubstr("step 31 came out differently"));
 }
 
+// With a right checksum and wrong content.
+TEST(EditedRun, AnImpossibleEditOfACheckpointIsRefused) {
+  const auto refusal_of = [](const std::function<void(recorder::v1::Checkpoint*)>& change) {
+    BusyRun run;
+    run.options.steps = 40;
+    run.options.edits.resize(1);
+    run.options.checkpoint = run.folder.path("checkpoint");
+    run.run();
+    std::string problem;
+    std::optional<recorder::v1::Checkpoint> checkpoint =
+        parse_checkpoint(read_whole_file(run.options.checkpoint), &problem);
+    EXPECT_GT(checkpoint->edits(0).places_size(), 0);
+    change(&*checkpoint);
+    replace_file(run.options.checkpoint, serialize_checkpoint(*checkpoint));
+    run.options.resume = std::exchange(run.options.checkpoint, "");
+    return run.refusal();
+  };
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
+                checkpoint->mutable_edits(0)->mutable_places(0)->set_position(0, std::nan(""));
+              }),
+              HasSubstr("the place of "));
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
+                checkpoint->mutable_edits(0)->mutable_places(0)->mutable_orientation()->RemoveLast();
+              }),
+              HasSubstr("the place of "));
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
+                checkpoint->mutable_edits(0)->mutable_changes(0)->mutable_add()->set_text("Bodies {");
+              }),
+              HasSubstr("the file ends inside the block"));
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) { checkpoint->clear_edits(); }),
+              HasSubstr("position has"));
+}
+
 TEST(EditedRun, WhatCannotBeIsSaidBeforeTheRunBegins) {
   EditedRun run(scene(ball("A", "") + ball("B", "Position = {1, 0, 0}"),
                       "Constraints { Constraint { Type = \"Spherical\" Id = \"Hang\" Body1 = \"A\" Body2 = \"B\" "
@@ -363,7 +418,7 @@ TEST(EditedRun, WhatCannotBeIsSaidBeforeTheRunBegins) {
       {"remove Body.A@step=6", "names no Body: \"A\""},
       {"remove Solver.X@step=5", "\"Solver\" is nothing that can go"},
       {"set Solver.Iterations=5@step=5", "a plugin and its properties are exchanged by a swap"},
-      {"set Body.A.Weight=5@step=5", "Weight"},
+      {"set Body.A.Weight=5@step=5", "edit before step 5: set Body.A.Weight=5: "},
       {"add /none@step=5", "/none"},
       {"add " + twice + "@step=5", "unknown block \"Body\""},
       {"add " + bodies + "@step=5", "Body \"A\" is there already"},
