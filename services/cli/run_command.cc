@@ -46,6 +46,8 @@ std::string resume_command(const RunOptions& options, const std::string& checkpo
   if (options.steps) command += fmt::format(" --steps {}", *options.steps);
   if (options.time_step) command += fmt::format(" --dt {}", *options.time_step);
   for (const std::string& one : options.overrides) command += " --set " + quoted(one);
+  // those that were made are known there
+  for (const std::string& one : options.edits) command += " --edit " + quoted(one);
   return command + " --resume " + quoted(checkpoint);
 }
 

@@ -232,14 +232,19 @@ class Run final : private kernel::CommitListener {
     if (frames_) frames_->offer(*environment_, last);
   }
 
-  void close_frames() {
-    if (!frames_) return;
-    for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
+  // What failed beside the run.
+  void note_survey() {
     for (const Slot slot : kSlots)
       for (const kernel::FaultRecord& failed : surveyor_->slot(slot).faults())
         warnings_.push_back(fmt::format(
             "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text,
             failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
+  }
+
+  void close_frames() {
+    if (!frames_) return;
+    for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
+    note_survey();
     frames_->close();
   }
 
@@ -317,8 +322,6 @@ class Run final : private kernel::CommitListener {
       }
       edits_.leave_out_past(resumed->checkpoint.step(), resumed->journal.edits);
     }
-    if (!edits_.to_come().empty() && !options_.instrumentation.empty())
-      throw BadInput("--edit and --instrumentation do not go together");
     edits_.rehearse(options_, scene_, description_, &catalog_);
   }
 
@@ -365,6 +368,11 @@ class Run final : private kernel::CommitListener {
     if (event_source_) event_source_->begin_again();
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
+    if (surveyor_) {
+      note_survey();
+      surveyor_.emplace(begun, options_.starter);
+      frames_->begin_again(&*surveyor_);
+    }
     figures_->begin_again(environment_.get());
     give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},

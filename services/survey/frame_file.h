@@ -20,6 +20,9 @@ class FrameFile {
   FrameFile(const FrameFile&) = delete;
   FrameFile& operator=(const FrameFile&) = delete;
 
+  // The scene was edited, and who answers knows it.
+  void begin_again(Surveyor* surveyor) { instrumentation_.emplace(surveyor); }
+
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);
 
@@ -36,7 +39,7 @@ class FrameFile {
 
   std::string path_;
   std::FILE* file_;
-  Instrumentation instrumentation_;
+  std::optional<Instrumentation> instrumentation_;
   std::vector<Kind> kinds_;
   Sampling sampling_;
   std::string title_;

@@ -273,6 +273,23 @@ TEST(EditedRun, HostingChangesNoBit) {
   EXPECT_EQ(hurt.report.faults(1).step(), 50U);
 }
 
+TEST(EditedRun, DebugGeometryIsThatOfTheEditedScene) {
+  BusyRun run;
+  const std::string chain = run.run().report.chain_hash();
+  run.options.instrumentation = run.folder.path("frames");
+  run.options.instrumentation_kinds = {"shape", "contact", "trajectory"};
+  const RunResult result = run.run();
+  EXPECT_EQ(result.report.chain_hash(), chain);
+  std::istringstream text(harness::read_file(run.options.instrumentation));
+  std::string first, last;
+  std::getline(text, first);
+  for (std::string line; std::getline(text, line);) last = line;
+  EXPECT_THAT(first, HasSubstr("\"B\""));
+  EXPECT_THAT(first, ::testing::Not(HasSubstr("\"D\"")));
+  EXPECT_THAT(last, HasSubstr("\"D\""));
+  EXPECT_THAT(last, ::testing::Not(HasSubstr("\"B\"")));
+}
+
 // Whoever took over answers in the edited scene, too.
 TEST(EditedRun, ASwapStays) {
   BusyRun run;
@@ -303,6 +320,21 @@ TEST(EditedRun, WhoSleepsWakesUp) {
     kinds.push_back(line.substr(at, line.find('"', at) - at));
   }
   EXPECT_THAT(kinds, ::testing::ElementsAre("sleep", "sleep", "edit", "wake", "wake"));
+}
+
+// A plugin that takes over binds joints where they were bound, not where the scene had the bodies.
+TEST(EditedRun, JointsAreBoundAgainWhereTheyWere) {
+  BusyRun run;
+  run.options.edits.resize(1);
+  run.options.hosting = {{std::nullopt, Hosting::kSharedMemory}};
+  const std::string chain = run.run().report.chain_hash();
+  for (const char* joints : {"constraint=Distance", "constraint=Spherical"}) {
+    run.options.swaps = {std::string(joints) + "@step=50,hosting=grpc"};
+    const RunResult swapped = run.run();
+    EXPECT_EQ(swapped.report.chain_hash(), chain) << joints;
+    ASSERT_EQ(swapped.report.swaps_size(), 1);
+    EXPECT_EQ(swapped.report.swaps(0).outcome(), "committed") << swapped.report.swaps(0).reason();
+  }
 }
 
 class StoppedAt : public ::testing::TestWithParam<std::uint32_t> {};
