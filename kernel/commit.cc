@@ -1,5 +1,5 @@
-// Stage::kCommit: the checked answers become S_{n+1} in the second state, the states are swapped, hashes and
-// events follow. Nothing before the swap can be seen from outside.
+// Stage::kCommit: the checked answers become S_{n+1} in the second state, the states are swapped, hashes
+// follow. Nothing before the swap can be seen from outside.
 #include <algorithm>
 #include <utility>
 
@@ -28,7 +28,6 @@ StepOutcome Environment::step() {
   if (fault_) return StepOutcome::kPaused;
   const std::uint64_t start = lap_ns_ = channel::now_ns();
   const CommitFigures figures = figures_;
-  events_.clear();
   try {
     find_sleepers();
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
@@ -94,11 +93,10 @@ void Environment::commit_solution(const Trusted<Solution>&) {
 void Environment::end_inner_step() {
   if (model_.constraint_count > 0) update_joints();
   if (has_contacts()) find_touching();
-  if (listener_ != nullptr && has_contacts()) raise_collision_events();
-  if (listener_ != nullptr && model_.constraint_count > 0) raise_break_events();
   back().rested.assign(front().rested);
   back().rest_wrench.assign(front().rest_wrench);
-  if (commit_listener_ != nullptr) commit_listener_->on_inner_step(*this, data_, inner_);
+  if (commit_listener_ != nullptr)
+    commit_listener_->on_inner_step(*this, {inner_, data_, front(), back(), inner_end_time()});
   std::swap(front_, back_);
   if (inner_ == 0 && states_.size() > 2) std::swap(back_, start_);
   ++inner_;
@@ -108,7 +106,6 @@ void Environment::return_to_start() {
   if (inner_ > 0) std::swap(front_, states_.size() > 2 ? start_ : back_);
   inner_ = 0;
   must_restart_ = false;
-  events_.clear();
 }
 
 void Environment::finish_step() {
@@ -119,7 +116,6 @@ void Environment::finish_step() {
   if (inner_ > 0) state_hash_ = kernel::state_hash(front());
   inner_ = 0;
   chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
-  for (const Event& event : events_) listener_->on_event(event);
   lap_ns_ = channel::now_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_ns_ - start);
 }
@@ -218,36 +214,8 @@ void Environment::find_touching() {
   copy_rows(merged_, 2, now, before, back().touching);
 }
 
-// Before the states are swapped: back() is what comes, front() what was.
 double Environment::inner_end_time() const {
   return inner_end_ == length_of_step(step_count_ + 1) ? time_of(step_count_ + 1) : time() + inner_end_;
-}
-
-void Environment::raise_collision_events() {
-  std::size_t contact = 0;
-  visit_changes(front().touching.span(), back().touching.span(), [&](bool starts, std::uint32_t a, std::uint32_t b) {
-    const EventKind kind = starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd;
-    Event event{kind, step_count_ + 1, inner_end_time(), a, b, kNone, 0.0, 0.0};
-    for (; starts && contact < data_.contact_key.size(); ++contact) {
-      const std::pair bodies{data_.contact_body[2 * contact], data_.contact_body[2 * contact + 1]};
-      if (bodies > std::pair{a, b}) break;
-      if (bodies != std::pair{a, b}) continue;
-      const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
-      event.relative_speed =
-          std::max(event.relative_speed, -normal.dot(vector_at(data_.contact_relative_velocity.span(), contact)));
-      event.impulse += normal.dot(vector_at(data_.contact_impulse.span(), contact));
-    }
-    events_.push_back(event);
-  });
-}
-
-void Environment::raise_break_events() {
-  for (std::uint32_t joint = 0; joint < model_.constraint_count; ++joint) {
-    if (front().intact[joint] == back().intact[joint]) continue;
-    const ConstraintDescription& broken = model_.constraints[joint];
-    events_.push_back(
-        {EventKind::kBreak, step_count_ + 1, inner_end_time(), broken.body1, broken.body2, joint, 0.0, 0.0});
-  }
 }
 
 }  // namespace gravitas::kernel

@@ -5,8 +5,10 @@
 // are flattened as plugin_sdk/property.h says.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -100,6 +102,8 @@ struct ConstraintDescription {
   double breaking_threshold = 0.0;             // joint error, m; 0: never
   double breaking_force = 0.0;                 // N; 0: never
   std::uint32_t plugin = 0;                    // which of the constraint slot's plugins serves the type
+  // Poses of its bodies in which it is bound; absent: the initial ones. A joint of a scene that was edited has others.
+  std::optional<std::array<Pose, 2>> bound_at = {};
 };
 
 // How a step is made of stages (simulators/).
@@ -125,7 +129,6 @@ struct EnvironmentDescription {
 
   SlotDescription space, collision, constraint, force, solver, integrator;
   std::uint32_t threads = 1;  // of each host's parallel_for
-  bool events = false;        // somebody listens to collision events
   // Steps from one whose answers are held against laws of physics (plugin_sdk/physics_checks.h) to the next; 1: each,
   // 0: none.
   std::uint32_t check_physics_every = 0;

@@ -19,10 +19,10 @@
 
 #include "kernel/arena.h"
 #include "kernel/description.h"
-#include "kernel/events.h"
 #include "kernel/fault.h"
 #include "kernel/hash.h"
 #include "kernel/model.h"
+#include "kernel/pair_arbiter.h"
 #include "kernel/plan.h"
 #include "kernel/saved_state.h"
 #include "kernel/slot.h"
@@ -55,18 +55,26 @@ struct PoisonedCall {
   const StageFault& fault;
 };
 
-// Hears of what a recorder keeps.
+// A part of a step, whose end has become a state.
+struct InnerStep {
+  std::uint32_t number;  // in its step
+  const StepData& data;  // what was worked out for it
+  const State& before;   // where it began
+  const State& after;    // where it ended
+  double end;            // s
+};
+
+// Hears of what a recorder keeps, and of what happens.
 class CommitListener {
  public:
   virtual ~CommitListener() = default;
   // Others answer from now on; told before the commit that uses them.
   virtual void on_decision(const Environment&, const Decision&) {}
   virtual void on_poison(const Environment&, const PoisonedCall&) {}
-  // An inner step ends, number `inner` of its step, with what was worked out for it. At 0 those before count no longer: the
-  // step has been begun again.
-  virtual void on_inner_step(const Environment&, const StepData&, std::uint32_t /*inner*/) {}
-  // Called at the end of a step, when S_{n+1} is the committed state and its events have been told. What it throws
-  // comes out of step(); the commit stands.
+  // An inner step ends. With number 0 those before count no longer: the step has been begun again.
+  virtual void on_inner_step(const Environment&, const InnerStep&) {}
+  // Called at the end of a step, when S_{n+1} is the committed state. What it throws comes out of step(); the commit
+  // stands.
   virtual void on_commit(const Environment& environment) = 0;
 };
 
@@ -129,10 +137,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   void wake(std::uint32_t body) { wake_orders_.push_back(body); }
   bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
 
-  // At most one listener; null: no events are made.
-  void set_listener(EventListener* listener) { listener_ = listener; }
   // At most one; null: nobody.
   void set_commit_listener(CommitListener* listener) { commit_listener_ = listener; }
+  // At most one; null: the scene's own rules hold. What it decides is part of what determines the trajectory.
+  void set_pair_arbiter(PairArbiter* arbiter) { arbiter_ = arbiter; }
 
   // The committed state with everything that the next steps depend on; its columns are valid until the next step.
   SavedState saved_state() const;
@@ -206,8 +214,6 @@ class Environment : private DerivativeSource, private SlotObserver {
   double gap_at(std::size_t contact, const State& state) const;
   void find_touching();
   double inner_end_time() const;
-  void raise_collision_events();
-  void raise_break_events();
   void end_inner_step();
   void finish_step();
 
@@ -323,9 +329,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   Hash state_hash_, chain_hash_;
   std::optional<FaultRecord> fault_;
   std::vector<FaultRecord> faults_;
-  EventListener* listener_ = nullptr;
-  std::vector<Event> events_;  // of the inner steps so far
   CommitListener* commit_listener_ = nullptr;
+  PairArbiter* arbiter_ = nullptr;
   // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.
   std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};
   std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_, validation_;

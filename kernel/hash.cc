@@ -17,13 +17,16 @@ std::string Hash::text() const {
   return digits.data();
 }
 
-Hash state_hash(const State& state) {
+Hash state_hash(const std::array<std::span<const double>, 4>& columns) {
   // the columns are hashed one by one and then together, so the gaps between them do not count
   std::array<XXH128_hash_t, 4> parts;
-  const Column<double> columns[] = {state.position, state.orientation, state.linear_velocity, state.angular_velocity};
-  for (std::size_t i = 0; i < parts.size(); ++i)
-    parts[i] = XXH3_128bits(columns[i].data(), columns[i].size() * sizeof(double));
+  for (std::size_t i = 0; i < parts.size(); ++i) parts[i] = XXH3_128bits(columns[i].data(), columns[i].size_bytes());
   return from(XXH3_128bits(parts.data(), sizeof parts));
+}
+
+Hash state_hash(const State& state) {
+  return state_hash(
+      {state.position.span(), state.orientation.span(), state.linear_velocity.span(), state.angular_velocity.span()});
 }
 
 Hash chain_hash(const Hash& chain, const Hash& state) {

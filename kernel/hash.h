@@ -4,7 +4,9 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "kernel/state.h"
@@ -18,7 +20,8 @@ struct Hash {
   std::string text() const;
 };
 
-// Hash of every body's pose and velocity, bit for bit.
+// Hash of every body's pose and velocity, bit for bit: of its position, orientation, linear and angular velocity.
+Hash state_hash(const std::array<std::span<const double>, 4>& columns);
 Hash state_hash(const State& state);
 
 // Hash of the chain so far and the next state.

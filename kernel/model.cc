@@ -105,6 +105,9 @@ Model::Model(Arena* arena, const EnvironmentDescription& d)
     group.body = Column<std::uint32_t>(arena, 2 * served.size(), 0);
     group.parameter_begin = Column<std::uint32_t>(arena, served.size() + 1, 0);
     group.parameter = Column<double>(arena, parameter_count(served), 0);
+    group.bind_body = Column<std::uint32_t>(arena, 2 * served.size(), 0);
+    group.bind_position = Column<double>(arena, 6 * served.size(), 0);
+    group.bind_orientation = Column<double>(arena, 8 * served.size(), 0);
     group.bound_begin = Column<std::uint32_t>(arena, served.size() + 1, 0);
     group.bound = Column<double>(arena, 0, 32 * served.size());
   }

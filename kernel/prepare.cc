@@ -63,7 +63,15 @@ void Environment::bind_joints() {
 
 void Environment::bind(const ConstraintGroup& group, const Column<double>& position,
                        const Column<double>& orientation) {
-  const auto request = ids(group.type, group.body, group.parameter_begin, group.parameter, position, orientation);
+  for (std::uint32_t row = 0; row < group.body.size(); ++row) {
+    const auto& bound_at = model_.constraints[group.row[row / 2]].bound_at;
+    const Pose pose = bound_at ? bound_at->at(row % 2) : pose_of(position, orientation, group.body[row]);
+    group.bind_body[row] = group.body[row] == kNone ? kNone : row;
+    set_vector(group.bind_position.span(), row, pose.position);
+    set_quaternion(group.bind_orientation.span(), row, pose.orientation);
+  }
+  const auto request = ids(group.type, group.bind_body, group.parameter_begin, group.parameter, group.bind_position,
+                           group.bind_orientation);
   const auto reply = ids(group.bound_begin, group.bound);
   const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
   ask(Stage::kConstrain, &constraint_, call, nullptr,

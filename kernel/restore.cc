@@ -140,8 +140,7 @@ std::string Environment::find_misfit(const SavedState& saved) const {
            " s: a shortened last step can neither be continued nor be made of a whole one";
   for (const double figure : {saved.figures.penetration, saved.figures.joint_error})
     if (!std::isfinite(figure) || figure < 0.0) return "its overlap or joint error is impossible";
-  if (saved.step == 0 && !(saved.state_hash == state_hash_ && saved.chain_hash == chain_hash_))
-    return "it is another initial state";
+  if (saved.step == 0 && !(saved.state_hash == state_hash_)) return "it is another initial state";
   return {};
 }
 

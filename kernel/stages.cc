@@ -148,6 +148,7 @@ Trusted<Pairs> Environment::find_pairs() {
   const auto pairs = ask(Stage::kBroadPhase, &space_, {stage::Method::kSpacePairs, 0, request, reply}, nullptr,
                          [&](const auto& answer) { return validator_.pairs(answer, data_); });
   if (sleepers_ > 0) leave_out_sleepers();
+  if (arbiter_ != nullptr) data_.pair.resize(arbiter_->keep_allowed(*this, data_.pair.span()));
   return pairs;
 }
 
@@ -222,6 +223,7 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
     set_vector(data_.contact_warm_impulse.span(), i,
                known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());
   }
+  if (arbiter_ != nullptr) arbiter_->mix_materials(data_.contact_body.span(), data_.contact_material.span());
 }
 
 void Environment::constrain(const Trusted<TrialState>&) {

@@ -125,15 +125,9 @@ void Environment::settle() {
   wakes_all_ = false;
   wake_orders_.clear();
   if (!can_sleep() || inner_ == 0) return;
-  const auto raise = [&](EventKind kind, std::uint32_t body) {
-    if (listener_ != nullptr) events_.push_back({kind, step_count_, time(), body, kNone, kNone, 0.0, 0.0});
-  };
   const State& next = front();
-  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    if (next.rested[i] != kAsleep || !is_awake(i)) continue;
-    next.rested[i] = 0;
-    raise(EventKind::kWake, i);
-  }
+  for (std::uint32_t i = 0; i < model_.body_count; ++i)
+    if (next.rested[i] == kAsleep && is_awake(i)) next.rested[i] = 0;
   const BodiesAtRest bodies = bodies_at_rest(model_, next);
   const std::uint32_t steps = activity_.steps_to_sleep(description_.time_step);
   activity_.count_rest(bodies, steps, next.rested.span());
@@ -143,7 +137,6 @@ void Environment::settle() {
     for (const Column<double>* velocity : {&next.linear_velocity, &next.angular_velocity})
       set_vector(velocity->span(), body, Vector3::Zero());
     next.state_changed[body] = 1;
-    raise(EventKind::kSleep, body);
   }
 }
 

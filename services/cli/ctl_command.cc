@@ -9,11 +9,13 @@
 
 #include "services/cli/commands.h"
 #include "services/cli/query_text.h"
+#include "services/cli/scene_options.h"
 #include "services/control/client.h"
 #include "services/control/server_socket.h"
 #include "services/control/status_text.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
+#include "services/run/edit_spec.h"
 #include "services/run/session.h"
 #include "services/survey/picture.h"
 
@@ -30,7 +32,9 @@ struct CtlLine {
   std::string text;  // what a swap, a setting, a fault or a slot is
   std::string out;
   QueryText query;
-  std::vector<std::string> kinds;
+  std::vector<std::string> kinds, changes;
+  std::optional<std::vector<std::string>> event_kinds;
+  std::optional<double> ongoing_rate;  // Hz
 };
 
 using Order = std::function<int(const CtlLine&, ControlClient*)>;
@@ -106,6 +110,20 @@ int swap(const CtlLine& line, ControlClient* client) {
 
 int set_property(const CtlLine& line, ControlClient* client) {
   return follow_swap(line, client, client->set_property(control::parse_set_request(line.text)));
+}
+
+int edit(const CtlLine& line, ControlClient* client) {
+  api::EditRequest request;
+  for (const std::string& change : line.changes) *request.add_changes() = parse_change(change);
+  const api::EditMade made = client->edit(request);
+  for (const std::string& warning : made.warnings()) std::cerr << warning << '\n';
+  if (line.json) {
+    std::cout << to_json(made, JsonForm::kPage);
+  } else {
+    std::cout << fmt::format("edited before step {}; the run stood for {:.0f} ms\n", made.step(),
+                             1e-3 * made.pause_us());
+  }
+  return kDone;
 }
 
 int inject(const CtlLine& line, ControlClient* client) {
@@ -185,6 +203,20 @@ int watch(const CtlLine& line, ControlClient* client) {
   return kDone;
 }
 
+int show_events(const CtlLine& line, ControlClient* client) {
+  api::EventsRequest request;
+  for (const std::string& kind : line.event_kinds.value_or(std::vector<std::string>())) request.add_kinds(kind);
+  request.set_ongoing_rate(line.ongoing_rate.value_or(0.0));
+  client->watch_events(
+      request, [] {},
+      [](const events::v1::Event& event) {
+        std::cout << to_json(event, JsonForm::kLine) << std::flush;
+        return std::cout.good();
+      });
+  std::cerr << "gravitas ctl: the server has ended\n";
+  return kDone;
+}
+
 }  // namespace
 
 void add_ctl(CLI::App* app, Action* action) {
@@ -229,6 +261,19 @@ void add_ctl(CLI::App* app, Action* action) {
   add_order("set", "Change a live property of a plugin", "set Solver.Iterations=50", set_property, "SPEC",
             "Slot.Property=VALUE")
       ->add_flag("--no-wait", line->no_wait, no_wait);
+  add("edit", "Change the scene while the run goes on: all changes or none",
+      "edit 'remove Constraint.Hinge' 'set Body.Door.LinearVelocity={1,0,0}' 'add more.gravitas'", edit)
+      ->add_option("CHANGE", line->changes,
+                   "\"add FILE\" (Geometries, Materials, Forces, Bodies, Constraints), \"remove Body.Ball\", "
+                   "\"set Body.Ball.Position={0,1,0}\"")
+      ->required();
+  add_order(
+      "wake", "Wake a body that sleeps, with those that it touches", "wake Ball",
+      [](const CtlLine& now, ControlClient* client) {
+        print_line(now, client->wake(now.text));
+        return kDone;
+      },
+      "BODY", "Id of the body");
   add_order("inject", "Have a worker commit a fault", "inject solver:kill", inject, "SPEC",
             "SLOT:KIND[@step=N][,ARGUMENT=VALUE]...: at step N, or the next");
   CLI::App* capture_command =
@@ -258,6 +303,9 @@ void add_ctl(CLI::App* app, Action* action) {
       ->allow_extra_args(false);
   picture->add_option("--out", line->out, "File: JSON, or a picture if its name ends in .svg");
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
+  CLI::App* events_command = add("events", "Print events from now on as JSON lines, until Ctrl-C or the server ends",
+                                 "events --kinds collision_start,fault,swap", show_events);
+  add_event_options(events_command, "--kinds", &line->event_kinds, &line->ongoing_rate);
 }
 
 }  // namespace gravitas::cli

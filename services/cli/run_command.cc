@@ -46,6 +46,8 @@ std::string resume_command(const RunOptions& options, const std::string& checkpo
   if (options.steps) command += fmt::format(" --steps {}", *options.steps);
   if (options.time_step) command += fmt::format(" --dt {}", *options.time_step);
   for (const std::string& one : options.overrides) command += " --set " + quoted(one);
+  // those that were made are known there
+  for (const std::string& one : options.edits) command += " --edit " + quoted(one);
   return command + " --resume " + quoted(checkpoint);
 }
 
@@ -122,8 +124,11 @@ int plan_scene(RunLine* line) {
 void add_run(CLI::App* app, Action* action) {
   const auto line = std::make_shared<RunLine>();
   CLI::App* command = app->add_subcommand("run", "Simulate a scene");
-  command->footer("Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n\nFaults:\n" +
-                  fault_help());
+  command->footer(
+      "Example: gravitas run deploy/scenes/two_spheres_motor.gravitas --report report.json\n"
+      "         gravitas run deploy/scenes/two_spheres_motor.gravitas --edit 'remove "
+      "Constraint.MyAngularMotor@step=200' --event-kinds all --events events.jsonl\n\nFaults:\n" +
+      fault_help());
   line->scene.add_to(command);
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
@@ -135,6 +140,7 @@ void add_run(CLI::App* app, Action* action) {
                       "lines, the mean over "
                       "the step that ends with the sample); the report then has those of the last step");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
+  add_event_options(command, "--event-kinds", &options.event_kinds, &options.ongoing_rate);
   CLI::Option* instrumentation = command->add_option(
       "--instrumentation", options.instrumentation,
       "Write debug geometry to this file: JSON lines, a frame per sample; NAME.svg: a picture of the last state");
@@ -157,6 +163,11 @@ void add_run(CLI::App* app, Action* action) {
                       "Go on from this checkpoint; --steps and --duration count from t = 0");
   add_list(command, "--swap", &options.swaps,
            "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N; repeatable");
+  add_list(
+      command, "--edit", &options.edits,
+      "Change the scene while the simulation runs, before step N: \"add FILE@step=N\", \"remove Body.Ball@step=N\", "
+      "\"set Body.Ball.Position={0,1,0}@step=N\"; FILE holds Geometries, Materials, Forces, Bodies, Constraints; "
+      "changes before the same step are one; repeatable");
   add_list(command, "--compare", &options.comparisons,
            "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
   add_list(command, "--rerun", &options.reruns,

@@ -54,6 +54,18 @@ void add_list(CLI::App* command, const char* name, std::vector<std::string>* val
   command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
 }
 
+void add_event_options(CLI::App* command, const char* name, std::optional<std::vector<std::string>>* kinds,
+                       std::optional<double>* ongoing_rate) {
+  command
+      ->add_option(name, *kinds,
+                   "Kinds of events to look for, separated by commas: collision_start, collision_ongoing, "
+                   "collision_end, break, wake, sleep, fault, swap, edit, listener; all; none. If absent: "
+                   "collision_start, collision_end, break, wake, sleep. What is not looked for costs nothing")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--ongoing-rate", *ongoing_rate, "How often collision_ongoing is told, Hz [10]");
+}
+
 void SceneOptions::add_to(CLI::App* command) {
   command->add_option("SCENE", run_->scenes, "Scene files; several are read as one scene")->required();
   command->add_option("--duration", run_->duration, "Simulated time, s");

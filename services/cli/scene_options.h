@@ -28,6 +28,10 @@ class SceneOptions {
 // An option that may be repeated, with one value each time.
 void add_list(CLI::App* command, const char* name, std::vector<std::string>* values, const char* text);
 
+// Kinds of events under `name`, and --ongoing-rate.
+void add_event_options(CLI::App* command, const char* name, std::optional<std::vector<std::string>>* kinds,
+                       std::optional<double>* ongoing_rate);
+
 // The words of --hosting and --attach. Throws BadInput, naming what is allowed.
 std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words,
                                          const std::vector<std::string>& attached = {});

@@ -24,6 +24,11 @@ grpc::ChannelArguments channel_arguments() {
   return arguments;
 }
 
+// Of a stream that the server, or this end, may end at any time.
+bool is_over(const grpc::Status& end) {
+  return end.error_code() == grpc::StatusCode::CANCELLED || end.error_code() == grpc::StatusCode::UNAVAILABLE;
+}
+
 void require(const grpc::Status& status) {
   using Kind = ControlError::Kind;
   switch (status.error_code()) {
@@ -91,6 +96,16 @@ api::SwapOrdered ControlClient::set_property(const api::SetPropertyRequest& requ
   return connection_->call(&api::Control::Stub::SetProperty, request);
 }
 
+api::EditMade ControlClient::edit(const api::EditRequest& request) {
+  return connection_->call(&api::Control::Stub::EditScene, request);
+}
+
+api::Status ControlClient::wake(const std::string& body) {
+  api::WakeRequest request;
+  request.set_body(body);
+  return connection_->call(&api::Control::Stub::Wake, request);
+}
+
 api::InjectOrdered ControlClient::inject(const std::string& fault) {
   api::InjectRequest request;
   request.set_fault(fault);
@@ -118,10 +133,41 @@ void ControlClient::watch(std::uint32_t interval_ms, const std::function<bool(co
   bool goes_on = true;
   while (goes_on && reader->Read(&status)) goes_on = show(status);
   if (!goes_on) context.TryCancel();
-  const grpc::Status end = reader->Finish();
-  const bool is_over =
-      end.error_code() == grpc::StatusCode::CANCELLED || end.error_code() == grpc::StatusCode::UNAVAILABLE;
-  if (!is_over) require(end);
+  if (const grpc::Status end = reader->Finish(); !is_over(end)) require(end);
+}
+
+void ControlClient::watch_events(const api::EventsRequest& request, const std::function<void()>& begun,
+                                 const std::function<bool(const events::v1::Event&)>& show) {
+  grpc::ClientContext context;
+  const auto reader = connection_->stub->WatchEvents(&context, request);
+  reader->WaitForInitialMetadata();
+  begun();
+  events::v1::Event event;
+  bool goes_on = true;
+  while (goes_on && reader->Read(&event)) goes_on = show(event);
+  if (!goes_on) context.TryCancel();
+  if (const grpc::Status end = reader->Finish(); !is_over(end)) require(end);
+}
+
+void ControlClient::decide_pairs(
+    double deadline, const std::function<void()>& begun,
+    const std::function<std::optional<api::PairDecisions>(const api::PairQuestions&)>& decide) {
+  grpc::ClientContext context;
+  const auto stream = connection_->stub->DecidePairs(&context);
+  api::PairDecisions first;
+  first.set_deadline(deadline);
+  stream->Write(first);
+  stream->WaitForInitialMetadata();
+  begun();
+  api::PairQuestions questions;
+  while (stream->Read(&questions)) {
+    const std::optional<api::PairDecisions> decisions = decide(questions);
+    if (!decisions) context.TryCancel();
+    if (!decisions || !stream->Write(*decisions)) break;
+  }
+  // what is still on its way is of no use
+  while (stream->Read(&questions)) continue;
+  if (const grpc::Status end = stream->Finish(); !is_over(end)) require(end);
 }
 
 // ---- what a person writes

@@ -37,10 +37,19 @@ class ControlClient {
   api::Status reset();
   api::SwapOrdered swap(const api::SwapRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
+  api::EditMade edit(const api::EditRequest& request);
+  api::Status wake(const std::string& body);
   api::InjectOrdered inject(const std::string& fault);
   api::Captured capture(const api::CaptureRequest& request);
   query::v1::Answers query(const query::v1::Batch& batch);
   instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
+  // `begun` is called when it listens, then `show` for each event until it returns false, or the server ends.
+  void watch_events(const api::EventsRequest& request, const std::function<void()>& begun,
+                    const std::function<bool(const events::v1::Event&)>& show);
+  // Decides about pairs (DecidePairs) until `decide` returns nothing, or the server ends: `begun` is called when it
+  // listens. `deadline` (s) as in PairDecisions.
+  void decide_pairs(double deadline, const std::function<void()>& begun,
+                    const std::function<std::optional<api::PairDecisions>(const api::PairQuestions&)>& decide);
   // Until `show` returns false, or the server ends.
   void watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show);
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 
@@ -65,9 +66,9 @@ PropertyValue parse_value(const std::string& what, const std::string& text) {
 ServedRun::ServedRun(const ServeOptions& options)
     : options_(options.run),
       speed_(options.speed),
-      description_(load(options.run, &scene_warnings_, &catalog_)),
+      first_description_(load(options.run, &scene_warnings_, &catalog_, &first_scene_)),
       timer_(loop_) {
-  for (const std::string& path : options.run.scenes) scene_ += (scene_.empty() ? "" : " ") + path;
+  for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
   begin_environment();
   if (!options.is_paused && state_ == State::kPaused) go();
   thread_ = std::jthread([this] {
@@ -80,20 +81,27 @@ ServedRun::~ServedRun() { loop_.stop(); }
 
 void ServedRun::begin_environment() {
   // where the new one cannot be made the old one stays
-  auto environment = start(description_, capsule::recording(tape_));
+  auto environment = start(first_description_, capsule::recording(tape_));
   close_capture();
   survey_.reset();
   environment_ = std::move(environment);
+  scene_ = first_scene_;
+  description_ = first_description_;
+  past_.Clear();
+  past_swaps_.clear();
   events_ = std::make_unique<EventLog>("", description_);
   figures_ = std::make_unique<Figures>(description_);
-  recorder_ = std::make_unique<Recorder>(identity_of(description_), [this] {
+  recorder_ = std::make_unique<Recorder>(identity_of(first_description_), [this] {
     recorder::v1::Tally tally;
     figures_->write(&tally);
     events_->write(&tally);
     return tally;
   });
-  environment_->set_listener(events_.get());
+  event_source_.emplace(events_.get());
+  with_subscriptions([](Subscription* one) { one->source().begin_again(); });
   environment_->set_commit_listener(this);
+  pair_decisions_.forget();
+  if (listener_) attend_listener();
   active_ = slots_of(description_);
   forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
   orders_.clear();
@@ -186,6 +194,7 @@ void ServedRun::make_step() {
 // As a run does that pauses: what was computed is not lost with the server.
 void ServedRun::keep_faulted_state() {
   stand(State::kFaulted);
+  with_subscriptions([&](Subscription* one) { one->source().tell_incidents(*environment_); });
   try {
     const std::string path = std::filesystem::absolute(paused_checkpoint(options_));
     recorder_->save_to(path, *environment_);
@@ -257,13 +266,13 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   if (spec.plugin.empty()) throw BadInput(spec.text + ": allowed: the name of a plugin, or the path of a library");
   if (!request.hosting().empty()) spec.hosting = parse_hosting_mode("swap", word, request.hosting());
   // the settings of the moment, else those of the scene
-  const kernel::EnvironmentDescription active = between_steps([this] { return active_; });
+  const auto [active, scenes] = between_steps([this] { return std::pair(active_, slots_of(description_)); });
   const bool is_active = std::ranges::any_of(active.slot(spec.slot).plugins, [&](const kernel::PluginChoice& one) {
     return one.declaration.name == spec.plugin;
   });
   // a library is asked in a process, which the steps do not wait for; the copy keeps its name from staying known
   Catalog catalog = catalog_;
-  kernel::SwapOrder found = resolve_swap(spec, is_active ? active : description_, &catalog);
+  kernel::SwapOrder found = resolve_swap(spec, is_active ? active : scenes, &catalog);
   return between_steps([&] {
     found.step = next_step(spec.text, request.step());
     return order(std::move(found));
@@ -433,6 +442,69 @@ instrumentation::v1::Frame ServedRun::instrumentation(const api::Instrumentation
     surveyor();
     return survey_->instrumentation.frame(*environment_, kinds);
   });
+}
+
+std::shared_ptr<Subscription> ServedRun::subscribe(const api::EventsRequest& request) {
+  const std::vector<std::string> names(request.kinds().begin(), request.kinds().end());
+  const double rate = request.ongoing_rate() == 0.0 ? kOngoingRate : request.ongoing_rate();
+  if (!std::isfinite(rate) || rate < 0.0)
+    throw BadInput(fmt::format("events: a rate of {:g} Hz; allowed: a finite number > 0", rate));
+  EventKinds kinds = default_event_kinds();
+  try {
+    if (!names.empty()) kinds = parse_event_kinds(names);
+  } catch (const std::invalid_argument& problem) {
+    throw BadInput(fmt::format("events: {}", problem.what()));
+  }
+  return between_steps([&] {
+    auto subscription = std::make_shared<Subscription>(description_, kinds, rate);
+    subscription->source().leave_out_past(*environment_);
+    subscriptions_.push_back(subscription);
+    return subscription;
+  });
+}
+
+void ServedRun::listen(std::shared_ptr<RemoteListener> listener, double deadline) {
+  const double seconds = deadline == 0.0 ? kListenerDeadline : deadline;
+  if (!(seconds > 0.0 && seconds <= 60.0))
+    throw BadInput(fmt::format("a deadline of {:g} s; allowed: more than 0, up to 60", deadline));
+  between_steps([&] {
+    if (listener_) throw NotNow("another client decides about pairs");
+    listener_ = std::move(listener);
+    pair_decisions_.listen(listener_, seconds);
+    attend_listener();
+  });
+}
+
+void ServedRun::end_listening(const std::shared_ptr<RemoteListener>& listener) {
+  between_steps([&] {
+    if (listener_ != listener) return;
+    pair_decisions_.leave();
+    listener_.reset();
+  });
+}
+
+void ServedRun::attend_listener() {
+  environment_->set_pair_arbiter(&pair_decisions_);
+  recorder_->note_listener();
+}
+
+void ServedRun::leave_aside(const std::string& why) {
+  warnings_.push_back(why);
+  Event event{EventKind::kListener, environment_->step_count() + 1, environment_->time()};
+  event.text = why;
+  with_subscriptions([&](Subscription* one) { one->tell(event); });
+  listener_->dismiss(why);
+  listener_.reset();
+}
+
+void ServedRun::on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  event_source_->on_inner_step(environment, inner);
+  with_subscriptions([&](Subscription* one) { one->source().on_inner_step(environment, inner); });
+}
+
+void ServedRun::on_commit(const kernel::Environment& environment) {
+  event_source_->on_commit(environment);
+  with_subscriptions([&](Subscription* one) { one->source().on_commit(environment); });
 }
 
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {

@@ -25,6 +25,9 @@
 #include "kernel/environment.h"
 #include "services/capsule/recording_host.h"
 #include "services/catalog/catalog.h"
+#include "services/control/remote_listener.h"
+#include "services/control/subscription.h"
+#include "services/events/event_source.h"
 #include "services/recorder/event_log.h"
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
@@ -54,7 +57,7 @@ class ServedRun final : private kernel::CommitListener {
   ServedRun(const ServedRun&) = delete;
   ServedRun& operator=(const ServedRun&) = delete;
 
-  const std::string& scene() const { return scene_; }
+  const std::string& scene() const { return scene_name_; }
   // Of the reader, for whoever started it.
   const std::vector<std::string>& scene_warnings() const { return scene_warnings_; }
 
@@ -67,10 +70,19 @@ class ServedRun final : private kernel::CommitListener {
 
   api::SwapOrdered swap(const api::SwapRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
+  api::EditMade edit(const api::EditRequest& request);
+  void wake(const api::WakeRequest& request);
   api::InjectOrdered inject(const api::InjectRequest& request);
   // Begins to keep calls. The future is ready when the steps are made, or end_capture() has ended it.
   std::future<api::Captured> capture(const api::CaptureRequest& request);
   void end_capture();
+
+  // Events from now on, for as long as somebody holds it; a reset does not end it.
+  std::shared_ptr<Subscription> subscribe(const api::EventsRequest& request);
+
+  // It decides about pairs, until it is dismissed or end_listening() is called. What was decided holds up to a reset.
+  void listen(std::shared_ptr<RemoteListener> listener, double deadline);
+  void end_listening(const std::shared_ptr<RemoteListener>& listener);
 
   // Of the state that the last step committed (services/survey/); a run that stands can be asked, too.
   query::v1::Answers query(const query::v1::Batch& batch);
@@ -118,28 +130,49 @@ class ServedRun final : private kernel::CommitListener {
   // Precondition: of this order, among records of all swaps.
   static const kernel::SwapRecord& record_of(const Order& order, const std::vector<kernel::SwapRecord>& records);
   void collect_warnings();
+  void attend_listener();
+  void leave_aside(const std::string& why);
+  // action(subscription) for those that somebody holds.
+  template <typename Action>
+  void with_subscriptions(Action&& action) {
+    std::erase_if(subscriptions_, [](const auto& one) { return one.expired(); });
+    for (const auto& one : subscriptions_)
+      if (const std::shared_ptr<Subscription> held = one.lock()) action(held.get());
+  }
   void write_plan(api::Plan* plan) const;
-  void write_swaps(api::Status* status) const;
+  std::vector<api::ServedSwap> swap_messages() const;
+  void require_settled_swaps() const;
   std::string state_name() const;
 
-  void on_commit(const kernel::Environment&) override {}
+  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override;
+  void on_commit(const kernel::Environment& environment) override;
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override;
 
   const RunOptions options_;
-  std::string scene_;
+  std::string scene_name_;
   double speed_;
   std::vector<std::string> scene_warnings_;
   Catalog catalog_;  // never changes, so any thread may read it
-  const kernel::EnvironmentDescription description_;
+  // Of the files, and with the edits that were made since the run began.
+  scene::v1::Scene first_scene_, scene_;
+  const kernel::EnvironmentDescription first_description_;
+  kernel::EnvironmentDescription description_;
   kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
+  // Faults and swaps of environments before the last edit.
+  report::v1::Report past_;
+  std::vector<api::ServedSwap> past_swaps_;
 
   // What a checkpoint holds besides the state.
   std::unique_ptr<EventLog> events_;
+  std::optional<EventSource> event_source_;
   std::unique_ptr<Figures> figures_;
   std::unique_ptr<Recorder> recorder_;
   const std::shared_ptr<capsule::Tape> tape_ = std::make_shared<capsule::Tape>();
   std::optional<Capture> capture_;
+  std::vector<std::weak_ptr<Subscription>> subscriptions_;
+  std::shared_ptr<RemoteListener> listener_;
+  PairDecisions pair_decisions_{[this](const std::string& why) { leave_aside(why); }};
 
   std::unique_ptr<kernel::Environment> environment_;
   // Made with the first question, and anew after a reset; trajectories are drawn from frame to frame.

@@ -67,7 +67,7 @@ std::string ServedRun::state_name() const {
 api::Status ServedRun::status() {
   return between_steps([this] {
     api::Status status;
-    status.set_scene(scene_);
+    status.set_scene(scene_name_);
     status.set_state(state_name());
     status.set_fault(fault_);
     status.set_checkpoint(checkpoint_);
@@ -82,8 +82,10 @@ api::Status ServedRun::status() {
     status.set_state_hash(environment_->state_hash().text());
     status.set_chain_hash(environment_->chain_hash().text());
     write_plan(status.mutable_plan());
-    write_swaps(&status);
-    report::v1::Report report;
+    for (api::ServedSwap& swap : swap_messages()) *status.add_swaps() = std::move(swap);
+    status.set_swap_count(static_cast<std::uint32_t>(status.swaps_size()));
+    keep_last(status.mutable_swaps());
+    report::v1::Report report = past_;
     write_faults(*environment_, &report);
     status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
     status.mutable_faults()->Swap(report.mutable_faults());
@@ -111,23 +113,23 @@ void ServedRun::write_plan(api::Plan* plan) const {
   *plan->mutable_left_out() = planned.left_out();
 }
 
-void ServedRun::write_swaps(api::Status* status) const {
+std::vector<api::ServedSwap> ServedRun::swap_messages() const {
+  std::vector<api::ServedSwap> swaps = past_swaps_;
   const std::vector<kernel::SwapRecord> records = environment_->swaps();
   for (std::size_t i = 0; i < orders_.size(); ++i) {
     const kernel::SwapRecord& record = record_of(orders_[i], records);
-    api::ServedSwap* swap = status->add_swaps();
-    swap->set_number(forgotten_orders_ + static_cast<std::uint32_t>(i) + 1);
-    swap->set_slot(slot_name(record.slot));
-    swap->set_step(record.step);
-    swap->set_from(record.from);
-    swap->set_to(record.to);
-    swap->set_outcome(kernel::swap_state_name(record.state));
-    swap->set_reason(record.reason);
-    swap->set_pause_us(record.pause_us);
-    swap->set_wait_us(record.wait_us);
+    api::ServedSwap& swap = swaps.emplace_back();
+    swap.set_number(forgotten_orders_ + static_cast<std::uint32_t>(i) + 1);
+    swap.set_slot(slot_name(record.slot));
+    swap.set_step(record.step);
+    swap.set_from(record.from);
+    swap.set_to(record.to);
+    swap.set_outcome(kernel::swap_state_name(record.state));
+    swap.set_reason(record.reason);
+    swap.set_pause_us(record.pause_us);
+    swap.set_wait_us(record.wait_us);
   }
-  status->set_swap_count(static_cast<std::uint32_t>(orders_.size()));
-  keep_last(status->mutable_swaps());
+  return swaps;
 }
 
 // Now and then: what is counted over a while is one line then.

@@ -87,6 +87,12 @@ class ControlServer::Service final : public api::Control::Service {
                            api::SwapOrdered* reply) override {
     return answered([&] { *reply = run_.set_property(*request); });
   }
+  grpc::Status EditScene(grpc::ServerContext*, const api::EditRequest* request, api::EditMade* reply) override {
+    return answered([&] { *reply = run_.edit(*request); });
+  }
+  grpc::Status Wake(grpc::ServerContext*, const api::WakeRequest* request, api::Status* reply) override {
+    return then_status([&] { run_.wake(*request); }, reply);
+  }
   grpc::Status Inject(grpc::ServerContext*, const api::InjectRequest* request, api::InjectOrdered* reply) override {
     return answered([&] { *reply = run_.inject(*request); });
   }
@@ -105,6 +111,38 @@ class ControlServer::Service final : public api::Control::Service {
   grpc::Status GetInstrumentation(grpc::ServerContext*, const api::InstrumentationRequest* request,
                                   instrumentation::v1::Frame* reply) override {
     return answered([&] { *reply = run_.instrumentation(*request); });
+  }
+  grpc::Status WatchEvents(grpc::ServerContext* context, const api::EventsRequest* request,
+                           grpc::ServerWriter<events::v1::Event>* writer) override {
+    return answered([&] {
+      const std::shared_ptr<Subscription> subscription = run_.subscribe(*request);
+      writer->SendInitialMetadata();
+      for (bool goes_on = true; goes_on && !context->IsCancelled();)
+        if (const auto event = subscription->next(kGlance)) goes_on = writer->Write(*event);
+    });
+  }
+  grpc::Status DecidePairs(grpc::ServerContext* context,
+                           grpc::ServerReaderWriter<api::PairQuestions, api::PairDecisions>* stream) override {
+    return answered([&] {
+      api::PairDecisions message;
+      if (!stream->Read(&message)) return;
+      const auto listener = std::make_shared<RemoteListener>([context] { context->TryCancel(); });
+      run_.listen(listener, message.deadline());
+      try {
+        stream->SendInitialMetadata();
+        for (bool goes_on = true; goes_on && !context->IsCancelled();) {
+          const std::optional<api::PairQuestions> questions = listener->next(kGlance);
+          if (!questions) continue;
+          goes_on = stream->Write(*questions) && stream->Read(&message);
+          if (goes_on) listener->answer(message);
+        }
+      } catch (const NotNow&) {
+        listener->end();
+        throw;
+      }
+      listener->end();
+      run_.end_listening(listener);
+    });
   }
   grpc::Status Watch(grpc::ServerContext* context, const api::WatchRequest* request,
                      grpc::ServerWriter<api::Status>* writer) override {

@@ -87,6 +87,10 @@ bool is_possible(const recorder::v1::Tally& tally) {
   for (const double number :
        {tally.largest_kinetic_energy(), tally.largest_energy_deviation(), tally.penetration(), tally.joint_error()})
     if (!std::isfinite(number) || number < 0.0) return false;
+  for (const double number : {tally.initial_energy(), tally.reference_energy()})
+    if (!std::isfinite(number)) return false;
+  for (const double number : tally.initial_momenta())
+    if (!std::isfinite(number)) return false;
   return std::ranges::all_of(tally.meetings(), [](const recorder::v1::Meeting& meeting) {
     return std::isfinite(meeting.time()) && std::isfinite(meeting.speed());
   });
@@ -163,6 +167,8 @@ std::string find_obstacle(const Checkpoint& checkpoint, const recorder::v1::Iden
   if (checkpoint.build() != GRAVITAS_BUILD_ID)
     return fmt::format("it was made by build {}, and this is build {}: only the same build gives the same bits",
                        checkpoint.build(), GRAVITAS_BUILD_ID);
+  if (checkpoint.listener_decided())
+    return "a listener decided about pairs of bodies in that run, and what it decided is not kept";
   const std::string difference = find_difference(checkpoint.identity(), scene);
   return difference.empty() ? "" : "it belongs to another scene, which differs in: " + difference;
 }

@@ -1,17 +1,18 @@
-// Listens to an environment: counts its events, writes them as JSON lines, and remembers who met whom first.
+// Counts events, writes them as JSON lines, and remembers who met whom first.
 #pragma once
 
 #include <cstdio>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
-#include "kernel/environment.h"
+#include "services/events/event.h"
 
 namespace gravitas {
 
-class EventLog final : public kernel::EventListener {
+class EventLog final : public EventListener {
  public:
   // The first time a movable body met an immovable one.
   struct Meeting {
@@ -20,13 +21,14 @@ class EventLog final : public kernel::EventListener {
     double speed;  // m/s, of arrival
   };
 
-  // No file if `path` is empty. Throws std::system_error if it cannot be made.
+  // The description is that of the moment when an event is told. No file if `path` is empty. Throws std::system_error if it
+  // cannot be made.
   EventLog(const std::string& path, const kernel::EnvironmentDescription& description);
   ~EventLog() override;
   EventLog(const EventLog&) = delete;
   EventLog& operator=(const EventLog&) = delete;
 
-  void on_event(const kernel::Event& event) override;
+  void on_event(const Event& event) override;
 
   const report::v1::EventCounts& counts() const { return counts_; }
   const std::vector<Meeting>& meetings() const { return meetings_; }
@@ -37,9 +39,7 @@ class EventLog final : public kernel::EventListener {
   void close();
 
  private:
-  void write(const kernel::Event& event, const char* kind);
-  void remember_meeting(const kernel::Event& event);
-  std::string body_id(std::uint32_t body) const;
+  void remember_meeting(const Event& event);
 
   const kernel::EnvironmentDescription& description_;
   std::string path_;
@@ -47,7 +47,7 @@ class EventLog final : public kernel::EventListener {
   bool write_failed_ = false;
   report::v1::EventCounts counts_;
   std::vector<Meeting> meetings_;
-  std::vector<bool> has_met_;
+  std::set<std::string> has_met_;
 };
 
 }  // namespace gravitas

@@ -32,7 +32,7 @@ struct JournalHeader {
 };
 static_assert(sizeof(JournalHeader) == 40);
 
-constexpr std::uint8_t kCommit = 1, kDecision = 2;
+constexpr std::uint8_t kCommit = 1, kDecision = 2, kEdit = 3;
 
 struct RecordHead {
   std::uint8_t kind;
@@ -41,7 +41,7 @@ struct RecordHead {
 };
 static_assert(sizeof(RecordHead) == 8);
 constexpr std::size_t kCheckSize = sizeof(std::uint64_t);
-constexpr std::uint32_t kLargestPayload = 1 << 20;
+constexpr std::uint32_t kLargestPayload = 1 << 30;
 
 struct CommitPayload {
   std::uint32_t step;
@@ -67,6 +67,12 @@ bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uin
     recorder::v1::Decision decision;
     if (!decision.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) return false;
     if (decision.step() > after) reading->decisions.push_back(std::move(decision));
+    return true;
+  }
+  if (kind == kEdit) {
+    edit::v1::Edit edit;
+    if (!edit.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) return false;
+    if (edit.step() > after) reading->edits.push_back(std::move(edit));
     return true;
   }
   CommitPayload commit;
@@ -156,9 +162,13 @@ void JournalWriter::append(const JournalEntry& commit) {
   if (buffer_.size() >= kLargestBuffer || Clock::now() - last_flush_ >= kLongestWait) flush();
 }
 
-void JournalWriter::append(const recorder::v1::Decision& decision) {
-  const std::string payload = decision.SerializeAsString();
-  put(kDecision, std::as_bytes(std::span(payload)));
+void JournalWriter::append(const recorder::v1::Decision& decision) { put_message(kDecision, decision); }
+
+void JournalWriter::append(const edit::v1::Edit& edit) { put_message(kEdit, edit); }
+
+void JournalWriter::put_message(std::uint8_t kind, const google::protobuf::Message& message) {
+  const std::string payload = message.SerializeAsString();
+  put(kind, std::as_bytes(std::span(payload)));
   flush();
 }
 

@@ -5,10 +5,11 @@
 //   record: kind 1 | 0 3 | size 4 | payload | check 8
 //   kinds:  1 commit: step 4, chain hash 16 (36 bytes a step in all)
 //           2 decision: a message recorder.v1.Decision; who answers from its step on
+//           3 edit: a message edit.v1.Edit; how the scene is from its step on
 //
 // A check is XXH3-64 of the record, seeded with the check before it, so that records can neither be changed nor
 // exchanged. `run` is the digest of the scene's identity and the build. A record that is not whole (a crash tears the
-// last one) ends the journal. Decisions change what the next commit is made of, and are written before that commit;
+// last one) ends the journal. Decisions and edits change what the next commit is made of, and are written before it;
 // commits may be buffered, since the journal only vouches for them.
 #pragma once
 
@@ -33,6 +34,7 @@ struct JournalEntry {
 struct JournalReading {
   std::vector<JournalEntry> commits;              // beyond the step asked for, ascending
   std::vector<recorder::v1::Decision> decisions;  // for steps beyond it
+  std::vector<edit::v1::Edit> edits;              // likewise
   std::uint64_t end = 0;                          // offset behind the last whole record; 0: not a journal of this run
   std::uint64_t check = 0;                        // of that record
   std::uint32_t last_step = 0;                    // of all commits
@@ -56,12 +58,14 @@ class JournalWriter {
   void append(const JournalEntry& commit);
   // Written at once.
   void append(const recorder::v1::Decision& decision);
+  void append(const edit::v1::Edit& edit);
   void flush();
 
  private:
   using Clock = std::chrono::steady_clock;
 
   void put(std::uint8_t kind, std::span<const std::byte> payload);
+  void put_message(std::uint8_t kind, const google::protobuf::Message& message);
 
   std::string path_;
   int file_ = -1;

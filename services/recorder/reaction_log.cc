@@ -25,8 +25,14 @@ void put(const Vector3& vector, google::protobuf::RepeatedField<double>* numbers
 ReactionLog::ReactionLog(const std::string& path, const kernel::EnvironmentDescription& description, double interval)
     : description_(description), file_("reactions", path), sampling_(interval) {}
 
-void ReactionLog::add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner) {
-  if (inner == 0) {
+void ReactionLog::begin_again() {
+  joints_.clear();
+  contacts_.clear();
+}
+
+void ReactionLog::add(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  const kernel::StepData& data = inner.data;
+  if (inner.number == 0) {
     step_ = environment.step_count() + 1;
     length_ = 0.0;
     joints_.clear();

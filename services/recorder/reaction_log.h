@@ -25,7 +25,10 @@ class ReactionLog {
   ReactionLog(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
 
   // What kernel::CommitListener hears of an inner step.
-  void add(const kernel::Environment& environment, const kernel::StepData& data, std::uint32_t inner);
+  void add(const kernel::Environment& environment, const kernel::InnerStep& inner);
+
+  // The description has changed; no step of it has been made.
+  void begin_again();
 
   // Of the step that led to the committed state: joints in the scene's order, then contacts by their pairs.
   std::vector<report::v1::Reaction> last(const kernel::Environment& environment) const;

@@ -56,6 +56,11 @@ void Recorder::on_decision(const kernel::Environment&, const kernel::Decision& d
   if (journal_) journal_->append(message);
 }
 
+void Recorder::note_edit(const edit::v1::Edit& edit) {
+  edits_.push_back(edit);
+  if (journal_) journal_->append(edit);
+}
+
 void Recorder::check(const JournalEntry& commit) {
   while (next_expected_ < expected_.size() && expected_[next_expected_].step < commit.step) ++next_expected_;
   if (next_expected_ == expected_.size()) return;
@@ -75,7 +80,9 @@ void Recorder::save(const kernel::Environment& environment) {
 }
 
 void Recorder::save_to(const std::string& path, const kernel::Environment& environment) const {
-  const recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
+  recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
+  checkpoint.set_listener_decided(listener_decided_);
+  for (const edit::v1::Edit& edit : edits_) *checkpoint.add_edits() = edit;
   try {
     replace_file(path, serialize_checkpoint(checkpoint));
   } catch (const std::system_error& error) {

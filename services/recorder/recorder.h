@@ -37,6 +37,14 @@ class Recorder final : public kernel::CommitListener {
 
   // Who answers instead of the scene's own plugins, when the run begins.
   void set_decisions(std::vector<recorder::v1::Decision> decisions) { decisions_ = std::move(decisions); }
+  const std::vector<recorder::v1::Decision>& decisions() const { return decisions_; }
+
+  // Edits made before the run begins here, and one that has been made: written to the journal at once.
+  void set_edits(std::vector<edit::v1::Edit> edits) { edits_ = std::move(edits); }
+  void note_edit(const edit::v1::Edit& edit);
+
+  // A listener decides about pairs: nobody goes on from what is kept from now on.
+  void note_listener() { listener_decided_ = true; }
 
   // The next steps must have the chain hashes of this journal.
   void expect(const std::string& journal, std::vector<JournalEntry> commits);
@@ -68,6 +76,8 @@ class Recorder final : public kernel::CommitListener {
   std::function<recorder::v1::Tally()> tally_;
 
   std::vector<recorder::v1::Decision> decisions_;  // the last for each plugin of a slot
+  std::vector<edit::v1::Edit> edits_;
+  bool listener_decided_ = false;
   std::string expected_journal_;
   std::vector<JournalEntry> expected_;
   std::size_t next_expected_ = 0;

@@ -20,11 +20,16 @@ std::string quoted(const std::string& id) {
 TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description,
                                    double interval)
     : file_("trajectory", path), sampling_(interval) {
+  follow(description);
+  file_.write("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n");
+}
+
+void TrajectoryWriter::follow(const kernel::EnvironmentDescription& description) {
+  rows_.clear();
   for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
     const kernel::BodyDescription& body = description.bodies[i];
     if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
   }
-  file_.write("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n");
 }
 
 void TrajectoryWriter::offer(const kernel::Environment& environment, bool last) {

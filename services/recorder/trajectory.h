@@ -22,6 +22,9 @@ class TrajectoryWriter {
   // `interval` 0: every step. Throws std::system_error if the file cannot be made.
   TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
 
+  // The bodies are these from now on.
+  void follow(const kernel::EnvironmentDescription& description);
+
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);
 

@@ -43,8 +43,9 @@ void Figures::find_drives() {
       const auto speed = property_of(type, joint.parameters, "AngularSpeed");
       if (!point1 || !point2 || !speed) continue;
       const Vector3 axis = vector_at(*point2, 0) - vector_at(*point1, 0);
-      const Quaternion q =
-          joint.body1 == kNone ? Quaternion::Identity() : description_.bodies[joint.body1].pose.orientation;
+      const Quaternion q = joint.bound_at         ? joint.bound_at->at(0).orientation
+                           : joint.body1 == kNone ? Quaternion::Identity()
+                                                  : description_.bodies[joint.body1].pose.orientation;
       drives_.push_back({i, q.conjugate() * axis.normalized(), (*speed)[0]});
     }
   }
@@ -81,17 +82,24 @@ Figures::Totals Figures::totals(kernel::Environment* environment) const {
 
 void Figures::follow(kernel::Environment* environment) {
   last_ = totals(environment);
-  if (!initial_) initial_ = last_;
+  if (!initial_) reference_energy_ = (initial_ = last_)->energy();
   largest_kinetic_ = std::max(largest_kinetic_, last_.kinetic);
-  largest_deviation_ = std::max(largest_deviation_, std::fabs(last_.energy() - initial_->energy()));
+  largest_deviation_ = std::max(largest_deviation_, std::fabs(last_.energy() - reference_energy_));
   penetration_ = std::max(penetration_, environment->figures().penetration);
   joint_error_ = std::max(joint_error_, environment->figures().joint_error);
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
 }
 
+void Figures::begin_again(kernel::Environment* environment) {
+  drives_.clear();
+  find_drives();
+  reference_energy_ = totals(environment).energy();
+  follow(environment);
+}
+
 void Figures::write(report::v1::Report* report) const {
   const Totals initial = initial_.value_or(Totals{});
-  const double scale = std::max(std::fabs(initial.energy()), largest_kinetic_);
+  const double scale = std::max(std::fabs(reference_energy_), largest_kinetic_);
   report->mutable_energy()->set_initial(initial.energy());
   report->mutable_energy()->set_final(last_.energy());
   report->mutable_energy()->set_max_relative_drift(scale > 0.0 ? largest_deviation_ / scale : 0.0);
@@ -112,6 +120,12 @@ void Figures::write(recorder::v1::Tally* tally) const {
   tally->set_largest_energy_deviation(largest_deviation_);
   tally->set_penetration(penetration_);
   tally->set_joint_error(joint_error_);
+  if (!initial_) return;
+  tally->set_initial_energy(initial_->energy());
+  tally->clear_initial_momenta();
+  for (const Vector3& momentum : {initial_->linear, initial_->angular})
+    tally->mutable_initial_momenta()->Add(momentum.begin(), momentum.end());
+  tally->set_reference_energy(reference_energy_);
 }
 
 void Figures::resume(const recorder::v1::Tally& tally) {
@@ -119,6 +133,11 @@ void Figures::resume(const recorder::v1::Tally& tally) {
   largest_deviation_ = std::max(largest_deviation_, tally.largest_energy_deviation());
   penetration_ = std::max(penetration_, tally.penetration());
   joint_error_ = std::max(joint_error_, tally.joint_error());
+  if (tally.initial_momenta_size() != 6) return;
+  const double* momenta = tally.initial_momenta().data();
+  initial_ = Totals{0.0, tally.initial_energy(), Vector3(momenta[0], momenta[1], momenta[2]),
+                    Vector3(momenta[3], momenta[4], momenta[5])};
+  reference_energy_ = tally.reference_energy();
 }
 
 }  // namespace gravitas

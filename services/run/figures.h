@@ -17,6 +17,8 @@ class Figures {
 
   // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential).
   void follow(kernel::Environment* environment);
+  // The scene was edited: energy is compared with that of now.
+  void begin_again(kernel::Environment* environment);
 
   // Energy, momenta, penetration, joint error, drives.
   void write(report::v1::Report* report) const;
@@ -48,6 +50,7 @@ class Figures {
   const kernel::EnvironmentDescription& description_;
   std::vector<Drive> drives_;
   std::optional<Totals> initial_;
+  double reference_energy_ = 0.0;  // J
   Totals last_;
   double largest_kinetic_ = 0.0, largest_deviation_ = 0.0;
   double penetration_ = 0.0, joint_error_ = 0.0;

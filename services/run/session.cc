@@ -6,15 +6,16 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
-#include <set>
 #include <system_error>
 
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
+#include "services/edit/edit_schedule.h"
+#include "services/edit/edited_scene.h"
+#include "services/events/event_source.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
@@ -24,59 +25,19 @@
 #include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
+#include "services/run/edit_spec.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
-#include "services/scene/build.h"
-#include "services/scene/overrides.h"
-#include "services/scene/reader.h"
 #include "services/survey/frame_file.h"
 
 namespace gravitas {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string joined(const std::vector<scene::SceneError>& errors) {
-  std::string text;
-  for (const scene::SceneError& error : errors) text += (text.empty() ? "" : "\n") + scene::to_string(error);
-  return text;
-}
-
-void require(const scene::Problems& problems) {
-  if (!problems.ok()) throw BadInput(joined(problems.errors));
-}
-
-void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description) {
-  for (const HostingChoice& choice : choices) {
-    for (const Slot slot : kSlots)
-      if (!choice.slot || *choice.slot == slot) {
-        description->slot(slot).hosting = choice.hosting;
-        description->slot(slot).attached = choice.attached;
-        if (choice.attached) description->slot(slot).deadline = kernel::kAttachedDeadline;
-        for (kernel::PluginChoice& plugin : description->slot(slot).plugins) plugin.address = choice.address;
-      }
-  }
-}
-
-// What the command line moves elsewhere leaves its process; the scene itself hosts the slots of one process alike.
-void warn_of_split_processes(const kernel::EnvironmentDescription& description, std::vector<std::string>* warnings) {
-  std::set<std::string> split;
-  for (const Slot one : kSlots)
-    for (const Slot other : kSlots)
-      if (description.slot(one).process == description.slot(other).process &&
-          description.slot(one).hosting != description.slot(other).hosting)
-        split.insert(description.slot(one).process);
-  for (const std::string& process : split)
-    if (!process.empty())
-      warnings->push_back(
-          fmt::format("the slots of Process \"{}\" are hosted in different ways; those that are hosted "
-                      "alike share one",
-                      process));
-}
 
 std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
   return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
@@ -120,61 +81,6 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
   }
 }
 
-std::string installed_worker() { return kernel::worker_program(); }
-
-std::string installed_plugins() {
-  const std::filesystem::path bin = std::filesystem::path(kernel::worker_program()).parent_path();
-  return (bin.parent_path() / "lib" / "gravitas").string();
-}
-
-kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings, Catalog* plugins) {
-  const auto require_positive = [](const char* option, double value) {
-    if (!std::isfinite(value) || value <= 0.0)
-      throw BadInput(fmt::format("{} {:g}: it must be a finite number of seconds > 0", option, value));
-  };
-  if (options.time_step) require_positive("--dt", *options.time_step);
-  if (options.sample_every) require_positive("--sample-every", *options.sample_every);
-  if (options.duration && !(std::isfinite(*options.duration) && *options.duration >= 0.0))
-    throw BadInput(fmt::format("--duration {:g}: it must be a finite number of seconds >= 0", *options.duration));
-  scene::Problems problems;
-  scene::SceneDocument document;
-  scene::read_files(options.scenes, &document, &problems);
-  require(problems);
-  std::vector<std::string> overrides = options.overrides;
-  if (options.time_step) overrides.push_back(fmt::format("Simulator.TimeStep={:.17g}", *options.time_step));
-  if (options.duration) overrides.push_back(fmt::format("Simulator.Duration={:.17g}", *options.duration));
-  for (const std::string& one : overrides) scene::apply_override(&document.scene(), one, &problems);
-  require(problems);
-
-  Catalog own;
-  Catalog& catalog = plugins != nullptr ? *plugins : own;
-  catalog = Catalog::installed(installed_worker(), installed_plugins());
-  std::optional<kernel::EnvironmentDescription> description = scene::build(document.scene(), &catalog, &problems);
-  require(problems);
-  for (const scene::SceneError& warning : problems.warnings) warnings->push_back(scene::to_string(warning));
-  if (options.steps) {
-    description->steps = *options.steps;
-    description->last_time_step = description->time_step;
-  }
-  description->threads = options.threads;
-  apply_hosting(options.hosting, &*description);
-  warn_of_split_processes(*description, warnings);
-  return std::move(*description);
-}
-
-std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
-                                           const kernel::HostStarter& starter) {
-  try {
-    auto environment = std::make_unique<kernel::Environment>(description, starter);
-    for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
-    return environment;
-  } catch (const kernel::StageFault& fault) {
-    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text));
-  } catch (const std::invalid_argument& problem) {
-    throw BadInput(problem.what());
-  }
-}
-
 namespace {
 
 const char* outcome_name(RunOutcome outcome) {
@@ -200,20 +106,25 @@ bool is_full(const std::error_code& code) {
 // A run in its phases. What fails on the way ends the stepping and is kept; the phases after it still do what they can.
 class Run final : private kernel::CommitListener {
  public:
-  explicit Run(const RunOptions& options) : options_(options), description_(load(options, &warnings_, &catalog_)) {}
+  explicit Run(const RunOptions& options)
+      : options_(options),
+        description_(load(options, &warnings_, &catalog_, &scene_)),
+        identity_(identity_of(description_)) {}
 
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
     std::optional<Resumption> resumed;
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
+    read_edits(resumed ? &*resumed : nullptr);
     read_orders();
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
     environment_ = start(begun, options_.starter);
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
-    environment_->set_commit_listener(this);
+    if (options_.listener) begin_listening();
+    attend();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed);
@@ -237,7 +148,8 @@ class Run final : private kernel::CommitListener {
       throw BadInput(error.what());
     }
     events_->resume(resumed_tally_);
-    environment_->set_listener(events_.get());
+    if (!event_kinds_.is_empty())
+      event_source_.emplace(events_.get(), event_kinds_, options_.ongoing_rate.value_or(kOngoingRate));
   }
 
   void go(const std::function<bool()>& interrupted, const std::function<void(const Progress&)>& progress) {
@@ -247,6 +159,8 @@ class Run final : private kernel::CommitListener {
       while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
         if (interrupted()) {
           result_.outcome = RunOutcome::kInterrupted;
+        } else if (!make_due_edit()) {
+          break;
         } else if (environment_->step() == kernel::StepOutcome::kPaused) {
           pause(*environment_->fault());
         } else {
@@ -285,6 +199,7 @@ class Run final : private kernel::CommitListener {
     guard([&] {
       if (reactions_) reactions_->close();
     });
+    if (event_source_) event_source_->tell_incidents(*environment_);
     guard([&] { events_->close(); });
     write_report();
     guard([&] {
@@ -299,6 +214,11 @@ class Run final : private kernel::CommitListener {
  private:
   void read_kinds() {
     try {
+      if (options_.event_kinds) event_kinds_ = parse_event_kinds(*options_.event_kinds);
+    } catch (const std::invalid_argument& problem) {
+      throw BadInput(fmt::format("--event-kinds: {}", problem.what()));
+    }
+    try {
       for (const std::string& name : options_.instrumentation_kinds) kinds_.push_back(survey::find_kind(name));
     } catch (const std::invalid_argument& problem) {
       throw BadInput(fmt::format("--instrumentation-kinds: {}", problem.what()));
@@ -312,15 +232,29 @@ class Run final : private kernel::CommitListener {
     if (frames_) frames_->offer(*environment_, last);
   }
 
-  void close_frames() {
-    if (!frames_) return;
-    for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
+  // What failed beside the run.
+  void note_survey() {
     for (const Slot slot : kSlots)
       for (const kernel::FaultRecord& failed : surveyor_->slot(slot).faults())
         warnings_.push_back(fmt::format(
             "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text,
             failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
+  }
+
+  void close_frames() {
+    if (!frames_) return;
+    for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
+    note_survey();
     frames_->close();
+  }
+
+  void begin_listening() {
+    if (!options_.resume.empty()) throw BadInput("a run in which a listener decides about pairs is not resumed");
+    pair_decisions_.emplace([this](const std::string& why) {
+      warnings_.push_back(why);
+      tell({EventKind::kListener, environment_->step_count() + 1, environment_->time()}, why);
+    });
+    pair_decisions_->listen(options_.listener, options_.listener_deadline);
   }
 
   void resume(Resumption* from) {
@@ -348,16 +282,8 @@ class Run final : private kernel::CommitListener {
     const std::uint32_t step = resumed.checkpoint.step();
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
     try {
-      for (const recorder::v1::Decision& decision : resumed.checkpoint.decisions()) {
-        decisions_.push_back(decision);
-        const kernel::SwapOrder order = order_of(decision, catalog_);
-        kernel::SlotDescription& slot = begun->slot(order.slot);
-        if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
-        const auto fallback = slot.plugins[decision.target()].fallback;
-        slot.plugins[decision.target()] = order.plugin;
-        slot.plugins[decision.target()].fallback = fallback;
-        slot.hosting = *order.hosting;
-      }
+      decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
+      put_in_place(begun);
       for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
         kernel::SwapOrder order = order_of(decision, catalog_);
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
@@ -373,23 +299,120 @@ class Run final : private kernel::CommitListener {
     apply_hosting(options_.hosting, begun);
   }
 
+  // Those of the decisions in force.
+  void put_in_place(kernel::EnvironmentDescription* begun) const {
+    for (const recorder::v1::Decision& decision : decisions_) {
+      const kernel::SwapOrder order = order_of(decision, catalog_);
+      kernel::SlotDescription& slot = begun->slot(order.slot);
+      if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
+      const auto fallback = slot.plugins[decision.target()].fallback;
+      slot.plugins[decision.target()] = order.plugin;
+      slot.plugins[decision.target()].fallback = fallback;
+      slot.hosting = *order.hosting;
+    }
+  }
+
+  // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.
+  void read_edits(const Resumption* resumed) {
+    edits_.plan(parse_edits(options_.edits));
+    if (resumed != nullptr) {
+      for (edit::v1::Edit one : resumed->checkpoint.edits()) {
+        take(EditedScene(options_, scene_, description_, &catalog_, &one, nullptr));
+        edits_.note(one);
+      }
+      edits_.leave_out_past(resumed->checkpoint.step(), resumed->journal.edits);
+    }
+    edits_.rehearse(options_, scene_, description_, &catalog_);
+  }
+
+  void take(const EditedScene& edited) {
+    scene_ = edited.scene();
+    description_ = edited.description();
+  }
+
+  // False if an edit could not be made, which ends the run.
+  bool make_due_edit() {
+    std::optional<edit::v1::Edit> edit = edits_.take_due(environment_->step_count() + 1);
+    if (!edit) return true;
+    try {
+      make(&*edit);
+    } catch (const BadInput& problem) {
+      fail(problem.what());
+    }
+    return result_.outcome == RunOutcome::kCompleted;
+  }
+
+  // Another environment goes on; what this one has to tell is told now.
+  void make(edit::v1::Edit* edit) {
+    const EditedScene edited(options_, scene_, description_, &catalog_, edit, &*environment_);
+    kernel::EnvironmentDescription active = description_, begun = edited.description();
+    put_in_place(&active);
+    keep_who_answers(description_, active, &begun);
+    std::unique_ptr<kernel::Environment> next = start(begun, options_.starter);
+    edited.hand_over(*environment_, next.get());
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_);
+    for (const std::string& warning : edited.warnings())
+      if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
+    write_past();
+    settle_swaps(&result_.report);
+    translate_decisions(description_, edited.description(), &decisions_);
+    take(edited);
+    environment_ = std::move(next);
+    edits_.note(*edit);
+    if (recorder_) {
+      recorder_->set_decisions(decisions_);
+      recorder_->note_edit(*edit);
+    }
+    attend();
+    if (pair_decisions_) pair_decisions_->forget();
+    if (event_source_) event_source_->begin_again();
+    if (trajectory_) trajectory_->follow(description_);
+    if (reactions_) reactions_->begin_again();
+    if (surveyor_) {
+      note_survey();
+      surveyor_.emplace(begun, options_.starter);
+      frames_->begin_again(&*surveyor_);
+    }
+    figures_->begin_again(environment_.get());
+    give_orders();
+    tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
+         fmt::format("{} changes before step {}", edit->changes_size(), edit->step()));
+    for (const std::uint32_t body : woken)
+      tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
+  }
+
+  void attend() {
+    environment_->set_commit_listener(this);
+    if (pair_decisions_) environment_->set_pair_arbiter(&*pair_decisions_);
+  }
+
+  void tell(Event event, const std::string& text) {
+    event.text = text;
+    if (event_kinds_.has(event.kind)) events_->on_event(event);
+  }
+
+  // Orders of steps that are made have been given.
   void give_orders() {
+    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) {
+      return environment_->step_count() > 0 && one.step <= environment_->step_count();
+    });
     try {
       for (const kernel::SwapOrder& order : swaps_) environment_->order_swap(order);
       for (const kernel::SwapOrder& order : comparisons_) environment_->order_swap(order, true);
-      for (kernel::FaultInjection& fault : faults_)
-        if (fault.step > environment_->step_count()) environment_->inject(std::move(fault));
+      for (const kernel::FaultInjection& fault : faults_)
+        if (fault.step > environment_->step_count()) environment_->inject(fault);
       for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
     }
   }
 
-  void on_inner_step(const kernel::Environment& environment, const kernel::StepData& data,
-                     std::uint32_t inner) override {
-    if (reactions_) reactions_->add(environment, data, inner);
+  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
+    if (reactions_) reactions_->add(environment, inner);
+    if (event_source_) event_source_->on_inner_step(environment, inner);
   }
   void on_commit(const kernel::Environment& environment) override {
+    if (event_source_) event_source_->on_commit(environment);
     if (recorder_) recorder_->on_commit(environment);
   }
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
@@ -405,7 +428,9 @@ class Run final : private kernel::CommitListener {
   // Where no recorder keeps a checkpoint.
   void keep_paused_state() {
     const std::string path = checkpoint_path_.empty() ? paused_checkpoint(options_) : checkpoint_path_;
-    Recorder recorder(identity_of(description_), [this] { return tally(); });
+    Recorder recorder(identity_, [this] { return tally(); });
+    recorder.set_edits(edits_.made());
+    if (options_.listener) recorder.note_listener();
     recorder.set_decisions(decisions_);
     recorder.save_to(path, *environment_);
     result_.checkpoint = path;
@@ -453,9 +478,11 @@ class Run final : private kernel::CommitListener {
   // Listens if there is something to keep or to compare.
   void start_recorder() {
     if (checkpoint_path_.empty() && journal_.commits.empty()) return;
-    recorder_.emplace(identity_of(description_), [this] { return tally(); });
+    recorder_.emplace(identity_, [this] { return tally(); });
+    recorder_->set_edits(edits_.made());
     recorder_->expect(journal_of(options_.resume), journal_.commits);
     recorder_->set_decisions(decisions_);
+    if (options_.listener) recorder_->note_listener();
     if (checkpoint_path_.empty()) return;
     // the journal of another file starts anew
     const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == checkpoint_path_;
@@ -471,17 +498,23 @@ class Run final : private kernel::CommitListener {
   }
 
   void write_report();
+  void write_past();
 
   const RunOptions& options_;
   std::vector<std::string> warnings_;
   Catalog catalog_;
-  const kernel::EnvironmentDescription description_;
+  scene::v1::Scene scene_;
+  // With the edits made so far, of which those that listen hold references.
+  kernel::EnvironmentDescription description_;
+  const recorder::v1::Identity identity_;  // of the scene before them
+  EditSchedule edits_;
   std::string checkpoint_path_;
   RunResult result_;
   std::vector<kernel::SwapOrder> swaps_, comparisons_;
   std::vector<kernel::FaultInjection> faults_;
   std::vector<RerunSpec> reruns_;
   std::vector<recorder::v1::Decision> decisions_;  // in force
+  std::optional<PairDecisions> pair_decisions_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
@@ -489,6 +522,8 @@ class Run final : private kernel::CommitListener {
   std::unique_ptr<TrajectoryWriter> trajectory_;
   std::unique_ptr<ReactionLog> reactions_;
   std::unique_ptr<EventLog> events_;
+  EventKinds event_kinds_ = default_event_kinds();
+  std::optional<EventSource> event_source_;
   std::vector<survey::Kind> kinds_;
   std::optional<survey::Surveyor> surveyor_;
   std::unique_ptr<survey::FrameFile> frames_;
@@ -496,6 +531,13 @@ class Run final : private kernel::CommitListener {
   bool is_unrepeatable_ = false;
   double wall_seconds_ = 0.0;
 };
+
+// What the environment has done so far, once.
+void Run::write_past() {
+  for (std::string& warning : environment_->warnings()) warnings_.push_back(std::move(warning));
+  write_faults(*environment_, &result_.report);
+  write_swaps(*environment_, &result_.report);
+}
 
 void Run::write_report() {
   report::v1::Report& report = result_.report;
@@ -511,10 +553,12 @@ void Run::write_report() {
   report.set_chain_hash(environment_->chain_hash().text());
   *report.mutable_plan() = plan_message(*environment_, description_);
   *report.mutable_events() = events_->counts();
+  for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(EventKind::kCount); ++i)
+    if (const auto kind = static_cast<EventKind>(i); event_kinds_.has(kind))
+      report.add_event_kinds(event_kind_name(kind));
+  write_past();
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
-  for (std::string& warning : environment_->warnings()) report.add_warnings(std::move(warning));
-  write_faults(*environment_, &report);
-  write_swaps(*environment_, &report);
+  if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");
   write_stages(*environment_, &report);
   figures_->write(&report);
   if (!reactions_) return;

@@ -7,11 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/edit/v1/edit.pb.h"
 #include "gravitas/recorder/v1/capsule.pb.h"
 #include "gravitas/report/v1/report.pb.h"
+#include "gravitas/scene/v1/scene.pb.h"
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
 #include "services/catalog/catalog.h"
+#include "services/listeners/pair_decisions.h"
 #include "services/scene/problem.h"
 
 namespace gravitas {
@@ -31,6 +34,9 @@ struct RunOptions {
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events, reactions;
+  // What is looked for, written to `events` and counted (services/events/event.h); default_event_kinds() if absent.
+  std::optional<std::vector<std::string>> event_kinds;
+  std::optional<double> ongoing_rate;              // Hz, of collision_ongoing; kOngoingRate if absent
   std::string instrumentation;                     // file of debug geometry (services/survey/frame_file.h)
   std::vector<std::string> instrumentation_kinds;  // all if empty
   std::optional<double> sample_every;  // s, of trajectory, instrumentation and reactions; every step if absent
@@ -38,8 +44,10 @@ struct RunOptions {
   std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
   std::string resume;                  // checkpoint to go on from
   std::uint32_t threads = 1;
-  std::vector<std::string> faults, swaps, comparisons, reruns;  // as on the command line
+  std::vector<std::string> faults, swaps, comparisons, reruns, edits;  // as on the command line
   kernel::HostStarter starter = kernel::start_host;
+  std::shared_ptr<PairListener> listener;        // decides about pairs; then the run is not resumed
+  double listener_deadline = kListenerDeadline;  // s
 };
 
 // The caller's mistake, with a text that says where and what: exit code 2.
@@ -67,9 +75,16 @@ struct RunResult {
 };
 
 // The scene as the kernel's description. Throws BadInput. `warnings` gets the reader's warnings, `plugins` the plugins
-// that there are.
+// that there are, `read` the scene with its overrides.
 kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings,
-                                    Catalog* plugins = nullptr);
+                                    Catalog* plugins = nullptr, scene::v1::Scene* read = nullptr);
+
+// Its second half: the description of a scene that was read.
+kernel::EnvironmentDescription build_scene(const RunOptions& options, const scene::v1::Scene& scene, Catalog* catalog,
+                                           std::vector<std::string>* warnings);
+
+// Where a command line has the slots.
+void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description);
 
 // Slots whose answers no law of physics tells right from wrong (plugin_sdk/physics_checks.h): where the physics is checked
 // (CheckPhysicsEvery), another process confirms them.

@@ -156,10 +156,9 @@ const Entry* BlockRule::find(std::string_view wanted) const {
 }
 
 const BlockRule& grammar_of(const pb::Descriptor& message) {
-  // all rules are made with the scene's, so later look-ups change nothing and may come from any
-  // thread
+  // all rules are made with these, so later look-ups change nothing and may come from any thread
   static Grammar grammar;
-  static const bool made = (grammar.rule(*v1::Scene::descriptor()), true);
+  static const bool made = (grammar.rule(*v1::Scene::descriptor()), grammar.rule(*v1::Addition::descriptor()), true);
   static_cast<void>(made);
   return grammar.rule(message);
 }

@@ -4,8 +4,17 @@
 
 namespace gravitas::scene {
 
+namespace {
+
+// Of an override or a change, which has no lines.
+bool is_one_word(const std::string& file) {
+  return file.starts_with("--set ") || file.starts_with("set ") || file.starts_with("remove ");
+}
+
+}  // namespace
+
 std::string to_string(const SceneError& error) {
-  if (error.file.starts_with("--set ")) return error.file + ": " + (error.is_warning ? "warning: " : "") + error.text;
+  if (is_one_word(error.file)) return error.file + ": " + (error.is_warning ? "warning: " : "") + error.text;
   return error.file + ':' + std::to_string(error.line) + ':' + std::to_string(error.column) +
          (error.is_warning ? ": warning: " : ": error: ") + error.text;
 }
@@ -54,7 +63,7 @@ void Diagnostics::add(const std::vector<PropertyProblem>& problems, const TextPo
 
 std::string Diagnostics::place_text(const TextPosition& position) const {
   const SceneError error = at(position, "", false);
-  if (error.file.starts_with("--set ")) return error.file;
+  if (is_one_word(error.file)) return error.file;
   return error.file + ':' + std::to_string(error.line) + ':' + std::to_string(error.column);
 }
 

@@ -32,9 +32,9 @@ class Reader {
   Reader(std::string_view text, std::uint32_t file, Diagnostics* diagnostics)
       : parser_(text, file), diagnostics_(diagnostics) {}
 
-  // Reads the whole text into the scene. `present` goes from file to file.
-  void read_scene(v1::Scene* scene, std::uint64_t* present) {
-    items(scene_grammar(), scene, present, 0);
+  // Reads the whole text into a scene or an addition. `present` goes from file to file.
+  void read_all(pb::Message* block, std::uint64_t* present) {
+    items(grammar_of(*block->GetDescriptor()), block, present, 0);
     if (parser_.current().kind == TokenKind::kClose)
       throw SyntaxError{parser_.current().position, "a \"}\" that closes nothing; allowed: Name { … }"};
   }
@@ -281,7 +281,7 @@ class SceneReading {
     if (diagnostics_.full()) return;
     if (file == 0) set_location({0, 1, 1}, scene_->mutable_location());
     try {
-      Reader(text, file, &diagnostics_).read_scene(scene_, &present_);
+      Reader(text, file, &diagnostics_).read_all(scene_, &present_);
     } catch (const SyntaxError& error) {
       diagnostics_.error(error.position, error.text);
     } catch (const EnoughErrors&) {
@@ -308,6 +308,20 @@ bool read_texts(std::span<const SceneText> texts, SceneDocument* document, Probl
   SceneReading reading(&document->scene(), problems);
   for (const SceneText& text : texts) reading.read(text.text, reading.add_file(text.name));
   return reading.finish();
+}
+
+bool read_addition(const SceneText& text, v1::Scene* scene, v1::Addition* addition, Problems* problems) {
+  Diagnostics diagnostics(*scene, problems);
+  scene->add_files(text.name);
+  std::uint64_t present = 0;
+  try {
+    Reader(text.text, static_cast<std::uint32_t>(scene->files_size() - 1), &diagnostics).read_all(addition, &present);
+  } catch (const SyntaxError& error) {
+    diagnostics.error(error.position, error.text);
+  } catch (const EnoughErrors&) {
+    // the errors found are reported already
+  }
+  return diagnostics.ok();
 }
 
 bool read_files(std::span<const std::string> paths, SceneDocument* document, Problems* problems) {

@@ -49,4 +49,7 @@ bool read_texts(std::span<const SceneText> texts, SceneDocument* document, Probl
 // The same from files. A file that cannot be read is an error at its line 1, column 1.
 bool read_files(std::span<const std::string> paths, SceneDocument* document, Problems* problems);
 
+// Reads what an edit adds to a scene; positions refer to files of the scene, of which it becomes one.
+bool read_addition(const SceneText& text, v1::Scene* scene, v1::Addition* addition, Problems* problems);
+
 }  // namespace gravitas::scene

@@ -19,7 +19,7 @@ void FrameFile::offer(const kernel::Environment& environment, bool last) {
   const bool is_due = sampling_.is_due(environment, last);
   if (!is_picture()) {
     if (!is_due) return;
-    const Frame frame = instrumentation_.frame(environment, kinds_);
+    const Frame frame = instrumentation_->frame(environment, kinds_);
     note_missing(frame);
     file_.write(to_json(frame, JsonForm::kLine));
     return;
@@ -27,12 +27,12 @@ void FrameFile::offer(const kernel::Environment& environment, bool last) {
   // on the way the lines of trajectories alone
   const auto trajectory = std::ranges::find(kinds_, instrumentation::v1::KIND_TRAJECTORY);
   if (is_due && trajectory != kinds_.end())
-    picture_.MergeFrom(instrumentation_.frame(environment, {instrumentation::v1::KIND_TRAJECTORY}));
+    picture_.MergeFrom(instrumentation_->frame(environment, {instrumentation::v1::KIND_TRAJECTORY}));
   if (!last || drawn_step_ == environment.step_count()) return;
   drawn_step_ = environment.step_count();
   std::vector<Kind> others = kinds_;
   std::erase(others, instrumentation::v1::KIND_TRAJECTORY);
-  const Frame frame = instrumentation_.frame(environment, others);
+  const Frame frame = instrumentation_->frame(environment, others);
   note_missing(frame);
   picture_.MergeFrom(frame);
 }

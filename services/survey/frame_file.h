@@ -17,6 +17,9 @@ class FrameFile {
   // `interval` as in Sampling. Throws std::system_error if the file cannot be made.
   FrameFile(const std::string& path, Surveyor* surveyor, std::vector<Kind> kinds, double interval);
 
+  // The scene was edited, and who answers knows it.
+  void begin_again(Surveyor* surveyor) { instrumentation_.emplace(surveyor); }
+
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);
 
@@ -31,7 +34,7 @@ class FrameFile {
   void note_missing(const Frame& frame);
 
   OutputFile file_;
-  Instrumentation instrumentation_;
+  std::optional<Instrumentation> instrumentation_;
   std::vector<Kind> kinds_;
   Sampling sampling_;
   std::string title_;

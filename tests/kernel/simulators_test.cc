@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernel/environment.h"
+#include "services/events/event_source.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas {
@@ -22,10 +23,10 @@ using kernel::StepOutcome;
 
 constexpr double kGravity = 9.81;
 
-class Listener final : public kernel::EventListener {
+class Listener final : public EventListener {
  public:
-  void on_event(const kernel::Event& event) override { events.push_back(event); }
-  std::vector<kernel::Event> events;
+  void on_event(const Event& event) override { events.push_back(event); }
+  std::vector<Event> events;
 };
 
 // Exact in free flight, and a solver that closes contacts to rounding.
@@ -155,12 +156,13 @@ class Located : public ::testing::TestWithParam<Simulator> {};
 TEST_P(Located, ImpactsOfABallAreWhereTheyAre) {
   Environment world(bouncing(GetParam(), 1.0, 150, 1.0 / 60.0).description());
   Listener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world);
   const double first = std::sqrt(2.0 / kGravity);
   std::vector<double> starts;
-  for (const kernel::Event& event : listener.events) {
-    if (event.kind != kernel::EventKind::kCollisionStart) continue;
+  for (const Event& event : listener.events) {
+    if (event.kind != EventKind::kCollisionStart) continue;
     starts.push_back(event.time);
     EXPECT_NEAR(event.impulse, 2.0 * kGravity * first, 1e-9);
   }
@@ -215,7 +217,8 @@ TEST(Continuous, NothingPassesThroughAPlate) {
   builder.box(Vector3(0.1, 0.1, 0.1), 1.0, Vector3(0.02, 0.01, -12.345), Vector3(0, 0, 1000.0));
   Environment world(builder.description());
   Listener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   for (int i = 0; i < 5; ++i) {
     ASSERT_EQ(world.step(), StepOutcome::kCommitted);
     EXPECT_LE(world.state().position[5], -0.115 + 1e-9);

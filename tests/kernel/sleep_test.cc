@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kernel/environment.h"
+#include "services/events/event_source.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas {
@@ -15,7 +16,6 @@ namespace {
 using harness::plugin_path;
 using harness::WorldBuilder;
 using kernel::Environment;
-using kernel::EventKind;
 using kernel::Hosting;
 using kernel::Simulator;
 using kernel::Stage;
@@ -27,16 +27,16 @@ const Vector3 kDown(0, -9.81, 0);
 constexpr double kTimeStep = 0.01;
 constexpr std::uint32_t kAsleepBy = 60;  // the default is half a second
 
-class SleepListener final : public kernel::EventListener {
+class SleepListener final : public EventListener {
  public:
-  void on_event(const kernel::Event& event) override { events.push_back(event); }
+  void on_event(const Event& event) override { events.push_back(event); }
   std::vector<std::uint32_t> bodies(EventKind kind) const {
     std::vector<std::uint32_t> all;
-    for (const kernel::Event& event : events)
+    for (const Event& event : events)
       if (event.kind == kind) all.push_back(event.a);
     return all;
   }
-  std::vector<kernel::Event> events;
+  std::vector<Event> events;
 };
 
 WorldBuilder& may_sleep(WorldBuilder* builder) {
@@ -68,7 +68,8 @@ WorldBuilder boxes_and_ball(Hosting hosting = Hosting::kDirect) {
 TEST(Sleep, WhatRestsFallsAsleepAndStaysBitForBit) {
   Environment world(boxes_and_ball().description());
   SleepListener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world, kAsleepBy);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), ElementsAre(1, 2, 3));
   EXPECT_FALSE(world.is_asleep(0));
@@ -81,17 +82,18 @@ TEST(Sleep, WhatRestsFallsAsleepAndStaysBitForBit) {
     EXPECT_EQ(velocity(world, body), Vector3::Zero());
   }
   // what touched goes on touching
-  for (const kernel::Event& event : listener.events) EXPECT_NE(event.kind, EventKind::kCollisionEnd);
+  for (const Event& event : listener.events) EXPECT_NE(event.kind, EventKind::kCollisionEnd);
 }
 
 TEST(Sleep, AContactWakesTheIslandAndNoOther) {
   Environment world(boxes_and_ball().description());
   SleepListener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world, 200);
   EXPECT_THAT(listener.bodies(EventKind::kWake), ElementsAre(1, 2));
   EXPECT_TRUE(world.is_asleep(3));
-  for (const kernel::Event& event : listener.events) {
+  for (const Event& event : listener.events) {
     if (event.kind != EventKind::kWake) continue;
     // the ball falls 4.9 m: within a step of its arrival
     EXPECT_NEAR(event.time, std::sqrt(2.0 * 4.9 / 9.81), kTimeStep);
@@ -151,7 +153,8 @@ TEST(Sleep, AChainWakesOneAfterTheOther) {
   may_sleep(&builder).gravity(kDown);
   Environment world(builder.description());
   SleepListener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world, 400);
   EXPECT_THAT(listener.bodies(EventKind::kWake), ElementsAre(1, 2, 3, 4, 5));
   EXPECT_NEAR(velocity(world, 5).x(), 3.0, 1e-9);
@@ -168,7 +171,8 @@ TEST(Sleep, AJointMakesAnIsland) {
   may_sleep(&builder).gravity(kDown);
   Environment world(builder.description());
   SleepListener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world, kAsleepBy);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), ElementsAre(1, 2));
   run(&world, 60);
@@ -219,7 +223,8 @@ TEST(Sleep, WhereAllSleepNothingIsAskedAndTimeGoesOn) {
 TEST(Sleep, AUserWakes) {
   Environment world(boxes_and_ball().description());
   SleepListener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world, kAsleepBy);
   world.wake(2);
   world.wake(4);  // is awake
@@ -300,14 +305,16 @@ WorldBuilder pushed_boxes(Hosting hosting) {
 TEST(Sleep, HasTheSameBitsInEveryHostingAndAfterKills) {
   Environment direct(pushed_boxes(Hosting::kDirect).description());
   SleepListener quiet;
-  direct.set_listener(&quiet);
+  EventSource quiet_source(&quiet);
+  direct.set_commit_listener(&quiet_source);
   run(&direct, 150);
   EXPECT_THAT(quiet.bodies(EventKind::kSleep), ElementsAre(1, 2, 3));
   EXPECT_THAT(quiet.bodies(EventKind::kWake), ElementsAre(1, 2));
   for (const Hosting hosting : {Hosting::kSharedMemory, Hosting::kGrpc}) {
     Environment world(pushed_boxes(hosting).threads(2).description());
     SleepListener heard;
-    world.set_listener(&heard);
+    EventSource heard_source(&heard);
+    world.set_commit_listener(&heard_source);
     std::uint32_t step = 70;
     for (const Slot slot : {Slot::kIntegrator, Slot::kForce, Slot::kSpace, Slot::kCollision, Slot::kSolver})
       world.inject({slot, "kill", slot == Slot::kCollision || slot == Slot::kSolver ? 101U : step++, 1});
@@ -352,7 +359,8 @@ TEST(Sleep, AForceThatChangesWakes) {
                                            9.0, push, 0, 0, 0});
     Environment world(builder.description());
     SleepListener listener;
-    world.set_listener(&listener);
+    EventSource listener_source(&listener);
+    world.set_commit_listener(&listener_source);
     run(&world, 100);
     EXPECT_TRUE(world.is_asleep(1));
     run(&world, 100);
@@ -375,7 +383,8 @@ TEST(Sleep, NothingSleepsUnderAForceThatKeepsChanging) {
   builder.force("Basic", "force_basic", {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0.0, 0, 0, 0, 100.0, 0.1, 0, 0, 0});
   Environment world(builder.description());
   SleepListener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   run(&world, 300);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), IsEmpty());
   EXPECT_LT(position(world, 1).norm() - 0.25, 1e-9);

@@ -10,6 +10,7 @@
 #include "kernel/environment.h"
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/math/rotation.h"
+#include "services/events/event_source.h"
 #include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/numerics/motion_problem.h"
@@ -28,10 +29,10 @@ using kernel::StepOutcome;
 
 constexpr double kGravity = 9.81;
 
-class Listener final : public kernel::EventListener {
+class Listener final : public EventListener {
  public:
-  void on_event(const kernel::Event& event) override { events.push_back(event); }
-  std::vector<kernel::Event> events;
+  void on_event(const Event& event) override { events.push_back(event); }
+  std::vector<Event> events;
 };
 
 // Exact in free flight, and a solver that closes contacts to rounding.
@@ -102,7 +103,8 @@ TEST(ContactProblems, ACubeAtAThousandMetresPerSecondMeetsAPlane) {
   const CpuClock clock;
   Environment world(builder.description());
   Listener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   double deepest = 0.0;
   const auto lowest_corner = [](const Vector3& centre, const Quaternion& q) {
     double lowest = centre.y();
@@ -129,7 +131,8 @@ TEST(ContactProblems, APlateAtAHundredMetresPerSecondMeetsAPlate) {
   const CpuClock clock;
   Environment world(builder.description());
   Listener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   double deepest = 0.0;
   while (world.step_count() < world.total_steps()) {
     ASSERT_NO_FATAL_FAILURE(step(&world));
@@ -149,7 +152,8 @@ TEST(ContactProblems, TwoCubesMeetHeadOnAtFiveHundredMetresPerSecond) {
   const CpuClock clock;
   Environment world(builder.description());
   Listener listener;
-  world.set_listener(&listener);
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
   double deepest = 0.0;
   while (world.step_count() < world.total_steps()) {
     ASSERT_NO_FATAL_FAILURE(step(&world));

@@ -177,16 +177,16 @@ TEST(Bounce, EventsTellOfEachLanding) {
     if (before < 0.0 && speed(run) > 0.0) landings.push_back(run.time());
   }
   std::vector<double> starts;
-  for (const kernel::Event& event : run.events()) {
+  for (const Event& event : run.events()) {
     ASSERT_LT(event.a, event.b);
-    if (event.kind == kernel::EventKind::kCollisionStart) starts.push_back(event.time);
+    if (event.kind == EventKind::kCollisionStart) starts.push_back(event.time);
   }
   ASSERT_GE(landings.size(), 2U);
   EXPECT_EQ(starts, landings);
   EXPECT_NEAR(run.events()[0].relative_speed, std::sqrt(2.0 * kG * kHeight), kG * run.time_step());
   // J = m (1 + e) v
   EXPECT_NEAR(run.events()[0].impulse, 2.0 * 1.8 * run.events()[0].relative_speed, 3.6 * kG * run.time_step());
-  EXPECT_NEAR(run.count_events(kernel::EventKind::kCollisionEnd), starts.size(), 1);
+  EXPECT_NEAR(run.count_events(EventKind::kCollisionEnd), starts.size(), 1);
 }
 
 struct Impact {
@@ -221,7 +221,7 @@ TEST_P(HeadOn, ConservesMomentumAndObeysTheLawOfRestitution) {
     EXPECT_EQ(run.body(ball).twist.linear.z(), 0.0);
     EXPECT_EQ(run.body(ball).twist.angular, Vector3::Zero());
   }
-  EXPECT_EQ(run.count_events(kernel::EventKind::kCollisionStart), 1U);
+  EXPECT_EQ(run.count_events(EventKind::kCollisionStart), 1U);
 }
 
 }  // namespace

@@ -86,7 +86,7 @@ TEST_P(Conservation, MomentumStaysToRoundingAndEnergyNeverRises) {
     }
     // sweeps may run out where three bodies meet edge on edge; what they leave is taken back in the next steps
     EXPECT_LE(run.report().max_penetration(), 1e-4) << "seed " << seed;
-    impacts += run.count_events(kernel::EventKind::kCollisionStart);
+    impacts += run.count_events(EventKind::kCollisionStart);
   }
   EXPECT_GE(impacts, 5 * kSeeds);
 }

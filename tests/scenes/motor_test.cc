@@ -91,13 +91,13 @@ TEST_P(Motor, JointBreaksBeyondItsForce) {
   SceneRun holds("pendulum.gravitas", with({hanging, set("Constraint.Pivot.BreakingForce", kG * (1.0 + 1e-6))}));
   holds.to_end();
   EXPECT_TRUE(holds.holds("Pivot"));
-  EXPECT_EQ(holds.count_events(kernel::EventKind::kBreak), 0U);
+  EXPECT_EQ(holds.count_events(EventKind::kBreak), 0U);
   EXPECT_NEAR(holds.body("Ball").pose.position.y(), -1.0, 1e-9);
 
   SceneRun breaks("pendulum.gravitas", with({hanging, set("Constraint.Pivot.BreakingForce", kG * (1.0 - 1e-6))}));
   breaks.steps(500);
   EXPECT_FALSE(breaks.holds("Pivot"));
-  ASSERT_EQ(breaks.count_events(kernel::EventKind::kBreak), 1U);
+  ASSERT_EQ(breaks.count_events(EventKind::kBreak), 1U);
   EXPECT_EQ(breaks.events()[0].step, 1U);
   EXPECT_EQ(breaks.events()[0].a, kNone);
   EXPECT_EQ(breaks.events()[0].b, 0U);
@@ -118,7 +118,7 @@ TEST_P(Motor, JointBreaksBeyondItsThreshold) {
   SceneRun breaks("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-8)}));
   breaks.to_end();
   EXPECT_FALSE(breaks.holds("Pivot"));
-  EXPECT_EQ(breaks.count_events(kernel::EventKind::kBreak), 1U);
+  EXPECT_EQ(breaks.count_events(EventKind::kBreak), 1U);
   EXPECT_LE(breaks.report().max_joint_error(), 1e-8);
   EXPECT_GT(breaks.body("Ball").pose.position.norm(), 10.0);
 }
@@ -130,7 +130,7 @@ TEST_P(Motor, JointThatIsLeftNoErrorBreaksByWhatItHolds) {
                  with({set("Body.Ball.Position", Vector3(0, -1, 0)), std::string("Solver=") + solver,
                        set("Constraint.Pivot.BreakingThreshold", threshold)}));
     run.steps(100);
-    EXPECT_EQ(run.count_events(kernel::EventKind::kBreak), run.holds("Pivot") ? 0U : 1U);
+    EXPECT_EQ(run.count_events(EventKind::kBreak), run.holds("Pivot") ? 0U : 1U);
     return run.holds("Pivot");
   };
   const double held = kG * 1e-3 * 1e-3;

@@ -28,9 +28,8 @@ class Watched final : private kernel::CommitListener {
   SceneRun run;
 
  private:
-  void on_inner_step(const kernel::Environment& environment, const kernel::StepData& data,
-                     std::uint32_t inner) override {
-    log_.add(environment, data, inner);
+  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
+    log_.add(environment, inner);
   }
   void on_commit(const kernel::Environment&) override {}
 

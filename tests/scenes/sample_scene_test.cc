@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 const std::string kSample = in_source("/deploy/scenes/two_spheres_motor.gravitas");
 
 bool has_met_ground(const SceneRun& run, std::uint32_t ball) {
-  return std::ranges::any_of(run.events(), [&](const kernel::Event& event) {
-    return event.kind == kernel::EventKind::kCollisionStart && event.a == 0 && event.b == ball;
+  return std::ranges::any_of(run.events(), [&](const Event& event) {
+    return event.kind == EventKind::kCollisionStart && event.a == 0 && event.b == ball;
   });
 }
 
@@ -36,7 +36,7 @@ TEST_P(Sample, LandsTurnsAndNeverBreaks) {
   EXPECT_TRUE(has_met_ground(run, 1));
   EXPECT_TRUE(has_met_ground(run, 2));
   EXPECT_TRUE(run.holds("MyAngularMotor"));
-  EXPECT_EQ(run.count_events(kernel::EventKind::kBreak), 0U);
+  EXPECT_EQ(run.count_events(EventKind::kBreak), 0U);
   ASSERT_EQ(run.report().drives_size(), 1);
   EXPECT_NEAR(run.report().drives(0).speed(), 3.1412, 1e-6);
   EXPECT_EQ(run.report().drives(0).target(), 3.1412);

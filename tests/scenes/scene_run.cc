@@ -73,7 +73,7 @@ SceneRun::SceneRun(const std::string& scene, std::vector<std::string> overrides)
     : description_(load_scene(scene, std::move(overrides), &warnings_)),
       environment_(start(description_)),
       figures_(std::make_unique<Figures>(description_)) {
-  environment_->set_listener(this);
+  environment_->set_commit_listener(&source_);
   figures_->follow(environment_.get());
 }
 
@@ -158,8 +158,8 @@ const report::v1::Report& SceneRun::report() {
   return report_;
 }
 
-std::uint32_t SceneRun::count_events(kernel::EventKind kind) const {
-  return static_cast<std::uint32_t>(std::ranges::count(events_, kind, &kernel::Event::kind));
+std::uint32_t SceneRun::count_events(EventKind kind) const {
+  return static_cast<std::uint32_t>(std::ranges::count(events_, kind, &Event::kind));
 }
 
 }  // namespace gravitas::harness

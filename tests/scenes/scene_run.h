@@ -17,6 +17,7 @@
 
 #include "kernel/environment.h"
 #include "plugin_sdk/dynamics.h"
+#include "services/events/event_source.h"
 #include "services/run/figures.h"
 #include "services/run/session.h"
 
@@ -46,7 +47,7 @@ Quaternion turned(const Vector3& axis, double angle);
 // Angle (rad, 0 … pi) of the rotation between two attitudes.
 double angle_between(const Quaternion& a, const Quaternion& b);
 
-class SceneRun final : private kernel::EventListener {
+class SceneRun final : private EventListener {
  public:
   // `scene` is a file of tests/scenes/, a path, or the text of a scene (it has a brace). Throws BadInput.
   explicit SceneRun(const std::string& scene, std::vector<std::string> overrides = {});
@@ -82,14 +83,14 @@ class SceneRun final : private kernel::EventListener {
 
   // What `gravitas run` would report so far.
   const report::v1::Report& report();
-  const std::vector<kernel::Event>& events() const { return events_; }
-  std::uint32_t count_events(kernel::EventKind kind) const;
+  const std::vector<Event>& events() const { return events_; }
+  std::uint32_t count_events(EventKind kind) const;
   const std::vector<std::string>& warnings() const { return warnings_; }
   kernel::Environment& environment() { return *environment_; }
   const kernel::EnvironmentDescription& description() const { return description_; }
 
  private:
-  void on_event(const kernel::Event& event) override { events_.push_back(event); }
+  void on_event(const Event& event) override { events_.push_back(event); }
   std::uint32_t row(const std::string& id) const;
   Motion motion(std::uint32_t body) const;
 
@@ -97,7 +98,8 @@ class SceneRun final : private kernel::EventListener {
   kernel::EnvironmentDescription description_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
-  std::vector<kernel::Event> events_;
+  std::vector<Event> events_;
+  EventSource source_{this};
   report::v1::Report report_;
 };
 

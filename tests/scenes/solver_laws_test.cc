@@ -54,7 +54,7 @@ TEST_P(SolverLaws, MomentumStaysToRoundingAndEnergyNeverRises) {
       before = run.energy();
     }
     EXPECT_LE(run.report().max_penetration(), 1e-4) << "seed " << seed;
-    impacts += run.count_events(kernel::EventKind::kCollisionStart);
+    impacts += run.count_events(EventKind::kCollisionStart);
   }
   EXPECT_GE(impacts, 5 * kLawSeeds);
 }

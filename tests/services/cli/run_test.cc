@@ -258,5 +258,38 @@ TEST(Run, AWorkerThatHangsIsReplacedAtItsDeadline) {
   EXPECT_THAT(result.err, HasSubstr("within its deadline of 200 ms"));
 }
 
+TEST(Run, LooksForTheKindsOfEventsThatAreAskedFor) {
+  const ScratchFolder folder;
+  const auto run_with = [&](const std::string& kinds) {
+    return run_program({"run", kSample, "--duration", "2", "--fault", "solver:kill@step=100", "--events",
+                        folder.path("events"), "--report", folder.path("report.json"), "--event-kinds", kinds},
+                       folder);
+  };
+  ProgramResult result = run_with("collision_start,fault");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string text = read_file(folder.path("events"));
+  EXPECT_THAT(text, HasSubstr("\"kind\":\"collision_start\""));
+  EXPECT_THAT(text, HasSubstr("\"kind\":\"fault\""));
+  EXPECT_EQ(text.find("collision_end"), std::string::npos);
+  report::v1::Report report = read_report(read_file(folder.path("report.json")));
+  EXPECT_THAT(report.event_kinds(), ::testing::ElementsAre("collision_start", "fault"));
+  EXPECT_GT(report.events().collision_start(), 0U);
+  EXPECT_EQ(report.events().collision_end(), 0U);
+
+  result = run_with("none");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(read_file(folder.path("events")), "");
+  report = read_report(read_file(folder.path("report.json")));
+  EXPECT_EQ(report.event_kinds_size(), 0);
+  EXPECT_EQ(report.events().collision_start(), 0U);
+
+  result = run_with("colision_start");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("did you mean \"collision_start\"?"));
+  result = run_program({"run", kSample, "--ongoing-rate", "0"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--ongoing-rate 0"));
+}
+
 }  // namespace
 }  // namespace gravitas

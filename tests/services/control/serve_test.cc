@@ -140,6 +140,22 @@ TEST(Serve, ASwapThatIsRolledBackIsExitCode4) {
   EXPECT_EQ(served.status().state(), "running");
 }
 
+TEST(Serve, CtlEditsTheSceneAndWakesABody) {
+  Served served({"--duration", "3600", "--paused"});
+  ASSERT_FALSE(served.socket().empty());
+  ProgramResult result =
+      served.ctl({"edit", "set Body.Ball01.LinearVelocity={0,1,0}", "set Material.Plastic.RestitutionCoefficient=0"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("edited before step 1; the run stood for "));
+  result = served.ctl({"edit", "remove Body.Ball1"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("remove Body.Ball1: there is none; did you mean \"Ball01\"?"));
+  result = served.ctl({"edit", "jump"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("allowed: add FILE, remove PATH, set PATH=VALUE"));
+  EXPECT_EQ(served.ctl({"wake", "Ball01"}).exit_code, 0);
+}
+
 TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   Served served({"--duration", "3600"});
   ASSERT_FALSE(served.socket().empty());
@@ -189,8 +205,8 @@ TEST(Serve, WhatCannotBeIsExitCode2) {
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("no server answers"));
   EXPECT_EQ(harness::run_program({"ctl"}, folder).exit_code, 2);
-  for (const char* command :
-       {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "capture", "watch"}) {
+  for (const char* command : {"status", "pause", "resume", "step", "reset", "swap", "set", "inject", "capture", "watch",
+                              "events", "edit", "wake"}) {
     result = harness::run_program({"ctl", command, "--help"}, folder);
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ctl ") + command));

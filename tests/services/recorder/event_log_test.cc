@@ -17,8 +17,6 @@ namespace gravitas {
 namespace {
 
 using harness::ScratchFolder;
-using kernel::Event;
-using kernel::EventKind;
 using ::testing::ElementsAre;
 
 // Ground (fixed), Ball and Cube (movable), Lift (kinematic), and a joint that hangs Ball from the world.
@@ -42,7 +40,7 @@ Event meeting(std::uint32_t step, std::uint32_t a, std::uint32_t b) {
   return {EventKind::kCollisionStart, step, 0.1 * step, a, b, kNone, 2.5, 7.0};
 }
 Event parting(std::uint32_t step, std::uint32_t a, std::uint32_t b) {
-  return {EventKind::kCollisionEnd, step, 0.1 * step, a, b, kNone, 0.0, 0.0};
+  return {EventKind::kCollisionEnd, step, 0.1 * step, a, b};
 }
 
 TEST(EventLog, WritesALineOfJsonPerEvent) {
@@ -51,8 +49,8 @@ TEST(EventLog, WritesALineOfJsonPerEvent) {
   EventLog log(folder.path("events"), d);
   log.on_event(meeting(3, 0, 1));
   log.on_event(parting(4, 0, 1));
-  log.on_event({EventKind::kBreak, 5, 0.5, kNone, 1, 0, 0.0, 0.0});
-  log.on_event({EventKind::kSleep, 6, 0.6, 1, kNone, kNone, 0.0, 0.0});
+  log.on_event({EventKind::kBreak, 5, 0.5, kNone, 1, 0});
+  log.on_event({EventKind::kSleep, 6, 0.6, 1});
   log.close();
   std::istringstream text(harness::read_file(folder.path("events")));
   std::vector<events::v1::Event> events;
@@ -79,9 +77,9 @@ TEST(EventLog, CountsEachKind) {
   EventLog log("", d);
   for (std::uint32_t step = 1; step <= 5; ++step) log.on_event(meeting(step, 1, 2));
   log.on_event(parting(6, 1, 2));
-  log.on_event({EventKind::kBreak, 7, 0.7, kNone, 1, 0, 0.0, 0.0});
-  for (std::uint32_t step = 8; step <= 10; ++step) log.on_event({EventKind::kSleep, step, 0.8, 1, kNone, kNone, 0, 0});
-  for (std::uint32_t step = 11; step <= 12; ++step) log.on_event({EventKind::kWake, step, 1.1, 1, kNone, kNone, 0, 0});
+  log.on_event({EventKind::kBreak, 7, 0.7, kNone, 1, 0});
+  for (std::uint32_t step = 8; step <= 10; ++step) log.on_event({EventKind::kSleep, step, 0.8, 1});
+  for (std::uint32_t step = 11; step <= 12; ++step) log.on_event({EventKind::kWake, step, 1.1, 1});
   recorder::v1::Tally tally;
   log.write(&tally);
   EventLog resumed("", d);

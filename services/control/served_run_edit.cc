@@ -1,0 +1,89 @@
+// Changes of the scene of a served run: another environment goes on.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "plugin_sdk/near_miss.h"
+#include "services/control/served_run.h"
+#include "services/edit/edited_scene.h"
+#include "services/run/report.h"
+
+namespace gravitas::control {
+
+// An environment takes its swaps along.
+void ServedRun::require_settled_swaps() const {
+  for (const kernel::SwapRecord& record : environment_->swaps())
+    if (record.state < kernel::SwapState::kCommitted)
+      throw NotNow(fmt::format("edit: the swap of slot {} to {} is on its way ({}); the next steps end it",
+                               slot_name(record.slot), record.to, kernel::swap_state_name(record.state)));
+}
+
+api::EditMade ServedRun::edit(const api::EditRequest& request) {
+  if (request.changes_size() == 0) throw BadInput("edit: nothing to change; allowed: changes of the scene");
+  return between_steps([&] {
+    const Clock::time_point begin = Clock::now();
+    require_steps_left("edit");
+    require_settled_swaps();
+    api::EditMade made;
+    made.set_step(environment_->step_count() + 1);
+    edit::v1::Edit edit;
+    edit.set_step(made.step());
+    *edit.mutable_changes() = request.changes();
+    const EditedScene edited(options_, scene_, description_, &catalog_, &edit, &*environment_);
+    kernel::EnvironmentDescription begun = edited.description(), active = description_;
+    for (const Slot slot : kSlots) active.slot(slot) = active_.slot(slot);
+    keep_who_answers(description_, active, &begun);
+    std::unique_ptr<kernel::Environment> next = start(begun, capsule::recording(tape_));
+    edited.hand_over(*environment_, next.get());
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_);
+
+    // from here on it is made
+    past_swaps_ = swap_messages();
+    write_faults(*environment_, &past_);
+    forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
+    orders_.clear();
+    next_collection_ = {};
+    collect_warnings();
+    survey_.reset();
+    for (const Slot slot : kSlots) active_.slot(slot) = begun.slot(slot);
+    std::vector<recorder::v1::Decision> decisions = recorder_->decisions();
+    translate_decisions(description_, edited.description(), &decisions);
+    recorder_->set_decisions(std::move(decisions));
+    scene_ = edited.scene();
+    description_ = edited.description();
+    environment_ = std::move(next);
+    environment_->set_commit_listener(this);
+    pair_decisions_.forget();
+    if (listener_) environment_->set_pair_arbiter(&pair_decisions_);
+    recorder_->note_edit(edit);
+    event_source_->begin_again();
+    figures_->begin_again(environment_.get());
+    with_subscriptions([](Subscription* one) { one->source().begin_again(); });
+    const auto tell = [&](const Event& event) {
+      events_->on_event(event);
+      with_subscriptions([&](Subscription* one) { one->tell(event); });
+    };
+    Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};
+    event.text = fmt::format("{} changes before step {}", edit.changes_size(), edit.step());
+    tell(event);
+    for (const std::uint32_t body : woken)
+      tell({EventKind::kWake, environment_->step_count(), environment_->time(), body});
+    for (const std::string& warning : edited.warnings())
+      if (std::ranges::find(scene_warnings_, warning) == scene_warnings_.end()) made.add_warnings(warning);
+    made.set_pause_us(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
+    return made;
+  });
+}
+
+void ServedRun::wake(const api::WakeRequest& request) {
+  between_steps([&] {
+    require_steps_left("wake");
+    const std::vector<std::string>& ids = environment_->model().body_id;
+    const auto found = std::ranges::find(ids, request.body());
+    if (found == ids.end())
+      throw BadInput(fmt::format("wake: no body \"{}\"; {}", request.body(), allowed_names(request.body(), ids)));
+    environment_->wake(static_cast<std::uint32_t>(found - ids.begin()));
+  });
+}
+
+}  // namespace gravitas::control

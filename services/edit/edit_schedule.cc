@@ -1,0 +1,36 @@
+#include "services/edit/edit_schedule.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace gravitas {
+
+void EditSchedule::leave_out_past(std::uint32_t step, const std::vector<edit::v1::Edit>& journal) {
+  // one may have been made before a step that was not
+  const std::uint32_t done = made_.empty() ? step : std::max(step, made_.back().step());
+  for (const edit::v1::Edit& one : journal)
+    if (std::ranges::find(to_come_, one.step(), &edit::v1::Edit::step) == to_come_.end()) to_come_.push_back(one);
+  std::erase_if(to_come_, [&](const edit::v1::Edit& one) { return one.step() <= done; });
+  std::ranges::sort(to_come_, {}, &edit::v1::Edit::step);
+}
+
+void EditSchedule::rehearse(const RunOptions& options, scene::v1::Scene scene,
+                            kernel::EnvironmentDescription description, Catalog* catalog) const {
+  for (edit::v1::Edit edit : to_come_) {
+    if (edit.step() > description.steps)
+      throw BadInput(fmt::format("--edit: there is no step {}; the run has {}", edit.step(), description.steps));
+    const EditedScene edited(options, scene, description, catalog, &edit, nullptr);
+    scene = edited.scene();
+    description = edited.description();
+  }
+}
+
+std::optional<edit::v1::Edit> EditSchedule::take_due(std::uint32_t step) {
+  if (to_come_.empty() || to_come_.front().step() != step) return std::nullopt;
+  std::optional<edit::v1::Edit> due = std::move(to_come_.front());
+  to_come_.erase(to_come_.begin());
+  return due;
+}
+
+}  // namespace gravitas

@@ -1,0 +1,34 @@
+// The edits of a run: those made, and those to come.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "services/edit/edited_scene.h"
+
+namespace gravitas {
+
+class EditSchedule {
+ public:
+  // Of the command line, ascending.
+  void plan(std::vector<edit::v1::Edit> edits) { to_come_ = std::move(edits); }
+  // A run begins after that step, in the scene of the edits made: what is planned up to there is past, and what a journal
+  // knows of later ones is planned, where nothing else is.
+  void leave_out_past(std::uint32_t step, const std::vector<edit::v1::Edit>& journal);
+  // Throws BadInput if one of those to come cannot be, as far as that can be said before.
+  void rehearse(const RunOptions& options, scene::v1::Scene scene, kernel::EnvironmentDescription description,
+                Catalog* catalog) const;
+
+  // The edit before that step, which is to come no more.
+  std::optional<edit::v1::Edit> take_due(std::uint32_t step);
+  void note(const edit::v1::Edit& edit) { made_.push_back(edit); }
+
+  const std::vector<edit::v1::Edit>& made() const { return made_; }
+  const std::vector<edit::v1::Edit>& to_come() const { return to_come_; }
+
+ private:
+  std::vector<edit::v1::Edit> made_, to_come_;  // ascending
+};
+
+}  // namespace gravitas

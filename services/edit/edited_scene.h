@@ -1,0 +1,80 @@
+// What an edit makes of the scene of a run, and how the run goes on in it: another environment, with processes of its own,
+// takes over the state at a step boundary.
+//
+//   EditedScene next(options, scene, before, catalog, &edit, &now);      throws BadInput, and nothing has changed
+//   auto environment = start(next.description());                        new processes
+//   next.hand_over(now, environment.get());                              the state, its hash chain with the edit in it
+//
+// A body, joint, force … that keeps its id goes on: a body where it is and as fast as it is, but for what the edit sets
+// of Position, Orientation (of its geometry's frame), LinearVelocity (of its centre of mass) and AngularVelocity; a joint
+// bound as it was, and broken if it was. Who is added is as the scene's text says, a joint bound where the bodies are
+// now, a force as of now; one that was removed and added again is new. Forces that act once act at t = 0: they cannot be
+// added later. An edit wakes all who sleep, lets integrators begin their histories again, and keeps the memory of
+// contacts between bodies that were not moved and have the same shapes. Who is removed ends his collisions without an event.
+//
+// The chain goes on as hash(hash(chain, digest of the changes), next state): a run that makes the same edits before the same
+// steps has the same chain, in any hosting, resumed or not.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "gravitas/edit/v1/edit.pb.h"
+#include "gravitas/recorder/v1/checkpoint.pb.h"
+#include "gravitas/scene/v1/scene.pb.h"
+#include "kernel/environment.h"
+#include "services/run/session.h"
+#include "services/scene/change.h"
+
+namespace gravitas {
+
+class EditedScene {
+ public:
+  // `before` is the description of `scene`, with all earlier edits. Where bodies are is `now`'s to say, and is written into
+  // the edit; with null it stands there since the edit was first made (and where it does not, as for a rehearsal, bodies
+  // are where the scene has them).
+  EditedScene(const RunOptions& options, const scene::v1::Scene& scene, const kernel::EnvironmentDescription& before,
+              Catalog* catalog, edit::v1::Edit* edit, const kernel::Environment* now);
+
+  const scene::v1::Scene& scene() const { return scene_; }
+  const kernel::EnvironmentDescription& description() const { return description_; }
+  // Of scene and builder.
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+  // Bodies that slept, and whom the edit wakes.
+  std::vector<std::uint32_t> woken(const kernel::Environment& now) const;
+
+  // Precondition: `next` runs description(), whoever answers there. Throws std::logic_error if it does not take the state.
+  void hand_over(const kernel::Environment& now, kernel::Environment* next) const;
+
+ private:
+  void read_changes(const RunOptions& options, Catalog* catalog);
+  void find_kept();
+  void find_motions(const kernel::Environment& now);
+  void write_places();
+  void place();
+  void refuse_late_impulses() const;
+  bool has_stopped(std::uint32_t body) const;
+
+  const kernel::EnvironmentDescription& before_;
+  edit::v1::Edit& edit_;
+  scene::v1::Scene scene_;
+  kernel::EnvironmentDescription description_;
+  std::vector<std::string> warnings_;
+  scene::ChangeLog log_;
+  std::vector<std::uint32_t> old_body_, old_joint_;  // row before, or kNone
+  std::vector<Pose> pose_;                           // of the bodies as the run goes on
+  std::vector<Twist> twist_;
+};
+
+// The slots of `next` get who answers now (`active`, whose rows are those of `before`) for the scene's own plugins.
+void keep_who_answers(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& active,
+                      kernel::EnvironmentDescription* next);
+
+// Rows of who answers, in the slots of an edited scene; who served what is gone goes, too.
+void translate_decisions(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& next,
+                         std::vector<recorder::v1::Decision>* decisions);
+
+}  // namespace gravitas

@@ -1,0 +1,171 @@
+#include "services/events/event_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "plugin_sdk/activity.h"
+#include "plugin_sdk/merged_rows.h"
+#include "plugin_sdk/slots.h"
+
+namespace gravitas {
+namespace {
+
+// A commit counts as at k / rate within this share of a time step.
+constexpr double kRateTolerance = 1e-9;
+
+bool has_pair(std::span<const std::uint32_t> pairs, std::uint32_t a, std::uint32_t b) {
+  std::size_t first = 0, last = pairs.size() / 2;
+  while (first < last) {
+    const std::size_t middle = (first + last) / 2;
+    if (std::pair{pairs[2 * middle], pairs[2 * middle + 1]} < std::pair{a, b})
+      first = middle + 1;
+    else
+      last = middle;
+  }
+  return 2 * first < pairs.size() && pairs[2 * first] == a && pairs[2 * first + 1] == b;
+}
+
+std::pair<std::uint32_t, std::uint32_t> bodies_of(const kernel::StepData& data, std::size_t contact) {
+  return {data.contact_body[2 * contact], data.contact_body[2 * contact + 1]};
+}
+
+}  // namespace
+
+// visit(record) for every swap that has got further.
+template <typename Visit>
+void EventSource::visit_swaps(const kernel::Environment& environment, Visit&& visit) {
+  using enum kernel::SwapState;
+  std::map<std::pair<Slot, std::uint32_t>, std::uint32_t> ranks;
+  for (const kernel::SwapRecord& record : environment.swaps()) {
+    const std::uint32_t rank = ranks[{record.slot, record.step}]++;
+    if (record.only_compared || record.state == kPreparing || record.state == kShadow) continue;
+    const auto [told, is_new] = swaps_.try_emplace({record.slot, record.step, rank}, record.state);
+    if (is_new || std::exchange(told->second, record.state) != record.state) visit(record);
+  }
+}
+
+void EventSource::begin_again() {
+  events_.clear();
+  ongoing_.clear();
+  faults_ = 0;
+  swaps_.clear();
+}
+
+void EventSource::leave_out_past(const kernel::Environment& environment) {
+  faults_ = environment.faults().size();
+  visit_swaps(environment, [](const kernel::SwapRecord&) {});
+}
+
+void EventSource::on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  if (inner.number == 0) {
+    events_.clear();
+    const bool looks_for_activity = kinds_.has(EventKind::kWake) || kinds_.has(EventKind::kSleep);
+    slept_.assign(looks_for_activity ? inner.before.rested.size() : 0, false);
+    for (std::size_t i = 0; i < slept_.size(); ++i) slept_[i] = inner.before.rested[i] == kAsleep;
+  }
+  ongoing_.clear();
+  if (kinds_.has(EventKind::kCollisionStart) || kinds_.has(EventKind::kCollisionEnd)) find_changes(environment, inner);
+  if (kinds_.has(EventKind::kCollisionOngoing)) find_ongoing(environment, inner);
+  if (kinds_.has(EventKind::kBreak)) find_breaks(environment, inner);
+}
+
+void EventSource::on_commit(const kernel::Environment& environment) {
+  for (const Event& event : events_) listener_.on_event(event);
+  events_.clear();
+  find_activity(environment);
+  for (const Event& event : ongoing_) listener_.on_event(event);
+  ongoing_.clear();
+  tell_incidents(environment);
+}
+
+void EventSource::tell_incidents(const kernel::Environment& environment) {
+  if (kinds_.has(EventKind::kFault)) find_faults(environment);
+  if (kinds_.has(EventKind::kSwap)) find_swaps(environment);
+}
+
+Event EventSource::collision(EventKind kind, const kernel::Environment& environment, const kernel::InnerStep& inner,
+                             std::size_t* contact) const {
+  const auto [a, b] = bodies_of(inner.data, *contact);
+  Event event{kind, environment.step_count() + 1, inner.end, a, b};
+  double fastest = -1.0;
+  for (; *contact < inner.data.contact_key.size() && bodies_of(inner.data, *contact) == std::pair{a, b}; ++*contact) {
+    const Vector3 normal = vector_at(inner.data.contact_normal.span(), *contact);
+    const Vector3 velocity = vector_at(inner.data.contact_relative_velocity.span(), *contact);
+    event.impulse += normal.dot(vector_at(inner.data.contact_impulse.span(), *contact));
+    const double approach = std::max(0.0, -normal.dot(velocity));
+    if (approach <= fastest) continue;
+    fastest = event.relative_speed = approach;
+    event.relative_velocity = velocity;
+  }
+  return event;
+}
+
+void EventSource::find_changes(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  std::size_t contact = 0;
+  visit_changes(inner.before.touching.span(), inner.after.touching.span(),
+                [&](bool starts, std::uint32_t a, std::uint32_t b) {
+                  const EventKind kind = starts ? EventKind::kCollisionStart : EventKind::kCollisionEnd;
+                  if (!kinds_.has(kind)) return;
+                  const std::size_t count = inner.data.contact_key.size();
+                  while (starts && contact < count && bodies_of(inner.data, contact) < std::pair{a, b}) ++contact;
+                  if (starts && contact < count && bodies_of(inner.data, contact) == std::pair{a, b})
+                    events_.push_back(collision(kind, environment, inner, &contact));
+                  else
+                    events_.push_back({kind, environment.step_count() + 1, inner.end, a, b});
+                });
+}
+
+// Of the state that the step ends in: what touches there and touched before. Those who sleep are not looked at.
+void EventSource::find_ongoing(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  const double tolerance = kRateTolerance * environment.time_step();
+  const auto samples = [&](double time) { return std::floor((time + tolerance) * ongoing_rate_); };
+  if (samples(inner.end) == samples(environment.time())) return;
+  for (std::size_t contact = 0; contact < inner.data.contact_key.size();) {
+    const auto [a, b] = bodies_of(inner.data, contact);
+    Event event = collision(EventKind::kCollisionOngoing, environment, inner, &contact);
+    if (has_pair(inner.before.touching.span(), a, b) && has_pair(inner.after.touching.span(), a, b))
+      ongoing_.push_back(std::move(event));
+  }
+}
+
+void EventSource::find_breaks(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  for (std::uint32_t joint = 0; joint < inner.after.intact.size(); ++joint) {
+    if (inner.before.intact[joint] == inner.after.intact[joint]) continue;
+    const kernel::ConstraintDescription& broken = environment.model().constraints[joint];
+    events_.push_back({EventKind::kBreak, environment.step_count() + 1, inner.end, broken.body1, broken.body2, joint});
+  }
+}
+
+void EventSource::find_activity(const kernel::Environment& environment) {
+  for (const auto& [kind, sleeps] : {std::pair{EventKind::kWake, false}, {EventKind::kSleep, true}})
+    for (std::uint32_t i = 0; i < slept_.size() && kinds_.has(kind); ++i)
+      if (slept_[i] != sleeps && environment.is_asleep(i) == sleeps)
+        listener_.on_event({kind, environment.step_count(), environment.time(), i});
+  slept_.clear();
+}
+
+void EventSource::find_faults(const kernel::Environment& environment) {
+  for (; faults_ < environment.faults().size(); ++faults_) {
+    const kernel::FaultRecord& record = environment.faults()[faults_];
+    Event event{EventKind::kFault, record.step, environment.time()};
+    event.slot = slot_name(record.fault.slot);
+    event.plugin = record.fault.plugin;
+    event.what = kernel::fault_kind_name(record.fault.kind);
+    event.text = record.fault.text + (record.recovered_by.empty() ? "" : "; answered by: " + record.recovered_by);
+    listener_.on_event(event);
+  }
+}
+
+void EventSource::find_swaps(const kernel::Environment& environment) {
+  visit_swaps(environment, [&](const kernel::SwapRecord& record) {
+    Event event{EventKind::kSwap, environment.step_count(), environment.time()};
+    event.slot = slot_name(record.slot);
+    event.plugin = record.to;
+    event.what = kernel::swap_state_name(record.state);
+    event.text = record.reason;
+    listener_.on_event(event);
+  });
+}
+
+}  // namespace gravitas

@@ -1,0 +1,145 @@
+#include "services/listeners/pair_decisions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace gravitas {
+namespace {
+
+std::pair<std::uint32_t, std::uint32_t> pair_of(const PairQuestion& one) { return {one.a, one.b}; }
+
+// Why answers cannot be used; empty if they can.
+std::string find_impossible(std::span<const PairQuestion> answers) {
+  for (const PairQuestion& answer : answers)
+    for (const double number : answer.material)
+      if (!std::isfinite(number) || number < 0.0)
+        return fmt::format("its material of '{}' and '{}' has the number {}; allowed: finite ones >= 0", answer.id_a,
+                           answer.id_b, number);
+  return {};
+}
+
+}  // namespace
+
+struct PairDecisions::Desk {
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<PairQuestion> pairs;
+  std::string problem;
+  bool is_asked = false, is_answered = false, has_ended = false;
+
+  static void serve(const std::shared_ptr<Desk>& desk, const std::shared_ptr<PairListener>& listener) {
+    std::unique_lock lock(desk->mutex);
+    for (;;) {
+      desk->changed.wait(lock, [&] { return desk->is_asked || desk->has_ended; });
+      if (desk->has_ended) return;
+      desk->is_asked = false;
+      std::vector<PairQuestion> pairs = desk->pairs;
+      std::string problem;
+      lock.unlock();
+      try {
+        listener->on_pairs(pairs);
+      } catch (const std::exception& error) {
+        problem = fmt::format("it threw: {}", error.what());
+      } catch (...) {
+        problem = "it threw";
+      }
+      lock.lock();
+      if (problem.empty()) {
+        // no more than decisions: of whom is not the listener's to say
+        for (std::size_t i = 0; i < pairs.size(); ++i) {
+          desk->pairs[i].may_collide = pairs[i].may_collide;
+          desk->pairs[i].material = pairs[i].material;
+        }
+      }
+      desk->problem = std::move(problem);
+      desk->is_answered = true;
+      desk->changed.notify_all();
+    }
+  }
+};
+
+void PairDecisions::listen(std::shared_ptr<PairListener> listener, double deadline) {
+  leave();
+  deadline_ = deadline;
+  desk_ = std::make_shared<Desk>();
+  std::thread(Desk::serve, desk_, std::move(listener)).detach();
+}
+
+void PairDecisions::leave() {
+  const std::shared_ptr<Desk> desk = std::exchange(desk_, nullptr);
+  if (!desk) return;
+  const std::lock_guard lock(desk->mutex);
+  desk->has_ended = true;
+  desk->changed.notify_all();
+}
+
+void PairDecisions::leave_aside(const std::string& why) {
+  leave();
+  report_(fmt::format("the listener that decides about pairs is left aside: {}; the scene's own rules hold", why));
+}
+
+PairDecisions::Decisions::const_iterator PairDecisions::find(Decisions::const_iterator from, std::uint32_t a,
+                                                             std::uint32_t b) const {
+  const auto found = std::ranges::lower_bound(from, decided_.end(), std::pair{a, b}, {}, pair_of);
+  return found != decided_.end() && pair_of(*found) == std::pair{a, b} ? found : decided_.end();
+}
+
+std::size_t PairDecisions::keep_allowed(const kernel::Environment& environment, std::span<std::uint32_t> pairs) {
+  const kernel::Model& model = environment.model();
+  std::vector<PairQuestion> questions;
+  for (std::size_t i = 0; i < pairs.size() && is_listening(); i += 2) {
+    const std::uint32_t a = pairs[i], b = pairs[i + 1];
+    if (find(decided_.begin(), a, b) != decided_.end()) continue;
+    PairQuestion& question = questions.emplace_back(PairQuestion{a, b, model.body_id[a], model.body_id[b], true, {}});
+    const std::size_t row = std::size_t{model.material[a]} * model.material_count + model.material[b];
+    std::copy_n(&model.material_pairs[kMaterialColumns * row], kMaterialColumns, question.material.begin());
+  }
+  if (!questions.empty()) ask(std::move(questions));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < pairs.size(); i += 2) {
+    const auto decision = find(decided_.begin(), pairs[i], pairs[i + 1]);
+    if (decision != decided_.end() && !decision->may_collide) continue;
+    pairs[kept++] = pairs[i];
+    pairs[kept++] = pairs[i + 1];
+  }
+  return kept;
+}
+
+void PairDecisions::mix_materials(std::span<const std::uint32_t> bodies, std::span<double> rows) {
+  for (std::size_t i = 0; i < bodies.size() / 2; ++i) {
+    const auto decision = find(decided_.begin(), bodies[2 * i], bodies[2 * i + 1]);
+    if (decision != decided_.end()) std::ranges::copy(decision->material, rows.subspan(kMaterialColumns * i).begin());
+  }
+}
+
+void PairDecisions::ask(std::vector<PairQuestion> questions) {
+  const std::shared_ptr<Desk> desk = desk_;
+  std::string problem;
+  {
+    std::unique_lock lock(desk->mutex);
+    desk->pairs = std::move(questions);
+    desk->is_asked = true;
+    desk->is_answered = false;
+    desk->changed.notify_all();
+    if (desk->changed.wait_for(lock, std::chrono::duration<double>(deadline_), [&] { return desk->is_answered; })) {
+      problem = desk->problem;
+      questions = std::move(desk->pairs);
+    } else {
+      problem = fmt::format("no answer within {:g} s about {} pairs", deadline_, desk->pairs.size());
+    }
+  }
+  if (problem.empty()) problem = find_impossible(questions);
+  if (!problem.empty()) return leave_aside(problem);
+  const auto middle = static_cast<std::ptrdiff_t>(decided_.size());
+  std::ranges::move(questions, std::back_inserter(decided_));
+  std::ranges::inplace_merge(decided_, decided_.begin() + middle, {}, pair_of);
+}
+
+}  // namespace gravitas

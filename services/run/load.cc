@@ -1,0 +1,123 @@
+// From scene files and a command line to an environment.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "plugin_sdk/slots.h"
+#include "services/run/session.h"
+#include "services/scene/build.h"
+#include "services/scene/overrides.h"
+#include "services/scene/reader.h"
+
+namespace gravitas {
+namespace {
+
+std::string joined(const std::vector<scene::SceneError>& errors) {
+  std::string text;
+  for (const scene::SceneError& error : errors) text += (text.empty() ? "" : "\n") + scene::to_string(error);
+  return text;
+}
+
+void require(const scene::Problems& problems) {
+  if (!problems.ok()) throw BadInput(joined(problems.errors));
+}
+
+// What the command line moves elsewhere leaves its process; the scene itself hosts the slots of one process alike.
+void warn_of_split_processes(const kernel::EnvironmentDescription& description, std::vector<std::string>* warnings) {
+  std::set<std::string> split;
+  for (const Slot one : kSlots)
+    for (const Slot other : kSlots)
+      if (description.slot(one).process == description.slot(other).process &&
+          description.slot(one).hosting != description.slot(other).hosting)
+        split.insert(description.slot(one).process);
+  for (const std::string& process : split)
+    if (!process.empty())
+      warnings->push_back(
+          fmt::format("the slots of Process \"{}\" are hosted in different ways; those that are hosted "
+                      "alike share one",
+                      process));
+}
+
+}  // namespace
+
+void apply_hosting(const std::vector<HostingChoice>& choices, kernel::EnvironmentDescription* description) {
+  for (const HostingChoice& choice : choices) {
+    for (const Slot slot : kSlots)
+      if (!choice.slot || *choice.slot == slot) {
+        description->slot(slot).hosting = choice.hosting;
+        description->slot(slot).attached = choice.attached;
+        if (choice.attached) description->slot(slot).deadline = kernel::kAttachedDeadline;
+        for (kernel::PluginChoice& plugin : description->slot(slot).plugins) plugin.address = choice.address;
+      }
+  }
+}
+
+std::string installed_worker() { return kernel::worker_program(); }
+
+std::string installed_plugins() {
+  const std::filesystem::path bin = std::filesystem::path(kernel::worker_program()).parent_path();
+  return (bin.parent_path() / "lib" / "gravitas").string();
+}
+
+kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::string>* warnings, Catalog* plugins,
+                                    scene::v1::Scene* read) {
+  const auto require_positive = [](const char* option, double value) {
+    if (!std::isfinite(value) || value <= 0.0)
+      throw BadInput(fmt::format("{} {:g}: it must be a finite number of seconds > 0", option, value));
+  };
+  if (options.time_step) require_positive("--dt", *options.time_step);
+  if (options.sample_every) require_positive("--sample-every", *options.sample_every);
+  if (options.ongoing_rate && !(std::isfinite(*options.ongoing_rate) && *options.ongoing_rate > 0.0))
+    throw BadInput(fmt::format("--ongoing-rate {:g}: it must be a finite number of Hz > 0", *options.ongoing_rate));
+  if (options.duration && !(std::isfinite(*options.duration) && *options.duration >= 0.0))
+    throw BadInput(fmt::format("--duration {:g}: it must be a finite number of seconds >= 0", *options.duration));
+  scene::Problems problems;
+  scene::SceneDocument document;
+  scene::read_files(options.scenes, &document, &problems);
+  require(problems);
+  std::vector<std::string> overrides = options.overrides;
+  if (options.time_step) overrides.push_back(fmt::format("Simulator.TimeStep={:.17g}", *options.time_step));
+  if (options.duration) overrides.push_back(fmt::format("Simulator.Duration={:.17g}", *options.duration));
+  for (const std::string& one : overrides) scene::apply_override(&document.scene(), one, &problems);
+  require(problems);
+  for (const scene::SceneError& warning : problems.warnings) warnings->push_back(scene::to_string(warning));
+
+  Catalog own;
+  Catalog& catalog = plugins != nullptr ? *plugins : own;
+  catalog = Catalog::installed(installed_worker(), installed_plugins());
+  if (read != nullptr) *read = document.scene();
+  return build_scene(options, document.scene(), &catalog, warnings);
+}
+
+kernel::EnvironmentDescription build_scene(const RunOptions& options, const scene::v1::Scene& scene, Catalog* catalog,
+                                           std::vector<std::string>* warnings) {
+  scene::Problems problems;
+  std::optional<kernel::EnvironmentDescription> description = scene::build(scene, catalog, &problems);
+  require(problems);
+  for (const scene::SceneError& warning : problems.warnings) warnings->push_back(scene::to_string(warning));
+  if (options.steps) {
+    description->steps = *options.steps;
+    description->last_time_step = description->time_step;
+  }
+  description->threads = options.threads;
+  apply_hosting(options.hosting, &*description);
+  warn_of_split_processes(*description, warnings);
+  return std::move(*description);
+}
+
+std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
+                                           const kernel::HostStarter& starter) {
+  try {
+    auto environment = std::make_unique<kernel::Environment>(description, starter);
+    for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
+    return environment;
+  } catch (const kernel::StageFault& fault) {
+    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text));
+  } catch (const std::invalid_argument& problem) {
+    throw BadInput(problem.what());
+  }
+}
+
+}  // namespace gravitas

@@ -1,0 +1,80 @@
+// The scene of a served run changes while it goes on: the chain is that of `gravitas run --edit`.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "services/run/edit_spec.h"
+#include "tests/services/control/served.h"
+
+namespace gravitas::control {
+namespace {
+
+using harness::quiet_chain;
+using harness::refusal;
+using harness::Served;
+using ::testing::HasSubstr;
+
+api::EditMade edit(Served* served, const std::vector<std::string>& changes) {
+  api::EditRequest request;
+  for (const std::string& change : changes) *request.add_changes() = parse_change(change);
+  return served->client.edit(request);
+}
+
+TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
+  Served served;
+  const std::string more =
+      served.folder.write("more.gravitas",
+                          "Bodies { Body { Id = \"New\" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { "
+                          "Position = {9, 9, 9} LinearVelocity = {1, 0, 0} } } }");
+  const std::string move = "set Body.Ball01.LinearVelocity={0,1,0}";
+  served.client.swap(parse_swap_request("solver=Sequential,hosting=direct"));
+  EXPECT_THAT(refusal([&] { edit(&served, {move}); }), HasSubstr("the swap of slot solver"));
+  served.client.inject("integrator:kill@step=20");
+  served.client.step(30);
+  const api::EditMade made = edit(&served, {"add " + more, move});
+  EXPECT_EQ(made.step(), 31U);
+  EXPECT_GT(made.pause_us(), 0.0);
+  api::Status status = served.client.status();
+  EXPECT_EQ(status.step(), 30U);
+  // what was before is not forgotten, and who took over stays
+  EXPECT_EQ(status.fault_count(), 1U);
+  ASSERT_EQ(status.swaps_size(), 1);
+  EXPECT_EQ(status.swaps(0).outcome(), "committed");
+  for (const api::PlannedSlot& slot : status.plan().slots()) {
+    if (slot.slot() == "solver") {
+      EXPECT_EQ(slot.hosting(), "direct");
+    }
+  }
+  served.client.step(30);
+  edit(&served, {"remove Body.New"});
+  status = served.to_the_end();
+
+  RunOptions options = harness::sample("direct").run;
+  options.edits = {"add " + more + "@step=31", move + "@step=31", "remove Body.New@step=61"};
+  const RunResult result = run(
+      options, [] { return false; }, [](const Progress&) {});
+  EXPECT_EQ(status.chain_hash(), result.report.chain_hash());
+  EXPECT_THAT(refusal([&] { edit(&served, {move}); }), HasSubstr("the run has made its last step"));
+
+  served.client.reset();
+  EXPECT_EQ(served.client.status().fault_count(), 0U);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+TEST(ServedEdit, WhatCannotBeChangesNothing) {
+  Served served(harness::sample("direct"));
+  served.client.step(10);
+  EXPECT_THAT(refusal([&] { edit(&served, {"remove Body.Ball03"}); }), HasSubstr("did you mean"));
+  EXPECT_THAT(refusal([&] {
+                edit(&served, {"set Body.Ball01.Mass=3", "remove Body.Ball01"});
+              }),
+              HasSubstr("names no Body: \"Ball01\""));
+  EXPECT_THAT(refusal([&] { edit(&served, {}); }), HasSubstr("nothing to change"));
+  EXPECT_THAT(refusal([&] { served.client.wake("Ball03"); }), HasSubstr("wake: no body \"Ball03\""));
+  EXPECT_EQ(served.client.wake("Ball01").step(), 10U);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+}  // namespace
+}  // namespace gravitas::control

@@ -1,0 +1,471 @@
+// Runs whose scene changes on the way: what bodies, joints, forces and materials then do has closed forms, and hosting,
+// stops and resumes change no bit.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "services/recorder/checkpoint.h"
+#include "services/recorder/durable_file.h"
+#include "services/recorder/recorder.h"
+#include "services/run/session.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas {
+namespace {
+
+using harness::ScratchFolder;
+using kernel::Hosting;
+using ::testing::HasSubstr;
+
+constexpr double kStep = 0.01;  // s
+
+struct Row {
+  Vector3 position, velocity;
+};
+
+// A scene, its edits, and where it ends.
+struct EditedRun {
+  RunOptions options;
+  ScratchFolder folder;
+
+  explicit EditedRun(const std::string& scene, const std::vector<std::string>& edits = {},
+                     const std::vector<std::string>& overrides = {}) {
+    options.scenes = {folder.write("scene.gravitas", scene)};
+    options.hosting = {{std::nullopt, Hosting::kDirect}};
+    options.overrides = overrides;
+    options.edits = edits;
+    options.trajectory = folder.path("motion.csv");
+  }
+  RunResult run() {
+    RunResult result = gravitas::run(
+        options, [] { return false; }, [](const Progress&) {});
+    EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    return result;
+  }
+  // Of the last sample.
+  std::map<std::string, Row> end() {
+    run();
+    std::map<std::string, Row> rows;
+    std::istringstream text(harness::read_file(options.trajectory));
+    std::string line, last;
+    std::getline(text, line);
+    while (std::getline(text, line)) {
+      std::vector<std::string> cells;
+      std::istringstream row(line);
+      for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+      if (cells[0] != last) rows.clear();
+      last = cells[0];
+      const auto vector = [&](std::size_t i) {
+        return Vector3(std::stod(cells[i]), std::stod(cells[i + 1]), std::stod(cells[i + 2]));
+      };
+      rows[cells[1]] = {vector(2), vector(9)};
+    }
+    return rows;
+  }
+  std::string refusal() {
+    try {
+      gravitas::run(
+          options, [] { return false; }, [](const Progress&) {});
+    } catch (const BadInput& problem) {
+      return problem.what();
+    }
+    ADD_FAILURE() << "it was not refused";
+    return {};
+  }
+};
+
+std::string scene(const std::string& bodies, const std::string& rest = "") {
+  return R"(
+Geometries { Geometry { Type = "Sphere" Id = "Unit" CustomProperties { Radius = 0.1 } }
+             Geometry { Type = "Halfspace" Id = "Flat" } }
+Materials { Material { Id = "Rubber" RestitutionCoefficient = 0.5 StaticFrictionCoefficient = 0 } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -10, 0} } } }
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 SleepEnergy = 0 } }
+Environment { KineticIntegrator = "Verlet" Space { Bodies { )" +
+         bodies + "} }\n" + rest + "}\n";
+}
+
+std::string ball(const std::string& id, const std::string& kinetic, const std::string& more = "") {
+  return "Body { Id = \"" + id + "\" GeometryId = \"Unit\" Mass = 2 Material = \"Rubber\" KineticProperties { " +
+         kinetic + " } " + more + " }\n";
+}
+
+const std::string kFalls = "Forces = { \"Down\" }";
+
+TEST(EditedRun, ABodyMovesAsItWasSet) {
+  EditedRun run(scene(ball("A", "LinearVelocity = {1, 0, 0}")), {"set Body.A.LinearVelocity={0,2,0}@step=51"});
+  Row end = run.end()["A"];
+  EXPECT_NEAR((end.position - Vector3(0.5, 1.0, 0)).norm(), 0.0, 1e-12);
+  EXPECT_EQ(end.velocity, Vector3(0, 2, 0));
+  // moved elsewhere it is as fast as it was
+  run.options.edits = {"set Body.A.Position={7,0,0}@step=51"};
+  end = run.end()["A"];
+  EXPECT_NEAR((end.position - Vector3(7.5, 0, 0)).norm(), 0.0, 1e-12);
+  EXPECT_EQ(end.velocity, Vector3(1, 0, 0));
+  // back to where it began, which the scene says already
+  run.options.edits = {"set Body.A.Position={0,0,0}@step=31", "set Body.A.Position={0,0,0}@step=61"};
+  EXPECT_NEAR(run.end()["A"].position.x(), 0.4, 1e-12);
+}
+
+TEST(EditedRun, BodiesComeAndGo) {
+  EditedRun run(scene(ball("A", "LinearVelocity = {1, 0, 0}") + ball("B", "Position = {0, 5, 0}")));
+  const std::string more = run.folder.write(
+      "more.gravitas",
+      "Geometries { Geometry { Type = \"Box\" Id = \"Cube\" CustomProperties { HalfExtents = {1, 1, 1} } } }\n"
+      "Bodies { Body { Id = \"C\" GeometryId = \"Cube\" Mass = 3 KineticProperties { Position = {0, -5, 0} "
+      "LinearVelocity = {0, -1, 0} } } }\n");
+  run.options.edits = {"remove Body.B@step=21", "add " + more + "@step=31"};
+  const std::map<std::string, Row> end = run.end();
+  ASSERT_EQ(end.size(), 2U);
+  EXPECT_NEAR((end.at("A").position - Vector3(1, 0, 0)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((end.at("C").position - Vector3(0, -5.7, 0)).norm(), 0.0, 1e-12);
+  const RunResult result = run.run();
+  EXPECT_EQ(result.report.bodies(), 2U);
+  EXPECT_NEAR(result.report.linear_momentum().final(0), 2.0, 1e-12);
+  EXPECT_NEAR(result.report.linear_momentum().final(1), -3.0, 1e-12);
+  // energy is compared with that after the last edit
+  EXPECT_NEAR(result.report.energy().initial(), 1.0, 1e-12);
+  EXPECT_NEAR(result.report.energy().final(), 2.5, 1e-12);
+  EXPECT_LT(result.report.energy().max_relative_drift(), 1e-12);
+}
+
+TEST(EditedRun, AForceThatIsSetActsFromThenOn) {
+  EditedRun run(scene(ball("A", "", kFalls)), {"set Force.Down.Acceleration={0,0,0}@step=51"});
+  const Row end = run.end()["A"];
+  EXPECT_NEAR(end.velocity.y(), -5.0, 1e-12);
+  EXPECT_NEAR(end.position.y(), -1.25 - 2.5, 1e-12);
+  // one that comes in the middle
+  const std::string wind = run.folder.write(
+      "wind.gravitas", "Forces { Force { Type = \"Basic\" Id = \"Wind\" CustomProperties { Force = {4, 0, 0} } } }");
+  run.options.edits = {"add " + wind + "@step=51", "set Body.A.Forces={\"Down\",\"Wind\"}@step=51"};
+  EXPECT_NEAR(run.end()["A"].position.x(), 0.5 * (4.0 / 2.0) * 0.25, 1e-12);
+}
+
+// A ball that falls freely is caught by a joint at a point, and let go again: it swings on the arm that it had when it was
+// caught, and keeps the energy of its speed along the circle.
+TEST(EditedRun, AJointIsBoundWhereTheBodiesAre) {
+  EditedRun run(scene(ball("A", "Position = {1, 0, 0}", kFalls)), {}, {"Solver=Newton"});
+  const std::string hold = run.folder.write(
+      "hold.gravitas",
+      "Constraints { Constraint { Type = \"Spherical\" Id = \"Hold\" Body2 = \"A\" CustomProperties { BindPoint = "
+      "{0, -0.8, 0} } } }");
+  run.options.edits = {"add " + hold + "@step=41"};
+  Row end = run.end()["A"];
+  // caught at (1, -0.8, 0), at the point's height, 1 m away
+  EXPECT_NEAR((end.position - Vector3(0, -0.8, 0)).norm(), 1.0, 1e-9);
+  EXPECT_NEAR((end.position - Vector3(0, -0.8, 0)).dot(end.velocity), 0.0, 0.05);
+  EXPECT_LT(run.run().report.max_joint_error(), 1e-9);
+  // let go it falls on: the velocity of then, and g
+  run.options.steps = 60;
+  const Row then = run.end()["A"];
+  run.options.edits.emplace_back("remove Constraint.Hold@step=61");
+  run.options.steps = 90;
+  end = run.end()["A"];
+  const double t = 30 * kStep;
+  EXPECT_NEAR((end.position - then.position - t * then.velocity - 0.5 * t * t * Vector3(0, -10, 0)).norm(), 0.0, 1e-12);
+}
+
+TEST(EditedRun, AMaterialIsThatOfTheImpact) {
+  const std::string ground = "Body { Id = \"Ground\" GeometryId = \"Flat\" Material = \"Rubber\" }\n";
+  for (const double restitution : {0.0, 0.5, 1.0}) {
+    EditedRun run(scene(ground + ball("A", "Position = {0, 1.1, 0} LinearVelocity = {0, -2, 0}")),
+                  {"set Material.Rubber.RestitutionCoefficient=" + std::to_string(restitution) + "@step=11"});
+    EXPECT_NEAR(run.end()["A"].velocity.y(), 2.0 * restitution, 1e-12);
+  }
+}
+
+// The plan is that of the edited scene.
+TEST(EditedRun, ThePlanIsMadeAnew) {
+  EditedRun run(scene(ball("A", "Position = {0, 1.1, 0}", kFalls)));
+  const auto planned = [&](const char* name) {
+    const RunResult result = run.run();
+    for (const report::v1::PlannedSlot& slot : result.report.plan().slots())
+      if (slot.slot() == name) return true;
+    return false;
+  };
+  EXPECT_FALSE(planned("collision"));
+  const std::string ground =
+      run.folder.write("ground.gravitas", "Bodies { Body { Id = \"Ground\" GeometryId = \"Flat\" } }");
+  run.options.edits = {"add " + ground + "@step=21"};
+  EXPECT_TRUE(planned("collision"));
+  EXPECT_GT(run.end()["A"].position.y(), 0.0);
+  run.options.edits.emplace_back("remove Body.Ground@step=41");
+  EXPECT_FALSE(planned("collision"));
+}
+
+// A body that is fixed stays where it is then.
+TEST(EditedRun, ABodyThatIsMadeImmovableStaysWhereItIs) {
+  EditedRun run(
+      scene(ball("A", "LinearVelocity = {1, 0, 0}") + ball("B", "Position = {3, 0, 0} LinearVelocity = {-1, 0, 0}")),
+      {"set Body.A.Immovable=true@step=51"});
+  // B meets A at rest at x = 0.5 at t = 2.3 s, and comes back
+  run.options.duration = 3.0;
+  const std::map<std::string, Row> end = run.end();
+  EXPECT_FALSE(end.contains("A"));
+  EXPECT_NEAR(end.at("B").velocity.x(), 0.5, 1e-12);
+  EXPECT_NEAR(end.at("B").position.x(), 0.7 + 0.5 * 0.7, 0.02);
+}
+
+// What the edit does not touch goes on bit for bit, warm start and all; that there was an edit is in the chain.
+TEST(EditedRun, WhatIsNotTouchedKeepsItsBits) {
+  for (const char* name : {"stack", "sliding_boxes", "double_pendulum", "two_spheres_motor"}) {
+    RunOptions options;
+    options.scenes = {harness::shipped_scene(name)};
+    options.hosting = {{std::nullopt, Hosting::kDirect}};
+    options.steps = 80;
+    options.overrides = {"Simulator.SleepEnergy=0"};
+    const auto run_it = [&] {
+      return run(
+          options, [] { return false; }, [](const Progress&) {});
+    };
+    const RunResult quiet = run_it();
+    const ScratchFolder folder;
+    const std::string idle = folder.write("idle", "Materials { Material { Id = \"Unused\" } }");
+    options.edits = {"add " + idle + "@step=41"};
+    const RunResult edited = run_it();
+    EXPECT_EQ(edited.outcome, RunOutcome::kCompleted) << edited.fault;
+    EXPECT_EQ(edited.report.state_hash(), quiet.report.state_hash()) << name;
+    EXPECT_NE(edited.report.chain_hash(), quiet.report.chain_hash()) << name;
+    EXPECT_EQ(edited.report.max_penetration(), quiet.report.max_penetration()) << name;
+    EXPECT_EQ(edited.report.max_joint_error(), quiet.report.max_joint_error()) << name;
+  }
+}
+
+// Balls on the ground and on a joint, and edits of all kinds.
+struct BusyRun : EditedRun {
+  BusyRun()
+      : EditedRun(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" Material = \"Rubber\" }\n" +
+                            ball("A", "Position = {0, 0.1, 0} LinearVelocity = {0.3, 0, 0}", kFalls) +
+                            ball("B", "Position = {1, 0.5, 0}", kFalls) + ball("C", "Position = {2, 1, 0}", kFalls),
+                        "Constraints { Constraint { Type = \"Spherical\" Id = \"Hang\" Body1 = \"B\" Body2 = \"C\" "
+                        "CustomProperties { BindPoint = {1.5, 0.7, 0} } } }")) {
+    const std::string more = folder.write(
+        "more.gravitas",
+        "Bodies { Body { Id = \"D\" GeometryId = \"Unit\" Mass = 1 KineticProperties { Position = "
+        "{0.2, 0.6, 0} } Forces = { \"Down\" } } }\n"
+        "Constraints { Constraint { Type = \"Distance\" Id = \"Rope\" Body1 = \"A\" Body2 = \"D\" "
+        "CustomProperties { BindPoint1 = {0.12, 0.1, 0} BindPoint2 = {0.2, 0.6, 0} MaximumDistance = 1 } } }\n");
+    options.edits = {"add " + more + "@step=31", "remove Constraint.Hang@step=46",
+                     "set Body.C.Position={-1,2,0}@step=46", "remove Body.B@step=61",
+                     "set Material.Rubber.RestitutionCoefficient=0.9@step=61"};
+    options.steps = 100;
+  }
+};
+
+TEST(EditedRun, HostingChangesNoBit) {
+  BusyRun run;
+  const std::string chain = run.run().report.chain_hash();
+  run.options.hosting = {{std::nullopt, Hosting::kSharedMemory}};
+  EXPECT_EQ(run.run().report.chain_hash(), chain);
+  run.options.faults = {"solver:kill@step=25", "solver:kill@step=50"};
+  const RunResult hurt = run.run();
+  EXPECT_EQ(hurt.report.chain_hash(), chain);
+  ASSERT_EQ(hurt.report.faults_size(), 2);
+  EXPECT_EQ(hurt.report.faults(0).step(), 25U);
+  EXPECT_EQ(hurt.report.faults(1).step(), 50U);
+}
+
+TEST(EditedRun, DebugGeometryIsThatOfTheEditedScene) {
+  BusyRun run;
+  const std::string chain = run.run().report.chain_hash();
+  run.options.instrumentation = run.folder.path("frames");
+  run.options.instrumentation_kinds = {"shape", "contact", "trajectory"};
+  const RunResult result = run.run();
+  EXPECT_EQ(result.report.chain_hash(), chain);
+  std::istringstream text(harness::read_file(run.options.instrumentation));
+  std::string first, last;
+  std::getline(text, first);
+  for (std::string line; std::getline(text, line);) last = line;
+  EXPECT_THAT(first, HasSubstr("\"B\""));
+  EXPECT_THAT(first, ::testing::Not(HasSubstr("\"D\"")));
+  EXPECT_THAT(last, HasSubstr("\"D\""));
+  EXPECT_THAT(last, ::testing::Not(HasSubstr("\"B\"")));
+}
+
+// Whoever took over answers in the edited scene, too.
+TEST(EditedRun, ASwapStays) {
+  BusyRun run;
+  run.options.hosting = {{std::nullopt, Hosting::kSharedMemory}};
+  run.options.swaps = {"integrator=SemiImplicitEuler@step=12", "integrator=Euler@step=70"};
+  const RunResult result = run.run();
+  ASSERT_EQ(result.report.swaps_size(), 2);
+  EXPECT_EQ(result.report.swaps(0).outcome(), "committed");
+  EXPECT_EQ(result.report.swaps(1).outcome(), "committed");
+  EXPECT_EQ(result.report.swaps(1).from(), "SemiImplicitEuler");
+  run.options.hosting = {{std::nullopt, Hosting::kDirect}};
+  EXPECT_EQ(run.run().report.chain_hash(), result.report.chain_hash());
+}
+
+// A ball that fell asleep on the ground is woken by the edit that takes the ground away, and falls.
+TEST(EditedRun, WhoSleepsWakesUp) {
+  EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" + ball("A", "Position = {0, 0.1, 0}", kFalls) +
+                      ball("B", "Position = {3, 0.1, 0}", kFalls)),
+                {"remove Body.Ground@step=81"}, {"Simulator.SleepEnergy=0.001", "Simulator.SleepTime=0.5"});
+  run.options.events = run.folder.path("events");
+  run.options.event_kinds = std::vector<std::string>{"sleep", "edit", "wake"};
+  const std::map<std::string, Row> end = run.end();
+  for (const char* id : {"A", "B"}) EXPECT_NEAR(end.at(id).velocity.y(), -10 * 20 * kStep, 1e-12);
+  std::vector<std::string> kinds;
+  std::istringstream text(harness::read_file(run.options.events));
+  for (std::string line; std::getline(text, line);) {
+    const std::size_t at = line.find("\"kind\":\"") + 8;
+    kinds.push_back(line.substr(at, line.find('"', at) - at));
+  }
+  EXPECT_THAT(kinds, ::testing::ElementsAre("sleep", "sleep", "edit", "wake", "wake"));
+}
+
+// A plugin that takes over binds joints where they were bound, not where the scene had the bodies.
+TEST(EditedRun, JointsAreBoundAgainWhereTheyWere) {
+  BusyRun run;
+  run.options.edits.resize(1);
+  run.options.hosting = {{std::nullopt, Hosting::kSharedMemory}};
+  const std::string chain = run.run().report.chain_hash();
+  for (const char* joints : {"constraint=Distance", "constraint=Spherical"}) {
+    run.options.swaps = {std::string(joints) + "@step=50,hosting=grpc"};
+    const RunResult swapped = run.run();
+    EXPECT_EQ(swapped.report.chain_hash(), chain) << joints;
+    ASSERT_EQ(swapped.report.swaps_size(), 1);
+    EXPECT_EQ(swapped.report.swaps(0).outcome(), "committed") << swapped.report.swaps(0).reason();
+  }
+}
+
+class StoppedAt : public ::testing::TestWithParam<std::uint32_t> {};
+
+INSTANTIATE_TEST_SUITE_P(Step, StoppedAt, ::testing::Values(10, 30, 31, 45, 46, 60, 80));
+
+TEST_P(StoppedAt, AnEditedRunIsResumedToItsChain) {
+  BusyRun run;
+  const RunResult whole = run.run();
+  run.options.steps = GetParam();
+  run.options.checkpoint = run.folder.path("checkpoint");
+  run.options.checkpoint_every = 7;
+  const std::vector<std::string> edits = std::exchange(run.options.edits, {});
+  for (const std::string& one : edits)
+    if (std::stoul(one.substr(one.rfind('=') + 1)) <= GetParam()) run.options.edits.push_back(one);
+  run.run();
+  run.options.steps = 100;
+  run.options.checkpoint.clear();
+  run.options.checkpoint_every = 0;
+  run.options.resume = run.folder.path("checkpoint");
+  // the checkpoint knows what was edited before it; with and without the words of then
+  std::vector<std::string> later;
+  for (const std::string& one : edits)
+    if (std::stoul(one.substr(one.rfind('=') + 1)) > GetParam()) later.push_back(one);
+  for (const std::vector<std::string>& words : {later, edits}) {
+    run.options.edits = words;
+    const RunResult rest = run.run();
+    EXPECT_EQ(rest.report.chain_hash(), whole.report.chain_hash());
+    EXPECT_EQ(rest.report.state_hash(), whole.report.state_hash());
+    EXPECT_EQ(rest.report.energy().initial(), whole.report.energy().initial());
+    EXPECT_NEAR(rest.report.energy().final(), whole.report.energy().final(), 1e-9);
+    EXPECT_EQ(rest.report.max_joint_error(), whole.report.max_joint_error());
+  }
+}
+
+// A kill leaves an old checkpoint and a journal that goes further: it knows the edits.
+TEST(EditedRun, TheJournalKnowsTheEdits) {
+  BusyRun run;
+  const RunResult whole = run.run();
+  run.options.steps = 20;
+  run.options.checkpoint = run.folder.path("checkpoint");
+  const std::vector<std::string> edits = std::exchange(run.options.edits, {});
+  run.run();
+  const std::vector<std::byte> early = read_whole_file(run.options.checkpoint);
+  run.options.steps = 100;
+  run.options.edits = edits;
+  run.options.resume = run.options.checkpoint;
+  EXPECT_EQ(run.run().report.chain_hash(), whole.report.chain_hash());
+  replace_file(run.options.checkpoint, early);
+  run.options.edits.clear();
+  const RunResult again = run.run();
+  EXPECT_EQ(again.report.chain_hash(), whole.report.chain_hash());
+  EXPECT_THAT(again.report.warnings(), ::testing::Each(::testing::Not(HasSubstr("left aside"))));
+  // another edit than the journal's comes out differently
+  replace_file(run.options.checkpoint, early);
+  run.options.edits = {"set Body.A.Mass=3@step=31"};
+  const RunResult other = gravitas::run(
+      run.options, [] { return false; }, [](const Progress&) {});
+  EXPECT_EQ(other.outcome, RunOutcome::kFailed);
+  EXPECT_THAT(other.fault, HasSubstr("step 31 came out differently"));
+}
+
+// With a right checksum and wrong content.
+TEST(EditedRun, AnImpossibleEditOfACheckpointIsRefused) {
+  const auto refusal_of = [](const std::function<void(recorder::v1::Checkpoint*)>& change) {
+    BusyRun run;
+    run.options.steps = 40;
+    run.options.edits.resize(1);
+    run.options.checkpoint = run.folder.path("checkpoint");
+    run.run();
+    std::string problem;
+    std::optional<recorder::v1::Checkpoint> checkpoint =
+        parse_checkpoint(read_whole_file(run.options.checkpoint), &problem);
+    EXPECT_GT(checkpoint->edits(0).places_size(), 0);
+    change(&*checkpoint);
+    replace_file(run.options.checkpoint, serialize_checkpoint(*checkpoint));
+    run.options.resume = std::exchange(run.options.checkpoint, "");
+    return run.refusal();
+  };
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
+                checkpoint->mutable_edits(0)->mutable_places(0)->set_position(0, std::nan(""));
+              }),
+              HasSubstr("the place of "));
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
+                checkpoint->mutable_edits(0)->mutable_places(0)->mutable_orientation()->RemoveLast();
+              }),
+              HasSubstr("the place of "));
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
+                checkpoint->mutable_edits(0)->mutable_changes(0)->mutable_add()->set_text("Bodies {");
+              }),
+              HasSubstr("the file ends inside the block"));
+  EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) { checkpoint->clear_edits(); }),
+              HasSubstr("position has"));
+}
+
+TEST(EditedRun, WhatCannotBeIsSaidBeforeTheRunBegins) {
+  EditedRun run(scene(ball("A", "") + ball("B", "Position = {1, 0, 0}"),
+                      "Constraints { Constraint { Type = \"Spherical\" Id = \"Hang\" Body1 = \"A\" Body2 = \"B\" "
+                      "CustomProperties { BindPoint = {0.5, 0, 0} } } }"));
+  const std::string twice = run.folder.write("twice", ball("A", ""));
+  const std::string bodies = run.folder.write("bodies", "Bodies { " + ball("A", "") + " }");
+  const std::string push = run.folder.write("push",
+                                            "Forces { Force { Type = \"Basic\" Id = \"Push\" CustomProperties { Force "
+                                            "= {1, 0, 0} Instantaneous = true } } }\n"
+                                            "Bodies { " +
+                                                ball("P", "Position = {0, 9, 0}", "Forces = { \"Push\" }") + " }");
+  const std::map<std::string, std::string> refused = {
+      {"jump Body.A@step=5", "allowed: add FILE, remove PATH, set PATH=VALUE"},
+      {"remove Body.A", "allowed: CHANGE@step=N"},
+      {"remove Body.A@step=0", "allowed: CHANGE@step=N"},
+      {"remove Body.A@step=101", "there is no step 101; the run has 100"},
+      {"remove Body.a@step=5", "did you mean \"A\"?"},
+      {"remove Body.A@step=6", "names no Body: \"A\""},
+      {"remove Solver.X@step=5", "\"Solver\" is nothing that can go"},
+      {"set Solver.Iterations=5@step=5", "a plugin and its properties are exchanged by a swap"},
+      {"set Body.A.Weight=5@step=5", "edit before step 5: set Body.A.Weight=5: "},
+      {"add /none@step=5", "/none"},
+      {"add " + twice + "@step=5", "unknown block \"Body\""},
+      {"add " + bodies + "@step=5", "Body \"A\" is there already"},
+      {"add " + push + "@step=5", "would act at t = 0"}};
+  for (const auto& [edit, why] : refused) {
+    run.options.edits = {edit};
+    EXPECT_THAT(run.refusal(), HasSubstr(why)) << edit;
+  }
+  // before the first step it may act once
+  run.options.edits = {"add " + push + "@step=1"};
+  EXPECT_NEAR(run.end()["P"].velocity.x(), 0.5, 1e-12);
+  // all changes before a step are one: the joint goes first
+  run.options.edits = {"remove Constraint.Hang@step=5", "remove Body.A@step=5"};
+  EXPECT_EQ(run.end().size(), 1U);
+}
+
+}  // namespace
+}  // namespace gravitas
