@@ -299,7 +299,7 @@ Vector3 angular_momentum_of(const kernel::Environment& environment) {
 }
 
 MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps,
-                        kernel::Simulator simulator) {
+                        kernel::Simulator simulator, double most_seconds) {
   WorldBuilder world = problem.world;
   world.steps(steps, problem.duration / steps);
   world.plugin(Slot::kIntegrator, plugin_path(method.library), method.settings);
@@ -317,6 +317,8 @@ MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method
     result.energy_error = std::max(result.energy_error, std::fabs(energy_of(&environment) - energy));
     result.momentum_error = std::max(result.momentum_error, (angular_momentum_of(environment) - momentum).norm());
     start += std::clock() - pause;
+    if (static_cast<double>(std::clock() - start) > most_seconds * CLOCKS_PER_SEC)
+      throw std::runtime_error("more than " + std::to_string(std::lround(most_seconds)) + " s");
   }
   result.seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   result.error = problem.error(environment.state());

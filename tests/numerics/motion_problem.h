@@ -1,6 +1,7 @@
 // Problems of motion with known answers, as worlds made by hand, and the methods that are measured on them.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -68,8 +69,8 @@ struct MotionResult {
 };
 
 // Runs with steps of duration/steps. Jointed problems: with the simulator and solver Direct. Throws std::runtime_error
-// with the fault where the run pauses.
+// with the fault where the run pauses, and where it takes more than most_seconds of CPU.
 MotionResult run_motion(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps,
-                        kernel::Simulator simulator = kernel::Simulator::kSmooth);
+                        kernel::Simulator simulator = kernel::Simulator::kSmooth, double most_seconds = HUGE_VAL);
 
 }  // namespace gravitas::harness

@@ -32,6 +32,9 @@ constexpr double kContraction = 0.4;
 constexpr double kConverged = 4e-16;
 // Below this the change is rounding, if it does not shrink any more.
 constexpr double kStagnant = 1e-9;
+// Share of |x| / h, and of 1 rad / h, that is no less than velocities count: kStagnant of it is what places and attitudes
+// of a double resolve, so that stiff systems at rest settle.
+constexpr double kResolved = 2e-6;
 constexpr double kDifference = 1e-7;
 
 // Turn of the Cayley map in body axes.
@@ -142,14 +145,16 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return w - 0.5 * body.inverse_moments.cwiseProduct(body.momentum + end);
   }
 
-  // The largest change of a body's velocity, relative to its size at the start and in the middle.
+  // The largest change of a body's velocity, relative to its size at the start and in the middle, or to what can be
+  // resolved.
   double size_of(const Eigen::VectorXd& change) const {
     double largest = 0.0;
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const auto i = static_cast<Eigen::Index>(6 * b);
       const Twist& start = bodies_[b].start.twist;
-      const double v = unknown_.segment<3>(i).norm() + start.linear.norm();
-      const double w = unknown_.segment<3>(i + 3).norm() + start.angular.norm();
+      const double place = bodies_[b].start.pose.position.norm();
+      const double v = unknown_.segment<3>(i).norm() + start.linear.norm() + kResolved * place / h_;
+      const double w = unknown_.segment<3>(i + 3).norm() + start.angular.norm() + kResolved / h_;
       const double dv = change.segment<3>(i).norm(), dw = change.segment<3>(i + 3).norm();
       for (const double share : {dv == 0.0 ? 0.0 : dv / v, dw == 0.0 ? 0.0 : dw / w})
         largest = share <= largest ? largest : share;

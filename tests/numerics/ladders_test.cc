@@ -1,0 +1,130 @@
+// Work against precision: every method climbs a ladder of settings (the step by halves, the accuracy by sqrt(10)) on five
+// problems, from useless to rounding. With GRAVITAS_TABLES each run is a row of motion.csv, which
+// tests/bench/motion_ladders.py draws; without, a few rungs show that errors fall as work grows.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/numerics/motion_problem.h"
+#include "tests/numerics/reached.h"
+
+namespace gravitas {
+namespace {
+
+using harness::MotionMethod;
+using harness::MotionProblem;
+using harness::MotionResult;
+
+constexpr double kMostSeconds = 4.0;  // CPU of a run; above it is a failure
+constexpr double kRepeated = 0.2;     // runs shorter than this are timed seven times
+
+struct Ladder {
+  const char* number;  // in the list of reference problems
+  MotionProblem problem;
+  std::uint32_t coarsest;  // steps of the first rung
+  int rungs;
+  std::uint32_t adaptive_steps;
+};
+
+std::vector<Ladder> ladders() {
+  return {{"2", harness::mujoco_box(), 10, 14, 100},
+          {"4", harness::point_pendulum(), 20, 13, 100},
+          {"6", harness::heavy_top(), 25, 12, 100},
+          {"8", harness::four_bar(), 50, 10, 100},
+          {"26", harness::flyball_governor(), 1000, 10, 100}};
+}
+
+struct Climbed {
+  MotionResult result;
+  std::vector<double> seconds;  // ascending
+  std::string failure;
+};
+
+Climbed climb(const MotionProblem& problem, const MotionMethod& method, std::uint32_t steps) {
+  Climbed climbed;
+  const harness::CpuClock clock;
+  try {
+    do {
+      climbed.result = harness::run_motion(problem, method, steps, kernel::Simulator::kSmooth, kMostSeconds);
+      climbed.seconds.push_back(climbed.result.seconds);
+    } while (climbed.seconds.size() < 7 && climbed.seconds.front() < kRepeated);
+    std::ranges::sort(climbed.seconds);
+    if (!(climbed.result.error < 1.0)) climbed.failure = "off by more than its size";
+  } catch (const std::exception& failure) {
+    climbed.failure = failure.what();
+    std::ranges::replace(climbed.failure, '\n', ' ');
+    std::ranges::replace(climbed.failure, '"', '\'');
+    climbed.seconds = {clock.seconds()};
+  }
+  return climbed;
+}
+
+class Table {
+ public:
+  explicit Table(const std::string& path) : out_(path) {
+    out_ << "problem,number,method,order,setting,value,steps,error,energy_error_J,joint_error_m,cpu_min_s,cpu_median_s,"
+            "cpu_iqr_s,simulated_s,evaluations,failed\n";
+  }
+
+  void write(const Ladder& ladder, const MotionMethod& method, const char* setting, double value, std::uint32_t steps) {
+    const Climbed climbed = climb(ladder.problem, method, steps);
+    const MotionResult& r = climbed.result;
+    const std::vector<double>& t = climbed.seconds;
+    char numbers[320];
+    std::snprintf(numbers, sizeof numbers, "%g,%s,%.6g,%u,%.4g,%.3g,%.3g,%.4g,%.4g,%.3g,%g,%llu,", method.order,
+                  setting, value, steps, r.error, r.energy_error, r.joint_error, t.empty() ? 0.0 : t.front(),
+                  t.empty() ? 0.0 : t[t.size() / 2], t.empty() ? 0.0 : t[t.size() * 3 / 4] - t[t.size() / 4],
+                  ladder.problem.duration,
+                  static_cast<unsigned long long>(std::max<std::uint64_t>(r.derivatives, steps)));
+    out_ << ladder.problem.name << ',' << ladder.number << ',' << method.name << ',' << numbers << '"'
+         << climbed.failure << "\"\n"
+         << std::flush;
+  }
+
+  bool is_good() const { return out_.good(); }
+
+ private:
+  std::ofstream out_;
+};
+
+TEST(Ladders, AreClimbedWhereATableIsAskedFor) {
+  if (harness::table_folder() == nullptr) GTEST_SKIP() << "GRAVITAS_TABLES is not set";
+  Table table(std::string(harness::table_folder()) + "/motion.csv");
+  for (const Ladder& ladder : ladders()) {
+    for (const MotionMethod& method : harness::fixed_step_methods())
+      for (int rung = 0; rung < ladder.rungs; ++rung) {
+        const std::uint32_t steps = ladder.coarsest << rung;
+        table.write(ladder, method, "time_step_s", ladder.problem.duration / steps, steps);
+      }
+    for (int half_digits = 4; half_digits <= 26; ++half_digits) {
+      const double accuracy = std::pow(10.0, -0.5 * half_digits);
+      for (const MotionMethod& method : harness::adaptive_methods(accuracy))
+        table.write(ladder, method, "accuracy", accuracy, ladder.adaptive_steps);
+    }
+  }
+  EXPECT_TRUE(table.is_good());
+}
+
+// An error that falls with the work, or is one of rounding.
+TEST(Ladders, LeadUpwards) {
+  for (const Ladder& ladder : ladders()) {
+    if (std::string(ladder.number) == "26" || std::string(ladder.number) == "8") continue;  // minutes
+    double last = HUGE_VAL;
+    for (const double accuracy : {1e-4, 1e-7, 1e-10}) {
+      const MotionMethod method = harness::adaptive_methods(accuracy).front();
+      const Climbed climbed = climb(ladder.problem, method, ladder.adaptive_steps);
+      EXPECT_EQ(climbed.failure, "") << ladder.problem.name;
+      EXPECT_LT(climbed.result.error, 0.05 * last) << ladder.problem.name << " at " << accuracy;
+      last = climbed.result.error;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace gravitas
