@@ -85,7 +85,7 @@ TEST_P(Breaking, ComesWithTheFirstStepThatBearsMore) {
     if (!held_before) speed += h * force / 2.0;
     ASSERT_NEAR(run.body("Ball").twist.linear.x(), speed, 1e-9) << run.step_count();
   }
-  ASSERT_EQ(run.count_events(kernel::EventKind::kBreak), 1U);
+  ASSERT_EQ(run.count_events(EventKind::kBreak), 1U);
   EXPECT_EQ(run.events()[0].step, 78U);
   EXPECT_EQ(run.events()[0].constraint, 0U);
   EXPECT_LE(run.report().max_joint_error(), 1e-9);
@@ -113,7 +113,7 @@ TEST_P(BreakingOf, TheWeakestLinkOfAChain) {
   EXPECT_TRUE(run.holds("Joint0"));
   EXPECT_FALSE(run.holds("Joint1"));
   EXPECT_TRUE(run.holds("Joint2"));
-  ASSERT_EQ(run.count_events(kernel::EventKind::kBreak), 1U);
+  ASSERT_EQ(run.count_events(EventKind::kBreak), 1U);
   EXPECT_EQ(run.events()[0].step, 1U);
   EXPECT_NEAR(run.body("Link0").pose.position.y(), -0.5, 1e-9);
   const double h = run.time_step();

@@ -66,7 +66,7 @@ TEST(Omissions, OfBallsOnIce) {
 TEST(Omissions, ChangeNoBit) {
   SceneRun shortest(balls("Ice", "Ball"));
   const std::string chain = chain_of(&shortest);
-  EXPECT_GT(shortest.count_events(kernel::EventKind::kCollisionStart), 2U);
+  EXPECT_GT(shortest.count_events(EventKind::kCollisionStart), 2U);
   struct Use {
     const char* what;
     std::string scene;
