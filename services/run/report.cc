@@ -106,15 +106,9 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 }
 
 void settle_swaps(report::v1::Report* report) {
-  using enum kernel::SwapState;
-  const auto is = [](const report::v1::SwapRecord& swap, kernel::SwapState state) {
-    return swap.outcome() == kernel::swap_state_name(state);
-  };
-  auto* swaps = report->mutable_swaps();
-  for (int i = swaps->size(); i-- > 0;) {
-    if (is(swaps->at(i), kProbation)) swaps->at(i).set_outcome(kernel::swap_state_name(kCommitted));
-    if (is(swaps->at(i), kPreparing) || is(swaps->at(i), kShadow)) swaps->DeleteSubrange(i, 1);
-  }
+  for (report::v1::SwapRecord& swap : *report->mutable_swaps())
+    if (swap.outcome() == kernel::swap_state_name(kernel::SwapState::kProbation))
+      swap.set_outcome(kernel::swap_state_name(kernel::SwapState::kCommitted));
 }
 
 }  // namespace gravitas

@@ -15,8 +15,7 @@ void write_stages(const kernel::Environment& environment, report::v1::Report* re
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
 
-// The environment whose swaps have been written is replaced by another, to which those on their way are ordered again: they
-// are left out. Probation has passed.
+// The environment whose swaps have been written is replaced by another: probation has passed.
 void settle_swaps(report::v1::Report* report);
 
 }  // namespace gravitas

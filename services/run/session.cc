@@ -391,16 +391,18 @@ class Run final : private kernel::CommitListener {
     if (event_kinds_.has(event.kind)) events_->on_event(event);
   }
 
-  // Orders of steps that are made have been given.
+  // Those of steps up to the next edit; after it another environment gets the rest.
   void give_orders() {
-    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) {
-      return environment_->step_count() > 0 && one.step <= environment_->step_count();
-    });
+    const std::uint32_t made = environment_->step_count();
+    const auto is_due = [&](std::uint32_t step) {
+      return (made == 0 || step > made) && (edits_.to_come().empty() || step < edits_.to_come().front().step());
+    };
     try {
-      for (const kernel::SwapOrder& order : swaps_) environment_->order_swap(order);
+      for (const kernel::SwapOrder& order : swaps_)
+        if (is_due(order.step)) environment_->order_swap(order);
       for (const kernel::SwapOrder& order : comparisons_) environment_->order_swap(order, true);
       for (const kernel::FaultInjection& fault : faults_)
-        if (fault.step > environment_->step_count()) environment_->inject(fault);
+        if (is_due(fault.step)) environment_->inject(fault);
       for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
