@@ -23,7 +23,7 @@ TEST(Plan, NamesWhatIsNeededAndWhyTheRestIsNot) {
   const ProgramResult table = run_program({"plan", shipped_scene("two_spheres_motor")}, folder);
   EXPECT_EQ(table.exit_code, 0) << table.err;
   EXPECT_THAT(table.out, HasSubstr("AngularMotor"));
-  EXPECT_THAT(table.out, HasSubstr("force        left out: all forces are constant"));
+  EXPECT_THAT(table.out, HasSubstr("force                 left out: all forces are constant"));
   const ProgramResult json = run_program({"plan", shipped_scene("two_spheres_motor"), "--json"}, folder);
   report::v1::Plan plan;
   ASSERT_TRUE(JsonStringToMessage(json.out, &plan).ok());
