@@ -1,12 +1,13 @@
 // Work against precision: every method climbs a ladder of settings (the step by halves, the accuracy by sqrt(10)) on five
 // problems, from useless to rounding. With GRAVITAS_TABLES each run is a row of motion.csv, which
-// tests/bench/motion_ladders.py draws; without, a few rungs show that errors fall as work grows.
+// tests/bench/motion_ladders.py draws; without, two rungs show that errors fall as work grows.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -36,7 +37,7 @@ std::vector<Ladder> ladders() {
   return {{"2", harness::mujoco_box(), 10, 14, 100},
           {"4", harness::point_pendulum(), 20, 13, 100},
           {"6", harness::heavy_top(), 25, 12, 100},
-          {"8", harness::four_bar(), 50, 10, 100},
+          {"8", harness::four_bar(), 50, 10, 400},
           {"26", harness::flyball_governor(), 1000, 10, 100}};
 }
 
@@ -72,7 +73,9 @@ class Table {
             "cpu_iqr_s,simulated_s,evaluations,failed\n";
   }
 
-  void write(const Ladder& ladder, const MotionMethod& method, const char* setting, double value, std::uint32_t steps) {
+  // Returns the time of the run, s.
+  double write(const Ladder& ladder, const MotionMethod& method, const char* setting, double value,
+               std::uint32_t steps) {
     const Climbed climbed = climb(ladder.problem, method, steps);
     const MotionResult& r = climbed.result;
     const std::vector<double>& t = climbed.seconds;
@@ -85,6 +88,7 @@ class Table {
     out_ << ladder.problem.name << ',' << ladder.number << ',' << method.name << ',' << numbers << '"'
          << climbed.failure << "\"\n"
          << std::flush;
+    return t.empty() ? 0.0 : t.front();
   }
 
   bool is_good() const { return out_.good(); }
@@ -102,27 +106,30 @@ TEST(Ladders, AreClimbedWhereATableIsAskedFor) {
         const std::uint32_t steps = ladder.coarsest << rung;
         table.write(ladder, method, "time_step_s", ladder.problem.duration / steps, steps);
       }
+    // one that took too long is not followed by finer ones: a single step of theirs may take hours
+    std::set<std::string> given_up;
     for (int half_digits = 4; half_digits <= 26; ++half_digits) {
       const double accuracy = std::pow(10.0, -0.5 * half_digits);
       for (const MotionMethod& method : harness::adaptive_methods(accuracy))
-        table.write(ladder, method, "accuracy", accuracy, ladder.adaptive_steps);
+        if (!given_up.contains(method.name) &&
+            table.write(ladder, method, "accuracy", accuracy, ladder.adaptive_steps) > kMostSeconds)
+          given_up.insert(method.name);
     }
   }
   EXPECT_TRUE(table.is_good());
 }
 
-// An error that falls with the work, or is one of rounding.
+// Errors fall at least by a hundred where the accuracy does by 1e5.
 TEST(Ladders, LeadUpwards) {
-  for (const Ladder& ladder : ladders()) {
-    if (std::string(ladder.number) == "26" || std::string(ladder.number) == "8") continue;  // minutes
-    double last = HUGE_VAL;
-    for (const double accuracy : {1e-4, 1e-7, 1e-10}) {
-      const MotionMethod method = harness::adaptive_methods(accuracy).front();
-      const Climbed climbed = climb(ladder.problem, method, ladder.adaptive_steps);
-      EXPECT_EQ(climbed.failure, "") << ladder.problem.name;
-      EXPECT_LT(climbed.result.error, 0.05 * last) << ladder.problem.name << " at " << accuracy;
-      last = climbed.result.error;
+  for (const MotionProblem& problem : {harness::mujoco_box(), harness::point_pendulum(), harness::heavy_top()}) {
+    double errors[2];
+    for (const int finer : {0, 1}) {
+      const MotionMethod method = harness::adaptive_methods(finer == 0 ? 1e-6 : 1e-11).front();
+      const Climbed climbed = climb(problem, method, 100);
+      EXPECT_EQ(climbed.failure, "") << problem.name;
+      errors[finer] = climbed.result.error;
     }
+    EXPECT_LT(errors[1], 1e-2 * errors[0]) << problem.name;
   }
 }
 

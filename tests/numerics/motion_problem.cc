@@ -1,6 +1,7 @@
 #include "tests/numerics/motion_problem.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ctime>
 #include <limits>
@@ -230,6 +231,66 @@ MotionProblem triple_pendulum() {
   world.gravity({0, -10, 0});
   for (std::uint32_t i = 0; i < 3; ++i) hinge(&world, i == 0 ? kNone : i - 1, i, {0.3 * i, 0, 0});
   return {"pendulum challenge", 10.0, true, world, no_reference};
+}
+
+// Andrews' squeezing mechanism: Hairer, Wanner, Solving ODEs II, VII.7, with their names of lengths and angles. Bodies are
+// K1 ... K7 in order, turned by their angles about z; where one turns about a fixed point, the direction in which its
+// centre of mass lies is free, since nothing weighs anything.
+MotionProblem squeezer() {
+  constexpr double kD = 28e-3, kDa = 115e-4, kE = 2e-2, kEa = 1421e-5, kRr = 7e-3, kRa = 92e-5, kSa = 1874e-5,
+                   kSb = 1043e-5, kSc = 18e-3, kSd = 2e-2, kTa = 2308e-5, kTb = 916e-5, kU = 4e-2, kUa = 1228e-5,
+                   kUb = 449e-5, kZf = 2e-2, kZt = 4e-2, kFa = 1421e-5;
+  constexpr double kMass[] = {0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498};
+  constexpr double kMoment[] = {2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5};
+  constexpr double kDrive = 0.033, kStiffness = 4530.0, kRest = 7785e-5;
+  const Vector3 a(-0.06934, -0.00227, 0), b(-0.03635, 0.03273, 0), c(0.014, 0.072, 0), origin = Vector3::Zero();
+  // beta, Theta, gamma, Phi, delta, Omega, epsilon
+  using Angles = std::array<double, 7>;
+  const auto attitudes = [](const Angles& q) {
+    return Angles{q[0], q[0] + q[1], q[2], q[3] + q[4], q[4], q[5] + q[6], q[6]};
+  };
+  const auto along = [](double angle) { return Vector3(std::cos(angle), std::sin(angle), 0); };
+  const auto across = [](double angle) { return Vector3(std::sin(angle), -std::cos(angle), 0); };
+
+  const Angles start = attitudes({-0.0617138900142764496, 0.0, 0.455279819163070380, 0.222668390165885885,
+                                  0.487364979543842550, -0.222668390165885885, 1.23054744454982119});
+  const Vector3 crank = kRr * along(start[0]), p = crank - kD * along(start[1]);
+  const Vector3 q5 = a + kZt * along(start[4]), q7 = a + kU * across(start[6]);
+  const std::array<Vector3, 7> centres = {kRa * along(start[0]),
+                                          crank - kDa * along(start[1]),
+                                          b + std::hypot(kSa, kSb) * along(start[2]),
+                                          q5 + (kE - kEa) * across(start[3]),
+                                          a + std::hypot(kTa, kTb) * along(start[4]),
+                                          q7 + (kZf - kFa) * along(start[5]),
+                                          a + std::hypot(kUa, kUb) * along(start[6])};
+  WorldBuilder world = jointed_world();
+  for (std::size_t i = 0; i < 7; ++i) {
+    world.point(kMass[i], Vector3::Constant(kMoment[i]), centres[i]);
+    world.body().pose.orientation = exp_rotation(Vector3(0, 0, start[i]));
+    if (i == 0) world.force("Basic", "force_basic", {0, 0, 0, 0, 0, 0, 0, 0, kDrive, 0, 0, 0});
+    if (i != 2) continue;
+    const Vector3 pulled = b + kSd * along(start[2]) + kSc * across(start[2]);
+    spring_between(&world, {kStiffness, 0.0, kRest},
+                   exp_rotation(Vector3(0, 0, -start[2])) * Vector3(pulled - centres[2]), kNone, c);
+  }
+  hinge(&world, kNone, 0, origin);
+  hinge(&world, 0, 1, crank);
+  for (const std::uint32_t other : {2U, 3U, 5U}) hinge(&world, 1, other, p);
+  hinge(&world, kNone, 2, b);
+  hinge(&world, 3, 4, q5);
+  hinge(&world, kNone, 4, a);
+  hinge(&world, 5, 6, q7);
+  hinge(&world, kNone, 6, a);
+  const Angles end =
+      attitudes({15.81077119515370710, -15.75637105841183947, 0.04082224011964580486, -0.5347301163420795938,
+                 0.5244099658799540694, 0.5347301163420795938, 1.048080741041937873});
+  return {"squeezer", 0.03, true, world, [end](const kernel::StateView& state) {
+            double worst = 0.0;
+            for (std::size_t i = 0; i < 7; ++i)
+              worst = std::max(worst,
+                               angle_between(quaternion_at(state.orientation, i), exp_rotation(Vector3(0, 0, end[i]))));
+            return worst;
+          }};
 }
 
 // IFToMM A05: a shaft along z, a slider on it, two arms (a rod with a ball without moments at its end) hinged to the shaft

@@ -45,6 +45,7 @@ MotionProblem symmetric_rotor();                 // J/I = 0.2: attitude, in clos
 MotionProblem lagrange_top();                    // fast, tilted, without precession at the start: axis
 MotionProblem bricard();           // five rods, six hinges, over-constrained: no reference, it keeps its energy
 MotionProblem triple_pendulum();   // three links of 0.3 m: no reference, it keeps its energy
+MotionProblem squeezer();          // Andrews' seven bodies, to 0.03 s: attitudes
 MotionProblem flyball_governor();  // stiff: height of the slider
 
 // A spring on the last body, from a point of it (its principal axes) to a point of another body, or of the world (kNone).

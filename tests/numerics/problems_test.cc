@@ -108,6 +108,11 @@ TEST(Problems, FourBarPassesItsSingularities) {
     expect_run(harness::four_bar(20.0), kRk4, 51200, {.error = 1e-8, .joint_error = 1e-12});
 }
 
+// Andrews' mechanism of the DAE test set.
+TEST(Problems, Squeezer) {
+  expect_run(harness::squeezer(), dormand_prince(1e-11), 30, {.error = 1e-9, .joint_error = 1e-12});
+}
+
 // IFToMM A04.
 TEST(Problems, BricardMovesThoughItsRowsAreTooMany) {
   expect_run(harness::bricard(), kRk4, 10000, {.joint_error = 1e-12, .energy = 1e-9});

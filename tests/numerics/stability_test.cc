@@ -1,5 +1,5 @@
 // The map of stability: method x k h^2 x damping, measured on the engine against the theory. With GRAVITAS_TABLES the
-// fine map is written to stability.csv, which tests/bench/motion_ladders.py draws.
+// map is written to stability.csv, which tests/bench/motion_ladders.py draws.
 #include "tests/numerics/stability.h"
 
 #include <gtest/gtest.h>
