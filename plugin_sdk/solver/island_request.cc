@@ -33,8 +33,7 @@ void IslandRequest::load(const Request& whole, const SolverBodies& bodies, const
   add_fixed(whole.discrepancy_body(), island.discrepancies);
   add_fixed(whole.contact_body(), island.contacts);
   std::ranges::sort(bodies_);
-  const auto doubled = std::ranges::unique(bodies_);
-  bodies_.erase(doubled.begin(), doubled.end());
+  bodies_.erase(std::unique(bodies_.begin(), bodies_.end()), bodies_.end());
 
   const std::span<const stage::ColumnInfo> infos = stage::method_info(stage::Method::kSolverSolve).request;
   for (std::size_t column = 0; column < kColumns; ++column) {

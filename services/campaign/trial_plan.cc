@@ -251,6 +251,11 @@ std::vector<Slot> slots_hit(const PlannedFault& fault, const Scene& scene) {
   return {fault.slot};
 }
 
+// Its process holds one plugin; else a command, which is how a liar is started, cannot serve there.
+bool is_alone(const Scene& scene, Slot slot) {
+  return sharing(scene, slot).size() == 1 && scene.description.slot(slot).plugins.size() == 1;
+}
+
 }  // namespace
 
 std::uint64_t trial_seed(std::uint64_t campaign_seed, std::uint64_t index) {
@@ -297,8 +302,7 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
     const bool joins = !plan.faults.empty() && draw.chance(25);
     fault.step = joins ? plan.faults.back().step : static_cast<std::uint32_t>(2 + draw.below(last_step - 4));
     draw_order(&draw, options.tier, &fault);
-    // the plugin of one slot cannot be put into a process that serves others
-    if (!fault.lie.empty() && sharing(scenes[plan.scene], fault.slot).size() > 1) continue;
+    if (!fault.lie.empty() && !is_alone(scenes[plan.scene], fault.slot)) continue;
     const std::vector<Slot> hit = slots_hit(fault, scenes[plan.scene]);
     if (!std::ranges::all_of(hit, [&](Slot slot) { return is_free(slot, fault.step); })) continue;
     const bool hits_anybody = fault.means == Means::kKillStandby || fault.means == Means::kSwapKilled;
