@@ -186,21 +186,28 @@ def limit_time():
     resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS))
 
 
+def run(gravitas, folder, text, step, overrides, sample_every=1000):
+    """Runs a scene. Returns its report, or None, and why it failed; the trajectory is folder/trajectory.csv."""
+    path = folder / "problem.gravitas"
+    path.write_text(text)
+    command = [gravitas, "run", path, "--hosting", "direct", "--quiet", "--dt", repr(step), "--sample-every", repr(sample_every)]
+    command += ["--trajectory", folder / "trajectory.csv", "--report", folder / "report.json"]
+    for override in overrides:
+        command += ["--set", override]
+    done = subprocess.run(command, capture_output=True, preexec_fn=limit_time, check=False, cwd=folder)
+    if done.returncode != 0:
+        return None, f"more than {MOST_SECONDS} s" if done.returncode < 0 else f"exit {done.returncode}"
+    return json.loads((folder / "report.json").read_text()), ""
+
+
 def measure(gravitas, folder, problem, solver, step, sweeps):
     """One run: error, microseconds of a simulated second, steps."""
     text, error = PROBLEMS[problem]()
-    path = folder / "problem.gravitas"
-    path.write_text(text)
-    command = [gravitas, "run", path, "--hosting", "direct", "--quiet", "--dt", repr(step), "--sample-every", "1000"]
-    command += ["--set", f"Solver={solver}", "--trajectory", folder / "end.csv", "--report", folder / "report.json"]
-    if sweeps:
-        command += ["--set", f"Solver.Iterations={sweeps}"]
-    done = subprocess.run(command, capture_output=True, preexec_fn=limit_time, check=False)
-    if done.returncode != 0:
-        why = f"more than {MOST_SECONDS} s" if done.returncode < 0 else f"exit {done.returncode}"
+    sweeps_of = [f"Solver.Iterations={sweeps}"] if sweeps else []
+    report, why = run(gravitas, folder, text, step, [f"Solver={solver}"] + sweeps_of)
+    if report is None:
         return {"error": math.inf, "us_per_second": math.inf, "steps": 0, "failed": why}
-    report = json.loads((folder / "report.json").read_text())
-    state, time = last_state(folder / "end.csv")
+    state, time = last_state(folder / "trajectory.csv")
     off = error(state, report, time)
     return {
         "error": off,
