@@ -18,7 +18,7 @@ namespace {
 constexpr std::chrono::milliseconds kHeartbeat{500};
 // A worker that leaves a heartbeat unanswered for this long hangs as a whole: its threads answer during a call, too.
 constexpr std::chrono::seconds kSilence{2};
-constexpr std::uint32_t kProtocol = 1;
+constexpr std::uint32_t kProtocol = 2;
 
 }  // namespace
 

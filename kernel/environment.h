@@ -219,8 +219,7 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // prepare.cc: what is asked once.
   void start_slots(const HostStarter& starter);
-  void bind_joints();
-  void bind(const ConstraintGroup& group, const Column<double>& position, const Column<double>& orientation);
+  void bind(const ConstraintGroup& group);
   void ask_constant_forces();
 
   // restore.cc
@@ -247,7 +246,6 @@ class Environment : private DerivativeSource, private SlotObserver {
   void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) override;
   void on_decision(const Decision& decision) override;
   void on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) override;
-  void bind_again(std::uint32_t target);
 
   // Books the time of a call, and of the check of its answer, which begins with that of its frame.
   void book_call(Stage stage, StageSlot* slot, std::uint64_t start, const CallTimes& times);

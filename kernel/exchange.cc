@@ -115,7 +115,8 @@ void Environment::inject(FaultInjection fault) {
 // What only the plugin before understands is dropped; another build or instance of it goes on with it.
 void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) {
   const PluginDeclaration& now = slot.description().plugins[target].declaration;
-  if (slot.which() == Slot::kConstraint) bind_again(target);
+  for (const ConstraintGroup& group : model_.constraint_groups)
+    if (slot.which() == Slot::kConstraint && group.target == target) bind(group);
   if (now.name == before.declaration.name) return;
   must_restart_ |= inner_ > 0 || sleepers_ > 0;
   wakes_all_ = true;
@@ -135,25 +136,6 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
       state.contact_key.resize(0);
     }
   }
-}
-
-// Joints are bound in the initial state; the trial state's columns lend themselves, and get back what they hold.
-void Environment::bind_again(std::uint32_t target) {
-  const std::span<double> position = data_.trial_position.span(), orientation = data_.trial_orientation.span();
-  const std::vector<double> held_position(position.begin(), position.end());
-  const std::vector<double> held_orientation(orientation.begin(), orientation.end());
-  data_.trial_position.resize(3ULL * model_.body_count);
-  data_.trial_orientation.resize(4ULL * model_.body_count);
-  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    set_vector(data_.trial_position.span(), i, description_.bodies[i].pose.position);
-    set_quaternion(data_.trial_orientation.span(), i, description_.bodies[i].pose.orientation);
-  }
-  for (double& value : data_.trial_position.span()) value += 0.0;
-  for (double& value : data_.trial_orientation.span()) value += 0.0;
-  for (const ConstraintGroup& group : model_.constraint_groups)
-    if (group.target == target) bind(group, data_.trial_position, data_.trial_orientation);
-  data_.trial_position.assign(held_position);
-  data_.trial_orientation.assign(held_orientation);
 }
 
 void Environment::on_decision(const Decision& decision) {

@@ -41,7 +41,7 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
   data_.theta[0] = description_.integrator.plugins.empty() ? 0.5 : description_.integrator.plugins[0].declaration.theta;
   check_fallbacks();
   start_slots(starter);
-  bind_joints();
+  for (const ConstraintGroup& group : model_.constraint_groups) bind(group);
   ask_constant_forces();
   state_hash_ = kernel::state_hash(front());
   chain_hash_ = kernel::chain_hash({}, state_hash_);
@@ -57,19 +57,19 @@ void Environment::start_slots(const HostStarter& starter) {
   for (StageSlot* slot : slots_) slot->finish_start();
 }
 
-void Environment::bind_joints() {
-  for (const ConstraintGroup& group : model_.constraint_groups) bind(group, front().position, front().orientation);
-}
-
-void Environment::bind(const ConstraintGroup& group, const Column<double>& position,
-                       const Column<double>& orientation) {
+// Joints are bound in the initial state, whenever it is that their plugin comes.
+void Environment::bind(const ConstraintGroup& group) {
   for (std::uint32_t row = 0; row < group.body.size(); ++row) {
     const auto& bound_at = model_.constraints[group.row[row / 2]].bound_at;
-    const Pose pose = bound_at ? bound_at->at(row % 2) : pose_of(position, orientation, group.body[row]);
-    group.bind_body[row] = group.body[row] == kNone ? kNone : row;
+    const bool has_body = group.body[row] != kNone;
+    const Pose pose = bound_at ? bound_at->at(row % 2) : has_body ? description_.bodies[group.body[row]].pose : Pose{};
+    group.bind_body[row] = has_body ? row : kNone;
     set_vector(group.bind_position.span(), row, pose.position);
     set_quaternion(group.bind_orientation.span(), row, pose.orientation);
   }
+  // one zero, as in the state
+  for (const Column<double>* column : {&group.bind_position, &group.bind_orientation})
+    for (double& value : column->span()) value += 0.0;
   const auto request = ids(group.type, group.bind_body, group.parameter_begin, group.parameter, group.bind_position,
                            group.bind_orientation);
   const auto reply = ids(group.bound_begin, group.bound);

@@ -6,6 +6,9 @@ namespace gravitas {
 
 Vector3 angular_acceleration(const Quaternion& q, const Vector3& w, const Vector3& inertia,
                              const Vector3& inverse_inertia, const Vector3& torque) {
+  // a body whose moments are equal turns alike about every axis
+  const auto are_equal = [](const Vector3& moments) { return moments[0] == moments[1] && moments[1] == moments[2]; };
+  if (are_equal(inertia) && are_equal(inverse_inertia)) return inverse_inertia.cwiseProduct(torque);
   const Quaternion to_body = q.conjugate();
   const Vector3 w_body = to_body * w;
   const Vector3 torque_body = to_body * torque;

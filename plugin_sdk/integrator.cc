@@ -92,22 +92,26 @@ double damped_time(double damping, double time_step) {
 
 namespace detail {
 
-BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body) {
-  return {{vector_at(request.position(), body), quaternion_at(request.orientation(), body)},
-          {vector_at(request.linear_velocity(), body), vector_at(request.angular_velocity(), body)}};
+bool StateColumns::resize(const stage::IntegratorIntegrateReply& reply, std::size_t bodies) {
+  position = reply.position().resize(3 * bodies);
+  orientation = reply.orientation().resize(4 * bodies);
+  linear_velocity = reply.linear_velocity().resize(3 * bodies);
+  angular_velocity = reply.angular_velocity().resize(3 * bodies);
+  return position.size() == 3 * bodies && orientation.size() == 4 * bodies && linear_velocity.size() == 3 * bodies &&
+         angular_velocity.size() == 3 * bodies;
 }
 
-void push_state(const stage::IntegratorIntegrateReply& reply, const BodyState& state) {
+void StateColumns::set(std::size_t body, const BodyState& state) const {
   const Vector3 &x = state.pose.position, &v = state.twist.linear, &w = state.twist.angular;
   const Quaternion& q = state.pose.orientation;
   if (!x.allFinite() || !q.coeffs().allFinite() || !v.allFinite() || !w.allFinite())
     throw Refusal(
-        "body " + std::to_string(reply.position().count() / 3) +
+        "body " + std::to_string(body) +
         " comes to a state that is not finite: its state, forces, inertia, damping or the time step overflow");
-  reply.position().push(x.x(), x.y(), x.z());
-  reply.orientation().push(q.w(), q.x(), q.y(), q.z());
-  reply.linear_velocity().push(v.x(), v.y(), v.z());
-  reply.angular_velocity().push(w.x(), w.y(), w.z());
+  set_vector(position, body, x);
+  set_quaternion(orientation, body, q);
+  set_vector(linear_velocity, body, v);
+  set_vector(angular_velocity, body, w);
 }
 
 BodyState keep_moving(const BodyState& state, double time_step) {

@@ -72,14 +72,29 @@ double damping_factor(double damping, double time_step);
 double damped_time(double damping, double time_step);
 
 namespace detail {
-BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body);
-void push_state(const stage::IntegratorIntegrateReply& reply, const BodyState& state);
+inline BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body) {
+  return {{vector_at(request.position(), body), quaternion_at(request.orientation(), body)},
+          {vector_at(request.linear_velocity(), body), vector_at(request.angular_velocity(), body)}};
+}
+
+// Where S* is written to.
+struct StateColumns {
+  std::span<double> position, orientation, linear_velocity, angular_velocity;
+
+  // Has it room for all bodies? If not, the counts of the reply tell the host how much it takes.
+  bool resize(const stage::IntegratorIntegrateReply& reply, std::size_t bodies);
+  // Throws Refusal for a state that is not finite.
+  void set(std::size_t body, const BodyState& state) const;
+};
+
 BodyState keep_moving(const BodyState& state, double time_step);
 }  // namespace detail
 
 template <typename Move>
 void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                    Move&& move) {
+  detail::StateColumns columns;
+  if (!columns.resize(reply, request.flags().size())) return;
   for (std::size_t body = 0; body < request.flags().size(); ++body) {
     BodyState state = detail::state_at(request, body);
     if ((request.flags()[body] & kMovable) != 0) {
@@ -87,7 +102,7 @@ void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage
     } else if ((request.flags()[body] & kKinematic) != 0) {
       state = detail::keep_moving(state, request.time_step());
     }
-    detail::push_state(reply, state);
+    columns.set(body, state);
   }
   reply.error_estimate().set(0.0);
 }

@@ -3,12 +3,12 @@
 // another language, or at an address, speaks.
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <set>
+#include <utility>
 
 #include "gravitas/stage/v1/call.pb.h"
 #include "kernel/carrier/carrier.h"
@@ -25,6 +25,8 @@ using stage::v1::Outcome;
 // A large constant column goes ahead of the calls, in parts, once per worker; a smaller one in every call.
 constexpr std::uint64_t kAssetBytes = 65536;
 constexpr std::uint64_t kAssetPart = 1 << 20;
+// A column at least as large that has not changed since the call before is not sent again.
+constexpr std::uint64_t kKeptBytes = 1024;
 // A waiting kernel looks whether the worker's process lives this often.
 constexpr std::uint64_t kLookAtProcessNs = 50'000'000;
 
@@ -54,8 +56,10 @@ class GrpcCarrier final : public Carrier {
   struct Stream {
     grpc::ClientContext context;
     std::unique_ptr<grpc::GenericClientAsyncReaderWriter> io;
-    grpc::ByteBuffer incoming;  // of a Read, which may end after its call was given up
-    grpc::Status status;        // at its end, of whose operation it is the tag
+    wire::MessageRooms rooms;
+    std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> sent{};  // hashes of the columns of its last request
+    grpc::ByteBuffer incoming;                               // of a Read, which may end after its call was given up
+    grpc::Status status;                                     // at its end, of whose operation it is the tag
   };
   // Time left of a call.
   struct Patience {
@@ -68,8 +72,8 @@ class GrpcCarrier final : public Carrier {
   void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
   void wait(Stream* stream, Patience* patience);
   [[noreturn]] void report_broken(Stream* stream, bool is_unread);
-  void send_assets(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
-                   stage::v1::Call* header, Patience* patience);
+  void leave_out_known(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
+                       std::span<const std::uint64_t> hashes, stage::v1::Call* header, Patience* patience);
   void answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header, Arena* arena,
                        DerivativeSource* derivatives, Patience* patience);
   void take_columns(const wire::ColumnsReader& reader, const MethodInfo& method, std::span<const ColumnId> targets,
@@ -152,14 +156,18 @@ void GrpcCarrier::write(Stream* stream, const grpc::ByteBuffer& message, Patienc
   wait(stream, patience);
 }
 
-// Columns that stay the same for the run go once, by the hash of their content.
-void GrpcCarrier::send_assets(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
-                              stage::v1::Call* header, Patience* patience) {
+// Large columns that stay the same for the run go once, by the hash of their content; others that are as in the stream's
+// last request stand in the worker's memory.
+void GrpcCarrier::leave_out_known(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
+                                  std::span<const std::uint64_t> hashes, stage::v1::Call* header, Patience* patience) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    const std::uint64_t size = columns[i].count * stage::element_size(method.request[i].type);
-    if (!method.request[i].asset || size < kAssetBytes) continue;
-    const std::uint64_t hash = XXH3_64bits(columns[i].data, size);
-    for (std::uint64_t offset = 0; offset < size && !sent_assets_.contains(hash); offset += kAssetPart) {
+    const auto field = static_cast<std::uint32_t>(i) + 1;
+    const std::uint64_t size = columns[i].count * stage::element_size(method.request[i].type), hash = hashes[i];
+    const bool is_asset = method.request[i].asset && size >= kAssetBytes;
+    const bool can_be_kept = !is_asset && size >= kKeptBytes && link_.keeps_columns();
+    const bool is_kept = std::exchange(stream->sent[i], can_be_kept ? hash : 0) == hash && can_be_kept;
+    if (!is_asset && !is_kept) continue;
+    for (std::uint64_t offset = 0; is_asset && offset < size && !sent_assets_.contains(hash); offset += kAssetPart) {
       stage::v1::AssetChunk chunk;
       chunk.set_hash(hash);
       chunk.set_size(size);
@@ -167,11 +175,15 @@ void GrpcCarrier::send_assets(Stream* stream, const MethodInfo& method, std::spa
       chunk.set_data(static_cast<const char*>(columns[i].data) + offset, std::min(kAssetPart, size - offset));
       write(stream, message_of(chunk), patience);
     }
+    columns[i] = {nullptr, 0};
+    if (is_kept) {
+      header->add_kept(field);
+      continue;
+    }
     sent_assets_.insert(hash);
     stage::v1::AssetUse* use = header->add_assets();
-    use->set_column(static_cast<std::uint32_t>(i) + 1);
+    use->set_column(field);
     use->set_hash(hash);
-    columns[i] = {nullptr, 0};
   }
 }
 
@@ -192,18 +204,19 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   header.set_attempt(call.attempt);
   header.set_target(call.target);
   header.set_deadline_microseconds(deadline_ns / 1000);
-  header.set_digest(wire::columns_digest(method.request, request));
+  std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> hashes;
+  wire::hash_columns(method.request, request, hashes);
+  header.set_digest(wire::columns_digest(request, std::span(hashes).first(request.size())));
   if (!call.fault.empty()) header.set_fault(std::string(call.fault));
   Stream& stream = stream_of(method, &patience);
-  send_assets(&stream, method, request, &header, &patience);
-  write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
+  leave_out_known(&stream, method, request, hashes, &header, &patience);
+  write(&stream, stream.rooms.write({method.request, request, &header}), &patience);
 
   for (;;) {
     stream.io->Read(&stream.incoming, &stream);
     wait(&stream, &patience);
-    const wire::FlatMessage flat(stream.incoming);
     wire::ColumnsReader reader(method.reply);
-    const std::string problem = reader.parse(flat.bytes());
+    const std::string problem = reader.parse(stream.rooms.read(stream.incoming));
     Outcome outcome;
     if (!problem.empty()) link_.report_bad_frame("a wrong message: " + problem);
     if (!reader.header().has ||
@@ -267,7 +280,7 @@ void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& rea
   patience->cap += pause;
   const ColumnId wrench = derivatives->wrench_column();
   const std::array<gravitas_column, 1> answer = {gravitas_column{arena->data(wrench), arena->count(wrench)}};
-  write(stream, wire::to_byte_buffer({{}, {}, &header, kDerivative.reply, answer}), patience);
+  write(stream, stream->rooms.write({{}, {}, &header, kDerivative.reply, answer}), patience);
 }
 
 }  // namespace

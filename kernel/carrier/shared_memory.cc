@@ -51,10 +51,9 @@ class SharedMemoryCarrier final : public Carrier {
   void make_rooms(const StageCall& call, const Arena& arena, const DerivativeSource* derivatives);
   void send_new_segments(const Arena& arena);
   void post_frame(gravitas_frame_header header, std::span<const ColumnId> columns, const Arena& arena);
-  gravitas_frame_header wait_for_message(std::uint64_t* spent_ns);
-  [[noreturn]] void report_death() {
-    link_->report_death(boxes_->theirs->progress.load(std::memory_order_relaxed) == open_->asked_at_mark);
-  }
+  gravitas_frame_header wait_for_message(std::uint64_t start, std::uint64_t* spent_ns);
+  [[noreturn]] void report_death() { link_->report_death(marks() == open_->asked_at_mark); }
+  std::uint64_t marks() const { return boxes_->theirs->progress.load(std::memory_order_relaxed); }
   void take_columns(const gravitas_frame_header& header, std::span<const stage::ColumnInfo> infos,
                     std::span<const ColumnId> targets, std::size_t first_room, Arena* arena);
   void answer_callback(const gravitas_frame_header& header, std::size_t first_room, Arena* arena,
@@ -77,7 +76,10 @@ class SharedMemoryCarrier final : public Carrier {
   std::uint64_t sequence_ = 0, response_generation_ = 0, sent_state_ = 0;  // the last
   std::array<OpenCall, 2> calls_;
   OpenCall* open_ = calls_.data();
+  // Of the last message: the worker's signal, its progress (between calls nothing makes any) and the clock. What was seen
+  // then is not read again: it would cost a cache line that the worker writes.
   std::uint32_t seen_ = 0;
+  std::uint64_t seen_marks_ = 0, seen_ns_ = 0;
   std::shared_ptr<Mailboxes> boxes_ = std::make_shared<Mailboxes>();
   std::unique_ptr<WorkerLink> link_;
 };
@@ -186,21 +188,22 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
   request.target = call.target;
   request.attempt = call.attempt;
   request.reply_count = static_cast<std::uint32_t>(open_->room_count);
-  request.deadline_ns = channel::now_ns() + open_->deadline_ns;
+  const std::uint64_t start = channel::now_ns();
+  request.deadline_ns = start + open_->deadline_ns;
   for (std::size_t i = 0; i < open_->room_count; ++i)
     boxes_->mine->reply[i] = {open_->rooms[i].offset, 0, open_->rooms[i].capacity};
   if (!call.fault.empty()) {
     request.fault = 1;
     boxes_->mine->text[call.fault.copy(boxes_->mine->text, sizeof Mailbox::text - 1)] = '\0';
   }
-  open_->asked_at_mark = boxes_->theirs->progress.load(std::memory_order_relaxed);
+  open_->asked_at_mark = seen_marks_;
   post_frame(request, call.request, *arena);
 
   std::uint64_t spent_ns = 0;
-  gravitas_frame_header answer = wait_for_message(&spent_ns);
+  gravitas_frame_header answer = wait_for_message(start, &spent_ns);
   while (answer.kind == GRAVITAS_FRAME_CALLBACK) {
     answer_callback(answer, call.reply.size(), arena, derivatives);
-    answer = wait_for_message(&spent_ns);
+    answer = wait_for_message(channel::now_ns(), &spent_ns);
   }
   if (answer.kind != GRAVITAS_FRAME_REPLY || answer.method != request.method)
     link_->report_bad_frame("another message");
@@ -214,25 +217,23 @@ CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, Deriva
     text.back() = '\0';
     result.text = text.data();
   }
-  const std::uint64_t check_begin = channel::now_ns();
   take_columns(answer, call.info().reply, call.reply, 0, arena);
-  result.check_ns = channel::now_ns() - check_begin;
+  result.check_ns = channel::now_ns() - seen_ns_;
   return result;
 }
 
 // Waits until the worker posts a message of this call, dies, or runs out of time.
-gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent_ns) {
+gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t start, std::uint64_t* spent_ns) {
   Mailbox* mine = boxes_->mine;
   const Mailbox* theirs = boxes_->theirs;
-  const std::uint64_t start = channel::now_ns();
   const std::uint64_t deadline_ns = open_->deadline_ns;
   const std::uint64_t cap = start + kDeadlineCap * deadline_ns - std::min(*spent_ns, kDeadlineCap * deadline_ns);
   std::uint64_t until = std::min(start + deadline_ns, cap);
-  std::uint64_t marks = theirs->progress.load(std::memory_order_relaxed);
-  for (;;) {
+  std::uint64_t last_marks = seen_marks_;
+  for (std::uint64_t now = start;;) {
     // an end from here on counts the signal up; one before may have been seen together with the last message
     if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_) report_death();
-    const std::uint64_t look = std::min(until, channel::now_ns() + kLookNs);
+    const std::uint64_t look = std::min(until, now + kLookNs);
     if (channel::wait(mine, theirs, seen_, look) == channel::Waited::kMessage) {
       seen_ = theirs->signal.load(std::memory_order_acquire);
       gravitas_frame_header header;
@@ -242,19 +243,21 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t* spent
       const bool is_dead_question = header.kind == GRAVITAS_FRAME_CALLBACK && link_->has_ended();
       const bool is_late = header.epoch != link_->epoch() || header.sequence != open_->sequence;
       if (!(is_late && defences_.epoch) && header.magic == GRAVITAS_MAGIC && !is_dead_question) {
-        *spent_ns += channel::now_ns() - start;
+        seen_marks_ = marks();
+        seen_ns_ = channel::now_ns();
+        *spent_ns += seen_ns_ - start;
         return header;
       }
       // a late or foreign message is dropped
       if (link_->has_ended()) report_death();
       if (header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
         link_->report_bad_frame("a header without the magic");
+      now = channel::now_ns();
       continue;
     }
-    const std::uint64_t now = channel::now_ns();
-    const std::uint64_t seen_marks = theirs->progress.load(std::memory_order_relaxed);
-    if (seen_marks != marks) {
-      marks = seen_marks;
+    now = channel::now_ns();
+    if (const std::uint64_t new_marks = marks(); new_marks != last_marks) {
+      last_marks = new_marks;
       until = std::min(now + deadline_ns, cap);
     } else if (now >= until) {
       link_->report_overdue(now >= cap, deadline_ns);

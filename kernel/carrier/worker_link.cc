@@ -108,6 +108,9 @@ ListeningCommand start_listening_command(const std::string& command, std::chrono
 
 std::shared_ptr<grpc::Channel> worker_channel(int descriptor) {
   fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+  // nor be sent in parts, each of which its receiver must be woken for; the system may allow less
+  const int room = 1 << 22;
+  setsockopt(descriptor, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);

@@ -73,6 +73,7 @@ class WorkerLink {
   std::vector<std::string> take_complaints();
   // Of the handshake.
   std::vector<std::string> sandbox() const;
+  bool keeps_columns() const { return control_->welcome().keeps_columns(); }
 
  private:
   void start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,

@@ -28,6 +28,13 @@ void futex_wait(const std::atomic<std::uint32_t>* word, std::uint32_t expected, 
   syscall(SYS_futex, word, FUTEX_WAIT, expected, &timeout, nullptr, 0);
 }
 
+// Core on which the caller runs. It is written only when it is another one: the reader may spin on that cache line.
+std::uint32_t say_cpu(Mailbox* mine) {
+  const auto here = static_cast<std::uint32_t>(sched_getcpu());
+  if (mine->cpu.load(std::memory_order_relaxed) != here) mine->cpu.store(here, std::memory_order_relaxed);
+  return here;
+}
+
 }  // namespace
 
 std::uint64_t now_ns() {
@@ -37,22 +44,23 @@ std::uint64_t now_ns() {
 }
 
 void post(Mailbox* mine, const Mailbox* theirs) {
-  mine->cpu.store(static_cast<std::uint32_t>(sched_getcpu()), std::memory_order_relaxed);
+  say_cpu(mine);
   mine->signal.fetch_add(1, std::memory_order_seq_cst);
   if (theirs->sleeping.load(std::memory_order_seq_cst) != 0) futex_wake(&mine->signal);
 }
 
 Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint64_t until) {
-  const auto here = static_cast<std::uint32_t>(sched_getcpu());
-  mine->cpu.store(here, std::memory_order_relaxed);
-  if (theirs->cpu.load(std::memory_order_relaxed) != here) {
-    const std::uint64_t spin_end = now_ns() + kSpinNs;
+  if (theirs->cpu.load(std::memory_order_relaxed) != say_cpu(mine)) {
+    // the clock is not looked at before the first round: most answers are there by then
+    std::uint64_t spin_end = 0, now = 0;
     do {
       for (int i = 0; i < 32; ++i) {
         if (theirs->signal.load(std::memory_order_acquire) != seen) return Waited::kMessage;
         _mm_pause();
       }
-    } while (now_ns() < spin_end);
+      now = now_ns();
+      if (spin_end == 0) spin_end = now + kSpinNs;
+    } while (now < spin_end);
   }
 
   mine->sleeping.store(1, std::memory_order_seq_cst);

@@ -21,6 +21,7 @@
 
 namespace gravitas::channel {
 
+// What the other side spins on has a cache line to itself: what else is written while it does would slow it.
 struct Mailbox {
   // Counted up once a message is complete; the futex word of the reader.
   std::atomic<std::uint32_t> signal;
@@ -28,13 +29,12 @@ struct Mailbox {
   std::atomic<std::uint32_t> sleeping;
   // Core on which the owner ran when it last looked.
   std::atomic<std::uint32_t> cpu;
-  std::uint32_t reserved;
+
+  alignas(64) gravitas_frame_header header;
   // Marks of progress of the code at work in a call, the first when it has taken the request.
   std::atomic<std::uint64_t> progress;
   // Nanoseconds the plugin worked on the call that is answered.
   std::uint64_t compute_ns;
-
-  alignas(64) gravitas_frame_header header;
   gravitas_frame_column columns[GRAVITAS_MAX_COLUMNS];
   gravitas_frame_column reply[GRAVITAS_MAX_COLUMNS];
   // Why a call was refused or failed; the signal's name after a crash.

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <grpcpp/server_posix.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <utility>
@@ -63,6 +64,7 @@ WorkerMessage ControlService::welcome(const Hello& hello) const {
   welcome->mutable_floating_point()->set_c_library(c_library());
   for (const std::string& feature : cpu_features()) welcome->mutable_floating_point()->add_cpu_features(feature);
   welcome->set_process_id(getpid());
+  welcome->set_keeps_columns(true);
   for (const plugin::v1::Description& description : plugins_) *welcome->add_plugins() = description;
   for (const std::string& measure : sandbox) welcome->add_sandbox(measure);
   if (const HandshakeLie* told = find_handshake_lie(lie)) told->tell(welcome);
@@ -140,6 +142,9 @@ std::unique_ptr<grpc::ServerBuilder> server_builder(grpc::Service* service) {
 
 std::unique_ptr<grpc::Server> serve_descriptor(grpc::ServerBuilder* builder, int descriptor) {
   fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+  // nor be sent in parts, each of which its receiver must be woken for; the system may allow less
+  const int room = 1 << 22;
+  setsockopt(descriptor, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
   std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
   if (server) grpc::AddInsecureChannelFromFd(server.get(), descriptor);
   return server;

@@ -16,8 +16,8 @@
 namespace gravitas::host {
 
 // Versions of the control protocol that this build speaks.
-inline constexpr std::uint32_t kProtocolMinimum = 1;
-inline constexpr std::uint32_t kProtocolMaximum = 1;
+inline constexpr std::uint32_t kProtocolMinimum = 2;
+inline constexpr std::uint32_t kProtocolMaximum = 2;
 
 // What the worker does with an accepted Hello: create the plugins. Empty text: ready; else the reason why not.
 struct Admission {

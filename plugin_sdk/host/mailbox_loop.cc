@@ -193,7 +193,9 @@ void MailboxLoop::write_reply(const OpenCall& call, std::int32_t status, const c
   header.digest =
       channel::frame_digest(header, std::span(mine_->columns).first(call.reply_columns),
                             stage::kMethods[header.method].reply, status == GRAVITAS_OK ? data.data() : nullptr);
-  std::strncpy(mine_->text, text, sizeof mine_->text - 1);
+  const std::size_t length = strnlen(text, sizeof mine_->text - 1);
+  std::memcpy(mine_->text, text, length);
+  mine_->text[length] = '\0';
   mine_->compute_ns = compute_ns;
   if (!call.fault) return post(header);
   call.fault->spoil_frame(&header, std::span(mine_->columns).first(call.reply_columns),

@@ -9,7 +9,8 @@
 namespace gravitas {
 namespace {
 
-// Squared angle (rad^2) below which the series of sin(x/2)/x ends at x^4 within 2^-57.
+// Squared angle (rad^2) below which the series of sin(x/2)/x ends at x^4 within 2^-57, that of cos(x/2) at x^6 within
+// 2^-76.
 constexpr double kSeriesAngleSquared = 1e-4;
 
 // Tangent of the half angle below which atan(x)/x ends at x^2 within 2^-100.
@@ -37,6 +38,12 @@ Quaternion negated(const Quaternion& q) { return Quaternion(-q.w(), -q.x(), -q.y
 }  // namespace
 
 Quaternion normalized(const Quaternion& q) {
+  // of most, the squares are harmless as they are
+  const double square = (q.w() * q.w() + q.x() * q.x()) + (q.y() * q.y() + q.z() * q.z());
+  if (square > 1e-200 && square < 1e200) {
+    const double norm = std::sqrt(square);
+    return Quaternion(q.w() / norm, q.x() / norm, q.y() / norm, q.z() / norm);
+  }
   const double scale = range_scale(q.coeffs().cwiseAbs().maxCoeff());
   const double w = q.w() * scale;
   const double x = q.x() * scale;
@@ -90,12 +97,14 @@ Quaternion to_quaternion(const Matrix3& rotation) {
 
 Quaternion exp_rotation(const Vector3& rotation_vector) {
   const Vector3& v = rotation_vector;
-  const double angle = length(v);
-  const double square = angle * angle;
+  // one that underflows has no part in the series, one that overflows none of the series
+  const double square = v.x() * v.x() + v.y() * v.y() + v.z() * v.z();
   if (square < kSeriesAngleSquared) {
     const double factor = 0.5 - square * (1.0 / 48.0 - square * (1.0 / 3840.0));
-    return Quaternion(math::cos(0.5 * angle), factor * v.x(), factor * v.y(), factor * v.z());
+    const double cosine = 1.0 - square * (1.0 / 8.0 - square * (1.0 / 384.0 - square * (1.0 / 46080.0)));
+    return Quaternion(cosine, factor * v.x(), factor * v.y(), factor * v.z());
   }
+  const double angle = length(v);
   const math::SinCos half = math::sincos(0.5 * angle);
   return Quaternion(half.cos, v.x() / angle * half.sin, v.y() / angle * half.sin, v.z() / angle * half.sin);
 }

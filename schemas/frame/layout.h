@@ -30,7 +30,7 @@ enum { GRAVITAS_COLUMN_ALIGNMENT = 64, GRAVITAS_MAX_COLUMNS = 48 };
 #define GRAVITAS_MAGIC UINT64_C(0x4752415649544153)
 
 // Version of this file: counted up when a structure below changes.
-enum { GRAVITAS_LAYOUT_VERSION = 1 };
+enum { GRAVITAS_LAYOUT_VERSION = 2 };
 
 // A body that is not one: the world in a joint, no shape of a body.
 #define GRAVITAS_NONE UINT32_C(0xFFFFFFFF)

@@ -220,14 +220,26 @@ void ColumnsReader::copy(std::size_t column, void* to) const {
     if (part.column == column) out = copy_part(part, out);
 }
 
-std::uint64_t columns_digest(std::span<const ColumnInfo> infos, std::span<const gravitas_column> columns) {
-  std::uint64_t digest = 0;
-  for (std::size_t i = 0; i < infos.size(); ++i) {
-    digest = XXH3_64bits_withSeed(&columns[i].count, sizeof columns[i].count, digest);
-    if (columns[i].count > 0)
-      digest = XXH3_64bits_withSeed(columns[i].data, columns[i].count * stage::element_size(infos[i].type), digest);
+void hash_columns(std::span<const ColumnInfo> infos, std::span<const gravitas_column> columns,
+                  std::span<std::uint64_t> hashes) {
+  for (std::size_t i = 0; i < infos.size(); ++i)
+    hashes[i] = XXH3_64bits(columns[i].data, columns[i].count * stage::element_size(infos[i].type));
+}
+
+std::uint64_t columns_digest(std::span<const gravitas_column> columns, std::span<const std::uint64_t> hashes) {
+  std::array<std::uint64_t, 2 * GRAVITAS_MAX_COLUMNS> all;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    all[2 * i] = columns[i].count;
+    all[2 * i + 1] = hashes[i];
   }
+  const std::uint64_t digest = XXH3_64bits(all.data(), 2 * columns.size() * sizeof all[0]);
   return digest != 0 ? digest : 1;
+}
+
+std::uint64_t columns_digest(std::span<const ColumnInfo> infos, std::span<const gravitas_column> columns) {
+  std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> hashes;
+  hash_columns(infos, columns, hashes);
+  return columns_digest(columns.first(infos.size()), std::span(hashes).first(infos.size()));
 }
 
 }  // namespace gravitas::wire

@@ -73,7 +73,11 @@ class ColumnsReader {
   Submessage header_, derivative_, asset_;
 };
 
-// XXH3 over all columns: of each the count, then the bytes of its elements. Never 0.
+// XXH3 of the bytes of each column's elements, into `hashes`.
+void hash_columns(std::span<const stage::ColumnInfo> infos, std::span<const gravitas_column> columns,
+                  std::span<std::uint64_t> hashes);
+// XXH3 over all columns: of each the count, then its hash. Never 0.
+std::uint64_t columns_digest(std::span<const gravitas_column> columns, std::span<const std::uint64_t> hashes);
 std::uint64_t columns_digest(std::span<const stage::ColumnInfo> infos, std::span<const gravitas_column> columns);
 
 }  // namespace gravitas::wire

@@ -308,6 +308,48 @@ std::string judge_assets(AbusedWorker* worker, const Question& question) {
   return {};
 }
 
+// The request without its columns, which the call says were kept.
+MessageColumns without_columns(const Question& question, Call* call) {
+  const stage::MethodInfo& method = stage::method_info(question.method);
+  MessageColumns bare = question.request;
+  for (std::uint32_t i = 0; i < method.request.size(); ++i) {
+    const stage::ColumnInfo& column = method.request[i];
+    if (column.rows_index == stage::kScalar) continue;
+    call->add_kept(i + 1);
+    if (column.type == stage::ElementType::kF64) bare.f64(column.name).clear();
+    if (column.type == stage::ElementType::kU32) bare.u32(column.name).clear();
+    if (column.type == stage::ElementType::kU64) bare.u64(column.name).clear();
+  }
+  return bare;
+}
+
+std::string judge_kept(AbusedWorker* worker, const Question& question) {
+  StreamTalk& talk = worker->talk();
+  Call call = talk.next_call(question, question.request);
+  const MessageColumns bare = without_columns(question, &call);
+  if (!talk.keeps_columns() || call.kept().empty()) return {};
+  const std::string unsent = worker->abuse("columns kept that were never sent", worker->bytes(bare, &call), call);
+  if (!unsent.empty()) return unsent;
+
+  talk.open(question.method);
+  talk.ask(question, question.request);
+  call.set_sequence(talk.next_call(question, question.request).sequence());
+  talk.send(worker->bytes(bare, &call));
+  const StreamReply reply = talk.receive(question, call);
+  if (!reply.came) return reply_text(reply);
+  const std::string differs = difference(question.method, worker->good(), reply.answer);
+  if (!differs.empty()) return "with columns kept from the request before: " + differs;
+
+  talk.open(question.method);
+  talk.ask(question, question.request);
+  call.set_sequence(talk.next_call(question, question.request).sequence());
+  call.set_digest(call.digest() ^ 1);
+  talk.send(worker->bytes(bare, &call));
+  if (const StreamReply wrong = talk.receive(question, call); wrong.came && wrong.answer.status == GRAVITAS_OK)
+    return "columns kept that are not those of the digest are answered with OK";
+  return worker->after("columns kept with a wrong digest");
+}
+
 }  // namespace
 
 std::vector<CheckCase> stream_cases() {
@@ -327,6 +369,8 @@ std::vector<CheckCase> stream_cases() {
       for_each_method(workers, "lengths", "Impossible lengths and tags fail, and harm nothing.", judge_lengths),
       for_each_method(workers, "types", "Fields of the wrong wire type harm nothing.", judge_types),
       for_each_method(workers, "duplicate", "A request that comes twice is answered twice, the same.", judge_duplicate),
+      for_each_method(workers, "kept", "Columns kept are those of the stream's request before, or refused.",
+                      judge_kept),
       for_each_method(workers, "reordered", "Each reply carries the sequence number of its request.", judge_reordered),
       for_each_method(workers, "stale", "A request of another incarnation is refused.", judge_stale),
       for_each_method(workers, "unknown-method", "A method that does not exist is UNIMPLEMENTED.",

@@ -38,6 +38,7 @@ class StreamTalk {
   StreamTalk& operator=(const StreamTalk&) = delete;
 
   std::uint64_t epoch() const { return link_.epoch(); }
+  bool keeps_columns() const { return link_.keeps_columns(); }
   // Empty while it lives, else how it ended.
   std::string ending();
 

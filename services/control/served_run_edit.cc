@@ -34,10 +34,16 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     for (const Slot slot : kSlots) active.slot(slot) = active_.slot(slot);
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = start(begun, capsule::recording(tape_));
-    edited.hand_over(*environment_, next.get());
+    const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
 
     // from here on it is made
+    const auto tell = [&](const Event& event) {
+      events_->on_event(event);
+      with_subscriptions([&](Subscription* one) { one->tell(event); });
+    };
+    for (const auto& [a, b] : parted)
+      tell({EventKind::kCollisionEnd, environment_->step_count(), environment_->time(), a, b});
     past_swaps_ = swap_messages();
     write_faults(*environment_, &past_);
     forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
@@ -59,10 +65,6 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     event_source_->begin_again();
     figures_->begin_again(environment_.get());
     with_subscriptions([](Subscription* one) { one->source().begin_again(); });
-    const auto tell = [&](const Event& event) {
-      events_->on_event(event);
-      with_subscriptions([&](Subscription* one) { one->tell(event); });
-    };
     Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};
     event.text = fmt::format("{} changes before step {}", edit.changes_size(), edit.step());
     tell(event);

@@ -264,7 +264,8 @@ std::vector<std::uint32_t> EditedScene::woken(const kernel::Environment& now) co
   return bodies;
 }
 
-void EditedScene::hand_over(const kernel::Environment& now, kernel::Environment* next) const {
+std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::Environment& now,
+                                                                 kernel::Environment* next) const {
   const kernel::SavedState before = now.saved_state(), like = next->saved_state();
   const ColumnTable old(before), fresh(like);
   const std::vector<std::uint32_t> body_row = new_rows(old_body_, before_.bodies.size());
@@ -293,7 +294,8 @@ void EditedScene::hand_over(const kernel::Environment& now, kernel::Environment*
     return rows;
   };
   const std::vector<std::size_t> contacts = kept_pairs(old.at<std::uint32_t>("contact_body"));
-  const std::vector<std::size_t> touching = kept_pairs(old.at<std::uint32_t>("touching"));
+  const std::span<const std::uint32_t> touched = old.at<std::uint32_t>("touching");
+  const std::vector<std::size_t> touching = kept_pairs(touched);
   std::vector<std::size_t> discrepancies;
   const std::span<const std::uint32_t> of_joint = old.at<std::uint32_t>("discrepancy_constraint");
   for (std::size_t i = 0; i < of_joint.size(); ++i)
@@ -345,6 +347,11 @@ void EditedScene::hand_over(const kernel::Environment& now, kernel::Environment*
         columns.at(column.name));
   if (const std::string problem = next->restore(saved); !problem.empty())
     throw std::logic_error("the edited scene does not take the state: " + problem);
+
+  std::vector<std::array<std::uint32_t, 2>> parted;
+  for (std::size_t i = 0; i < touched.size() / 2; ++i)
+    if (!std::ranges::binary_search(touching, i)) parted.push_back({touched[2 * i], touched[2 * i + 1]});
+  return parted;
 }
 
 void keep_who_answers(const kernel::EnvironmentDescription& before, const kernel::EnvironmentDescription& active,

@@ -10,12 +10,13 @@
 // bound as it was, and broken if it was. Who is added is as the scene's text says, a joint bound where the bodies are
 // now, a force as of now; one that was removed and added again is new. Forces that act once act at t = 0: they cannot be
 // added later. An edit wakes all who sleep, lets integrators begin their histories again, and keeps the memory of
-// contacts between bodies that were not moved and have the same shapes. Who is removed ends his collisions without an event.
+// contacts between bodies that were not moved and have the same shapes. All other collisions end with it.
 //
 // The chain goes on as hash(hash(chain, digest of the changes), next state): a run that makes the same edits before the same
 // steps has the same chain, in any hosting, resumed or not.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -46,8 +47,9 @@ class EditedScene {
   // Bodies that slept, and whom the edit wakes.
   std::vector<std::uint32_t> woken(const kernel::Environment& now) const;
 
-  // Precondition: `next` runs description(), whoever answers there. Throws std::logic_error if it does not take the state.
-  void hand_over(const kernel::Environment& now, kernel::Environment* next) const;
+  // Returns the pairs of bodies (rows of before) whose collision ends with the edit. Precondition: `next` runs
+  // description(), whoever answers there. Throws std::logic_error if it does not take the state.
+  std::vector<std::array<std::uint32_t, 2>> hand_over(const kernel::Environment& now, kernel::Environment* next) const;
 
  private:
   void read_changes(const RunOptions& options, Catalog* catalog);

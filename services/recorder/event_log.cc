@@ -1,6 +1,5 @@
 #include "services/recorder/event_log.h"
 
-#include <cerrno>
 #include <system_error>
 #include <utility>
 
@@ -15,15 +14,7 @@ constexpr std::size_t kMostMeetings = 16;
 }  // namespace
 
 EventLog::EventLog(const std::string& path, const kernel::EnvironmentDescription& description)
-    : description_(description), path_(path) {
-  if (path.empty()) return;
-  file_ = std::fopen(path.c_str(), "we");
-  if (file_ == nullptr) throw std::system_error(errno, std::generic_category(), "events '" + path + "'");
-}
-
-EventLog::~EventLog() {
-  if (file_ != nullptr) std::fclose(file_);
-}
+    : description_(description), file_("events", path) {}
 
 void EventLog::on_event(const Event& event) {
   switch (event.kind) {
@@ -46,9 +37,12 @@ void EventLog::on_event(const Event& event) {
     default:
       break;
   }
-  if (file_ == nullptr) return;
-  const std::string line = to_json(event_message(event, description_), JsonForm::kLine);
-  write_failed_ |= std::fwrite(line.data(), 1, line.size(), file_) != line.size();
+  if (!file_.is_open() || failure_) return;
+  try {
+    file_.write(to_json(event_message(event, description_), JsonForm::kLine));
+  } catch (const std::system_error&) {
+    failure_ = std::current_exception();
+  }
 }
 
 void EventLog::remember_meeting(const Event& event) {
@@ -91,10 +85,8 @@ void EventLog::resume(const recorder::v1::Tally& tally) {
 }
 
 void EventLog::close() {
-  std::FILE* file = std::exchange(file_, nullptr);
-  if (file == nullptr) return;
-  const bool closed = std::fclose(file) == 0;
-  if (!closed || write_failed_) throw std::system_error(errno, std::generic_category(), "events '" + path_ + "'");
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  file_.close();
 }
 
 }  // namespace gravitas

@@ -1,7 +1,7 @@
 // Counts events, writes them as JSON lines, and remembers who met whom first.
 #pragma once
 
-#include <cstdio>
+#include <exception>
 #include <set>
 #include <string>
 #include <vector>
@@ -9,6 +9,7 @@
 #include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "services/events/event.h"
+#include "services/recorder/output_file.h"
 
 namespace gravitas {
 
@@ -24,10 +25,8 @@ class EventLog final : public EventListener {
   // The description is that of the moment when an event is told. No file if `path` is empty. Throws std::system_error if it
   // cannot be made.
   EventLog(const std::string& path, const kernel::EnvironmentDescription& description);
-  ~EventLog() override;
-  EventLog(const EventLog&) = delete;
-  EventLog& operator=(const EventLog&) = delete;
 
+  // A file that cannot be written is said by close(): events come in the middle of a commit.
   void on_event(const Event& event) override;
 
   const report::v1::EventCounts& counts() const { return counts_; }
@@ -42,9 +41,8 @@ class EventLog final : public EventListener {
   void remember_meeting(const Event& event);
 
   const kernel::EnvironmentDescription& description_;
-  std::string path_;
-  std::FILE* file_ = nullptr;
-  bool write_failed_ = false;
+  OutputFile file_;
+  std::exception_ptr failure_;
   report::v1::EventCounts counts_;
   std::vector<Meeting> meetings_;
   std::set<std::string> has_met_;

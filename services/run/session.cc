@@ -349,10 +349,12 @@ class Run final : private kernel::CommitListener {
     put_in_place(&active);
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = start(begun, options_.starter);
-    edited.hand_over(*environment_, next.get());
+    const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
+    for (const auto& [a, b] : parted)
+      tell({EventKind::kCollisionEnd, environment_->step_count(), environment_->time(), a, b}, "");
     write_past();
     settle_swaps(&result_.report);
     translate_decisions(description_, edited.description(), &decisions_);

@@ -76,7 +76,7 @@ void sleeping_call(benchmark::State& state, Hosting hosting) {
   }
 }
 
-// Free motion of n bodies: 15 columns out, 6 back, about 350 bytes a body.
+// Free motion of n bodies: 15 columns out, 6 back, about 350 bytes a body, of which a third stays as it is.
 void integrate_call(benchmark::State& state, Hosting hosting) {
   using Request = stage::IntegratorIntegrateRequest;
   const auto bodies = static_cast<std::uint64_t>(state.range(0));
@@ -94,8 +94,15 @@ void integrate_call(benchmark::State& state, Hosting hosting) {
     }
   }
   const auto carrier = make_carrier(hosting, harness::plugin_path("integrator_semi_implicit_euler"));
-  for (int i = 0; i < 20; ++i) call.make(carrier.get(), &state);
-  for (auto _ : state) call.make(carrier.get(), &state);
+  // from call to call the state is another, as in a run: what has not changed need not travel again
+  const auto make = [&] {
+    for (const auto column :
+         {Request::kPosition, Request::kOrientation, Request::kLinearVelocity, Request::kAngularVelocity})
+      for (std::uint64_t i = 0; i < bodies; ++i) call.f64(column)[3 * i] += 1e-9;
+    call.make(carrier.get(), &state);
+  };
+  for (int i = 0; i < 20; ++i) make();
+  for (auto _ : state) make();
 }
 
 BENCHMARK_CAPTURE(empty_call, direct, Hosting::kDirect)->UseRealTime();

@@ -16,6 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from ladders import Rung, panel, save
 from tabulate import plt
 
 G = 9.81
@@ -221,7 +222,7 @@ def ladder(solver):
     """Settings: time step and, where it is not the default, the number of sweeps."""
     settings = [(step, 0) for step in LADDER]
     if solver == "Newton":
-        return settings + [(1 / 7680, 0), (1 / 1000, 0)]
+        return settings + [(1 / 7680, 0), (1 / 15360, 0)]
     return settings + [(1 / 240, sweeps) for sweeps in SWEEPS]
 
 
@@ -250,22 +251,28 @@ def table(rows):
     return "\n".join(lines) + "\n"
 
 
+def curves(rows, problem):
+    """By solver: its steps, and its numbers of sweeps at one step."""
+    drawn = {}
+    for solver in SOLVERS:
+        for step, sweeps in ladder(solver):
+            run = rows[problem, solver, step, sweeps]
+            seconds = run["us_per_second"] / 1e6 if math.isfinite(run["us_per_second"]) else 0.0
+            label = f"{sweeps} sweeps" if sweeps else f"{step:.1e} s"
+            rungs = drawn.setdefault(f"{solver}, sweeps at 1/240 s" if sweeps else solver, [])
+            rungs.append(Rung(label, run["error"], seconds, run["failed"]))
+    return drawn
+
+
 def draw(rows, path):
     figure, axes = plt.subplots(1, len(PROBLEMS), figsize=(4 * len(PROBLEMS), 4), sharey=True, layout="constrained")
     for axis, problem in zip(axes, PROBLEMS):
-        for i, solver in enumerate(SOLVERS):
-            runs = [rows[problem, solver, *setting] for setting in ladder(solver)]
-            good = [run for run in runs if not run["failed"]]
-            axis.loglog([max(run["error"], 1e-17) for run in good], [run["us_per_second"] / 1e6 for run in good], "o", color=f"C{i}", label=solver)
-            bad = [run for run in runs if run["failed"] and math.isfinite(run["us_per_second"])]
-            axis.loglog([10.0] * len(bad), [run["us_per_second"] / 1e6 for run in bad], "o", color=f"C{i}", fillstyle="none")
+        panel(axis, curves(rows, problem))
         axis.set_title(problem)
         axis.set_xlabel("error (hollow: failed)")
-        axis.grid(True, alpha=0.3)
     axes[0].set_ylabel("s of time per simulated s")
-    axes[0].legend()
-    plt.rcParams["svg.hashsalt"] = "solvers"
-    figure.savefig(path, metadata={"Date": None})
+    axes[0].legend(fontsize=7)
+    save(figure, path)
 
 
 def main():

@@ -231,7 +231,7 @@ class Talk(unittest.TestCase):
         self._folder.cleanup()
 
     def hello(self, **changes):
-        fields = dict(magic=MAGIC, protocol_minimum=1, protocol_maximum=1, schema_hash=SCHEMA_HASH, epoch=self.EPOCH,
+        fields = dict(magic=MAGIC, protocol_minimum=2, protocol_maximum=2, schema_hash=SCHEMA_HASH, epoch=self.EPOCH,
                       nonce=5, plugins=[control_pb2.PluginSettings(plugin="Midpoint", numbers=[0.5])])
         fields.update(changes)
         stream = Stream(self.channel, "/gravitas.control.v1.WorkerControl/Session")
@@ -265,7 +265,7 @@ class Talk(unittest.TestCase):
     def test_greetings_that_are_not_for_this_worker_are_refused(self):
         other = [control_pb2.PluginSettings(plugin="Other")]
         wrong = [control_pb2.PluginSettings(plugin="Midpoint", numbers=[1.5])]
-        for reason, changes in (("MAGIC", {"magic": 1}), ("PROTOCOL", {"protocol_minimum": 2, "protocol_maximum": 3}),
+        for reason, changes in (("MAGIC", {"magic": 1}), ("PROTOCOL", {"protocol_minimum": 3, "protocol_maximum": 4}),
                                 ("SCHEMA", {"schema_hash": 1}), ("LIBRARY", {"plugins": other}),
                                 ("SETTINGS", {"plugins": []}), ("SETTINGS", {"plugins": wrong})):
             _, answer = self.hello(**changes)

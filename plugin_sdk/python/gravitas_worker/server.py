@@ -25,7 +25,7 @@ from .columns import WireError, stage_methods
 from .declaration import Refusal, description_of
 
 MAGIC = 0x4752415649544153  # "GRAVITAS"
-PROTOCOL = 1
+PROTOCOL = 2
 # Of the schemas that the messages here were generated from; the build writes it beside them.
 SCHEMA_HASH = int(pathlib.Path(__file__).with_name("schema_hash").read_text(), 16)
 BUILD_ID = f"python-{sys.version_info.major}.{sys.version_info.minor}-numpy-{numpy.__version__}"

@@ -26,17 +26,17 @@ struct Mailboxes {
   std::unique_ptr<Mailbox> worker{new Mailbox()};
 };
 
-TEST(Mailbox, HasTheLayoutOfVersionOne) {
-  ASSERT_EQ(GRAVITAS_LAYOUT_VERSION, 1);
+TEST(Mailbox, HasTheLayoutOfVersionTwo) {
+  ASSERT_EQ(GRAVITAS_LAYOUT_VERSION, 2);
   EXPECT_EQ(offsetof(Mailbox, signal), 0U);
   EXPECT_EQ(offsetof(Mailbox, sleeping), 4U);
   EXPECT_EQ(offsetof(Mailbox, cpu), 8U);
-  EXPECT_EQ(offsetof(Mailbox, progress), 16U);
-  EXPECT_EQ(offsetof(Mailbox, compute_ns), 24U);
   EXPECT_EQ(offsetof(Mailbox, header), 64U);
-  EXPECT_EQ(offsetof(Mailbox, columns), 160U);
-  EXPECT_EQ(offsetof(Mailbox, reply), 160U + 48 * 24);
-  EXPECT_EQ(offsetof(Mailbox, text), 160U + 2 * 48 * 24);
+  EXPECT_EQ(offsetof(Mailbox, progress), 160U);
+  EXPECT_EQ(offsetof(Mailbox, compute_ns), 168U);
+  EXPECT_EQ(offsetof(Mailbox, columns), 176U);
+  EXPECT_EQ(offsetof(Mailbox, reply), 176U + 48 * 24);
+  EXPECT_EQ(offsetof(Mailbox, text), 176U + 2 * 48 * 24);
   EXPECT_EQ(sizeof(Mailbox), 3008U);
 }
 

@@ -14,8 +14,8 @@ namespace {
 template <typename T>
 constexpr bool kIsPlain = std::is_standard_layout_v<T>&& std::is_trivial_v<T>;
 
-TEST(FrameLayout, StructuresHaveTheSizesOfVersionOne) {
-  ASSERT_EQ(GRAVITAS_LAYOUT_VERSION, 1);
+TEST(FrameLayout, StructuresHaveTheSizesOfVersionTwo) {
+  ASSERT_EQ(GRAVITAS_LAYOUT_VERSION, 2);
   EXPECT_EQ(sizeof(gravitas_column), 16U);
   EXPECT_EQ(sizeof(gravitas_reply_column), 24U);
   EXPECT_EQ(sizeof(gravitas_frame_column), 24U);
@@ -24,7 +24,7 @@ TEST(FrameLayout, StructuresHaveTheSizesOfVersionOne) {
   EXPECT_EQ(GRAVITAS_MAX_COLUMNS, 48);
 }
 
-TEST(FrameLayout, HeaderFieldsAreWhereVersionOnePutThem) {
+TEST(FrameLayout, HeaderFieldsAreWhereVersionTwoPutThem) {
   EXPECT_EQ(offsetof(gravitas_frame_header, magic), 0U);
   EXPECT_EQ(offsetof(gravitas_frame_header, schema_hash), 8U);
   EXPECT_EQ(offsetof(gravitas_frame_header, epoch), 16U);

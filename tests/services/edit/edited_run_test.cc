@@ -201,6 +201,23 @@ TEST(EditedRun, ThePlanIsMadeAnew) {
   EXPECT_FALSE(planned("collision"));
 }
 
+// Every collision that began ends: with the body that is removed, and where one is put elsewhere, where it may begin anew.
+TEST(EditedRun, CollisionsEndWithWhoIsRemovedOrMoved) {
+  const std::string ground = "Body { Id = \"Ground\" GeometryId = \"Flat\" }";
+  EditedRun run(
+      scene(ground + ball("A", "Position = {0, 0.1, 0}", kFalls) + ball("B", "Position = {3, 0.1, 0}", kFalls)));
+  using Counts = std::pair<std::uint64_t, std::uint64_t>;  // begun, ended
+  const auto events = [&](const std::string& edit) {
+    run.options.edits = {edit};
+    const report::v1::EventCounts counts = run.run().report.events();
+    return Counts(counts.collision_start(), counts.collision_end());
+  };
+  EXPECT_EQ(events("remove Body.Ground@step=41"), Counts(2, 2));
+  EXPECT_EQ(events("remove Body.A@step=41"), Counts(2, 1));
+  EXPECT_EQ(events("set Body.A.Position={5,0.1,0}@step=41"), Counts(3, 1));
+  EXPECT_EQ(events("set Body.A.Mass=3@step=41"), Counts(2, 0));
+}
+
 // A body that is fixed stays where it is then.
 TEST(EditedRun, ABodyThatIsMadeImmovableStaysWhereItIs) {
   EditedRun run(

@@ -114,8 +114,11 @@ TEST(EventLog, AFileThatCannotBeMadeOrWrittenIsSaid) {
   const kernel::EnvironmentDescription d = description();
   EXPECT_THROW(EventLog(folder.path("none/events"), d), std::system_error);
   EventLog log("/dev/full", d);
-  for (std::uint32_t step = 1; step <= 1000; ++step) log.on_event(meeting(step, 0, 1));
-  EXPECT_THROW(log.close(), std::system_error);
+  const auto write_all = [&] {
+    for (std::uint32_t step = 1; step <= 1000; ++step) log.on_event(meeting(step, 0, 1));
+    log.close();
+  };
+  EXPECT_THROW(write_all(), std::system_error);
 }
 
 }  // namespace
