@@ -26,7 +26,7 @@ struct Ruleset {
 };
 // Bits of Ruleset::files that versions 1 to 5 of the interface know; later ones know no more.
 constexpr std::array<int, 5> kFileRights = {13, 14, 15, 15, 16};
-constexpr std::uint64_t kRead = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
+constexpr std::uint64_t kReadAccess = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 constexpr long kNetworkVersion = 4;
 constexpr std::uint64_t kBindAndConnectTcp = 3;
 constexpr long kScopeVersion = 6;
@@ -74,18 +74,18 @@ std::string folder_of(const std::string& library) {
 }
 
 bool allow_all(int ruleset, const std::vector<std::string>& libraries) {
-  bool done = allow(ruleset, "/dev/null", kRead | LANDLOCK_ACCESS_FS_WRITE_FILE);
-  for (const char* path : kReadable) done = done && allow(ruleset, path, kRead);
+  bool done = allow(ruleset, "/dev/null", kReadAccess | LANDLOCK_ACCESS_FS_WRITE_FILE);
+  for (const char* path : kReadable) done = done && allow(ruleset, path, kReadAccess);
   // the program itself: a sanitizer reads the names of its functions
-  done = done && allow(ruleset, "/proc/self/exe", kRead);
+  done = done && allow(ruleset, "/proc/self/exe", kReadAccess);
   for (const std::string& library : libraries) {
     const std::string folder = folder_of(library);
-    done = done && (folder.empty() || allow(ruleset, folder, kRead));
+    done = done && (folder.empty() || allow(ruleset, folder, kReadAccess));
   }
   if (const char* folders = std::getenv("LD_LIBRARY_PATH")) {
     std::istringstream list(folders);
     for (std::string folder; std::getline(list, folder, ':');)
-      done = done && (folder.empty() || allow(ruleset, folder, kRead));
+      done = done && (folder.empty() || allow(ruleset, folder, kReadAccess));
   }
   return done;
 }

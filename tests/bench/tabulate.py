@@ -41,12 +41,12 @@ BOUNDS = [
      "validation_percent", None, "%"),
     ("checkpoints/iterations:200/real_time", "a checkpoint every 100 steps of pile1000 and its journal, direct", "percent",
      2, "%"),
-    *((f"recovery/{fault}/iterations:1", f"{what}, noticed to answered by a warm standby: {name}", counter, bound, "us")
+    *((f"recovery/{fault}/iterations:1/repeats:1", f"{what}, noticed to answered by a warm standby: {name}", counter, bound, "us")
       for fault, what in (("kill", "killed in a call, shm"), ("segv", "the same, SIGSEGV"), ("abort", "the same, abort"),
                           ("hang", "hanging, shm (its deadline not counted)"), ("nan", "answering NaN, shm"),
                           ("kill_grpc", "killed in a call, gRPC"))
       for name, counter, bound in (("median", "median_us", 2e3), ("p99", "p99_us", 10e3))),
-    *((f"swap_pause/{carrier}/iterations:1", f"pause of a swap, {carrier}: {name}", counter, bound, "us")
+    *((f"swap_pause/{carrier}/iterations:1/repeats:1", f"pause of a swap, {carrier}: {name}", counter, bound, "us")
       for carrier in ("direct", "shm", "grpc")
       for name, counter, bound in (("median", "median_us", 200), ("p99", "p99_us", None))),
     ("memory/iterations:1/real_time", "memory of a body, all slots direct", "bytes_per_body", None, "B"),
@@ -55,11 +55,11 @@ BOUNDS = [
 
 
 def medians(path):
-    """Benchmark name -> its median run."""
+    """Benchmark name -> its median run, or its only one."""
     report = json.loads(Path(path).read_text())
     runs = {}
     for run in report["benchmarks"]:
-        if run.get("aggregate_name") == "median":
+        if run.get("aggregate_name") == "median" or run.get("repetitions") == 1:
             runs[run["run_name"]] = run
     return report["context"], runs
 
