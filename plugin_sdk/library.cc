@@ -18,27 +18,36 @@
 namespace gravitas {
 namespace {
 
+void close_keeping_errno(int descriptor) {
+  const int reason = errno;
+  close(descriptor);
+  errno = reason;
+}
+
+// A descriptor of a regular file, or -1 with the reason in errno.
+int open_regular(const std::string& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  struct stat status {};
+  if (file < 0 || (fstat(file, &status) == 0 && S_ISREG(status.st_mode))) return file;
+  errno = S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
+  close_keeping_errno(file);
+  return -1;
+}
+
 // A descriptor of an anonymous copy of the file, or -1 with the reason in errno.
 int private_copy(const std::string& path) {
-  const int source = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (source < 0) return -1;
+  const int source = open_regular(path);
   struct stat status;
-  int copy = -1;
-  if (fstat(source, &status) == 0 && S_ISREG(status.st_mode)) {
-    copy = memfd_create("gravitas plugin", MFD_CLOEXEC);
-    off_t offset = 0;
-    while (copy >= 0 && offset < status.st_size) {
-      if (sendfile(copy, source, &offset, static_cast<std::size_t>(status.st_size - offset)) <= 0) {
-        close(copy);
-        copy = -1;
-      }
+  if (source < 0 || fstat(source, &status) != 0) return -1;
+  int copy = memfd_create("gravitas plugin", MFD_CLOEXEC);
+  off_t offset = 0;
+  while (copy >= 0 && offset < status.st_size) {
+    if (sendfile(copy, source, &offset, static_cast<std::size_t>(status.st_size - offset)) <= 0) {
+      close_keeping_errno(copy);
+      copy = -1;
     }
-  } else {
-    errno = S_ISDIR(status.st_mode) ? EISDIR : EINVAL;
   }
-  const int reason = errno;
-  close(source);
-  errno = reason;
+  close_keeping_errno(source);
   return copy;
 }
 
@@ -77,17 +86,16 @@ std::uint64_t content_digest(int descriptor) {
   return digest.value();
 }
 
-// Loads and checks the copy of a library that errors call `path`.
-PluginLibrary load_copy(int copy, const std::string& path, std::string* problem) {
-  // the descriptor stays open: debuggers and sanitizers read symbols through this name
-  const std::string private_path = "/proc/self/fd/" + std::to_string(copy);
-  void* handle = dlopen(private_path.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) {
-    const char* reason = dlerror();
-    *problem = "'" + path + "' is not a shared library that can be loaded: " + (reason != nullptr ? reason : "?");
-    close(copy);
-    return {};
-  }
+// Loads what is in `file`, which errors call `path`.
+void* load(const std::string& file, const std::string& path, std::string* problem) {
+  void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle != nullptr) return handle;
+  const char* reason = dlerror();
+  *problem = "'" + path + "' is not a shared library that can be loaded: " + (reason != nullptr ? reason : "?");
+  return nullptr;
+}
+
+PluginLibrary checked(void* handle, const std::string& path, std::string* problem) {
   const auto entry = reinterpret_cast<gravitas_plugin_function>(dlsym(handle, "gravitas_plugin"));
   if (entry == nullptr) {
     *problem = "'" + path + "' is not a plugin: it has no function gravitas_plugin";
@@ -152,9 +160,27 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     close(copy);
     return known->second;
   }
-  PluginLibrary library = load_copy(copy, path, problem);
+  // the descriptor stays open: debuggers and sanitizers read symbols through this name
+  void* handle = load("/proc/self/fd/" + std::to_string(copy), path, problem);
+  if (handle == nullptr) {
+    close(copy);
+    return {};
+  }
+  PluginLibrary library = checked(handle, path, problem);
   if (library.table != nullptr) loaded.emplace(content, library);
   return library;
+}
+
+PluginLibrary look_into_plugin_library(const std::string& path, std::string* problem) {
+  const int file = open_regular(path);
+  if (file < 0) {
+    *problem = "cannot read '" + path + "': " + std::strerror(errno);
+    return {};
+  }
+  close(file);
+  // without a slash it would be looked for elsewhere
+  void* handle = load(path.find('/') == std::string::npos ? "./" + path : path, path, problem);
+  return handle == nullptr ? PluginLibrary() : checked(handle, path, problem);
 }
 
 }  // namespace gravitas

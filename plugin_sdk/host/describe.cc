@@ -59,7 +59,7 @@ bool read_all(int descriptor, void* data, std::size_t size, std::uint64_t until)
     Entry entry;
     entry.set_library(libraries[i]);
     std::string problem;
-    const PluginLibrary library = load_plugin_library(libraries[i], &problem);
+    const PluginLibrary library = look_into_plugin_library(libraries[i], &problem);
     entry.set_problem(problem);
     if (library.table != nullptr) *entry.mutable_description() = to_message(library.declaration);
     const std::string bytes = entry.SerializeAsString();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <ranges>
 #include <stdexcept>
 
 #include "plugin_sdk/collision.h"
@@ -80,10 +79,16 @@ class Impulses {
   Vector3 of(const Contact& contact) const {
     const auto identity = [&](std::size_t i) { return std::array{body_[2 * i], body_[2 * i + 1], feature_[i]}; };
     const std::array wanted{contact.a, contact.b, contact.feature};
-    const auto rows = std::views::iota(std::size_t{0}, feature_.size());
-    const auto found = std::ranges::lower_bound(rows, wanted, {}, identity);
-    if (found == rows.end() || identity(*found) != wanted) return Vector3::Zero();
-    return vector_at(impulse_, *found);
+    std::size_t found = 0;
+    for (std::size_t end = feature_.size(); found < end;) {
+      const std::size_t middle = (found + end) / 2;
+      if (identity(middle) < wanted)
+        found = middle + 1;
+      else
+        end = middle;
+    }
+    if (found == feature_.size() || identity(found) != wanted) return Vector3::Zero();
+    return vector_at(impulse_, found);
   }
   double step_length() const { return state_.step_length; }
 
@@ -284,7 +289,7 @@ void Instrumentation::add_shapes(const kernel::Environment& environment, Frame* 
   const std::vector<std::uint32_t>& shape = lines.u32("line_shape");
   for (std::uint32_t body = 0; body < model.body_count; ++body) {
     const Pose pose = placed(environment, body);
-    const auto [begin, end] = std::ranges::equal_range(shape, model.body_shape[body]);
+    const auto [begin, end] = std::equal_range(shape.begin(), shape.end(), model.body_shape[body]);
     for (auto row = begin; row != end; ++row) {
       const auto i = static_cast<std::size_t>(row - shape.begin());
       add_line(v1::KIND_SHAPE, body_id(body), transform_point(pose, vector_at(lines.f64("line_from"), i)),
@@ -300,7 +305,7 @@ void Instrumentation::add_trees(const kernel::Environment& environment, Frame* f
   const std::vector<std::uint32_t>& shape = nodes.u32("node_shape");
   for (std::uint32_t body = 0; body < model.body_count; ++body) {
     const Pose pose = placed(environment, body);
-    const auto [begin, end] = std::ranges::equal_range(shape, model.body_shape[body]);
+    const auto [begin, end] = std::equal_range(shape.begin(), shape.end(), model.body_shape[body]);
     for (auto row = begin; row != end; ++row) {
       const auto i = static_cast<std::size_t>(row - shape.begin());
       const Pose own{vector_at(nodes.f64("node_centre"), i), quaternion_at(nodes.f64("node_orientation"), i)};

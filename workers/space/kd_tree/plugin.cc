@@ -181,7 +181,7 @@ class KdTreeSpace final : public SpacePlugin {
     // wholly left | wholly right | cut
     const auto is_left = [&](std::uint32_t i) { return bounds_[i].upper[axis] < plane; };
     const auto is_right = [&](std::uint32_t i) { return bounds_[i].lower[axis] > plane; };
-    const auto right_begin = std::ranges::partition(bodies, is_left).begin();
+    const auto right_begin = std::partition(bodies.begin(), bodies.end(), is_left);
     const auto right_end = std::partition(right_begin, bodies.end(), is_right);
     if (right_begin == bodies.begin() && right_end == right_begin) return;
 
