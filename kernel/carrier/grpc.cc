@@ -56,7 +56,6 @@ class GrpcCarrier final : public Carrier {
   struct Stream {
     grpc::ClientContext context;
     std::unique_ptr<grpc::GenericClientAsyncReaderWriter> io;
-    wire::MessageRooms rooms;
     std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> sent{};  // hashes of the columns of its last request
     grpc::ByteBuffer incoming;                               // of a Read, which may end after its call was given up
     grpc::Status status;                                     // at its end, of whose operation it is the tag
@@ -72,6 +71,8 @@ class GrpcCarrier final : public Carrier {
   void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
   void wait(Stream* stream, Patience* patience);
   [[noreturn]] void report_broken(Stream* stream, bool is_unread);
+  void send_asset(Stream* stream, const gravitas_column& column, std::uint64_t size, std::uint64_t hash,
+                  Patience* patience);
   void leave_out_known(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
                        std::span<const std::uint64_t> hashes, stage::v1::Call* header, Patience* patience);
   void answer_callback(Stream* stream, const wire::ColumnsReader& reader, const stage::v1::Call& header, Arena* arena,
@@ -156,34 +157,38 @@ void GrpcCarrier::write(Stream* stream, const grpc::ByteBuffer& message, Patienc
   wait(stream, patience);
 }
 
+void GrpcCarrier::send_asset(Stream* stream, const gravitas_column& column, std::uint64_t size, std::uint64_t hash,
+                             Patience* patience) {
+  for (std::uint64_t offset = 0; offset < size; offset += kAssetPart) {
+    stage::v1::AssetChunk chunk;
+    chunk.set_hash(hash);
+    chunk.set_size(size);
+    chunk.set_offset(offset);
+    chunk.set_data(static_cast<const char*>(column.data) + offset, std::min(kAssetPart, size - offset));
+    write(stream, message_of(chunk), patience);
+  }
+}
+
 // Large columns that stay the same for the run go once, by the hash of their content; others that are as in the stream's
 // last request stand in the worker's memory.
 void GrpcCarrier::leave_out_known(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
                                   std::span<const std::uint64_t> hashes, stage::v1::Call* header, Patience* patience) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const auto field = static_cast<std::uint32_t>(i) + 1;
-    const std::uint64_t size = columns[i].count * stage::element_size(method.request[i].type), hash = hashes[i];
-    const bool is_asset = method.request[i].asset && size >= kAssetBytes;
-    const bool can_be_kept = !is_asset && size >= kKeptBytes && link_.keeps_columns();
-    const bool is_kept = std::exchange(stream->sent[i], can_be_kept ? hash : 0) == hash && can_be_kept;
-    if (!is_asset && !is_kept) continue;
-    for (std::uint64_t offset = 0; is_asset && offset < size && !sent_assets_.contains(hash); offset += kAssetPart) {
-      stage::v1::AssetChunk chunk;
-      chunk.set_hash(hash);
-      chunk.set_size(size);
-      chunk.set_offset(offset);
-      chunk.set_data(static_cast<const char*>(columns[i].data) + offset, std::min(kAssetPart, size - offset));
-      write(stream, message_of(chunk), patience);
-    }
-    columns[i] = {nullptr, 0};
-    if (is_kept) {
+    const std::uint64_t size = columns[i].count * stage::element_size(method.request[i].type);
+    const std::uint64_t before = std::exchange(stream->sent[i], hashes[i]);
+    if (method.request[i].asset && size >= kAssetBytes) {
+      stream->sent[i] = 0;
+      if (sent_assets_.insert(hashes[i]).second) send_asset(stream, columns[i], size, hashes[i], patience);
+      stage::v1::AssetUse* use = header->add_assets();
+      use->set_column(field);
+      use->set_hash(hashes[i]);
+    } else if (link_.keeps_columns() && size >= kKeptBytes && before == hashes[i]) {
       header->add_kept(field);
+    } else {
       continue;
     }
-    sent_assets_.insert(hash);
-    stage::v1::AssetUse* use = header->add_assets();
-    use->set_column(field);
-    use->set_hash(hash);
+    columns[i] = {nullptr, 0};
   }
 }
 
@@ -210,13 +215,14 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   if (!call.fault.empty()) header.set_fault(std::string(call.fault));
   Stream& stream = stream_of(method, &patience);
   leave_out_known(&stream, method, request, hashes, &header, &patience);
-  write(&stream, stream.rooms.write({method.request, request, &header}), &patience);
+  write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
 
   for (;;) {
     stream.io->Read(&stream.incoming, &stream);
     wait(&stream, &patience);
+    const wire::FlatMessage flat(stream.incoming);
     wire::ColumnsReader reader(method.reply);
-    const std::string problem = reader.parse(stream.rooms.read(stream.incoming));
+    const std::string problem = reader.parse(flat.bytes());
     Outcome outcome;
     if (!problem.empty()) link_.report_bad_frame("a wrong message: " + problem);
     if (!reader.header().has ||
@@ -280,7 +286,7 @@ void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& rea
   patience->cap += pause;
   const ColumnId wrench = derivatives->wrench_column();
   const std::array<gravitas_column, 1> answer = {gravitas_column{arena->data(wrench), arena->count(wrench)}};
-  write(stream, stream->rooms.write({{}, {}, &header, kDerivative.reply, answer}), patience);
+  write(stream, wire::to_byte_buffer({{}, {}, &header, kDerivative.reply, answer}), patience);
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "kernel/carrier/worker_link.h"
 
-#include <fcntl.h>
 #include <grpcpp/create_channel_posix.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -107,10 +106,7 @@ ListeningCommand start_listening_command(const std::string& command, std::chrono
 }
 
 std::shared_ptr<grpc::Channel> worker_channel(int descriptor) {
-  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-  // nor be sent in parts, each of which its receiver must be woken for; the system may allow less
-  const int room = 1 << 22;
-  setsockopt(descriptor, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
+  channel::prepare_for_grpc(descriptor);
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetMaxSendMessageSize(-1);

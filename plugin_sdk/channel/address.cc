@@ -1,6 +1,7 @@
 #include "plugin_sdk/channel/address.h"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
@@ -93,6 +94,12 @@ Resolved resolve(const std::string& address) {
 
 int connect_to(const std::string& address) {
   return address.starts_with("unix:") ? connect_unix(address.substr(5)) : connect_tcp(address);
+}
+
+void prepare_for_grpc(int descriptor) {
+  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
+  const int room = 1 << 22;
+  setsockopt(descriptor, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
 }
 
 }  // namespace gravitas::channel

@@ -1,12 +1,11 @@
 #include "plugin_sdk/host/control_service.h"
 
-#include <fcntl.h>
 #include <grpcpp/server_posix.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <utility>
 
+#include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/host/handshake_lie.h"
 
@@ -141,10 +140,7 @@ std::unique_ptr<grpc::ServerBuilder> server_builder(grpc::Service* service) {
 }
 
 std::unique_ptr<grpc::Server> serve_descriptor(grpc::ServerBuilder* builder, int descriptor) {
-  fcntl(descriptor, F_SETFL, fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-  // nor be sent in parts, each of which its receiver must be woken for; the system may allow less
-  const int room = 1 << 22;
-  setsockopt(descriptor, SOL_SOCKET, SO_SNDBUF, &room, sizeof room);
+  channel::prepare_for_grpc(descriptor);
   std::unique_ptr<grpc::Server> server = builder->BuildAndStart();
   if (server) grpc::AddInsecureChannelFromFd(server.get(), descriptor);
   return server;

@@ -45,7 +45,6 @@ struct StreamLoop::Stream {
   Operation accept{Operation::kAccept, this}, read{Operation::kRead, this}, write{Operation::kWrite, this},
       finish{Operation::kFinish, this};
   stage::Method method{};
-  wire::MessageRooms rooms;
   grpc::ByteBuffer incoming;
   bool writing = false, arrived = false, open = true, finished = false;
 
@@ -79,7 +78,7 @@ struct StreamLoop::OpenCall final : CallServices {
     last_mark = now;
     Outcome outcome = head();
     outcome.set_marks(marks);
-    loop->write(stream, stream->rooms.write({{}, {}, &outcome}));
+    loop->write(stream, wire::to_byte_buffer({{}, {}, &outcome}));
   }
 
   // Whoever dies of the request from here on has read it: so it must be out before anything can happen.
@@ -87,7 +86,7 @@ struct StreamLoop::OpenCall final : CallServices {
     const std::lock_guard lock(loop->io_);
     Outcome outcome = head();
     outcome.set_marks(++marks);
-    loop->write(stream, stream->rooms.write({{}, {}, &outcome}), grpc::WriteOptions().set_write_through());
+    loop->write(stream, wire::to_byte_buffer({{}, {}, &outcome}), grpc::WriteOptions().set_write_through());
     while (stream->open && stream->writing) loop->pump(kIdleMilliseconds);
   }
 
@@ -97,7 +96,7 @@ struct StreamLoop::OpenCall final : CallServices {
     std::unique_lock lock(loop->io_);
     const Outcome outcome = head();
     const wire::MessageParts message{{}, {}, &outcome, kDerivative.request, {asked, kDerivative.request.size()}};
-    if (!loop->write(stream, stream->rooms.write(message))) return GRAVITAS_CALLBACK_FAILED;
+    if (!loop->write(stream, wire::to_byte_buffer(message))) return GRAVITAS_CALLBACK_FAILED;
     loop->read(stream);
     while (stream->open && !stream->arrived) {
       loop->pump(kIdleMilliseconds);
@@ -107,9 +106,9 @@ struct StreamLoop::OpenCall final : CallServices {
     }
     if (!std::exchange(stream->arrived, false)) return GRAVITAS_CALLBACK_FAILED;
 
+    const wire::FlatMessage message_bytes(stream->incoming);
     wire::ColumnsReader outer({});
-    if (!outer.parse(stream->rooms.read(stream->incoming)).empty() || !outer.derivative().has)
-      return GRAVITAS_CALLBACK_FAILED;
+    if (!outer.parse(message_bytes.bytes()).empty() || !outer.derivative().has) return GRAVITAS_CALLBACK_FAILED;
     wire::ColumnsReader reader(kDerivative.reply);
     if (!reader.parse(outer.derivative().bytes).empty()) return GRAVITAS_CALLBACK_FAILED;
     for (std::size_t i = 0; i < kDerivative.reply.size(); ++i) {
@@ -288,9 +287,10 @@ std::string StreamLoop::read_request(Stream* stream, const wire::ColumnsReader& 
 }
 
 void StreamLoop::handle(Stream* stream) {
+  const wire::FlatMessage message(stream->incoming);
   wire::ColumnsReader reader(stage::method_info(stream->method).request);
   Call call;
-  std::string problem = reader.parse(stream->rooms.read(stream->incoming));
+  std::string problem = reader.parse(message.bytes());
   if (problem.empty() && reader.asset().has) {
     problem = take_asset(reader.asset().bytes);
     if (problem.empty()) {
@@ -363,15 +363,14 @@ void StreamLoop::write_reply(Stream* stream, std::span<const ColumnInfo> infos,
                              std::span<const gravitas_column> columns, Outcome* outcome, const FaultInjection* fault) {
   const std::lock_guard lock(io_);
   if (fault == nullptr) {
-    write(stream, stream->rooms.write({infos, columns, outcome}));
+    write(stream, wire::to_byte_buffer({infos, columns, outcome}));
     return;
   }
   outcome->set_epoch(fault->epoch(outcome->epoch()));
   outcome->set_sequence(fault->sequence(outcome->sequence()));
-  wire::MessageRooms rooms;
-  const grpc::ByteBuffer right = rooms.write({infos, columns, outcome});
-  const std::span<const std::byte> bytes = rooms.read(right);
-  std::string message(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const grpc::ByteBuffer right = wire::to_byte_buffer({infos, columns, outcome});
+  const wire::FlatMessage flat(right);
+  std::string message(reinterpret_cast<const char*>(flat.bytes().data()), flat.bytes().size());
   fault->spoil_message(&message, wire::columns_size(infos, columns));
   fault->pass(Moment::kWrite);
   const grpc::Slice slice(message);

@@ -16,18 +16,18 @@ namespace {
 // Beyond all rows, and not one of the numbers that mean "none".
 constexpr std::uint32_t kFarAway = 0x7FFFFFF0;
 
+bool shares_its_rows(std::span<const ColumnInfo> infos, std::size_t column) {
+  return std::ranges::count(infos, infos[column].rows_index, &ColumnInfo::rows_index) > 1;
+}
+
+}  // namespace
+
 void set_count(MessageColumns* columns, std::size_t column, std::uint64_t count) {
   std::vector<gravitas_reply_column> sizes = columns->rooms();
   for (gravitas_reply_column& size : sizes) size.count = size.capacity;
   sizes[column].count = count;
   columns->resize(sizes);
 }
-
-bool shares_its_rows(std::span<const ColumnInfo> infos, std::size_t column) {
-  return std::ranges::count(infos, infos[column].rows_index, &ColumnInfo::rows_index) > 1;
-}
-
-}  // namespace
 
 std::vector<AbusedRequest> with_uneven_rows(const Question& question) {
   const std::span<const ColumnInfo> infos = stage::method_info(question.method).request;

@@ -313,12 +313,9 @@ MessageColumns without_columns(const Question& question, Call* call) {
   const stage::MethodInfo& method = stage::method_info(question.method);
   MessageColumns bare = question.request;
   for (std::uint32_t i = 0; i < method.request.size(); ++i) {
-    const stage::ColumnInfo& column = method.request[i];
-    if (column.rows_index == stage::kScalar) continue;
+    if (method.request[i].rows_index == stage::kScalar) continue;
     call->add_kept(i + 1);
-    if (column.type == stage::ElementType::kF64) bare.f64(column.name).clear();
-    if (column.type == stage::ElementType::kU32) bare.u32(column.name).clear();
-    if (column.type == stage::ElementType::kU64) bare.u64(column.name).clear();
+    set_count(&bare, i, 0);
   }
   return bare;
 }
@@ -331,21 +328,20 @@ std::string judge_kept(AbusedWorker* worker, const Question& question) {
   const std::string unsent = worker->abuse("columns kept that were never sent", worker->bytes(bare, &call), call);
   if (!unsent.empty()) return unsent;
 
-  talk.open(question.method);
-  talk.ask(question, question.request);
-  call.set_sequence(talk.next_call(question, question.request).sequence());
-  talk.send(worker->bytes(bare, &call));
-  const StreamReply reply = talk.receive(question, call);
+  const auto ask_after_good = [&] {
+    talk.open(question.method);
+    talk.ask(question, question.request);
+    call.set_sequence(talk.next_call(question, question.request).sequence());
+    talk.send(worker->bytes(bare, &call));
+    return talk.receive(question, call);
+  };
+  const StreamReply reply = ask_after_good();
   if (!reply.came) return reply_text(reply);
   const std::string differs = difference(question.method, worker->good(), reply.answer);
   if (!differs.empty()) return "with columns kept from the request before: " + differs;
 
-  talk.open(question.method);
-  talk.ask(question, question.request);
-  call.set_sequence(talk.next_call(question, question.request).sequence());
   call.set_digest(call.digest() ^ 1);
-  talk.send(worker->bytes(bare, &call));
-  if (const StreamReply wrong = talk.receive(question, call); wrong.came && wrong.answer.status == GRAVITAS_OK)
+  if (const StreamReply wrong = ask_after_good(); wrong.came && wrong.answer.status == GRAVITAS_OK)
     return "columns kept that are not those of the digest are answered with OK";
   return worker->after("columns kept with a wrong digest");
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/iterator/counting_iterator.hpp>
 #include <cctype>
 #include <stdexcept>
 
@@ -79,14 +80,8 @@ class Impulses {
   Vector3 of(const Contact& contact) const {
     const auto identity = [&](std::size_t i) { return std::array{body_[2 * i], body_[2 * i + 1], feature_[i]}; };
     const std::array wanted{contact.a, contact.b, contact.feature};
-    std::size_t found = 0;
-    for (std::size_t end = feature_.size(); found < end;) {
-      const std::size_t middle = (found + end) / 2;
-      if (identity(middle) < wanted)
-        found = middle + 1;
-      else
-        end = middle;
-    }
+    const boost::counting_iterator<std::size_t> begin(0), end(feature_.size());
+    const std::size_t found = *std::partition_point(begin, end, [&](std::size_t i) { return identity(i) < wanted; });
     if (found == feature_.size() || identity(found) != wanted) return Vector3::Zero();
     return vector_at(impulse_, found);
   }

@@ -15,9 +15,8 @@ import tempfile
 from pathlib import Path
 
 import numpy
-from ladders import Rung, order_of, panel, save
+from ladders import Rung, order_of, panels, write_csv
 from solver_ladders import FLOOR, G, GRAVITY, MOST_SECONDS, body, ground, run, scene, shape, vector
-from tabulate import plt
 
 LADDER = [1 / 8 / 2**k for k in range(10)]
 METHODS = {
@@ -149,17 +148,6 @@ def table(rows):
     return "\n".join(lines) + "\n"
 
 
-def draw(rows, path):
-    figure, axes = plt.subplots(1, len(PROBLEMS), figsize=(5 * len(PROBLEMS), 4.5), layout="constrained")
-    for axis, problem in zip(axes, PROBLEMS):
-        panel(axis, {method: rows[problem, method] for method in METHODS}, (1, 2))
-        axis.set_title(problem)
-        axis.set_xlabel("error (hollow: failed)")
-    axes[0].set_ylabel("s of time per simulated s")
-    axes[0].legend(fontsize=6)
-    save(figure, path)
-
-
 def main():
     gravitas, folder = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
     rows = {}
@@ -173,14 +161,12 @@ def main():
                     rung = Rung(f"{step:.2g}", math.inf, 0.0, "not tried") if is_hopeless else measure(gravitas, Path(scratch), problem, method, step)
                     rungs.append(rung)
                     print(problem, method, rung.label, "s", rung.failed or f"{rung.error:.1e}", file=sys.stderr)
-    with open(folder / "impacts.csv", "w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(["problem", "method", "time_step", "error", "s_per_simulated_s", "failed"])
-        for (problem, method), rungs in rows.items():
-            for step, rung in zip(LADDER, rungs):
-                out.writerow([problem, method, repr(step), rung.error, rung.work, rung.failed])
+    write_csv(folder / "impacts.csv", ["problem", "method", "time_step", "error", "s_per_simulated_s", "failed"],
+              [[problem, method, repr(step), rung.error, rung.work, rung.failed]
+               for (problem, method), rungs in rows.items() for step, rung in zip(LADDER, rungs)])
     (folder / "IMPACTS.md").write_text(table(rows))
-    draw(rows, folder / "impacts.svg")
+    panels(PROBLEMS, lambda problem: {method: rows[problem, method] for method in METHODS}, folder / "impacts.svg",
+           slopes=(1, 2), figsize=(5 * len(PROBLEMS), 4.5))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """Draws error against work: what ladders of settings reach. solver_ladders.py and motion_ladders.py climb them."""
+import csv
 import math
 from dataclasses import dataclass
 
@@ -42,6 +43,25 @@ def panel(axis, curves, slopes=()):
         guides(axis, slopes, (1e-1, min(works) * 0.4))
     axis.set_xlim(FINEST * 0.3, WORST * 3)
     axis.grid(True, alpha=0.3)
+
+
+def panels(problems, curves, path, slopes=(), **figure_options):
+    """A panel a problem; curves(problem): those of panel()."""
+    figure, axes = plt.subplots(1, len(problems), layout="constrained", **figure_options)
+    for axis, problem in zip(axes, problems):
+        panel(axis, curves(problem), slopes)
+        axis.set_title(problem)
+        axis.set_xlabel("error (hollow: failed)")
+    axes[0].set_ylabel("s of time per simulated s")
+    axes[0].legend(fontsize=6)
+    save(figure, path)
+
+
+def write_csv(path, head, rows):
+    with open(path, "w", newline="") as file:
+        out = csv.writer(file, lineterminator="\n")
+        out.writerow(head)
+        out.writerows(rows)
 
 
 def save(figure, path):

@@ -1,7 +1,8 @@
 """Error against work of the integrators on five problems of motion, as table, CSV and drawing; and where they are stable.
 
-    motion_ladders.py TEST_NUMERICS FOLDER      writes FOLDER/MOTION.md, motion.csv, motion.svg, stability.csv, stability.svg
-    motion_ladders.py - FOLDER                  draws again from FOLDER's CSV
+    motion_ladders.py TEST_NUMERICS CELLS FOLDER    writes CELLS/motion.csv, stability.csv: every run and cell;
+                                                    FOLDER/MOTION.md, motion.csv, motion.svg, stability.svg
+    motion_ladders.py - CELLS FOLDER                the same from the CSV of CELLS
 
 The runs are those of tests/numerics/ladders_test.cc, the map that of tests/numerics/stability_test.cc.
 """
@@ -9,6 +10,7 @@ import csv
 import math
 import os
 import platform
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -130,8 +132,8 @@ def limits(methods):
     lines = ["", "## Stability", "", "![map of stability](stability.svg)", "",
              "A damped spring: growth in a step, measured on the engine for 1 kg (colour) and for the stiffest mode of eight point",
              "masses on 28 springs (dots, full where stable), against the limit of the theory (line). Adaptive methods: one whole",
-             "step; with their error control they shorten it. All cells stand in `stability.csv`. Limit: smallest k h²/m that is",
-             "not stable; agreement: cells of the mass that theory and engine call the same.", "",
+             "step; with their error control they shorten it. `deploy/bench` leaves all cells in `build/ladders/stability.csv`.",
+             "Limit: smallest k h²/m that is not stable; agreement: cells of the mass that theory and engine call the same.", "",
              "| integrator | limit undamped | zeta 0.1 | zeta 1 | cells that agree |", "| --- | --- | --- | --- | --- |"]
     for method, worlds in methods.items():
         cells = worlds["mass"]
@@ -147,11 +149,13 @@ def limits(methods):
 
 
 def main():
-    folder = Path(sys.argv[2])
+    cells, folder = Path(sys.argv[2]), Path(sys.argv[3])
     if sys.argv[1] != "-":
-        environment = dict(os.environ, GRAVITAS_TABLES=str(folder))
+        cells.mkdir(parents=True, exist_ok=True)
+        environment = dict(os.environ, GRAVITAS_TABLES=str(cells))
         subprocess.run([sys.argv[1], "--gtest_brief=1", "--gtest_filter=Ladders.*:Stability.*"], env=environment, check=True)
-    problems, methods = climbed(folder / "motion.csv"), mapped(folder / "stability.csv")
+    shutil.copy(cells / "motion.csv", folder)
+    problems, methods = climbed(cells / "motion.csv"), mapped(cells / "stability.csv")
     draw(problems, folder / "motion.svg")
     draw_stability(methods, folder / "stability.svg")
     (folder / "MOTION.md").write_text("\n".join(tables(problems) + limits(methods)) + "\n")

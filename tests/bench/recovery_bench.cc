@@ -120,37 +120,18 @@ void checkpoints(benchmark::State& state) {
   state.counters["percent"] = 100.0 * std::chrono::duration<double>(timed.took) / (Clock::now() - start);
 }
 
-// Each is a median of many already: once is enough.
-BENCHMARK_CAPTURE(recovery, kill, Hosting::kSharedMemory, "kill")
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(recovery, segv, Hosting::kSharedMemory, "segv")
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(recovery, abort, Hosting::kSharedMemory, "abort")
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(recovery, hang, Hosting::kSharedMemory, "hang")
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(recovery, nan, Hosting::kSharedMemory, "nan")
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(recovery, kill_grpc, Hosting::kGrpc, "kill")
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(swap_pause, direct, Hosting::kDirect)->Iterations(1)->Repetitions(1)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(swap_pause, shm, Hosting::kSharedMemory)
-    ->Iterations(1)
-    ->Repetitions(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(swap_pause, grpc, Hosting::kGrpc)->Iterations(1)->Repetitions(1)->Unit(benchmark::kMillisecond);
+// Each is a median of many already.
+void once(benchmark::internal::Benchmark* row) { row->Iterations(1)->Repetitions(1)->Unit(benchmark::kMillisecond); }
+
+BENCHMARK_CAPTURE(recovery, kill, Hosting::kSharedMemory, "kill")->Apply(once);
+BENCHMARK_CAPTURE(recovery, segv, Hosting::kSharedMemory, "segv")->Apply(once);
+BENCHMARK_CAPTURE(recovery, abort, Hosting::kSharedMemory, "abort")->Apply(once);
+BENCHMARK_CAPTURE(recovery, hang, Hosting::kSharedMemory, "hang")->Apply(once);
+BENCHMARK_CAPTURE(recovery, nan, Hosting::kSharedMemory, "nan")->Apply(once);
+BENCHMARK_CAPTURE(recovery, kill_grpc, Hosting::kGrpc, "kill")->Apply(once);
+BENCHMARK_CAPTURE(swap_pause, direct, Hosting::kDirect)->Apply(once);
+BENCHMARK_CAPTURE(swap_pause, shm, Hosting::kSharedMemory)->Apply(once);
+BENCHMARK_CAPTURE(swap_pause, grpc, Hosting::kGrpc)->Apply(once);
 BENCHMARK(checkpoints)->UseRealTime()->Iterations(200)->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -16,8 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from ladders import Rung, panel, save
-from tabulate import plt
+from ladders import Rung, panels, write_csv
 
 G = 9.81
 GRAVITY = 'Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = %s } }'
@@ -264,17 +263,6 @@ def curves(rows, problem):
     return drawn
 
 
-def draw(rows, path):
-    figure, axes = plt.subplots(1, len(PROBLEMS), figsize=(4 * len(PROBLEMS), 4), sharey=True, layout="constrained")
-    for axis, problem in zip(axes, PROBLEMS):
-        panel(axis, curves(rows, problem))
-        axis.set_title(problem)
-        axis.set_xlabel("error (hollow: failed)")
-    axes[0].set_ylabel("s of time per simulated s")
-    axes[0].legend(fontsize=7)
-    save(figure, path)
-
-
 def main():
     gravitas, folder = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
     rows = {}
@@ -286,13 +274,12 @@ def main():
                     if key not in rows:
                         rows[key] = measure(gravitas, Path(scratch), problem, solver, step, sweeps)
                         print(problem, solver, f"{step:.3g} s", sweeps or "", shown(rows[key]), file=sys.stderr)
-    with open(folder / "solvers.csv", "w", newline="") as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(["problem", "solver", "time_step", "iterations", "error", "us_per_simulated_second", "steps", "failed"])
-        for (problem, solver, step, sweeps), run in rows.items():
-            out.writerow([problem, solver, repr(step), sweeps or "default", run["error"], run["us_per_second"], run["steps"], run["failed"]])
+    write_csv(folder / "solvers.csv",
+              ["problem", "solver", "time_step", "iterations", "error", "us_per_simulated_second", "steps", "failed"],
+              [[problem, solver, repr(step), sweeps or "default", run["error"], run["us_per_second"], run["steps"], run["failed"]]
+               for (problem, solver, step, sweeps), run in rows.items()])
     (folder / "SOLVERS.md").write_text(table(rows))
-    draw(rows, folder / "solvers.svg")
+    panels(PROBLEMS, lambda problem: curves(rows, problem), folder / "solvers.svg", figsize=(4 * len(PROBLEMS), 4), sharey=True)
 
 
 if __name__ == "__main__":

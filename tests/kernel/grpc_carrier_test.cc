@@ -8,8 +8,10 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
@@ -190,6 +192,42 @@ TEST(GrpcCarrier, AListeningWorkerTakesTheAssetsOfEveryKernel) {
   builder.description().collision.plugins[0].address = worker.address();
   EXPECT_EQ(chain_by_grpc_of(builder), direct);
   EXPECT_EQ(chain_by_grpc_of(builder), direct);
+}
+
+// Of 20, 100 and 3000 bodies: columns of less than 1 KiB, which always go, and of more than 64 KiB. Whatever a stream
+// carried before, the answer is that of a worker who is asked for the first time.
+TEST(GrpcCarrier, ColumnsThatAreKeptAreThoseOfTheRequestBefore) {
+  using Request = stage::IntegratorIntegrateRequest;
+  const std::unique_ptr<kernel::Carrier> carrier = start_worker(Hosting::kGrpc, "integrator_euler", 2.0);
+  const auto ask_both = [&](harness::Integration* call, const std::string& when) {
+    SCOPED_TRACE(when);
+    const kernel::CallResult result = call->make(carrier.get());
+    const std::vector<std::vector<std::byte>> answers = call->answers();
+    const kernel::CallResult first = call->make(start_worker(Hosting::kGrpc, "integrator_euler", 2.0).get());
+    EXPECT_EQ(result.status, first.status);
+    EXPECT_EQ(result.text, first.text);
+    if (first.status == GRAVITAS_OK) {
+      EXPECT_EQ(answers, call->answers());
+    }
+    return result.status;
+  };
+  for (const std::uint32_t bodies : {20U, 100U, 3000U, 100U, 20U, 3000U}) {
+    harness::Integration call(bodies);
+    double* velocity = call.f64(Request::kLinearVelocity);
+    const std::string count = std::to_string(bodies) + " bodies, ";
+    const double was = velocity[30];
+    EXPECT_EQ(ask_both(&call, count + "at first"), GRAVITAS_OK);
+    EXPECT_EQ(ask_both(&call, count + "the same again"), GRAVITAS_OK);
+    velocity[30] = 77.0;
+    EXPECT_EQ(ask_both(&call, count + "one column changed"), GRAVITAS_OK);
+    velocity[30] = was;
+    EXPECT_EQ(ask_both(&call, count + "changed back"), GRAVITAS_OK);
+    velocity[30] = std::numeric_limits<double>::infinity();
+    EXPECT_NE(ask_both(&call, count + "refused"), GRAVITAS_OK);
+    EXPECT_NE(ask_both(&call, count + "refused again"), GRAVITAS_OK);
+    velocity[30] = was;
+    EXPECT_EQ(ask_both(&call, count + "after the refusal"), GRAVITAS_OK);
+  }
 }
 
 // Takes three of the asker's deadlines to answer.

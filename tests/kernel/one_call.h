@@ -72,16 +72,16 @@ class OneCall {
   stage::Method method_;
 };
 
-// Three bodies on their way, each number of the answer another one and none of them zero.
+// Bodies on their way, each number of the answer another one and none of them zero.
 class Integration : public OneCall {
  public:
   using Reply = stage::IntegratorIntegrateReply;
 
-  Integration() : OneCall(stage::Method::kIntegratorIntegrate, 3) {
+  explicit Integration(std::uint32_t bodies = 3) : OneCall(stage::Method::kIntegratorIntegrate, bodies) {
     using Request = stage::IntegratorIntegrateRequest;
     *f64(Request::kTimeStep) = 0.01;
     *u32(Request::kWrenchIsConstant) = 1;
-    for (std::uint32_t body = 0; body < 3; ++body) {
+    for (std::uint32_t body = 0; body < bodies; ++body) {
       u32(Request::kFlags)[body] = kMovable;
       f64(Request::kInverseMass)[body] = 1.0;
       for (const std::uint32_t column : {Request::kInertia, Request::kInverseInertia})

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <numbers>
 
 #include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
@@ -79,6 +80,14 @@ TEST(AngularAcceleration, DoesNotTurnWhatCannotBeTurned) {
   EXPECT_EQ(angular_acceleration(Quaternion::Identity(), Vector3(1, 2, 3), Vector3::Zero(), Vector3::Zero(),
                                  Vector3(4, 5, 6)),
             Vector3::Zero());
+}
+
+// Its z axis, which points along -y of the world, is locked.
+TEST(AngularAcceleration, KeepsALockedAxisOfABall) {
+  const Quaternion turned = exp_rotation(Vector3(std::numbers::pi / 2, 0, 0));
+  const Vector3 acceleration =
+      angular_acceleration(turned, Vector3(4, 5, 6), Vector3::Ones(), Vector3(1, 1, 0), Vector3(1, 2, 3));
+  EXPECT_LT((acceleration - Vector3(1, 0, 3)).norm(), 1e-15);
 }
 
 // ---- displacement -------------------------------------------------------------------------------

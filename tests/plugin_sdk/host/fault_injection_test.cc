@@ -105,10 +105,9 @@ struct Message {
     outcome.set_sequence(kSequence);
     outcome.set_digest(wire::columns_digest(kMethod.reply, {&column, 1}));
     columns_size = wire::columns_size(kMethod.reply, {&column, 1});
-    wire::MessageRooms rooms;
-    const grpc::ByteBuffer buffer = rooms.write({kMethod.reply, {&column, 1}, &outcome});
-    const std::span<const std::byte> flat = rooms.read(buffer);
-    bytes.assign(reinterpret_cast<const char*>(flat.data()), flat.size());
+    const grpc::ByteBuffer buffer = wire::to_byte_buffer({kMethod.reply, {&column, 1}, &outcome});
+    const wire::FlatMessage flat(buffer);
+    bytes.assign(reinterpret_cast<const char*>(flat.bytes().data()), flat.bytes().size());
   }
   void spoil(const std::string& order) { fault(order).spoil_message(&bytes, columns_size); }
   bool is_accepted() const {

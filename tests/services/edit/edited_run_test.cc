@@ -216,6 +216,8 @@ TEST(EditedRun, CollisionsEndWithWhoIsRemovedOrMoved) {
   EXPECT_EQ(events("remove Body.A@step=41"), Counts(2, 1));
   EXPECT_EQ(events("set Body.A.Position={5,0.1,0}@step=41"), Counts(3, 1));
   EXPECT_EQ(events("set Body.A.Mass=3@step=41"), Counts(2, 0));
+  EXPECT_EQ(events("set Body.A.Immovable=true@step=41"), Counts(2, 1));
+  EXPECT_EQ(events("set Geometry.Unit.Radius=0.11@step=41"), Counts(4, 2));
 }
 
 // A body that is fixed stays where it is then.
