@@ -29,7 +29,7 @@ StepOutcome Environment::step() {
   const std::uint64_t start = lap_ns_ = channel::now_ns();
   const CommitFigures figures = figures_;
   try {
-    find_sleepers();
+    if (!is_idle_ || !wake_orders_.empty()) find_sleepers();
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
     finish_step();
@@ -113,7 +113,8 @@ void Environment::finish_step() {
   const std::uint64_t start = lap_ns_;
   ++step_count_;
   settle();
-  if (inner_ > 0) state_hash_ = kernel::state_hash(front());
+  is_idle_ = inner_ == 0;
+  if (!is_idle_) state_hash_ = kernel::state_hash(front());
   inner_ = 0;
   chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
   lap_ns_ = channel::now_ns();

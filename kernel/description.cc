@@ -76,6 +76,9 @@ std::string EnvironmentDescription::validate() const {
     if (!std::isfinite(number) || number < 0.0) return "the table of material pairs has an impossible number";
   for (const ForceDescription& one : forces)
     if (one.plugin >= force.plugins.size()) return "force '" + one.id + "': no plugin serves its type";
+  for (std::size_t i = 0; i < switches.size(); ++i)
+    if (!std::isfinite(switches[i]) || (i > 0 && !(switches[i] > switches[i - 1])))
+      return "times of switches must rise";
   for (const BodyDescription& body : bodies)
     if (std::string problem = validate_body(*this, body); !problem.empty()) return problem;
   for (const ConstraintDescription& joint : constraints)

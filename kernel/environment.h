@@ -153,6 +153,11 @@ class Environment : private DerivativeSource, private SlotObserver {
  private:
   // simulators/: what a step is made of, and the order of the stages.
   void make_inner_steps();
+  void make_inner_step(double begin, double length);
+  // What is left of a length before a force jumps; sets the times between which forces are asked.
+  double length_to_switch(double begin, double length);
+  // Inner steps begin some time after S_n, in front() what the one before has made of it.
+  void begin_inner_step(double begin, double length);
   // Nothing where somebody asleep is woken: the step starts again.
   std::optional<Trusted<Solution>> react(const Trusted<TrialState>& trial, bool has_found_contacts = false);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
@@ -184,8 +189,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
 
-  // stages.cc: a stage each. Inner steps begin some time after S_n, in front() what the one before has made of it.
-  void begin_inner_step(double begin, double length);
+  // stages.cc: a stage each.
   Trusted<TrialState> integrate();
   Bounds trial_bounds(std::uint32_t body) const;
   // Kinematic bodies with a motion are where it says, whatever an integrator makes of them.
@@ -297,6 +301,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
   std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
+  double asked_from_ = 0.0, asked_until_ = 0.0;   // times of forces, clear of jumps at its ends
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::optional<Trusted<Pairs>> pairs_;           // the last
   double margin_ = 0.0;
@@ -304,6 +309,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   Activity activity_;
   std::uint32_t sleepers_ = 0;               // in this step
   bool wakes_all_ = false;                   // with the next step
+  bool is_idle_ = false;                     // nothing moved in the last step, and nothing has come up since
   std::vector<std::uint32_t> wake_orders_;   // of the user
   std::vector<std::uint32_t> pushed_;        // asleep, under another force than before
   std::vector<std::uint32_t> joint_bodies_;  // scratch of connections()

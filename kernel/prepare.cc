@@ -32,7 +32,8 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       trial_columns_(ids(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
                          data_.derivative_linear_velocity, data_.derivative_angular_velocity)) {
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
-  const bool has_inner_steps = description_.simulator >= Simulator::kBisection || description_.substeps > 1;
+  const bool has_inner_steps =
+      description_.simulator >= Simulator::kBisection || description_.substeps > 1 || !description_.switches.empty();
   for (int i = 0; i < (has_inner_steps ? 3 : 2); ++i) states_.emplace_back(&arena_, description_);
   arena_.seal();
   model_.write(description_);

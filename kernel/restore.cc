@@ -158,7 +158,7 @@ std::string Environment::restore(const SavedState& saved) {
     return problem;
   }
   std::swap(front_, back_);
-  wakes_all_ = false;
+  wakes_all_ = is_idle_ = false;
   step_count_ = saved.step;
   figures_ = saved.figures;
   state_hash_ = saved.state_hash;

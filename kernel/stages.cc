@@ -4,7 +4,6 @@
 #include "kernel/environment.h"
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/contact_key.h"
-#include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/motion.h"
 #include "plugin_sdk/solver.h"
 
@@ -53,31 +52,6 @@ const Column<double>& Environment::start_linear_velocity() const {
 
 const Column<double>& Environment::start_angular_velocity() const {
   return has_impulses_ && step_count_ + inner_ == 0 ? data_.start_angular_velocity : front().angular_velocity;
-}
-
-void Environment::begin_inner_step(double begin, double length) {
-  validator_.begin_step(step_count_ + 1);
-  data_.time[0] = time() + begin;
-  data_.time_step[0] = length;
-  inner_end_ = begin + length;
-  data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
-  start_wrench_known_ = false;
-  if (!wrench_is_constant_) {
-    // no trace of earlier steps: a step must be the same after a restore
-    std::ranges::fill(data_.wrench.span(), 0.0);
-    std::ranges::fill(data_.start_wrench.span(), 0.0);
-  }
-  if (!has_impulses_ || step_count_ + inner_ != 0) return;
-  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    const double* impulse = &data_.impulse[6 * i];
-    const Twist twist =
-        after_impulse({vector_at(front().linear_velocity.span(), i), vector_at(front().angular_velocity.span(), i)},
-                      quaternion_at(front().orientation.span(), i), model_.inverse_mass[i],
-                      vector_at(model_.inverse_inertia.span(), i), Vector3(impulse[0], impulse[1], impulse[2]),
-                      Vector3(impulse[3], impulse[4], impulse[5]));
-    set_vector(data_.start_linear_velocity.span(), i, twist.linear);
-    set_vector(data_.start_angular_velocity.span(), i, twist.angular);
-  }
 }
 
 Trusted<TrialState> Environment::integrate() {

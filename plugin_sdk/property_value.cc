@@ -284,6 +284,18 @@ std::size_t flat_size_of(const Property& declared, std::span<const double> numbe
   return size <= numbers.size() ? size : 0;
 }
 
+std::vector<double> jumps_of(const std::vector<Property>& declared, std::span<const double> numbers) {
+  std::vector<double> jumps;
+  for (const Property& p : declared) {
+    const std::size_t size = flat_size_of(p, numbers);
+    if (p.kind == PropertyKind::kTable && p.unit.starts_with("s,"))
+      for (std::size_t row = 1 + p.columns; row < size; row += p.columns)
+        if (numbers[row] == numbers[row - p.columns]) jumps.push_back(numbers[row]);
+    numbers = numbers.subspan(size);
+  }
+  return jumps;
+}
+
 std::string check_flattened(const std::vector<Property>& declared, std::span<const double> numbers) {
   for (const Property& p : declared) {
     std::size_t size = p.flat_size(), first = 0;

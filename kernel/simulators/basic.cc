@@ -4,26 +4,78 @@
 //   S_n -> integrate (asks for forces): S* -> bounds -> broad phase -> narrow phase at S*
 //       -> constrain -> solve -> commit S_{n+1} -> events
 //
-// A committed step is made of one or more inner steps: `Substeps` equal ones, and whatever a simulator makes of each.
+// A committed step is made of one or more inner steps: `Substeps` equal ones, cut where a force jumps, and whatever a
+// simulator makes of each. What is asked at the end of a step that a jump ends is asked before it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "kernel/environment.h"
+#include "plugin_sdk/dynamics.h"
 
 namespace gravitas::kernel {
+namespace {
+
+constexpr double kSameTime = 1e-9;  // of the step
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+}  // namespace
 
 void Environment::make_inner_steps() {
   if (!does_anything_move()) return;
   const double length = length_of_step(step_count_ + 1) / description_.substeps;
-  for (std::uint32_t i = 0; i < description_.substeps && !must_restart_; ++i) {
-    if (locates_events()) {
-      locate_events(i * length, length);
-    } else {
-      begin_inner_step(i * length, length);
-      const auto trial = integrate();
-      if (has_reactions()) {
-        if (const auto solution = react(trial)) commit_solution(*solution);
-      } else {
-        commit_trial(trial);
-      }
+  for (std::uint32_t i = 0; i < description_.substeps; ++i) {
+    for (double done = 0.0; done < length && !must_restart_;) {
+      const double left = length - done, part = length_to_switch(i * length + done, left);
+      make_inner_step(i * length + done, part);
+      done = part == left ? length : done + part;
     }
+  }
+}
+
+double Environment::length_to_switch(double begin, double length) {
+  const std::vector<double>& switches = description_.switches;
+  const double from = time() + begin, slack = kSameTime * length_of_step(step_count_ + 1);
+  const auto next = std::ranges::upper_bound(switches, from + slack);
+  asked_from_ = next == switches.begin() ? -kInfinity : *std::prev(next);
+  asked_until_ = kInfinity;
+  // a history from before the jump says nothing about what comes
+  if (asked_from_ >= from - slack) std::ranges::fill(front().state_changed.span(), 1U);
+  if (next == switches.end() || *next > from + length + slack) return length;
+  asked_until_ = std::nextafter(*next, -kInfinity);
+  return *next < from + length - slack ? *next - from : length;
+}
+
+void Environment::make_inner_step(double begin, double length) {
+  if (locates_events()) return locate_events(begin, length);
+  begin_inner_step(begin, length);
+  const auto trial = integrate();
+  if (!has_reactions()) return commit_trial(trial);
+  if (const auto solution = react(trial)) commit_solution(*solution);
+}
+
+void Environment::begin_inner_step(double begin, double length) {
+  validator_.begin_step(step_count_ + 1);
+  data_.time[0] = time() + begin;
+  data_.time_step[0] = length;
+  inner_end_ = begin + length;
+  data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
+  start_wrench_known_ = false;
+  if (!wrench_is_constant_) {
+    // no trace of earlier steps: a step must be the same after a restore
+    std::ranges::fill(data_.wrench.span(), 0.0);
+    std::ranges::fill(data_.start_wrench.span(), 0.0);
+  }
+  if (!has_impulses_ || step_count_ + inner_ != 0) return;
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    const double* impulse = &data_.impulse[6 * i];
+    const Twist twist =
+        after_impulse({vector_at(front().linear_velocity.span(), i), vector_at(front().angular_velocity.span(), i)},
+                      quaternion_at(front().orientation.span(), i), model_.inverse_mass[i],
+                      vector_at(model_.inverse_inertia.span(), i), Vector3(impulse[0], impulse[1], impulse[2]),
+                      Vector3(impulse[3], impulse[4], impulse[5]));
+    set_vector(data_.start_linear_velocity.span(), i, twist.linear);
+    set_vector(data_.start_angular_velocity.span(), i, twist.angular);
   }
 }
 

@@ -24,6 +24,7 @@ void Environment::remember_wrenches() {
 }
 
 void Environment::find_sleepers() {
+  is_idle_ = false;
   sleepers_ = 0;
   if (!can_sleep()) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
@@ -45,7 +46,7 @@ void Environment::let_sleep(std::uint32_t body, bool sleeps) {
 
 bool Environment::does_anything_move() const {
   if (sleepers_ == 0 || !wrench_is_constant_ || !model_.curves.empty()) return model_.body_count > 0;
-  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+  for (std::uint32_t i = 0; i < model_.body_count && !is_idle_; ++i) {
     if (is_awake(i)) return true;
     if ((model_.flags[i] & kKinematic) != 0 && (!vector_at(front().linear_velocity.span(), i).isZero(0.0) ||
                                                 !vector_at(front().angular_velocity.span(), i).isZero(0.0)))

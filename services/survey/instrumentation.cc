@@ -161,6 +161,13 @@ void Instrumentation::add_contacts(const kernel::Environment& environment, bool 
     frame->add_missing("reaction: this simulator makes inner steps of any length, and keeps the impulses of the last");
     shows_reactions = false;
   }
+  const auto has_jumped = [&](double jump) {
+    return jump > environment.time() - environment.time_step() && jump <= environment.time();
+  };
+  if (shows_reactions && std::ranges::any_of(surveyor_.description().switches, has_jumped)) {
+    frame->add_missing("reaction: a force has jumped within the step, which was made in parts");
+    shows_reactions = false;
+  }
   if (!shows_contacts && !shows_reactions) return;
   const std::vector<Contact> contacts = surveyor_.contacts(environment);
   const Impulses impulses(environment);

@@ -124,6 +124,23 @@ TEST(PropertyValue, FlattensTablesWithTheirRowCount) {
   EXPECT_FALSE(take(table, PropertyValue::of(Values{PropertyValue::of("x")})).good);
 }
 
+TEST(PropertyValue, ATableOverTimeJumpsWhereATimeComesTwice) {
+  const std::vector<Property> declared = {Property::vector("Point", "m", "body"),
+                                          Property::table("T", 2, "s,N", "world"),
+                                          Property::table("Way", 2, "m,N", "world"), Property::flag("On")};
+  const auto jumps = [&](std::vector<double> table) {
+    std::vector<double> numbers = {1, 1, 1, static_cast<double>(table.size() / 2)};
+    numbers.insert(numbers.end(), table.begin(), table.end());
+    numbers.insert(numbers.end(), {2, 3, 4, 3, 5, 0});  // the other table is not over time
+    return jumps_of(declared, numbers);
+  };
+  EXPECT_EQ(jumps({}), std::vector<double>());
+  EXPECT_EQ(jumps({0, 1, 1, 1, 1.5, 1}), std::vector<double>());
+  EXPECT_EQ(jumps({0, 1, 1, 1, 1, 2, 3, 2, 3, 4}), (std::vector<double>{1, 3}));
+  // what is not whole says nothing
+  EXPECT_EQ(jumps_of(declared, std::vector<double>{1, 1, 1, 5, 0}), std::vector<double>());
+}
+
 TEST(Flatten, FollowsTheOrderOfDeclaration) {
   const std::vector<Property> declared = {
       Property::number("Stiffness", "N/m").required(), Property::number("Damping", "N*s/m").defaults_to({0.25}),

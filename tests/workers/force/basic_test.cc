@@ -122,11 +122,22 @@ TEST_F(BasicForce, ATableActsAtThePointAndInTheAxesOfTheForce) {
 }
 
 TEST_F(BasicForce, RefusesATableWhoseTimesDoNotAscend) {
-  for (const double second : {1.0, 0.5}) {
-    const BasicProperties properties = {.table = {1, 0, 0, 0, second, 1, 0, 0}};
+  const auto refusal = [&](std::vector<double> table) {
+    const BasicProperties properties = {.table = std::move(table)};
     const ForceProblem problem{0.0, {type_id("Basic")}, {properties.flat()}, {ForcedBody{}}, {0, 0}};
-    EXPECT_EQ(force_.refusal(stage::Method::kForceWrenches, problem.request()), "Table: times must ascend");
-  }
+    return force_.refusal(stage::Method::kForceWrenches, problem.request());
+  };
+  EXPECT_EQ(refusal({1, 0, 0, 0, 0.5, 1, 0, 0}), "Table: times must ascend");
+  EXPECT_EQ(refusal({1, 0, 0, 0, 1, 1, 0, 0, 1, 2, 0, 0}), "Table: more than two rows of one time");
+}
+
+TEST_F(BasicForce, ATableJumpsWhereTwoRowsHaveOneTime) {
+  const BasicProperties properties = {.table = {0, 0, 0, 0, 1, 2, 0, 0, 1, 5, 0, 0, 2, 7, 0, 0}};
+  const auto at = [&](double time) { return ask(properties, {}, time).wrench.force.x(); };
+  EXPECT_EQ(at(0.5), 1.0);
+  EXPECT_EQ(at(std::nextafter(1.0, 0.0)), std::nextafter(2.0, 0.0));
+  EXPECT_EQ(at(1.0), 5.0);
+  EXPECT_EQ(at(1.5), 6.0);
 }
 
 // ---- impulses -----------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ Parameters read(PropertyCursor cursor) {
   return p;
 }
 
-// Linear between the rows of the table, constant outside it.
+// Linear between the rows of the table, constant outside it; at a jump what comes after.
 Vector3 force_at(const Parameters& p, double time) {
   const std::size_t rows = p.table.size() / 4;
   if (rows == 0) return p.force;
@@ -54,30 +54,31 @@ Vector3 force_at(const Parameters& p, double time) {
 class BasicForce final : public ForcePlugin {
  public:
   static PluginDeclaration declaration() {
-    return {
-        .name = "BasicForce",
-        .version = "1.0",
-        .slot = Slot::kForce,
-        .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
-        .types = {{"Basic",
-                   "A given force at a point of the body.",
-                   {Property::vector("Force", "N", "world")
-                        .defaults_to({0, 0, 0})
-                        .means("The force, in N; in N s where Instantaneous is true. Required unless Table is given."),
-                    Property::vector("ApplicationPoint", "m", "geometry")
-                        .defaults_to({0, 0, 0})
-                        .means("Where it acts, in the frame of the body's geometry."),
-                    Property::vector("Torque", "N*m", "world")
-                        .defaults_to({0, 0, 0})
-                        .means("An additional torque (N m s where Instantaneous)."),
-                    Property::choice("Frame", {"World", "Body"})
-                        .defaults_to({0})
-                        .means("Axes in which Force, Torque and Table are given: the world's or the geometry's."),
-                    Property::table("Table", 4, "s,N", "world")
-                        .means("Rows {t, fx, fy, fz}: the force over time, linear between rows; replaces Force."),
-                    Property::flag("Instantaneous")
-                        .defaults_to({0})
-                        .means("The value is an impulse, applied once at the start.")}}}};
+    return {.name = "BasicForce",
+            .version = "1.0",
+            .slot = Slot::kForce,
+            .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
+            .types = {
+                {"Basic",
+                 "A given force at a point of the body.",
+                 {Property::vector("Force", "N", "world")
+                      .defaults_to({0, 0, 0})
+                      .means("The force, in N; in N s where Instantaneous is true. Required unless Table is given."),
+                  Property::vector("ApplicationPoint", "m", "geometry")
+                      .defaults_to({0, 0, 0})
+                      .means("Where it acts, in the frame of the body's geometry."),
+                  Property::vector("Torque", "N*m", "world")
+                      .defaults_to({0, 0, 0})
+                      .means("An additional torque (N m s where Instantaneous)."),
+                  Property::choice("Frame", {"World", "Body"})
+                      .defaults_to({0})
+                      .means("Axes in which Force, Torque and Table are given: the world's or the geometry's."),
+                  Property::table("Table", 4, "s,N", "world")
+                      .means("Rows {t, fx, fy, fz}: the force over time, linear between rows; two rows of one time are "
+                             "a jump, at which steps end. Replaces Force."),
+                  Property::flag("Instantaneous")
+                      .defaults_to({0})
+                      .means("The value is an impulse, applied once at the start.")}}}};
   }
   explicit BasicForce(PropertyCursor) {}
 
@@ -89,8 +90,11 @@ class BasicForce final : public ForcePlugin {
 
  private:
   static ApplicationAnswer answer(const Parameters& p, const stage::ForceWrenchesRequest& request, std::uint32_t body) {
-    for (std::size_t row = 1; row < p.table.size() / 4; ++row)
-      if (!(p.table[4 * row] > p.table[4 * row - 4])) throw Refusal("Table: times must ascend");
+    for (std::size_t row = 1; row < p.table.size() / 4; ++row) {
+      const double time = p.table[4 * row];
+      if (time < p.table[4 * row - 4]) throw Refusal("Table: times must ascend");
+      if (row > 1 && time == p.table[4 * row - 8]) throw Refusal("Table: more than two rows of one time");
+    }
 
     // where the geometry's frame lies in the world
     const Quaternion q_WB = quaternion_at(request.orientation(), body);

@@ -1,0 +1,73 @@
+// Forces that jump at a time, within a step and at its end: what comes before the jump and what comes after do not mix.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::SceneRun;
+using harness::set;
+
+// 8 N on 2 kg from 0.505 s to 0.9 s, the second of which is the end of a step; above `ground`.
+std::string scene(const std::string& ground) {
+  return R"(
+Geometries { Geometry { Type = "Sphere" Id = "Unit" CustomProperties { Radius = 0.1 } }
+             Geometry { Type = "Halfspace" Id = "Flat" } }
+Forces { Force { Type = "Basic" Id = "Push" CustomProperties {
+  Table = {{0, {0, 0, 0}}, {0.505, {0, 0, 0}}, {0.505, {8, 0, 0}}, {0.9, {8, 0, 0}}, {0.9, {0, 0, 0}}} } } }
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1.5 } }
+Environment { Space { Bodies { )" +
+         ground + R"(
+  Body { Id = "Ball" GeometryId = "Unit" Mass = 2 Forces = { "Push" } KineticProperties { Position = {0, 5, 0} } } } } }
+)";
+}
+const std::string kWithoutGround = scene("");
+const std::string kScene = scene("Body { Id = \"Ground\" GeometryId = \"Flat\" Immovable = true }");
+constexpr double kSpeed = 4.0 * 0.395, kWay = 0.5 * 4.0 * 0.395 * 0.395 + kSpeed * 0.6;
+
+// Of sums of 150 terms of size 2.
+constexpr double kRounding = 1e-13;
+
+TEST(SwitchedForce, ActsAsLongAsItIsOnWithEveryIntegrator) {
+  for (const std::string integrator : {"Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4",
+                                       "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54", "Rosenbrock"}) {
+    SCOPED_TRACE(integrator);
+    SceneRun run(kScene, {set("Integrator", integrator)});
+    run.to_end();
+    const SceneRun::Motion ball = run.body("Ball");
+    // whose velocities are differences of positions
+    const double rounding = integrator == "BasicVerlet" ? kRounding / 0.01 : kRounding;
+    EXPECT_NEAR(ball.twist.linear.x(), kSpeed, rounding);
+    // methods of order 1 are off by a h t/2
+    if (!integrator.ends_with("Euler")) {
+      EXPECT_NEAR(ball.pose.position.x(), kWay, rounding);
+    }
+  }
+}
+
+TEST(SwitchedForce, ActsAsLongAsItIsOnInEverySimulator) {
+  for (const std::string simulator : {"Basic", "Substepping", "Continuous", "Bisection", "Smooth"}) {
+    SCOPED_TRACE(simulator);
+    SceneRun run(simulator == "Smooth" ? kWithoutGround : kScene,
+                 {set("Integrator", std::string("RK4")), set("Simulator.Type", simulator)});
+    run.to_end();
+    EXPECT_EQ(run.step_count(), 150U);
+    EXPECT_NEAR(run.body("Ball").pose.position.x(), kWay, kRounding);
+  }
+}
+
+// The same whatever the step: at 1/7 s no jump is the end of one.
+TEST(SwitchedForce, IsNotSmearedOverLongSteps) {
+  for (const double step : {1.5, 1.0 / 7, 0.015, 1e-3}) {
+    SCOPED_TRACE(step);
+    SceneRun run(kScene, {set("Integrator", std::string("Verlet")), set("Simulator.TimeStep", step)});
+    run.to_end();
+    EXPECT_NEAR(run.body("Ball").pose.position.x(), kWay, 10 * kRounding);
+  }
+}
+
+}  // namespace
+}  // namespace gravitas
