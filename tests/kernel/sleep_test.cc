@@ -236,6 +236,37 @@ TEST(Sleep, AUserWakes) {
   EXPECT_TRUE(world.is_asleep(3));
 }
 
+// Steps in which all sleep look at nobody; what comes up then is seen all the same, and gives the bits of a run that was
+// restored there.
+TEST(Sleep, WhoHasSleptForLongWakesAsWell) {
+  WorldBuilder builder;
+  builder.steps(300, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
+  may_sleep(&builder).gravity(kDown);
+  Environment world(builder.description());
+  run(&world, kAsleepBy + 50);
+  ASSERT_TRUE(world.is_asleep(1));
+  Environment restored(builder.description());
+  ASSERT_EQ(restored.restore(world.saved_state()), "");
+  for (Environment* one : {&world, &restored}) {
+    one->wake(1);
+    EXPECT_EQ(one->step(), StepOutcome::kCommitted);
+    EXPECT_FALSE(one->is_asleep(1));
+    run(one, 100);
+    EXPECT_TRUE(one->is_asleep(1));
+  }
+  EXPECT_EQ(world.chain_hash(), restored.chain_hash());
+
+  kernel::SwapOrder order;
+  order.slot = Slot::kSolver;
+  WorldBuilder other;
+  other.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 100});
+  order.plugin = other.description().solver.plugins[0];
+  order.step = world.step_count() + 1;
+  world.order_swap(order);
+  run(&world, 1);
+  EXPECT_FALSE(world.is_asleep(1));
+}
+
 TEST(Sleep, AnotherPluginWakesAll) {
   Environment world(boxes_and_ball().description());
   run(&world, kAsleepBy);
