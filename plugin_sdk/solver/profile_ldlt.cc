@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace gravitas {
 namespace {
 
 constexpr double kDependent = 1e-12;
+constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();  // of a diagonal, in its pivot
 
 double dot(const double* a, const double* b, std::size_t count) {
   const auto size = static_cast<Eigen::Index>(count);
@@ -23,6 +25,7 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
   for (std::size_t i = 0; i < first.size(); ++i) begin_[i + 1] = begin_[i] + (i - first[i] + 1);
   values_.assign(begin_.back(), 0.0);
   pivot_.assign(first.size(), 0.0);
+  error_.assign(first.size(), 0.0);
   dropped_.clear();
   null_.clear();
 }
@@ -32,7 +35,7 @@ void ProfileLdlt::factorise() {
     double* row = &values_[begin_[i]];
     const std::size_t from = first_[i];
     const double diagonal = row[i - from];
-    double pivot = diagonal;
+    double pivot = diagonal, error = kRounding * diagonal;
     // row[j] holds l_ij d_j until it is divided
     for (std::size_t j = from; j < i; ++j) {
       const double* other = &values_[begin_[j]];
@@ -45,9 +48,11 @@ void ProfileLdlt::factorise() {
       const double scaled = row[j - from];
       row[j - from] = scaled / pivot_[j];
       pivot -= scaled * row[j - from];
+      error += row[j - from] * row[j - from] * error_[j];
     }
-    if (pivot > kDependent * diagonal) {
+    if (pivot > std::max(kDependent * diagonal, error)) {
       pivot_[i] = pivot;
+      error_[i] = error;
     } else {
       dropped_.push_back(i);
     }

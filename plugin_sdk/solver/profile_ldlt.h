@@ -1,9 +1,11 @@
 // A symmetric positive semidefinite matrix, factorised as L D L^T within its profile, that bears dependent rows.
 //
 // Row i of L reaches from its first entry to the diagonal; nothing outside is stored or computed, so a chain of joints in
-// order costs what a band costs. A row whose pivot falls below 1e-12 of its diagonal is a combination of rows before it to
-// rounding and is left out: its unknown is 0. What it would have added is the same, if the right-hand side agrees; if not,
-// the side is first projected to the nearest one (least squares) that does.
+// order costs what a band costs. A row is a combination of rows before it to rounding, and left out, if its pivot falls
+// below 1e-12 of its diagonal or below what rounding may have left there, e_i = 8 eps a_ii + sum_j l_ij^2 e_j (rows almost
+// dependent have small pivots, of which an error weighs more in all that follow): its unknown is 0. What it would have added
+// is the same, if the right-hand side agrees; if not, the side is first projected to the nearest one (least squares) that
+// does.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +36,8 @@ class ProfileLdlt {
   void solve_transposed(std::vector<double>* x) const;
 
   std::vector<std::size_t> first_, begin_;
-  std::vector<double> values_, pivot_;  // 0: dropped
+  std::vector<double> values_;
+  std::vector<double> pivot_, error_;  // 0: dropped
   std::vector<std::size_t> dropped_;
   std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "tests/paths.h"
 #include "tests/scenes/scene_run.h"
@@ -24,13 +25,17 @@ bool has_met_ground(const SceneRun& run, std::uint32_t ball) {
   });
 }
 
-class Sample : public ::testing::TestWithParam<const char*> {};
+using Plugins = std::pair<const char*, const char*>;
+class Sample : public ::testing::TestWithParam<Plugins> {};
 
-INSTANTIATE_TEST_SUITE_P(EachIntegrator, Sample, ::testing::Values("Euler", "SemiImplicitEuler"),
-                         [](const auto& which) { return std::string(which.param); });
+INSTANTIATE_TEST_SUITE_P(With, Sample,
+                         ::testing::Values(Plugins("Euler", "Sequential"), Plugins("SemiImplicitEuler", "Sequential"),
+                                           Plugins("Euler", "Newton"), Plugins("Euler", "Direct")),
+                         [](const auto& which) { return which.param.first + std::string(which.param.second); });
 
 TEST_P(Sample, LandsTurnsAndNeverBreaks) {
-  SceneRun run(kSample, {set("Integrator", std::string(GetParam()))});
+  SceneRun run(kSample,
+               {set("Integrator", std::string(GetParam().first)), set("Solver", std::string(GetParam().second))});
   run.to_end();
   EXPECT_EQ(run.step_count(), 600U);
   EXPECT_TRUE(has_met_ground(run, 1));

@@ -62,6 +62,26 @@ TEST(ProfileLdlt, SolvesAndDropsWhatDepends) {
   }
 }
 
+// Two anchors of a hinge, whose six rows have rank five. With the axis tilted by t from y, the second anchor's y row adds t^2
+// to those before, which rounding then leaves of the row that depends on it.
+TEST(ProfileLdlt, SeesOneRowDependWhereAnotherAlmostDoes) {
+  for (double tilt = 0.3; tilt > 1e-10; tilt *= 0.7) {
+    Eigen::Matrix<double, 6, 6> rows;
+    int next = 0;
+    for (const Vector3& arm : {Vector3(0.3, -0.2, 0.1), Vector3(0.3 + 0.7 * tilt, 1.8, 0.1 - tilt)})
+      for (int k = 0; k < 3; ++k)
+        rows.row(next++) << Vector3::Unit(k).transpose(), arm.cross(Vector3::Unit(k)).transpose();
+    const Eigen::MatrixXd matrix = rows * rows.transpose();
+    ProfileLdlt factor;
+    factor.start(std::vector<std::size_t>(6, 0));
+    for (std::size_t i = 0; i < 6; ++i)
+      for (std::size_t j = 0; j <= i; ++j)
+        factor.entry(i, j) = matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    factor.factorise();
+    EXPECT_EQ(factor.dropped(), 1U) << tilt;
+  }
+}
+
 // The nearest side that has a solution is that of least squares.
 TEST(ProfileLdlt, ContradictionsEndAtLeastSquares) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
