@@ -153,8 +153,8 @@ class Environment : private DerivativeSource, private SlotObserver {
  private:
   // simulators/: what a step is made of, and the order of the stages.
   void make_inner_steps();
-  void make_inner_step(double begin, double length);
-  // What is left of a length before a force jumps; sets the times between which forces are asked.
+  void make_part(double begin, double length);
+  // What is left of a length until a force jumps; sets the times between which forces are asked there.
   double length_to_switch(double begin, double length);
   // Inner steps begin some time after S_n, in front() what the one before has made of it.
   void begin_inner_step(double begin, double length);
@@ -301,7 +301,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
   std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
-  double asked_from_ = 0.0, asked_until_ = 0.0;   // times of forces, clear of jumps at its ends
+  double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::optional<Trusted<Pairs>> pairs_;           // the last
   double margin_ = 0.0;

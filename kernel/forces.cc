@@ -59,6 +59,7 @@ void Environment::evaluate() {
   follow_motion(data_.derivative_time[0], data_.derivative_position, data_.derivative_orientation,
                 data_.derivative_linear_velocity, data_.derivative_angular_velocity);
   if (!wrench_is_constant_) {
+    // the end of a step may be the time of a jump
     data_.derivative_time[0] = std::clamp(data_.derivative_time[0], asked_from_, asked_until_);
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);

@@ -125,6 +125,16 @@ bool take_table(const Property& declared, const PropertyValue& given, std::vecto
                        " numbers; allowed: " + allowed_values(declared),
                    problems);
     }
+    if (!declared.unit.starts_with("s,")) continue;
+    // the times of this row, the one before, and the one before that
+    const double* time = &(*out)[before];
+    const auto columns = static_cast<std::ptrdiff_t>(declared.columns);
+    const std::ptrdiff_t row_number = &row - given.list.data();
+    if ((row_number > 0 && time[0] < time[-columns]) || (row_number > 1 && time[0] == time[-2 * columns]))
+      return wrong(row,
+                   declared.name + " has the time " + number_text(time[0]) + " after " + number_text(time[-columns]) +
+                       "; allowed: times that ascend, two of a jump the same",
+                   problems);
   }
   return true;
 }

@@ -179,7 +179,8 @@ void GrpcCarrier::leave_out_known(Stream* stream, const MethodInfo& method, std:
     const std::uint64_t before = std::exchange(stream->sent[i], hashes[i]);
     if (method.request[i].asset && size >= kAssetBytes) {
       stream->sent[i] = 0;
-      if (sent_assets_.insert(hashes[i]).second) send_asset(stream, columns[i], size, hashes[i], patience);
+      if (!sent_assets_.contains(hashes[i])) send_asset(stream, columns[i], size, hashes[i], patience);
+      sent_assets_.insert(hashes[i]);
       stage::v1::AssetUse* use = header->add_assets();
       use->set_column(field);
       use->set_hash(hashes[i]);

@@ -5,7 +5,7 @@
 //       -> constrain -> solve -> commit S_{n+1} -> events
 //
 // A committed step is made of one or more inner steps: `Substeps` equal ones, cut where a force jumps, and whatever a
-// simulator makes of each. What is asked at the end of a step that a jump ends is asked before it.
+// simulator makes of each. A force is asked before the jump that ends an inner step, and after the one that began it.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,6 +17,7 @@ namespace gravitas::kernel {
 namespace {
 
 constexpr double kSameTime = 1e-9;  // of the step
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -27,26 +28,29 @@ void Environment::make_inner_steps() {
   for (std::uint32_t i = 0; i < description_.substeps; ++i) {
     for (double done = 0.0; done < length && !must_restart_;) {
       const double left = length - done, part = length_to_switch(i * length + done, left);
-      make_inner_step(i * length + done, part);
+      make_part(i * length + done, part);
       done = part == left ? length : done + part;
+      // a history from before the jump says nothing about what comes
+      if (asked_until_ < kInfinity && !must_restart_) std::ranges::fill(front().state_changed.span(), 1U);
     }
   }
 }
 
 double Environment::length_to_switch(double begin, double length) {
-  const std::vector<double>& switches = description_.switches;
-  const double from = time() + begin, slack = kSameTime * length_of_step(step_count_ + 1);
-  const auto next = std::ranges::upper_bound(switches, from + slack);
-  asked_from_ = next == switches.begin() ? -kInfinity : *std::prev(next);
+  asked_from_ = -kInfinity;
   asked_until_ = kInfinity;
-  // a history from before the jump says nothing about what comes
-  if (asked_from_ >= from - slack) std::ranges::fill(front().state_changed.span(), 1U);
+  const std::vector<double>& switches = description_.switches;
+  if (switches.empty() || wrench_is_constant_) return length;
+  const double from = time() + begin;
+  const double slack = std::max(kSameTime * length_of_step(step_count_ + 1), 4.0 * kEpsilon * from);
+  const auto next = std::ranges::upper_bound(switches, from + slack);
+  if (next != switches.begin()) asked_from_ = *std::prev(next);
   if (next == switches.end() || *next > from + length + slack) return length;
   asked_until_ = std::nextafter(*next, -kInfinity);
   return *next < from + length - slack ? *next - from : length;
 }
 
-void Environment::make_inner_step(double begin, double length) {
+void Environment::make_part(double begin, double length) {
   if (locates_events()) return locate_events(begin, length);
   begin_inner_step(begin, length);
   const auto trial = integrate();

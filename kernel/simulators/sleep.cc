@@ -46,7 +46,7 @@ void Environment::let_sleep(std::uint32_t body, bool sleeps) {
 
 bool Environment::does_anything_move() const {
   if (sleepers_ == 0 || !wrench_is_constant_ || !model_.curves.empty()) return model_.body_count > 0;
-  for (std::uint32_t i = 0; i < model_.body_count && !is_idle_; ++i) {
+  for (std::uint32_t i = is_idle_ ? model_.body_count : 0; i < model_.body_count; ++i) {
     if (is_awake(i)) return true;
     if ((model_.flags[i] & kKinematic) != 0 && (!vector_at(front().linear_velocity.span(), i).isZero(0.0) ||
                                                 !vector_at(front().angular_velocity.span(), i).isZero(0.0)))
@@ -105,6 +105,7 @@ bool Environment::wakes_sleepers() {
 
 void Environment::wake_island(std::uint32_t body) {
   if (!can_sleep() || body == kNone || data_.flags[body] == model_.flags[body]) return;
+  is_idle_ = false;
   const auto sleeps = [&](std::uint32_t i) { return data_.flags[i] != model_.flags[i]; };
   for (const std::uint32_t one : activity_.sleepers_with(body, model_.body_count, connections(), sleeps)) {
     let_sleep(one, false);

@@ -8,7 +8,8 @@ namespace gravitas {
 namespace {
 
 constexpr double kDependent = 1e-12;
-constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();  // of a diagonal, in its pivot
+constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
+constexpr double kDoubtful = 1e-4;  // of a diagonal: pivots that may be rounding
 
 double dot(const double* a, const double* b, std::size_t count) {
   const auto size = static_cast<Eigen::Index>(count);
@@ -25,7 +26,6 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
   for (std::size_t i = 0; i < first.size(); ++i) begin_[i + 1] = begin_[i] + (i - first[i] + 1);
   values_.assign(begin_.back(), 0.0);
   pivot_.assign(first.size(), 0.0);
-  error_.assign(first.size(), 0.0);
   dropped_.clear();
   null_.clear();
 }
@@ -35,7 +35,7 @@ void ProfileLdlt::factorise() {
     double* row = &values_[begin_[i]];
     const std::size_t from = first_[i];
     const double diagonal = row[i - from];
-    double pivot = diagonal, error = kRounding * diagonal;
+    double pivot = diagonal;
     // row[j] holds l_ij d_j until it is divided
     for (std::size_t j = from; j < i; ++j) {
       const double* other = &values_[begin_[j]];
@@ -48,22 +48,15 @@ void ProfileLdlt::factorise() {
       const double scaled = row[j - from];
       row[j - from] = scaled / pivot_[j];
       pivot -= scaled * row[j - from];
-      error += row[j - from] * row[j - from] * error_[j];
     }
-    if (pivot > std::max(kDependent * diagonal, error)) {
+    if (pivot > kDoubtful * diagonal || (pivot > kDependent * diagonal && pivot > rounding_of_pivot(i))) {
       pivot_[i] = pivot;
-      error_[i] = error;
     } else {
       dropped_.push_back(i);
     }
   }
   for (const std::size_t row : dropped_) {
-    // A z = 0: z is 1 at the row and minus its combination of the rows before
-    std::vector<double> z(size(), 0.0);
-    for (std::size_t j = first_[row]; j < row; ++j)
-      if (pivot_[j] > 0.0) z[j] = -values_[begin_[row] + j - first_[row]];
-    solve_transposed(&z);
-    z[row] = 1.0;
+    std::vector<double> z = difference(row);  // A z = 0
     for (int repeat = 0; repeat < 2; ++repeat) {
       for (const std::vector<double>& other : null_) {
         const double share = dot(other, z);
@@ -74,6 +67,22 @@ void ProfileLdlt::factorise() {
     for (double& number : z) number /= length;
     null_.push_back(std::move(z));
   }
+}
+
+std::vector<double> ProfileLdlt::difference(std::size_t row) const {
+  std::vector<double> z(size(), 0.0);
+  for (std::size_t j = first_[row]; j < row; ++j)
+    if (pivot_[j] > 0.0) z[j] = -values_[begin_[row] + j - first_[row]];
+  solve_transposed(&z);
+  z[row] = 1.0;
+  return z;
+}
+
+double ProfileLdlt::rounding_of_pivot(std::size_t row) const {
+  const std::vector<double> z = difference(row);
+  double sum = 0.0;
+  for (std::size_t k = 0; k <= row; ++k) sum += z[k] * z[k] * values_[begin_[k + 1] - 1];
+  return kRounding * sum;
 }
 
 void ProfileLdlt::solve_transposed(std::vector<double>* x) const {

@@ -2,10 +2,10 @@
 //
 // Row i of L reaches from its first entry to the diagonal; nothing outside is stored or computed, so a chain of joints in
 // order costs what a band costs. A row is a combination of rows before it to rounding, and left out, if its pivot falls
-// below 1e-12 of its diagonal or below what rounding may have left there, e_i = 8 eps a_ii + sum_j l_ij^2 e_j (rows almost
-// dependent have small pivots, of which an error weighs more in all that follow): its unknown is 0. What it would have added
-// is the same, if the right-hand side agrees; if not, the side is first projected to the nearest one (least squares) that
-// does.
+// below 1e-12 of its diagonal, or below what rounding may have left there: the pivot is z^T A z, with z the row less its
+// combination, whose terms are of size z_k^2 a_kk (where other rows are almost dependent, z is large). Its unknown is 0. What
+// it would have added is the same, if the right-hand side agrees; if not, the side is first projected to the nearest one
+// (least squares) that does.
 #pragma once
 
 #include <cstddef>
@@ -32,12 +32,14 @@ class ProfileLdlt {
   double make_consistent(std::vector<double>* b) const;
 
  private:
+  // 1 at the row, and minus its combination of the rows before.
+  std::vector<double> difference(std::size_t row) const;
+  double rounding_of_pivot(std::size_t row) const;
   // L^-T applied in place.
   void solve_transposed(std::vector<double>* x) const;
 
   std::vector<std::size_t> first_, begin_;
-  std::vector<double> values_;
-  std::vector<double> pivot_, error_;  // 0: dropped
+  std::vector<double> values_, pivot_;  // 0: dropped
   std::vector<std::size_t> dropped_;
   std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range
 };

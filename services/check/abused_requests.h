@@ -19,10 +19,10 @@ struct AbusedRequest {
 std::vector<AbusedRequest> with_uneven_rows(const conformance::Question& question);
 // Every index of a column points beyond all rows.
 std::vector<AbusedRequest> with_wild_indices(const conformance::Question& question);
-// No row of anything.
 // Resizes one column, and leaves the others.
 void set_count(MessageColumns* columns, std::size_t column, std::uint64_t count);
 
+// No row of anything.
 AbusedRequest with_no_rows(const conformance::Question& question);
 
 }  // namespace gravitas::check

@@ -1,11 +1,33 @@
 // gravitas: one program, sub-commands. Results go to standard output, everything else to standard error.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <iostream>
+#include <string>
+#include <vector>
 
 #include "plugin_sdk/floating_point.h"
+#include "plugin_sdk/near_miss.h"
 #include "services/cli/commands.h"
 #include "services/run/session.h"
+
+namespace {
+
+// What is wrong with the words that should name sub-commands; empty: nothing.
+std::string unknown_subcommand(const CLI::App& app, const std::vector<std::string>& words) {
+  const CLI::App* command = &app;
+  for (const std::string& word : words) {
+    std::vector<std::string> names;
+    for (const CLI::App* one : command->get_subcommands(nullptr)) names.push_back(one->get_name());
+    if (names.empty() || word.starts_with('-')) return {};
+    if (std::ranges::find(names, word) == names.end())
+      return "there is no sub-command \"" + word + "\"; " + gravitas::allowed_names(word, names);
+    command = command->get_subcommand(word);
+  }
+  return {};
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace gravitas;
@@ -30,6 +52,10 @@ int main(int argc, char** argv) {
   cli::add_campaign(&app, &action);
   cli::add_serve(&app, &action);
   cli::add_ctl(&app, &action);
+  if (const std::string unknown = unknown_subcommand(app, {argv + 1, argv + argc}); !unknown.empty()) {
+    std::cerr << "gravitas: " << unknown << '\n';
+    return cli::kBadInput;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

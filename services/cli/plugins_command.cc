@@ -120,13 +120,15 @@ int describe(const std::string& name, bool json) {
     }
   }
   if (found.empty()) throw BadInput(problem);
-  for (const InstalledPlugin& plugin : found) {
-    if (json) {
-      std::cout << to_json(host::to_message(plugin.declaration), JsonForm::kPage);
-    } else {
-      print_declaration(plugin);
-    }
+  if (!json) {
+    for (const InstalledPlugin& plugin : found) print_declaration(plugin);
+    return kDone;
   }
+  // several make a list
+  std::vector<std::string> pages;
+  for (const InstalledPlugin& plugin : found)
+    pages.push_back(to_json(host::to_message(plugin.declaration), JsonForm::kPage));
+  std::cout << (pages.size() == 1 ? pages[0] : fmt::format("[{}]\n", fmt::join(pages, ",\n")));
   return kDone;
 }
 

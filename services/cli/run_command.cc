@@ -160,7 +160,8 @@ void add_run(CLI::App* app, Action* action) {
       ->check(CLI::Range(1U, std::numeric_limits<std::uint32_t>::max()))
       ->needs(checkpoint);
   command->add_option("--resume", options.resume,
-                      "Go on from this checkpoint; --steps and --duration count from t = 0");
+                      "Go on from this checkpoint; --steps and --duration count from t = 0. Files of output hold what "
+                      "follows it");
   add_list(command, "--swap", &options.swaps,
            "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N; repeatable");
   add_list(

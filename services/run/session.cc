@@ -129,6 +129,7 @@ class Run final : private kernel::CommitListener {
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed);
     give_orders();
+    warn_of_orders_beyond_the_end();
     if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
   }
 
@@ -144,6 +145,8 @@ class Run final : private kernel::CommitListener {
       if (!options_.reactions.empty())
         reactions_ =
             std::make_unique<ReactionLog>(options_.reactions, description_, options_.sample_every.value_or(0.0));
+      // so that nothing is simulated for a report that cannot be written
+      if (!options_.report.empty()) write_text_file(options_.report, "", "report");
     } catch (const std::system_error& error) {
       throw BadInput(error.what());
     }
@@ -391,6 +394,16 @@ class Run final : private kernel::CommitListener {
   void tell(Event event, const std::string& text) {
     event.text = text;
     if (event_kinds_.has(event.kind)) events_->on_event(event);
+  }
+
+  void warn_of_orders_beyond_the_end() {
+    const auto warn = [&](const char* option, std::uint32_t step) {
+      if (step > description_.steps)
+        warnings_.push_back(
+            fmt::format("{} at step {} never comes: the run has {} steps", option, step, description_.steps));
+    };
+    for (const kernel::SwapOrder& order : swaps_) warn("--swap", order.step);
+    for (const kernel::FaultInjection& fault : faults_) warn("--fault", fault.step);
   }
 
   // Those of steps up to the next edit; after it another environment gets the rest.

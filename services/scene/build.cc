@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <set>
 #include <string>
 #include <utility>
 
@@ -100,7 +99,6 @@ void hand_on_accuracy(BuildContext* context) {
 }
 
 void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
-  std::set<double> switches;
   for (const v1::Force& force : context->scene.forces().force()) {
     kernel::ForceDescription& description = context->description.forces.emplace_back();
     description.id = force.id();
@@ -110,10 +108,7 @@ void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext*
     description.plugin = plugins->serve(Slot::kForce, force.type(), place, &type);
     if (type == nullptr) continue;
     flatten_force(*type, force, bodies, context, &description.parameters);
-    const std::vector<double> jumps = jumps_of(type->properties, description.parameters);
-    switches.insert(jumps.begin(), jumps.end());
   }
-  context->description.switches.assign(switches.begin(), switches.end());
 }
 
 // ---- joints

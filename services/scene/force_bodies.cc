@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
 
 #include "plugin_sdk/property_value.h"
@@ -114,6 +115,15 @@ void complete_forces(BuildContext* context) {
     if (absent_gravity(type, &context->description.forces[force].parameters) != nullptr)
       float_bodies(force, type, context);
   }
+  std::set<double> switches;
+  for (const kernel::BodyDescription& body : context->description.bodies) {
+    for (const std::uint32_t row : body.forces) {
+      const kernel::ForceDescription& force = context->description.forces[row];
+      const std::vector<double> jumps = jumps_of(type_of(force, *context)->properties, force.parameters);
+      switches.insert(jumps.begin(), jumps.end());
+    }
+  }
+  context->description.switches.assign(switches.begin(), switches.end());
 }
 
 }  // namespace gravitas::scene

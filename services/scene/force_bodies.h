@@ -13,7 +13,7 @@ void flatten_force(const TypeDeclaration& type, const v1::Force& force, const Id
 
 // Once all bodies are built: a force that names a movable body is applied to that one too, last of its forces, where it
 // answers the reaction; and a vector property `Gravity` that is absent becomes the sum of the accelerations of the
-// body's Gravity forces, for which the force is split where its bodies differ in that.
+// body's Gravity forces, for which the force is split where its bodies differ in that. Notes when forces of bodies jump.
 void complete_forces(BuildContext* context);
 
 }  // namespace gravitas::scene

@@ -161,11 +161,12 @@ void Instrumentation::add_contacts(const kernel::Environment& environment, bool 
     frame->add_missing("reaction: this simulator makes inner steps of any length, and keeps the impulses of the last");
     shows_reactions = false;
   }
+  const double last_step = environment.saved_state().step_length, same_time = 1e-9 * last_step;
   const auto has_jumped = [&](double jump) {
-    return jump > environment.time() - environment.time_step() && jump <= environment.time();
+    return jump > environment.time() - last_step + same_time && jump < environment.time() - same_time;
   };
   if (shows_reactions && std::ranges::any_of(surveyor_.description().switches, has_jumped)) {
-    frame->add_missing("reaction: a force has jumped within the step, which was made in parts");
+    frame->add_missing("reaction: a force has jumped within the last step, which was made in parts");
     shows_reactions = false;
   }
   if (!shows_contacts && !shows_reactions) return;

@@ -106,6 +106,45 @@ TEST(Simulators, AKilledWorkerChangesNoBitOfInnerSteps) {
   }
 }
 
+// Inner steps end at 0.055 s, at the end of a step, and twice in the step of 0.26 s.
+TEST(Simulators, StepsCutByJumpsAreTheSameAfterARestoreAndAKill) {
+  for (const Simulator simulator :
+       {Simulator::kBasic, Simulator::kSubstepping, Simulator::kBisection, Simulator::kContinuous}) {
+    SCOPED_TRACE(static_cast<int>(simulator));
+    WorldBuilder builder = simulator >= Simulator::kBisection ? bouncing(simulator, 0.9, 40, 0.01)
+                                                              : busy_world(Hosting::kDirect).steps(40, 0.01);
+    builder.force("Drag", "force_drag", {0.1, 0.0});
+    builder.description().simulator = simulator;
+    builder.description().substeps = 2;
+    const kernel::Hash uncut = chain_of(builder);
+    builder.description().switches = {0.055, 0.1, 0.252, 0.2571};
+    const kernel::Hash whole = chain_of(builder);
+    EXPECT_NE(whole, uncut);
+    for (const std::uint32_t stop : {4U, 5U, 6U, 9U, 10U, 11U, 25U, 26U}) {
+      Environment first(builder.description()), second(builder.description());
+      while (first.step_count() < stop) ASSERT_EQ(first.step(), StepOutcome::kCommitted);
+      ASSERT_EQ(second.restore(first.saved_state()), "");
+      run(&second);
+      EXPECT_EQ(second.chain_hash(), whole) << stop;
+    }
+    for (const Slot slot : {Slot::kForce, Slot::kSolver, Slot::kIntegrator})
+      builder.hosting(slot, Hosting::kSharedMemory);
+    Environment world(builder.description());
+    world.inject({Slot::kIntegrator, "kill", 6, 1});
+    world.inject({Slot::kForce, "kill", 10, 1});
+    world.inject({Slot::kSolver, "kill", 26, 1});
+    run(&world);
+    EXPECT_EQ(world.chain_hash(), whole);
+    EXPECT_EQ(world.faults().size(), 3U);
+  }
+}
+
+TEST(Simulators, TimesOfJumpsMustRise) {
+  WorldBuilder builder = busy_world(Hosting::kDirect);
+  builder.description().switches = {0.1, 0.1};
+  EXPECT_EQ(builder.description().validate(), "times of switches must rise");
+}
+
 // Serves so many calls, and fails at all others.
 class Weary final : public kernel::Carrier {
  public:

@@ -38,7 +38,7 @@ TEST(SwitchedForce, ActsAsLongAsItIsOnWithEveryIntegrator) {
     SceneRun run(kScene, {set("Integrator", integrator)});
     run.to_end();
     const SceneRun::Motion ball = run.body("Ball");
-    // whose velocities are differences of positions
+    // whose velocities are displacements over the step, 0.01 s
     const double rounding = integrator == "BasicVerlet" ? kRounding / 0.01 : kRounding;
     EXPECT_NEAR(ball.twist.linear.x(), kSpeed, rounding);
     // methods of order 1 are off by a h t/2
@@ -54,7 +54,6 @@ TEST(SwitchedForce, ActsAsLongAsItIsOnInEverySimulator) {
     SceneRun run(simulator == "Smooth" ? kWithoutGround : kScene,
                  {set("Integrator", std::string("RK4")), set("Simulator.Type", simulator)});
     run.to_end();
-    EXPECT_EQ(run.step_count(), 150U);
     EXPECT_NEAR(run.body("Ball").pose.position.x(), kWay, kRounding);
   }
 }
@@ -65,7 +64,7 @@ TEST(SwitchedForce, IsNotSmearedOverLongSteps) {
     SCOPED_TRACE(step);
     SceneRun run(kScene, {set("Integrator", std::string("Verlet")), set("Simulator.TimeStep", step)});
     run.to_end();
-    EXPECT_NEAR(run.body("Ball").pose.position.x(), kWay, 10 * kRounding);
+    EXPECT_NEAR(run.body("Ball").pose.position.x(), kWay, 10 * kRounding);  // up to 1500 terms
   }
 }
 

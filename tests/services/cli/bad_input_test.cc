@@ -55,6 +55,16 @@ const BadScene kBadScenes[] = {
     {"far_from_unit",
      with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" KineticProperties { Orientation = {1,1,0,0} } }"),
      "4:83", "norm 1"},
+    {"descending_times",
+     "Forces { Force { Type = \"Basic\" Id = \"F\" CustomProperties { Table = {{1, 0, 0, 0},\n{0.5, 1, 0, 0}} } } }\n" +
+         with_body(""),
+     "2:1", "Basic \"F\": Table has the time 0.5 after 1; allowed: times that ascend, two of a jump the same"},
+    {"three_rows_of_one_time",
+     "Forces { Force { Type = \"Basic\" Id = \"F\" CustomProperties { Table = {{1, 0, 0, 0}, {1, {1, 0, 0}},\n{1, 1, "
+     "0, "
+     "0}} } } }\n" +
+         with_body(""),
+     "2:1", "Table has the time 1 after 1"},
     {"unbalanced", "Environment {\n", "2:1", "}"},
     {"deep", std::string(100'000, '{'), "1:", ""},
 };
@@ -182,6 +192,25 @@ TEST(BadInput, NoOrUnknownSubcommand) {
   EXPECT_EQ(run_program({}, folder).exit_code, 2);
   EXPECT_EQ(run_program({"fly"}, folder).exit_code, 2);
   EXPECT_EQ(run_program({"run"}, folder).exit_code, 2);
+}
+
+TEST(BadInput, AWordThatIsNoSubcommandIsNamed) {
+  const ScratchFolder folder;
+  for (const auto& [arguments, message] : std::vector<std::pair<std::vector<std::string>, const char*>>{
+           {{"runn"}, "there is no sub-command \"runn\"; did you mean \"run\"?"},
+           {{"ctl", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"}}) {
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(message));
+  }
+}
+
+TEST(BadInput, AReportThatCannotBeWrittenIsRefusedBeforeTheRun) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program(
+      {"run", kSample, "--steps", "2", "--hosting", "direct", "--report", folder.path("nowhere/report.json")}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("nowhere/report.json"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // `gravitas plan`, `plugins`, `describe` and the help of all.
 #include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
@@ -50,6 +51,10 @@ TEST(Describe, ShowsPropertiesWithUnitRangeDefaultAndMeaning) {
   EXPECT_THAT(solver.out, HasSubstr("slot solver"));
   EXPECT_THAT(solver.out, HasSubstr("Iterations"));
   EXPECT_THAT(solver.out, HasSubstr("live"));
+  // a name may stand for several
+  google::protobuf::ListValue several;
+  ASSERT_TRUE(JsonStringToMessage(run_program({"describe", "Basic", "--json"}, folder).out, &several).ok());
+  EXPECT_GT(several.values_size(), 1);
   // a type's name stands for the plugin that serves it, a path for the library
   EXPECT_THAT(run_program({"describe", "Sphere"}, folder).out, HasSubstr("Radius"));
   const ProgramResult library = run_program({"describe", in_build("/lib/gravitas/hello.so"), "--json"}, folder);

@@ -291,5 +291,16 @@ TEST(Run, LooksForTheKindsOfEventsThatAreAskedFor) {
   EXPECT_THAT(result.err, HasSubstr("--ongoing-rate 0"));
 }
 
+TEST(Run, WarnsOfOrdersBeyondItsEnd) {
+  const ScratchFolder folder;
+  const ProgramResult result =
+      run_program({"run", kSample, "--steps", "3", "--hosting", "direct", "--hosting", "solver=shm", "--fault",
+                   "solver:kill@step=9", "--swap", "solver=Newton@step=8"},
+                  folder);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("--fault at step 9 never comes: the run has 3 steps"));
+  EXPECT_THAT(result.err, HasSubstr("--swap at step 8 never comes: the run has 3 steps"));
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -87,10 +87,15 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of_kinds() {
   return pairs;
 }
 
-class CollisionCrossCheck : public ::testing::TestWithParam<std::pair<std::size_t, std::size_t>> {};
-INSTANTIATE_TEST_SUITE_P(Of, CollisionCrossCheck, ::testing::ValuesIn(pairs_of_kinds()), [](const auto& one) {
-  return "Kind" + std::to_string(one.param.first) + "AndKind" + std::to_string(one.param.second);
-});
+using PairOfKinds = std::pair<std::size_t, std::size_t>;
+
+std::string name_of(const ::testing::TestParamInfo<PairOfKinds>& pair) {
+  constexpr std::array kNames = {"Sphere", "Box", "Cylinder", "Capsule", "Cone", "Polyhedron", "Halfspace"};
+  return kNames[pair.param.first] + std::string("And") + kNames[pair.param.second];
+}
+
+class CollisionCrossCheck : public ::testing::TestWithParam<PairOfKinds> {};
+INSTANTIATE_TEST_SUITE_P(Of, CollisionCrossCheck, ::testing::ValuesIn(pairs_of_kinds()), name_of);
 
 TEST_P(CollisionCrossCheck, StandardAndGjkOnlyAgree) {
   const char* wanted = std::getenv("GRAVITAS_CROSS_CHECK_POSES");

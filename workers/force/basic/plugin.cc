@@ -54,31 +54,33 @@ Vector3 force_at(const Parameters& p, double time) {
 class BasicForce final : public ForcePlugin {
  public:
   static PluginDeclaration declaration() {
-    return {.name = "BasicForce",
-            .version = "1.0",
-            .slot = Slot::kForce,
-            .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
-            .types = {
-                {"Basic",
-                 "A given force at a point of the body.",
-                 {Property::vector("Force", "N", "world")
-                      .defaults_to({0, 0, 0})
-                      .means("The force, in N; in N s where Instantaneous is true. Required unless Table is given."),
-                  Property::vector("ApplicationPoint", "m", "geometry")
-                      .defaults_to({0, 0, 0})
-                      .means("Where it acts, in the frame of the body's geometry."),
-                  Property::vector("Torque", "N*m", "world")
-                      .defaults_to({0, 0, 0})
-                      .means("An additional torque (N m s where Instantaneous)."),
-                  Property::choice("Frame", {"World", "Body"})
-                      .defaults_to({0})
-                      .means("Axes in which Force, Torque and Table are given: the world's or the geometry's."),
-                  Property::table("Table", 4, "s,N", "world")
-                      .means("Rows {t, fx, fy, fz}: the force over time, linear between rows; two rows of one time are "
-                             "a jump, at which steps end. Replaces Force."),
-                  Property::flag("Instantaneous")
-                      .defaults_to({0})
-                      .means("The value is an impulse, applied once at the start.")}}}};
+    return {
+        .name = "BasicForce",
+        .version = "1.0",
+        .slot = Slot::kForce,
+        .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
+        .types = {
+            {"Basic",
+             "A given force at a point of the body.",
+             {Property::vector("Force", "N", "world")
+                  .defaults_to({0, 0, 0})
+                  .means("The force, in N; in N s where Instantaneous is true."),
+              Property::vector("ApplicationPoint", "m", "geometry")
+                  .defaults_to({0, 0, 0})
+                  .means("Where it acts, in the frame of the body's geometry."),
+              Property::vector("Torque", "N*m", "world")
+                  .defaults_to({0, 0, 0})
+                  .means("An additional torque (N m s where Instantaneous)."),
+              Property::choice("Frame", {"World", "Body"})
+                  .defaults_to({0})
+                  .means("Axes in which Force, Torque and Table are given: the world's or the geometry's."),
+              Property::table("Table", 4, "s,N", "world")
+                  .means("Rows {t, fx, fy, fz}: the force over time, linear between rows and constant "
+                         "before and after them; two rows of one time are "
+                         "a jump, at which steps end. Replaces Force."),
+              Property::flag("Instantaneous")
+                  .defaults_to({0})
+                  .means("The value is an impulse, applied once at the start (of a Table, its value at time 0).")}}}};
   }
   explicit BasicForce(PropertyCursor) {}
 
