@@ -39,7 +39,8 @@ void Arena::move_to_new_segment(std::vector<Entry> layout) {
     std::memcpy(segment.data() + layout[i].offset, base_ + old.offset, old.count * stage::element_size(old.type));
   }
   columns_ = std::move(layout);
-  segment_ = std::move(segment);
+  std::swap(segment_, segment);
+  if (holds_ > 0) left_.push_back(std::move(segment));
   base_ = segment_.data();
   ++generation_;
 }

@@ -37,6 +37,12 @@ class Arena {
   std::uint64_t capacity(ColumnId column) const { return columns_[column].capacity; }
   void set_count(ColumnId column, std::uint64_t count) { columns_[column].count = count; }
 
+  // Segments that are left meanwhile stay mapped: of a call that others, which may make room, are nested in.
+  void hold() { ++holds_; }
+  void let_go() {
+    if (--holds_ == 0) left_.clear();
+  }
+
   const channel::Segment& segment() const { return segment_; }
   std::uint64_t generation() const { return generation_; }
 
@@ -50,6 +56,8 @@ class Arena {
 
   std::vector<Entry> columns_;
   channel::Segment segment_;
+  std::vector<channel::Segment> left_;  // while held
+  int holds_ = 0;
   std::byte* base_ = nullptr;
   std::uint64_t generation_ = 0;
 };

@@ -4,10 +4,9 @@
 //   Environment world(description);         // starts what the plan needs; throws StageFault, std::invalid_argument
 //   while (world.step() == StepOutcome::kCommitted && world.step_count() < world.total_steps()) …
 //
-// step() is a transaction: it works on scratch columns and the second of two states, and swaps the states at
-// the end. A stage that fails is asked again elsewhere (slot_host.h); where that ends, nothing has happened: the outcome
-// is kPaused, fault() says why, and the state is that of the last commit. An environment is used by one thread at a
-// time.
+// step() is a transaction: it works on scratch columns and the second of two states, and swaps the states at the end. A
+// stage that fails is asked again elsewhere (slot_host.h); where that ends, nothing has happened: the outcome is
+// kPaused, fault() says why, and the state is that of the last commit. An environment is used by one thread at a time.
 #pragma once
 
 #include <array>

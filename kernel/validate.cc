@@ -7,7 +7,6 @@
 #include <string>
 
 #include "plugin_sdk/answer_checks.h"
-#include "plugin_sdk/checks.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -56,7 +55,7 @@ void Validator::check_structure_and_finiteness(const StageCall& call) const {
   for (std::size_t i = 0; i < call.request.size(); ++i) request[i] = arena_.count(call.request[i]);
   for (std::size_t i = 0; i < call.reply.size(); ++i) reply[i] = arena_.count(call.reply[i]);
   const stage::MethodInfo& method = call.info();
-  require_structure(check_rows(method, {request.data(), call.request.size()}, {reply.data(), call.reply.size()}));
+  require_structure(rows_.check(call.method, {request.data(), call.request.size()}, {reply.data(), call.reply.size()}));
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     if (method.reply[i].type != stage::ElementType::kF64) continue;
     const std::size_t index = first_not_finite({reinterpret_cast<const double*>(arena_.data(call.reply[i])), reply[i]});

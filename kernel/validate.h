@@ -14,6 +14,7 @@
 #include "kernel/model.h"
 #include "kernel/state.h"
 #include "kernel/step_data.h"
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/physics_checks.h"
 
 namespace gravitas::kernel {
@@ -101,6 +102,7 @@ class Validator {
   bool samples_physics_ = false;
   WrenchRange told_;
   // scratch
+  mutable RowCheck rows_;
   mutable PairCheck pair_check_;
   mutable SolutionCheck solution_check_;
 };

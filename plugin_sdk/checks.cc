@@ -1,6 +1,7 @@
 #include "plugin_sdk/checks.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -10,19 +11,31 @@ namespace {
 constexpr std::uint64_t kUnknown = ~0ULL;
 constexpr std::size_t kMaxRowWords = 64;
 
-std::string check_column(const stage::ColumnInfo& column, std::uint64_t count,
-                         std::array<std::uint64_t, kMaxRowWords>* rows) {
-  const auto name = [&] { return std::string("column ") + column.name; };
-  if (column.rows_index == stage::kScalar)
-    return count == 1 ? "" : name() + " must be one value, has " + std::to_string(count);
-  if (count % column.components != 0 || count / column.components < column.extra)
-    return name() + " has " + std::to_string(count) + " elements, not a whole number of rows";
-  const std::uint64_t found = count / column.components - column.extra;
+// Rows of each word of a method, as the columns looked at so far have them.
+using RowCounts = std::array<std::uint64_t, kMaxRowWords>;
+
+// The rows of a column that are its word's, or kUnknown if there is no whole number of them.
+std::uint64_t rows_found(const stage::ColumnInfo& column, std::uint64_t count) {
+  const std::uint64_t rows = count / column.components;
+  return rows * column.components == count && rows >= column.extra ? rows - column.extra : kUnknown;
+}
+
+bool fits(const stage::ColumnInfo& column, std::uint64_t count, RowCounts* rows) {
+  if (column.rows_index == stage::kScalar) return count == 1;
   std::uint64_t& expected = (*rows)[column.rows_index];
-  if (expected == kUnknown) expected = found;
-  return found == expected ? ""
-                           : name() + " has " + std::to_string(found + column.extra) + " rows, expected " +
-                                 std::to_string(expected + column.extra) + " (one per " + column.rows + ")";
+  if (expected == kUnknown) return (expected = rows_found(column, count)) != kUnknown;
+  std::uint64_t wanted = 0;
+  return !__builtin_mul_overflow(expected + column.extra, std::uint64_t{column.components}, &wanted) && count == wanted;
+}
+
+// Of a column that does not fit.
+std::string misfit(const stage::ColumnInfo& column, std::uint64_t count, const RowCounts& rows) {
+  const std::string name = std::string("column ") + column.name;
+  if (column.rows_index == stage::kScalar) return name + " must be one value, has " + std::to_string(count);
+  const std::uint64_t found = rows_found(column, count);
+  if (found == kUnknown) return name + " has " + std::to_string(count) + " elements, not a whole number of rows";
+  return name + " has " + std::to_string(found + column.extra) + " rows, expected " +
+         std::to_string(rows[column.rows_index] + column.extra) + " (one per " + column.rows + ")";
 }
 
 }  // namespace
@@ -46,17 +59,30 @@ std::size_t first_not_unit(std::span<const double> numbers, std::size_t componen
 }
 
 std::string check_rows(const stage::MethodInfo& method, ColumnCounts request, ColumnCounts reply) {
-  std::array<std::uint64_t, kMaxRowWords> rows;
-  rows.fill(kUnknown);
-  for (std::size_t i = 0; i < request.size(); ++i) {
-    std::string problem = check_column(method.request[i], request[i], &rows);
-    if (!problem.empty()) return problem;
-  }
-  for (std::size_t i = 0; i < reply.size(); ++i) {
-    std::string problem = check_column(method.reply[i], reply[i], &rows);
-    if (!problem.empty()) return problem;
-  }
+  RowCounts rows;
+  std::fill_n(rows.begin(), method.row_words, kUnknown);
+  for (std::size_t i = 0; i < request.size(); ++i)
+    if (!fits(method.request[i], request[i], &rows)) return misfit(method.request[i], request[i], rows);
+  for (std::size_t i = 0; i < reply.size(); ++i)
+    if (!fits(method.reply[i], reply[i], &rows)) return misfit(method.reply[i], reply[i], rows);
   return {};
+}
+
+RowCheck::RowCheck() {
+  for (Counts& passed : passed_) passed.request.fill(kUnknown), passed.reply.fill(kUnknown);
+}
+
+std::string RowCheck::check(stage::Method method, ColumnCounts request, ColumnCounts reply) {
+  Counts& passed = passed_[static_cast<std::size_t>(method)];
+  const auto is_known = [](ColumnCounts counts, const auto& known) {
+    return std::equal(counts.begin(), counts.end(), known.begin());
+  };
+  if (is_known(request, passed.request) && is_known(reply, passed.reply)) return {};
+  std::string problem = check_rows(stage::method_info(method), request, reply);
+  if (!problem.empty()) return problem;
+  std::ranges::copy(request, passed.request.begin());
+  std::ranges::copy(reply, passed.reply.begin());
+  return problem;
 }
 
 }  // namespace gravitas

@@ -1,11 +1,13 @@
 // Checks of answers: what the kernel demands of every reply, and what a plugin's author can test against.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 
 #include "schemas/frame/column.h"
+#include "schemas/stage_frames.h"
 
 namespace gravitas {
 
@@ -26,5 +28,18 @@ using ColumnCounts = std::span<const std::uint64_t>;
 // Structure of a reply: every column a whole number of rows; single values present; columns that name the same
 // rows equally long, and as long as the request's where it has such rows. Empty, or a sentence naming the column.
 std::string check_rows(const stage::MethodInfo& method, ColumnCounts request, ColumnCounts reply);
+
+// The same for many replies: counts that passed when the method was last asked pass at a glance.
+class RowCheck {
+ public:
+  RowCheck();
+  std::string check(stage::Method method, ColumnCounts request, ColumnCounts reply);
+
+ private:
+  struct Counts {
+    std::array<std::uint64_t, GRAVITAS_MAX_COLUMNS> request, reply;
+  };
+  std::array<Counts, stage::kMethodCount> passed_;
+};
 
 }  // namespace gravitas

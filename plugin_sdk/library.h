@@ -21,8 +21,8 @@ struct PluginLibrary {
 // no plugin, made for another schema or version of the interface.
 PluginLibrary load_plugin_library(const std::string& path, std::string* problem);
 
-// The same from the file itself, of which no copy is made: for a process that asks for each path once, and ends before any of the
-// files may be replaced.
+// The same from the file itself, of which no copy is made: for a process that asks for each path once, and ends before
+// any of the files may be replaced.
 PluginLibrary look_into_plugin_library(const std::string& path, std::string* problem);
 
 // The plain declaration of a table as C++ values.

@@ -53,8 +53,8 @@ struct Property {
   static Property choice(std::string name, std::vector<std::string> choices);
   static Property vector(std::string name, std::string unit, std::string frame);
   static Property quaternion(std::string name, std::string frame);
-  // With a unit that begins with "s," the first column is a time, which ascends from row to row; twice the same is a jump. At
-  // jumps of forces steps end, and what is asked before is asked on that side.
+  // With a unit that begins with "s," the first column is a time, which ascends from row to row; twice the same is a
+  // jump. At jumps of forces steps end, and what is asked before is asked on that side.
   static Property table(std::string name, std::uint32_t columns, std::string unit, std::string frame);
   // May be absent. Of forces only.
   static Property body(std::string name);

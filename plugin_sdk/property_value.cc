@@ -103,6 +103,9 @@ bool take_quaternion(const Property& declared, const PropertyValue& given, std::
   return true;
 }
 
+// A table whose first column is a time.
+bool is_over_time(const Property& table) { return table.unit.starts_with("s,"); }
+
 // Numbers of one row of a table, whatever the nesting inside it.
 bool take_row(const Property& declared, const PropertyValue& row, std::vector<double>* out,
               std::vector<PropertyProblem>* problems) {
@@ -125,7 +128,7 @@ bool take_table(const Property& declared, const PropertyValue& given, std::vecto
                        " numbers; allowed: " + allowed_values(declared),
                    problems);
     }
-    if (!declared.unit.starts_with("s,")) continue;
+    if (!is_over_time(declared)) continue;
     // the times of this row, the one before, and the one before that
     const double* time = &(*out)[before];
     const auto columns = static_cast<std::ptrdiff_t>(declared.columns);
@@ -298,7 +301,7 @@ std::vector<double> jumps_of(const std::vector<Property>& declared, std::span<co
   std::vector<double> jumps;
   for (const Property& p : declared) {
     const std::size_t size = flat_size_of(p, numbers);
-    if (p.kind == PropertyKind::kTable && p.unit.starts_with("s,"))
+    if (p.kind == PropertyKind::kTable && is_over_time(p))
       for (std::size_t row = 1 + p.columns; row < size; row += p.columns)
         if (numbers[row] == numbers[row - p.columns]) jumps.push_back(numbers[row]);
     numbers = numbers.subspan(size);

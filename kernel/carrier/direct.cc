@@ -1,6 +1,7 @@
 // Direct hosting: the plugins are libraries of this process and columns are pointers into the arena.
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <exception>
@@ -13,8 +14,6 @@
 
 namespace gravitas::kernel {
 namespace {
-
-using PluginLibraryList = std::vector<PluginLibrary>;
 
 class DirectCarrier final : public Carrier {
  public:
@@ -35,7 +34,7 @@ class DirectCarrier final : public Carrier {
   };
   static std::int32_t derivative(void* context, const gravitas_column* request, gravitas_reply_column* reply);
 
-  PluginLibraryList libraries_;
+  std::vector<PluginLibrary> libraries_;
   std::vector<void*> instances_;
   ThreadPool threads_;
 };
@@ -101,8 +100,14 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
   gravitas_error error;
   error.text[0] = '\0';
   CallResult result;
+  const std::uint64_t generation = arena->generation();
+  arena->hold();
   result.status = libraries_[call.target].table->call(instances_[call.target], static_cast<std::uint32_t>(call.method),
                                                       request.data(), reply.data(), &host, &error);
+  for (std::size_t i = 0; i < call.reply.size() && arena->generation() != generation; ++i)
+    std::memcpy(arena->data(call.reply[i]), reply[i].data,
+                std::min(reply[i].count, reply[i].capacity) * stage::element_size(call.info().reply[i].type));
+  arena->let_go();
   if (open.nested_fault) std::rethrow_exception(open.nested_fault);
   if (floating_point_control() != control) {
     set_floating_point_control(control);

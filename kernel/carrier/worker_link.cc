@@ -51,10 +51,7 @@ std::string last_words(const WorkerProcess& process) {
   return words.empty() ? words : "; its last words: " + words;
 }
 
-std::uint64_t next_epoch() {
-  static std::atomic<std::uint64_t> epoch{0};
-  return ++epoch;
-}
+std::atomic<std::uint64_t> last_epoch{0};
 
 [[noreturn]] void fail_start(const std::string& why) { throw StageFault(FaultKind::kHandshake, "handshake", why); }
 
@@ -118,7 +115,7 @@ std::shared_ptr<grpc::Channel> worker_channel(int descriptor) {
 
 WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
                        std::function<void()> on_end, std::stop_token stop)
-    : stop_(std::move(stop)), epoch_(next_epoch()), address_(slot.plugins[0].address) {
+    : stop_(std::move(stop)), epoch_(++last_epoch), address_(slot.plugins[0].address) {
   control::v1::Hello hello = hello_of_this_kernel();
   hello.set_epoch(epoch_);
   hello.set_nonce(channel::now_ns() ^ (static_cast<std::uint64_t>(getpid()) << 32));

@@ -46,7 +46,8 @@ void Environment::let_sleep(std::uint32_t body, bool sleeps) {
 
 bool Environment::does_anything_move() const {
   if (sleepers_ == 0 || !wrench_is_constant_ || !model_.curves.empty()) return model_.body_count > 0;
-  for (std::uint32_t i = is_idle_ ? model_.body_count : 0; i < model_.body_count; ++i) {
+  const std::uint32_t to_look_at = is_idle_ ? 0 : model_.body_count;
+  for (std::uint32_t i = 0; i < to_look_at; ++i) {
     if (is_awake(i)) return true;
     if ((model_.flags[i] & kKinematic) != 0 && (!vector_at(front().linear_velocity.span(), i).isZero(0.0) ||
                                                 !vector_at(front().angular_velocity.span(), i).isZero(0.0)))

@@ -221,7 +221,9 @@ kernel::CallResult SimulatedCarrier::call(OpenCall* open, const kernel::StageCal
     reply[i] = {open->reply.bytes() + open->rooms[i].offset, open->rooms[i].capacity, 0};
 
   Derivatives services(arena, derivatives);
+  arena->hold();
   host::CallEnd end = plugins_.call(call.target, call.method, request.data(), reply.data(), &services);
+  arena->let_go();
   services.rethrow();
   if (dead_) die("while another plugin of its process was asked");
   if (end.status == GRAVITAS_OK && order)

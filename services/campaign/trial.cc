@@ -126,6 +126,8 @@ class Run {
   void judge_swaps();
   void step_neighbour(std::uint32_t step);
   void write();
+  void note_fallbacks();
+  std::vector<Slot> hit_by(const PlannedFault& fault) const;
   // A busy machine's deadlines have used up the slot's budget, with faults that it would have borne: what follows is right.
   bool is_worn_out(Slot slot) const;
   int process_of(Slot slot) const;
@@ -257,12 +259,14 @@ void Run::go() {
   write();
 }
 
+std::vector<Slot> Run::hit_by(const PlannedFault& fault) const {
+  return is_between_calls(fault) ? sharing(scene_, fault.slot) : std::vector<Slot>{fault.slot};
+}
+
 Run::Injected* Run::find(const FaultRecord& record) {
   Injected* later = nullptr;
   for (Injected& fault : faults_) {
-    const std::vector<Slot> hit =
-        is_between_calls(*fault.plan) ? sharing(scene_, fault.plan->slot) : std::vector<Slot>{fault.plan->slot};
-    const bool is_hit = std::ranges::find(hit, record.fault.slot) != hit.end();
+    const bool is_hit = std::ranges::count(hit_by(*fault.plan), record.fault.slot) > 0;
     if (!fault.happened || !is_hit || fault.records.size() >= fault.plan->times) continue;
     if (fault.plan->step == record.step) return &fault;
     // one that is seen in the next call
@@ -272,20 +276,23 @@ Run::Injected* Run::find(const FaultRecord& record) {
 }
 
 bool Run::is_worn_out(Slot slot) const {
-  std::uint32_t failures = 0, unprovoked = 0;
+  std::uint32_t failures = 0, deadlines = 0, planned = 0;
   for (const FaultRecord& record : world_->faults()) {
     if (record.fault.slot != slot) continue;
     ++failures;
-    const bool is_planned = std::ranges::any_of(faults_, [&](const Injected& one) {
-      return one.plan->slot == slot && one.plan->step <= record.step && record.step <= one.plan->step + 1;
-    });
-    unprovoked += record.fault.kind == kernel::FaultKind::kDeadline && !is_planned ? 1 : 0;
+    deadlines += record.fault.kind == kernel::FaultKind::kDeadline ? 1 : 0;
   }
-  return unprovoked > 0 && failures >= kernel::SlotHost::kBudget;
+  for (const Injected& fault : faults_)
+    if (fault.happened && std::ranges::count(hit_by(*fault.plan), slot) > 0) planned += fault.plan->times;
+  return deadlines > 0 && failures > planned && failures >= kernel::SlotHost::kBudget;
+}
+
+void Run::note_fallbacks() {
+  for (const FaultRecord& record : world_->faults()) has_other_plugin_ |= record.recovered_by.starts_with("fallback");
 }
 
 void Run::judge_divergence(std::uint32_t step) {
-  for (const FaultRecord& record : world_->faults()) has_other_plugin_ |= record.recovered_by.starts_with("fallback");
+  note_fallbacks();
   if (has_other_plugin_) {
     if (!is_finite(*world_)) forbid(fmt::format("the fallback's step {} is not finite", step));
     return;
@@ -311,7 +318,7 @@ void Run::judge_pause(std::uint32_t step) {
   for (Injected& fault : faults_)
     if (fault.plan->duty == Duty::kPoison && fault.plan->step == step && fault.plan->slot == last.slot) poison = &fault;
   const bool is_tired = is_worn_out(last.slot);
-  if ((poison == nullptr && !is_tired) || plan_.has_fallbacks) {
+  if ((poison == nullptr || plan_.has_fallbacks) && !is_tired) {
     for (Injected& fault : faults_)
       if (fault.plan->step == step) fault.outcome = "forbidden";
     forbid(
@@ -319,6 +326,8 @@ void Run::judge_pause(std::uint32_t step) {
     return;
   }
   if (poison != nullptr) poison->outcome = "Q";
+  note_fallbacks();
+  if (has_other_plugin_) return;
   Environment resumed(alone_description());
   const std::string problem = resumed.restore(world_->saved_state());
   if (!problem.empty()) return forbid(fmt::format("the state of the pause cannot be resumed: {}", problem));

@@ -22,8 +22,8 @@ using conformance::Question;
 
 namespace {
 
-// How long nothing must come for a frame to count as dropped.
-constexpr double kQuiet = 0.02;
+// How long (s) nothing must come for a frame to count as dropped.
+constexpr double kQuiet = 0.02, kQuickQuiet = 0.005;
 // Room of each column beside what the questions need.
 constexpr std::uint64_t kSpareElements = 4096;
 
@@ -36,7 +36,9 @@ enum class Expected {
 class FrameAbuser {
  public:
   FrameAbuser(const Examination& examination, const Question& question)
-      : question_(question), talk_(examination.examinee, examination.patience, elements_for(question)) {
+      : question_(question),
+        quiet_(examination.options.quick ? kQuickQuiet : kQuiet),
+        talk_(examination.examinee, examination.patience, elements_for(question)) {
     good_ = talk_.ask(question);
     if (!good_.ok()) throw std::runtime_error("before any abuse: " + outcome_text(good_));
   }
@@ -50,7 +52,7 @@ class FrameAbuser {
     try {
       talk_.post(frame);
       const std::optional<Answer> answer =
-          talk_.receive(question_, frame, expected == Expected::kDropped ? kQuiet : talk_.deadline());
+          talk_.receive(question_, frame, expected == Expected::kDropped ? quiet_ : talk_.deadline());
       const std::string finding = judge(what, answer, expected);
       return finding.empty() ? after(what) : finding;
     } catch (const kernel::StageFault& fault) {
@@ -88,6 +90,7 @@ class FrameAbuser {
   }
 
   const Question& question_;
+  const double quiet_;
   MailboxTalk talk_;
   Answer good_{GRAVITAS_OK, {}, {}, conformance::empty_reply(question_.method)};
 };

@@ -28,6 +28,7 @@ class MailboxTalk {
   // Starts a worker and hands over segments with room for `elements` numbers in each column. Throws
   // kernel::StageFault.
   MailboxTalk(const Examinee& examinee, const Patience& patience, std::uint64_t elements);
+  ~MailboxTalk() { link_.kill(); }
   MailboxTalk(const MailboxTalk&) = delete;
   MailboxTalk& operator=(const MailboxTalk&) = delete;
 

@@ -18,6 +18,11 @@ namespace {
 
 constexpr int kSteps = 4, kQuickSteps = 3;
 
+// Is any part of its answers a part of the next question?
+bool goes_on(stage::Method method) {
+  return method == stage::Method::kIntegratorIntegrate || method == stage::Method::kSolverSolve;
+}
+
 // The question that a kernel asks next: what was answered is the new state, and what the plugin wants to be given back.
 void go_on(stage::Method method, const MessageColumns& reply, MessageColumns* request) {
   if (method == stage::Method::kIntegratorIntegrate) {
@@ -50,6 +55,7 @@ std::vector<Answer> chain(CarrierSubject* subject, const Question& question, int
 std::string judge_chains(Examination& examination) {
   const int steps = examination.options.quick ? kQuickSteps : kSteps;
   for (const Question* question : examination.one_of_each_method()) {
+    if (!goes_on(question->method)) continue;
     examination.blamed_call = call_text(question->method, question->request);
     const auto one = examination.fresh(examination.usual_hosting()),
                many = examination.fresh(examination.usual_hosting());

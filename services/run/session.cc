@@ -18,10 +18,10 @@
 #include "services/events/event_source.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
-#include "services/recorder/durable_file.h"
 #include "services/recorder/event_log.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/json.h"
+#include "services/recorder/output_file.h"
 #include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/recorder/trajectory.h"
@@ -145,8 +145,8 @@ class Run final : private kernel::CommitListener {
       if (!options_.reactions.empty())
         reactions_ =
             std::make_unique<ReactionLog>(options_.reactions, description_, options_.sample_every.value_or(0.0));
-      // so that nothing is simulated for a report that cannot be written
-      if (!options_.report.empty()) write_text_file(options_.report, "", "report");
+      // opened now, so that nothing is simulated for a report that cannot be written
+      if (!options_.report.empty()) report_.emplace("report", options_.report);
     } catch (const std::system_error& error) {
       throw BadInput(error.what());
     }
@@ -206,8 +206,9 @@ class Run final : private kernel::CommitListener {
     guard([&] { events_->close(); });
     write_report();
     guard([&] {
-      if (!options_.report.empty())
-        write_text_file(options_.report, to_json(result_.report, JsonForm::kPage), "report");
+      if (!report_) return;
+      report_->write(to_json(result_.report, JsonForm::kPage));
+      report_->close();
     });
     result_.summary = summarize(result_.report, events_->meetings());
   }
@@ -537,6 +538,7 @@ class Run final : private kernel::CommitListener {
   recorder::v1::Tally resumed_tally_;  // of the checkpoint
   JournalReading journal_;             // of the checkpoint
   std::unique_ptr<TrajectoryWriter> trajectory_;
+  std::optional<OutputFile> report_;
   std::unique_ptr<ReactionLog> reactions_;
   std::unique_ptr<EventLog> events_;
   EventKinds event_kinds_ = default_event_kinds();

@@ -10,9 +10,12 @@
 #include <fstream>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/integrator.h"
 #include "services/run/session.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/paths.h"
@@ -160,6 +163,65 @@ void memory(benchmark::State& state) {
   }
 }
 
+// What leaving out saves: a hundred bodies in free flight that have no use for a feature, with a use of one, and a loop over
+// them that knows of no features at all.
+constexpr std::uint32_t kFlying = 100;
+constexpr double kFlightStep = 1e-6;
+
+enum class Use { kNothing, kSleep, kJoints, kContacts };
+
+Vector3 start_of_flight(std::uint32_t body) { return {2.0 * (body % 10), 2.0 * (body / 10), 0}; }
+Twist twist_of_flight() { return {Vector3(1, 0, 0), Vector3(0, 1, 0)}; }
+
+WorldBuilder flight_with(Use use, Hosting hosting) {
+  WorldBuilder builder(hosting);
+  builder.steps(kEndless, kFlightStep).space("space_dynamic_bvh");
+  const auto add = [&](const Vector3& position) {
+    if (use == Use::kContacts)
+      builder.sphere(0.5, 1.0, position);
+    else
+      builder.point(1.0, Vector3(0.1, 0.1, 0.1), position);
+    builder.body().twist = twist_of_flight();
+    if (use == Use::kSleep) builder.body().flags |= kCanSleep;
+  };
+  for (std::uint32_t i = 0; i < kFlying; ++i) add(start_of_flight(i));
+  if (use == Use::kJoints) {
+    add(Vector3(1e4, 0, 0));
+    builder.joint("Spherical", "constraint_spherical", kFlying, kNone, {1e4, 0, 0});
+  }
+  return builder;
+}
+
+void plan(benchmark::State& state, Use use) {
+  Environment world(flight_with(use, Hosting::kDirect).description());
+  for (int i = 0; i < 20; ++i) step(&world, &state);
+  for (auto _ : state) step(&world, &state);
+
+  Environment workers(flight_with(use, Hosting::kSharedMemory).description());
+  step(&workers, &state);
+  std::set<int> processes;
+  for (const kernel::PlannedSlot& slot : workers.plan().slots) processes.insert(slot.process_id);
+  double bytes = 0.0;
+  for (const int process : processes) bytes += resident(process);
+  state.counters["processes"] = static_cast<double>(processes.size());
+  state.counters["megabytes"] = bytes / 1e6;
+}
+
+// The same motion where there is nothing else: no columns, checks, states, hashes or slots.
+void without_engine(benchmark::State& state) {
+  std::vector<BodyState> bodies;
+  for (std::uint32_t i = 0; i < kFlying; ++i)
+    bodies.push_back({{start_of_flight(i), Quaternion::Identity()}, twist_of_flight()});
+  const Acceleration none{Vector3::Zero(), Vector3::Zero()};
+  for (auto _ : state) {
+    for (BodyState& body : bodies) {
+      body.twist = accelerated(body.twist, none, 0.0, kFlightStep);
+      body.pose = displaced(body.pose, kFlightStep * body.twist.linear, kFlightStep * body.twist.angular);
+    }
+    benchmark::ClobberMemory();
+  }
+}
+
 BENCHMARK_CAPTURE(free_body, direct, Hosting::kDirect)->UseRealTime();
 BENCHMARK_CAPTURE(free_body, shm, Hosting::kSharedMemory)->UseRealTime();
 BENCHMARK_CAPTURE(free_body, grpc, Hosting::kGrpc)->UseRealTime();
@@ -178,6 +240,11 @@ BENCHMARK_CAPTURE(resting, visited, SleepRule{}.energy, true)
     ->Arg(10'000)
     ->UseRealTime()
     ->Unit(benchmark::kMicrosecond);
+BENCHMARK(without_engine)->UseRealTime();
+BENCHMARK_CAPTURE(plan, nothing, Use::kNothing)->UseRealTime();
+BENCHMARK_CAPTURE(plan, sleep, Use::kSleep)->UseRealTime();
+BENCHMARK_CAPTURE(plan, joints, Use::kJoints)->UseRealTime();
+BENCHMARK_CAPTURE(plan, contacts, Use::kContacts)->UseRealTime();
 BENCHMARK(start_to_first_step)->UseRealTime()->Iterations(20)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pile_in_workers, cheap, 0)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pile_in_workers, physics, 1)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);

@@ -43,6 +43,25 @@ TEST(Arena, GrowingKeepsEveryColumnAndCountsTheGeneration) {
   EXPECT_EQ(arena.generation(), generation + 1);
 }
 
+TEST(Arena, WhatItLeavesStaysWhileItIsHeld) {
+  Arena arena;
+  const Column<double> a(&arena, 3, 0), b(&arena, 3, 0);
+  arena.seal();
+  const std::span<double> before = a.span();
+  std::iota(before.begin(), before.end(), 1.0);
+  arena.hold();
+  arena.hold();
+  b.resize(4);
+  b.resize(100);
+  ASSERT_NE(a.data(), before.data());
+  arena.let_go();
+  EXPECT_EQ(before[2], 3.0);
+  before[2] = 5.0;
+  EXPECT_EQ(a[2], 3.0);
+  arena.let_go();
+  EXPECT_EQ(a[2], 3.0);
+}
+
 TEST(Arena, AColumnIsAssignedThoughRoomForItMovesBoth) {
   Arena arena;
   const Column<double> from(&arena, 3, 3), to(&arena, 0, 0);

@@ -406,6 +406,42 @@ TEST(Sleep, AForceThatChangesWakes) {
   }
 }
 
+// In the middle of a step, and from there on as if it had never slept.
+TEST(Sleep, AForceThatJumpsWakesAtItsTime) {
+  constexpr double kJump = 1.004, kPush = 3.0;
+  WorldBuilder builder;
+  builder.steps(200, kTimeStep)
+      .material({0.0, 0.0, 0.0, 0.0})
+      .ground()
+      .box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
+  may_sleep(&builder).gravity(kDown);
+  builder.force("Basic", "force_basic", {0,   0,     0, 0, 0,     0, 0, 0, 0,     0,     4,     //
+                                         0.0, 0,     0, 0, kJump, 0, 0, 0, kJump, kPush, 0, 0,  //
+                                         9.0, kPush, 0, 0, 0});
+  builder.description().switches = {kJump};
+  Environment world(builder.description());
+  run(&world, 100);
+  EXPECT_TRUE(world.is_asleep(1));
+  run(&world, 100);
+  EXPECT_NEAR(velocity(world, 1).x(), (2.0 - kJump) * kPush / 2.0, 1e-12);
+}
+
+// The stages are asked there for its sake, which changes no bit.
+TEST(Sleep, AFaultOrderedIntoAStepInWhichAllSleepIsInjectedThere) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(100, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
+  may_sleep(&builder).gravity(kDown);
+  Environment quiet(builder.description()), world(builder.description());
+  world.inject({Slot::kSolver, "kill", 90});
+  run(&quiet, 100);
+  run(&world, 100);
+  EXPECT_TRUE(world.is_asleep(1));
+  EXPECT_TRUE(quiet.faults().empty());
+  ASSERT_EQ(world.faults().size(), 1U);
+  EXPECT_EQ(world.faults()[0].step, 90U);
+  EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
+}
+
 // A pull that grows all the time, however slowly, is no rest.
 TEST(Sleep, NothingSleepsUnderAForceThatKeepsChanging) {
   WorldBuilder builder;

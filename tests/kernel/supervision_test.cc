@@ -104,6 +104,18 @@ TEST_P(Supervised, DeathsInsideANestedCallAreRecoveredThere) {
   for (const kernel::FaultRecord& record : world.faults()) EXPECT_FALSE(record.recovered_by.empty());
 }
 
+// Room is made for them, so the arena moves while the asker, a library of the kernel's process, reads it.
+TEST_P(Supervised, TooManyRowsInANestedCallSpareItsAsker) {
+  WorldBuilder mixed = builder();
+  mixed.description().integrator.hosting = Hosting::kDirect;
+  Environment world(mixed.description());
+  world.inject({Slot::kForce, "double", 4});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  ASSERT_EQ(world.faults().size(), 1U);
+  EXPECT_EQ(world.faults()[0].fault.kind, FaultKind::kBadStructure);
+}
+
 TEST_P(Supervised, ActiveAndStandbyMayDieTogether) {
   Environment world(builder().description());
   world.inject({Slot::kSolver, "kill", 6, 2});

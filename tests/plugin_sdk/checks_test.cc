@@ -114,5 +114,22 @@ TEST(CheckRows, WantsSingleValues) {
   EXPECT_EQ(check_rows(integrate, request, reply), "column position has 1 rows, expected 2 (one per body)");
 }
 
+TEST(RowCheck, FindsEachTimeWhatCheckRowsFinds) {
+  RowCheck rows;
+  const Counts request{9, 9, 3, 3, 3}, other{6, 6, 2, 2, 2}, uneven{9, 6, 3, 3, 3};
+  const auto problem = [&](const Counts& asked, const Counts& answered) {
+    return rows.check(stage::Method::kSpacePairs, asked, answered);
+  };
+  EXPECT_NE(problem(uneven, {0}), "");
+  EXPECT_NE(problem(uneven, {0}), "");
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(problem(request, {8}), "");
+  EXPECT_NE(problem(request, {3}), "");
+  EXPECT_NE(problem(uneven, {8}), "");
+  EXPECT_EQ(problem(other, {8}), "");
+  EXPECT_EQ(problem(request, {8}), "");
+  // a scalar that is missing where nothing has passed yet
+  EXPECT_NE(rows.check(stage::Method::kIntegratorIntegrate, Counts(15, 0), Counts(6, 0)), "");
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "workers/collision/standard/contact_axis.h"
 #include "workers/collision/standard/unit_vector.h"
@@ -205,25 +206,52 @@ struct Circle3 {
   Vector3 tangent(const Vector2& d) const { return v * d.x() - u * d.y(); }
 };
 
-// The rate, up to a positive factor, at which a point of the small circle, given by its direction,
-// moves away from the nearest point of the large circle when it goes round.
-double recession(const Circle3& small, const Circle3& large, const Vector2& direction) {
+// How the squared distance F between a point of the small circle and the large circle changes when the point goes round:
+// with the arm from the large circle's centre, its part `flat` in the large circle's plane and rho = |flat|,
+//
+//   F = |arm|^2 + R^2 - 2 R rho
+//
+// differentiated by the angle.
+struct Recession {
+  double rate;       // F' / 2
+  double curvature;  // F'' / 2
+  double rho;        // m
+};
+
+Recession recession(const Circle3& small, const Circle3& large, const Vector2& direction) {
   const Vector3 arm = small.at(direction) - large.centre;
-  const Vector3 flat = arm - large.axis * large.axis.dot(arm);
-  const double radial = std::sqrt(flat.squaredNorm());
-  const double scale = radial > 0.0 ? large.radius / radial : 0.0;
-  return small.tangent(direction).dot(arm - scale * flat);
+  const Vector3 velocity = small.radius * small.tangent(direction);
+  const Vector3 acceleration = small.centre - small.at(direction);
+  const auto flattened = [&](const Vector3& v) -> Vector3 { return v - large.axis * large.axis.dot(v); };
+  const Direction radial = direction_of(flattened(arm), large.u);
+  const double outwards = radial.unit.dot(velocity);
+  // (e x axis) . velocity, which turns the arm
+  const double across = large.axis.cross(radial.unit).dot(velocity);
+  const double turning = radial.length > 0.0 ? across * across / radial.length : 0.0;
+  return {velocity.dot(arm) - large.radius * outwards,
+          acceleration.dot(arm) + velocity.squaredNorm() - large.radius * (radial.unit.dot(acceleration) + turning),
+          radial.length};
 }
 
-// The direction between `from` (recession < 0) and `to` (> 0) where the distance has a minimum,
-// bisected to a hundredth of a degree, near enough for Newton.
-Vector2 bisected_minimum(const Circle3& small, const Circle3& large, Vector2 from, Vector2 to) {
-  for (int i = 0; i < 10; ++i) {
-    const Vector2 sum = from + to;
-    const Vector2 middle = sum / std::sqrt(sum.squaredNorm());
-    (recession(small, large, middle) < 0.0 ? from : to) = middle;
+// A part of the small circle between two directions, `half` radians from its middle to either.
+struct RimArc {
+  Vector2 from;
+  Vector2 to;
+  double half;
+};
+
+Vector2 middle_of(const RimArc& arc) {
+  const Vector2 sum = arc.from + arc.to;
+  return sum / std::sqrt(sum.squaredNorm());
+}
+
+// The direction in an arc in whose course the rate rises through zero, bisected to rounding.
+Vector2 bisected_minimum(const Circle3& small, const Circle3& large, RimArc arc) {
+  for (int i = 0; i < 40; ++i) {
+    const Vector2 middle = middle_of(arc);
+    (recession(small, large, middle).rate < 0.0 ? arc.from : arc.to) = middle;
   }
-  return from;
+  return arc.from;
 }
 
 // the axis of the contact between the point of the small circle and the nearest of the large one is
@@ -238,23 +266,39 @@ void offer_rim_contact(const Circle3& small, const Circle3& large, const Vector2
   newton(along < 0.0 ? Vector3(-n.unit) : n.unit, Vector3::Zero(), search);
 }
 
+// Offers all minima of the distance between the circles: arcs are halved until F is monotone, convex or concave on them,
+// which bounds of its derivatives tell, so that neither of two minima close to each other is overlooked.
 void search_rim_pair(const Circle3& small, const Circle3& large, ShallowestAxis* search) {
-  // cosines and sines of multiples of pi / 8
-  constexpr double c = 0.92387953251128674;
-  constexpr double d = 0.70710678118654752;
-  constexpr double s = 0.38268343236508977;
-  const std::array<Vector2, 16> directions = {Vector2(1, 0),  Vector2(c, s),   Vector2(d, d),   Vector2(s, c),
-                                              Vector2(0, 1),  Vector2(-s, c),  Vector2(-d, d),  Vector2(-c, s),
-                                              Vector2(-1, 0), Vector2(-c, -s), Vector2(-d, -d), Vector2(-s, -c),
-                                              Vector2(0, -1), Vector2(s, -c),  Vector2(d, -d),  Vector2(c, -s)};
-  // the slope brackets a minimum also where a maximum hides it from a comparison of distances
-  std::array<double, 16> rates;
-  for (std::size_t i = 0; i < 16; ++i) rates[i] = recession(small, large, directions[i]);
-  for (std::size_t i = 0; i < 16; ++i) {
-    const std::size_t next = (i + 1) % 16;
-    if (!(rates[i] < 0.0 && rates[next] >= 0.0)) continue;
-    const Vector2 minimum = bisected_minimum(small, large, directions[i], directions[next]);
-    offer_rim_contact(small, large, minimum, search);
+  // where there are more arcs or shorter ones, each is taken to hold one minimum at most; ordinary pairs need some 30
+  constexpr std::size_t kArcLimit = 256;
+  constexpr double kShortest = 1e-5;               // rad
+  constexpr double kEighth = 0.78539816339744831;  // of the circle, rad
+  const std::array<Vector2, 4> quarters = {Vector2(1, 0), Vector2(0, 1), Vector2(-1, 0), Vector2(0, -1)};
+  std::array<RimArc, kArcLimit> arcs;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < 4; ++i) arcs[count++] = {quarters[i], quarters[(i + 1) % 4], kEighth};
+
+  const double r = small.radius;
+  const Vector3 between = small.centre - large.centre;
+  const double offset = std::sqrt(Vector2(small.u.dot(between), small.v.dot(between)).squaredNorm());
+  for (std::size_t i = 0; i < count; ++i) {
+    const RimArc arc = arcs[i];
+    const Vector2 middle = middle_of(arc);
+    const Recession there = recession(small, large, middle);
+    // the arm's derivatives are at most r long, so |rho^(3)| <= r + 3 r^2 / rho + 3 r^3 / rho^2
+    const double least_rho = there.rho - r * arc.half;
+    const double ratio = r / least_rho;
+    const double third = r * offset + large.radius * r * (1.0 + 3.0 * ratio * (1.0 + ratio));
+    const double change = least_rho > 0.0 ? arc.half * third : std::numeric_limits<double>::infinity();
+    if (std::fabs(there.rate) > arc.half * (std::fabs(there.curvature) + 0.5 * change)) continue;
+    if (there.curvature <= -change) continue;
+    if (there.curvature >= change || arc.half < kShortest || count + 2 > kArcLimit) {
+      if (recession(small, large, arc.from).rate < 0.0 && recession(small, large, arc.to).rate >= 0.0)
+        offer_rim_contact(small, large, bisected_minimum(small, large, arc), search);
+      continue;
+    }
+    arcs[count++] = {arc.from, middle, 0.5 * arc.half};
+    arcs[count++] = {middle, arc.to, 0.5 * arc.half};
   }
 }
 

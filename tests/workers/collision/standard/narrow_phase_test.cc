@@ -505,5 +505,16 @@ TEST(CylinderCylinder, RimAgainstRimIsSymmetricForACrossedPair) {
   EXPECT_NEAR(deepest(m), depth_along(disc, a, disc, b, contact(m, 0).normal), kTolerance);
 }
 
+TEST(CylinderCylinder, RimsThatMeetTwiceWithinAFewDegreesPartAtTheShallowerPlace) {
+  // rims that run side by side, tilted by 0.008: the places are 3e-5 apart in depth
+  const Shape a = cylinder(0.904926, 0.527304), b = cylinder(0.936323, 0.837026);
+  const Pose X_WA = at(0, 0, 0);
+  const Pose X_WB{Vector3(1.99568, 1.149239, 0.006669),
+                  Quaternion(0.994411, 0.004001, -0.000424, -0.105502).normalized()};
+  Random random(5);
+  const double least = sampled_depth(a, X_WA, b, X_WB, 20000, &random);
+  EXPECT_NEAR(deepest(contacts_of(a, X_WA, b, X_WB)), least, 1e-6);
+}
+
 }  // namespace
 }  // namespace gravitas::collision
