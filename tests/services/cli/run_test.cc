@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -50,7 +51,10 @@ TEST(Run, TheSampleTellsItsStoryWithEverySlotInAProcessOfItsOwn) {
   EXPECT_EQ(report.steps(), 600U);
   EXPECT_EQ(report.bodies(), 3U);
   EXPECT_EQ(report.outcome(), "completed");
-  EXPECT_EQ(report.warnings_size(), 2);
+  // a busy machine's slow answers are warnings, too
+  EXPECT_EQ(std::ranges::count_if(report.warnings(),
+                                  [](const std::string& one) { return one.find("slow") == std::string::npos; }),
+            2);
   ASSERT_EQ(report.plan().slots_size(), 5);
   std::set<int> processes;
   for (const report::v1::PlannedSlot& slot : report.plan().slots()) {
