@@ -128,9 +128,10 @@ TEST_P(LyingSolver, IsRefusedAtTheStart) {
 
 // The run waits until one that is started cold is honest.
 TEST_P(LyingSolver, IsNotTakenAtAColdStart) {
+  std::optional<LyingWorkers> workers;  // outlives the world, whose standbys start beside it
   std::optional<Environment> world;
   world.emplace(builder(0).description());
-  const LyingWorkers workers("solver_sequential", {"protocol", "nonce"});
+  workers.emplace("solver_sequential", std::vector<std::string>{"protocol", "nonce"});
   world->inject({Slot::kSolver, "kill", 10});
   run_to_end(&*world);
   ASSERT_EQ(world->faults().size(), 1U);
@@ -138,8 +139,9 @@ TEST_P(LyingSolver, IsNotTakenAtAColdStart) {
 }
 
 TEST_P(LyingSolver, IsNotTakenAsAStandby) {
+  std::optional<LyingWorkers> workers;  // outlives the world, whose standbys start beside it
   Environment world(builder(1).steps(60'000, 1e-4).description());
-  const LyingWorkers workers("solver_sequential", {"protocol", "processor"});
+  workers.emplace("solver_sequential", std::vector<std::string>{"protocol", "processor"});
   std::vector<std::string> refused;
   while (refused.size() < 2 && world.step_count() < 59'000) {
     ASSERT_EQ(world.step(), StepOutcome::kCommitted);
