@@ -327,13 +327,14 @@ void Run::judge_pause(std::uint32_t step) {
   }
   if (poison != nullptr) poison->outcome = "Q";
   note_fallbacks();
-  if (has_other_plugin_) return;
   Environment resumed(alone_description());
   const std::string problem = resumed.restore(world_->saved_state());
   if (!problem.empty()) return forbid(fmt::format("the state of the pause cannot be resumed: {}", problem));
   while (resumed.step_count() < plan_.steps && resumed.step() == StepOutcome::kCommitted) {
   }
-  if (!(resumed.chain_hash() == scene_.chains[plan_.steps]))
+  if (resumed.step_count() < plan_.steps || !is_finite(resumed))
+    return forbid(fmt::format("what the pause left goes on to step {} only", resumed.step_count()));
+  if (!has_other_plugin_ && !(resumed.chain_hash() == scene_.chains[plan_.steps]))
     forbid("what the pause left does not go on as the quiet run does");
 }
 

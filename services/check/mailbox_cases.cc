@@ -22,7 +22,8 @@ using conformance::Question;
 
 namespace {
 
-// How long (s) nothing must come for a frame to count as dropped.
+// How long (s) nothing must come for a frame to count as dropped. A worker that waits has read a frame within 0.1 ms;
+// the rest is for a busy machine, and one that took even longer fails with the next good question.
 constexpr double kQuiet = 0.02, kQuickQuiet = 0.005;
 // Room of each column beside what the questions need.
 constexpr std::uint64_t kSpareElements = 4096;

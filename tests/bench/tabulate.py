@@ -41,14 +41,22 @@ BOUNDS = [
      "validation_percent", None, "%"),
     ("checkpoints/iterations:200/real_time", "a checkpoint every 100 steps of pile1000 and its journal, direct", "percent",
      2, "%"),
+    *((f"recovery/{fault}/iterations:1/repeats:1", f"{what}, {name}", counter, bound, "us")
+      for fault, what, noticed in (("kill", "killed in a call, shm", 1500), ("segv", "the same, SIGSEGV", 500),
+                                   ("abort", "the same, abort", 500), ("kill_grpc", "killed in a call, gRPC", 1500))
+      for name, counter, bound in (("noticed: median", "noticed_median_us", noticed),
+                                   ("noticed to answered by a warm standby: median", "recovery_median_us", 2e3),
+                                   ("delay of the step: median", "delay_median_us", 2e3),
+                                   ("delay of the step: p99", "delay_p99_us", 10e3))),
     *((f"recovery/{fault}/iterations:1/repeats:1", f"{what}, noticed to answered by a warm standby: {name}", counter, bound, "us")
-      for fault, what in (("kill", "killed in a call, shm"), ("segv", "the same, SIGSEGV"), ("abort", "the same, abort"),
-                          ("hang", "hanging, shm (its deadline not counted)"), ("nan", "answering NaN, shm"),
-                          ("kill_grpc", "killed in a call, gRPC"))
-      for name, counter, bound in (("median", "median_us", 2e3), ("p99", "p99_us", 10e3))),
+      for fault, what in (("hang", "hanging, shm"), ("nan", "answering NaN, shm"))
+      for name, counter, bound in (("median", "recovery_median_us", 2e3), ("p99", "recovery_p99_us", 10e3))),
+    ("recovery/kill_cold/iterations:1/repeats:1", "killed in a call, shm, no standby, delay of the step: median",
+     "delay_median_us", 25e3, "us"),
+    ("recovery/kill_cold/iterations:1/repeats:1", "the same: p99", "delay_p99_us", None, "us"),
     *((f"swap_pause/{carrier}/iterations:1/repeats:1", f"pause of a swap, {carrier}: {name}", counter, bound, "us")
       for carrier in ("direct", "shm", "grpc")
-      for name, counter, bound in (("median", "median_us", 200), ("p99", "p99_us", None))),
+      for name, counter, bound in (("median", "pause_median_us", 200), ("p99", "pause_p99_us", None))),
     ("memory/iterations:1/real_time", "memory of a body, all slots direct", "bytes_per_body", None, "B"),
     ("memory/iterations:1/real_time", "resident memory of a worker", "megabytes_per_worker", None, "MB"),
 ]

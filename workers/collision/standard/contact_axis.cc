@@ -96,6 +96,10 @@ void ShallowestAxis::offer(const Vector3& direction, double shortest) {
   offer_signed(axis.unit.dot(pair_.p_AB) < 0.0 ? Vector3(-axis.unit) : axis.unit);
 }
 
+void ShallowestAxis::offer_axis(const ContactAxis& axis) {
+  if (axis.depth < best_.depth) best_ = axis;
+}
+
 void ShallowestAxis::offer_signed(const Vector3& normal) {
   const double depth = pair_.depth_along(normal);
   if (depth < best_.depth) best_ = {normal, depth, AxisKind::kFree, -1};
@@ -130,6 +134,7 @@ bool find_contact_axes(const ConvexPair& pair, double margin, ContactAxes* out) 
     if (search.depth() < -margin) return false;
     refine_axis(least->normal, &search);
   } else {
+    search.offer_axis(shallowest);
     search_curved(&search);
   }
   if (std::min(shallowest.depth, search.depth()) < -margin) return false;

@@ -61,6 +61,8 @@ class ShallowestAxis {
   // Offers a direction of any length, of either sign: the sign that points from a to b is taken.
   // Directions shorter than `shortest` are ignored: their rounding errors would speak.
   void offer(const Vector3& direction, double shortest = 0.0);
+  // Offers an axis whose depth is known: what is searched after it need not beat less.
+  void offer_axis(const ContactAxis& axis);
   // Offers a unit normal whose sign is settled.
   void offer_signed(const Vector3& normal);
   // The same for a stationary direction. It also replaces one that is as shallow within rounding:
@@ -90,7 +92,8 @@ void refine_axis(const Vector3& start, ShallowestAxis* search);
 void search_great_circle(const Vector3& pole, const Vector3& u, const Vector3& v, double tolerance,
                          ShallowestAxis* search);
 
-// Offers the minima of h that touch rim against rim. Both shapes are cylinders.
+// Offers the minima of h that touch rim against rim, if they are less than the depth known. Both shapes are cylinders,
+// and they overlap.
 void search_rims(ShallowestAxis* search);
 
 }  // namespace gravitas::collision

@@ -1,5 +1,6 @@
 // The curved families of contact_axis.h: Newton's method on the sphere, branch and bound on a great
 // circle, and the minima of the distance between two rims.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -216,22 +217,41 @@ struct Recession {
   double rate;       // F' / 2
   double curvature;  // F'' / 2
   double rho;        // m
+  double distance;   // sqrt(F), m
 };
 
-Recession recession(const Circle3& small, const Circle3& large, const Vector2& direction) {
-  const Vector3 arm = small.at(direction) - large.centre;
-  const Vector3 velocity = small.radius * small.tangent(direction);
-  const Vector3 acceleration = small.centre - small.at(direction);
-  const auto flattened = [&](const Vector3& v) -> Vector3 { return v - large.axis * large.axis.dot(v); };
-  const Direction radial = direction_of(flattened(arm), large.u);
-  const double outwards = radial.unit.dot(velocity);
-  // (e x axis) . velocity, which turns the arm
-  const double across = large.axis.cross(radial.unit).dot(velocity);
-  const double turning = radial.length > 0.0 ? across * across / radial.length : 0.0;
-  return {velocity.dot(arm) - large.radius * outwards,
-          acceleration.dot(arm) + velocity.squaredNorm() - large.radius * (radial.unit.dot(acceleration) + turning),
-          radial.length};
-}
+// The small circle, seen in the frame of the large one: the rows u and v of its plane, and its axis.
+class RimPair {
+ public:
+  RimPair(const Circle3& small, const Circle3& large)
+      : centre_(in_frame(large, small.centre - large.centre)),
+        u_(small.radius * in_frame(large, small.u)),
+        v_(small.radius * in_frame(large, small.v)),
+        radius_(large.radius) {}
+
+  Recession recession(const Vector2& direction) const {
+    const Vector3 out = u_ * direction.x() + v_ * direction.y();
+    const Vector3 velocity = v_ * direction.x() - u_ * direction.y();
+    const Vector3 arm = centre_ + out;
+    const double rho = std::sqrt(arm.head<2>().squaredNorm());
+    const Vector2 radial = rho > 0.0 ? Vector2(arm.head<2>() / rho) : Vector2::UnitX();
+    const double across = radial.x() * velocity.y() - radial.y() * velocity.x();
+    const double turning = rho > 0.0 ? across * across / rho : 0.0;
+    return {velocity.dot(arm) - radius_ * radial.dot(velocity.head<2>()),
+            velocity.squaredNorm() - out.dot(arm) + radius_ * (radial.dot(out.head<2>()) - turning), rho,
+            std::sqrt(Vector2(arm.z(), rho - radius_).squaredNorm())};
+  }
+
+ private:
+  static Vector3 in_frame(const Circle3& large, const Vector3& v) {
+    return {large.u.dot(v), large.v.dot(v), large.axis.dot(v)};
+  }
+
+  Vector3 centre_;  // m
+  Vector3 u_;       // m
+  Vector3 v_;       // m
+  double radius_;   // m, of the large circle
+};
 
 // A part of the small circle between two directions, `half` radians from its middle to either.
 struct RimArc {
@@ -245,11 +265,11 @@ Vector2 middle_of(const RimArc& arc) {
   return sum / std::sqrt(sum.squaredNorm());
 }
 
-// The direction in an arc in whose course the rate rises through zero, bisected to rounding.
-Vector2 bisected_minimum(const Circle3& small, const Circle3& large, RimArc arc) {
-  for (int i = 0; i < 40; ++i) {
+// A direction near that in an arc in which the rate rises through zero; Newton's method ends the search.
+Vector2 bisected_minimum(const RimPair& rims, RimArc arc) {
+  for (int i = 0; i < 20; ++i) {
     const Vector2 middle = middle_of(arc);
-    (recession(small, large, middle).rate < 0.0 ? arc.from : arc.to) = middle;
+    (rims.recession(middle).rate < 0.0 ? arc.from : arc.to) = middle;
   }
   return arc.from;
 }
@@ -268,6 +288,7 @@ void offer_rim_contact(const Circle3& small, const Circle3& large, const Vector2
 
 // Offers all minima of the distance between the circles: arcs are halved until F is monotone, convex or concave on them,
 // which bounds of its derivatives tell, so that neither of two minima close to each other is overlooked.
+// Arcs farther from the large circle than the least depth known have nothing to offer.
 void search_rim_pair(const Circle3& small, const Circle3& large, ShallowestAxis* search) {
   // where there are more arcs or shorter ones, each is taken to hold one minimum at most; ordinary pairs need some 30
   constexpr std::size_t kArcLimit = 256;
@@ -278,23 +299,31 @@ void search_rim_pair(const Circle3& small, const Circle3& large, ShallowestAxis*
   std::size_t count = 0;
   for (std::size_t i = 0; i < 4; ++i) arcs[count++] = {quarters[i], quarters[(i + 1) % 4], kEighth};
 
+  const RimPair rims(small, large);
   const double r = small.radius;
   const Vector3 between = small.centre - large.centre;
   const double offset = std::sqrt(Vector2(small.u.dot(between), small.v.dot(between)).squaredNorm());
+  // flat = c + r d with |d|^2 = 1 - (axis . direction)^2, so the derivatives of rho^2 are at most q1, q2, q3
+  const double beside = 2.0 * r * std::sqrt((between - large.axis * large.axis.dot(between)).squaredNorm());
+  const double tilt = r * r * Vector2(small.u.dot(large.axis), small.v.dot(large.axis)).squaredNorm();
+  const double q1 = beside + tilt, q2 = beside + 2.0 * tilt, q3 = beside + 4.0 * tilt;
   for (std::size_t i = 0; i < count; ++i) {
     const RimArc arc = arcs[i];
     const Vector2 middle = middle_of(arc);
-    const Recession there = recession(small, large, middle);
-    // the arm's derivatives are at most r long, so |rho^(3)| <= r + 3 r^2 / rho + 3 r^3 / rho^2
-    const double least_rho = there.rho - r * arc.half;
-    const double ratio = r / least_rho;
-    const double third = r * offset + large.radius * r * (1.0 + 3.0 * ratio * (1.0 + ratio));
-    const double change = least_rho > 0.0 ? arc.half * third : std::numeric_limits<double>::infinity();
+    const Recession there = rims.recession(middle);
+    if (there.distance - r * arc.half > search->depth()) continue;
+    // bounds of |rho^(3)|: from derivatives of flat, at most r long, and, where the circles are nearly coaxial, of rho^2
+    const double rho = there.rho - r * arc.half, ratio = r / rho;
+    const double third_rho =
+        std::min(r * (1.0 + 3.0 * ratio * (1.0 + ratio)),
+                 (0.5 * q3 + (0.75 * q1 * q2 + 0.375 * q1 * q1 * q1 / (rho * rho)) / (rho * rho)) / rho);
+    const double change =
+        rho > 0.0 ? arc.half * (r * offset + large.radius * third_rho) : std::numeric_limits<double>::infinity();
     if (std::fabs(there.rate) > arc.half * (std::fabs(there.curvature) + 0.5 * change)) continue;
     if (there.curvature <= -change) continue;
     if (there.curvature >= change || arc.half < kShortest || count + 2 > kArcLimit) {
-      if (recession(small, large, arc.from).rate < 0.0 && recession(small, large, arc.to).rate >= 0.0)
-        offer_rim_contact(small, large, bisected_minimum(small, large, arc), search);
+      if (rims.recession(arc.from).rate < 0.0 && rims.recession(arc.to).rate >= 0.0)
+        offer_rim_contact(small, large, bisected_minimum(rims, arc), search);
       continue;
     }
     arcs[count++] = {arc.from, middle, 0.5 * arc.half};
@@ -307,12 +336,19 @@ void search_rim_pair(const Circle3& small, const Circle3& large, ShallowestAxis*
 void search_rims(ShallowestAxis* search) {
   const ConvexPair& pair = search->pair();
   const Vector3 axis = pair.R_AB.col(1);
+  const double sine = std::sqrt(Vector2(axis.x(), axis.z()).squaredNorm());
   for (const double side_a : {1.0, -1.0}) {
     for (const double side_b : {1.0, -1.0}) {
       const Circle3 of_a{Vector3(0.0, side_a * pair.a.size.y(), 0.0), Vector3::UnitY(), Vector3::UnitZ(),
                          Vector3::UnitX(), pair.a.size.x()};
       const Circle3 of_b{pair.p_AB + (side_b * pair.b.size.y()) * axis, axis, pair.R_AB.col(2), pair.R_AB.col(0),
                          pair.b.size.x()};
+      // The solids overlap, so at a minimum of h the point of a's rim lies within b's cap, and that of b's rim within
+      // a's, by no more than the depth there.
+      const Vector3 between = of_a.centre - of_b.centre;
+      const double within_a = side_a * of_a.axis.dot(between), within_b = -side_b * of_b.axis.dot(between);
+      if (within_a + of_b.radius * sine < 0.0 || within_a - of_b.radius * sine > search->depth()) continue;
+      if (within_b + of_a.radius * sine < 0.0 || within_b - of_a.radius * sine > search->depth()) continue;
       // the smaller circle is sampled: what happens on it has its scale
       if (of_a.radius < of_b.radius) {
         search_rim_pair(of_a, of_b, search);
