@@ -4,13 +4,6 @@
 #include <utility>
 
 namespace gravitas::kernel {
-namespace {
-
-constexpr std::uint64_t kPage = 4096;
-
-constexpr std::uint64_t round_up(std::uint64_t value, std::uint64_t unit) { return (value + unit - 1) / unit * unit; }
-
-}  // namespace
 
 ColumnId Arena::add(stage::ElementType type, std::uint64_t count, std::uint64_t capacity) {
   columns_.push_back({0, count, std::max<std::uint64_t>(capacity, count), type});
@@ -30,10 +23,9 @@ void Arena::move_to_new_segment(std::vector<Entry> layout) {
   std::uint64_t size = 0;
   for (Entry& entry : layout) {
     entry.offset = size;
-    size += round_up(entry.capacity * stage::element_size(entry.type), GRAVITAS_COLUMN_ALIGNMENT);
+    size += channel::round_up(entry.capacity * stage::element_size(entry.type), GRAVITAS_COLUMN_ALIGNMENT);
   }
-  channel::Segment segment = channel::Segment::create(
-      "gravitas state", round_up(std::max<std::uint64_t>(size, 1), kPage), channel::Sharing::kReadersOnly);
+  channel::Segment segment = channel::Segment::create("gravitas state", size, channel::Sharing::kReadersOnly);
   for (std::size_t i = 0; base_ != nullptr && i < columns_.size(); ++i) {
     const Entry& old = columns_[i];
     std::memcpy(segment.data() + layout[i].offset, base_ + old.offset, old.count * stage::element_size(old.type));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -25,25 +26,34 @@ enum class FaultKind : std::uint32_t {
 };
 
 // "death", "deadline", …
-const char* fault_kind_name(FaultKind kind);
-
-struct Defences;
-// Whether the check that finds this is off.
-bool is_off(const Defences& defences, FaultKind kind);
+inline const char* fault_kind_name(FaultKind kind) {
+  static constexpr const char* kNames[] = {"death",         "deadline",    "refusal",     "failure",      "bad_frame",
+                                           "bad_structure", "bad_numbers", "bad_physics", "disagreement", "handshake"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
 
 class StageFault : public std::exception {
  public:
-  StageFault(FaultKind what_failed, std::string how_noticed, std::string why)
-      : kind(what_failed), detected_by(std::move(how_noticed)), text(std::move(why)) {}
+  // `rest` waits for the rest of the reason.
+  StageFault(FaultKind what_failed, std::string how_noticed, std::string why, std::function<std::string()> rest = {})
+      : kind(what_failed), detected_by(std::move(how_noticed)), text_(std::move(why)), rest_(std::move(rest)) {}
 
-  const char* what() const noexcept override { return text.c_str(); }
+  const char* what() const noexcept override { return text().c_str(); }
+  // The reason. May wait, since a worker that is known to be dying takes milliseconds until it is known how it ended.
+  const std::string& text() const {
+    if (const auto rest = std::exchange(rest_, nullptr)) text_ += rest();
+    return text_;
+  }
 
   FaultKind kind;
   std::string detected_by;  // "pidfd", "deadline", "status", "wire", "structure", "numbers", "physics", "handshake" …
-  std::string text;
   Slot slot = Slot::kSpace;  // filled where the slot is known
   std::string plugin;
   bool is_unread = false;  // it died before it looked at the request, which is not to blame
+
+ private:
+  mutable std::string text_;
+  mutable std::function<std::string()> rest_;
 };
 
 // One failed call and what became of it, as the report shows it.

@@ -39,7 +39,7 @@ bool Spare::is_done() const {
 
 std::string Spare::problem() const {
   const std::lock_guard lock(mutex_);
-  if (fault_) return "could not be started: " + fault_->text;
+  if (fault_) return "could not be started: " + fault_->text();
   return carrier_ && !carrier_->is_alive() ? "has died" : "";
 }
 

@@ -44,6 +44,18 @@ bool WorkerProcess::wait(int milliseconds) const {
 
 void WorkerProcess::kill() const { syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0); }
 
+ssize_t WorkerProcess::read_output(std::size_t stream) {
+  static thread_local std::array<char, kPipeSize> bytes;
+  const std::lock_guard lock(mutex_);
+  const ssize_t got = read(output_pipes_[stream], bytes.data(), bytes.size());
+  if (got > 0) output_.add(static_cast<channel::OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
+  return got;
+}
+
+void WorkerProcess::catch_up() {
+  for (std::size_t stream = 0; stream < output_pipes_.size(); ++stream) read_output(stream);
+}
+
 std::vector<std::string> WorkerProcess::take_output() {
   const std::lock_guard lock(mutex_);
   return output_.take();
@@ -169,26 +181,19 @@ void Supervisor::execute(Order* order) {
 }
 
 bool Supervisor::read_output(WorkerProcess* process, std::size_t stream) {
-  static thread_local std::array<char, kPipeSize> bytes;
   if (process->output_pipes_[stream] < 0) return false;
-  const ssize_t got = read(process->output_pipes_[stream], bytes.data(), bytes.size());
+  const ssize_t got = process->read_output(stream);
   if (got < 0 && (errno == EAGAIN || errno == EINTR)) return errno == EINTR;
-  if (got <= 0) {
-    close_output(process, stream);
-    return false;
-  }
-  const std::lock_guard lock(process->mutex_);
-  process->output_.add(static_cast<channel::OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
-  return true;
+  if (got <= 0) close_output(process, stream);
+  return got > 0;
 }
 
 void Supervisor::close_output(WorkerProcess* process, std::size_t stream) {
   int& pipe = process->output_pipes_[stream];
   if (pipe < 0) return;
   forget(pipe);
-  close(pipe);
-  pipe = -1;
   const std::lock_guard lock(process->mutex_);
+  close(std::exchange(pipe, -1));
   process->output_.end(static_cast<channel::OutputStream>(stream));
 }
 

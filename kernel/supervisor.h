@@ -31,6 +31,8 @@ class WorkerProcess {
   bool wait(int milliseconds) const;
   void kill() const;
 
+  // Reads at once what a dying process has written, a pipe's content of it at most.
+  void catch_up();
   // What it wrote since the last time, and the last of it (process_output.h). Whole once has_ended().
   std::vector<std::string> take_output();
   std::string last_words() const;
@@ -38,9 +40,12 @@ class WorkerProcess {
  private:
   friend class Supervisor;
 
+  // Reads once; what read(2) returns.
+  ssize_t read_output(std::size_t stream);
+
   int process_id_ = -1;
   int pidfd_ = -1;
-  std::array<int, 2> output_pipes_ = {-1, -1};  // standard output, standard error; the supervisor's
+  std::array<int, 2> output_pipes_ = {-1, -1};  // standard output, standard error; closed by the supervisor
   mutable std::mutex mutex_;
   mutable std::condition_variable reaped_;
   std::atomic<bool> ended_{false};

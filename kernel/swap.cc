@@ -116,7 +116,7 @@ bool StageSlot::advance_swap(PendingSwap* swap) {
     try {
       swap->candidate = spare->take();
     } catch (const StageFault& fault) {
-      refuse(swap, "it could not be prepared: " + fault.text);
+      refuse(swap, "it could not be prepared: " + fault.text());
       return true;
     }
     if (!swap->only_compare) record.wait_us += microseconds(start);
@@ -206,7 +206,7 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, Arena* aren
   } catch (const StageFault& fault) {
     if (!fault.plugin.empty()) throw;
     if (fault.kind != FaultKind::kDeadline || swap->only_compare) {
-      refuse(swap, "in shadow: " + fault.text);
+      refuse(swap, "in shadow: " + fault.text());
       return false;
     }
     // slow is no reason to refuse; it was ended all the same, and goes on unseen until the cut-over
@@ -245,7 +245,7 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
       try {
         *carrier = hosts_[host]->prepare(hosts_[host]->description())->take();
       } catch (const StageFault& fault) {
-        complaints_.push_back("no other process for a re-run: " + fault.text);
+        complaints_.push_back("no other process for a re-run: " + fault.text());
       }
     }
     if (!*carrier) return unknown;

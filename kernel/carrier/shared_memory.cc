@@ -23,9 +23,6 @@ using channel::SegmentRole;
 // A waiting kernel looks at the worker's marks of progress this often.
 constexpr std::uint64_t kLookNs = 50'000'000;
 
-constexpr std::uint64_t kPageSize = 4096;
-constexpr std::uint64_t aligned(std::uint64_t bytes, std::uint64_t unit) { return (bytes + unit - 1) / unit * unit; }
-
 class SharedMemoryCarrier final : public Carrier {
  public:
   SharedMemoryCarrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop);
@@ -52,7 +49,7 @@ class SharedMemoryCarrier final : public Carrier {
   void send_new_segments(const Arena& arena);
   void post_frame(gravitas_frame_header header, std::span<const ColumnId> columns, const Arena& arena);
   gravitas_frame_header wait_for_message(std::uint64_t start, std::uint64_t* spent_ns);
-  [[noreturn]] void report_death() { link_->report_death(marks() == open_->asked_at_mark); }
+  [[noreturn]] void report_death() { link_->report_death(marks() == open_->asked_at_mark, true); }
   std::uint64_t marks() const { return boxes_->theirs->progress.load(std::memory_order_relaxed); }
   void take_columns(const gravitas_frame_header& header, std::span<const stage::ColumnInfo> infos,
                     std::span<const ColumnId> targets, std::size_t first_room, Arena* arena);
@@ -78,7 +75,7 @@ class SharedMemoryCarrier final : public Carrier {
   OpenCall* open_ = calls_.data();
   // Of the last message: the worker's signal, its progress (between calls nothing makes any) and the clock. What was seen
   // then is not read again: it would cost a cache line that the worker writes.
-  std::uint32_t seen_ = 0;
+  std::uint32_t seen_ = 1;
   std::uint64_t seen_marks_ = 0, seen_ns_ = 0;
   std::shared_ptr<Mailboxes> boxes_ = std::make_shared<Mailboxes>();
   std::unique_ptr<WorkerLink> link_;
@@ -88,16 +85,15 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
     : defences_(slot.defences),
       slot_deadline_ns_(
           static_cast<std::uint64_t>((slot.defences.deadline ? slot.deadline : kAttachedDeadline) * 1e9)) {
-  boxes_->kernel_segment =
-      Segment::create("gravitas kernel mailbox", aligned(sizeof(Mailbox), kPageSize), channel::Sharing::kReadersOnly);
-  boxes_->worker_segment =
-      Segment::create("gravitas worker mailbox", aligned(sizeof(Mailbox), kPageSize), channel::Sharing::kWriters);
+  boxes_->kernel_segment = Segment::create("gravitas kernel mailbox", sizeof(Mailbox), channel::Sharing::kReadersOnly);
+  boxes_->worker_segment = Segment::create("gravitas worker mailbox", sizeof(Mailbox), channel::Sharing::kWriters);
   boxes_->mine = reinterpret_cast<Mailbox*>(boxes_->kernel_segment.data());
   boxes_->theirs = reinterpret_cast<Mailbox*>(boxes_->worker_segment.data());
   boxes_->theirs->cpu = ~0U;
-  // a dead process posts nothing any more: its word is ours to count up, and the sleeper ours to wake
+  boxes_->theirs->signal = seen_;
+  // the worker's end does so itself, unless other threads of it ended first
   const auto on_end = [boxes = boxes_] {
-    boxes->theirs->signal.fetch_add(1, std::memory_order_seq_cst);
+    boxes->theirs->signal = channel::kEnded;
     channel::wake(boxes->theirs);
   };
   link_ = std::make_unique<WorkerLink>(slot, threads, true, on_end, std::move(stop));
@@ -129,15 +125,14 @@ void SharedMemoryCarrier::make_rooms(const StageCall& call, const Arena& arena, 
   open_->room_count = 0;
   const auto add = [&](std::uint64_t capacity) {
     open_->rooms[open_->room_count++] = {offset, capacity};
-    offset += aligned(capacity * 8, GRAVITAS_COLUMN_ALIGNMENT);
+    offset += channel::round_up(capacity * 8, GRAVITAS_COLUMN_ALIGNMENT);
   };
   for (const ColumnId column : call.reply) add(arena.capacity(column));
   if (derivatives != nullptr)
     for (const ColumnId column : derivatives->trial_columns()) add(arena.count(column));
   if (offset <= open_->response.size()) return;
   open_->response =
-      Segment::create("gravitas response", aligned(std::max(offset, 2 * open_->response.size()), kPageSize),
-                      channel::Sharing::kWriters);
+      Segment::create("gravitas response", std::max(offset, 2 * open_->response.size()), channel::Sharing::kWriters);
   open_->response_generation = ++response_generation_;
 }
 
@@ -176,7 +171,7 @@ void SharedMemoryCarrier::post_frame(gravitas_frame_header header, std::span<con
 }
 
 CallResult SharedMemoryCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
-  if (link_->has_ended()) link_->report_death(true);
+  if (link_->has_ended() || seen_ == channel::kEnded) link_->report_death(true, true);
   open_->deadline_ns = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   make_rooms(call, *arena, derivatives);
   send_new_segments(*arena);
@@ -231,8 +226,8 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t start,
   std::uint64_t until = std::min(start + deadline_ns, cap);
   std::uint64_t last_marks = seen_marks_;
   for (std::uint64_t now = start;;) {
-    // an end from here on counts the signal up; one before may have been seen together with the last message
-    if (link_->has_ended() && theirs->signal.load(std::memory_order_acquire) == seen_) report_death();
+    // an end may have been seen together with the last message
+    if (seen_ == channel::kEnded) report_death();
     const std::uint64_t look = std::min(until, now + kLookNs);
     if (channel::wait(mine, theirs, seen_, look) == channel::Waited::kMessage) {
       seen_ = theirs->signal.load(std::memory_order_acquire);
@@ -240,7 +235,7 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t start,
       std::memcpy(&header, &theirs->header, sizeof header);
       if (header.kind == GRAVITAS_FRAME_CRASH && header.epoch == link_->epoch()) report_death();
       // a dead worker's last word may be a reply, but not a question, which may also be the one it asked before
-      const bool is_dead_question = header.kind == GRAVITAS_FRAME_CALLBACK && link_->has_ended();
+      const bool is_dead_question = header.kind == GRAVITAS_FRAME_CALLBACK && seen_ == channel::kEnded;
       const bool is_late = header.epoch != link_->epoch() || header.sequence != open_->sequence;
       if (!(is_late && defences_.epoch) && header.magic == GRAVITAS_MAGIC && !is_dead_question) {
         seen_marks_ = marks();
@@ -249,7 +244,7 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t start,
         return header;
       }
       // a late or foreign message is dropped
-      if (link_->has_ended()) report_death();
+      if (seen_ == channel::kEnded) report_death();
       if (header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
         link_->report_bad_frame("a header without the magic");
       now = channel::now_ns();

@@ -177,7 +177,7 @@ WorkerLink::~WorkerLink() {
   if (control_) drain();
   if (descriptor_socket_ >= 0) close(descriptor_socket_);
   if (!process_ || process_->wait(kDrainMilliseconds)) return;
-  kill();
+  process_->kill();
   process_->wait(kDrainMilliseconds);
 }
 
@@ -197,7 +197,7 @@ void WorkerLink::finish() {
 }
 
 void WorkerLink::kill() {
-  if (process_) process_->kill();
+  if (process_ && !is_dying_) process_->kill();
 }
 
 std::vector<std::string> WorkerLink::take_complaints() {
@@ -214,14 +214,20 @@ std::vector<std::string> WorkerLink::sandbox() const {
 
 int WorkerLink::process_id() const { return process_ ? process_->process_id() : control_->welcome().process_id(); }
 
-void WorkerLink::report_death(bool is_unread) {
+void WorkerLink::report_death(bool is_unread, bool is_certain) {
   if (!process_) throw StageFault(FaultKind::kDeath, "stream", "the worker at " + address_ + " is gone");
   const std::string who = "its worker process " + std::to_string(process_id());
   // the end may be known to the socket before it is to the watcher
-  const bool has_died = process_->wait(kDrainMilliseconds);
+  const bool has_died = is_certain || process_->wait(kDrainMilliseconds);
+  is_dying_ = is_certain;
+  process_->catch_up();
   kill();
+  const auto rest = [process = process_, has_died] {
+    if (has_died && !process->wait(kDrainMilliseconds)) return std::string("still ending");
+    return (has_died ? process->ending() : "") + last_words(*process);
+  };
   StageFault fault(has_died ? FaultKind::kDeath : FaultKind::kFailure, has_died ? "pidfd" : "stream",
-                   who + (has_died ? " was " + process_->ending() : " closed its stream") + last_words(*process_));
+                   who + (has_died ? " was " : " closed its stream"), rest);
   fault.is_unread = is_unread;
   throw StageFault(fault);
 }

@@ -53,7 +53,7 @@ class WorkerLink {
 
   // Asks it to end; the destructor waits for it.
   void drain() { control_->drain(); }
-  // Ends it; the destructor waits for it.
+  // Ends it, unless it is dying already; the destructor waits for it.
   void kill();
 
   // Incarnation; unique in this process, so an answer of another one can never be taken for one of this.
@@ -62,8 +62,9 @@ class WorkerLink {
   int process_id() const;
   bool has_ended() const { return process_ && process_->has_ended(); }
   bool is_alive() const { return !has_ended() && control_->answers_heartbeats(); }
-  // Each ends the worker, whatever it would say next, and throws the fault that says how it failed.
-  [[noreturn]] void report_death(bool is_unread = false);
+  // Each ends the worker, whatever it would say next, and throws the fault that says how it failed. `is_certain`: it is
+  // dying already, which is not waited for.
+  [[noreturn]] void report_death(bool is_unread = false, bool is_certain = false);
   [[noreturn]] void report_overdue(bool at_cap, std::uint64_t deadline_ns);
   [[noreturn]] void report_bad_frame(const std::string& what);
 
@@ -84,6 +85,7 @@ class WorkerLink {
   std::vector<std::string> plugins_;  // names
   std::string address_;               // of a worker that is no process of ours
   int descriptor_socket_ = -1;
+  bool is_dying_ = false;  // of what it did, which its end shall tell
   std::shared_ptr<WorkerProcess> process_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<ControlSession> control_;

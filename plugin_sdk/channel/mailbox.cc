@@ -45,7 +45,8 @@ std::uint64_t now_ns() {
 
 void post(Mailbox* mine, const Mailbox* theirs) {
   say_cpu(mine);
-  mine->signal.fetch_add(1, std::memory_order_seq_cst);
+  const std::uint32_t next = mine->signal.load(std::memory_order_relaxed) + 1;
+  mine->signal.store(next == kEnded ? next + 1 : next, std::memory_order_seq_cst);
   if (theirs->sleeping.load(std::memory_order_seq_cst) != 0) futex_wake(&mine->signal);
 }
 

@@ -21,9 +21,13 @@
 
 namespace gravitas::channel {
 
+// The signal of a worker that has ended. Linux writes it when a thread that asked for it (set_tid_address(2)) is dying,
+// before it takes the process's memory down, milliseconds before others hear of it.
+inline constexpr std::uint32_t kEnded = 0;
+
 // What the other side spins on has a cache line to itself: what else is written while it does would slow it.
 struct Mailbox {
-  // Counted up once a message is complete; the futex word of the reader.
+  // Counted up once a message is complete, or kEnded; the futex word of the reader.
   std::atomic<std::uint32_t> signal;
   // 1 while the owner of this mailbox sleeps: the other side must wake it.
   std::atomic<std::uint32_t> sleeping;

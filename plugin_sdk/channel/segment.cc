@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -27,6 +28,8 @@ Segment::~Segment() {
 }
 
 Segment Segment::create(const char* name, std::size_t size, Sharing sharing) {
+  constexpr std::size_t kPage = 4096;
+  size = round_up(std::max(size, std::size_t{1}), kPage);
   Segment segment;
   segment.descriptor_ = memfd_create(name, MFD_CLOEXEC | MFD_ALLOW_SEALING);
   if (segment.descriptor_ < 0) fail("memfd_create");

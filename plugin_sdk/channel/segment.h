@@ -8,6 +8,9 @@
 
 namespace gravitas::channel {
 
+// The next multiple of `unit`.
+constexpr std::size_t round_up(std::size_t value, std::size_t unit) { return (value + unit - 1) / unit * unit; }
+
 enum class Access { kReadOnly, kReadWrite };
 
 // Who may write the segment besides its creator.
@@ -26,7 +29,7 @@ class Segment {
   }
   ~Segment();
 
-  // A new segment, zeroed and mapped for reading and writing. Throws std::system_error.
+  // A new segment of whole pages, at least one, zeroed and mapped for reading and writing. Throws std::system_error.
   static Segment create(const char* name, std::size_t size, Sharing sharing);
   // Maps a segment received from its creator; takes over the descriptor. Throws std::system_error, also if the
   // file is smaller than `size`.

@@ -66,7 +66,8 @@ class MailboxLoop {
   std::uint32_t collisions_ = 0;
 };
 
-// Makes fatal signals wake the kernel at once, with the signal's name, before the process dies of them.
+// Makes fatal signals wake the kernel at once, before the process dies of them, and so any other end of the calling
+// thread, which is the process's first.
 void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kernel, std::uint64_t epoch);
 
 }  // namespace gravitas::host

@@ -49,7 +49,7 @@ EnduranceResult endure(const std::string& name, double seconds, const std::funct
         ++result.kills;
       }
       if (world->step() != kernel::StepOutcome::kCommitted) {
-        result.problem = fmt::format("paused at step {}: {}", step + 1, world->fault()->fault.text);
+        result.problem = fmt::format("paused at step {}: {}", step + 1, world->fault()->fault.text());
         break;
       }
       if (step % kStepsPerKill == 0) progress(1e-3 * step);

@@ -160,7 +160,7 @@ void run_quietly(Scene* scene, std::uint32_t steps) {
   while (world->step_count() < steps) {
     if (world->step() != kernel::StepOutcome::kCommitted)
       throw BadInput(fmt::format("scene '{}' does not run without faults: step {}: {}", scene->name,
-                                 world->step_count() + 1, world->fault()->fault.text));
+                                 world->step_count() + 1, world->fault()->fault.text()));
     scene->chains.push_back(world->chain_hash());
   }
 }

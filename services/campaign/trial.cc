@@ -322,7 +322,7 @@ void Run::judge_pause(std::uint32_t step) {
     for (Injected& fault : faults_)
       if (fault.plan->step == step) fault.outcome = "forbidden";
     forbid(
-        fmt::format("paused at step {} where it had to recover: slot {}: {}", step, slot_name(last.slot), last.text));
+        fmt::format("paused at step {} where it had to recover: slot {}: {}", step, slot_name(last.slot), last.text()));
     return;
   }
   if (poison != nullptr) poison->outcome = "Q";
@@ -347,7 +347,7 @@ void Run::attribute_records() {
       fault->records.push_back(record);
     } else {
       trial_.add_unprovoked(fmt::format("step {}, slot {}: {}: {}", record.step, slot_name(record.fault.slot),
-                                        kernel::fault_kind_name(record.fault.kind), record.fault.text));
+                                        kernel::fault_kind_name(record.fault.kind), record.fault.text()));
     }
   }
 }

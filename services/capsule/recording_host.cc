@@ -98,7 +98,7 @@ kernel::CallResult RecordingHost::call(const kernel::StageCall& call, kernel::Ar
     keep(&record, call.target);
     return result;
   } catch (const kernel::StageFault& fault) {
-    record.set_fault(fault.text);
+    record.set_fault(fault.text());
     keep(&record, call.target);
     throw;
   }

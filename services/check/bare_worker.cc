@@ -56,7 +56,7 @@ void BareWorker::start_command(const std::string& command, double seconds) {
     process_ = started.process;
     channel_ = kernel::worker_channel(started.descriptor);
   } catch (const kernel::StageFault& fault) {
-    throw std::runtime_error(fault.text);
+    throw std::runtime_error(fault.text());
   }
 }
 

@@ -176,7 +176,7 @@ Answer CarrierSubject::ask(stage::Method method, const MessageColumns& request, 
     const std::lock_guard lock(mutex_);
     count_fault(std::exchange(capped_, false)
                     ? fmt::format("no answer within {:g} s, whatever its marks of progress", patience_.cap)
-                    : fault.text);
+                    : fault.text());
   } catch (...) {
     // the question's own code threw in the middle of a call
     arm(0.0);

@@ -57,7 +57,7 @@ class FrameAbuser {
       const std::string finding = judge(what, answer, expected);
       return finding.empty() ? after(what) : finding;
     } catch (const kernel::StageFault& fault) {
-      return fmt::format("it does not survive {}: {}", what, fault.text);
+      return fmt::format("it does not survive {}: {}", what, fault.text());
     }
   }
 
@@ -66,7 +66,7 @@ class FrameAbuser {
       const std::string differs = difference(question_.method, good_, talk_.ask(question_));
       return differs.empty() ? "" : fmt::format("after {}, the next good answer differs: {}", what, differs);
     } catch (const kernel::StageFault& fault) {
-      return fmt::format("it does not survive {}: {}", what, fault.text);
+      return fmt::format("it does not survive {}: {}", what, fault.text());
     } catch (const std::runtime_error& problem) {
       return fmt::format("after {}: {}", what, problem.what());
     }

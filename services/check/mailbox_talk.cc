@@ -17,7 +17,6 @@ using conformance::Question;
 
 namespace {
 
-constexpr std::uint64_t kPage = 4096;
 constexpr std::uint64_t kGeneration = 1;
 constexpr std::uint64_t kLookNs = 20'000'000;
 // The state segment has the request's columns, and behind them the one that a derivative is answered in.
@@ -25,20 +24,17 @@ constexpr std::size_t kWrenchColumn = GRAVITAS_MAX_COLUMNS - 1;
 
 const stage::MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
 
-Segment segment(const char* name, std::uint64_t bytes, channel::Sharing sharing) {
-  return Segment::create(name, (bytes + kPage - 1) / kPage * kPage, sharing);
-}
-
 }  // namespace
 
 MailboxTalk::MailboxTalk(const Examinee& examinee, const Patience& patience, std::uint64_t elements)
     : deadline_(patience.deadline),
       // whole columns are aligned
       elements_((elements + 7) / 8 * 8),
-      kernel_segment_(segment("check kernel mailbox", sizeof(channel::Mailbox), channel::Sharing::kReadersOnly)),
-      worker_segment_(segment("check worker mailbox", sizeof(channel::Mailbox), channel::Sharing::kWriters)),
-      state_(segment("check state", GRAVITAS_MAX_COLUMNS * elements_ * 8, channel::Sharing::kReadersOnly)),
-      response_(segment("check response", GRAVITAS_MAX_COLUMNS * elements_ * 8, channel::Sharing::kWriters)),
+      kernel_segment_(
+          Segment::create("check kernel mailbox", sizeof(channel::Mailbox), channel::Sharing::kReadersOnly)),
+      worker_segment_(Segment::create("check worker mailbox", sizeof(channel::Mailbox), channel::Sharing::kWriters)),
+      state_(Segment::create("check state", GRAVITAS_MAX_COLUMNS * elements_ * 8, channel::Sharing::kReadersOnly)),
+      response_(Segment::create("check response", GRAVITAS_MAX_COLUMNS * elements_ * 8, channel::Sharing::kWriters)),
       mine_(reinterpret_cast<channel::Mailbox*>(kernel_segment_.data())),
       theirs_(reinterpret_cast<channel::Mailbox*>(worker_segment_.data())),
       link_(examinee.slot(kernel::Hosting::kSharedMemory, patience.deadline), 1, true, [] {}) {

@@ -73,7 +73,7 @@ std::string StreamTalk::ending() {
   try {
     link_.report_death();
   } catch (const kernel::StageFault& fault) {
-    return fault.text;
+    return fault.text();
   }
 }
 

@@ -172,7 +172,7 @@ void ServedRun::make_step() {
     if (environment_->step() == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
       fault_ = fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(record.fault.slot),
-                           record.fault.plugin, record.fault.text, kernel::fault_kind_name(record.fault.kind));
+                           record.fault.plugin, record.fault.text(), kernel::fault_kind_name(record.fault.kind));
       return keep_faulted_state();
     }
     figures_->follow(environment_.get());

@@ -152,7 +152,7 @@ void EventSource::find_faults(const kernel::Environment& environment) {
     event.slot = slot_name(record.fault.slot);
     event.plugin = record.fault.plugin;
     event.what = kernel::fault_kind_name(record.fault.kind);
-    event.text = record.fault.text + (record.recovered_by.empty() ? "" : "; answered by: " + record.recovered_by);
+    event.text = record.fault.text() + (record.recovered_by.empty() ? "" : "; answered by: " + record.recovered_by);
     listener_.on_event(event);
   }
 }

@@ -114,7 +114,7 @@ std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription&
     for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
     return environment;
   } catch (const kernel::StageFault& fault) {
-    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text));
+    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text()));
   } catch (const std::invalid_argument& problem) {
     throw BadInput(problem.what());
   }

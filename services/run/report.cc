@@ -61,7 +61,7 @@ void write_faults(const kernel::Environment& environment, report::v1::Report* re
     fault->set_recovered_by(record.recovered_by.empty() ? "none: paused" : record.recovered_by);
     fault->set_recovery_us(record.recovery_us);
     fault->set_plugin(record.fault.plugin);
-    fault->set_text(record.fault.text);
+    fault->set_text(record.fault.text());
   }
 }
 

@@ -41,7 +41,7 @@ using Clock = std::chrono::steady_clock;
 
 std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
   return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
-                     fault.text, kernel::fault_kind_name(fault.kind));
+                     fault.text(), kernel::fault_kind_name(fault.kind));
 }
 
 }  // namespace
@@ -64,7 +64,7 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
   header.set_poison(true);
   recorder::v1::CapsuleCall call = capsule::begin_call(poisoned.call, poisoned.arena);
   call.set_step(step);
-  call.set_fault(poisoned.fault.text);
+  call.set_fault(poisoned.fault.text());
   const std::string path = fmt::format("{}.{}.step{}.capsule", std::filesystem::path(options.scenes[0]).stem().string(),
                                        header.slot(), step);
   try {
@@ -241,7 +241,7 @@ class Run final : private kernel::CommitListener {
     for (const Slot slot : kSlots)
       for (const kernel::FaultRecord& failed : surveyor_->slot(slot).faults())
         warnings_.push_back(fmt::format(
-            "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text,
+            "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text(),
             failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
   }
 

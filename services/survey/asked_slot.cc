@@ -149,7 +149,7 @@ MessageColumns AskedSlot::ask(stage::Method method, std::uint32_t target, const 
     slot_.reset();
     throw NoAnswer(fmt::format("slot {}, plugin {}: {}", slot_name(which_),
                                fault.plugin.empty() ? description_.plugins[target].declaration.name : fault.plugin,
-                               fault.text));
+                               fault.text()));
   } catch (...) {
     slot_.reset();
     throw;

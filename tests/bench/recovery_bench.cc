@@ -34,7 +34,7 @@ constexpr int kTimes = 200;
 
 bool take_step(Environment* world, benchmark::State* state) {
   if (world->step() == kernel::StepOutcome::kCommitted) return true;
-  state->SkipWithError(world->fault()->fault.text.c_str());
+  state->SkipWithError(world->fault()->fault.text().c_str());
   return false;
 }
 

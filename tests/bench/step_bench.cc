@@ -32,7 +32,7 @@ using kernel::Hosting;
 constexpr std::uint32_t kEndless = 1U << 31;
 
 void step(Environment* world, benchmark::State* state) {
-  if (world->step() == kernel::StepOutcome::kPaused) state->SkipWithError(world->fault()->fault.text.c_str());
+  if (world->step() == kernel::StepOutcome::kPaused) state->SkipWithError(world->fault()->fault.text().c_str());
 }
 
 // One body without a shape, in free flight.

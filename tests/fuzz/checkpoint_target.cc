@@ -27,7 +27,7 @@ void try_to_restore(recorder::v1::Checkpoint* checkpoint) {
     return;
   }
   if (world->step_count() < world->total_steps() && world->step() == kernel::StepOutcome::kPaused)
-    require(world->fault().has_value() && !world->fault()->fault.text.empty(), "a pause has a reason");
+    require(world->fault().has_value() && !world->fault()->fault.text().empty(), "a pause has a reason");
   world = std::make_unique<kernel::Environment>(description);
 }
 

@@ -41,7 +41,7 @@ WorldBuilder ball_on_ground(Hosting hosting) {
 // budget of five failures is spent at step 11.
 void expect_failures_and_pause(const WorldBuilder& builder, const Expected& expected) {
   Environment world(builder.description());
-  while (world.step_count() < 10) ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text;
+  while (world.step_count() < 10) ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text();
   const kernel::Hash state = world.state_hash(), chain = world.chain_hash();
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
   ASSERT_TRUE(world.fault().has_value());
@@ -49,11 +49,11 @@ void expect_failures_and_pause(const WorldBuilder& builder, const Expected& expe
   for (std::uint32_t i = 0; i < 5; ++i) {
     const kernel::FaultRecord& record = world.faults()[i];
     EXPECT_EQ(record.step, 3 + 2 * i);
-    EXPECT_EQ(record.fault.kind, expected.kind) << record.fault.text;
+    EXPECT_EQ(record.fault.kind, expected.kind) << record.fault.text();
     EXPECT_EQ(record.fault.detected_by, expected.detected_by);
     EXPECT_EQ(record.fault.slot, Slot::kIntegrator);
     EXPECT_EQ(record.fault.plugin, "Faulty");
-    EXPECT_NE(record.fault.text.find(expected.text), std::string::npos) << record.fault.text;
+    EXPECT_NE(record.fault.text().find(expected.text), std::string::npos) << record.fault.text();
     EXPECT_EQ(record.recovered_by.empty(), i == 4) << record.recovered_by;
     EXPECT_EQ(record.recovery_us > 0.0, i != 4);
   }
@@ -139,7 +139,7 @@ TEST(FailingPlugins, ContactsThatPullAreRefused) {
   Environment world(builder.description());
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
   EXPECT_EQ(world.fault()->fault.kind, FaultKind::kBadNumbers);
-  EXPECT_NE(world.fault()->fault.text.find("pulls"), std::string::npos) << world.fault()->fault.text;
+  EXPECT_NE(world.fault()->fault.text().find("pulls"), std::string::npos) << world.fault()->fault.text();
 }
 
 TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
@@ -152,7 +152,7 @@ TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
     } catch (const kernel::StageFault& fault) {
       EXPECT_EQ(fault.kind, FaultKind::kHandshake);
       EXPECT_EQ(fault.slot, Slot::kSolver);
-      EXPECT_NE(fault.text.find("README.md"), std::string::npos) << fault.text;
+      EXPECT_NE(fault.text().find("README.md"), std::string::npos) << fault.text();
     }
   }
 }

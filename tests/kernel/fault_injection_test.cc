@@ -77,8 +77,8 @@ class InjectedFaults : public ::testing::TestWithParam<Hosting> {
     Integration call;
     const std::optional<StageFault> fault = fault_of(&call, integrator(deadline).get(), order);
     ASSERT_TRUE(fault.has_value()) << "it was answered";
-    EXPECT_EQ(fault->kind, kind) << fault->text;
-    EXPECT_THAT(fault->text, HasSubstr(text));
+    EXPECT_EQ(fault->kind, kind) << fault->text();
+    EXPECT_THAT(fault->text(), HasSubstr(text));
   }
 
   // A worker of its own commits it, and answers rightly, now and once more. Returns what it said.
@@ -134,7 +134,7 @@ TEST_P(InjectedFaults, ThatEndTheProcessAfterTheReply) {
   EXPECT_EQ(call.answers(), quiet.answers());
   const std::optional<StageFault> next = fault_of(&call, carrier.get(), "");
   ASSERT_TRUE(next.has_value());
-  EXPECT_EQ(next->kind, FaultKind::kDeath) << next->text;
+  EXPECT_EQ(next->kind, FaultKind::kDeath) << next->text();
 }
 
 // Stopped, it is handed a request that another failed at, and dies: the request is not to blame, as it would be for one
@@ -157,7 +157,7 @@ TEST_P(InjectedFaults, ThatEndTheProcessBeforeItHasReadARepeatedRequest) {
   }
   killer.join();
   ASSERT_TRUE(fault.has_value());
-  EXPECT_EQ(fault->kind, FaultKind::kDeath) << fault->text;
+  EXPECT_EQ(fault->kind, FaultKind::kDeath) << fault->text();
   EXPECT_TRUE(fault->is_unread);
 }
 
@@ -170,7 +170,7 @@ TEST_P(InjectedFaults, ThatEndTheProcessWithARepeatedRequestRead) {
       call.make(carrier.get(), nullptr, order, 1);
       ADD_FAILURE() << "it was answered";
     } catch (const StageFault& fault) {
-      EXPECT_EQ(fault.kind, FaultKind::kDeath) << fault.text;
+      EXPECT_EQ(fault.kind, FaultKind::kDeath) << fault.text();
       EXPECT_FALSE(fault.is_unread);
     }
   }

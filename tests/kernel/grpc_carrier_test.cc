@@ -44,7 +44,7 @@ WorldBuilder balls(std::uint32_t count) {
 std::string chain_by_grpc_of(const WorldBuilder& builder) {
   Environment world(builder.description());
   while (world.step_count() < world.total_steps())
-    if (world.step() == StepOutcome::kPaused) return world.fault()->fault.text;
+    if (world.step() == StepOutcome::kPaused) return world.fault()->fault.text();
   return world.chain_hash().text();
 }
 
@@ -135,7 +135,7 @@ TEST(GrpcCarrier, TheEndOfAListeningWorkerPausesTheEnvironment) {
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
   // nobody listens there any more
   EXPECT_EQ(world.faults()[0].fault.kind, FaultKind::kDeath);
-  EXPECT_THAT(world.faults()[0].fault.text, HasSubstr(worker.address() + " is gone"));
+  EXPECT_THAT(world.faults()[0].fault.text(), HasSubstr(worker.address() + " is gone"));
   EXPECT_EQ(world.fault()->fault.kind, FaultKind::kHandshake);
   EXPECT_EQ(world.step_count(), 1U);
 }
@@ -144,15 +144,16 @@ TEST(GrpcCarrier, AWorkerOfAnotherPluginRefuses) {
   const ListeningWorker worker(plugin_path("solver_sequential"));
   WorldBuilder builder = balls(3);
   builder.description().integrator.plugins[0].address = worker.address();
-  EXPECT_THAT(start_fault(builder).text, HasSubstr("this worker serves plugin 'Sequential', not 'SemiImplicitEuler'"));
+  EXPECT_THAT(start_fault(builder).text(),
+              HasSubstr("this worker serves plugin 'Sequential', not 'SemiImplicitEuler'"));
 }
 
 TEST(GrpcCarrier, AnAddressWithoutWorkerIsAnError) {
   WorldBuilder builder = balls(1);
   builder.description().solver.plugins[0].address = "unix:/nowhere/at/all";
-  EXPECT_THAT(start_fault(builder).text, HasSubstr("no worker answers at unix:/nowhere/at/all: No such file"));
+  EXPECT_THAT(start_fault(builder).text(), HasSubstr("no worker answers at unix:/nowhere/at/all: No such file"));
   builder.description().solver.plugins[0].address = "192.0.2.1:7000";
-  EXPECT_THAT(start_fault(builder).text, HasSubstr("no address of this machine"));
+  EXPECT_THAT(start_fault(builder).text(), HasSubstr("no address of this machine"));
 }
 
 TEST(GrpcCarrier, ACommandStartsAWorkerBesideTheSlotsLibraries) {
@@ -169,9 +170,9 @@ TEST(GrpcCarrier, ACommandStartsAWorkerBesideTheSlotsLibraries) {
 TEST(GrpcCarrier, ACommandThatIsNoWorkerIsAnError) {
   WorldBuilder builder = balls(1);
   builder.description().solver.plugins[0].command = "true";
-  EXPECT_THAT(start_fault(builder).text, HasSubstr("'true' was ended by itself with exit code 0 before it listened"));
+  EXPECT_THAT(start_fault(builder).text(), HasSubstr("'true' was ended by itself with exit code 0 before it listened"));
   builder.description().solver.plugins[0].command = "no-such-program";
-  EXPECT_THAT(start_fault(builder).text, HasSubstr("exit code 127"));
+  EXPECT_THAT(start_fault(builder).text(), HasSubstr("exit code 127"));
 }
 
 // Nine thousand shapes are more than goes inline: they travel as an asset, in the one call that needs it.
@@ -274,7 +275,7 @@ TEST(GrpcCarrier, AMethodThatTheWorkerDoesNotServeIsNamed) {
     FAIL() << "it was answered";
   } catch (const StageFault& fault) {
     EXPECT_EQ(fault.kind, FaultKind::kFailure);
-    EXPECT_THAT(fault.text, HasSubstr("no method of a stage: /gravitas.stage.v1.Integrator/Derivative"));
+    EXPECT_THAT(fault.text(), HasSubstr("no method of a stage: /gravitas.stage.v1.Integrator/Derivative"));
   }
 }
 

@@ -79,7 +79,7 @@ TEST_P(Handshake, RefusesEveryLieWithItsReason) {
       ADD_FAILURE() << "it was taken";
     } catch (const StageFault& fault) {
       EXPECT_EQ(fault.kind, FaultKind::kHandshake);
-      EXPECT_THAT(fault.text, HasSubstr(std::string(lie.refusal)));
+      EXPECT_THAT(fault.text(), HasSubstr(std::string(lie.refusal)));
     }
   }
 }
@@ -107,7 +107,7 @@ class LyingSolver : public Handshake {
   }
   static void run_to_end(Environment* world) {
     while (world->step_count() < kMeetingSteps)
-      ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+      ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
     EXPECT_EQ(world->chain_hash(), chain_without_lies());
   }
 };
@@ -122,7 +122,7 @@ TEST_P(LyingSolver, IsRefusedAtTheStart) {
   } catch (const StageFault& fault) {
     EXPECT_EQ(fault.slot, Slot::kSolver);
     EXPECT_EQ(fault.plugin, "Sequential");
-    EXPECT_THAT(fault.text, HasSubstr(refusal_of("schema")));
+    EXPECT_THAT(fault.text(), HasSubstr(refusal_of("schema")));
   }
 }
 

@@ -92,7 +92,7 @@ class Ladder : public ::testing::Test {
   }
   static void run(Environment* world) {
     while (world->step_count() < kLadderSteps)
-      ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+      ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
   }
 
   std::size_t starts() {

@@ -9,7 +9,7 @@
 namespace gravitas {
 
 inline void step(kernel::Environment* world) {
-  ASSERT_EQ(world->step(), kernel::StepOutcome::kCommitted) << world->fault()->fault.text;
+  ASSERT_EQ(world->step(), kernel::StepOutcome::kCommitted) << world->fault()->fault.text();
 }
 
 inline void run_to_end(kernel::Environment* world) {

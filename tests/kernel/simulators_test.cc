@@ -47,7 +47,7 @@ WorldBuilder bouncing(Simulator simulator, double restitution, std::uint32_t ste
 
 void run(Environment* world) {
   while (world->step_count() < world->total_steps())
-    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
 }
 
 kernel::Hash chain_of(const WorldBuilder& builder) {

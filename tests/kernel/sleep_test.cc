@@ -47,7 +47,7 @@ WorldBuilder& may_sleep(WorldBuilder* builder) {
 
 void run(Environment* world, std::uint32_t steps) {
   for (std::uint32_t i = 0; i < steps; ++i)
-    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text;
+    ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
 }
 
 Vector3 position(const Environment& world, std::uint32_t body) { return vector_at(world.state().position, body); }

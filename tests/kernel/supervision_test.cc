@@ -209,7 +209,7 @@ TEST(Supervision, FaultsAreRefusedWhereTheyWouldHitTheKernelOrNobody) {
 TEST_P(Supervised, WorkersKilledBetweenStepsAreReplaced) {
   Environment world(builder().description());
   while (world.step_count() < kSteps) {
-    ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text;
+    ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text();
     if (world.step_count() % 5 != 0 || world.step_count() == kSteps) continue;
     for (const kernel::PlannedSlot& slot : world.plan().slots) kill(slot.process_id, SIGKILL);
   }

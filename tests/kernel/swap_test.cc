@@ -223,7 +223,7 @@ TEST_P(Swapped, ARerunAsksTheNewPluginToo) {
   world.set_rerun_every(Slot::kSolver, 1);
   run_to_end(&world);
   EXPECT_EQ(world.swaps()[0].state, SwapState::kCommitted);
-  for (const kernel::FaultRecord& fault : world.faults()) ADD_FAILURE() << fault.step << ": " << fault.fault.text;
+  for (const kernel::FaultRecord& fault : world.faults()) ADD_FAILURE() << fault.step << ": " << fault.fault.text();
   for (const std::string& warning : world.warnings()) EXPECT_THAT(warning, Not(HasSubstr("otherwise")));
 }
 

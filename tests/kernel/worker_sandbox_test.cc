@@ -60,7 +60,7 @@ std::string third_call(Carrier* host) {
   try {
     return call.make(host).text;
   } catch (const kernel::StageFault& fault) {
-    return fault.text;
+    return fault.text();
   }
 }
 
@@ -209,7 +209,7 @@ TEST(WorkerSandbox, ACommandThatFailsHasItsLastWordsInTheFault) {
     start(slot);
     FAIL() << "it started";
   } catch (const kernel::StageFault& fault) {
-    EXPECT_THAT(fault.text, EndsWith("before it listened; its last words: no licence found"));
+    EXPECT_THAT(fault.text(), EndsWith("before it listened; its last words: no licence found"));
   }
 }
 

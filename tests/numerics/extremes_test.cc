@@ -192,7 +192,7 @@ TEST(Extremes, AForceThatOverflowsIsRefusedWithItsBody) {
     const Environment world(builder.description());
     ADD_FAILURE() << "it was accepted";
   } catch (const kernel::StageFault& fault) {
-    EXPECT_NE(fault.text.find("on body 1 is not finite"), std::string::npos) << fault.text;
+    EXPECT_NE(fault.text().find("on body 1 is not finite"), std::string::npos) << fault.text();
   }
 }
 
@@ -207,8 +207,8 @@ TEST(Extremes, AMotionThatOverflowsIsRefusedWithItsBody) {
     while (world.step_count() < world.total_steps() && world.step() == kernel::StepOutcome::kCommitted) {
     }
     ASSERT_TRUE(world.fault()) << library;
-    EXPECT_NE(world.fault()->fault.text.find("body 1"), std::string::npos)
-        << library << ": " << world.fault()->fault.text;
+    EXPECT_NE(world.fault()->fault.text().find("body 1"), std::string::npos)
+        << library << ": " << world.fault()->fault.text();
     EXPECT_LT(world.step_count(), 200U);
     for (const double number : world.state().position) EXPECT_TRUE(std::isfinite(number));
     EXPECT_EQ(vector_at(world.state().position, 0), Vector3::Zero());

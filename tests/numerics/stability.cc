@@ -175,7 +175,7 @@ std::vector<Path> paths_of(const MotionMethod& method, const std::vector<SpringC
     for (std::size_t body = 0; body < cells.size(); ++body)
       paths[body].emplace_back(world.state().position[3 * body], world.state().linear_velocity[3 * body]);
     if (i == steps_to_see(method)) return paths;
-    if (!steps(&world)) throw std::runtime_error(world.fault()->fault.text);
+    if (!steps(&world)) throw std::runtime_error(world.fault()->fault.text());
   }
 }
 
@@ -267,7 +267,7 @@ double lattice_amplification(const MotionMethod& method, const SpringCell& cell)
     kernel::Environment world(lattice.world(method, cell, place, speed).description());
     Path shares = {lattice.shares(world.state())};
     for (int i = 0; i < steps_to_see(method); ++i) {
-      if (!steps(&world)) throw std::runtime_error(world.fault()->fault.text);
+      if (!steps(&world)) throw std::runtime_error(world.fault()->fault.text());
       shares.push_back(lattice.shares(world.state()));
     }
     return shares;

@@ -82,7 +82,7 @@ TEST_P(HonestAnswers, PassTheChecksOfTheirPhysicsInEveryStep) {
     const std::uint32_t most = description.bodies.size() > 300 ? kMostStepsOfLarge : kMostSteps;
     while (environment->step_count() < std::min(most, environment->total_steps())) {
       if (environment->step() == kernel::StepOutcome::kCommitted) continue;
-      ADD_FAILURE() << "step " << environment->fault()->step << ": " << environment->fault()->fault.text;
+      ADD_FAILURE() << "step " << environment->fault()->step << ": " << environment->fault()->fault.text();
       break;
     }
   }

@@ -120,13 +120,21 @@ TEST(Mailbox, AWakeIsNoMessage) {
   EXPECT_EQ(waited, Waited::kTimeout);
 }
 
-// The kernel does so for a worker that died: counts its signal up and wakes.
-TEST(Mailbox, CountingUpForTheOtherSideEndsAWait) {
+TEST(Mailbox, APostIsNeverTakenForAnEnd) {
   const Mailboxes boxes;
+  boxes.worker->signal = ~0U;
+  post(boxes.worker.get(), boxes.kernel.get());
+  EXPECT_EQ(boxes.worker->signal.load(), 1U);
+}
+
+// The kernel does so for a worker that died, if its threads did not.
+TEST(Mailbox, AnEndThatIsWrittenForTheOtherSideEndsAWait) {
+  const Mailboxes boxes;
+  boxes.worker->signal = 1;
   Waited waited = Waited::kTimeout;
-  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kLong); });
+  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 1, now_ns() + kLong); });
   while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
-  boxes.worker->signal.fetch_add(1);
+  boxes.worker->signal = kEnded;
   wake(boxes.worker.get());
   sleeper.join();
   EXPECT_EQ(waited, Waited::kMessage);

@@ -128,9 +128,17 @@ TEST(Segment, SmallerThanAnnouncedIsRefused) {
   EXPECT_EQ(open_descriptors(), before);  // it took the descriptor over all the same
 }
 
-TEST(Segment, OfNoBytesIsRefused) {
+TEST(Segment, HasWholePages) {
+  for (const std::size_t size : {0, 1, 4095, 4096}) {
+    const Segment segment = Segment::create("test", size, Sharing::kWriters);
+    EXPECT_EQ(segment.size(), 4096U) << size;
+  }
+  EXPECT_EQ(Segment::create("test", 4097, Sharing::kWriters).size(), 8192U);
+}
+
+TEST(Segment, LargerThanAnyMemoryIsRefused) {
   const std::size_t before = open_descriptors();
-  EXPECT_THROW(Segment::create("test", 0, Sharing::kWriters), std::system_error);
+  EXPECT_THROW(Segment::create("test", std::size_t{1} << 62, Sharing::kWriters), std::system_error);
   EXPECT_EQ(open_descriptors(), before);
 }
 
