@@ -25,13 +25,6 @@ enum class FaultKind : std::uint32_t {
   kHandshake      // the worker could not be started or refused to serve
 };
 
-// "death", "deadline", …
-inline const char* fault_kind_name(FaultKind kind) {
-  static constexpr const char* kNames[] = {"death",         "deadline",    "refusal",     "failure",      "bad_frame",
-                                           "bad_structure", "bad_numbers", "bad_physics", "disagreement", "handshake"};
-  return kNames[static_cast<std::size_t>(kind)];
-}
-
 class StageFault : public std::exception {
  public:
   // `rest` waits for the rest of the reason.
@@ -46,7 +39,8 @@ class StageFault : public std::exception {
   }
 
   FaultKind kind;
-  std::string detected_by;  // "pidfd", "deadline", "status", "wire", "structure", "numbers", "physics", "handshake" …
+  std::string
+      detected_by;  // "pidfd" (its process ended), "deadline", "status", "wire", "structure", "numbers", "physics", "handshake" …
   Slot slot = Slot::kSpace;  // filled where the slot is known
   std::string plugin;
   bool is_unread = false;  // it died before it looked at the request, which is not to blame

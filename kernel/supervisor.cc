@@ -42,7 +42,10 @@ bool WorkerProcess::wait(int milliseconds) const {
   return reaped_.wait_for(lock, std::chrono::milliseconds(milliseconds), [this] { return has_ended(); });
 }
 
-void WorkerProcess::kill() const { syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0); }
+void WorkerProcess::kill() const {
+  const std::lock_guard lock(mutex_);
+  if (pidfd_ >= 0) syscall(SYS_pidfd_send_signal, pidfd_, SIGKILL, nullptr, 0);
+}
 
 ssize_t WorkerProcess::read_output(std::size_t stream) {
   static thread_local std::array<char, kPipeSize> bytes;
@@ -53,7 +56,11 @@ ssize_t WorkerProcess::read_output(std::size_t stream) {
 }
 
 void WorkerProcess::catch_up() {
-  for (std::size_t stream = 0; stream < output_pipes_.size(); ++stream) read_output(stream);
+  for (std::size_t stream = 0; stream < output_pipes_.size(); ++stream) {
+    read_output(stream);
+    const std::lock_guard lock(mutex_);
+    output_.end(static_cast<channel::OutputStream>(stream));
+  }
 }
 
 std::vector<std::string> WorkerProcess::take_output() {
@@ -208,6 +215,7 @@ void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {
   }
   {
     const std::lock_guard lock(process->mutex_);
+    close(std::exchange(process->pidfd_, -1));  // whoever asks how it ended may keep the rest for long
     process->ending_ = std::move(ending);
     process->ended_.store(true, std::memory_order_release);
   }

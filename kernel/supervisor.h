@@ -31,7 +31,7 @@ class WorkerProcess {
   bool wait(int milliseconds) const;
   void kill() const;
 
-  // Reads at once what a dying process has written, a pipe's content of it at most.
+  // Reads at once what a dying process has written, a pipe's content of it at most; a line that it began is whole.
   void catch_up();
   // What it wrote since the last time, and the last of it (process_output.h). Whole once has_ended().
   std::vector<std::string> take_output();

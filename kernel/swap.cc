@@ -22,11 +22,6 @@ std::string shown(const PluginChoice& plugin, const SlotDescription& host) {
 
 }  // namespace
 
-const char* swap_state_name(SwapState state) {
-  static constexpr const char* kNames[] = {"preparing", "shadow", "probation", "committed", "rolled back", "refused"};
-  return kNames[static_cast<std::size_t>(state)];
-}
-
 void StageSlot::order_swap(SwapOrder order, std::uint32_t target, bool only_compare) {
   const std::size_t host = routes_[target].host;
   PendingSwap& swap = pending_.emplace_back();

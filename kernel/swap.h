@@ -29,9 +29,6 @@ struct SwapOrder {
 
 enum class SwapState : std::uint32_t { kPreparing, kShadow, kProbation, kCommitted, kRolledBack, kRefused };
 
-// "preparing", "shadow", "probation", "committed", "rolled back", "refused".
-const char* swap_state_name(SwapState state);
-
 struct SwapRecord {
   Slot slot;
   std::uint32_t step;    // first step that the new host makes

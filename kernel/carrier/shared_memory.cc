@@ -91,7 +91,7 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
   boxes_->theirs = reinterpret_cast<Mailbox*>(boxes_->worker_segment.data());
   boxes_->theirs->cpu = ~0U;
   boxes_->theirs->signal = seen_;
-  // the worker's end does so itself, unless other threads of it ended first
+  // Linux does so, unless the worker ended before it had asked for it, or posted while it ended
   const auto on_end = [boxes = boxes_] {
     boxes->theirs->signal = channel::kEnded;
     channel::wake(boxes->theirs);
@@ -108,6 +108,7 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
 
 // Said on both ways: the data loop sleeps on its mailbox, not on the stream.
 void SharedMemoryCarrier::drain() {
+  if (link_->is_dying()) return;
   link_->drain();
   gravitas_frame_header stop{};
   stop.kind = GRAVITAS_FRAME_STOP;
@@ -244,8 +245,7 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t start,
         return header;
       }
       // a late or foreign message is dropped
-      if (seen_ == channel::kEnded) report_death();
-      if (header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
+      if (seen_ != channel::kEnded && header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
         link_->report_bad_frame("a header without the magic");
       now = channel::now_ns();
       continue;

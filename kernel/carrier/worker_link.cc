@@ -174,7 +174,7 @@ void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t thread
 }
 
 WorkerLink::~WorkerLink() {
-  if (control_) drain();
+  if (control_ && !is_dying_) drain();
   if (descriptor_socket_ >= 0) close(descriptor_socket_);
   if (!process_ || process_->wait(kDrainMilliseconds)) return;
   process_->kill();
@@ -223,8 +223,11 @@ void WorkerLink::report_death(bool is_unread, bool is_certain) {
   process_->catch_up();
   kill();
   const auto rest = [process = process_, has_died] {
-    if (has_died && !process->wait(kDrainMilliseconds)) return std::string("still ending");
-    return (has_died ? process->ending() : "") + last_words(*process);
+    if (has_died && !process->wait(kDrainMilliseconds)) {
+      process->kill();
+      process->wait(kDrainMilliseconds);
+    }
+    return (has_died && process->has_ended() ? process->ending() : "") + last_words(*process);
   };
   StageFault fault(has_died ? FaultKind::kDeath : FaultKind::kFailure, has_died ? "pidfd" : "stream",
                    who + (has_died ? " was " : " closed its stream"), rest);

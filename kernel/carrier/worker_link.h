@@ -61,6 +61,8 @@ class WorkerLink {
   // Of the handshake for a worker that is no process of ours.
   int process_id() const;
   bool has_ended() const { return process_ && process_->has_ended(); }
+  // It dies of what it did; an end of our making would hide of what.
+  bool is_dying() const { return is_dying_; }
   bool is_alive() const { return !has_ended() && control_->answers_heartbeats(); }
   // Each ends the worker, whatever it would say next, and throws the fault that says how it failed. `is_certain`: it is
   // dying already, which is not waited for.
@@ -85,7 +87,7 @@ class WorkerLink {
   std::vector<std::string> plugins_;  // names
   std::string address_;               // of a worker that is no process of ours
   int descriptor_socket_ = -1;
-  bool is_dying_ = false;  // of what it did, which its end shall tell
+  bool is_dying_ = false;
   std::shared_ptr<WorkerProcess> process_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<ControlSession> control_;

@@ -41,7 +41,7 @@ struct Mailbox {
   std::uint64_t compute_ns;
   gravitas_frame_column columns[GRAVITAS_MAX_COLUMNS];
   gravitas_frame_column reply[GRAVITAS_MAX_COLUMNS];
-  // Why a call was refused or failed; the signal's name after a crash.
+  // Why a call was refused or failed.
   char text[512];
 };
 

@@ -66,8 +66,8 @@ class MailboxLoop {
   std::uint32_t collisions_ = 0;
 };
 
-// Makes fatal signals wake the kernel at once, before the process dies of them, and so any other end of the calling
-// thread, which is the process's first.
+// Makes fatal signals wake the kernel at once, before the process dies of them, and so any other end of the process, whose
+// first thread calls this. Starts a thread that does nothing and never ends; the mailboxes must stay.
 void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kernel, std::uint64_t epoch);
 
 }  // namespace gravitas::host

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "kernel/environment.h"
@@ -17,6 +18,7 @@
 #include "services/campaign/host_trouble.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/simulated_carrier.h"
+#include "services/run/kernel_names.h"
 #include "services/run/session.h"
 
 namespace gravitas::campaign {
@@ -145,6 +147,7 @@ class Run {
   std::unique_ptr<Environment> neighbour_;
   std::vector<std::jthread> pauses_;
   std::vector<Injected> faults_;
+  std::set<Slot> late_;  // whose call overran its deadline though nothing had been injected
   bool is_over_ = false, has_other_plugin_ = false;
   v1::Trial trial_;
 };
@@ -249,12 +252,13 @@ void Run::go() {
     if (world_->step_count() != expected || !commits.is(expected))
       forbid(fmt::format("step {} was lost or made twice: {} are counted", step, world_->step_count()));
     if (outcome == StepOutcome::kPaused) {
-      judge_pause(step);
+      is_over_ = true;
     } else if (!(world_->chain_hash() == scene_.chains[step]) && !has_other_plugin_) {
       judge_divergence(step);
     }
   }
   attribute_records();
+  if (world_->fault()) judge_pause(world_->fault()->step);
   judge_swaps();
   write();
 }
@@ -276,15 +280,9 @@ Run::Injected* Run::find(const FaultRecord& record) {
 }
 
 bool Run::is_worn_out(Slot slot) const {
-  std::uint32_t failures = 0, deadlines = 0, planned = 0;
-  for (const FaultRecord& record : world_->faults()) {
-    if (record.fault.slot != slot) continue;
-    ++failures;
-    deadlines += record.fault.kind == kernel::FaultKind::kDeadline ? 1 : 0;
-  }
-  for (const Injected& fault : faults_)
-    if (fault.happened && std::ranges::count(hit_by(*fault.plan), slot) > 0) planned += fault.plan->times;
-  return deadlines > 0 && failures > planned && failures >= kernel::SlotHost::kBudget;
+  const auto failures =
+      std::ranges::count(world_->faults(), slot, [](const FaultRecord& one) { return one.fault.slot; });
+  return failures >= kernel::SlotHost::kBudget && late_.contains(slot);
 }
 
 void Run::note_fallbacks() {
@@ -312,7 +310,6 @@ void Run::judge_divergence(std::uint32_t step) {
 
 // A pause is right after poison that no fallback takes over; what it leaves must go on as the quiet run does.
 void Run::judge_pause(std::uint32_t step) {
-  is_over_ = true;
   const kernel::StageFault& last = world_->fault()->fault;
   Injected* poison = nullptr;
   for (Injected& fault : faults_)
@@ -332,8 +329,10 @@ void Run::judge_pause(std::uint32_t step) {
   if (!problem.empty()) return forbid(fmt::format("the state of the pause cannot be resumed: {}", problem));
   while (resumed.step_count() < plan_.steps && resumed.step() == StepOutcome::kCommitted) {
   }
-  if (resumed.step_count() < plan_.steps || !is_finite(resumed))
-    return forbid(fmt::format("what the pause left goes on to step {} only", resumed.step_count()));
+  if (resumed.fault())
+    return forbid(fmt::format("what the pause left goes on to step {} only: {}", resumed.step_count(),
+                              resumed.fault()->fault.text()));
+  if (!is_finite(resumed)) return forbid("what the pause left goes on to what is not finite");
   if (!has_other_plugin_ && !(resumed.chain_hash() == scene_.chains[plan_.steps]))
     forbid("what the pause left does not go on as the quiet run does");
 }
@@ -346,8 +345,9 @@ void Run::attribute_records() {
     if (Injected* fault = find(record); fault != nullptr) {
       fault->records.push_back(record);
     } else {
+      if (record.fault.kind == kernel::FaultKind::kDeadline) late_.insert(record.fault.slot);
       trial_.add_unprovoked(fmt::format("step {}, slot {}: {}: {}", record.step, slot_name(record.fault.slot),
-                                        kernel::fault_kind_name(record.fault.kind), record.fault.text()));
+                                        fault_kind_name(record.fault.kind), record.fault.text()));
     }
   }
 }
@@ -361,7 +361,7 @@ void Run::judge_swaps() {
       const bool has_reason = lie == nullptr || swap.reason.find(lie->refusal) != std::string::npos;
       if (is_it && (swap.state != kernel::SwapState::kRefused || !has_reason))
         forbid(fmt::format("{} in slot {} is {}{}{}", fault.plan->order, slot_name(swap.slot),
-                           kernel::swap_state_name(swap.state), swap.reason.empty() ? "" : ": ", swap.reason));
+                           swap_state_name(swap.state), swap.reason.empty() ? "" : ": ", swap.reason));
     }
   }
 }
@@ -378,12 +378,14 @@ void Run::write() {
     line->set_rerun(fault.plan->rerun);
     std::string outcome = fault.outcome;
     if (outcome.empty()) outcome = fault.records.empty() ? "M" : "B";
+    bool is_tired = false;
     for (const FaultRecord& record : fault.records) {
       line->set_detected_by(record.fault.detected_by);
       line->set_recovered_by(record.recovered_by);
       if (record.recovered_by.starts_with("fallback") && fault.outcome.empty()) outcome = "F";
+      is_tired |= is_worn_out(record.fault.slot);
     }
-    if (outcome == "F" && fault.plan->duty != Duty::kPoison && !is_worn_out(fault.plan->slot)) {
+    if (outcome == "F" && fault.plan->duty != Duty::kPoison && !is_tired) {
       outcome = "forbidden";
       forbid(fmt::format("the fallback took over at step {} from {}, which had to be recovered", fault.plan->step,
                          fault.plan->order));

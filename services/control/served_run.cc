@@ -15,6 +15,7 @@
 #include "services/recorder/identity.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
+#include "services/run/kernel_names.h"
 #include "services/scene/parser.h"
 #include "services/survey/queries.h"
 
@@ -172,7 +173,7 @@ void ServedRun::make_step() {
     if (environment_->step() == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
       fault_ = fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(record.fault.slot),
-                           record.fault.plugin, record.fault.text(), kernel::fault_kind_name(record.fault.kind));
+                           record.fault.plugin, record.fault.text(), fault_kind_name(record.fault.kind));
       return keep_faulted_state();
     }
     figures_->follow(environment_.get());

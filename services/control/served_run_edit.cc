@@ -6,6 +6,7 @@
 #include "plugin_sdk/near_miss.h"
 #include "services/control/served_run.h"
 #include "services/edit/edited_scene.h"
+#include "services/run/kernel_names.h"
 #include "services/run/report.h"
 
 namespace gravitas::control {
@@ -15,7 +16,7 @@ void ServedRun::require_settled_swaps() const {
   for (const kernel::SwapRecord& record : environment_->swaps())
     if (record.state < kernel::SwapState::kCommitted)
       throw NotNow(fmt::format("edit: the swap of slot {} to {} is on its way ({}); the next steps end it",
-                               slot_name(record.slot), record.to, kernel::swap_state_name(record.state)));
+                               slot_name(record.slot), record.to, swap_state_name(record.state)));
 }
 
 api::EditMade ServedRun::edit(const api::EditRequest& request) {

@@ -7,6 +7,7 @@
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
+#include "services/run/kernel_names.h"
 #include "services/run/report.h"
 
 namespace gravitas::control {
@@ -124,7 +125,7 @@ std::vector<api::ServedSwap> ServedRun::swap_messages() const {
     swap.set_step(record.step);
     swap.set_from(record.from);
     swap.set_to(record.to);
-    swap.set_outcome(kernel::swap_state_name(record.state));
+    swap.set_outcome(swap_state_name(record.state));
     swap.set_reason(record.reason);
     swap.set_pause_us(record.pause_us);
     swap.set_wait_us(record.wait_us);

@@ -7,6 +7,7 @@
 #include "plugin_sdk/activity.h"
 #include "plugin_sdk/merged_rows.h"
 #include "plugin_sdk/slots.h"
+#include "services/run/kernel_names.h"
 
 namespace gravitas {
 namespace {
@@ -151,7 +152,7 @@ void EventSource::find_faults(const kernel::Environment& environment) {
     Event event{EventKind::kFault, record.step, environment.time()};
     event.slot = slot_name(record.fault.slot);
     event.plugin = record.fault.plugin;
-    event.what = kernel::fault_kind_name(record.fault.kind);
+    event.what = fault_kind_name(record.fault.kind);
     event.text = record.fault.text() + (record.recovered_by.empty() ? "" : "; answered by: " + record.recovered_by);
     listener_.on_event(event);
   }
@@ -162,7 +163,7 @@ void EventSource::find_swaps(const kernel::Environment& environment) {
     Event event{EventKind::kSwap, environment.step_count(), environment.time()};
     event.slot = slot_name(record.slot);
     event.plugin = record.to;
-    event.what = kernel::swap_state_name(record.state);
+    event.what = swap_state_name(record.state);
     event.text = record.reason;
     listener_.on_event(event);
   });

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "services/run/kernel_names.h"
 #include "services/run/omissions.h"
 
 namespace gravitas {
@@ -56,7 +57,7 @@ void write_faults(const kernel::Environment& environment, report::v1::Report* re
     report::v1::FaultRecord* fault = report->add_faults();
     fault->set_step(record.step);
     fault->set_slot(slot_name(record.fault.slot));
-    fault->set_kind(record.injected.empty() ? kernel::fault_kind_name(record.fault.kind) : record.injected);
+    fault->set_kind(record.injected.empty() ? fault_kind_name(record.fault.kind) : record.injected);
     fault->set_detected_by(record.fault.detected_by);
     fault->set_recovered_by(record.recovered_by.empty() ? "none: paused" : record.recovered_by);
     fault->set_recovery_us(record.recovery_us);
@@ -74,7 +75,7 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
     swap->set_to(one.to);
     swap->set_pause_us(one.pause_us);
     swap->set_wait_us(one.wait_us);
-    swap->set_outcome(kernel::swap_state_name(one.state));
+    swap->set_outcome(swap_state_name(one.state));
     swap->set_reason(one.reason);
     write_comparison(one.shadow, environment, swap->mutable_shadow());
   }
@@ -107,8 +108,8 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 
 void settle_swaps(report::v1::Report* report) {
   for (report::v1::SwapRecord& swap : *report->mutable_swaps())
-    if (swap.outcome() == kernel::swap_state_name(kernel::SwapState::kProbation))
-      swap.set_outcome(kernel::swap_state_name(kernel::SwapState::kCommitted));
+    if (swap.outcome() == swap_state_name(kernel::SwapState::kProbation))
+      swap.set_outcome(swap_state_name(kernel::SwapState::kCommitted));
 }
 
 }  // namespace gravitas

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -29,6 +28,7 @@
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
+#include "services/run/kernel_names.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
@@ -41,7 +41,7 @@ using Clock = std::chrono::steady_clock;
 
 std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
   return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
-                     fault.text(), kernel::fault_kind_name(fault.kind));
+                     fault.text(), fault_kind_name(fault.kind));
 }
 
 }  // namespace

@@ -76,6 +76,7 @@ void recovery(benchmark::State& state, Hosting hosting, const std::string& fault
       world.inject({Slot::kSolver, fault, world.step_count() + 1});
       const double faulty = step_after_a_pause(&world, &state);
       if (quiet < 0.0 || faulty < 0.0) return;
+      if (world.faults().empty()) continue;
       const kernel::FaultRecord& record = world.faults().back();
       if (record.step != world.step_count() || record.recovered_by != expected) continue;
       recoveries.push_back(record.recovery_us);

@@ -3,10 +3,15 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <chrono>
+#include <filesystem>
+#include <iterator>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "kernel/environment.h"
+#include "kernel/slot_host.h"
 #include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 
@@ -65,6 +70,25 @@ TEST_P(Supervised, WithoutAStandbyANewWorkerIsStarted) {
   EXPECT_EQ(world.chain_hash(), quiet_chain());
   ASSERT_EQ(world.faults().size(), 1U);
   EXPECT_EQ(world.faults()[0].recovered_by, "cold start");
+}
+
+// How a worker ended is told only to who asks, and kept until then.
+TEST_P(Supervised, DeathsThatNobodyAsksAboutHoldNoDescriptor) {
+  constexpr std::uint32_t kDeaths = 12, kBetween = kernel::SlotHost::kGoodAnswers + 1;
+  WorldBuilder cold = busy_world(GetParam()).steps((kDeaths + 1) * kBetween, 1e-4);
+  cold.description().solver.standbys = 0;
+  Environment world(cold.description());
+  for (std::uint32_t i = 1; i <= kDeaths; ++i) world.inject({Slot::kSolver, "kill", i * kBetween});
+  const auto descriptors = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
+  };
+  while (world.step_count() < kBetween) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  const auto before = descriptors();
+  run_to_end(&world);
+  EXPECT_EQ(world.faults().size(), kDeaths);
+  // what has died is put away in threads of their own
+  for (int i = 0; i < 1000 && descriptors() > before; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_LE(descriptors(), before);
 }
 
 TEST_P(Supervised, AHangingWorkerIsReplacedAtItsDeadline) {

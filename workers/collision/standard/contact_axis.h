@@ -61,7 +61,7 @@ class ShallowestAxis {
   // Offers a direction of any length, of either sign: the sign that points from a to b is taken.
   // Directions shorter than `shortest` are ignored: their rounding errors would speak.
   void offer(const Vector3& direction, double shortest = 0.0);
-  // Offers an axis whose depth is known: what is searched after it need not beat less.
+  // Offers an axis whose depth is known: what cannot beat it is not searched for afterwards.
   void offer_axis(const ContactAxis& axis);
   // Offers a unit normal whose sign is settled.
   void offer_signed(const Vector3& normal);
@@ -93,7 +93,7 @@ void search_great_circle(const Vector3& pole, const Vector3& u, const Vector3& v
                          ShallowestAxis* search);
 
 // Offers the minima of h that touch rim against rim, if they are less than the depth known. Both shapes are cylinders,
-// and they overlap.
+// and they overlap or touch.
 void search_rims(ShallowestAxis* search);
 
 }  // namespace gravitas::collision
