@@ -137,7 +137,9 @@ TEST(WorkerSandbox, LinesOfWorkersAreWarnings) {
   Environment world(builder.description());
   while (world.step_count() < world.total_steps() && world.step() == kernel::StepOutcome::kCommitted) {
   }
-  EXPECT_THAT(world.warnings(), Contains("worker of slot integrator: stdout: three calls are enough"));
+  const std::vector<std::string> warnings = world.warnings();
+  EXPECT_THAT(warnings, Contains("worker of slot integrator: stdout: three calls are enough"));
+  EXPECT_THAT(warnings, Contains("worker of slot integrator: stderr: it cannot go on"));
 }
 
 TEST(WorkerSandbox, AWorkerThatListensIsInOneToo) {

@@ -8,7 +8,7 @@ namespace {
 
 void misbehave(const gravitas::faulty::Request&, const gravitas::faulty::Reply&, gravitas::Host&) {
   std::printf("three calls are enough\n");
-  std::fprintf(stderr, "it cannot go on\n");
+  std::fprintf(stderr, "it cannot go on");  // a line that is only begun
   std::abort();
 }
 
