@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <thread>
 
@@ -36,15 +37,26 @@ int listen_on(const sockaddr* address, socklen_t size) {
   return -1;
 }
 
+// Its file gets the name when somebody listens there already: whoever sees it can connect.
 int listen_unix(const std::string& path) {
-  const std::optional<sockaddr_un> address = channel::unix_address(path);
+  const std::string unnamed = path + "." + std::to_string(getpid());
+  const std::optional<sockaddr_un> address = channel::unix_address(unnamed);
   if (!address) return -1;
-  const auto* plain = reinterpret_cast<const sockaddr*>(&*address);
-  const int listening = listen_on(plain, sizeof *address);
-  if (listening >= 0 || errno != EADDRINUSE) return listening;
+  unlink(unnamed.c_str());
+  const int listening = listen_on(reinterpret_cast<const sockaddr*>(&*address), sizeof *address);
+  if (listening < 0) return -1;
+  bool is_named = link(unnamed.c_str(), path.c_str()) == 0;
   // left behind by a worker that was killed
-  if (channel::probe_unix(path) == ECONNREFUSED) unlink(path.c_str());
-  return listen_on(plain, sizeof *address);
+  if (!is_named && errno == EEXIST) {
+    is_named = channel::probe_unix(path) == ECONNREFUSED && rename(unnamed.c_str(), path.c_str()) == 0;
+    if (!is_named) errno = EADDRINUSE;
+  }
+  const int problem = errno;
+  unlink(unnamed.c_str());
+  if (is_named) return listening;
+  close(listening);
+  errno = problem;
+  return -1;
 }
 
 int listen_tcp(const std::string& address) {

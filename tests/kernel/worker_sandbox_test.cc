@@ -152,19 +152,24 @@ TEST(WorkerSandbox, AWorkerThatListensIsInOneToo) {
           slot.plugins[0].library.c_str(), nullptr);
     _exit(127);
   }
+  struct Ended {
+    ~Ended() {
+      kill(worker, SIGKILL);
+      waitpid(worker, nullptr, 0);
+      unlink(path.c_str());
+    }
+    pid_t worker;
+    const std::string& path;
+  };
+  const Ended ended{worker, path};
   slot.plugins[0].address = address;
   while (access(path.c_str(), F_OK) != 0) ASSERT_EQ(waitpid(worker, nullptr, WNOHANG), 0);
-  {
-    const auto host = start(slot);
-    expect_whole_sandbox(host->sandbox());
-    const std::string text = third_call(host.get());
-    EXPECT_THAT(text, StartsWith("not prevented: "));
-    for (const char* act : {"socket", "connect", "fork", "exec", "signal", "ptrace", "peeking"})
-      EXPECT_THAT(text, Not(HasSubstr(act)));
-  }
-  kill(worker, SIGKILL);
-  waitpid(worker, nullptr, 0);
-  unlink(path.c_str());
+  const auto host = start(slot);
+  expect_whole_sandbox(host->sandbox());
+  const std::string text = third_call(host.get());
+  EXPECT_THAT(text, StartsWith("not prevented: "));
+  for (const char* act : {"socket", "connect", "fork", "exec", "signal", "ptrace", "peeking"})
+    EXPECT_THAT(text, Not(HasSubstr(act)));
 }
 
 TEST(WorkerSandbox, AWorkerWhoseKernelIsGoneAlreadyEnds) {
