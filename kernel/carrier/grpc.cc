@@ -65,12 +65,16 @@ class GrpcCarrier final : public Carrier {
     std::uint64_t deadline_ns;
     std::uint64_t until, cap;  // CLOCK_MONOTONIC, ns
     bool is_unread;            // the worker will say that it has the request, and has not yet
+    std::uint64_t taken;       // requests that it had taken before
   };
 
   Stream& stream_of(const MethodInfo& method, Patience* patience);
   void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
   void wait(Stream* stream, Patience* patience);
-  [[noreturn]] void report_broken(Stream* stream, bool is_unread);
+  [[noreturn]] void report_broken(Stream* stream, const Patience& patience);
+  [[noreturn]] void report_death(const Patience& patience) {
+    link_.report_death(patience.is_unread && link_.requests_taken() == patience.taken, link_.is_ending());
+  }
   void send_asset(Stream* stream, const gravitas_column& column, std::uint64_t size, std::uint64_t hash,
                   Patience* patience);
   void leave_out_known(Stream* stream, const MethodInfo& method, std::span<gravitas_column> columns,
@@ -108,7 +112,8 @@ GrpcCarrier::~GrpcCarrier() {
 }
 
 // Says why an operation on the stream failed: its worker ended the stream with a status, or is gone.
-void GrpcCarrier::report_broken(Stream* stream, bool is_unread) {
+void GrpcCarrier::report_broken(Stream* stream, const Patience& patience) {
+  if (link_.is_ending()) report_death(patience);
   grpc::Status& status = stream->status;
   void* tag = nullptr;
   bool ok = false;
@@ -116,7 +121,7 @@ void GrpcCarrier::report_broken(Stream* stream, bool is_unread) {
   const auto until = std::chrono::system_clock::now() + std::chrono::milliseconds(kDrainMilliseconds);
   while (tag != &status && queue_.AsyncNext(&tag, &ok, until) == grpc::CompletionQueue::GOT_EVENT) continue;
   if (tag != &status || status.ok() || status.error_code() == grpc::StatusCode::UNAVAILABLE || link_.has_ended())
-    link_.report_death(is_unread);
+    report_death(patience);
   link_.kill();
   throw StageFault(FaultKind::kFailure, "stream", "it ended the stream of its method: " + status.error_message());
 }
@@ -131,10 +136,10 @@ void GrpcCarrier::wait(Stream* stream, Patience* patience) {
     bool ok = false;
     if (queue_.AsyncNext(&tag, &ok, until) == grpc::CompletionQueue::GOT_EVENT) {
       if (tag != stream) continue;
-      if (!ok) report_broken(stream, patience->is_unread);
+      if (!ok) report_broken(stream, *patience);
       return;
     }
-    if (link_.has_ended()) link_.report_death(patience->is_unread);
+    if (link_.has_ended()) report_death(*patience);
     const std::uint64_t later = channel::now_ns();
     if (later < patience->until && later < patience->cap) continue;
     link_.report_overdue(later >= patience->cap, patience->deadline_ns);
@@ -194,7 +199,7 @@ void GrpcCarrier::leave_out_known(Stream* stream, const MethodInfo& method, std:
 }
 
 CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
-  if (link_.has_ended()) link_.report_death(true);
+  if (link_.has_ended() || link_.is_ending()) link_.report_death(true, link_.is_ending());
   const MethodInfo& method = call.info();
   std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns;
   for (std::size_t i = 0; i < call.request.size(); ++i)
@@ -203,7 +208,8 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
 
   const std::uint64_t deadline_ns = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
   const std::uint64_t start = channel::now_ns();
-  Patience patience{deadline_ns, start + deadline_ns, start + kDeadlineCap * deadline_ns, call.attempt > 0};
+  Patience patience{deadline_ns, start + deadline_ns, start + kDeadlineCap * deadline_ns, call.attempt > 0,
+                    link_.requests_taken()};
   stage::v1::Call header;
   header.set_epoch(link_.epoch());
   header.set_sequence(++sequence_);

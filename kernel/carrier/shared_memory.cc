@@ -10,7 +10,7 @@
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/carrier/worker_link.h"
-#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/mailboxes.h"
 #include "plugin_sdk/channel/reply_frame.h"
 
 namespace gravitas::kernel {
@@ -38,13 +38,6 @@ class SharedMemoryCarrier final : public Carrier {
   std::vector<std::string> sandbox() const override { return link_->sandbox(); }
 
  private:
-  // What outlives this object until the process has been reaped: the mailbox that the watcher wakes.
-  struct Mailboxes {
-    Segment kernel_segment, worker_segment;
-    Mailbox* mine = nullptr;
-    Mailbox* theirs = nullptr;
-  };
-
   void make_rooms(const StageCall& call, const Arena& arena, const DerivativeSource* derivatives);
   void send_new_segments(const Arena& arena);
   void post_frame(gravitas_frame_header header, std::span<const ColumnId> columns, const Arena& arena);
@@ -73,11 +66,11 @@ class SharedMemoryCarrier final : public Carrier {
   std::uint64_t sequence_ = 0, response_generation_ = 0, sent_state_ = 0;  // the last
   std::array<OpenCall, 2> calls_;
   OpenCall* open_ = calls_.data();
+  std::shared_ptr<channel::Mailboxes> boxes_ = std::make_shared<channel::Mailboxes>();
   // Of the last message: the worker's signal, its progress (between calls nothing makes any) and the clock. What was seen
   // then is not read again: it would cost a cache line that the worker writes.
-  std::uint32_t seen_ = 1;
+  std::uint32_t seen_ = boxes_->theirs->signal;
   std::uint64_t seen_marks_ = 0, seen_ns_ = 0;
-  std::shared_ptr<Mailboxes> boxes_ = std::make_shared<Mailboxes>();
   std::unique_ptr<WorkerLink> link_;
 };
 
@@ -85,25 +78,10 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
     : defences_(slot.defences),
       slot_deadline_ns_(
           static_cast<std::uint64_t>((slot.defences.deadline ? slot.deadline : kAttachedDeadline) * 1e9)) {
-  boxes_->kernel_segment = Segment::create("gravitas kernel mailbox", sizeof(Mailbox), channel::Sharing::kReadersOnly);
-  boxes_->worker_segment = Segment::create("gravitas worker mailbox", sizeof(Mailbox), channel::Sharing::kWriters);
-  boxes_->mine = reinterpret_cast<Mailbox*>(boxes_->kernel_segment.data());
-  boxes_->theirs = reinterpret_cast<Mailbox*>(boxes_->worker_segment.data());
-  boxes_->theirs->cpu = ~0U;
-  boxes_->theirs->signal = seen_;
-  // Linux does so, unless the worker ended before it had asked for it, or posted while it ended
-  const auto on_end = [boxes = boxes_] {
-    boxes->theirs->signal = channel::kEnded;
-    channel::wake(boxes->theirs);
-  };
-  link_ = std::make_unique<WorkerLink>(slot, threads, true, on_end, std::move(stop));
+  link_ = std::make_unique<WorkerLink>(
+      slot, threads, true, [boxes = boxes_] { boxes->say_ended(); }, std::move(stop));
   link_->finish();
-  const auto send = [&](SegmentRole role, const Segment& segment) {
-    return channel::send_segment(link_->descriptor_socket(), {role, 0, 0, segment.size()}, segment.descriptor());
-  };
-  if (!send(SegmentRole::kKernelMailbox, boxes_->kernel_segment) ||
-      !send(SegmentRole::kWorkerMailbox, boxes_->worker_segment))
-    link_->report_death();
+  if (!boxes_->send(link_->descriptor_socket())) link_->report_death();
 }
 
 // Said on both ways: the data loop sleeps on its mailbox, not on the stream.

@@ -1,5 +1,6 @@
 #include "kernel/carrier/worker_link.h"
 
+#include <fcntl.h>
 #include <grpcpp/create_channel_posix.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -146,6 +147,7 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
 
 void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
                                std::function<void()> on_end) {
+  if (!with_descriptors) watch_ = std::make_shared<channel::EndWatch>();
   int control[2], descriptors[2] = {-1, -1};
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, control) != 0 ||
       (with_descriptors && socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, descriptors) != 0))
@@ -159,6 +161,11 @@ void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t thread
   if (with_descriptors) {
     arguments.insert(arguments.end(), {"--descriptor-fd", "4"});
     inherited.push_back(descriptors[1]);
+  } else {
+    watch_->shut_at_end(control[0]);
+    on_end = [watch = watch_] { watch->say_ended(); };
+    arguments.insert(arguments.end(), {"--mailbox-fd", "4"});
+    inherited.push_back(fcntl(watch_->descriptor(), F_DUPFD_CLOEXEC, 0));
   }
   if (const std::uint64_t memory = kWorkerMemory / 2 + threads * kThreadMemory; memory > kWorkerMemory)
     arguments.insert(arguments.end(), {"--memory-limit", std::to_string(memory)});

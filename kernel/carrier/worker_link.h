@@ -17,6 +17,7 @@
 #include "kernel/description.h"
 #include "kernel/fault.h"
 #include "kernel/supervisor.h"
+#include "plugin_sdk/channel/mailboxes.h"
 
 namespace gravitas::kernel {
 
@@ -40,8 +41,9 @@ std::shared_ptr<grpc::Channel> worker_channel(int descriptor);
 class WorkerLink {
  public:
   // Starts `gravitas-worker` with the plugins of the slot, or what the slot names instead. `with_descriptors`: with
-  // a second socket pair, for shared memory. `on_end` runs in the supervisor's thread when a process of ours has
-  // ended. Whoever asks `stop` to stop ends the waiting for it here and in finish(). Throws StageFault.
+  // a second socket pair, for shared memory; else the end of the process shuts the channel's socket at once. `on_end`
+  // runs in the supervisor's thread when a process of ours has ended. Whoever asks `stop` to stop ends the waiting for
+  // it here and in finish(). Throws StageFault.
   WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors, std::function<void()> on_end,
              std::stop_token stop = {});
   ~WorkerLink();
@@ -61,9 +63,12 @@ class WorkerLink {
   // Of the handshake for a worker that is no process of ours.
   int process_id() const;
   bool has_ended() const { return process_ && process_->has_ended(); }
+  // Of a process of ours without shared memory: it has said that it ends, and how many requests it has taken.
+  bool is_ending() const { return watch_ && watch_->has_ended(); }
+  std::uint64_t requests_taken() const { return watch_ ? watch_->requests_taken() : 0; }
   // It dies of what it did; an end of our making would hide of what.
   bool is_dying() const { return is_dying_; }
-  bool is_alive() const { return !has_ended() && control_->answers_heartbeats(); }
+  bool is_alive() const { return !has_ended() && !is_ending() && control_->answers_heartbeats(); }
   // Each ends the worker, whatever it would say next, and throws the fault that says how it failed. `is_certain`: it is
   // dying already, which is not waited for.
   [[noreturn]] void report_death(bool is_unread = false, bool is_certain = false);
@@ -88,6 +93,7 @@ class WorkerLink {
   std::string address_;               // of a worker that is no process of ours
   int descriptor_socket_ = -1;
   bool is_dying_ = false;
+  std::shared_ptr<channel::EndWatch> watch_;
   std::shared_ptr<WorkerProcess> process_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<ControlSession> control_;

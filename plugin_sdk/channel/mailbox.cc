@@ -22,10 +22,9 @@ void futex_wake(const std::atomic<std::uint32_t>* word) {
   syscall(SYS_futex, word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
 }
 
-void futex_wait(const std::atomic<std::uint32_t>* word, std::uint32_t expected, std::uint64_t timeout_ns) {
-  const timespec timeout = {static_cast<time_t>(timeout_ns / 1'000'000'000),
-                            static_cast<long>(timeout_ns % 1'000'000'000)};
-  syscall(SYS_futex, word, FUTEX_WAIT, expected, &timeout, nullptr, 0);
+// Without a timeout it waits for ever.
+void futex_wait(const std::atomic<std::uint32_t>* word, std::uint32_t expected, const timespec* timeout) {
+  syscall(SYS_futex, word, FUTEX_WAIT, expected, timeout, nullptr, 0);
 }
 
 // Core on which the caller runs. It is written only when it is another one: the reader may spin on that cache line.
@@ -47,7 +46,7 @@ void post(Mailbox* mine, const Mailbox* theirs) {
   say_cpu(mine);
   const std::uint32_t next = mine->signal.load(std::memory_order_relaxed) + 1;
   mine->signal.store(next == kEnded ? next + 1 : next, std::memory_order_seq_cst);
-  if (theirs->sleeping.load(std::memory_order_seq_cst) != 0) futex_wake(&mine->signal);
+  if (theirs == nullptr || theirs->sleeping.load(std::memory_order_seq_cst) != 0) futex_wake(&mine->signal);
 }
 
 Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint64_t until) {
@@ -72,10 +71,16 @@ Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint6
       result = Waited::kTimeout;
       break;
     }
-    futex_wait(&theirs->signal, seen, until - now);
+    const timespec timeout = {static_cast<time_t>((until - now) / 1'000'000'000),
+                              static_cast<long>((until - now) % 1'000'000'000)};
+    futex_wait(&theirs->signal, seen, &timeout);
   }
   mine->sleeping.store(0, std::memory_order_relaxed);
   return result;
+}
+
+void wait_for_change(const Mailbox* mailbox, std::uint32_t seen) {
+  while (mailbox->signal.load(std::memory_order_acquire) == seen) futex_wait(&mailbox->signal, seen, nullptr);
 }
 
 void wake(const Mailbox* mailbox) { futex_wake(&mailbox->signal); }

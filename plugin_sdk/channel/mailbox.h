@@ -47,7 +47,7 @@ struct Mailbox {
 
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free && std::atomic<std::uint64_t>::is_always_lock_free);
 
-// Makes the message in `mine` visible and wakes the other side if it sleeps.
+// Makes the message in `mine` visible and wakes the other side if it sleeps, or, without `theirs`, whether it does or not.
 void post(Mailbox* mine, const Mailbox* theirs);
 
 enum class Waited { kMessage, kTimeout };
@@ -55,6 +55,9 @@ enum class Waited { kMessage, kTimeout };
 // Waits until the other side's signal differs from `seen` or the clock (CLOCK_MONOTONIC, ns) passes `until`.
 // May also return kTimeout early by less than a millisecond; the caller looks at the clock.
 Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint64_t until);
+
+// Sleeps until the signal of `mailbox` differs from `seen`.
+void wait_for_change(const Mailbox* mailbox, std::uint32_t seen);
 
 // Wakes whoever sleeps on the signal of `mailbox`, without a message.
 void wake(const Mailbox* mailbox);

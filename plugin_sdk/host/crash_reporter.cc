@@ -16,12 +16,12 @@ namespace {
 channel::Mailbox* reporter_mailbox = nullptr;
 const channel::Mailbox* reporter_kernel = nullptr;
 std::uint64_t reporter_epoch = 0;
+std::atomic<bool> crash_reported{false};
 alignas(16) std::array<char, 65536> reporter_stack;
 
 // Runs on its own stack (the signal may be a stack overflow) and calls nothing that takes a lock.
 void report_crash(int signal_number) {
-  static std::atomic<bool> reported{false};
-  if (!reported.exchange(true)) {
+  if (!crash_reported.exchange(true)) {
     gravitas_frame_header header{};
     header.magic = GRAVITAS_MAGIC;
     header.kind = GRAVITAS_FRAME_CRASH;
@@ -41,6 +41,8 @@ void report_crash(int signal_number) {
 void write_end_of_this_thread(channel::Mailbox* mine) { syscall(SYS_set_tid_address, &mine->signal); }
 
 }  // namespace
+
+bool is_crashing() { return crash_reported; }
 
 void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kernel, std::uint64_t epoch) {
   reporter_mailbox = mine;

@@ -4,7 +4,8 @@
 //                                                                     standard output
 //   gravitas-worker --control-fd N --descriptor-fd M LIBRARY...       serves a kernel over inherited sockets, data in
 //                                                                     shared memory
-//   gravitas-worker --control-fd N LIBRARY...                         the same, data as gRPC messages
+//   gravitas-worker --control-fd N --mailbox-fd M LIBRARY...          the same, data as gRPC messages; its end is said
+//                                                                     in the mailbox, if there is one
 //   gravitas-worker --exec PROGRAM ARGUMENT...                        becomes that program, which dies with the kernel
 //   gravitas-worker --listen ADDRESS LIBRARY...                       serves one kernel after the other at an address
 //                                                                     of this machine, data as gRPC messages
@@ -52,19 +53,22 @@ struct Arguments {
   bool describe = false;
   int control = -1;
   int descriptors = -1;
+  int mailbox = -1;
   std::uint64_t memory_limit = host::kDefaultMemoryLimit;
   std::string address, lie;
   std::vector<std::string> libraries;
 };
 
 int usage() {
-  std::cerr << "usage: gravitas-worker --describe LIBRARY...\n"
-            << "       gravitas-worker --listen ADDRESS LIBRARY...     127.0.0.1:PORT, [::1]:PORT or unix:PATH\n"
-            << "       gravitas-worker --exec PROGRAM ARGUMENT...     as a kernel starts a command\n"
-            << "       gravitas-worker --control-fd N [--descriptor-fd M] LIBRARY...     as a kernel starts it\n"
-            << "       gravitas-worker --no-sandbox ...     for debuggers: the process does not restrict itself\n"
-            << "--memory-limit BYTES, beside the libraries: address space that it may take, 4 GiB if absent\n"
-            << "--lie WHAT, there too, to test who starts it: it says in the handshake that it is another, in its";
+  std::cerr
+      << "usage: gravitas-worker --describe LIBRARY...\n"
+      << "       gravitas-worker --listen ADDRESS LIBRARY...     127.0.0.1:PORT, [::1]:PORT or unix:PATH\n"
+      << "       gravitas-worker --exec PROGRAM ARGUMENT...     as a kernel starts a command\n"
+      << "       gravitas-worker --control-fd N [--descriptor-fd M | --mailbox-fd M] LIBRARY...     as a kernel starts "
+         "it\n"
+      << "       gravitas-worker --no-sandbox ...     for debuggers: the process does not restrict itself\n"
+      << "--memory-limit BYTES, beside the libraries: address space that it may take, 4 GiB if absent\n"
+      << "--lie WHAT, there too, to test who starts it: it says in the handshake that it is another, in its";
   for (const host::HandshakeLie& lie : host::handshake_lies()) std::cerr << ' ' << lie.what;
   std::cerr << '\n';
   return 2;
@@ -82,8 +86,12 @@ bool parse(int argc, char** argv, Arguments* arguments) {
     const std::string word = argv[i];
     if (word == "--describe") {
       arguments->describe = true;
-    } else if ((word == "--control-fd" || word == "--descriptor-fd") && i + 1 < argc) {
-      (word == "--control-fd" ? arguments->control : arguments->descriptors) = std::atoi(argv[++i]);
+    } else if (word == "--control-fd" && i + 1 < argc) {
+      arguments->control = std::atoi(argv[++i]);
+    } else if (word == "--descriptor-fd" && i + 1 < argc) {
+      arguments->descriptors = std::atoi(argv[++i]);
+    } else if (word == "--mailbox-fd" && i + 1 < argc) {
+      arguments->mailbox = std::atoi(argv[++i]);
     } else if (word == "--listen" && i + 1 < argc) {
       arguments->address = argv[++i];
     } else if (word == "--lie" && i + 1 < argc) {
@@ -99,7 +107,9 @@ bool parse(int argc, char** argv, Arguments* arguments) {
   }
   const int ways =
       (arguments->describe ? 1 : 0) + (arguments->control >= 0 ? 1 : 0) + (arguments->address.empty() ? 0 : 1);
-  return ways == 1 && (arguments->descriptors < 0 || arguments->control >= 0) && !arguments->libraries.empty();
+  const bool has_data = arguments->descriptors >= 0 || arguments->mailbox >= 0;
+  const bool has_both = arguments->descriptors >= 0 && arguments->mailbox >= 0;
+  return ways == 1 && (!has_data || arguments->control >= 0) && !has_both && !arguments->libraries.empty();
 }
 
 int describe(const std::vector<std::string>& libraries) {
@@ -167,9 +177,18 @@ void die_with_kernel(int inherited) {
 std::vector<std::string> enter_sandbox(const Arguments& arguments, int socket) {
   if (!arguments.sandbox) return {};
   std::vector<int> kept = {socket};
-  if (arguments.descriptors >= 0) kept.push_back(arguments.descriptors);
+  for (const int inherited : {arguments.descriptors, arguments.mailbox})
+    if (inherited >= 0) kept.push_back(inherited);
   host::close_inherited(kept);
   return host::enter_sandbox(arguments.libraries, arguments.memory_limit);
+}
+
+// The mailbox that was inherited, for as long as the process lives; null if none was.
+channel::Mailbox* map_mailbox(int descriptor) {
+  if (descriptor < 0) return nullptr;
+  static const channel::Segment segment =
+      channel::Segment::map(descriptor, sizeof(channel::Mailbox), channel::Access::kReadWrite);
+  return reinterpret_cast<channel::Mailbox*>(segment.data());
 }
 
 int serve(const Arguments& arguments) {
@@ -214,6 +233,8 @@ int serve(const Arguments& arguments) {
   service.sandbox = std::move(sandbox);
   service.lie = arguments.lie;
   service.on_end = [&](bool kernel_is_gone) {
+    // a kernel that was told of a crash has gone, too
+    while (host::is_crashing()) pause();
     if (kernel_is_gone && !listens) std::_Exit(0);
     handshake.end();
   };
@@ -239,7 +260,10 @@ int serve(const Arguments& arguments) {
       const std::uint64_t epoch = hello->epoch();
       handshake.answer(create(*hello, &plugins));
       if (streams) {
-        streams->serve(&plugins, epoch, handshake.stopping, &service.calls);
+        channel::Mailbox* mine = map_mailbox(arguments.mailbox);
+        if (mine != nullptr) host::install_crash_reporter(mine, nullptr, epoch);
+        streams->serve(&plugins, epoch, handshake.stopping, &service.calls,
+                       mine != nullptr ? &mine->progress : nullptr);
       } else {
         host::MailboxLoop loop(&plugins, arguments.descriptors);
         code = loop.serve(epoch, handshake.stopping, &service.calls,

@@ -67,7 +67,11 @@ class MailboxLoop {
 };
 
 // Makes fatal signals wake the kernel at once, before the process dies of them, and so any other end of the process, whose
-// first thread calls this. Starts a thread that does nothing and never ends; the mailboxes must stay.
+// first thread calls this. Starts a thread that does nothing and never ends; the mailboxes must stay. Without `kernel`
+// nobody says whether it sleeps.
 void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kernel, std::uint64_t epoch);
+
+// A fatal signal has been reported; the process dies of it, and of nothing else, within a millisecond.
+bool is_crashing();
 
 }  // namespace gravitas::host

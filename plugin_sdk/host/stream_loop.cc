@@ -211,10 +211,11 @@ bool StreamLoop::write(Stream* stream, const grpc::ByteBuffer& message, grpc::Wr
 }
 
 void StreamLoop::serve(HostedPlugins* plugins, std::uint64_t epoch, const std::atomic<bool>& stopping,
-                       std::atomic<std::uint64_t>* calls) {
+                       std::atomic<std::uint64_t>* calls, std::atomic<std::uint64_t>* taken) {
   plugins_ = plugins;
   epoch_ = epoch;
   calls_ = calls;
+  taken_ = taken;
   // the assets of the kernel before
   assets_.clear();
   if (accepting_ == nullptr) accept();
@@ -316,6 +317,7 @@ void StreamLoop::handle(Stream* stream) {
 void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault) {
   const MethodInfo& method = stage::method_info(stream->method);
   OpenCall services(this, stream, call);
+  if (taken_ != nullptr) taken_->fetch_add(1, std::memory_order_relaxed);
   if (call.attempt() > 0) services.say_taken();
   if (fault != nullptr) fault->pass(Moment::kRead);
   CallEnd end;

@@ -30,9 +30,10 @@ class StreamLoop {
   explicit StreamLoop(grpc::ServerBuilder* builder);
   ~StreamLoop();
 
-  // Serves the streams of one kernel until `stopping` is set. The server must have started.
+  // Serves the streams of one kernel until `stopping` is set. The server must have started. Counts the calls that are done
+  // in `calls`, and in `taken`, unless it is null, those that are begun.
   void serve(HostedPlugins* plugins, std::uint64_t epoch, const std::atomic<bool>& stopping,
-             std::atomic<std::uint64_t>* calls);
+             std::atomic<std::uint64_t>* calls, std::atomic<std::uint64_t>* taken);
 
  private:
   struct Stream;
@@ -69,6 +70,7 @@ class StreamLoop {
   std::map<std::uint64_t, std::vector<std::byte>> assets_;  // by hash
   std::uint64_t epoch_ = 0;
   std::atomic<std::uint64_t>* calls_ = nullptr;
+  std::atomic<std::uint64_t>* taken_ = nullptr;
   std::mutex io_;  // of a call: the plugin's threads may mark progress
 };
 

@@ -30,22 +30,15 @@ MailboxTalk::MailboxTalk(const Examinee& examinee, const Patience& patience, std
     : deadline_(patience.deadline),
       // whole columns are aligned
       elements_((elements + 7) / 8 * 8),
-      kernel_segment_(
-          Segment::create("check kernel mailbox", sizeof(channel::Mailbox), channel::Sharing::kReadersOnly)),
-      worker_segment_(Segment::create("check worker mailbox", sizeof(channel::Mailbox), channel::Sharing::kWriters)),
       state_(Segment::create("check state", GRAVITAS_MAX_COLUMNS * elements_ * 8, channel::Sharing::kReadersOnly)),
       response_(Segment::create("check response", GRAVITAS_MAX_COLUMNS * elements_ * 8, channel::Sharing::kWriters)),
-      mine_(reinterpret_cast<channel::Mailbox*>(kernel_segment_.data())),
-      theirs_(reinterpret_cast<channel::Mailbox*>(worker_segment_.data())),
       link_(examinee.slot(kernel::Hosting::kSharedMemory, patience.deadline), 1, true, [] {}) {
   link_.finish();
-  theirs_->cpu = ~0U;
+  if (!boxes_.send(link_.descriptor_socket())) link_.report_death();
   const auto send = [&](SegmentRole role, const Segment& one) {
     if (!channel::send_segment(link_.descriptor_socket(), {role, 0, kGeneration, one.size()}, one.descriptor()))
       link_.report_death();
   };
-  send(SegmentRole::kKernelMailbox, kernel_segment_);
-  send(SegmentRole::kWorkerMailbox, worker_segment_);
   send(SegmentRole::kResponse, response_);
   send(SegmentRole::kState, state_);
 }
@@ -82,10 +75,10 @@ Frame MailboxTalk::frame(stage::Method method, const MessageColumns& request) {
 }
 
 void MailboxTalk::post(const Frame& frame) {
-  std::memcpy(mine_->columns, frame.columns.data(), frame.columns.size() * sizeof frame.columns[0]);
-  std::memcpy(mine_->reply, frame.rooms.data(), frame.rooms.size() * sizeof frame.rooms[0]);
-  std::memcpy(&mine_->header, &frame.header, sizeof frame.header);
-  channel::post(mine_, theirs_);
+  std::memcpy(boxes_.mine->columns, frame.columns.data(), frame.columns.size() * sizeof frame.columns[0]);
+  std::memcpy(boxes_.mine->reply, frame.rooms.data(), frame.rooms.size() * sizeof frame.rooms[0]);
+  std::memcpy(&boxes_.mine->header, &frame.header, sizeof frame.header);
+  channel::post(boxes_.mine, boxes_.theirs);
 }
 
 void MailboxTalk::answer_derivative(const Question& question, const Frame& asked) {
@@ -93,7 +86,8 @@ void MailboxTalk::answer_derivative(const Question& question, const Frame& asked
   const std::size_t first_room = asked.rooms.size() - kDerivative.request.size();
   std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> trial{};
   for (std::size_t i = 0; i < kDerivative.request.size(); ++i)
-    trial[i] = {response_.data() + asked.rooms[first_room + i].offset, std::min(theirs_->columns[i].count, elements_)};
+    trial[i] = {response_.data() + asked.rooms[first_room + i].offset,
+                std::min(boxes_.theirs->columns[i].count, elements_)};
   const std::vector<double> wrench = question.derivative(stage::IntegratorDerivativeRequest(trial.data()));
   Frame answer;
   answer.header = asked.header;
@@ -110,12 +104,13 @@ void MailboxTalk::answer_derivative(const Question& question, const Frame& asked
 std::optional<Answer> MailboxTalk::receive(const Question& question, const Frame& frame, double seconds) {
   const std::uint64_t until = channel::now_ns() + static_cast<std::uint64_t>(seconds * 1e9);
   while (channel::now_ns() < until) {
-    if (link_.has_ended()) link_.report_death();
-    if (channel::wait(mine_, theirs_, seen_, std::min(until, channel::now_ns() + kLookNs)) == channel::Waited::kTimeout)
+    if (link_.has_ended() || seen_ == channel::kEnded) link_.report_death();
+    if (channel::wait(boxes_.mine, boxes_.theirs, seen_, std::min(until, channel::now_ns() + kLookNs)) ==
+        channel::Waited::kTimeout)
       continue;
-    seen_ = theirs_->signal.load(std::memory_order_acquire);
+    seen_ = boxes_.theirs->signal.load(std::memory_order_acquire);
     gravitas_frame_header header;
-    std::memcpy(&header, &theirs_->header, sizeof header);
+    std::memcpy(&header, &boxes_.theirs->header, sizeof header);
     if (header.kind == GRAVITAS_FRAME_CRASH) link_.report_death();
     if (header.sequence != frame.header.sequence || header.epoch != frame.header.epoch) continue;
     if (header.kind == GRAVITAS_FRAME_CALLBACK) {
@@ -125,11 +120,12 @@ std::optional<Answer> MailboxTalk::receive(const Question& question, const Frame
     const stage::MethodInfo& method = stage::method_info(question.method);
     Answer answer{.status = header.status, .text = {}, .fault = {}, .columns = MessageColumns(method.reply)};
     if (header.status != GRAVITAS_OK) {
-      answer.text.assign(theirs_->text, strnlen(theirs_->text, sizeof theirs_->text));
+      answer.text.assign(boxes_.theirs->text, strnlen(boxes_.theirs->text, sizeof boxes_.theirs->text));
       return answer;
     }
     std::vector<gravitas_reply_column> rooms = answer.columns.rooms();
-    for (std::size_t i = 0; i < rooms.size(); ++i) rooms[i].count = std::min(theirs_->columns[i].count, elements_);
+    for (std::size_t i = 0; i < rooms.size(); ++i)
+      rooms[i].count = std::min(boxes_.theirs->columns[i].count, elements_);
     answer.columns.resize(rooms);
     rooms = answer.columns.rooms();
     for (std::size_t i = 0; i < rooms.size(); ++i)

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "kernel/carrier/worker_link.h"
-#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/channel/mailboxes.h"
 #include "plugin_sdk/channel/segment.h"
 #include "plugin_sdk/conformance/conformance.h"
 #include "services/check/carrier_subject.h"
@@ -37,7 +37,7 @@ class MailboxTalk {
 
   void post(const Frame& frame);
   // The same message once more: the signal is counted up and nothing is written.
-  void post_again() { channel::post(mine_, theirs_); }
+  void post_again() { channel::post(boxes_.mine, boxes_.theirs); }
 
   // The reply with that sequence number, after answering what derivatives are asked for; nothing within `seconds`:
   // no value. Throws kernel::StageFault if the process ends.
@@ -57,12 +57,11 @@ class MailboxTalk {
 
   double deadline_;
   std::uint64_t elements_;
-  channel::Segment kernel_segment_, worker_segment_, state_, response_;
-  channel::Mailbox* mine_ = nullptr;
-  channel::Mailbox* theirs_ = nullptr;
+  channel::Segment state_, response_;
+  channel::Mailboxes boxes_;
   kernel::WorkerLink link_;
   std::uint64_t sequence_ = 0;
-  std::uint32_t seen_ = 0;
+  std::uint32_t seen_ = boxes_.theirs->signal;
 };
 
 }  // namespace gravitas::check
