@@ -42,16 +42,17 @@ void ConePath::add_disc(Eigen::Index row, int count, Eigen::Index normal, double
   }
 }
 
-std::uint32_t ConePath::next(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
+std::uint32_t ConePath::next(double smallest, Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
   constexpr std::uint32_t kSteps = 60, kStuck = 5;
   constexpr double kLittle = 0.02, kEnd = 1e-10;
   enter(lambda, y);
+  const double near = kEnd * load_ * speed_, end = discs_.empty() ? std::min(near, square(smallest)) : near;
   double last = 0.9, product = load_ * speed_;
   std::uint32_t steps = 0, stuck = 0;
   while (steps < kSteps && stuck < kStuck) {
     ++steps;
     product = normals_.empty() ? 0.01 * product : mean_product(*lambda);
-    if (!(product > kEnd * load_ * speed_)) break;
+    if (!(product > end)) break;
     // far, when the last step could be whole
     const double aim = std::clamp(square(1.0 - last), 0.01, 0.9) * product;
     linearise(aim, *lambda, *y);

@@ -35,9 +35,12 @@ class ConePath {
   // `count` rows (one or two) bounded by factor times the multiplier of `normal`; with factor 0 they push nothing.
   void add_disc(Eigen::Index row, int count, Eigen::Index normal, double factor);
 
-  // Sets the next guess at a solution and its y: the end of the way itself, then those of the convex problems in turn.
-  // Returns the steps that it took, at least 1.
-  std::uint32_t next(Eigen::VectorXd* lambda, Eigen::VectorXd* y);
+  // Whether next() has a guess that it has not made: without discs the problem is convex, and all guesses are the first.
+  bool has_next() const { return rounds_ == 0 || !discs_.empty(); }
+  // Sets the next guess at a solution and its y: the end of the way itself, then those of the convex problems in turn. The
+  // way is followed until multipliers times slacks are below `smallest` squared. Returns the steps that it took, at least
+  // 1.
+  std::uint32_t next(double smallest, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
 
  private:
   struct Scalar {

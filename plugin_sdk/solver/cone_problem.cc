@@ -306,8 +306,10 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
 
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
   // Newton steps without a residual half as large before the next guess
-  constexpr int kPatience = 4;
+  constexpr int kPatience = 7;
   const bool is_newton = settings.method == ConeMethod::kNewton;
+  double most = 0.0;
+  for (const std::uint32_t r : other_) most = std::max(most, scale_[r] * rows[r].length);
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
     double best = residual_of(lambda, y);
@@ -321,7 +323,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     std::uint32_t done = 0;
     // what rounding leaves of sums of large terms is no violation
     double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
-    while (best > enough && done < settings.iterations) {
+    while (best > enough && done < settings.iterations && (!is_newton || without < kPatience || guesses.has_next())) {
       const double before = best;
       if (!is_newton) {
         ++done;
@@ -329,7 +331,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       } else if (without < kPatience && newton_step(&lambda, &y)) {
         ++done, ++without;
       } else {
-        done += guesses.next(&lambda, &y);
+        done += guesses.next(enough / most, &lambda, &y);
         without = 0;
       }
       keep_better();

@@ -25,7 +25,7 @@
 //  3. Static and dynamic friction: all stick within mu_s first; what slips then slides with mu_d.
 //
 // Measured: heaps of two to five bodies with four contacts a face that slide and turn, at ratios of mass of 1e-3, 1, 1e2 and
-// 1e4, are all solved (400 of each); at 1e6 390 of 400, the others to what rounding leaves of the loads.
+// 1e4, are all solved (400 of each); at 1e6 392 of 400, the others to what rounding leaves of the loads.
 //
 // Scaled: every row by the root of its W_ii, a contact's three by one number, so that cones stay cones. More than kDenseRows
 // other rows: sweeps on all rows, the held ones factorised in between; the answer says if that did not do.
