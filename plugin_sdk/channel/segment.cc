@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <utility>
 
 #ifndef F_SEAL_FUTURE_WRITE
 #define F_SEAL_FUTURE_WRITE 0x0010
@@ -58,6 +59,7 @@ Segment Segment::map(int descriptor, std::size_t size, Access access) {
   if (data == MAP_FAILED) fail("mmap of shared memory");
   segment.data_ = static_cast<std::byte*>(data);
   segment.size_ = size;
+  close(std::exchange(segment.descriptor_, -1));
   return segment;
 }
 

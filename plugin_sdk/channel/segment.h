@@ -31,12 +31,13 @@ class Segment {
 
   // A new segment of whole pages, at least one, zeroed and mapped for reading and writing. Throws std::system_error.
   static Segment create(const char* name, std::size_t size, Sharing sharing);
-  // Maps a segment received from its creator; takes over the descriptor. Throws std::system_error, also if the
+  // Maps a segment received from its creator and closes the descriptor. Throws std::system_error, also if the
   // file is smaller than `size`.
   static Segment map(int descriptor, std::size_t size, Access access);
 
   std::byte* data() const { return data_; }
   std::size_t size() const { return size_; }
+  // Of one that was created here; -1 of one that was received.
   int descriptor() const { return descriptor_; }
 
  private:

@@ -1,5 +1,6 @@
 #include "plugin_sdk/host/mailbox_loop.h"
 
+#include <fcntl.h>
 #include <sched.h>
 #include <unistd.h>
 
@@ -51,13 +52,17 @@ bool fits(const channel::Segment& segment, std::uint64_t offset, std::uint64_t c
 
 }  // namespace
 
+void MailboxLoop::take_reserve() { reserve_ = fcntl(descriptor_socket_, F_DUPFD_CLOEXEC, 0); }
+
 bool MailboxLoop::receive_segments() {
   channel::SegmentMessage message{};
+  if (reserve_ >= 0) close(reserve_);
   const int descriptor = channel::receive_segment(descriptor_socket_, &message);
   if (descriptor < 0) return false;
   const bool read_only = message.role == SegmentRole::kKernelMailbox || message.role == SegmentRole::kState;
   channel::Segment segment = channel::Segment::map(
       descriptor, message.size, read_only ? channel::Access::kReadOnly : channel::Access::kReadWrite);
+  take_reserve();
   switch (message.role) {
     case SegmentRole::kKernelMailbox:
       kernel_segment_ = std::move(segment);

@@ -23,7 +23,9 @@ namespace gravitas::host {
 class MailboxLoop {
  public:
   MailboxLoop(HostedPlugins* plugins, int descriptor_socket)
-      : plugins_(plugins), descriptor_socket_(descriptor_socket) {}
+      : plugins_(plugins), descriptor_socket_(descriptor_socket) {
+    take_reserve();
+  }
 
   // Serves calls until a stop frame comes, `stopping` is set, or the kernel is gone. Returns the exit code.
   // `complain` takes what the kernel should hear of besides the answers.
@@ -40,6 +42,7 @@ class MailboxLoop {
   };
 
   bool receive_segments();
+  void take_reserve();
   // False if a segment that it announces did not come.
   bool take_request(const gravitas_frame_header& header);
   bool map_announced_segments(const gravitas_frame_header& header);
@@ -53,6 +56,7 @@ class MailboxLoop {
 
   HostedPlugins* plugins_;
   int descriptor_socket_;
+  int reserve_ = -1;  // a descriptor given up for the next segment's: plugins may take all others
   std::uint64_t epoch_ = 0;
 
   channel::Segment kernel_segment_, worker_segment_, state_;

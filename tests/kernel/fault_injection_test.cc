@@ -223,6 +223,17 @@ TEST_P(InjectedFaults, ThatUseUpDescriptors) {
               ::testing::MatchesRegex("opened [1-9][0-9]+ descriptors: Too many open files"));
 }
 
+TEST_P(InjectedFaults, ThatUseUpDescriptorsLeaveOneForTheNextSegments) {
+  Integration call;
+  const std::unique_ptr<Carrier> carrier = integrator();
+  call.make(carrier.get(), nullptr, "descriptors");
+  for (std::uint64_t room = 10'000; room <= 1'000'000; room *= 10) {
+    call.arena.grow(call.request[0], room);
+    call.arena.grow(call.reply[0], room);
+    EXPECT_EQ(call.make(carrier.get()).status, GRAVITAS_OK);
+  }
+}
+
 // More than a pipe holds; all of it is read, though not all of it is kept.
 TEST_P(InjectedFaults, ThatFloodTheOutput) {
   constexpr std::size_t kBytes = 1'000'000;
