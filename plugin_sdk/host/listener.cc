@@ -4,6 +4,7 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -46,10 +47,15 @@ int listen_unix(const std::string& path) {
   const int listening = listen_on(reinterpret_cast<const sockaddr*>(&*address), sizeof *address);
   if (listening < 0) return -1;
   bool is_named = link(unnamed.c_str(), path.c_str()) == 0;
-  // left behind by a worker that was killed
-  if (!is_named && errno == EEXIST) {
-    is_named = channel::probe_unix(path) == ECONNREFUSED && rename(unnamed.c_str(), path.c_str()) == 0;
+  struct stat found {};
+  if (!is_named && lstat(path.c_str(), &found) == 0) {
+    // a socket may have been left behind by a worker that was killed; any other file is somebody's
+    is_named = S_ISSOCK(found.st_mode) && channel::probe_unix(path) == ECONNREFUSED &&
+               rename(unnamed.c_str(), path.c_str()) == 0;
     if (!is_named) errno = EADDRINUSE;
+  } else if (!is_named) {
+    // a file system without links
+    is_named = rename(unnamed.c_str(), path.c_str()) == 0;
   }
   const int problem = errno;
   unlink(unnamed.c_str());

@@ -8,8 +8,8 @@
 
 namespace gravitas::host {
 
-// Listens at the address (plugin_sdk/channel/address.h); the port 0 lets the system choose one. The file of a
-// "unix:PATH" that nobody listens at any more is replaced. Returns the socket, or -1 and why in `problem`.
+// Listens at the address (plugin_sdk/channel/address.h); the port 0 lets the system choose one. The socket at a
+// "unix:PATH" that nobody listens at any more is replaced, any other file is not. Returns the socket, or -1 and why in `problem`.
 int listen_at(const std::string& address, std::string* problem);
 
 // The address with the port that the socket has.

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -59,6 +60,19 @@ TEST(Listener, AFileThatNobodyListensAtIsReplacedAndOneInUseIsNot) {
   close(second);
   unlink(path.c_str());
   EXPECT_NE(access((path + "." + std::to_string(getpid())).c_str(), F_OK), 0);
+}
+
+// It refuses connections, too.
+TEST(Listener, AFileThatIsNoSocketStays) {
+  const std::string path = path_of("file");
+  std::ofstream(path) << "a scene";
+  std::string problem;
+  EXPECT_EQ(listen_at("unix:" + path, &problem), -1);
+  EXPECT_THAT(problem, HasSubstr("Address already in use"));
+  std::string text;
+  std::getline(std::ifstream(path), text);
+  EXPECT_EQ(text, "a scene");
+  unlink(path.c_str());
 }
 
 }  // namespace
