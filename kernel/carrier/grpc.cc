@@ -73,7 +73,7 @@ class GrpcCarrier final : public Carrier {
   void wait(Stream* stream, Patience* patience);
   [[noreturn]] void report_broken(Stream* stream, const Patience& patience);
   [[noreturn]] void report_death(const Patience& patience) {
-    link_.report_death(patience.is_unread && link_.requests_taken() == patience.taken, link_.is_ending());
+    link_.report_death(patience.is_unread && link_.requests_taken() == patience.taken);
   }
   void send_asset(Stream* stream, const gravitas_column& column, std::uint64_t size, std::uint64_t hash,
                   Patience* patience);
@@ -113,7 +113,7 @@ GrpcCarrier::~GrpcCarrier() {
 
 // Says why an operation on the stream failed: its worker ended the stream with a status, or is gone.
 void GrpcCarrier::report_broken(Stream* stream, const Patience& patience) {
-  if (link_.is_ending()) report_death(patience);
+  if (link_.has_ended()) report_death(patience);
   grpc::Status& status = stream->status;
   void* tag = nullptr;
   bool ok = false;
@@ -199,7 +199,7 @@ void GrpcCarrier::leave_out_known(Stream* stream, const MethodInfo& method, std:
 }
 
 CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
-  if (link_.has_ended() || link_.is_ending()) link_.report_death(true, link_.is_ending());
+  if (link_.has_ended()) link_.report_death(true);
   const MethodInfo& method = call.info();
   std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns;
   for (std::size_t i = 0; i < call.request.size(); ++i)

@@ -79,7 +79,7 @@ SharedMemoryCarrier::SharedMemoryCarrier(const SlotDescription& slot, std::uint3
       slot_deadline_ns_(
           static_cast<std::uint64_t>((slot.defences.deadline ? slot.deadline : kAttachedDeadline) * 1e9)) {
   link_ = std::make_unique<WorkerLink>(
-      slot, threads, true, [boxes = boxes_] { boxes->say_ended(); }, std::move(stop));
+      slot, threads, true, [boxes = boxes_] { channel::say_ended(boxes->theirs); }, std::move(stop));
   link_->finish();
   if (!boxes_->send(link_->descriptor_socket())) link_->report_death();
 }

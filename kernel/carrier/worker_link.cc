@@ -224,6 +224,7 @@ int WorkerLink::process_id() const { return process_ ? process_->process_id() : 
 void WorkerLink::report_death(bool is_unread, bool is_certain) {
   if (!process_) throw StageFault(FaultKind::kDeath, "stream", "the worker at " + address_ + " is gone");
   const std::string who = "its worker process " + std::to_string(process_id());
+  is_certain = is_certain || is_ending();
   // the end may be known to the socket before it is to the watcher
   const bool has_died = is_certain || process_->wait(kDrainMilliseconds);
   is_dying_ = is_certain;

@@ -62,13 +62,13 @@ class WorkerLink {
   std::uint64_t epoch() const { return epoch_; }
   // Of the handshake for a worker that is no process of ours.
   int process_id() const;
-  bool has_ended() const { return process_ && process_->has_ended(); }
-  // Of a process of ours without shared memory: it has said that it ends, and how many requests it has taken.
-  bool is_ending() const { return watch_ && watch_->has_ended(); }
+  // A process of ours is gone, or, without shared memory, has said that it ends.
+  bool has_ended() const { return is_ending() || (process_ && process_->has_ended()); }
+  // Of a process of ours without shared memory.
   std::uint64_t requests_taken() const { return watch_ ? watch_->requests_taken() : 0; }
   // It dies of what it did; an end of our making would hide of what.
   bool is_dying() const { return is_dying_; }
-  bool is_alive() const { return !has_ended() && !is_ending() && control_->answers_heartbeats(); }
+  bool is_alive() const { return !has_ended() && control_->answers_heartbeats(); }
   // Each ends the worker, whatever it would say next, and throws the fault that says how it failed. `is_certain`: it is
   // dying already, which is not waited for.
   [[noreturn]] void report_death(bool is_unread = false, bool is_certain = false);
@@ -84,6 +84,7 @@ class WorkerLink {
   bool keeps_columns() const { return control_->welcome().keeps_columns(); }
 
  private:
+  bool is_ending() const { return watch_ && watch_->has_ended(); }
   void start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
                      std::function<void()> on_end);
 

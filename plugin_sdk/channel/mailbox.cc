@@ -83,6 +83,11 @@ void wait_for_change(const Mailbox* mailbox, std::uint32_t seen) {
   while (mailbox->signal.load(std::memory_order_acquire) == seen) futex_wait(&mailbox->signal, seen, nullptr);
 }
 
+void say_ended(Mailbox* mailbox) {
+  mailbox->signal = kEnded;
+  wake(mailbox);
+}
+
 void wake(const Mailbox* mailbox) { futex_wake(&mailbox->signal); }
 
 std::uint64_t frame_digest(const gravitas_frame_header& header, std::span<const gravitas_frame_column> columns,

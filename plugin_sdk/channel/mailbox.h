@@ -59,6 +59,9 @@ Waited wait(Mailbox* mine, const Mailbox* theirs, std::uint32_t seen, std::uint6
 // Sleeps until the signal of `mailbox` differs from `seen`.
 void wait_for_change(const Mailbox* mailbox, std::uint32_t seen);
 
+// Says for its owner that it has ended: Linux does, unless that ended before it had asked for it, or posted while it ended.
+void say_ended(Mailbox* mailbox);
+
 // Wakes whoever sleeps on the signal of `mailbox`, without a message.
 void wake(const Mailbox* mailbox);
 

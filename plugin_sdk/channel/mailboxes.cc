@@ -22,11 +22,6 @@ bool Mailboxes::send(int socket) const {
   return send_one(SegmentRole::kKernelMailbox, kernel_segment) && send_one(SegmentRole::kWorkerMailbox, worker_segment);
 }
 
-void Mailboxes::say_ended() const {
-  theirs->signal = kEnded;
-  wake(theirs);
-}
-
 EndWatch::EndWatch()
     : segment_(Segment::create("gravitas worker mailbox", sizeof(Mailbox), Sharing::kWriters)),
       theirs_(reinterpret_cast<Mailbox*>(segment_.data())) {
@@ -46,11 +41,6 @@ void EndWatch::shut_at_end(int socket) {
     shutdown(own, SHUT_RDWR);
     close(own);
   });
-}
-
-void EndWatch::say_ended() {
-  theirs_->signal = kEnded;
-  wake(theirs_);
 }
 
 }  // namespace gravitas::channel

@@ -14,8 +14,6 @@ struct Mailboxes {
   Mailboxes();
   // Sends both over the descriptor socket of the worker; false if it is gone.
   bool send(int socket) const;
-  // Linux says so, unless the worker ended before it had asked for it, or posted while it ended.
-  void say_ended() const;
 
   const Segment kernel_segment, worker_segment;
   Mailbox* const mine;
@@ -38,7 +36,7 @@ class EndWatch {
   // Once.
   void shut_at_end(int socket);
   // Ends the watching; for when the process has ended, however.
-  void say_ended();
+  void say_ended() { channel::say_ended(theirs_); }
   bool has_ended() const { return theirs_->signal.load(std::memory_order_acquire) != kAlive; }
   std::uint64_t requests_taken() const { return theirs_->progress.load(std::memory_order_relaxed); }
 

@@ -1,7 +1,5 @@
 // Two sides that talk through two mailboxes: no message is lost, a silence ends in time, and a
 // message that was changed on its way is seen to be.
-#include "plugin_sdk/channel/mailbox.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -12,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "plugin_sdk/channel/mailboxes.h"
 #include "schemas/stage_frames.h"
 
 namespace gravitas::channel {
@@ -20,11 +19,6 @@ namespace {
 constexpr std::uint64_t kMillisecond = 1'000'000;
 // Longer than any scheduler makes a test wait.
 constexpr std::uint64_t kLong = 60'000 * kMillisecond;
-
-struct Mailboxes {
-  std::unique_ptr<Mailbox> kernel{new Mailbox()};
-  std::unique_ptr<Mailbox> worker{new Mailbox()};
-};
 
 TEST(Mailbox, HasTheLayoutOfVersionTwo) {
   ASSERT_EQ(GRAVITAS_LAYOUT_VERSION, 2);
@@ -48,94 +42,92 @@ TEST(Mailbox, TwoThreadsTakeTurns) {
   std::thread worker([&] {
     std::uint32_t seen = 0;
     for (std::uint64_t i = 1; i <= kRounds; ++i) {
-      if (wait(boxes.worker.get(), boxes.kernel.get(), seen, now_ns() + kLong) != Waited::kMessage) ++wrong_in_worker;
-      seen = boxes.kernel->signal.load();
-      if (boxes.kernel->header.sequence != i) ++wrong_in_worker;
-      boxes.worker->header.sequence = i;
-      boxes.worker->columns[GRAVITAS_MAX_COLUMNS - 1].count = 2 * i;
-      post(boxes.worker.get(), boxes.kernel.get());
+      if (wait(boxes.theirs, boxes.mine, seen, now_ns() + kLong) != Waited::kMessage) ++wrong_in_worker;
+      seen = boxes.mine->signal.load();
+      if (boxes.mine->header.sequence != i) ++wrong_in_worker;
+      boxes.theirs->header.sequence = i;
+      boxes.theirs->columns[GRAVITAS_MAX_COLUMNS - 1].count = 2 * i;
+      post(boxes.theirs, boxes.mine);
     }
   });
 
   std::uint64_t wrong = 0;
-  std::uint32_t seen = 0;
+  std::uint32_t seen = 1;
   for (std::uint64_t i = 1; i <= kRounds; ++i) {
-    boxes.kernel->header.sequence = i;
-    post(boxes.kernel.get(), boxes.worker.get());
-    if (wait(boxes.kernel.get(), boxes.worker.get(), seen, now_ns() + kLong) != Waited::kMessage) ++wrong;
-    seen = boxes.worker->signal.load();
-    if (boxes.worker->header.sequence != i || boxes.worker->columns[GRAVITAS_MAX_COLUMNS - 1].count != 2 * i) ++wrong;
+    boxes.mine->header.sequence = i;
+    post(boxes.mine, boxes.theirs);
+    if (wait(boxes.mine, boxes.theirs, seen, now_ns() + kLong) != Waited::kMessage) ++wrong;
+    seen = boxes.theirs->signal.load();
+    if (boxes.theirs->header.sequence != i || boxes.theirs->columns[GRAVITAS_MAX_COLUMNS - 1].count != 2 * i) ++wrong;
   }
   worker.join();
   EXPECT_EQ(wrong, 0U);
   EXPECT_EQ(wrong_in_worker, 0U);
-  EXPECT_EQ(seen, kRounds);
+  EXPECT_EQ(seen, kRounds + 1);
 }
 
 TEST(Mailbox, AMessageThatIsThereIsTakenAtOnce) {
   const Mailboxes boxes;
-  post(boxes.worker.get(), boxes.kernel.get());
+  post(boxes.theirs, boxes.mine);
   // even when the time is over already
-  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, 0), Waited::kMessage);
-  EXPECT_EQ(boxes.worker->signal.load(), 1U);
+  EXPECT_EQ(wait(boxes.mine, boxes.theirs, 1, 0), Waited::kMessage);
+  EXPECT_EQ(boxes.theirs->signal.load(), 2U);
 }
 
 TEST(Mailbox, ASilenceEndsInTime) {
   const Mailboxes boxes;
   const std::uint64_t until = now_ns() + 5 * kMillisecond;
-  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, until), Waited::kTimeout);
+  EXPECT_EQ(wait(boxes.mine, boxes.theirs, 1, until), Waited::kTimeout);
   EXPECT_GE(now_ns() + kMillisecond, until);  // at most a millisecond early
-  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, 0), Waited::kTimeout);
-  EXPECT_EQ(boxes.kernel->sleeping.load(), 0U);
+  EXPECT_EQ(wait(boxes.mine, boxes.theirs, 1, 0), Waited::kTimeout);
+  EXPECT_EQ(boxes.mine->sleeping.load(), 0U);
 }
 
 TEST(Mailbox, ALateMessageIsStillThere) {
   const Mailboxes boxes;
-  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kMillisecond), Waited::kTimeout);
-  post(boxes.worker.get(), boxes.kernel.get());
-  EXPECT_EQ(wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kLong), Waited::kMessage);
+  EXPECT_EQ(wait(boxes.mine, boxes.theirs, 1, now_ns() + kMillisecond), Waited::kTimeout);
+  post(boxes.theirs, boxes.mine);
+  EXPECT_EQ(wait(boxes.mine, boxes.theirs, 1, now_ns() + kLong), Waited::kMessage);
 }
 
 TEST(Mailbox, ASleeperIsWoken) {
   const Mailboxes boxes;
   Waited waited = Waited::kTimeout;
-  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + kLong); });
+  std::thread sleeper([&] { waited = wait(boxes.mine, boxes.theirs, 1, now_ns() + kLong); });
   // long after the sleeper has stopped spinning
-  while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
+  while (boxes.mine->sleeping.load() == 0) std::this_thread::yield();
   const std::uint64_t before = now_ns();
-  post(boxes.worker.get(), boxes.kernel.get());
+  post(boxes.theirs, boxes.mine);
   sleeper.join();
   EXPECT_EQ(waited, Waited::kMessage);
   EXPECT_LT(now_ns() - before, kLong);
-  EXPECT_EQ(boxes.kernel->sleeping.load(), 0U);
+  EXPECT_EQ(boxes.mine->sleeping.load(), 0U);
 }
 
 TEST(Mailbox, AWakeIsNoMessage) {
   const Mailboxes boxes;
   Waited waited = Waited::kMessage;
-  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 0, now_ns() + 20 * kMillisecond); });
-  while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
-  for (int i = 0; i < 100; ++i) wake(boxes.worker.get());
+  std::thread sleeper([&] { waited = wait(boxes.mine, boxes.theirs, 1, now_ns() + 20 * kMillisecond); });
+  while (boxes.mine->sleeping.load() == 0) std::this_thread::yield();
+  for (int i = 0; i < 100; ++i) wake(boxes.theirs);
   sleeper.join();
   EXPECT_EQ(waited, Waited::kTimeout);
 }
 
 TEST(Mailbox, APostIsNeverTakenForAnEnd) {
   const Mailboxes boxes;
-  boxes.worker->signal = ~0U;
-  post(boxes.worker.get(), boxes.kernel.get());
-  EXPECT_EQ(boxes.worker->signal.load(), 1U);
+  boxes.theirs->signal = ~0U;
+  post(boxes.theirs, boxes.mine);
+  EXPECT_EQ(boxes.theirs->signal.load(), 1U);
 }
 
 // The kernel does so for a worker that died, if its threads did not.
 TEST(Mailbox, AnEndThatIsWrittenForTheOtherSideEndsAWait) {
   const Mailboxes boxes;
-  boxes.worker->signal = 1;
   Waited waited = Waited::kTimeout;
-  std::thread sleeper([&] { waited = wait(boxes.kernel.get(), boxes.worker.get(), 1, now_ns() + kLong); });
-  while (boxes.kernel->sleeping.load() == 0) std::this_thread::yield();
-  boxes.worker->signal = kEnded;
-  wake(boxes.worker.get());
+  std::thread sleeper([&] { waited = wait(boxes.mine, boxes.theirs, 1, now_ns() + kLong); });
+  while (boxes.mine->sleeping.load() == 0) std::this_thread::yield();
+  say_ended(boxes.theirs);
   sleeper.join();
   EXPECT_EQ(waited, Waited::kMessage);
 }

@@ -42,8 +42,8 @@ using RimPoints = std::array<Vector3, kRimPointCount>;
 // The points of the rim along u, v, -u, -v, spread over the whole circle and fixed in the frame of
 // u, v; but if the rim is tilted against the other surface, its deepest point replaces the nearest
 // of them. depth_towards(direction) is the depth (m) of the rim point in that unit direction, an
-// affine function of the point. A tilt that lowers the deepest point by less than 1e-8 of the
-// radius counts as none, since its direction would be noise.
+// affine function of the point. A tilt that lowers it by less than 3e-8 of the radius counts as
+// none, since its direction would be noise.
 template <typename DepthTowards>
 RimPoints spread_rim_points(const Rim& rim, const DepthTowards& depth_towards) {
   const std::array<Vector3, kRimPointCount> fixed = {rim.u, rim.v, -rim.u, -rim.v};
@@ -53,10 +53,9 @@ RimPoints spread_rim_points(const Rim& rim, const DepthTowards& depth_towards) {
   const double along_u = 0.5 * (depth_towards(fixed[0]) - depth_towards(fixed[2]));
   const double along_v = 0.5 * (depth_towards(fixed[1]) - depth_towards(fixed[3]));
   const double slope = std::sqrt(along_u * along_u + along_v * along_v);
-  const bool nearer_u = std::fabs(along_u) >= std::fabs(along_v);
-  const double at_fixed = nearer_u ? std::fabs(along_u) : std::fabs(along_v);
-  if (!(slope - at_fixed > 1e-8 * rim.radius)) return points;
+  if (!(slope > 3e-8 * rim.radius)) return points;
 
+  const bool nearer_u = std::fabs(along_u) >= std::fabs(along_v);
   const std::size_t slot = nearer_u ? (along_u > 0.0 ? 0 : 2) : (along_v > 0.0 ? 1 : 3);
   points[slot] = rim.centre + rim.radius * ((along_u / slope) * rim.u + (along_v / slope) * rim.v);
   return points;
