@@ -54,17 +54,17 @@ StateView Environment::state() const {
           front().angular_velocity.span()};
 }
 
-void Environment::commit_trial(const Trusted<TrialState>&) {
+void Environment::write_trial(const Trusted<TrialState>&) {
   copy(data_.trial_position, back().position);
   copy(data_.trial_orientation, back().orientation);
   copy(data_.trial_linear_velocity, back().linear_velocity);
   copy(data_.trial_angular_velocity, back().angular_velocity);
   back().plugin_state.assign(data_.next_plugin_state);
   std::ranges::fill(back().state_changed.span(), 0U);
-  end_inner_step();
+  complete_state();
 }
 
-void Environment::commit_solution(const Trusted<Solution>&) {
+void Environment::write_solution(const Trusted<Solution>&) {
   copy(data_.solved_linear_velocity, back().linear_velocity);
   copy(data_.solved_angular_velocity, back().angular_velocity);
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
@@ -87,14 +87,17 @@ void Environment::commit_solution(const Trusted<Solution>&) {
   figures_ = {};
   remember_contacts();
   remember_joints();
-  end_inner_step();
+  complete_state();
 }
 
-void Environment::end_inner_step() {
+void Environment::complete_state() {
   if (model_.constraint_count > 0) update_joints();
   if (has_contacts()) find_touching();
   back().rested.assign(front().rested);
   back().rest_wrench.assign(front().rest_wrench);
+}
+
+void Environment::end_inner_step() {
   if (commit_listener_ != nullptr)
     commit_listener_->on_inner_step(*this, {inner_, data_, front(), back(), inner_end_time()});
   std::swap(front_, back_);

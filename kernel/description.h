@@ -113,6 +113,7 @@ struct EnvironmentDescription {
   std::string id;
   Simulator simulator = Simulator::kBasic;
   std::uint32_t substeps = 1;     // equal inner steps of a step
+  double accuracy = 0.0;          // of kContinuous: estimated error of a part of a step, as of DormandPrince54; 0: any
   SleepRule sleep;                // when islands fall asleep (plugin_sdk/activity.h)
   double time_step = 1.0 / 60.0;  // s
   // Number of steps of the whole run and the length of the last one (s), which may be shorter.

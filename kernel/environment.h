@@ -33,6 +33,7 @@
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/duration_histogram.h"
 #include "plugin_sdk/event_location.h"
+#include "plugin_sdk/extrapolation.h"
 #include "plugin_sdk/merged_rows.h"
 
 namespace gravitas::kernel {
@@ -157,11 +158,18 @@ class Environment : private DerivativeSource, private SlotObserver {
   double length_to_switch(double begin, double length);
   // Inner steps begin some time after S_n, in front() what the one before has made of it.
   void begin_inner_step(double begin, double length);
-  // Nothing where somebody asleep is woken: the step starts again.
+  // Basic's, in back(); false where somebody asleep is woken: the step starts again.
+  bool make_next_state();
+  // Nothing then.
   std::optional<Trusted<Solution>> react(const Trusted<TrialState>& trial, bool has_found_contacts = false);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
   bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
   void locate_events(double begin, double length);
+  // extrapolated.cc
+  void extrapolate_parts(double begin, double length);
+  std::uint32_t pieces_to_accuracy(double begin, double length);
+  bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
+  void take_extrapolated();
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
@@ -208,8 +216,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   Trusted<Solution> solve();
 
   // commit.cc
-  void commit_trial(const Trusted<TrialState>& trial);
-  void commit_solution(const Trusted<Solution>& solution);
+  void write_trial(const Trusted<TrialState>& trial);
+  void write_solution(const Trusted<Solution>& solution);
+  void complete_state();
   void remember_contacts();
   void remember_joints();
   void update_joints();
@@ -281,6 +290,7 @@ class Environment : private DerivativeSource, private SlotObserver {
     return Validator::unchecked<Checked>();
   }
 
+  static constexpr std::size_t kSpareState = 3;
   const State& front() const { return states_[front_]; }
   State& back() { return states_[back_]; }
   // To S_n from what inner steps have made of it.
@@ -297,7 +307,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   Plan plan_;
   Arena arena_;
   Model model_;
-  std::vector<State> states_;  // a third one, S_n, where there are inner steps
+  std::vector<State> states_;  // a third one, S_n, where there are inner steps; kSpareState for attempts at them
   StepData data_;
   Validator validator_;
   std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
@@ -306,6 +316,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::optional<Trusted<Pairs>> pairs_;           // the last
+  Extrapolation extrapolation_;
   double margin_ = 0.0;
 
   Activity activity_;

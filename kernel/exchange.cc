@@ -117,8 +117,8 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   const PluginDeclaration& now = slot.description().plugins[target].declaration;
   for (const ConstraintGroup& group : model_.constraint_groups)
     if (slot.which() == Slot::kConstraint && group.target == target) bind(group);
+  must_restart_ = true;
   if (now.name == before.declaration.name) return;
-  must_restart_ |= inner_ > 0 || sleepers_ > 0;
   wakes_all_ = true;
   find_sleepers();
   if (slot.which() == Slot::kIntegrator) {

@@ -34,7 +34,8 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
   const bool has_inner_steps =
       description_.simulator >= Simulator::kBisection || description_.substeps > 1 || !description_.switches.empty();
-  for (int i = 0; i < (has_inner_steps ? 3 : 2); ++i) states_.emplace_back(&arena_, description_);
+  const std::size_t states = description_.accuracy > 0.0 ? kSpareState + 1 : has_inner_steps ? 3 : 2;
+  while (states_.size() < states) states_.emplace_back(&arena_, description_);
   arena_.seal();
   model_.write(description_);
   for (const State& state : states_) state.write(description_);

@@ -47,11 +47,11 @@ Pose Environment::pose_of(const Column<double>& position, const Column<double>& 
 }
 
 const Column<double>& Environment::start_linear_velocity() const {
-  return has_impulses_ && step_count_ + inner_ == 0 ? data_.start_linear_velocity : front().linear_velocity;
+  return has_impulses_ && data_.time[0] == 0.0 ? data_.start_linear_velocity : front().linear_velocity;
 }
 
 const Column<double>& Environment::start_angular_velocity() const {
-  return has_impulses_ && step_count_ + inner_ == 0 ? data_.start_angular_velocity : front().angular_velocity;
+  return has_impulses_ && data_.time[0] == 0.0 ? data_.start_angular_velocity : front().angular_velocity;
 }
 
 Trusted<TrialState> Environment::integrate() {
@@ -135,23 +135,6 @@ void Environment::find_impacts(const Trusted<Pairs>&) {
       ids(data_.impact_pair, data_.impact_fraction, data_.impact_normal, data_.impact_point, data_.impact_depth);
   ask(Stage::kNarrowPhase, &collision_, {stage::Method::kCollisionTimesOfImpact, 0, request, reply}, nullptr,
       [&](const auto& answer) { return validator_.impacts(answer, data_); });
-}
-
-Encounter Environment::encounter(std::size_t impact) const {
-  const double fraction = data_.impact_fraction[impact];
-  const auto velocity = [&](std::uint32_t body, const Column<double>& linear, const Column<double>& angular) {
-    const Vector3 centre =
-        vector_at(front().position.span(), body) + fraction * vector_at(data_.displacement.span(), body);
-    return Vector3(vector_at(linear.span(), body) +
-                   vector_at(angular.span(), body).cross(vector_at(data_.impact_point.span(), impact) - centre));
-  };
-  const auto speed = [&](const Column<double>& linear, const Column<double>& angular) {
-    const std::uint32_t* pair = &data_.pair[2 * data_.impact_pair[impact]];
-    return vector_at(data_.impact_normal.span(), impact)
-        .dot(velocity(pair[1], linear, angular) - velocity(pair[0], linear, angular));
-  };
-  return {fraction, -data_.impact_depth[impact], speed(start_linear_velocity(), start_angular_velocity()),
-          speed(data_.trial_linear_velocity, data_.trial_angular_velocity)};
 }
 
 Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {

@@ -51,11 +51,18 @@ double Environment::length_to_switch(double begin, double length) {
 }
 
 void Environment::make_part(double begin, double length) {
+  if (description_.accuracy > 0.0) return extrapolate_parts(begin, length);
   if (locates_events()) return locate_events(begin, length);
   begin_inner_step(begin, length);
+  if (make_next_state()) end_inner_step();
+}
+
+bool Environment::make_next_state() {
   const auto trial = integrate();
-  if (!has_reactions()) return commit_trial(trial);
-  if (const auto solution = react(trial)) commit_solution(*solution);
+  if (!has_reactions()) return write_trial(trial), true;
+  const auto solution = react(trial);
+  if (solution) write_solution(*solution);
+  return solution.has_value();
 }
 
 void Environment::begin_inner_step(double begin, double length) {
@@ -70,7 +77,7 @@ void Environment::begin_inner_step(double begin, double length) {
     std::ranges::fill(data_.wrench.span(), 0.0);
     std::ranges::fill(data_.start_wrench.span(), 0.0);
   }
-  if (!has_impulses_ || step_count_ + inner_ != 0) return;
+  if (!has_impulses_ || data_.time[0] > 0.0) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* impulse = &data_.impulse[6 * i];
     const Twist twist =

@@ -52,7 +52,8 @@ void Environment::locate_events(double begin, double length) {
         inner < kMostSlides ? react_until_a_slide_ends(trial, begin + done, &stop, has_found_contacts)
                             : react(trial, has_found_contacts);
     if (!solution) return;
-    commit_solution(*solution);
+    write_solution(*solution);
+    end_inner_step();
     done = stop == left ? length : done + stop;
   }
 }
@@ -80,6 +81,23 @@ double Environment::first_impact(const Trusted<TrialState>& trial, double begin,
     left = next.length;
     begin_inner_step(begin, left);
   }
+}
+
+Encounter Environment::encounter(std::size_t impact) const {
+  const double fraction = data_.impact_fraction[impact];
+  const auto velocity = [&](std::uint32_t body, const Column<double>& linear, const Column<double>& angular) {
+    const Vector3 centre =
+        vector_at(front().position.span(), body) + fraction * vector_at(data_.displacement.span(), body);
+    return Vector3(vector_at(linear.span(), body) +
+                   vector_at(angular.span(), body).cross(vector_at(data_.impact_point.span(), impact) - centre));
+  };
+  const auto speed = [&](const Column<double>& linear, const Column<double>& angular) {
+    const std::uint32_t* pair = &data_.pair[2 * data_.impact_pair[impact]];
+    return vector_at(data_.impact_normal.span(), impact)
+        .dot(velocity(pair[1], linear, angular) - velocity(pair[0], linear, angular));
+  };
+  return {fraction, -data_.impact_depth[impact], speed(start_linear_velocity(), start_angular_velocity()),
+          speed(data_.trial_linear_velocity, data_.trial_angular_velocity)};
 }
 
 double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {

@@ -91,7 +91,8 @@ PartDigest digest_plugins(const kernel::SlotDescription& slot) {
 recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& d) {
   recorder::v1::Identity identity;
   identity.set_time_step(d.time_step);
-  add_part("the simulator or its Substeps", PartDigest() << d.simulator << d.substeps, &identity);
+  add_part("the simulator, its Substeps or its Accuracy", PartDigest() << d.simulator << d.substeps << d.accuracy,
+           &identity);
   add_part("SleepEnergy or SleepTime", PartDigest() << d.sleep.energy << d.sleep.time, &identity);
   add_part("bodies", digest_bodies(d), &identity);
   add_part("geometries", digest_shapes(d), &identity);

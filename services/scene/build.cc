@@ -65,20 +65,24 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
                                                                        {"Smooth", kSmooth}};
   context->description.simulator = kSimulators.at(simulator.type());
   const SimulatorProperties& properties = simulator.custom_properties();
-  if (properties.has_accuracy() && context->description.simulator != kSmooth)
+  if (properties.has_accuracy() && context->description.simulator == kContinuous)
+    context->description.accuracy = properties.accuracy();
+  else if (properties.has_accuracy() && context->description.simulator != kSmooth)
     context->diagnostics->error(place_of(properties, SimulatorProperties::kAccuracyFieldNumber),
-                                "Accuracy belongs to the simulator \"Smooth\"; allowed: Type = \"Smooth\", or Accuracy "
-                                "in KineticIntegrator { … }");
+                                "Accuracy belongs to the simulators \"Smooth\" and \"Continuous\"; allowed: Type = "
+                                "\"Smooth\", Type = \"Continuous\", or Accuracy in KineticIntegrator { … }");
   context->description.substeps = properties.substeps();
   context->description.sleep = {properties.sleep_energy(), properties.sleep_time()};
   context->description.check_physics_every = properties.check_physics_every();
   build_steps(properties, context);
 }
 
-// The simulator's Accuracy is the integrator's.
+// The Accuracy of Smooth is the integrator's.
 void hand_on_accuracy(BuildContext* context) {
   const SimulatorProperties& properties = context->scene.simulator().custom_properties();
-  if (!properties.has_accuracy() || context->description.integrator.plugins.empty()) return;
+  if (!properties.has_accuracy() || context->description.simulator != kernel::Simulator::kSmooth ||
+      context->description.integrator.plugins.empty())
+    return;
   kernel::PluginChoice& integrator = context->description.integrator.plugins[0];
   const TextPosition place = place_of(properties, SimulatorProperties::kAccuracyFieldNumber);
   std::size_t at = 0;

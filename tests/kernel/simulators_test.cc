@@ -29,17 +29,24 @@ class Listener final : public EventListener {
   std::vector<Event> events;
 };
 
+struct Way {
+  Simulator simulator;
+  double accuracy;
+};
+
 // Exact in free flight, and a solver that closes contacts to rounding.
-WorldBuilder accurate(Simulator simulator, std::uint32_t steps, double time_step) {
+WorldBuilder accurate(Simulator simulator, std::uint32_t steps, double time_step, double accuracy = 0.0) {
   WorldBuilder builder;
+  builder.description().accuracy = accuracy;
   builder.steps(steps, time_step).integrator("integrator_verlet");
   builder.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 100});
   builder.description().simulator = simulator;
   return builder;
 }
 
-WorldBuilder bouncing(Simulator simulator, double restitution, std::uint32_t steps, double time_step) {
-  WorldBuilder builder = accurate(simulator, steps, time_step);
+WorldBuilder bouncing(Simulator simulator, double restitution, std::uint32_t steps, double time_step,
+                      double accuracy = 0.0) {
+  WorldBuilder builder = accurate(simulator, steps, time_step, accuracy);
   builder.material({restitution, 0.0, 0.0, 0.0}).ground().sphere(0.1, 1.0, Vector3(0, 1.1, 0));
   builder.gravity(Vector3(0, -kGravity, 0));
   return builder;
@@ -88,8 +95,9 @@ TEST(Simulators, SubsteppingAsksTheSpaceOnceAStepWhereNothingRunsOutOfItsBounds)
 }
 
 TEST(Simulators, AKilledWorkerChangesNoBitOfInnerSteps) {
-  for (const Simulator simulator : {Simulator::kSubstepping, Simulator::kBisection, Simulator::kContinuous}) {
-    WorldBuilder builder = bouncing(simulator, 0.9, 60, 0.02);
+  for (const auto [simulator, accuracy] : {Way{Simulator::kSubstepping, 0.0}, Way{Simulator::kBisection, 0.0},
+                                           Way{Simulator::kContinuous, 0.0}, Way{Simulator::kContinuous, 1e-9}}) {
+    WorldBuilder builder = bouncing(simulator, 0.9, 60, 0.02, accuracy);
     builder.description().substeps = 2;
     const kernel::Hash quiet = chain_of(builder);
     for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kSolver, Slot::kIntegrator})
@@ -108,13 +116,15 @@ TEST(Simulators, AKilledWorkerChangesNoBitOfInnerSteps) {
 
 // Inner steps end at 0.055 s, at the end of a step, and twice in the step of 0.26 s.
 TEST(Simulators, StepsCutByJumpsAreTheSameAfterARestoreAndAKill) {
-  for (const Simulator simulator :
-       {Simulator::kBasic, Simulator::kSubstepping, Simulator::kBisection, Simulator::kContinuous}) {
-    SCOPED_TRACE(static_cast<int>(simulator));
+  for (const auto [simulator, accuracy] :
+       {Way{Simulator::kBasic, 0.0}, Way{Simulator::kSubstepping, 0.0}, Way{Simulator::kBisection, 0.0},
+        Way{Simulator::kContinuous, 0.0}, Way{Simulator::kContinuous, 1e-9}}) {
+    SCOPED_TRACE(testing::Message() << static_cast<int>(simulator) << ' ' << accuracy);
     WorldBuilder builder = simulator >= Simulator::kBisection ? bouncing(simulator, 0.9, 40, 0.01)
                                                               : busy_world(Hosting::kDirect).steps(40, 0.01);
     builder.force("Drag", "force_drag", {0.1, 0.0});
     builder.description().simulator = simulator;
+    builder.description().accuracy = accuracy;
     builder.description().substeps = 2;
     const kernel::Hash uncut = chain_of(builder);
     builder.description().switches = {0.055, 0.1, 0.252, 0.2571};
@@ -189,11 +199,150 @@ TEST(Simulators, AStepThatFailsHalfwayLeavesTheLastCommit) {
   EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
 }
 
-class Located : public ::testing::TestWithParam<Simulator> {};
+// Whatever call of a step it is that nobody answers: who takes over makes the whole step.
+TEST(Simulators, AFallbackMakesTheWholeStep) {
+  for (const auto [simulator, accuracy] : {Way{Simulator::kSubstepping, 0.0}, Way{Simulator::kBisection, 0.0},
+                                           Way{Simulator::kContinuous, 0.0}, Way{Simulator::kContinuous, 0.5}}) {
+    SCOPED_TRACE(testing::Message() << static_cast<int>(simulator) << ' ' << accuracy);
+    WorldBuilder builder = accurate(simulator, 1, 0.6, accuracy);
+    builder.material({0.9, 0.0, 0.0, 0.0}).ground().box({0.1, 0.2, 0.3}, 1.0, Vector3(0, 1.3, 0));
+    builder.gravity(Vector3(0, -kGravity, 0)).body().twist.angular = Vector3(1, 2, 3);
+    builder.description().substeps = 2;
+    WorldBuilder other = builder;
+    other.integrator("integrator_rk4");
+    const kernel::Hash alone = chain_of(other);
+    EXPECT_NE(alone, chain_of(builder));
+    builder.description().integrator.plugins[0].fallback =
+        std::make_shared<kernel::PluginChoice>(other.description().integrator.plugins[0]);
+    int failures = 0;
+    for (int calls = 0; calls < 12; ++calls) {
+      int calls_left = calls;
+      Environment world(builder.description(),
+                        [&](const kernel::SlotDescription& slot, std::uint32_t threads,
+                            std::stop_token) -> std::unique_ptr<kernel::Carrier> {
+                          auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
+                          if (slot.plugins[0].declaration.name != "Verlet") return plugins;
+                          return std::make_unique<Weary>(std::move(plugins), &calls_left);
+                        });
+      run(&world);
+      if (calls_left >= 0) continue;
+      ++failures;
+      EXPECT_EQ(world.chain_hash(), alone) << calls;
+    }
+    EXPECT_GE(failures, 2);
+  }
+}
+
+// Answers twice what its plugin does.
+class Doubling final : public kernel::Carrier {
+ public:
+  explicit Doubling(std::unique_ptr<Carrier> plugins) : plugins_(std::move(plugins)) {}
+  kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
+                          kernel::DerivativeSource* derivatives) override {
+    const kernel::CallResult result = plugins_->call(call, arena, derivatives);
+    auto* wrench = reinterpret_cast<double*>(arena->data(call.reply[0]));
+    for (std::uint64_t i = 0; i < arena->count(call.reply[0]); ++i) wrench[i] *= 2.0;
+    return result;
+  }
+  int process_id() const override { return 0; }
+  Hosting hosting() const override { return Hosting::kDirect; }
+
+ private:
+  std::unique_ptr<Carrier> plugins_;
+};
+
+// One of the four derivatives of a step is another's first: it makes them all.
+TEST(Simulators, AForceThatTakesOverMakesTheWholeStep) {
+  WorldBuilder builder = WorldBuilder().steps(1, 0.1).integrator("integrator_rk4");
+  builder.sphere(0.1, 1.0, Vector3::Zero(), Vector3(3, 2, 1)).force("Drag", "force_drag", {0.1, 0.5});
+  kernel::PluginChoice other = builder.description().force.plugins[0];
+  other.declaration.name = "Other";
+  builder.description().force.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(other);
+  const auto speed_after = [&](int calls_left) {
+    Environment world(builder.description(),
+                      [&](const kernel::SlotDescription& slot, std::uint32_t threads,
+                          std::stop_token) -> std::unique_ptr<kernel::Carrier> {
+                        auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
+                        if (slot.plugins[0].declaration.slot != Slot::kForce) return plugins;
+                        if (slot.plugins[0].declaration.name == "Other")
+                          return std::make_unique<Doubling>(std::move(plugins));
+                        return std::make_unique<Weary>(std::move(plugins), &calls_left);
+                      });
+    run(&world);
+    return world.state().linear_velocity[0];
+  };
+  const double quiet = speed_after(100), other_alone = speed_after(0);
+  EXPECT_LT(other_alone, quiet);
+  for (const int calls : {1, 2, 3, 4}) EXPECT_EQ(speed_after(calls), other_alone) << calls;
+}
+
+// The impulses of the inner steps that listeners hear of are what changes the momentum; their lengths are the step.
+TEST(Simulators, ExtrapolatedPartsAreInnerStepsForListeners) {
+  class Sum final : public kernel::CommitListener {
+   public:
+    void on_inner_step(const Environment&, const kernel::InnerStep& inner) override {
+      numbers.push_back(inner.number);
+      length += inner.data.time_step[0];
+      for (std::size_t i = 0; i < inner.data.contact_key.size(); ++i)
+        impulse += vector_at(inner.data.contact_impulse.span(), i);
+    }
+    void on_commit(const Environment&) override {}
+    std::vector<std::uint32_t> numbers;
+    double length = 0.0;
+    Vector3 impulse = Vector3::Zero();
+  };
+  WorldBuilder builder = accurate(Simulator::kContinuous, 10, 0.01, 1e-9);
+  builder.material({0.0, 0.3, 0.3, 0.0}).ground().sphere(0.1, 2.0, Vector3(0, 0.1, 0), Vector3(1.0, 0, 0));
+  builder.gravity(Vector3(0, -kGravity, 0));
+  Environment world(builder.description());
+  Sum sum;
+  world.set_commit_listener(&sum);
+  run(&world);
+  EXPECT_NEAR(sum.length, 0.1, 1e-15);
+  EXPECT_EQ(sum.numbers[0], 0U);
+  EXPECT_NEAR(sum.impulse.y(), 2.0 * kGravity * 0.1, 1e-12);
+  EXPECT_NEAR(sum.impulse.x(), 2.0 * (world.state().linear_velocity[3] - 1.0), 1e-12);
+  EXPECT_NEAR(world.state().linear_velocity[3], 5.0 / 7.0, 1e-12);  // it has come to roll
+}
+
+// An instantaneous impulse acts once, however often the first part is made; others fall, slide and are held beside it.
+TEST(Simulators, ExtrapolationAgreesWithManySmallSteps) {
+  const auto end = [](const WorldBuilder& builder) {
+    Environment world(builder.description());
+    run(&world);
+    const auto view = world.state().position;
+    return std::vector<double>(view.begin(), view.end());
+  };
+  WorldBuilder coarse = busy_world(Hosting::kDirect).steps(4, 0.01),
+               fine = busy_world(Hosting::kDirect).steps(4000, 1e-5);
+  for (WorldBuilder* builder : {&coarse, &fine})
+    builder->integrator("integrator_verlet").plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-13, 100});
+  const std::vector<double> reference = end(fine), plain = end(coarse);
+  coarse.description().simulator = Simulator::kContinuous;
+  coarse.description().accuracy = 1e-9;
+  const std::vector<double> accurate = end(coarse);
+  double plain_error = 0.0, accurate_error = 0.0;
+  for (std::size_t i = 0; i < reference.size(); ++i) {
+    plain_error = std::max(plain_error, std::fabs(plain[i] - reference[i]));
+    accurate_error = std::max(accurate_error, std::fabs(accurate[i] - reference[i]));
+  }
+  EXPECT_LT(accurate_error, 1e-6);  // of the reference
+  EXPECT_GT(plain_error, 20.0 * accurate_error);
+}
+
+TEST(Simulators, OnlyContinuousHasAnAccuracyOfItsOwn) {
+  WorldBuilder builder = bouncing(Simulator::kBisection, 1.0, 1, 0.01, 1e-6);
+  EXPECT_EQ(builder.description().validate(), "Accuracy is of Continuous");
+  builder.description().accuracy = -1.0;
+  EXPECT_EQ(builder.description().validate(), "Accuracy is of Continuous");
+}
+
+class Located : public ::testing::TestWithParam<Way> {};
 
 // Impacts of a ball that falls 1 m and keeps its energy: at t0, 3 t0, 5 t0, …
 TEST_P(Located, ImpactsOfABallAreWhereTheyAre) {
-  Environment world(bouncing(GetParam(), 1.0, 150, 1.0 / 60.0).description());
+  const auto [simulator, accuracy] = GetParam();
+  Environment world(bouncing(simulator, 1.0, 150, 1.0 / 60.0, accuracy).description());
   Listener listener;
   EventSource listener_source(&listener);
   world.set_commit_listener(&listener_source);
@@ -218,7 +367,8 @@ TEST_P(Located, ImpactsOfABallAreWhereTheyAre) {
 TEST_P(Located, AZenoSequenceEndsAtRest) {
   const double restitution = 0.5, first = std::sqrt(2.0 / kGravity);
   const double rests = first * (1.0 + restitution) / (1.0 - restitution);
-  Environment world(bouncing(GetParam(), restitution, 200, 0.01).description());
+  const auto [simulator, accuracy] = GetParam();
+  Environment world(bouncing(simulator, restitution, 200, 0.01, accuracy).description());
   while (world.step_count() < 200) {
     ASSERT_EQ(world.step(), StepOutcome::kCommitted);
     const bool is_at_rest = world.state().linear_velocity[4] == 0.0;
@@ -231,7 +381,7 @@ TEST_P(Located, AZenoSequenceEndsAtRest) {
 
 // Equal balls in a row hand on their velocity one after the other.
 TEST_P(Located, ACradleHandsOnWhatItGets) {
-  WorldBuilder builder = accurate(GetParam(), 10, 0.01);
+  WorldBuilder builder = accurate(GetParam().simulator, 10, 0.01, GetParam().accuracy);
   builder.material({1.0, 0.0, 0.0, 0.0});
   for (int i = 0; i < 5; ++i)
     builder.sphere(0.1, 1.0, Vector3(i == 0 ? -0.05 : 0.2 * i + 1e-6 * i, 0, 0), Vector3(i == 0 ? 1.0 : 0.0, 0, 0));
@@ -240,11 +390,15 @@ TEST_P(Located, ACradleHandsOnWhatItGets) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(world.state().linear_velocity[3 * i], i == 4 ? 1.0 : 0.0, 1e-10) << i;
 }
 
-std::string name_of(const ::testing::TestParamInfo<Simulator>& info) {
-  return info.param == Simulator::kBisection ? "Bisection" : "Continuous";
+std::string name_of(const ::testing::TestParamInfo<Way>& info) {
+  if (info.param.accuracy > 0.0) return "ContinuousWithAccuracy";
+  return info.param.simulator == Simulator::kBisection ? "Bisection" : "Continuous";
 }
 
-INSTANTIATE_TEST_SUITE_P(By, Located, ::testing::Values(Simulator::kBisection, Simulator::kContinuous), name_of);
+INSTANTIATE_TEST_SUITE_P(By, Located,
+                         ::testing::Values(Way{Simulator::kBisection, 0.0}, Way{Simulator::kContinuous, 0.0},
+                                           Way{Simulator::kContinuous, 1e-9}),
+                         name_of);
 
 // 10 m a step, through a plate of 3 cm.
 TEST(Continuous, NothingPassesThroughAPlate) {

@@ -71,8 +71,9 @@ TEST(Smooth, HandsItsAccuracyToTheIntegrator) {
   };
   EXPECT_LT(energy_error(1e-10), 1e-8);
   EXPECT_GT(energy_error(1e-3), 1e-7);
-  EXPECT_THAT([] { SceneRun run("double_pendulum.gravitas", {set("Simulator.Accuracy", 1e-3)}); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("Accuracy belongs to the simulator \"Smooth\"")));
+  EXPECT_THAT(
+      [] { SceneRun run("double_pendulum.gravitas", {set("Simulator.Accuracy", 1e-3)}); },
+      ThrowsMessage<std::runtime_error>(HasSubstr("Accuracy belongs to the simulators \"Smooth\" and \"Continuous\"")));
   EXPECT_THAT(
       [] {
         SceneRun run("double_pendulum.gravitas",

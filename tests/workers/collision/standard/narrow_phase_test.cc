@@ -205,6 +205,19 @@ TEST(CylinderHalfspace, TiltedStandsOnItsDeepestRimPoint) {
   EXPECT_NEAR(contact(m, 0).depth, 0.01, kTolerance);
 }
 
+// A disk that rolls on its rim: also where its lowest point passes one of the four that stand for a rim at rest.
+TEST(CylinderHalfspace, TheDeepestRimPointGoesOnSmoothly) {
+  const double tilt = 0.2, lowest = std::cos(tilt) + 0.5 * std::sin(tilt);
+  const double across = std::sin(tilt) - 0.5 * std::cos(tilt);
+  for (const double heading : {-1e-3, -1e-4, -1e-5, 0.0, 1e-6, 3e-5, 3e-4}) {
+    const Vector3 about(std::sin(heading), 0, std::cos(heading));
+    const Manifold m =
+        contacts_of(cylinder(0.5, 1), at(Vector3(0, lowest - 0.01, 0), about, tilt), halfspace(), at(0, 0, 0));
+    ASSERT_EQ(m.count, 1);
+    expect_near(contact(m, 0).point, Vector3(across * std::cos(heading), -0.005, -across * std::sin(heading)));
+  }
+}
+
 TEST(CylinderHalfspace, LyingGivesBothEndsOfTheSideLine) {
   const Manifold m =
       contacts_of(cylinder(0.5, 1), at(Vector3(0, 0.4, 0), Vector3::UnitZ(), kHalfPi), halfspace(), at(0, 0, 0));

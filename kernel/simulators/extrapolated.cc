@@ -1,0 +1,133 @@
+// `Continuous` with an Accuracy: Basic's inner steps, which are of order 1 where reactions change on the way, extrapolated
+// to step 0 (plugin_sdk/extrapolation.h). A part of a step is made in 1, 2, 3, … inner steps until the estimated error is
+// below the accuracy; the finest of them then stand, and the last of these ends in the extrapolated state.
+//
+// What jumps on the way (a contact closes or opens, a slide ends) has no expansion in powers of the step: the part is
+// shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. Impacts of bodies
+// that do not touch are found first, as without an accuracy, so that nothing passes through another.
+#include <algorithm>
+
+#include "kernel/environment.h"
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr int kMostAttempts = 10'000;  // in a step; the rest of it is then made as Basic makes it
+constexpr std::uint32_t kMostPieces = 8;
+constexpr std::size_t kRow = 13;       // numbers of a body
+constexpr double kFinestPart = 1e-10;  // of the step
+constexpr double kShorter = 0.25, kLonger = 4.0;
+constexpr double kConverges = 0.5;  // share of the error that a piece more leaves, at most
+
+// The numbers of a state; attitudes q, which are the same as -q, on the side of those at the start.
+void put(const State& state, const State& start, std::uint32_t bodies, Extrapolation* extrapolation) {
+  for (std::uint32_t i = 0; i < bodies; ++i) {
+    const auto put_vector = [&](const Column<double>& column, double scale) {
+      for (std::size_t k = 3ULL * i; k < 3ULL * i + 3; ++k) extrapolation->put(column[k], scale);
+    };
+    const Quaternion q = quaternion_at(state.orientation.span(), i);
+    const double side = q.dot(quaternion_at(start.orientation.span(), i)) < 0.0 ? -1.0 : 1.0;
+    for (const double number : {q.w(), q.x(), q.y(), q.z()}) extrapolation->put(side * number, 0.5);
+    put_vector(state.position, 1.0);
+    put_vector(state.linear_velocity, std::max(1.0, vector_at(state.linear_velocity.span(), i).norm()));
+    put_vector(state.angular_velocity, std::max(1.0, vector_at(state.angular_velocity.span(), i).norm()));
+  }
+}
+
+}  // namespace
+
+void Environment::extrapolate_parts(double begin, double length) {
+  const double finest = kFinestPart * length_of_step(step_count_ + 1);
+  double done = 0.0, wanted = length;
+  bool has_failed = false;
+  for (int attempt = 0; done < length && !must_restart_; ++attempt) {
+    const double from = begin + done, left = length - done;
+    double part = left;
+    std::uint32_t pieces = 1;
+    if (attempt < kMostAttempts) {
+      part = std::min(wanted, left);
+      if (has_contacts()) {
+        begin_inner_step(from, part);
+        part = first_impact(integrate(), from, part);
+      }
+      if (part > finest) pieces = pieces_to_accuracy(from, part);
+      if (pieces == 0) {
+        wanted = kShorter * part;
+        has_failed = true;
+        continue;
+      }
+    }
+    for (std::uint32_t i = 0; i < pieces && !must_restart_; ++i) {
+      if (!make_piece(from, part, i, pieces)) return;
+      if (i > 0 && i + 1 == pieces) take_extrapolated();
+      end_inner_step();
+    }
+    done = part == left ? length : done + part;
+    wanted = has_failed ? part : kLonger * part;
+    has_failed = false;
+  }
+}
+
+bool Environment::make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces) {
+  const double from = i * length / pieces, to = (i + 1) * length / pieces;
+  begin_inner_step(begin + from, to - from);
+  return make_next_state();
+}
+
+// The number of inner steps whose extrapolation meets the accuracy; 0: none does, or the step is to be begun again.
+std::uint32_t Environment::pieces_to_accuracy(double begin, double length) {
+  const std::size_t front = front_, back = back_;
+  const CommitFigures figures = figures_;
+  const auto go_back = [&] {
+    front_ = front;
+    back_ = back;
+    figures_ = figures;
+  };
+  extrapolation_.begin();
+  std::uint32_t enough = 0;
+  double error = 0.0;
+  try {
+    for (std::uint32_t pieces = 1; pieces <= kMostPieces && enough == 0; ++pieces) {
+      for (std::uint32_t i = 0; i < pieces; ++i) {
+        if (!make_piece(begin, length, i, pieces) || must_restart_) {
+          go_back();
+          return 0;
+        }
+        const std::size_t before = front_;
+        front_ = back_;
+        back_ = before == front ? kSpareState : before;
+      }
+      put(this->front(), states_[front], model_.body_count, &extrapolation_);
+      const double now = extrapolation_.add();
+      go_back();
+      if (now <= description_.accuracy) enough = pieces;
+      if (pieces > 2 && now > kConverges * error) break;
+      error = now;
+    }
+  } catch (...) {
+    go_back();
+    throw;
+  }
+  return enough;
+}
+
+// Of bodies that it moves from where the last inner step has them; others keep every bit.
+void Environment::take_extrapolated() {
+  const State& end = back();
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    if (!is_awake(i)) continue;
+    const double* best = &extrapolation_.best()[kRow * i];
+    set_quaternion(end.orientation.span(), i, Quaternion(best[0], best[1], best[2], best[3]).normalized());
+    const auto set = [&](const Column<double>& column, std::size_t at) {
+      for (std::size_t k = 0; k < 3; ++k) column[3ULL * i + k] = best[at + k] + 0.0;
+    };
+    set(end.position, 4);
+    set(end.linear_velocity, 7);
+    set(end.angular_velocity, 10);
+    end.state_changed[i] = 1;
+  }
+  figures_ = {};
+  complete_state();
+}
+
+}  // namespace gravitas::kernel

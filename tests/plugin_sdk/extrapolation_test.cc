@@ -1,0 +1,84 @@
+// Results in 1, 2, 3, … pieces, and what they tend to.
+#include "plugin_sdk/extrapolation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+namespace gravitas {
+namespace {
+
+double add(Extrapolation* extrapolation, const std::vector<double>& numbers, double scale = 1.0) {
+  for (const double number : numbers) extrapolation->put(number, scale);
+  return extrapolation->add();
+}
+
+// c0 + c1 h + c2 h^2 + c3 h^3 is known from four results.
+TEST(Extrapolation, IsExactForPolynomialsInTheStep) {
+  Extrapolation extrapolation;
+  extrapolation.begin();
+  for (int pieces = 1; pieces <= 4; ++pieces) {
+    const double h = 1.0 / pieces;
+    add(&extrapolation, {3.0 + h * (2.0 + h * (-5.0 + h)), -1.0 + 4.0 * h});
+    if (pieces == 1) continue;
+    EXPECT_NEAR(extrapolation.best()[1], -1.0, 1e-15) << pieces;
+  }
+  EXPECT_NEAR(extrapolation.best()[0], 3.0, 1e-14);
+}
+
+// Euler's method for y' = y over 1/4: k results make it one of order k, and its error is what it is estimated to be.
+TEST(Extrapolation, RaisesTheOrderByOneAResult) {
+  const auto solve = [](double length, int results, double* estimate) {
+    Extrapolation extrapolation;
+    extrapolation.begin();
+    for (int pieces = 1; pieces <= results; ++pieces)
+      *estimate = add(&extrapolation, {std::pow(1.0 + length / pieces, pieces)});
+    return std::fabs(extrapolation.best()[0] - std::exp(length));
+  };
+  for (int results = 2; results <= 5; ++results) {
+    double estimate = 0.0;
+    const double fine = solve(0.125, results, &estimate), coarse = solve(0.25, results, &estimate);
+    // of one step: an order more
+    EXPECT_NEAR(std::log2(coarse / fine), results + 1.0, 0.25) << results;
+    EXPECT_LT(coarse, estimate);
+    EXPECT_GT(coarse, 1e-3 * estimate);
+  }
+}
+
+TEST(Extrapolation, MeasuresErrorsByTheirScale) {
+  Extrapolation extrapolation;
+  extrapolation.begin();
+  EXPECT_EQ(add(&extrapolation, {1.0}, 4.0), std::numeric_limits<double>::infinity());
+  // T_{2,1} = 3, T_{2,2} = 5
+  EXPECT_DOUBLE_EQ(add(&extrapolation, {3.0}, 4.0), 0.5);
+  EXPECT_EQ(extrapolation.best()[0], 5.0);
+}
+
+TEST(Extrapolation, LeavesWhatDoesNotChangeAsItIsToTheBit) {
+  Extrapolation extrapolation;
+  extrapolation.begin();
+  for (int pieces = 1; pieces <= 8; ++pieces) {
+    const double error = add(&extrapolation, {0.1, std::numbers::pi, -1e300, 0.0});
+    EXPECT_EQ(error, pieces == 1 ? std::numeric_limits<double>::infinity() : 0.0);
+  }
+  EXPECT_EQ(extrapolation.best()[0], 0.1);
+  EXPECT_EQ(extrapolation.best()[1], std::numbers::pi);
+  EXPECT_EQ(extrapolation.best()[2], -1e300);
+  EXPECT_EQ(extrapolation.best()[3], 0.0);
+}
+
+TEST(Extrapolation, BelievesNoNumberThatOverflows) {
+  Extrapolation extrapolation;
+  extrapolation.begin();
+  add(&extrapolation, {1.5e308});
+  EXPECT_EQ(add(&extrapolation, {-1.5e308}), std::numeric_limits<double>::infinity());
+  extrapolation.begin();
+  add(&extrapolation, {1.0});
+  EXPECT_EQ(add(&extrapolation, {1.0}), 0.0);  // nothing of before is left
+}
+
+}  // namespace
+}  // namespace gravitas
