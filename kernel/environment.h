@@ -167,7 +167,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void locate_events(double begin, double length);
   // extrapolated.cc
   void extrapolate_parts(double begin, double length);
-  std::uint32_t pieces_to_accuracy(double begin, double length);
+  std::uint32_t pieces_to_accuracy(double begin, double length, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
   void take_extrapolated();
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
@@ -316,7 +316,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::optional<Trusted<Pairs>> pairs_;           // the last
-  Extrapolation extrapolation_;
+  Extrapolation extrapolation_, jumps_;
   double margin_ = 0.0;
 
   Activity activity_;

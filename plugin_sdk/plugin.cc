@@ -112,7 +112,7 @@ bool SolverPlugin::dispatch(stage::Method method, const gravitas_column* request
 }
 
 void SolverPlugin::reactions(const stage::SolverReactionsRequest&, const stage::SolverReactionsReply&, Host&) {
-  throw Refusal("this solver has no answer to Solver.Reactions");
+  throw UnknownMethod();
 }
 
 bool IntegratorPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,

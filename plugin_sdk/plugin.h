@@ -184,7 +184,7 @@ class SolverPlugin {
   static constexpr Slot kSlot = Slot::kSolver;
   virtual ~SolverPlugin() = default;
   virtual void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, Host& host) = 0;
-  // For solvers with the capability `reactions` (plugin_sdk/solver/reactions.h answers it); others refuse.
+  // For solvers with the capability `reactions` (plugin_sdk/solver/reactions.h answers it).
   virtual void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
                          Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);

@@ -3,9 +3,12 @@
 // below the accuracy; the finest of them then stand, and the last of these ends in the extrapolated state.
 //
 // What jumps on the way (a contact closes or opens, a slide ends) has no expansion in powers of the step: the part is
-// shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. Impacts of bodies
+// shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. A jump in the
+// first or in the last inner step of every attempt would look smooth; it shows in that step's change of velocities, which
+// then does not tend to 0 with the step. Impacts of bodies
 // that do not touch are found first, as without an accuracy, so that nothing passes through another.
 #include <algorithm>
+#include <cmath>
 
 #include "kernel/environment.h"
 
@@ -50,7 +53,7 @@ void Environment::extrapolate_parts(double begin, double length) {
         begin_inner_step(from, part);
         part = first_impact(integrate(), from, part);
       }
-      if (part > finest) pieces = pieces_to_accuracy(from, part);
+      if (part > finest) pieces = pieces_to_accuracy(from, part, part < std::min(wanted, left));
       if (pieces == 0) {
         wanted = kShorter * part;
         has_failed = true;
@@ -74,8 +77,9 @@ bool Environment::make_piece(double begin, double length, std::uint32_t i, std::
   return make_next_state();
 }
 
-// The number of inner steps whose extrapolation meets the accuracy; 0: none does, or the step is to be begun again.
-std::uint32_t Environment::pieces_to_accuracy(double begin, double length) {
+// The number of inner steps whose extrapolation meets the accuracy; 0: none does, or the step is to be begun again. Where
+// the part ends with an impact its last inner step jumps as it should.
+std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool ends_with_impact) {
   const std::size_t front = front_, back = back_;
   const CommitFigures figures = figures_;
   const auto go_back = [&] {
@@ -84,6 +88,15 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length) {
     figures_ = figures;
   };
   extrapolation_.begin();
+  jumps_.begin();
+  const auto put_change = [&] {
+    const auto put_vectors = [&](const Column<double>& from, const Column<double>& to) {
+      for (std::size_t k = 0; k < to.size(); ++k)
+        jumps_.put(is_awake(static_cast<std::uint32_t>(k / 3)) ? to[k] - from[k] : 0.0, 1.0);
+    };
+    put_vectors(start_linear_velocity(), this->back().linear_velocity);
+    put_vectors(start_angular_velocity(), this->back().angular_velocity);
+  };
   std::uint32_t enough = 0;
   double error = 0.0;
   try {
@@ -93,6 +106,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length) {
           go_back();
           return 0;
         }
+        if (i == 0) put_change();
+        if (i + 1 == pieces && !ends_with_impact) put_change();
         const std::size_t before = front_;
         front_ = back_;
         back_ = before == front ? kSpareState : before;
@@ -100,8 +115,11 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length) {
       put(this->front(), states_[front], model_.body_count, &extrapolation_);
       const double now = extrapolation_.add();
       go_back();
-      if (now <= description_.accuracy) enough = pieces;
-      if (pieces > 2 && now > kConverges * error) break;
+      jumps_.add();
+      double jump = 0.0;
+      for (const double change : jumps_.best()) jump = std::max(jump, std::fabs(change) * length);
+      if (std::max(now, jump) <= description_.accuracy) enough = pieces;
+      if (pieces > 2 && now > kConverges * error && enough == 0) break;
       error = now;
     }
   } catch (...) {

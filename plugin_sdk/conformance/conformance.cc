@@ -57,7 +57,7 @@ std::vector<Question> questions_of_slot(Subject& subject, std::uint64_t seed) {
     case Slot::kForce:
       return force_questions(subject, &draw);
     case Slot::kSolver:
-      return solver_questions(&draw);
+      return solver_questions(subject.declaration(), &draw);
     case Slot::kIntegrator:
       return integrator_questions(&draw);
   }

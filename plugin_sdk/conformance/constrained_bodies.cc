@@ -49,7 +49,8 @@ void ConstrainedBodies::add_ball_joint(std::uint32_t body1, std::uint32_t body2,
   joints.push_back(joint);
 }
 
-void ConstrainedBodies::append_bodies(MessageColumns* request) const {
+// At S_n.
+void ConstrainedBodies::append_start(MessageColumns* request) const {
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const ConstrainedBody& body = bodies[i];
     request->u32("flags").push_back(kHasShape | (body.kinematic ? kKinematic : is_pushed(i) ? kMovable : 0U));
@@ -59,12 +60,17 @@ void ConstrainedBodies::append_bodies(MessageColumns* request) const {
     add_row(request, "orientation", body.pose.orientation);
     add_row(request, "linear_velocity", body.twist.linear);
     add_row(request, "angular_velocity", body.twist.angular);
+    add_row(request, "wrench", wrench[i].force);
+    add_row(request, "wrench", wrench[i].torque);
+  }
+}
+
+void ConstrainedBodies::append_trial(MessageColumns* request) const {
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
     add_row(request, "trial_position", trial_pose[i].position);
     add_row(request, "trial_orientation", trial_pose[i].orientation);
     add_row(request, "trial_linear_velocity", trial_twist[i].linear);
     add_row(request, "trial_angular_velocity", trial_twist[i].angular);
-    add_row(request, "wrench", wrench[i].force);
-    add_row(request, "wrench", wrench[i].torque);
   }
 }
 
@@ -84,8 +90,6 @@ void ConstrainedBodies::append_joints(MessageColumns* request) const {
     add_row(request, "compliance", d.compliance);
     add_row(request, "damping", d.damping);
     add_row(request, "maximum_force", d.maximum_force);
-    add_row(request, "discrepancy_warm_impulse", joint.warm_impulse);
-    add_row(request, "discrepancy_warm_correction", joint.warm_correction);
   }
 }
 
@@ -108,9 +112,23 @@ MessageColumns ConstrainedBodies::request() const {
   MessageColumns columns = empty_request(kSolverSolve);
   columns.f64("time_step") = {time_step};
   columns.f64("theta") = {theta};
-  append_bodies(&columns);
+  append_start(&columns);
+  append_trial(&columns);
   append_joints(&columns);
+  for (const BodyJoint& joint : joints) {
+    add_row(&columns, "discrepancy_warm_impulse", joint.warm_impulse);
+    add_row(&columns, "discrepancy_warm_correction", joint.warm_correction);
+  }
   append_contacts(&columns);
+  return columns;
+}
+
+MessageColumns ConstrainedBodies::reactions_request() const {
+  MessageColumns columns = empty_request(stage::Method::kSolverReactions);
+  append_start(&columns);
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    add_row(&columns, "inertia", is_pushed(i) ? bodies[i].moments : Vector3::Zero());
+  append_joints(&columns);
   return columns;
 }
 

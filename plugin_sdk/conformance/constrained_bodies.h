@@ -83,6 +83,8 @@ class ConstrainedBodies {
   Vector3 at_trial(std::uint32_t body, const Vector3& point) const;
 
   MessageColumns request() const;
+  // Of the second question, at S_n, without drag and accelerations.
+  MessageColumns reactions_request() const;
   // The answer, checked for what the kernel demands of every solution: bodies that nothing can push are left alone,
   // contacts push and stay in their cones.
   Solution ask(Inquiry* inquiry) const;
@@ -95,7 +97,8 @@ class ConstrainedBodies {
   double energy(const std::vector<Twist>& twists) const;
 
  private:
-  void append_bodies(MessageColumns* request) const;
+  void append_start(MessageColumns* request) const;
+  void append_trial(MessageColumns* request) const;
   void append_joints(MessageColumns* request) const;
   void append_contacts(MessageColumns* request) const;
 };

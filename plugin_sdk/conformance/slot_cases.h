@@ -18,6 +18,8 @@ std::vector<Case> space_geometry_cases(const PluginDeclaration& declaration);
 std::vector<Case> constraint_cases(const PluginDeclaration& declaration);
 std::vector<Case> force_cases(const PluginDeclaration& declaration);
 std::vector<Case> solver_cases(const PluginDeclaration& declaration);
+// Of the optional method of slot solver.
+std::vector<Case> reaction_cases(const PluginDeclaration& declaration);
 std::vector<Case> integrator_cases(const PluginDeclaration& declaration);
 
 // That an optional method is not answered whose capability is not declared.
@@ -30,7 +32,8 @@ std::vector<Question> collision_geometry_questions(const PluginDeclaration& decl
 std::vector<Question> space_geometry_questions(const PluginDeclaration& declaration);
 std::vector<Question> constraint_questions(Subject& subject, Draw* draw);
 std::vector<Question> force_questions(Subject& subject, Draw* draw);
-std::vector<Question> solver_questions(Draw* draw);
+std::vector<Question> solver_questions(const PluginDeclaration& declaration, Draw* draw);
+std::vector<Question> reaction_questions(const PluginDeclaration& declaration, Draw* draw);
 std::vector<Question> integrator_questions(Draw* draw);
 
 }  // namespace gravitas::conformance

@@ -545,6 +545,7 @@ std::vector<Case> solver_cases(const PluginDeclaration& declaration) {
                 judge_solver_refusals),
       make_case("solver/hostile", "Hostile numbers are refused with a reason, or answered with finite ones.",
                 judge_solver_hostile)};
+  std::ranges::move(reaction_cases(declaration), std::back_inserter(cases));
   const auto add = [&](const char* name, const char* claim, void (*judge)(Subject&)) {
     cases.push_back(make_case(name, claim, judge));
   };
@@ -565,8 +566,8 @@ std::vector<Case> solver_cases(const PluginDeclaration& declaration) {
 }
 
 // Columns of balls that stand on the ground, and beside each a chain of two that hangs from the world.
-std::vector<Question> solver_questions(Draw* draw) {
-  std::vector<Question> questions;
+std::vector<Question> solver_questions(const PluginDeclaration& declaration, Draw* draw) {
+  std::vector<Question> questions = reaction_questions(declaration, draw);
   for (const std::uint32_t columns : {1U, 4U, 40U}) {
     constexpr std::uint32_t kHeight = 3;
     ConstrainedBodies world;

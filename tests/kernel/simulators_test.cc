@@ -330,6 +330,22 @@ TEST(Simulators, ExtrapolationAgreesWithManySmallSteps) {
   EXPECT_GT(plain_error, 20.0 * accurate_error);
 }
 
+// The end of a slide lies in the first inner step, in the last, or between, of whatever part holds it.
+TEST(Simulators, ASlideThatEndsInAPartEndsWhereItDoes) {
+  const double speed = 5.0, friction = 0.3, way = speed * speed / (2.0 * friction * kGravity);
+  for (const double time_step : {0.125, 0.1, 0.0625, 0.05, 0.02}) {
+    const auto steps = static_cast<std::uint32_t>(std::lround(2.0 / time_step));
+    WorldBuilder builder = accurate(Simulator::kContinuous, steps, time_step, 1e-9);
+    builder.material({0.0, friction, friction, 0.0}).ground();
+    builder.box({0.5, 0.5, 0.5}, 1.0, {0, 0.5, 0}, {0.8 * speed, 0, 0.6 * speed});
+    builder.gravity(Vector3(0, -kGravity, 0));
+    Environment world(builder.description());
+    run(&world);
+    EXPECT_NEAR(world.state().position[3], 0.8 * way, 1e-9) << time_step;
+    EXPECT_NEAR(world.state().position[5], 0.6 * way, 1e-9) << time_step;
+  }
+}
+
 TEST(Simulators, OnlyContinuousHasAnAccuracyOfItsOwn) {
   WorldBuilder builder = bouncing(Simulator::kBisection, 1.0, 1, 0.01, 1e-6);
   EXPECT_EQ(builder.description().validate(), "Accuracy is of Continuous");

@@ -81,10 +81,8 @@ class Force(Plugin):
 
 
 class Solver(Plugin):
+    # the last one is asked only of plugins that declare the capability of that name
     slot, methods = "solver", {"Solve": "solve", "Reactions": "reactions"}
-
-    def reactions(self, request, reply, host):
-        raise Refusal("this solver has no answer to Solver.Reactions")
 
 
 class Integrator(Plugin):
