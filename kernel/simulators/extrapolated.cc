@@ -4,9 +4,8 @@
 //
 // What jumps on the way (a contact closes or opens, a slide ends) has no expansion in powers of the step: the part is
 // shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. A jump in the
-// first or in the last inner step of every attempt would look smooth; it shows in that step's change of velocities, which
-// then does not tend to 0 with the step. Impacts of bodies
-// that do not touch are found first, as without an accuracy, so that nothing passes through another.
+// first or the last inner step of every attempt would look smooth; it shows in that step's change of velocities, which then
+// does not tend to 0 with the step. Impacts of bodies that do not touch are found first, as without an accuracy.
 #include <algorithm>
 #include <cmath>
 
@@ -97,8 +96,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
     put_vectors(start_linear_velocity(), this->back().linear_velocity);
     put_vectors(start_angular_velocity(), this->back().angular_velocity);
   };
-  std::uint32_t enough = 0;
   double error = 0.0;
+  std::uint32_t enough = 0;
   try {
     for (std::uint32_t pieces = 1; pieces <= kMostPieces && enough == 0; ++pieces) {
       for (std::uint32_t i = 0; i < pieces; ++i) {
@@ -119,7 +118,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       double jump = 0.0;
       for (const double change : jumps_.best()) jump = std::max(jump, std::fabs(change) * length);
       if (std::max(now, jump) <= description_.accuracy) enough = pieces;
-      if (pieces > 2 && now > kConverges * error && enough == 0) break;
+      if (pieces > 2 && now > kConverges * error) break;
       error = now;
     }
   } catch (...) {
