@@ -37,7 +37,7 @@ struct Mechanism {
   std::vector<Twist> accelerations;  // of kinematic bodies
 
   Reactions ask(Inquiry* inquiry) const {
-    const Reactions came(inquiry->answer(kReactions, request()));
+    Reactions came(inquiry->answer(kReactions, request()));
     for (std::size_t i = 0; i < world.bodies.size(); ++i) {
       if (world.is_pushed(i)) continue;
       const std::string of = " on body " + std::to_string(i) + ", which nothing can push";

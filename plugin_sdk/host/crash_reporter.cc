@@ -16,7 +16,7 @@ namespace {
 channel::Mailbox* reporter_mailbox = nullptr;
 const channel::Mailbox* reporter_kernel = nullptr;
 std::uint64_t reporter_epoch = 0;
-std::atomic<bool> crash_reported{false};
+std::atomic<bool> crash_reported{false}, second_has_asked{false};
 alignas(16) std::array<char, 65536> reporter_stack;
 
 // Runs on its own stack (the signal may be a stack overflow) and calls nothing that takes a lock.
@@ -61,8 +61,12 @@ void install_crash_reporter(channel::Mailbox* mine, const channel::Mailbox* kern
   write_end_of_this_thread(mine);
   std::thread([mine] {
     write_end_of_this_thread(mine);
+    second_has_asked = true;
+    second_has_asked.notify_one();
     for (;;) pause();
   }).detach();
+  // an end before that could leave this thread for the last
+  second_has_asked.wait(false);
 }
 
 }  // namespace gravitas::host
