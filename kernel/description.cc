@@ -69,7 +69,8 @@ std::string EnvironmentDescription::validate() const {
   if (!(time_step > 0.0) || !std::isfinite(time_step)) return "the time step must be positive";
   if (!(last_time_step > 0.0) || !(last_time_step <= time_step * (1.0 + 1e-9))) return "the last time step is longer";
   if (substeps == 0) return "a step has one inner step at least";
-  if (!(accuracy >= 0.0) || (accuracy > 0.0 && simulator != Simulator::kContinuous)) return "Accuracy is of Continuous";
+  if (!(accuracy >= 0.0) || (accuracy > 0.0 && simulator != Simulator::kContinuous))
+    return "the accuracy must be positive, and is of Continuous alone";
   if (!(sleep.energy >= 0.0) || !(sleep.time >= 0.0)) return "the energy or the time of sleep is negative";
   if (material_count == 0 || material_pairs.size() != std::size_t{material_count} * material_count * kMaterialColumns)
     return "the table of material pairs has the wrong size";

@@ -348,9 +348,9 @@ TEST(Simulators, ASlideThatEndsInAPartEndsWhereItDoes) {
 
 TEST(Simulators, OnlyContinuousHasAnAccuracyOfItsOwn) {
   WorldBuilder builder = bouncing(Simulator::kBisection, 1.0, 1, 0.01, 1e-6);
-  EXPECT_EQ(builder.description().validate(), "Accuracy is of Continuous");
+  EXPECT_EQ(builder.description().validate(), "the accuracy must be positive, and is of Continuous alone");
   builder.description().accuracy = -1.0;
-  EXPECT_EQ(builder.description().validate(), "Accuracy is of Continuous");
+  EXPECT_EQ(builder.description().validate(), "the accuracy must be positive, and is of Continuous alone");
 }
 
 class Located : public ::testing::TestWithParam<Way> {};
