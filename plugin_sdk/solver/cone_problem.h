@@ -18,14 +18,17 @@
 //  2. The others, dense:
 //     kNewton       semi-smooth Newton on the equation above. A row is held, free, or slides; with the states known the
 //                   equations are linear but for the direction of a slide, so that steps end at the solution itself once
-//                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-10 added to
-//                   the diagonal of the step's matrix, not of the equation: the answer is one of those that are right.
-//                   Where four steps do not halve the residual, they start anew from the guesses of cone_path.h.
+//                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-6 to 1e-10
+//                   added to the diagonal of the step's matrix, not of the equation: the answer is one of those that are
+//                   right. Where seven steps do not halve the residual, they start anew: from the guesses of cone_path.h,
+//                   and every third time from sweeps.
 //     kGaussSeidel  projected block Gauss-Seidel, each contact solved exactly (coulomb_contact.h).
-//  3. Static and dynamic friction: all stick within mu_s first; what slips then slides with mu_d.
+//  3. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
+//     with mu_d.
 //
 // Measured: heaps of two to five bodies with four contacts a face that slide and turn, at ratios of mass of 1e-3, 1, 1e2 and
-// 1e4, are all solved (400 of each); at 1e6 392 of 400, the others to what rounding leaves of the loads.
+// 1e4, are all solved (400 of each), with rolling and spinning friction, too; at 1e6 399 of 400, the other to what rounding
+// leaves of the loads.
 //
 // Scaled: every row by the root of its W_ii, a contact's three by one number, so that cones stay cones. More than kDenseRows
 // other rows: sweeps on all rows, the held ones factorised in between; the answer says if that did not do.
@@ -59,6 +62,7 @@ struct ConeContact {
   double target = 0.0;
   double static_friction = 0.0, dynamic_friction = 0.0;
   double rolling_friction = 0.0, spinning_friction = 0.0;  // m
+  bool slides = false;                                     // is known to, then: does, with dynamic_friction
 
   std::uint32_t count() const { return 1U + (has_friction ? 2U : 0U) + (has_turning ? 3U : 0U); }
 };
@@ -98,7 +102,6 @@ class ConeProblem {
     std::uint32_t first = 0;    // place among the other rows
     std::int32_t contact = -1;  // of contacts; -1: one scalar row
     std::uint32_t count = 1;
-    bool slides = false;
   };
   // Of a contact's scaled multipliers, as multiples of the normal one.
   struct Bounds {
@@ -123,7 +126,7 @@ class ConeProblem {
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
   bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y);
-  bool newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y);
+  bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void solve_sliding();
   void solve_sticking();
   ConePath path() const;
@@ -161,6 +164,7 @@ class ConeProblem {
   Eigen::VectorXd side_of_step_, step_;
   std::vector<double> rest_;
   Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  double proximal_ = 0.0, factored_proximal_ = 0.0;
   std::vector<Eigen::Index> coupled_, factored_;  // rows; of sticking_
   ProfileLdlt sticking_;
 };

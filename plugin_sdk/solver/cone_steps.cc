@@ -12,9 +12,6 @@ namespace {
 
 using Vector2 = Eigen::Vector2d;
 
-// Added to the diagonal of a step's matrix, whose diagonal is 1: dependent rows stay solvable.
-constexpr double kProximal = 1e-10;
-
 double length_of(double a, double b) { return std::sqrt(a * a + b * b); }
 
 // Shortens a vector of two to a radius.
@@ -36,7 +33,7 @@ JointLaw ConeProblem::scaled_law(std::uint32_t row) const {
 ConeProblem::Bounds ConeProblem::bounds_of(const Block& block) const {
   const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
   Bounds bounds;
-  if (contact.has_friction) bounds.friction = block.slides ? contact.dynamic_friction : contact.static_friction;
+  if (contact.has_friction) bounds.friction = contact.slides ? contact.dynamic_friction : contact.static_friction;
   if (contact.has_turning) {
     bounds.turning = contact.has_friction ? 3 : 1;
     const std::uint32_t r = other_[block.first];
@@ -112,7 +109,7 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     for (int a = 0; a < 2; ++a) {
       start_sliding(i + a, mu * lambda[normal] * direction[a] - lambda[i + a]);
       sliding_.row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
-      for (int b = 0; b < 2; ++b) sliding_(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - kProximal);
+      for (int b = 0; b < 2; ++b) sliding_(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - proximal_);
       sliding_(i + a, normal) -= mu * direction[a];
     }
   };
@@ -164,8 +161,9 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
   return any_slides;
 }
 
-// False, with nothing done, if the step is not finite.
-bool ConeProblem::newton_step(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
+// False, with nothing done, if the step is not finite. `proximal` is added to the diagonal of its matrix, which is 1.
+bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
+  proximal_ = proximal;
   const Eigen::Index count = lambda->size();
   const bool any_slides = linearise(*lambda, *y);
   // what is put somewhere goes to the right
@@ -211,7 +209,7 @@ void ConeProblem::solve_sliding() {
       const Eigen::Index j = coupled_[static_cast<std::size_t>(b)];
       core_(a, b) = is_held ? response_(j, i) : sliding_(i, j);
     }
-    if (is_held) core_(a, a) += kProximal;
+    if (is_held) core_(a, a) += proximal_;
   }
   Eigen::Map<Eigen::VectorXd> rest(rest_.data(), size);
   if (size > 0) rest = lu_.compute(core_).solve(rest).eval();
@@ -219,17 +217,18 @@ void ConeProblem::solve_sliding() {
 
 // Symmetric, and a contact's rows meet only those of its two bodies: a stack costs what a band costs.
 void ConeProblem::solve_sticking() {
-  if (coupled_ != factored_) {
+  if (coupled_ != factored_ || proximal_ != factored_proximal_) {
     std::vector<std::size_t> first(coupled_.size());
     for (std::size_t a = 0; a < coupled_.size(); ++a)
       while (first[a] < a && response_(coupled_[first[a]], coupled_[a]) == 0.0) ++first[a];
     sticking_.start(first);
     for (std::size_t a = 0; a < coupled_.size(); ++a) {
       for (std::size_t b = first[a]; b <= a; ++b) sticking_.entry(a, b) = response_(coupled_[b], coupled_[a]);
-      sticking_.entry(a, a) += kProximal;
+      sticking_.entry(a, a) += proximal_;
     }
     sticking_.factorise();
     factored_ = coupled_;
+    factored_proximal_ = proximal_;
   }
   sticking_.solve(&rest_);
 }
@@ -311,12 +310,12 @@ void ConeProblem::sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
 
 bool ConeProblem::let_slide(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double slip) {
   bool any = false;
-  for (Block& block : blocks_) {
-    if (block.contact < 0 || block.slides || !(lambda[block.first] > 0.0)) continue;
-    const ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
-    if (!(contact.dynamic_friction < contact.static_friction)) continue;
+  for (const Block& block : blocks_) {
+    if (block.contact < 0 || !(lambda[block.first] > 0.0)) continue;
+    ConeContact& contact = contacts[static_cast<std::size_t>(block.contact)];
+    if (contact.slides || !(contact.dynamic_friction < contact.static_friction)) continue;
     if (length_of(y[block.first + 1], y[block.first + 2]) * scale_[other_[block.first]] <= slip) continue;
-    block.slides = any = true;
+    contact.slides = any = true;
   }
   return any;
 }

@@ -36,18 +36,18 @@ class IslandSolver {
     load();
     const double share = request_.theta() * request_.time_step();
     guess_offset(share);
-    double change = 0.0;
     for (int round = 0; round < kRounds; ++round) {
+      const BodyMotion before = displacement_;
       solve_pose();
-      find_closed();
+      const bool closes = find_closed();
+      // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
+      has_settled_ = round > 0 && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
+      if (has_settled_) break;
       solve_velocity();
-      if (share > 0.0) change = set_offset(share);
-      // velocities are known to their residual
-      has_settled_ = change <= 4.0 * share * summary_.residual;
+      has_settled_ = !set_offset(share);
       if (has_settled_) break;
     }
-    // the pose change answered is that of the impulses answered; where they do not settle it must not move their rows away
-    if (has_settled_ && change > 0.0) solve_pose();
+    // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
     summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
     store();
     return summary_;
@@ -309,11 +309,13 @@ class IslandSolver {
   }
 
   // Contacts and limits that the end of the step closes, beside those that were.
-  void find_closed() {
+  bool find_closed() {
+    bool any = false;
     for (EndContact& contact : contacts_) {
       const double gap =
           contact.gap + contact.gap_row.along(displacement_[contact.body1], displacement_[contact.body2]);
-      contact.is_closed = contact.is_closed || gap <= contact.slop;
+      if (contact.is_closed || gap > contact.slop) continue;
+      contact.is_closed = any = true;
     }
     for (EndJoint& joint : joints_) {
       for (std::size_t k = 0; k < 3; ++k) {
@@ -322,8 +324,13 @@ class IslandSolver {
         law = velocity_law_of(joint, k);
         law.has_lower = law.has_lower || known.has_lower;
         law.has_upper = law.has_upper || known.has_upper;
+        any = any || law.has_lower != known.has_lower || law.has_upper != known.has_upper;
       }
     }
+    // with others closed, what slid may stick
+    if (any)
+      for (EndContact& contact : contacts_) contact.slides = false;
+    return any;
   }
 
   JointLaw velocity_law_of(const EndJoint& joint, std::size_t k) const {
@@ -350,8 +357,11 @@ class IslandSolver {
       velocity_ = trial;
       cone_.push(bodies_, &velocity_);
       keep_impulses();
-      if (!lower_restitution(trial, round)) return;
+      if (!lower_restitution(trial, round)) break;
     }
+    std::size_t cone = 0;
+    for (EndContact& contact : contacts_)
+      if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
   }
 
   static bool has_turning(const ContactLaw& law) { return law.rolling_friction > 0.0 || law.spinning_friction > 0.0; }
@@ -390,6 +400,7 @@ class IslandSolver {
     cone.has_friction = law.static_friction > 0.0;
     cone.has_turning = with_turning && has_turning(law) && !(inverse1 + inverse2).isZero(0.0);
     cone.target = law.target;
+    cone.slides = contact.slides;
     cone.static_friction = law.static_friction, cone.dynamic_friction = law.dynamic_friction;
     cone.rolling_friction = law.rolling_friction, cone.spinning_friction = law.spinning_friction;
     const Vector3 impulse = law.frame.transpose() * vector_at(answer_.contact_impulse, contact.row);
@@ -472,8 +483,8 @@ class IslandSolver {
 
   // ---- rows on velocity alone
 
-  // offset_ from the present impulses. Returns by how much that changes it, m; 0 for rounding.
-  double set_offset(double share) {
+  // offset_ from the present impulses. False if that changes nothing.
+  bool set_offset(double share) {
     BodyMotion next = start_motion(nullptr);
     const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
     const auto push = [&](const ConeRow& row) {
@@ -485,10 +496,9 @@ class IslandSolver {
       if (cone_.rows[r].law.is_velocity_only) push(cone_.rows[r]);
     for (const ConeContact& contact : cone_.contacts)
       for (std::uint32_t k = 1; k < contact.count(); ++k) push(cone_.rows[contact.first + k]);
-    const double change = largest_change(next, offset_);
-    const double size = std::max(largest(next), largest(displacement_));
+    const bool changes = is_change(next, offset_, 0.0);
     offset_ = std::move(next);
-    return change > std::max(kEpsilon * coordinates_, 1e-14 * size) ? change : 0.0;
+    return changes;
   }
 
   // ---- sizes, m
@@ -505,6 +515,12 @@ class IslandSolver {
     for (const std::uint32_t i : pushed_)
       most = std::max(most, a[i].linear.norm() + bodies_[i].gyration() * a[i].angular.norm());
     return most;
+  }
+
+  // By more than rounding, and than `known`.
+  bool is_change(const BodyMotion& a, const BodyMotion& b, double known) const {
+    const double size = std::max({largest(a), largest(b), largest(displacement_)});
+    return largest_change(a, b) > std::max({known, kEpsilon * coordinates_, 1e-14 * size});
   }
 
   void note(const ConeSummary& solved) {

@@ -40,7 +40,7 @@ struct EndContact {
   ContactLaw law;
   Vector3 arm1, arm2;                 // to the surface points
   Vector3 turning = Vector3::Zero();  // impulses of rolling and spinning friction in the law's frame, N m s
-  bool is_closed = false;
+  bool is_closed = false, slides = false;
   std::uint32_t lowered = 0;
 };
 
