@@ -43,9 +43,24 @@ class TurningCore {
     const double along = axis_.dot(m);
     return (along > 0.0 ? along * up_ : -along * down_) + off_axis_ * norm_of(m - along * axis_);
   }
-  // How m turns with the body, and what its support leaves out, per second and per half of its square.
-  Vector3 turning(const Vector3& n) const { return n.cross(spin_); }
-  double remainder(const Vector3& n) const { return norm_of(n.cross(spin_)) * rate_ * off_axis_; }
+  // n . x of a point x while n turns along with w: n . x + s first . x + s^2/2 second . x, to within s^3/6 third.
+  struct Swing {
+    Vector3 n, first, second;
+    double third;
+  };
+  Swing swing(const Vector3& n, const Vector3& w) const {
+    const Vector3 relative = spin_ - w, first = n.cross(relative);
+    const double rates = norm_of(w) + rate_;
+    return {n, first, first.cross(spin_) - n.cross(w).cross(relative),
+            w.isZero(0.0) ? norm_of(first) * rate_ * rate_ * off_axis_ : norm_of(relative) * rates * rates * reach_};
+  }
+  // The greatest of these, or more, convex in s: curvature that leads away counts as none.
+  double support(const Swing& swing, double s) const {
+    const Vector3 m = swing.n + s * swing.first;
+    double most = support(m);
+    if (!swing.second.isZero(0.0)) most = std::max(most, support(m + (0.5 * s * s) * swing.second));
+    return most + s * s * s / 6.0 * swing.third;
+  }
 
   const SupportMap& map() const { return map_; }
   const Matrix3& axes() const { return R_; }
@@ -88,6 +103,18 @@ double safe_step(const Bound& f, double at_zero, double rest) {
   return low;
 }
 
+// n . c of the offset c of two centres while n turns along with w, or less, concave in s.
+struct Drift {
+  double at_zero, first, second, third;
+
+  Drift(const Vector3& n, const Vector3& c, const Vector3& v, const Vector3& w, double rest)
+      : at_zero(n.dot(c)),
+        first(n.dot(v - w.cross(c))),
+        second(std::min(0.0, n.dot(w.cross(w.cross(c)) - 2.0 * w.cross(v)))),
+        third(w.squaredNorm() * ((3.0 + norm_of(w) * rest) * norm_of(v) + norm_of(w) * norm_of(c))) {}
+  double operator()(double s) const { return at_zero + s * (first + 0.5 * s * (second - s / 3.0 * third)); }
+};
+
 // Two bounded solids.
 class ConvexApproach {
  public:
@@ -109,31 +136,39 @@ class ConvexApproach {
                           a_.axes().transpose() * (centres_ + b_.p() - a_.p())};
     least_ = find_separation(pair, std::numeric_limits<double>::infinity());
     normal_ = a_.axes() * least_.normal;
-    turning_a_ = a_.turning(normal_), turning_b_ = b_.turning(normal_);
-    remainder_ = a_.remainder(normal_) + b_.remainder(normal_);
     rounding_ = pair.rounding();
   }
   double gap() const { return -least_.depth; }
-  // How far the plane parts the solids s after the time looked at, at least.
-  double parted(double s) const {
-    return normal_.dot(centres_ + s * velocity_) - a_.support(normal_ + s * turning_a_) -
-           b_.support(-(normal_ + s * turning_b_)) - rounding_ - 0.5 * s * s * remainder_;
-  }
-  // The same, whatever the angles.
-  double parted_at_any_angle(double s) const {
-    return normal_.dot(centres_ + s * velocity_) - a_.swept_support(normal_) - b_.swept_support(-normal_) - rounding_;
-  }
   Impact impact(double t) const {
     const Vector3 middle = 0.5 * (least_.point_a + least_.point_b);
     return {t, normal_, start_ + t * motion_ + a_.p() + a_.axes() * middle, least_.depth};
   }
 
-  double step(double half_target, double rest) const {
-    const auto bound = [&](double s) { return parted(s) - half_target; };
-    const double at_zero = bound(0.0);
-    if (!(at_zero > 0.0)) return 0.0;
-    double step = safe_step(bound, at_zero, rest);
-    const double swept = parted_at_any_angle(0.0) - half_target;
+  double step(double half_target, double rest) {
+    double step = step_from_plane(half_target, rest);
+    if (step > 0.0) return step;
+    // of faces that lie flush at a small gap the plane of the nearest points is tilted by rounding, those of the faces not
+    constexpr double kFlush = 1e-6;
+    const auto try_face = [&](const TurningCore& core, double side) {
+      Contour face;
+      core.map().contour(core.axes().transpose() * (side * normal_), kFlush, &face);
+      if (step > 0.0 || !face.is_face()) return;
+      normal_ = core.axes() * (side * face.normal);
+      step = step_from_plane(half_target, rest);
+    };
+    try_face(a_, 1.0);
+    try_face(b_, -1.0);
+    return step;
+  }
+
+ private:
+  double step_from_plane(double half_target, double rest) const {
+    // it stays as it is, or turns along with either solid
+    double step = step_along(Vector3::Zero(), half_target, rest);
+    for (const TurningCore* core : {&a_, &b_})
+      if (step > 0.0 && step < rest && !core->spin().isZero(0.0))
+        step = std::max(step, step_along(core->spin(), half_target, rest));
+    const double swept = parted_at_any_angle() - half_target;
     if (step < rest && swept > 0.0) {
       const double closing = -normal_.dot(velocity_);
       step = std::max(step, closing * rest <= swept ? rest : swept / closing);
@@ -141,12 +176,26 @@ class ConvexApproach {
     return step;
   }
 
- private:
+  // How far the plane parts the solids, whatever their angles.
+  double parted_at_any_angle() const {
+    return normal_.dot(centres_) - a_.swept_support(normal_) - b_.swept_support(-normal_) - rounding_;
+  }
+  // How far the plane surely parts them when it turns along with w.
+  double step_along(const Vector3& w, double half_target, double rest) const {
+    const Drift drift(normal_, centres_, velocity_, w, rest);
+    const TurningCore::Swing of_a = a_.swing(normal_, w), of_b = b_.swing(-normal_, w);
+    const auto bound = [&](double s) {
+      return drift(s) - a_.support(of_a, s) - b_.support(of_b, s) - rounding_ - half_target;
+    };
+    const double at_zero = bound(0.0);
+    return at_zero > 0.0 ? safe_step(bound, at_zero, rest) : 0.0;
+  }
+
   TurningCore a_, b_;
   Vector3 offset_, velocity_, start_, motion_;
   Separation least_;
-  Vector3 normal_, centres_, turning_a_, turning_b_;
-  double remainder_ = 0.0, rounding_ = 0.0;
+  Vector3 normal_, centres_;
+  double rounding_ = 0.0;
 };
 
 // A half-space, first, and a bounded solid.
@@ -156,15 +205,7 @@ class HalfspaceApproach {
       : ground_(ground),
         b_(solid),
         offset_(solid.start.position - ground.start.position),
-        velocity_(solid.motion.displacement - ground.motion.displacement) {
-    const Vector3& spin = ground.motion.rotation;
-    tilts_ = !spin.isZero(0.0);
-    if (!tilts_) return;
-    // no point of the solid comes nearer to the plane faster than this
-    const double farthest = std::max(norm_of(offset_), norm_of(offset_ + velocity_)) + b_.reach();
-    speed_ = (norm_of(velocity_) + norm_of(spin) * (farthest + norm_of(ground.geometry.position)) + b_.travel()) *
-             (1.0 + 1e-12);
-  }
+        velocity_(solid.motion.displacement - ground.motion.displacement) {}
 
   double sizes() const { return b_.map().radius(); }
 
@@ -174,14 +215,9 @@ class HalfspaceApproach {
     const Quaternion turned = rotate_by(ground_.start.orientation, t * ground_.motion.rotation);
     up_ = normalized(turned * ground_.geometry.orientation) * Vector3::UnitY();
     plane_ = up_.dot(turned * ground_.geometry.position);
-    turning_ = b_.turning(up_), remainder_ = b_.remainder(up_);
-    gap_ = parted(0.0);
+    gap_ = up_.dot(centres_) - plane_ - b_.support(-up_) - b_.map().rounding();
   }
   double gap() const { return gap_; }
-  double parted(double s) const {
-    return up_.dot(centres_ + s * velocity_) - plane_ - b_.support(-(up_ + s * turning_)) - b_.map().rounding() -
-           0.5 * s * s * remainder_;
-  }
   Impact impact(double t) const {
     const Vector3 farthest = b_.map().support(b_.axes().transpose() * -up_);
     const Vector3 foot = b_.p() + b_.axes() * farthest - b_.map().rounding() * up_;
@@ -189,13 +225,16 @@ class HalfspaceApproach {
     return {t, up_, centre + foot - (0.5 * gap_) * up_, -gap_};
   }
   double step(double half_target, double rest) const {
-    const double at_zero = gap_ - half_target;
+    const Vector3& spin = ground_.motion.rotation;
+    const Drift drift(up_, centres_, velocity_, spin, rest);
+    const TurningCore::Swing swing = b_.swing(-up_, spin);
+    const double nearer = plane_ + b_.map().rounding() + half_target;
+    const auto bound = [&](double s) { return drift(s) - b_.support(swing, s) - nearer; };
+    const double at_zero = bound(0.0);
     if (!(at_zero > 0.0)) return 0.0;
-    if (tilts_) return std::min(rest, at_zero / speed_);
-    const auto bound = [&](double s) { return parted(s) - half_target; };
     double step = safe_step(bound, at_zero, rest);
-    const double swept = up_.dot(centres_) - plane_ - b_.swept_support(-up_) - b_.map().rounding() - half_target;
-    if (step < rest && swept > 0.0) {
+    const double swept = up_.dot(centres_) - b_.swept_support(-up_) - nearer;
+    if (step < rest && swept > 0.0 && spin.isZero(0.0)) {
       const double closing = -up_.dot(velocity_);
       step = std::max(step, closing * rest <= swept ? rest : swept / closing);
     }
@@ -206,10 +245,8 @@ class HalfspaceApproach {
   const MovingSolid& ground_;
   TurningCore b_;
   Vector3 offset_, velocity_;
-  bool tilts_ = false;
-  double speed_ = 0.0;
-  Vector3 up_, centres_, turning_;
-  double plane_ = 0.0, remainder_ = 0.0, gap_ = 0.0;
+  Vector3 up_, centres_;
+  double plane_ = 0.0, gap_ = 0.0;
 };
 
 // A vertex, edge or triangle at one instant.

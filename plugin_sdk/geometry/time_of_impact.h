@@ -1,22 +1,25 @@
 // When two moving convex solids first come close, never later than they do.
 //
 // Conservative advancement. At the time t the nearest points give a plane that parts the solids, with normal n (from a
-// to b) and gap d. As long as the plane, moving along, parts them by more than half the target they cannot touch; with
-// c(s) = c + s v the offset of the centres, w the angular velocities, and the supports h about the centres at time t,
+// to b) and gap d. As long as a plane parts them by more than half the target they cannot touch. Planes that turn at the
+// angular velocity w are tried for w = 0, w_a and w_b, so that a solid which another carries along does not seem to come
+// nearer. With c(s) = c + s v the offset of the centres, w_a the angular velocity of a and x a point of it, in axes that turn
+// along with the plane,
 //
-//   gap(t + s) >= n . c(s) - h_a(n + s n x w_a) - h_b(-n - s n x w_b) - s^2/2 (k_a + k_b),   k = |n x w| |w| rho
+//   n . x(s) = n . x + s (n x r) . x + s^2/2 ((n x r) x w_a - (n x w) x r) . x + ...,   r = w_a - w
 //
-// because n . (w x x) = (n x w) . x and the second derivative of n . x is at most k, rho being the greatest distance of
-// a point of the solid from the axis through its centre (B. Mirtich, "Timewarp rigid body simulation" (2000), bounds
-// the first derivative alone: steps of first order, where these are of second). The bound is concave in s, so that each
-// chord under it is one, too: regula falsi climbs it from the safe side. A second bound, for solids that spin fast,
-// holds for all angles at once: the support of what the solid sweeps in a whole turn.
+// whose third derivative is at most |r| (|w| + |w_a|)^2 |x| (of w = 0: |n x w_a| |w_a|^2 rho, rho the distance from the axis
+// through the centre). The greatest over all x is the support of the solid in a direction that moves with s (B. Mirtich,
+// "Timewarp rigid body simulation" (2000), bounds the first derivative alone: steps of first order, where these are of
+// third). Curvature that leads away from the plane counts as none: then the bound of the gap is concave in s, each chord
+// under it is a bound, too, and regula falsi climbs it from the safe side. A last bound, for solids that spin fast, holds
+// for all angles at once: the support of what the solid sweeps in a whole turn.
 //
 // Steps repeat until the gap is at most the target (an impact), a bound reaches the end of the interval (none), or
 // kMostSteps are spent: then the answer is an impact at the time that was reached, its depth showing that the gap is
-// still wider. That takes a spin of many turns in grazing contact; a whole turn costs some thousand steps then. It also
-// ends so where features lie so nearly flush that rounding hides the plane between them: one vertex or edge against
-// another in ten thousand, at gaps up to 1e-7 of the coordinates.
+// still wider. That takes a spin of many turns in grazing contact. It also ends so where an edge lies so nearly flush with
+// another that rounding hides the plane between them, one vertex or edge against another in ten thousand, at gaps up to 1e-7
+// of the coordinates; of flat faces, their own planes part them.
 //
 // Lengths in m, world axes. The answer depends on the arguments alone.
 #pragma once

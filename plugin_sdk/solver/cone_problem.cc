@@ -322,7 +322,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       return residual;
     };
     ConePath guesses = path();
-    Eigen::VectorXd swept = lambda;
+    Eigen::VectorXd swept = lambda, start = lambda;
     int without = 0;
     double attempt = best;
     std::uint32_t done = 0, guess = 0;
@@ -336,6 +336,9 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       } else if (without < kPatience && newton_step(proximal_after(without), &lambda, &y)) {
         ++done, ++without;
       } else {
+        lambda = start, y = start_others_ + response_ * lambda;
+        done += descend(enough, &lambda, &y);
+        if (keep_better() <= enough) break;
         if (++guess % 3 != 0) {
           done += guesses.next(enough / most, &lambda, &y);
         } else {
@@ -351,7 +354,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       }
       const double residual = keep_better();
       if (residual < 0.5 * attempt) without = 0;
-      attempt = std::min(attempt, residual);
+      if (residual < attempt) attempt = residual, start = lambda;
       if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
     // one step more costs little and ends at rounding

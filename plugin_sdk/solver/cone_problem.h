@@ -20,15 +20,16 @@
 //                   equations are linear but for the direction of a slide, so that steps end at the solution itself once
 //                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-6 to 1e-10
 //                   added to the diagonal of the step's matrix, not of the equation: the answer is one of those that are
-//                   right. Where seven steps do not halve the residual, they start anew: from the guesses of cone_path.h,
-//                   and every third time from sweeps.
+//                   right. Where seven steps do not halve the residual, some follow from the best place that are kept only
+//                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
+//                   anew, from the guesses of cone_path.h, and every third time from sweeps.
 //     kGaussSeidel  projected block Gauss-Seidel, each contact solved exactly (coulomb_contact.h).
 //  3. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
 //     with mu_d.
 //
 // Measured: heaps of two to five bodies with four contacts a face that slide and turn, at ratios of mass of 1e-3, 1, 1e2 and
-// 1e4, are all solved (400 of each), with rolling and spinning friction, too; at 1e6 399 of 400, the other to what rounding
-// leaves of the loads.
+// 1e4, are all solved (400 of each), with rolling and spinning friction at ratios up to 1e4 1599 of 1600; at 1e6 398 of 400,
+// the others to what rounding leaves of the loads.
 //
 // Scaled: every row by the root of its W_ii, a contact's three by one number, so that cones stay cones. More than kDenseRows
 // other rows: sweeps on all rows, the held ones factorised in between; the answer says if that did not do.
@@ -127,6 +128,7 @@ class ConeProblem {
   double largest_sum(const Eigen::VectorXd& lambda) const;
   bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y);
   bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
+  std::uint32_t descend(double enough, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void solve_sliding();
   void solve_sticking();
   ConePath path() const;

@@ -199,6 +199,28 @@ bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::V
   return true;
 }
 
+// Steps that are kept only where they shorten the residual; the diagonal grows where they do not.
+std::uint32_t ConeProblem::descend(double enough, Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
+  constexpr std::uint32_t kSteps = 12;
+  constexpr int kRejections = 3;
+  double residual = residual_of(*lambda, *y), proximal = 1e-3;
+  int rejected = 0;
+  std::uint32_t steps = 0;
+  while (steps < kSteps && rejected < kRejections && residual > enough) {
+    Eigen::VectorXd next = *lambda, next_y = *y;
+    if (!newton_step(proximal, &next, &next_y)) break;
+    ++steps;
+    const double after = residual_of(next, next_y);
+    if (after < 0.9 * residual) {
+      residual = after, *lambda = next, *y = next_y;
+      proximal *= 0.1, rejected = 0;
+    } else {
+      proximal *= 10.0, ++rejected;
+    }
+  }
+  return steps;
+}
+
 void ConeProblem::solve_sliding() {
   const auto size = static_cast<Eigen::Index>(coupled_.size());
   core_.resize(size, size);

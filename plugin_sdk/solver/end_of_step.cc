@@ -32,10 +32,11 @@ class IslandSolver {
     bodies_ = all.subset(rows_);
   }
 
-  ConeSummary solve() {
+  ConeSummary solve(Host& host) {
     load();
     const double share = request_.theta() * request_.time_step();
     guess_offset(share);
+    int failures = 0;
     for (int round = 0; round < kRounds; ++round) {
       const BodyMotion before = displacement_;
       solve_pose();
@@ -44,8 +45,12 @@ class IslandSolver {
       has_settled_ = round > 0 && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
       if (has_settled_) break;
       solve_velocity();
+      host.mark_progress();
       has_settled_ = !set_offset(share);
       if (has_settled_) break;
+      // what two rounds cannot solve the others could not either
+      failures = has_velocity_ ? 0 : failures + 1;
+      if (failures == 2) break;
     }
     // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
     summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
@@ -569,7 +574,7 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSetti
   host.parallel_for_each(islands.size(), [&](std::uint64_t i) {
     // its matrices are large; memory is all that stays of them
     thread_local ConeProblem cone;
-    summaries[i] = IslandSolver(request, bodies, islands[i], settings, &cone, &answer).solve();
+    summaries[i] = IslandSolver(request, bodies, islands[i], settings, &cone, &answer).solve(host);
     host.mark_progress();
   });
   SolverOutcome outcome;

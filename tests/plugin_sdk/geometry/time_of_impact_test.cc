@@ -209,6 +209,21 @@ TEST(TimeOfImpact, IsNoneForWhatDoesNotMoveAndWhatMovesAsOne) {
   EXPECT_FALSE(impact_of(Body(ground(), at(0, 0, 0), by(0, 0, 0)), Body(ground(), at(0, 0, 0), by(0, -9, 0))));
 }
 
+// A cube 2 nm above another that turns, carried along: in its frame the way goes straight on where the turn goes round,
+// so the gap is 2 nm + phi sin(phi) + cos(phi) - 1. Planes that do not turn come nearer by 2 nm in a 1e-8th of the way.
+TEST(TimeOfImpact, IsNoneForWhatIsCarriedByABodyThatTurns) {
+  for (const double turn : {1e-3, 0.3, 1.0}) {
+    const Vector3 rotation(0, 0, turn);
+    const Body carrier(box(0.5, 0.5, 0.5), at(0, 0, 0), by(0, 0, 0, rotation));
+    const Body load(box(0.5, 0.5, 0.5), at(0, 1.0 + 2e-9, 0), {rotation.cross(Vector3(0, 1.0 + 2e-9, 0)), rotation});
+    EXPECT_FALSE(impact_of(carrier, load, 1e-9)) << turn;
+    EXPECT_FALSE(impact_of(load, carrier, 1e-9)) << turn;
+    // and on a ground that turns
+    const Body plate(ground(), at(0, 0.5, 0), by(-0.5 * turn, 0, 0, rotation));
+    EXPECT_FALSE(impact_of(plate, load, 1e-9)) << turn;
+  }
+}
+
 TEST(TimeOfImpact, OfAPartOfTheInterval) {
   const Body a(ball(0.5), at(0, 0, 0), by(0, 0, 0)), b(ball(0.5), at(3, 0, 0), by(-4, 0, 0));
   EXPECT_FALSE(first_impact(a.solid, b.solid, kTarget, {0.0, 0.49}));
