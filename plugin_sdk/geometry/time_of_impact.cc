@@ -144,46 +144,56 @@ class ConvexApproach {
     return {t, normal_, start_ + t * motion_ + a_.p() + a_.axes() * middle, least_.depth};
   }
 
-  double step(double half_target, double rest) {
-    double step = step_from_plane(half_target, rest);
-    if (step > 0.0) return step;
-    // of faces that lie flush at a small gap the plane of the nearest points is tilted by rounding, those of the faces not
-    constexpr double kFlush = 1e-6;
-    const auto try_face = [&](const TurningCore& core, double side) {
-      Contour face;
-      core.map().contour(core.axes().transpose() * (side * normal_), kFlush, &face);
-      if (step > 0.0 || !face.is_face()) return;
-      normal_ = core.axes() * (side * face.normal);
-      step = step_from_plane(half_target, rest);
+  double step(double half_target, double rest) const {
+    double step = step_of(normal_, half_target, rest);
+    if (step >= rest) return rest;
+    const auto try_plane = [&](const Vector3& normal, const Vector3& turn) {
+      if (step < rest) step = std::max(step, step_along(normal, turn, half_target, rest));
     };
-    try_face(a_, 1.0);
-    try_face(b_, -1.0);
+    // rounding tilts the plane of points that lie close; those of the features it belongs to are exact
+    Contour on_a, on_b;
+    a_.map().contour(a_.axes().transpose() * normal_, kFlush, &on_a);
+    b_.map().contour(b_.axes().transpose() * -normal_, kFlush, &on_b);
+    if (on_a.is_face()) try_plane(a_.axes() * on_a.normal, a_.spin());
+    if (on_b.is_face()) try_plane(b_.axes() * -on_b.normal, b_.spin());
+    if (on_a.count != 2 || on_b.count != 2) return step;
+    // the plane of two edges turns with neither: its normal n stays across both
+    const Vector3 edge_a = (a_.axes() * (on_a.points[1] - on_a.points[0])).normalized();
+    const Vector3 edge_b = (b_.axes() * (on_b.points[1] - on_b.points[0])).normalized();
+    const Vector3 across = edge_a.cross(edge_b);
+    const double square = across.squaredNorm();
+    if (!(square > kFlush)) return step;
+    const Vector3 n = across / std::copysign(std::sqrt(square), across.dot(normal_));
+    // n' = p edge_a + q edge_b with n' . edge = -n . (w x edge) for both
+    const double at_a = -n.dot(a_.spin().cross(edge_a)), at_b = -n.dot(b_.spin().cross(edge_b));
+    const double cosine = edge_a.dot(edge_b);
+    try_plane(n, n.cross((at_a - cosine * at_b) / square * edge_a + (at_b - cosine * at_a) / square * edge_b));
     return step;
   }
 
  private:
-  double step_from_plane(double half_target, double rest) const {
-    // it stays as it is, or turns along with either solid
-    double step = step_along(Vector3::Zero(), half_target, rest);
+  // Of features that meet a plane.
+  static constexpr double kFlush = 1e-6;
+
+  // How far a plane surely parts them that stays as it is, or turns along with either solid.
+  double step_of(const Vector3& normal, double half_target, double rest) const {
+    double step = step_along(normal, Vector3::Zero(), half_target, rest);
     for (const TurningCore* core : {&a_, &b_})
       if (step > 0.0 && step < rest && !core->spin().isZero(0.0))
-        step = std::max(step, step_along(core->spin(), half_target, rest));
-    const double swept = parted_at_any_angle() - half_target;
+        step = std::max(step, step_along(normal, core->spin(), half_target, rest));
+    const double swept =
+        normal.dot(centres_) - a_.swept_support(normal) - b_.swept_support(-normal) - rounding_ - half_target;
     if (step < rest && swept > 0.0) {
-      const double closing = -normal_.dot(velocity_);
+      const double closing = -normal.dot(velocity_);
       step = std::max(step, closing * rest <= swept ? rest : swept / closing);
     }
     return step;
   }
 
-  // How far the plane parts the solids, whatever their angles.
-  double parted_at_any_angle() const {
-    return normal_.dot(centres_) - a_.swept_support(normal_) - b_.swept_support(-normal_) - rounding_;
-  }
-  // How far the plane surely parts them when it turns along with w.
-  double step_along(const Vector3& w, double half_target, double rest) const {
-    const Drift drift(normal_, centres_, velocity_, w, rest);
-    const TurningCore::Swing of_a = a_.swing(normal_, w), of_b = b_.swing(-normal_, w);
+  // The same of one that turns along with w.
+  double step_along(const Vector3& normal, const Vector3& w, double half_target, double rest) const {
+    const Drift drift(normal, centres_, velocity_, w, rest);
+    const TurningCore::Swing of_a = a_.swing(normal, w), of_b = b_.swing(-normal, w);
     const auto bound = [&](double s) {
       return drift(s) - a_.support(of_a, s) - b_.support(of_b, s) - rounding_ - half_target;
     };

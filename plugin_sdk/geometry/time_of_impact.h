@@ -3,8 +3,9 @@
 // Conservative advancement. At the time t the nearest points give a plane that parts the solids, with normal n (from a
 // to b) and gap d. As long as a plane parts them by more than half the target they cannot touch. Planes that turn at the
 // angular velocity w are tried for w = 0, w_a and w_b, so that a solid which another carries along does not seem to come
-// nearer. With c(s) = c + s v the offset of the centres, w_a the angular velocity of a and x a point of it, in axes that turn
-// along with the plane,
+// nearer; then those of faces that lie along them, with exact normals, and that of two edges, which stays across both. With
+// c(s) = c + s v the offset of the centres, w_a the angular velocity of a and x a point of it, in axes that turn along with
+// the plane,
 //
 //   n . x(s) = n . x + s (n x r) . x + s^2/2 ((n x r) x w_a - (n x w) x r) . x + ...,   r = w_a - w
 //
@@ -17,9 +18,9 @@
 //
 // Steps repeat until the gap is at most the target (an impact), a bound reaches the end of the interval (none), or
 // kMostSteps are spent: then the answer is an impact at the time that was reached, its depth showing that the gap is
-// still wider. That takes a spin of many turns in grazing contact. It also ends so where an edge lies so nearly flush with
-// another that rounding hides the plane between them, one vertex or edge against another in ten thousand, at gaps up to 1e-7
-// of the coordinates; of flat faces, their own planes part them.
+// still wider. That takes a spin of many turns in grazing contact. It also ends so where features lie so nearly flush that
+// rounding hides the plane between them: one vertex or edge against another in ten thousand, at gaps up to 1e-7 of the
+// coordinates.
 //
 // Lengths in m, world axes. The answer depends on the arguments alone.
 #pragma once

@@ -25,6 +25,7 @@ METHODS = {
     "Substepping 10, Verlet, Newton": ["Simulator=Substepping", "Simulator.Substeps=10", "Integrator=Verlet", "Solver=Newton"],
     "Bisection, Verlet, Newton": ["Simulator=Bisection", "Integrator=Verlet", "Solver=Newton"],
     "Continuous, Verlet, Newton": ["Simulator=Continuous", "Integrator=Verlet", "Solver=Newton"],
+    "Continuous to 1e-9, Verlet, Newton": ["Simulator=Continuous", "Simulator.Accuracy=1e-9", "Integrator=Verlet", "Solver=Newton"],
 }
 SAMPLE = 0.125  # s, of trajectories
 FAILED = 1.0

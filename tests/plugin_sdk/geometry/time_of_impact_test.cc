@@ -224,6 +224,23 @@ TEST(TimeOfImpact, IsNoneForWhatIsCarriedByABodyThatTurns) {
   }
 }
 
+// Two cubes on edges that cross 2 nm apart, each rocking about the place where they do: their centres go straight on, so the
+// edges part by the square of the turn. Their plane turns with neither.
+TEST(TimeOfImpact, IsNoneForEdgesThatRockOnEachOther) {
+  const double high = std::sqrt(0.5);
+  const auto on_edge = [](const Vector3& axis) { return exp_rotation(0.25 * M_PI * axis); };
+  for (const double turn : {1e-3, 0.1, 0.3}) {
+    const Vector3 rocks_a(0, 0, -turn), rocks_b(turn, 0, 0);
+    const Body below(box(0.5, 0.5, 0.5), {Vector3(0, -high, 0), on_edge(Vector3::UnitX())},
+                     {Vector3(0, high, 0).cross(rocks_a), rocks_a});
+    const Body above(box(0.5, 0.5, 0.5), {Vector3(0, high + 2e-9, 0), on_edge(Vector3::UnitZ())},
+                     {Vector3(0, -high, 0).cross(rocks_b), rocks_b});
+    for (const double time : {0.0, 0.01, 0.1, 0.5, 1.0}) EXPECT_GT(gap_at(below, above, time), 1.9e-9) << turn;
+    EXPECT_FALSE(impact_of(below, above, 1e-9)) << turn;
+    EXPECT_FALSE(impact_of(above, below, 1e-9)) << turn;
+  }
+}
+
 TEST(TimeOfImpact, OfAPartOfTheInterval) {
   const Body a(ball(0.5), at(0, 0, 0), by(0, 0, 0)), b(ball(0.5), at(3, 0, 0), by(-4, 0, 0));
   EXPECT_FALSE(first_impact(a.solid, b.solid, kTarget, {0.0, 0.49}));
