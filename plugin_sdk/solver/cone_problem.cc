@@ -307,8 +307,9 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
   // Newton steps without a residual half as large before the next guess
   constexpr int kPatience = 7;
-  // much holds the multipliers of rows that depend on each other where they are, little lets those that nearly do settle
-  const auto proximal_after = [](int without) { return without < 2 ? 1e-6 : without < 5 ? 1e-8 : 1e-10; };
+  // much holds the multipliers of rows that depend on each other where they are (1e-6: directions of friction, too, which a
+  // slip that ends needs to 1e-9), little lets those that nearly do settle
+  const auto proximal_after = [&](int without) { return without < 2 ? settings.proximal : without < 5 ? 1e-8 : 1e-10; };
   const bool is_newton = settings.method == ConeMethod::kNewton;
   double most = 0.0;
   for (const std::uint32_t r : other_) most = std::max(most, scale_[r] * rows[r].length);

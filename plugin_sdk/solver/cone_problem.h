@@ -18,7 +18,7 @@
 //  2. The others, dense:
 //     kNewton       semi-smooth Newton on the equation above. A row is held, free, or slides; with the states known the
 //                   equations are linear but for the direction of a slide, so that steps end at the solution itself once
-//                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-6 to 1e-10
+//                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-7 to 1e-10
 //                   added to the diagonal of the step's matrix, not of the equation: the answer is one of those that are
 //                   right. Where seven steps do not halve the residual, some follow from the best place that are kept only
 //                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
@@ -28,7 +28,7 @@
 //     with mu_d.
 //
 // Measured: heaps of two to five bodies with four contacts a face that slide and turn, at ratios of mass of 1e-3, 1, 1e2 and
-// 1e4, are all solved (400 of each), with rolling and spinning friction at ratios up to 1e4 1599 of 1600; at 1e6 398 of 400,
+// 1e4, are all solved (400 of each), with rolling and spinning friction at ratios up to 1e4 1599 of 1600; at 1e6 395 of 400,
 // the others to what rounding leaves of the loads.
 //
 // Scaled: every row by the root of its W_ii, a contact's three by one number, so that cones stay cones. More than kDenseRows
@@ -74,6 +74,7 @@ struct ConeSettings {
   ConeMethod method = ConeMethod::kNewton;
   double tolerance = 1e-12;  // of the largest velocity (length) that meets in a row
   std::uint32_t iterations = 500;
+  double proximal = 1e-7;  // added to the diagonal of the first steps
 };
 
 struct ConeSummary {

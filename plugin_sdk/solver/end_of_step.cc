@@ -39,6 +39,8 @@ class IslandSolver {
     int failures = 0;
     for (int round = 0; round < kRounds; ++round) {
       const BodyMotion before = displacement_;
+      // impulses that wander from round to round are held more
+      if (round == kPatience) settings_.proximal *= 10.0;
       solve_pose();
       const bool closes = find_closed();
       // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
@@ -59,7 +61,7 @@ class IslandSolver {
   }
 
  private:
-  static constexpr int kRounds = 12;
+  static constexpr int kRounds = 12, kPatience = 4;
   static constexpr int kPoseSteps = 30;
 
   // ---- what does not change within the step
@@ -542,7 +544,7 @@ class IslandSolver {
 
   const stage::SolverSolveRequest& request_;
   const Island& island_;
-  const ConeSettings& settings_;
+  ConeSettings settings_;
   SolverSolution& answer_;
   ConeProblem& cone_;
 

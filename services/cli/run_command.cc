@@ -38,23 +38,25 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
-// The command that goes on from a checkpoint: the scene and how far, not the files it wrote.
-std::string resume_command(const RunOptions& options, const std::string& checkpoint) {
+// The command that goes on from a checkpoint: the scene, how far, and where plugins live, not the files it wrote.
+std::string resume_command(const RunLine& line, const std::string& checkpoint) {
+  const RunOptions& options = line.options;
   std::string command = "gravitas run";
   for (const std::string& scene : options.scenes) command += " " + quoted(scene);
   if (options.duration) command += fmt::format(" --duration {}", *options.duration);
   if (options.steps) command += fmt::format(" --steps {}", *options.steps);
   if (options.time_step) command += fmt::format(" --dt {}", *options.time_step);
   for (const std::string& one : options.overrides) command += " --set " + quoted(one);
+  for (const std::string& word : line.scene.hosting_words()) command += " " + quoted(word);
   // those that were made are known there
   for (const std::string& one : options.edits) command += " --edit " + quoted(one);
   return command + " --resume " + quoted(checkpoint);
 }
 
-void print_checkpoint(const RunOptions& options, const RunResult& result) {
+void print_checkpoint(const RunLine& line, const RunResult& result) {
   if (result.checkpoint.empty()) return;
   std::cerr << fmt::format("gravitas: checkpoint '{}' holds step {}; to go on: {}\n", result.checkpoint,
-                           result.checkpoint_step, resume_command(options, result.checkpoint));
+                           result.checkpoint_step, resume_command(line, result.checkpoint));
 }
 
 void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warnings) {
@@ -84,18 +86,18 @@ int run_scene(RunLine* line) {
       return kDone;
     case RunOutcome::kPaused:
       std::cerr << "gravitas: " << result.fault << "\n";
-      print_checkpoint(line->options, result);
+      print_checkpoint(*line, result);
       return kPaused;
     case RunOutcome::kInterrupted:
       std::cerr << fmt::format("gravitas: interrupted after step {}; what was computed is kept\n",
                                result.report.steps());
-      print_checkpoint(line->options, result);
+      print_checkpoint(*line, result);
       return kInterrupted;
     case RunOutcome::kFailed:
       break;
   }
   std::cerr << fmt::format("gravitas: stopped after step {}: {}\n", result.report.steps(), result.fault);
-  print_checkpoint(line->options, result);
+  print_checkpoint(*line, result);
   return kOurFault;
 }
 

@@ -87,4 +87,12 @@ void SceneOptions::apply() const {
   kernel::set_worker_sandbox(!no_sandbox_);
 }
 
+std::vector<std::string> SceneOptions::hosting_words() const {
+  std::vector<std::string> words;
+  for (const std::string& one : hosting_) words.insert(words.end(), {"--hosting", one});
+  if (run_->threads != RunOptions{}.threads) words.insert(words.end(), {"--threads", std::to_string(run_->threads)});
+  if (no_sandbox_) words.emplace_back("--no-sandbox");
+  return words;
+}
+
 }  // namespace gravitas::cli

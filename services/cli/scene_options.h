@@ -18,6 +18,8 @@ class SceneOptions {
   void add_to(CLI::App* command);
   // What stands for itself is in the RunOptions already; this does the rest. Throws BadInput, naming what is allowed.
   void apply() const;
+  // What of the line says where plugins live, but for workers that were attached.
+  std::vector<std::string> hosting_words() const;
 
  private:
   RunOptions* run_;
