@@ -44,14 +44,15 @@ class IslandSolver {
       solve_pose();
       const bool closes = find_closed();
       // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
-      has_settled_ = round > 0 && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
+      has_settled_ =
+          round > 0 && has_velocity_ && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
       if (has_settled_) break;
       solve_velocity();
       host.mark_progress();
       has_settled_ = !set_offset(share);
       if (has_settled_) break;
-      // what two rounds cannot solve the others could not either
-      failures = has_velocity_ ? 0 : failures + 1;
+      // what two rounds cannot solve the others could not either; sweeps go on from round to round
+      failures = has_velocity_ || settings_.method == ConeMethod::kGaussSeidel ? 0 : failures + 1;
       if (failures == 2) break;
     }
     // where they do not settle, the pose change stays that of the impulses before: it must not move rows away

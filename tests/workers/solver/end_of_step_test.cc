@@ -162,6 +162,21 @@ TEST(EndOfStep, SweepsEndAtASolutionToo) {
   EXPECT_GE(converged, seeds / 4 * 3);
 }
 
+// Where friction moves the pose, sweeps that ran out go on in the next round: all rounds are used before Direct gives up.
+TEST(EndOfStep, SweepsGoOnFromRoundToRound) {
+  constexpr std::uint32_t kSweeps = 20;
+  int unfinished = 0;
+  for (int seed = 1; seed <= 20; ++seed) {
+    Heap heap = random_heap(seed);
+    heap.problem.theta = 0.5;
+    const SolverAnswer answer = heap.problem.solve(direct(kSweeps));
+    if (answer.converged()) continue;
+    ++unfinished;
+    EXPECT_GE(answer.iterations[0], 12 * kSweeps) << seed;
+  }
+  EXPECT_GT(unfinished, 0);
+}
+
 TEST(EndOfStep, EnergyNeverRises) {
   for (const double restitution : {0.0, 0.5, 1.0}) {
     for (int seed = 1; seed <= harness::unless_sanitized(100); ++seed) {
