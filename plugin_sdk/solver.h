@@ -10,7 +10,7 @@ enum class StopReason : std::uint32_t {
   kNothingToDo = 0,   // no rows
   kConverged = 1,     // the last sweep changed no velocity by more than rounding's size
   kIterations = 2,    // the allowed number of sweeps or steps was used up
-  kContradiction = 3  // joints contradict each other: a compromise, by least squares if the solver factorises
+  kContradiction = 3  // converged, but joints contradict each other: a least-squares compromise
 };
 
 constexpr const char* stop_reason_name(StopReason reason) {

@@ -85,23 +85,6 @@ TEST(SequentialRequest, RunningOutOfSweepsIsSaid) {
   EXPECT_GT(answer.residual[0], 0.0);
 }
 
-// A chain of hinges, each held at two points (6 rows for 5), that has swung by a turn: slow, not a contradiction.
-TEST(SequentialRequest, ASlowChainIsNoContradiction) {
-  SolverProblem problem;
-  for (int link = 0; link < 10; ++link)
-    problem.add_body({.pose = {Vector3(0, -0.5 - link, 0), Quaternion::Identity()},
-                      .linear = {3.0 + 2.0 * link, 0, 0.1 * link},
-                      .angular = {0.3, 0.2, 4}});
-  problem.make_trial({0, -9.81, 0});
-  for (std::uint32_t link = 0; link < 10; ++link) {
-    const std::uint32_t above = link == 0 ? kNone : link - 1;
-    for (const double z : {-0.2, 0.2})
-      problem.add_discrepancy(above, link, problem.joint_at(above, link, Vector3(0, -1.0 * link, z)));
-  }
-  const SolverAnswer answer = problem.solve(SequentialSolver(SequentialSettings{3, 1.0}));
-  EXPECT_EQ(answer.stop_reason[0], static_cast<std::uint32_t>(StopReason::kIterations));
-}
-
 TEST(SequentialRequest, AnAnswerWithoutRoomIsCountedAndNotWritten) {
   // the first answer tells how much room it takes; the view itself keeps from writing
   struct Cramped {

@@ -64,7 +64,7 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   const bool has_rows =
       !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
   summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
-  if (used_up_) summary_.stop_reason = joints_contradict() ? StopReason::kContradiction : StopReason::kIterations;
+  if (used_up_) summary_.stop_reason = StopReason::kIterations;
   pose_joints_.store(solution_.joint_correction);
   gaps_.store(solution_.contact_correction);
   return summary_;
@@ -103,24 +103,6 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   offset_.assign(bodies_.count() + 1, Twist{});
   closed_.assign(request.contact_key().size(), 0);
   velocity_laws_.assign(pose_laws_.size(), JointLaw{});
-}
-
-// Whether no motion closes all joints: least squares leave a good part of the largest error.
-bool SequentialSolver::joints_contradict() {
-  // redundant rows are off by the square of a turn
-  constexpr double kGoodPart = 0.1;
-  held_.rows.clear();
-  for (std::size_t i = 0; i < pose_laws_.size(); ++i) {
-    if (!pose_laws_[i].is_rigid()) continue;
-    const RelaxationDiscrepancy& d = discrepancies_[i / 3];
-    ConeRow& row = held_.rows.emplace_back();
-    row.body1 = d.body1, row.body2 = d.body2;
-    row.direction = d.directions[i % 3];
-    row.length = d.length;
-    row.law = pose_laws_[i];
-  }
-  const double largest = pose_joints_.largest_violation(offset_);
-  return held_.solve(bodies_, offset_, 0.25 * kEpsilon * coordinates_, {}).contradiction > kGoodPart * largest;
 }
 
 // ---- pose change

@@ -60,15 +60,12 @@
 // the warm start has caught up. Much friction at long arms (Painlevé; mu > 4/3 at a slender rod, less where
 // several contacts drive each other) may have no solution or several, and then the sweeps run round
 // in circles. `stop_reason` and `residual` say so; a small residual in a slow case is a small
-// change, not a small error. Newton and Direct exist for these scenes. Joints that contradict each
-// other are told from slow ones by their least squares; the answer is what the last of them says,
-// or with Order = "Simultaneous" their compromise.
+// change, not a small error. Newton and Direct exist for these scenes.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "plugin_sdk/solver/cone_problem.h"
 #include "plugin_sdk/solver/reply.h"
 #include "workers/solver/sequential/contact_gaps.h"
 #include "workers/solver/sequential/contact_impulses.h"
@@ -119,7 +116,6 @@ class SequentialSolver {
 
  private:
   void load(const stage::SolverSolveRequest& request);
-  bool joints_contradict();
   void solve_pose();
   bool find_closed();
   void build_velocity(const stage::SolverSolveRequest& request);
@@ -142,7 +138,6 @@ class SequentialSolver {
   bool velocity_converged_ = true;
   bool used_up_ = false;  // some relaxation ran out of sweeps
   double time_step_ = 0.0;
-  ConeProblem held_;  // joints that hold always, where sweeps ran out
   double coordinates_ = 0.0;
 
   SolverBodies bodies_;
