@@ -40,7 +40,7 @@ class IslandSolver {
     for (int round = 0; round < kRounds; ++round) {
       const BodyMotion before = displacement_;
       // impulses that wander from round to round are held more
-      if (round == kPatience) settings_.proximal *= 10.0;
+      if (round == kFreeRounds) settings_.proximal *= 10.0;
       solve_pose();
       const bool closes = find_closed();
       // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
@@ -56,13 +56,14 @@ class IslandSolver {
       if (failures == 2) break;
     }
     // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
+    summary_.contradiction = std::max(summary_.contradiction, pose_contradiction_);
     summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
     store();
     return summary_;
   }
 
  private:
-  static constexpr int kRounds = 12, kPatience = 4;
+  static constexpr int kRounds = 12, kFreeRounds = 4;
   static constexpr int kPoseSteps = 30;
 
   // ---- what does not change within the step
@@ -263,8 +264,10 @@ class IslandSolver {
       const double representable = 0.25 * kEpsilon * coordinates_;
       const BodyMotion x0 = start_of_step();
       const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_);
-      note(solved);
+      summary_.iterations += solved.iterations;
       has_pose_ = solved.has_converged;
+      // where the steps end: before, redundant rows are off by the square of a turn
+      pose_contradiction_ = solved.contradiction;
       BodyMotion next = x0;
       cone_.push(bodies_, &next);
       const double change = largest_change(next, displacement_), size = largest(next);
@@ -353,14 +356,15 @@ class IslandSolver {
     if (may_turn() && !is_turned()) {
       build_velocity(false);
       const ConeSummary without = cone_.solve(bodies_, trial, 0.0, settings_);
-      note(without);
+      summary_.iterations += without.iterations;
       if (without.has_converged) keep_impulses();
     }
     for (int round = 0;; ++round) {
       build_velocity(true);
       const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_);
-      note(solved);
+      summary_.iterations += solved.iterations;
       has_velocity_ = solved.has_converged;
+      summary_.contradiction = solved.contradiction;
       summary_.residual = solved.residual;
       velocity_ = trial;
       cone_.push(bodies_, &velocity_);
@@ -531,11 +535,6 @@ class IslandSolver {
     return largest_change(a, b) > std::max({known, kEpsilon * coordinates_, 1e-14 * size});
   }
 
-  void note(const ConeSummary& solved) {
-    summary_.iterations += solved.iterations;
-    summary_.contradiction = std::max(summary_.contradiction, solved.contradiction);
-  }
-
   void store() {
     for (const std::uint32_t i : pushed_) {
       answer_.velocity[rows_[i]] = velocity_[i];
@@ -558,6 +557,7 @@ class IslandSolver {
   double coordinates_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   ConeSummary summary_;
+  double pose_contradiction_ = 0.0;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
 };
 
