@@ -30,7 +30,8 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
   null_.clear();
 }
 
-void ProfileLdlt::factorise() {
+void ProfileLdlt::factorise(double least) {
+  least_pivot_ = 1.0;
   for (std::size_t i = 0; i < size(); ++i) {
     double* row = &values_[begin_[i]];
     const std::size_t from = first_[i];
@@ -49,23 +50,13 @@ void ProfileLdlt::factorise() {
       row[j - from] = scaled / pivot_[j];
       pivot -= scaled * row[j - from];
     }
-    if (pivot > kDoubtful * diagonal || (pivot > kDependent * diagonal && pivot > rounding_of_pivot(i))) {
+    if (pivot > std::max(least, kDependent) * diagonal &&
+        (pivot > kDoubtful * diagonal || pivot > rounding_of_pivot(i))) {
       pivot_[i] = pivot;
+      least_pivot_ = std::min(least_pivot_, pivot / diagonal);
     } else {
       dropped_.push_back(i);
     }
-  }
-  for (const std::size_t row : dropped_) {
-    std::vector<double> z = difference(row);  // A z = 0
-    for (int repeat = 0; repeat < 2; ++repeat) {
-      for (const std::vector<double>& other : null_) {
-        const double share = dot(other, z);
-        for (std::size_t i = 0; i < z.size(); ++i) z[i] -= share * other[i];
-      }
-    }
-    const double length = std::sqrt(dot(z, z));
-    for (double& number : z) number /= length;
-    null_.push_back(std::move(z));
   }
 }
 
@@ -110,7 +101,23 @@ void ProfileLdlt::solve(std::vector<double>* b) const {
   for (const std::size_t row : dropped_) x[row] = 0.0;
 }
 
+void ProfileLdlt::find_null_space() const {
+  for (const std::size_t row : dropped_) {
+    std::vector<double> z = difference(row);  // A z = 0
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      for (const std::vector<double>& other : null_) {
+        const double share = dot(other, z);
+        for (std::size_t i = 0; i < z.size(); ++i) z[i] -= share * other[i];
+      }
+    }
+    const double length = std::sqrt(dot(z, z));
+    for (double& number : z) number /= length;
+    null_.push_back(std::move(z));
+  }
+}
+
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {
+  if (null_.empty()) find_null_space();
   double square = 0.0;
   for (const std::vector<double>& z : null_) {
     const double share = dot(z, *b);

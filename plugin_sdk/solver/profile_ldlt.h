@@ -22,9 +22,12 @@ class ProfileLdlt {
   // Entry of the lower triangle, within the profile.
   double& entry(std::size_t row, std::size_t column) { return values_[begin_[row] + column - first_[row]]; }
 
-  void factorise();
+  // Rows whose pivot is at most `least` of their diagonal are left out, too.
+  void factorise(double least = 0.0);
 
   std::size_t size() const { return first_.size(); }
+  // Smallest pivot of a row that is not left out, as a share of its diagonal; 1 if there is none.
+  double least_pivot() const { return least_pivot_; }
   std::size_t dropped() const { return dropped_.size(); }
   // x with A x = b; entries of dropped rows are 0 and not looked at.
   void solve(std::vector<double>* b) const;
@@ -35,13 +38,15 @@ class ProfileLdlt {
   // 1 at the row, and minus its combination of the rows before.
   std::vector<double> difference(std::size_t row) const;
   double rounding_of_pivot(std::size_t row) const;
+  void find_null_space() const;
   // L^-T applied in place.
   void solve_transposed(std::vector<double>* x) const;
 
   std::vector<std::size_t> first_, begin_;
   std::vector<double> values_, pivot_;  // 0: dropped
+  double least_pivot_ = 1.0;
   std::vector<std::size_t> dropped_;
-  std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range
+  mutable std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range; found when asked for
 };
 
 }  // namespace gravitas

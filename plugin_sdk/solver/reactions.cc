@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plugin_sdk/discrepancy.h"
@@ -19,7 +20,7 @@ namespace {
 struct Body {
   double inverse_mass = 0.0;
   Matrix3 inverse_inertia = Matrix3::Zero();
-  Vector3 position = Vector3::Zero();
+  Pose asked, pose;  // as the question has it, and where the joints agree
   Twist velocity, acceleration;
 
   bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
@@ -27,12 +28,22 @@ struct Body {
   Vector3 centripetal(const Vector3& arm) const { return velocity.angular.cross(velocity.angular.cross(arm)); }
 };
 
+struct Joint {
+  std::size_t place;  // of its first axis among the multipliers
+  std::uint32_t body1, body2;
+  Discrepancy discrepancy;
+};
+
 struct Row {
   std::uint32_t body1, body2;
   std::size_t place;  // among the multipliers
   ConstraintDirection direction;
+  double error;           // m or rad
+  double velocity_error;  // m/s or rad/s
   double gamma;
   double scale;  // root of the diagonal
+
+  double reach;  // m, the longer arm, or a rod's length; of an angular row 0
 };
 
 bool holds_always(const Discrepancy& d, int axis) {
@@ -53,8 +64,11 @@ class ReactionSolver {
  public:
   explicit ReactionSolver(const stage::SolverReactionsRequest& request) : request_(request) {
     load_bodies();
-    load_rows();
-    factorise();
+    load_joints();
+    make_rows();
+    factorise(0.0);
+    if (factor_.least_pivot() < kNearlyDependent) agree_with_joints();
+    accelerate();
   }
 
   // Multipliers by row. Returns what the rows are missed by.
@@ -97,25 +111,44 @@ class ReactionSolver {
   }
 
  private:
+  // Share of a diagonal: rows with such a pivot are nearly dependent.
+  static constexpr double kNearlyDependent = 0.1;
+  // Turns (rad) by which a state is off the joints: that are none, may be rounding, or small enough to go by.
+  static constexpr double kOnJoints = 1e-15, kRounding = 1e-13, kNearEnough = 1e-5;
+  // Of a diagonal: a row with a lesser pivot, at a state that agrees with the joints, says nothing but rounding.
+  static constexpr double kSingular = 1e-10;
+  // What an error leaves of the pivots of dependent rows, in its squares.
+  static constexpr double kMargin = 100.0, kMostMargin = 1e9;
+
   void load_bodies() {
     const std::size_t count = request_.flags().size();
     bodies_.resize(count + 1);
     for (std::size_t i = 0; i < count; ++i) {
       Body& body = bodies_[i];
-      const Quaternion q = quaternion_at(request_.orientation(), i);
-      body.position = vector_at(request_.position(), i);
+      body.asked = body.pose = {vector_at(request_.position(), i), quaternion_at(request_.orientation(), i)};
       body.velocity = {vector_at(request_.linear_velocity(), i), vector_at(request_.angular_velocity(), i)};
-      body.acceleration = {vector_at(request_.acceleration(), 2 * i), vector_at(request_.acceleration(), 2 * i + 1)};
-      const std::uint32_t flags = request_.flags()[i];
-      if ((flags & kMovable) == 0 || (flags & kKinematic) != 0) continue;
-      const Vector3 inverse_moments = vector_at(request_.inverse_inertia(), i);
+      if (!is_free(i)) continue;
       body.inverse_mass = request_.inverse_mass()[i];
-      body.inverse_inertia = world_inverse_inertia(q, inverse_moments);
+      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_.inverse_inertia(), i));
+    }
+  }
+
+  bool is_free(std::size_t body) const {
+    return (request_.flags()[body] & kMovable) != 0 && (request_.flags()[body] & kKinematic) == 0;
+  }
+
+  // What forces, the gyroscopic term and drag make of the bodies.
+  void accelerate() {
+    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+      Body& body = bodies_[i];
+      body.acceleration = {vector_at(request_.acceleration(), 2 * i), vector_at(request_.acceleration(), 2 * i + 1)};
+      if (!is_free(i)) continue;
       const double drag = request_.drag()[i];
       const Vector3 force = vector_at(request_.wrench(), 2 * i), torque = vector_at(request_.wrench(), 2 * i + 1);
       body.acceleration.linear = body.inverse_mass * force - drag * body.velocity.linear;
       body.acceleration.angular =
-          angular_acceleration(q, body.velocity.angular, vector_at(request_.inertia(), i), inverse_moments, torque) -
+          angular_acceleration(body.pose.orientation, body.velocity.angular, vector_at(request_.inertia(), i),
+                               vector_at(request_.inverse_inertia(), i), torque) -
           drag * body.velocity.angular;
     }
   }
@@ -124,54 +157,164 @@ class ReactionSolver {
     return body == kNone ? static_cast<std::uint32_t>(bodies_.size() - 1) : body;
   }
 
-  void load_rows() {
+  void load_joints() {
     const DiscrepancyColumns columns{request_.point1(),     request_.point2(),       request_.velocity(),
                                      request_.correction(), request_.axes(),         request_.mode(),
                                      request_.lower(),      request_.upper(),        request_.compliance(),
                                      request_.damping(),    request_.maximum_force()};
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      const Discrepancy d = columns.at(i);
       const std::uint32_t one = row_of(request_.discrepancy_body()[2 * i]);
       const std::uint32_t two = row_of(request_.discrepancy_body()[2 * i + 1]);
-      if (!bodies_[one].is_pushed() && !bodies_[two].is_pushed()) continue;
+      if (bodies_[one].is_pushed() || bodies_[two].is_pushed()) joints_.push_back({3 * i, one, two, columns.at(i)});
+    }
+  }
+
+  // Rows of all joints with the bodies where they are.
+  void make_rows() {
+    rows_.clear();
+    for (const Joint& joint : joints_) {
+      const Discrepancy d = at_pose(joint);
       const Matrix3 axes = to_rotation_matrix(d.axes);
       for (int axis = 0; axis < 3; ++axis) {
         if (!holds_always(d, axis)) continue;
-        Row row = d.is_radial() && axis == 0 ? radial_row(d, one, two) : axis_row(d, axes.col(axis), one, two);
-        row.place = 3 * i + static_cast<std::size_t>(axis);
-        row.direction = with_turns(row.direction, bodies_[one].inverse_inertia, bodies_[two].inverse_inertia);
-        row.scale =
-            std::sqrt(row.direction.product(row.direction, bodies_[one].inverse_mass + bodies_[two].inverse_mass));
+        Row row = d.is_radial() && axis == 0 ? radial_row(d, joint) : axis_row(d, axes.col(axis), joint);
+        row.place = joint.place + static_cast<std::size_t>(axis);
+        const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+        row.direction = with_turns(row.direction, one.inverse_inertia, two.inverse_inertia);
+        row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
+        row.velocity_error = row.direction.along(one.velocity, two.velocity) - row.direction.linear.dot(d.velocity) -
+                             (d.is_angular() ? axes.col(axis).dot(d.velocity) : 0.0);
+        row.error = axis_mode(d.modes, axis) == AxisMode::kDriven ? 0.0 : row.error - target(d, axis);
         if (row.scale > 0.0) rows_.push_back(row);
       }
     }
   }
 
-  Row axis_row(const Discrepancy& d, const Vector3& axis, std::uint32_t one, std::uint32_t two) const {
-    const Body &first = bodies_[one], &second = bodies_[two];
+  static double target(const Discrepancy& d, int axis) {
+    return axis_mode(d.modes, axis) == AxisMode::kLimited ? d.lower[axis] : 0.0;
+  }
+
+  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error, which is to first order.
+  Discrepancy at_pose(const Joint& joint) const {
+    const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+    Discrepancy d = joint.discrepancy;
+    if (!has_moved_) return d;
+    const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
+    if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
+    d.point2 = d.point1 + error;
+    d.axes = one.pose.orientation * (one.asked.orientation.conjugate() * d.axes);
+    return d;
+  }
+
+  Row axis_row(const Discrepancy& d, const Vector3& axis, const Joint& joint) const {
+    const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
     const Vector3 &w1 = first.velocity.angular, &w2 = second.velocity.angular;
-    if (d.is_angular()) return {one, two, 0, turning_about(axis), w1.cross(axis).dot(w2 - w1), 0.0};
+    Row row{joint.body1, joint.body2, 0, turning_about(axis), axis.dot(d.point2 - d.point1), 0.0, 0.0, 0.0, 0.0};
+    if (d.is_angular()) {
+      row.gamma = w1.cross(axis).dot(w2 - w1);
+      return row;
+    }
     // a drive acts where it is in body 1
     const Vector3 at = holds_pose(d) ? d.point2 : d.point1;
-    const Vector3 arm1 = at - first.position, arm2 = at - second.position;
+    const Vector3 arm1 = at - first.pose.position, arm2 = at - second.pose.position;
     const Vector3 relative = second.velocity_at(arm2) - first.velocity_at(arm1);
-    const Vector3 bend = second.centripetal(arm2) - first.centripetal(arm1) - 2.0 * w1.cross(relative);
-    return {one, two, 0, direction_at(axis, arm1, arm2), axis.dot(bend), 0.0};
+    row.direction = direction_at(axis, arm1, arm2);
+    row.reach = longer_arm(first, arm1, second, arm2);
+    row.gamma = axis.dot(second.centripetal(arm2) - first.centripetal(arm1) - 2.0 * w1.cross(relative));
+    return row;
   }
 
   // Of a rod without length there is no direction: the first axis stands in.
-  Row radial_row(const Discrepancy& d, std::uint32_t one, std::uint32_t two) const {
-    const Body &first = bodies_[one], &second = bodies_[two];
+  Row radial_row(const Discrepancy& d, const Joint& joint) const {
+    const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
     const Vector3 error = d.point2 - d.point1;
     const double length = error.norm();
-    if (!(length > 0.0)) return axis_row(d, to_rotation_matrix(d.axes).col(0), one, two);
+    if (!(length > 0.0)) return axis_row(d, to_rotation_matrix(d.axes).col(0), joint);
     const Vector3 direction = error / length;
-    const Vector3 arm1 = d.point1 - first.position, arm2 = d.point2 - second.position;
+    const Vector3 arm1 = d.point1 - first.pose.position, arm2 = d.point2 - second.pose.position;
     const Vector3 rate = second.velocity_at(arm2) - first.velocity_at(arm1);
     const Vector3 across = rate - direction.dot(rate) * direction;
-    const double gamma =
-        direction.dot(second.centripetal(arm2) - first.centripetal(arm1)) + across.squaredNorm() / length;
-    return {one, two, 0, direction_at(direction, arm1, arm2), gamma, 0.0};
+    Row row{joint.body1, joint.body2, 0, direction_at(direction, arm1, arm2), length, 0.0, 0.0, 0.0, 0.0};
+    row.gamma = direction.dot(second.centripetal(arm2) - first.centripetal(arm1)) + across.squaredNorm() / length;
+    row.reach = std::max(length, longer_arm(first, arm1, second, arm2));
+    return row;
+  }
+
+  static double longer_arm(const Body& one, const Vector3& arm1, const Body& two, const Vector3& arm2) {
+    return std::max(one.is_pushed() ? arm1.norm() : 0.0, two.is_pushed() ? arm2.norm() : 0.0);
+  }
+
+  // Radians by which bodies turn where the largest error is taken out by turning.
+  double largest_turn() const {
+    constexpr double kShortest = 1e-3;  // of the longest reach
+    double longest = 0.0, largest = 0.0;
+    for (const Row& row : rows_) longest = std::max(longest, row.reach);
+    for (const Row& row : rows_) {
+      const double reach = row.direction.linear.isZero(0.0) ? 1.0 : std::max(row.reach, kShortest * longest);
+      if (reach > 0.0) largest = std::max(largest, std::abs(row.error) / reach);
+    }
+    return largest;
+  }
+
+  // A state that an integrator tries is off the joints by an error e of its own. Where rows are nearly dependent that
+  // counts for more than its size: redundant ones are dependent no more (pivots of e^2, which no rounding explains), and
+  // near a singular configuration, at a distance x, directions are off by e/x^2. So the question is answered for the
+  // nearest state that agrees with the joints, in pose and in velocity; where there is none, for the one asked.
+  void agree_with_joints() {
+    constexpr int kRounds = 12;
+    const std::vector<Body> asked = bodies_;
+    double turn = largest_turn(), margin = kMargin;
+    for (int round = 0; round < kRounds && turn > kOnJoints && margin < kMostMargin; ++round) {
+      const std::vector<Body> before = bodies_;
+      factorise(margin * turn * turn);
+      const std::vector<Twist> change = taken_out(&Row::error);
+      for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+        Body& body = bodies_[i];
+        if (!body.is_pushed()) continue;
+        body.pose = displaced(body.pose, change[i].linear, change[i].angular);
+        body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_.inverse_inertia(), i));
+      }
+      has_moved_ = true;
+      make_rows();
+      const double next = largest_turn();
+      if (next < 0.5 * turn) {
+        turn = next;
+        margin = kMargin;
+        continue;
+      }
+      // rounding, or a row that is dependent but for the error was taken for one that is not
+      bodies_ = before;
+      make_rows();
+      if (turn < kRounding) break;
+      margin *= kMargin;
+    }
+    if (turn > kNearEnough) {
+      bodies_ = asked;
+      has_moved_ = false;
+      make_rows();
+      return factorise(0.0);
+    }
+    factorise(std::max(kSingular, kMargin * turn * turn));
+    const std::vector<Twist> change = taken_out(&Row::velocity_error);
+    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+      bodies_[i].velocity.linear += change[i].linear;
+      bodies_[i].velocity.angular += change[i].angular;
+    }
+    make_rows();
+  }
+
+  // Change of pose or velocity, along M^-1 J^T, that takes an error of the rows away.
+  std::vector<Twist> taken_out(double Row::*error) const {
+    std::vector<double> side(rows_.size());
+    for (std::size_t i = 0; i < rows_.size(); ++i) side[i] = -(rows_[i].*error) / rows_[i].scale;
+    factor_.solve(&side);
+    std::vector<Twist> change(bodies_.size());
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const Row& row = rows_[i];
+      row.direction.push(side[i] / row.scale, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
+                         change[row.body1], change[row.body2]);
+    }
+    return change;
   }
 
   // Of rows that share a body that can be pushed.
@@ -191,7 +334,8 @@ class ReactionSolver {
     return sum;
   }
 
-  void factorise() {
+  // Rows whose pivot is less than `least` of their diagonal count as dependent.
+  void factorise(double least) {
     constexpr std::size_t kNowhere = std::numeric_limits<std::size_t>::max();
     std::vector<std::size_t> first_of_body(bodies_.size(), kNowhere), first(rows_.size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -206,11 +350,13 @@ class ReactionSolver {
     for (std::size_t i = 0; i < rows_.size(); ++i)
       for (std::size_t j = first[i]; j <= i; ++j)
         factor_.entry(i, j) = coupling(rows_[i], rows_[j]) / (rows_[i].scale * rows_[j].scale);
-    factor_.factorise();
+    factor_.factorise(least);
   }
 
   const stage::SolverReactionsRequest& request_;
   std::vector<Body> bodies_;  // the world last
+  std::vector<Joint> joints_;
+  bool has_moved_ = false;  // bodies, from where they were asked
   std::vector<Row> rows_;
   ProfileLdlt factor_;
   std::vector<double> multipliers_;
