@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "kernel/environment.h"
-#include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/joint_load.h"
@@ -26,7 +25,7 @@ void copy(const Column<double>& from, const Column<double>& to) {
 
 StepOutcome Environment::step() {
   if (fault_) return StepOutcome::kPaused;
-  const std::uint64_t start = lap_ns_ = channel::now_ns();
+  const std::uint64_t start = lap_ns_ = lap_ns();
   const CommitFigures figures = figures_;
   try {
     if (!is_idle_ || !wake_orders_.empty()) find_sleepers();
@@ -67,13 +66,17 @@ void Environment::write_trial(const Trusted<TrialState>&) {
 void Environment::write_solution(const Trusted<Solution>&) {
   copy(data_.solved_linear_velocity, back().linear_velocity);
   copy(data_.solved_angular_velocity, back().angular_velocity);
+  copy(data_.trial_position, back().position);
+  copy(data_.trial_orientation, back().orientation);
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* change = &data_.pose_change[6 * i];
-    const Pose pose = displaced(pose_of(data_.trial_position, data_.trial_orientation, i),
-                                Vector3(change[0], change[1], change[2]), Vector3(change[3], change[4], change[5]));
-    set_vector(back().position.span(), i, pose.position);
-    set_quaternion(back().orientation.span(), i, pose.orientation);
     const bool moved = std::any_of(change, change + 6, [](double number) { return number != 0.0; });
+    if (moved) {
+      const Pose pose = displaced(pose_of(data_.trial_position, data_.trial_orientation, i),
+                                  Vector3(change[0], change[1], change[2]), Vector3(change[3], change[4], change[5]));
+      set_vector(back().position.span(), i, pose.position);
+      set_quaternion(back().orientation.span(), i, pose.orientation);
+    }
     const auto differs = [&](const Column<double>& a, const Column<double>& b) {
       return !std::equal(&a[3 * i], &a[3 * i] + 3, &b[3 * i]);
     };
@@ -119,8 +122,8 @@ void Environment::finish_step() {
   is_idle_ = inner_ == 0;
   if (!is_idle_) state_hash_ = kernel::state_hash(front());
   inner_ = 0;
-  chain_hash_ = kernel::chain_hash(chain_hash_, state_hash_);
-  lap_ns_ = channel::now_ns();
+  chain_hash_ = gravitas::chain_hash(chain_hash_, state_hash_);
+  lap_ns_ = lap_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_ns_ - start);
 }
 

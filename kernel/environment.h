@@ -19,7 +19,6 @@
 #include "kernel/arena.h"
 #include "kernel/description.h"
 #include "kernel/fault.h"
-#include "kernel/hash.h"
 #include "kernel/model.h"
 #include "kernel/pair_arbiter.h"
 #include "kernel/plan.h"
@@ -30,11 +29,12 @@
 #include "kernel/step_data.h"
 #include "kernel/swap.h"
 #include "kernel/validate.h"
-#include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/duration_histogram.h"
 #include "plugin_sdk/event_location.h"
 #include "plugin_sdk/extrapolation.h"
+#include "plugin_sdk/lap_clock.h"
 #include "plugin_sdk/merged_rows.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas::kernel {
 
@@ -205,6 +205,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   void bound_bodies(const Trusted<TrialState>& trial);
   void bound_motions(const Trusted<TrialState>& trial, double length);
   Trusted<Pairs> find_pairs();
+  // The answer to a question about nothing.
+  void leave_empty(std::span<const ColumnId> reply);
   void find_impacts(const Trusted<Pairs>& pairs);
   Encounter encounter(std::size_t impact) const;
   Trusted<Contacts> find_contacts(const Trusted<Pairs>& pairs);
@@ -267,7 +269,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   template <typename Check>
   auto ask(Stage stage, StageSlot* slot, const StageCall& call, DerivativeSource* derivatives, Check&& check) {
     // the first stage begins with the step
-    const std::uint64_t start = stage == Stage::kIntegrate ? lap_ns_ : channel::now_ns();
+    const std::uint64_t start = stage == Stage::kIntegrate ? lap_ns_ : lap_ns();
     return slot->ask(call, &arena_, derivatives, [&](const Untrusted<StageCall>& answer, const CallTimes* times) {
       if (times != nullptr) book_call(stage, slot, start, *times);
       auto checked =

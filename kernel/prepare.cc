@@ -46,7 +46,7 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
   for (const ConstraintGroup& group : model_.constraint_groups) bind(group);
   ask_constant_forces();
   state_hash_ = kernel::state_hash(front());
-  chain_hash_ = kernel::chain_hash({}, state_hash_);
+  chain_hash_ = gravitas::chain_hash({}, state_hash_);
 }
 
 Environment::~Environment() {

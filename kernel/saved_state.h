@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "kernel/hash.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas::kernel {
 

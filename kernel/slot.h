@@ -15,7 +15,7 @@
 #include "kernel/slot_host.h"
 #include "kernel/swap.h"
 #include "kernel/validate.h"
-#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/lap_clock.h"
 #include "plugin_sdk/slow_calls.h"
 
 namespace gravitas::kernel {
@@ -85,7 +85,7 @@ class StageSlot {
     for (;;) {
       try {
         CallTimes times;
-        if (attempts.made > 0) times.begin = channel::now_ns();
+        if (attempts.made > 0) times.begin = lap_ns();
         attempt(call, arena, derivatives, &attempts, &times);
         auto checked = check(Untrusted<StageCall>(call), &times);
         if (attempts.made > 0) note_recovery(attempts);
@@ -105,6 +105,9 @@ class StageSlot {
   void inject(FaultInjection fault) { armed_.push_back(std::move(fault)); }
   // True if a call of this step is to be hit.
   bool has_order() const { return std::ranges::find(armed_, step_, &FaultInjection::step) != armed_.end(); }
+  // True if a question about nothing, whose answer the contract says, need not be asked. A worker is asked: who looks after
+  // it wants to know how it is.
+  bool may_be_spared() const { return description_.hosting == Hosting::kDirect && !is_watched_; }
 
   // Begins a swap of the plugin in row `target`; see swap.h. With `only_compare` it never cuts over.
   void order_swap(SwapOrder order, std::uint32_t target, bool only_compare = false);

@@ -2,14 +2,13 @@
 #include <algorithm>
 
 #include "kernel/environment.h"
-#include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/contact_key.h"
 #include "plugin_sdk/math/motion.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
 void Environment::book_call(Stage stage, StageSlot* slot, std::uint64_t start, const CallTimes& times) {
-  const std::uint64_t end = channel::now_ns();
+  const std::uint64_t end = lap_ns();
   // what failed before it is no measure of how long a call takes
   const std::uint64_t total = end - (times.begin != 0 ? times.begin : start);
   check_begin_ns_ = end - times.check;
@@ -24,7 +23,7 @@ void Environment::book_call(Stage stage, StageSlot* slot, std::uint64_t start, c
 }
 
 void Environment::book_check(Stage stage) {
-  lap_ns_ = channel::now_ns();
+  lap_ns_ = lap_ns();
   validation_[static_cast<std::size_t>(stage)].add(lap_ns_ - check_begin_ns_);
 }
 
@@ -88,18 +87,18 @@ Bounds Environment::trial_bounds(std::uint32_t body) const {
 }
 
 void Environment::bound_bodies(const Trusted<TrialState>&) {
-  const std::uint64_t start = channel::now_ns();
+  const std::uint64_t start = lap_ns();
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const Bounds bounds = trial_bounds(i);
     set_vector(data_.lower.span(), i, bounds.lower);
     set_vector(data_.upper.span(), i, bounds.upper);
   }
-  profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
+  profile_[static_cast<std::size_t>(Stage::kBound)].add(lap_ns() - start);
 }
 
 // How the bodies get from S_n to S*, and bounds of all that they pass.
 void Environment::bound_motions(const Trusted<TrialState>&, double length) {
-  const std::uint64_t start = channel::now_ns();
+  const std::uint64_t start = lap_ns();
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const Pose from = pose_of(front().position, front().orientation, i);
     const Pose to = pose_of(data_.trial_position, data_.trial_orientation, i);
@@ -113,7 +112,7 @@ void Environment::bound_motions(const Trusted<TrialState>&, double length) {
     set_vector(data_.lower.span(), i, bounds.lower);
     set_vector(data_.upper.span(), i, bounds.upper);
   }
-  profile_[static_cast<std::size_t>(Stage::kBound)].add(channel::now_ns() - start);
+  profile_[static_cast<std::size_t>(Stage::kBound)].add(lap_ns() - start);
 }
 
 Trusted<Pairs> Environment::find_pairs() {
@@ -126,6 +125,10 @@ Trusted<Pairs> Environment::find_pairs() {
   return pairs;
 }
 
+void Environment::leave_empty(std::span<const ColumnId> reply) {
+  for (const ColumnId column : reply) arena_.set_count(column, 0);
+}
+
 void Environment::find_impacts(const Trusted<Pairs>&) {
   const auto request =
       ids(data_.target_gap, model_.shape_hash, model_.shape_type, model_.shape_parameter_begin, model_.shape_parameter,
@@ -133,6 +136,7 @@ void Environment::find_impacts(const Trusted<Pairs>&) {
           front().orientation, data_.displacement, data_.rotation, data_.pair);
   const auto reply =
       ids(data_.impact_pair, data_.impact_fraction, data_.impact_normal, data_.impact_point, data_.impact_depth);
+  if (data_.pair.size() == 0 && collision_.may_be_spared()) return leave_empty(reply);
   ask(Stage::kNarrowPhase, &collision_, {stage::Method::kCollisionTimesOfImpact, 0, request, reply}, nullptr,
       [&](const auto& answer) { return validator_.impacts(answer, data_); });
 }
@@ -144,6 +148,10 @@ Trusted<Contacts> Environment::find_contacts(const Trusted<Pairs>&) {
           data_.trial_orientation, data_.trial_linear_velocity, data_.trial_angular_velocity, data_.pair);
   const auto reply = ids(data_.contact_pair, data_.contact_feature, data_.contact_normal, data_.contact_point,
                          data_.contact_depth, data_.contact_relative_velocity);
+  if (data_.pair.size() == 0 && collision_.may_be_spared()) {
+    leave_empty(reply);
+    return Validator::unchecked<Trusted<Contacts>>();
+  }
   const StageCall call{stage::Method::kCollisionManifolds, 0, request, reply};
   return ask(Stage::kNarrowPhase, &collision_, call, nullptr,
              [&](const auto& answer) { return validator_.contacts(answer, data_); });
@@ -271,6 +279,16 @@ Trusted<Solution> Environment::solve() {
     column->resize(3 * discrepancies);
   for (const Column<double>* column : {&data_.contact_impulse, &data_.contact_direction}) column->resize(3 * contacts);
   data_.contact_correction.resize(contacts);
+  if (discrepancies + contacts == 0 && solver_.may_be_spared()) {
+    // without joints and contacts S* stands
+    data_.solved_linear_velocity.assign(data_.trial_linear_velocity);
+    data_.solved_angular_velocity.assign(data_.trial_angular_velocity);
+    data_.pose_change.resize(6 * model_.body_count);
+    std::ranges::fill(data_.pose_change.span(), 0.0);
+    data_.iterations[0] = data_.stop_reason[0] = 0;
+    data_.residual[0] = 0.0;
+    return Validator::unchecked<Trusted<Solution>>();
+  }
   return ask(Stage::kSolve, &solver_, {stage::Method::kSolverSolve, 0, request, reply}, nullptr,
              [&](const auto& answer) { return validator_.solution(answer, data_); });
 }

@@ -7,6 +7,7 @@
 #include "kernel/arena.h"
 #include "kernel/description.h"
 #include "kernel/model.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas::kernel {
 
@@ -73,6 +74,11 @@ struct State {
     visit("rest_wrench", StateRows::kWrench, 6U, rest_wrench);
   }
 };
+
+inline Hash state_hash(const State& s) {
+  return gravitas::state_hash(
+      {s.position.span(), s.orientation.span(), s.linear_velocity.span(), s.angular_velocity.span()});
+}
 
 inline BodiesAtRest bodies_at_rest(const Model& model, const State& state) {
   return {model.flags.span(),           model.mass.span(),

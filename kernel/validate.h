@@ -59,7 +59,8 @@ struct Solution {};       // solved_*, pose_change, multipliers
 
 class Validator {
  public:
-  // For a campaign's self-test only: what a missing defence would say.
+  // Of an answer that the contract says, so that nobody was asked; and for a campaign's self-test: what a missing defence
+  // would say.
   template <typename Checked>
   static Checked unchecked() {
     return Checked({});

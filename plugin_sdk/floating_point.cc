@@ -1,18 +1,10 @@
 #include "plugin_sdk/floating_point.h"
 
 #include <gnu/libc-version.h>
-#include <immintrin.h>
 
 namespace gravitas {
-namespace {
 
-constexpr std::uint32_t kExceptionFlags = 0x3F;
-
-}  // namespace
-
-std::uint32_t floating_point_control() { return _mm_getcsr() & ~kExceptionFlags; }
-
-void set_floating_point_control(std::uint32_t control) { _mm_setcsr(control & ~kExceptionFlags); }
+void set_floating_point_control(std::uint32_t control) { _mm_setcsr(control & ~kFloatingPointExceptions); }
 
 std::string c_library() { return std::string("glibc ") + gnu_get_libc_version(); }
 

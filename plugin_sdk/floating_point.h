@@ -1,15 +1,20 @@
 // How floating-point arithmetic behaves in this process, and whether this processor can run this build.
 #pragma once
 
+#include <immintrin.h>
+
 #include <cstdint>
 #include <string>
 #include <vector>
 
 namespace gravitas {
 
+// Sticky flags of MXCSR.
+inline constexpr std::uint32_t kFloatingPointExceptions = 0x3F;
+
 // The MXCSR control register without its sticky exception flags: rounding mode, flush-to-zero,
 // denormals-are-zero, exception masks.
-std::uint32_t floating_point_control();
+inline std::uint32_t floating_point_control() { return _mm_getcsr() & ~kFloatingPointExceptions; }
 void set_floating_point_control(std::uint32_t control);
 
 // The C library and its version.

@@ -35,6 +35,9 @@ class Derivatives {
   // `room` is kept by the plugin from call to call, so that a step allocates nothing.
   Derivatives(const stage::IntegratorIntegrateRequest& request, Host& host, std::vector<double>* room);
 
+  // True if the wrenches are the same in any state at any time of the step.
+  bool are_constant() const { return request_.wrench_is_constant() != 0; }
+
   // Wrenches of all bodies (six numbers each) in the initial state of the step, or in a trial state. Throws Refusal,
   // naming the body, for a trial state that is not finite, and for wrenches that are not.
   std::span<const double> wrenches_at_start();

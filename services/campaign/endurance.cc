@@ -34,7 +34,7 @@ EnduranceResult endure(const std::string& name, double seconds, const std::funct
   EnduranceResult result;
   const auto start = std::chrono::steady_clock::now();
   std::uint64_t made = 0;
-  kernel::Hash chain;
+  Hash chain;
   {
     set_hosting(kernel::Hosting::kSharedMemory, &scene.description);
     const std::unique_ptr<kernel::Environment> world = gravitas::start(scene.description);

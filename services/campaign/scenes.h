@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "kernel/description.h"
-#include "kernel/hash.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas::campaign {
 
@@ -15,8 +15,8 @@ inline constexpr std::uint32_t kMostSteps = 60;
 struct Scene {
   std::string name;
   kernel::EnvironmentDescription description;
-  std::vector<Slot> slots;           // that the plan does not leave out
-  std::vector<kernel::Hash> chains;  // of the quiet run, hosted direct: [n] after n steps
+  std::vector<Slot> slots;   // that the plan does not leave out
+  std::vector<Hash> chains;  // of the quiet run, hosted direct: [n] after n steps
 };
 
 // Slots of the scene that share a worker process with this one, itself among them.

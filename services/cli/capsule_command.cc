@@ -58,7 +58,10 @@ int capture(CaptureLine* line) {
   std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->out, writer->calls(), line->slot,
                            result.report.steps());
   if (writer->calls() == 0) {
-    std::cerr << fmt::format("gravitas: slot {} was not asked: `gravitas plan` says why\n", line->slot);
+    std::cerr << fmt::format(
+        "gravitas: slot {} was not asked: `gravitas plan` says why; and hosted direct, a slot is not asked about "
+        "nothing\n",
+        line->slot);
     return kBadInput;
   }
   if (result.outcome == RunOutcome::kCompleted || is_enough()) return kDone;

@@ -38,7 +38,7 @@ std::uint32_t find_row(const std::map<std::string, std::uint32_t>& rows, const s
   return found == rows.end() ? kNone : found->second;
 }
 
-kernel::Hash digest_of(const edit::v1::Edit& edit) {
+Hash digest_of(const edit::v1::Edit& edit) {
   std::string text;
   const auto add = [&](const std::string& one) { text += fmt::format("{} {} ", one.size(), one); };
   for (const edit::v1::Change& change : edit.changes()) {
@@ -311,8 +311,8 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
     motion[3].insert(motion[3].end(), twist_[i].angular.begin(), twist_[i].angular.end());
   }
   kernel::SavedState saved{before.step, before.step_length, {}, {}, before.figures, {}};
-  saved.state_hash = kernel::state_hash({motion[0], motion[1], motion[2], motion[3]});
-  saved.chain_hash = kernel::chain_hash(before.chain_hash, digest_of(edit_));
+  saved.state_hash = gravitas::state_hash({motion[0], motion[1], motion[2], motion[3]});
+  saved.chain_hash = gravitas::chain_hash(before.chain_hash, digest_of(edit_));
   columns["position"] = std::move(motion[0]);
   columns["orientation"] = std::move(motion[1]);
   columns["linear_velocity"] = std::move(motion[2]);

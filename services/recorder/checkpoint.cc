@@ -76,12 +76,12 @@ void visit_columns(recorder::v1::State* state, Visit&& visit) {
   visit("rest_wrench", state->mutable_rest_wrench());
 }
 
-void set_hash(const kernel::Hash& hash, recorder::v1::Hash* message) {
+void set_hash(const Hash& hash, recorder::v1::Hash* message) {
   message->set_low(hash.low);
   message->set_high(hash.high);
 }
 
-kernel::Hash hash_of(const recorder::v1::Hash& message) { return {message.low(), message.high()}; }
+Hash hash_of(const recorder::v1::Hash& message) { return {message.low(), message.high()}; }
 
 bool is_possible(const recorder::v1::Tally& tally) {
   for (const double number :

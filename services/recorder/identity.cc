@@ -118,7 +118,7 @@ std::string find_difference(const recorder::v1::Identity& recorded, const record
   return differences;
 }
 
-kernel::Hash digest_of(const recorder::v1::Identity& identity) {
+Hash digest_of(const recorder::v1::Identity& identity) {
   std::vector<std::uint64_t> words;
   PartDigest build;
   build << std::string_view(GRAVITAS_BUILD_ID) << identity.time_step();

@@ -6,7 +6,7 @@
 
 #include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "kernel/description.h"
-#include "kernel/hash.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas {
 
@@ -16,6 +16,6 @@ recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& descrip
 std::string find_difference(const recorder::v1::Identity& recorded, const recorder::v1::Identity& scene);
 
 // One number for the identity and this build.
-kernel::Hash digest_of(const recorder::v1::Identity& identity);
+Hash digest_of(const recorder::v1::Identity& identity);
 
 }  // namespace gravitas

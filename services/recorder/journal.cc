@@ -27,7 +27,7 @@ constexpr std::chrono::milliseconds kLongestWait{50};
 struct JournalHeader {
   std::array<unsigned char, 8> magic;
   std::uint32_t version, zero;
-  kernel::Hash run;
+  Hash run;
   std::uint64_t check;
 };
 static_assert(sizeof(JournalHeader) == 40);
@@ -55,7 +55,7 @@ constexpr std::uint64_t word(const std::array<std::uint32_t, 4>& halves, std::si
   return halves[first] | static_cast<std::uint64_t>(halves[first + 1]) << 32;
 }
 
-JournalHeader header_of(const kernel::Hash& run) {
+JournalHeader header_of(const Hash& run) {
   JournalHeader header{kJournalMagic, kJournalVersion, 0, run, 0};
   header.check = XXH3_64bits(&header, offsetof(JournalHeader, check));
   return header;
@@ -86,7 +86,7 @@ bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uin
 
 }  // namespace
 
-JournalReading read_journal(std::span<const std::byte> bytes, const kernel::Hash& run, std::uint32_t after) {
+JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, std::uint32_t after) {
   JournalReading reading;
   JournalHeader header;
   const JournalHeader expected = header_of(run);
@@ -124,7 +124,7 @@ JournalReading read_journal(std::span<const std::byte> bytes, const kernel::Hash
   return reading;
 }
 
-JournalWriter::JournalWriter(const std::string& path, const kernel::Hash& run, const JournalReading& known)
+JournalWriter::JournalWriter(const std::string& path, const Hash& run, const JournalReading& known)
     : path_(path), check_(known.check), last_step_(known.last_step) {
   file_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
   const auto fail = [&] {

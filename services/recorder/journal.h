@@ -21,13 +21,13 @@
 #include <vector>
 
 #include "gravitas/recorder/v1/checkpoint.pb.h"
-#include "kernel/hash.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas {
 
 struct JournalEntry {
   std::uint32_t step;
-  kernel::Hash chain;
+  Hash chain;
 };
 
 // What could be read of a journal.
@@ -42,13 +42,13 @@ struct JournalReading {
 };
 
 // Reads any bytes. `after`: the step that is already known.
-JournalReading read_journal(std::span<const std::byte> bytes, const kernel::Hash& run, std::uint32_t after);
+JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, std::uint32_t after);
 
 class JournalWriter {
  public:
   // Goes on behind what was read; a reading of nothing starts a new journal. Throws std::system_error if the file cannot
   // be made, std::runtime_error if another run is writing it.
-  JournalWriter(const std::string& path, const kernel::Hash& run, const JournalReading& known);
+  JournalWriter(const std::string& path, const Hash& run, const JournalReading& known);
   ~JournalWriter();
   JournalWriter(const JournalWriter&) = delete;
   JournalWriter& operator=(const JournalWriter&) = delete;

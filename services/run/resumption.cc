@@ -25,7 +25,7 @@ std::vector<std::byte> read_or_refuse(const std::string& path) {
   }
 }
 
-JournalReading read_journal_beside(const std::string& path, const kernel::Hash& run, std::uint32_t step,
+JournalReading read_journal_beside(const std::string& path, const Hash& run, std::uint32_t step,
                                    std::vector<std::string>* warnings) {
   const std::string journal = journal_of(path);
   if (!fs::exists(journal)) return {};

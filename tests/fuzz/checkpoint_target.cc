@@ -46,7 +46,7 @@ void checkpoint(std::span<const std::byte> bytes) {
     static_cast<void>(find_obstacle(inside, recorder::v1::Identity()));
     try_to_restore(&inside);
   }
-  const JournalReading journal = read_journal(bytes, kernel::Hash(), 0);
+  const JournalReading journal = read_journal(bytes, Hash(), 0);
   require(journal.end <= bytes.size(), "a journal ends within its file");
 }
 

@@ -53,7 +53,7 @@ TEST(Environment, TheBallThatBouncesIsTheSameInEveryHosting) {
     EXPECT_NEAR(position(world, 1).y(), 0.5, 1e-9);
     return world.chain_hash();
   };
-  const kernel::Hash direct = hash(Hosting::kDirect, Slot::kSolver);
+  const Hash direct = hash(Hosting::kDirect, Slot::kSolver);
   EXPECT_EQ(direct, hash(Hosting::kSharedMemory, Slot::kForce));
   EXPECT_EQ(direct, hash(Hosting::kSharedMemory, Slot::kSolver));
   EXPECT_EQ(direct, hash(Hosting::kSharedMemory, Slot::kCollision));

@@ -42,7 +42,7 @@ WorldBuilder ball_on_ground(Hosting hosting) {
 void expect_failures_and_pause(const WorldBuilder& builder, const Expected& expected) {
   Environment world(builder.description());
   while (world.step_count() < 10) ASSERT_EQ(world.step(), StepOutcome::kCommitted) << world.fault()->fault.text();
-  const kernel::Hash state = world.state_hash(), chain = world.chain_hash();
+  const Hash state = world.state_hash(), chain = world.chain_hash();
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
   ASSERT_TRUE(world.fault().has_value());
   ASSERT_EQ(world.faults().size(), 5U);

@@ -92,7 +92,7 @@ TEST_P(Handshake, TakesAnotherBuildAndSaysSo) {
   EXPECT_THAT(carrier->take_complaints(), Contains("it is of another build, another build: its bits may differ"));
 }
 
-kernel::Hash chain_without_lies() {
+Hash chain_without_lies() {
   Environment quiet(busy_world(Hosting::kDirect).steps(kMeetingSteps, 1.0 / 120.0).description());
   while (quiet.step_count() < kMeetingSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
   return quiet.chain_hash();

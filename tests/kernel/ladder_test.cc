@@ -85,7 +85,7 @@ class Ladder : public ::testing::Test {
     builder.description().solver.standbys = standbys;
     return builder;
   }
-  static kernel::Hash quiet_chain() {
+  static Hash quiet_chain() {
     Environment quiet(busy_world(Hosting::kDirect).steps(kLadderSteps, 0.01).description());
     while (quiet.step_count() < kLadderSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
     return quiet.chain_hash();

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "kernel/environment.h"
+#include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 
 namespace gravitas::kernel {
@@ -86,6 +88,44 @@ TEST(Plan, SleepIsLeftOutWhereNothingCanFallAsleep) {
     builder->description().simulator = Simulator::kSmooth;
   };
   EXPECT_EQ(why(make_smooth), "the simulator Smooth stops no motion");
+}
+
+// Two balls fly towards each other and touch after 0.5 s; a third flies elsewhere.
+WorldBuilder meeting(Hosting hosting, Simulator simulator) {
+  WorldBuilder builder(hosting);
+  builder.steps(60, 1.0 / 60.0).integrator("integrator_basic_verlet");
+  builder.sphere(0.5, 1.0, Vector3::Zero(), Vector3(2, 0, 0))
+      .sphere(0.5, 1.0, Vector3(3, 0, 0), Vector3(-2, 0.0, -0.0));
+  builder.sphere(0.5, 1.0, Vector3(0, 9, 0), Vector3(0, 0, 1)).gravity(Vector3(0, -9.81, 0));
+  builder.description().simulator = simulator;
+  return builder;
+}
+
+TEST(Plan, AQuestionAboutNothingIsNotAskedAndChangesNoBit) {
+  for (const Simulator simulator : {Simulator::kBasic, Simulator::kContinuous}) {
+    Environment spared(meeting(Hosting::kDirect, simulator).description());
+    run_to_end(&spared);
+    Environment asked(meeting(Hosting::kSharedMemory, simulator).description());
+    for (const Slot slot : {Slot::kCollision, Slot::kSolver}) asked.set_rerun_every(slot, 1);
+    run_to_end(&asked);
+    EXPECT_EQ(spared.chain_hash(), asked.chain_hash());
+    EXPECT_TRUE(asked.faults().empty());
+    for (const Stage stage : {Stage::kNarrowPhase, Stage::kSolve}) {
+      EXPECT_GT(spared.stage_time(stage).count(), 0U);
+      EXPECT_LT(spared.stage_time(stage).count(), asked.stage_time(stage).count());
+    }
+  }
+}
+
+// So that its end is noticed where it comes.
+TEST(Plan, AWorkerIsAskedAboutNothing) {
+  Environment world(meeting(Hosting::kSharedMemory, Simulator::kBasic).description());
+  world.inject({Slot::kSolver, "kill", 3});
+  world.inject({Slot::kCollision, "kill", 4});
+  run_to_end(&world);
+  ASSERT_EQ(world.faults().size(), 2U);
+  EXPECT_EQ(world.faults()[0].step, 3U);
+  EXPECT_EQ(world.faults()[1].step, 4U);
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ INSTANTIATE_TEST_SUITE_P(Hosting, FromTo,
 TEST_P(FromTo, EveryStepAfterARestoreHasTheBitsOfTheUninterruptedRun) {
   constexpr double kLoadOfLanding = 30.0;  // N
   Environment whole(busy_world(Hosting::kDirect, kLoadOfLanding).description());
-  std::vector<kernel::Hash> chain = {whole.chain_hash()};
+  std::vector<Hash> chain = {whole.chain_hash()};
   bool breaks = false, touches = false;
   while (whole.step_count() < kRestoreSteps) {
     steps(&whole, 1);

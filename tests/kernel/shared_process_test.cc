@@ -45,8 +45,8 @@ WorldBuilder together(Hosting hosting, const std::vector<Slot>& slots) {
 const std::vector<Slot> kAll(kSlots.begin(), kSlots.end());
 const std::vector<Slot> kTwo = {Slot::kCollision, Slot::kSolver};
 
-kernel::Hash chain_of_own_processes() {
-  static const kernel::Hash chain = [] {
+Hash chain_of_own_processes() {
+  static const Hash chain = [] {
     Environment world(apart(Hosting::kDirect).description());
     run_to_end(&world);
     return world.chain_hash();

@@ -57,7 +57,7 @@ void run(Environment* world) {
     ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
 }
 
-kernel::Hash chain_of(const WorldBuilder& builder) {
+Hash chain_of(const WorldBuilder& builder) {
   Environment world(builder.description());
   run(&world);
   return world.chain_hash();
@@ -67,7 +67,7 @@ TEST(Simulators, SubsteppingIsBasicWithAsManySubsteps) {
   for (const std::uint32_t substeps : {1U, 2U, 7U}) {
     WorldBuilder builder = busy_world(Hosting::kDirect).steps(90, 0.02);
     builder.description().substeps = substeps;
-    const kernel::Hash basic = chain_of(builder);
+    const Hash basic = chain_of(builder);
     builder.description().simulator = Simulator::kSubstepping;
     EXPECT_EQ(chain_of(builder), basic) << substeps;
   }
@@ -91,7 +91,7 @@ TEST(Simulators, SubsteppingAsksTheSpaceOnceAStepWhereNothingRunsOutOfItsBounds)
   Environment world(builder.description());
   run(&world);
   EXPECT_EQ(world.stage_time(kernel::Stage::kBroadPhase).count(), 20U);
-  EXPECT_EQ(world.stage_time(kernel::Stage::kSolve).count(), 100U);
+  EXPECT_EQ(world.stage_time(kernel::Stage::kNarrowPhase).count(), 100U);
 }
 
 TEST(Simulators, AKilledWorkerChangesNoBitOfInnerSteps) {
@@ -99,7 +99,7 @@ TEST(Simulators, AKilledWorkerChangesNoBitOfInnerSteps) {
                                            Way{Simulator::kContinuous, 0.0}, Way{Simulator::kContinuous, 1e-9}}) {
     WorldBuilder builder = bouncing(simulator, 0.9, 60, 0.02, accuracy);
     builder.description().substeps = 2;
-    const kernel::Hash quiet = chain_of(builder);
+    const Hash quiet = chain_of(builder);
     for (const Slot slot : {Slot::kSpace, Slot::kCollision, Slot::kSolver, Slot::kIntegrator})
       builder.hosting(slot, Hosting::kSharedMemory);
     Environment world(builder.description());
@@ -126,9 +126,9 @@ TEST(Simulators, StepsCutByJumpsAreTheSameAfterARestoreAndAKill) {
     builder.description().simulator = simulator;
     builder.description().accuracy = accuracy;
     builder.description().substeps = 2;
-    const kernel::Hash uncut = chain_of(builder);
+    const Hash uncut = chain_of(builder);
     builder.description().switches = {0.055, 0.1, 0.252, 0.2571};
-    const kernel::Hash whole = chain_of(builder);
+    const Hash whole = chain_of(builder);
     EXPECT_NE(whole, uncut);
     for (const std::uint32_t stop : {4U, 5U, 6U, 9U, 10U, 11U, 25U, 26U}) {
       Environment first(builder.description()), second(builder.description());
@@ -182,7 +182,7 @@ TEST(Simulators, AStepThatFailsHalfwayLeavesTheLastCommit) {
                     [&](const kernel::SlotDescription& slot, std::uint32_t threads,
                         std::stop_token) -> std::unique_ptr<kernel::Carrier> {
                       auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
-                      if (slot.plugins[0].declaration.slot != Slot::kSolver) return plugins;
+                      if (slot.plugins[0].declaration.slot != Slot::kCollision) return plugins;
                       return std::make_unique<Weary>(std::move(plugins), &calls_left);
                     });
   while (world.step() == StepOutcome::kCommitted && world.step_count() < 20) {
@@ -210,7 +210,7 @@ TEST(Simulators, AFallbackMakesTheWholeStep) {
     builder.description().substeps = 2;
     WorldBuilder other = builder;
     other.integrator("integrator_rk4");
-    const kernel::Hash alone = chain_of(other);
+    const Hash alone = chain_of(other);
     EXPECT_NE(alone, chain_of(builder));
     builder.description().integrator.plugins[0].fallback =
         std::make_shared<kernel::PluginChoice>(other.description().integrator.plugins[0]);

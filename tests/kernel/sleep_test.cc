@@ -212,7 +212,7 @@ TEST(Sleep, WhereAllSleepNothingIsAskedAndTimeGoesOn) {
     return sum;
   };
   const std::uint64_t before = calls();
-  const kernel::Hash state = world.state_hash(), chain = world.chain_hash();
+  const Hash state = world.state_hash(), chain = world.chain_hash();
   run(&world, 240);
   EXPECT_EQ(calls(), before);
   EXPECT_EQ(world.time(), 3.0);

@@ -30,8 +30,8 @@ using ::testing::HasSubstr;
 
 constexpr std::uint32_t kSteps = 20;
 
-const kernel::Hash& quiet_chain() {
-  static const kernel::Hash chain = [] {
+const Hash& quiet_chain() {
+  static const Hash chain = [] {
     Environment world(busy_world(Hosting::kDirect).steps(kSteps, 0.01).description());
     run_to_end(&world);
     return world.chain_hash();

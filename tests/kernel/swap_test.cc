@@ -32,7 +32,7 @@ using ::testing::Not;
 
 constexpr std::uint32_t kSwapSteps = 40;
 
-kernel::Hash chain_without_swaps() {
+Hash chain_without_swaps() {
   Environment world(busy_world(Hosting::kDirect).steps(kSwapSteps, 1.0 / 120.0).description());
   run_to_end(&world);
   return world.chain_hash();

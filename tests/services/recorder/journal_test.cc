@@ -20,7 +20,7 @@ namespace {
 using harness::ScratchFolder;
 using ::testing::HasSubstr;
 
-const kernel::Hash kRun{11, 22};
+const Hash kRun{11, 22};
 constexpr std::size_t kJournalHeader = 40, kRecord = 36;
 
 JournalEntry entry(std::uint32_t step) { return {step, {step * 1000003ULL, ~std::uint64_t{step}}}; }

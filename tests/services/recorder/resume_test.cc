@@ -122,7 +122,7 @@ class Killed : public ::testing::Test {
     return options;
   }
 
-  kernel::Hash run_identity() const {
+  Hash run_identity() const {
     std::vector<std::string> warnings;
     return digest_of(identity_of(load(go_on(), &warnings)));
   }

@@ -310,7 +310,7 @@ TEST(Queries, CastsOverlapAndDistanceAgree) {
 TEST(Queries, AreTheSameOnAnyHostingAlsoWhenTheirWorkerDies) {
   const query::v1::Batch batch = many_rays(6, 20);
   std::string right;
-  kernel::Hash chain;
+  Hash chain;
   for (const kernel::Hosting hosting :
        {kernel::Hosting::kDirect, kernel::Hosting::kSharedMemory, kernel::Hosting::kGrpc}) {
     SCOPED_TRACE(kernel::hosting_name(hosting));

@@ -36,10 +36,32 @@ class Verlet final : public IntegratorPlugin {
     const double h = request.time_step();
     Derivatives derivatives(request, host, &room_);
     const std::size_t bodies = derivatives.size();
-    first_.resize(bodies), trial_.resize(bodies);
-
-    // where the bodies go, and their velocities as far as the first derivative knows
     const std::span<const double> before = derivatives.wrenches_at_start();
+
+    // where a body goes, and its velocities as far as the first derivative knows
+    const auto predicted = [&](std::size_t i, const BodyState& s, const Acceleration& first) {
+      const double moved = damped_time(request.damping()[i], h);
+      return BodyState{displaced(s.pose, moved * s.twist.linear + 0.5 * h * h * first.linear,
+                                 moved * s.twist.angular + 0.5 * h * h * first.angular),
+                       accelerated(s.twist, first, request.damping()[i], h)};
+    };
+    const auto completed = [&](std::size_t i, const BodyState& s, const Acceleration& first, const BodyState& trial,
+                               const Acceleration& second) {
+      const double kept = damping_factor(request.damping()[i], h);
+      return BodyState{trial.pose,
+                       {kept * (s.twist.linear + 0.5 * h * first.linear) + 0.5 * h * second.linear,
+                        kept * (s.twist.angular + 0.5 * h * first.angular) + 0.5 * h * second.angular}};
+    };
+
+    if (derivatives.are_constant()) {
+      for_each_body(request, reply, [&](std::size_t i, const BodyState& s) {
+        const Acceleration first = derivatives.acceleration(i, s, before);
+        const BodyState trial = predicted(i, s, first);
+        return completed(i, s, first, trial, derivatives.acceleration(i, trial, before));
+      });
+      return;
+    }
+    first_.resize(bodies), trial_.resize(bodies);
     for (std::size_t i = 0; i < bodies; ++i) {
       const BodyState s = derivatives.start(i);
       if ((request.flags()[i] & kMovable) == 0) {
@@ -47,20 +69,12 @@ class Verlet final : public IntegratorPlugin {
         continue;
       }
       first_[i] = derivatives.acceleration(i, s, before);
-      const double moved = damped_time(request.damping()[i], h);
-      const Pose pose = displaced(s.pose, moved * s.twist.linear + 0.5 * h * h * first_[i].linear,
-                                  moved * s.twist.angular + 0.5 * h * h * first_[i].angular);
-      trial_.set(i, {pose, accelerated(s.twist, first_[i], request.damping()[i], h)});
+      trial_.set(i, predicted(i, s, first_[i]));
     }
-
     const std::span<const double> after = derivatives.wrenches(request.time() + h, trial_);
     for_each_body(request, reply, [&](std::size_t i, const BodyState& s) {
-      const BodyState predicted = trial_.at(i);
-      const Acceleration second = derivatives.acceleration(i, predicted, after);
-      const double kept = damping_factor(request.damping()[i], h);
-      return BodyState{predicted.pose,
-                       {kept * (s.twist.linear + 0.5 * h * first_[i].linear) + 0.5 * h * second.linear,
-                        kept * (s.twist.angular + 0.5 * h * first_[i].angular) + 0.5 * h * second.angular}};
+      const BodyState trial = trial_.at(i);
+      return completed(i, s, first_[i], trial, derivatives.acceleration(i, trial, after));
     });
   }
 

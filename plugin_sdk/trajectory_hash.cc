@@ -1,9 +1,9 @@
-#include "kernel/hash.h"
+#include "plugin_sdk/trajectory_hash.h"
 
 #include <array>
 #include <cstdio>
 
-namespace gravitas::kernel {
+namespace gravitas {
 namespace {
 
 Hash from(const XXH128_hash_t& hash) { return {hash.low64, hash.high64}; }
@@ -24,14 +24,9 @@ Hash state_hash(const std::array<std::span<const double>, 4>& columns) {
   return from(XXH3_128bits(parts.data(), sizeof parts));
 }
 
-Hash state_hash(const State& state) {
-  return state_hash(
-      {state.position.span(), state.orientation.span(), state.linear_velocity.span(), state.angular_velocity.span()});
-}
-
 Hash chain_hash(const Hash& chain, const Hash& state) {
   const std::array<Hash, 2> both = {chain, state};
   return from(XXH3_128bits(both.data(), sizeof both));
 }
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas

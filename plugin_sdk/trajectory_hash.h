@@ -9,9 +9,7 @@
 #include <span>
 #include <string>
 
-#include "kernel/state.h"
-
-namespace gravitas::kernel {
+namespace gravitas {
 
 struct Hash {
   std::uint64_t low = 0, high = 0;
@@ -22,9 +20,8 @@ struct Hash {
 
 // Hash of every body's pose and velocity, bit for bit: of its position, orientation, linear and angular velocity.
 Hash state_hash(const std::array<std::span<const double>, 4>& columns);
-Hash state_hash(const State& state);
 
 // Hash of the chain so far and the next state.
 Hash chain_hash(const Hash& chain, const Hash& state);
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas
