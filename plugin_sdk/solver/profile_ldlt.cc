@@ -53,7 +53,7 @@ void ProfileLdlt::factorise(double least) {
     if (pivot > std::max(least, kDependent) * diagonal &&
         (pivot > kDoubtful * diagonal || pivot > rounding_of_pivot(i))) {
       pivot_[i] = pivot;
-      least_pivot_ = std::min(least_pivot_, pivot / diagonal);
+      if (pivot < least_pivot_ * diagonal) least_pivot_ = pivot / diagonal, weakest_ = i;
     } else {
       dropped_.push_back(i);
     }

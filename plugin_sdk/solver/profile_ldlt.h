@@ -28,6 +28,8 @@ class ProfileLdlt {
   std::size_t size() const { return first_.size(); }
   // Smallest pivot of a row that is not left out, as a share of its diagonal; 1 if there is none.
   double least_pivot() const { return least_pivot_; }
+  // Its row.
+  std::size_t weakest() const { return weakest_; }
   std::size_t dropped() const { return dropped_.size(); }
   // x with A x = b; entries of dropped rows are 0 and not looked at.
   void solve(std::vector<double>* b) const;
@@ -45,6 +47,7 @@ class ProfileLdlt {
   std::vector<std::size_t> first_, begin_;
   std::vector<double> values_, pivot_;  // 0: dropped
   double least_pivot_ = 1.0;
+  std::size_t weakest_ = 0;
   std::vector<std::size_t> dropped_;
   mutable std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range; found when asked for
 };

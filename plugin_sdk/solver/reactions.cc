@@ -67,7 +67,7 @@ class ReactionSolver {
     load_joints();
     make_rows();
     factorise(0.0);
-    if (factor_.least_pivot() < kNearlyDependent) agree_with_joints();
+    if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
     accelerate();
   }
 
@@ -185,6 +185,7 @@ class ReactionSolver {
         row.velocity_error = row.direction.along(one.velocity, two.velocity) - row.direction.linear.dot(d.velocity) -
                              (d.is_angular() ? axes.col(axis).dot(d.velocity) : 0.0);
         row.error = axis_mode(d.modes, axis) == AxisMode::kDriven ? 0.0 : row.error - target(d, axis);
+        longest_ = std::max(longest_, row.reach);
         if (row.scale > 0.0) rows_.push_back(row);
       }
     }
@@ -244,16 +245,33 @@ class ReactionSolver {
     return std::max(one.is_pushed() ? arm1.norm() : 0.0, two.is_pushed() ? arm2.norm() : 0.0);
   }
 
+  // m by which a turn of 1 rad takes an error out of the row; 1 if it is one of angles.
+  double reach_of(const Row& row) const {
+    constexpr double kShortest = 1e-3;  // of the longest reach
+    if (row.direction.linear.isZero(0.0) || longest_ == 0.0) return 1.0;
+    return std::max(row.reach, kShortest * longest_);
+  }
+
   // Radians by which bodies turn where the largest error is taken out by turning.
   double largest_turn() const {
-    constexpr double kShortest = 1e-3;  // of the longest reach
-    double longest = 0.0, largest = 0.0;
-    for (const Row& row : rows_) longest = std::max(longest, row.reach);
-    for (const Row& row : rows_) {
-      const double reach = row.direction.linear.isZero(0.0) ? 1.0 : std::max(row.reach, kShortest * longest);
-      if (reach > 0.0) largest = std::max(largest, std::abs(row.error) / reach);
-    }
+    double largest = 0.0;
+    for (const Row& row : rows_) largest = std::max(largest, std::abs(row.error) / reach_of(row));
     return largest;
+  }
+
+  // True if bodies would have to move much farther than the weakest row might be off: it is nearly dependent, and not only
+  // because masses differ.
+  bool is_amplifying() const {
+    constexpr double kMuch = 10.0;
+    const Row& weakest = rows_[factor_.weakest()];
+    std::vector<double> unit(rows_.size(), 0.0);
+    unit[factor_.weakest()] = reach_of(weakest);
+    double largest = 0.0;
+    for (const Twist& change : taken_out(std::move(unit))) {
+      largest = std::max(largest, change.angular.norm());
+      if (longest_ > 0.0) largest = std::max(largest, change.linear.norm() / longest_);
+    }
+    return largest > kMuch;
   }
 
   // A state that an integrator tries is off the joints by an error e of its own. Where rows are nearly dependent that
@@ -262,31 +280,28 @@ class ReactionSolver {
   // nearest state that agrees with the joints, in pose and in velocity; where there is none, for the one asked.
   void agree_with_joints() {
     constexpr int kRounds = 12;
+    constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
     const std::vector<Body> asked = bodies_;
     double turn = largest_turn(), margin = kMargin;
+    bool is_factored = margin * turn * turn < factor_.least_pivot();
     for (int round = 0; round < kRounds && turn > kOnJoints && margin < kMostMargin; ++round) {
       const std::vector<Body> before = bodies_;
-      factorise(margin * turn * turn);
-      const std::vector<Twist> change = taken_out(&Row::error);
-      for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-        Body& body = bodies_[i];
-        if (!body.is_pushed()) continue;
-        body.pose = displaced(body.pose, change[i].linear, change[i].angular);
-        body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_.inverse_inertia(), i));
-      }
-      has_moved_ = true;
-      make_rows();
+      const bool is_new = !is_factored, had_moved = has_moved_;
+      if (is_new) factorise(margin * turn * turn);
+      move(taken_out(errors(&Row::error)));
       const double next = largest_turn();
+      is_factored = next < kQuick * turn;
       if (next < 0.5 * turn) {
         turn = next;
         margin = kMargin;
         continue;
       }
-      // rounding, or a row that is dependent but for the error was taken for one that is not
+      // rounding, old factors, or a row that is dependent but for the error was taken for one that is not
       bodies_ = before;
+      has_moved_ = had_moved;
       make_rows();
       if (turn < kRounding) break;
-      margin *= kMargin;
+      if (is_new) margin *= kMargin;
     }
     if (turn > kNearEnough) {
       bodies_ = asked;
@@ -294,8 +309,8 @@ class ReactionSolver {
       make_rows();
       return factorise(0.0);
     }
-    factorise(std::max(kSingular, kMargin * turn * turn));
-    const std::vector<Twist> change = taken_out(&Row::velocity_error);
+    if (has_moved_ || factor_.least_pivot() < kSingular) factorise(std::max(kSingular, kMargin * turn * turn));
+    const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
     for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
       bodies_[i].velocity.linear += change[i].linear;
       bodies_[i].velocity.angular += change[i].angular;
@@ -303,15 +318,31 @@ class ReactionSolver {
     make_rows();
   }
 
-  // Change of pose or velocity, along M^-1 J^T, that takes an error of the rows away.
-  std::vector<Twist> taken_out(double Row::*error) const {
-    std::vector<double> side(rows_.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) side[i] = -(rows_[i].*error) / rows_[i].scale;
-    factor_.solve(&side);
+  void move(const std::vector<Twist>& change) {
+    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+      Body& body = bodies_[i];
+      if (!body.is_pushed()) continue;
+      body.pose = displaced(body.pose, change[i].linear, change[i].angular);
+      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_.inverse_inertia(), i));
+    }
+    has_moved_ = true;
+    make_rows();
+  }
+
+  std::vector<double> errors(double Row::*of) const {
+    std::vector<double> all;
+    for (const Row& row : rows_) all.push_back(row.*of);
+    return all;
+  }
+
+  // Change of pose or velocity, along M^-1 J^T, that takes errors of the rows away.
+  std::vector<Twist> taken_out(std::vector<double> errors) const {
+    for (std::size_t i = 0; i < rows_.size(); ++i) errors[i] /= -rows_[i].scale;
+    factor_.solve(&errors);
     std::vector<Twist> change(bodies_.size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const Row& row = rows_[i];
-      row.direction.push(side[i] / row.scale, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
+      row.direction.push(errors[i] / row.scale, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
                          change[row.body1], change[row.body2]);
     }
     return change;
@@ -356,6 +387,7 @@ class ReactionSolver {
   const stage::SolverReactionsRequest& request_;
   std::vector<Body> bodies_;  // the world last
   std::vector<Joint> joints_;
+  double longest_ = 0.0;    // reach of a row
   bool has_moved_ = false;  // bodies, from where they were asked
   std::vector<Row> rows_;
   ProfileLdlt factor_;
