@@ -38,7 +38,7 @@ StepOutcome Environment::step() {
     fault_ = FaultRecord{step_count_ + 1, fault};
     return StepOutcome::kPaused;
   }
-  step_profile_.add(lap_ns_ - start);
+  step_profile_.add(lap_between(start, lap_ns_));
   if (commit_listener_ != nullptr) commit_listener_->on_commit(*this);
   return StepOutcome::kCommitted;
 }
@@ -124,7 +124,7 @@ void Environment::finish_step() {
   inner_ = 0;
   chain_hash_ = gravitas::chain_hash(chain_hash_, state_hash_);
   lap_ns_ = lap_ns();
-  profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_ns_ - start);
+  profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_between(start, lap_ns_));
 }
 
 // What is remembered of those who sleep goes on.

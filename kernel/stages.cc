@@ -10,9 +10,9 @@ namespace gravitas::kernel {
 void Environment::book_call(Stage stage, StageSlot* slot, std::uint64_t start, const CallTimes& times) {
   const std::uint64_t end = lap_ns();
   // what failed before it is no measure of how long a call takes
-  const std::uint64_t total = end - (times.begin != 0 ? times.begin : start);
+  const std::uint64_t total = lap_between(times.begin != 0 ? times.begin : start, end);
   check_begin_ns_ = end - times.check;
-  profile_[static_cast<std::size_t>(stage)].add(end - start);
+  profile_[static_cast<std::size_t>(stage)].add(lap_between(start, end));
   if (slot->description().hosting == Hosting::kDirect &&
       static_cast<double>(total) > 1e9 * slot->description().deadline) {
     std::uint64_t& longest = overrun_ns_[static_cast<std::size_t>(stage)];
@@ -24,7 +24,7 @@ void Environment::book_call(Stage stage, StageSlot* slot, std::uint64_t start, c
 
 void Environment::book_check(Stage stage) {
   lap_ns_ = lap_ns();
-  validation_[static_cast<std::size_t>(stage)].add(lap_ns_ - check_begin_ns_);
+  validation_[static_cast<std::size_t>(stage)].add(lap_between(check_begin_ns_, lap_ns_));
 }
 
 std::vector<std::string> Environment::warnings() {
@@ -93,7 +93,7 @@ void Environment::bound_bodies(const Trusted<TrialState>&) {
     set_vector(data_.lower.span(), i, bounds.lower);
     set_vector(data_.upper.span(), i, bounds.upper);
   }
-  profile_[static_cast<std::size_t>(Stage::kBound)].add(lap_ns() - start);
+  profile_[static_cast<std::size_t>(Stage::kBound)].add(lap_between(start, lap_ns()));
 }
 
 // How the bodies get from S_n to S*, and bounds of all that they pass.
@@ -112,7 +112,7 @@ void Environment::bound_motions(const Trusted<TrialState>&, double length) {
     set_vector(data_.lower.span(), i, bounds.lower);
     set_vector(data_.upper.span(), i, bounds.upper);
   }
-  profile_[static_cast<std::size_t>(Stage::kBound)].add(lap_ns() - start);
+  profile_[static_cast<std::size_t>(Stage::kBound)].add(lap_between(start, lap_ns()));
 }
 
 Trusted<Pairs> Environment::find_pairs() {

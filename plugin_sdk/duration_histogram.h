@@ -36,7 +36,7 @@ class DurationHistogram {
 
  private:
   static constexpr std::uint32_t kPerOctave = 16;
-  static constexpr std::uint32_t kBuckets = 60 * kPerOctave;
+  static constexpr std::uint32_t kBuckets = 61 * kPerOctave;
 
   // 0 … 15 ns have a bucket each; above, four bits below the leading one choose it.
   static std::uint32_t bucket(std::uint64_t ns) {

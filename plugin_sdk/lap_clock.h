@@ -22,4 +22,7 @@ inline std::uint64_t lap_ns() {
   return static_cast<std::uint64_t>((static_cast<Uint128>(__rdtsc()) * scale) >> 32U);
 }
 
+// From one reading to a later one; 0 if the counter of another core is behind.
+inline std::uint64_t lap_between(std::uint64_t start, std::uint64_t end) { return end > start ? end - start : 0; }
+
 }  // namespace gravitas

@@ -22,6 +22,9 @@ TEST(DurationHistogram, IsExactForSmallAndKeepsLargeDurations) {
   large.add(3'600'000'000'000);
   EXPECT_NEAR(large.quantile_us(0.5), 3.6e9, 0.04 * 3.6e9);
   EXPECT_EQ(DurationHistogram().quantile_us(0.5), 0.0);
+  DurationHistogram largest;
+  largest.add(~std::uint64_t{0});
+  EXPECT_NEAR(largest.quantile_us(0.5), 1.8447e16, 0.04 * 1.8447e16);
 }
 
 }  // namespace
