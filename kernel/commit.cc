@@ -66,8 +66,8 @@ void Environment::write_trial(const Trusted<TrialState>&) {
 void Environment::write_solution(const Trusted<Solution>&) {
   copy(data_.solved_linear_velocity, back().linear_velocity);
   copy(data_.solved_angular_velocity, back().angular_velocity);
-  copy(data_.trial_position, back().position);
-  copy(data_.trial_orientation, back().orientation);
+  back().position.assign(data_.trial_position);
+  back().orientation.assign(data_.trial_orientation);
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* change = &data_.pose_change[6 * i];
     const bool moved = std::any_of(change, change + 6, [](double number) { return number != 0.0; });

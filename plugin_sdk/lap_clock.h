@@ -9,7 +9,7 @@
 
 namespace gravitas {
 namespace detail {
-// Nanoseconds in 2^32 ticks of the processor's counter; 0 where it does not run evenly. Measures for 0.2 ms.
+// Nanoseconds in 2^32 ticks of the processor's counter; 0 where it does not run evenly. Measures for 1 ms.
 std::uint64_t measure_tick_scale();
 }  // namespace detail
 

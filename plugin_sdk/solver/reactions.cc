@@ -172,6 +172,7 @@ class ReactionSolver {
   // Rows of all joints with the bodies where they are.
   void make_rows() {
     rows_.clear();
+    longest_ = 0.0;
     for (const Joint& joint : joints_) {
       const Discrepancy d = at_pose(joint);
       const Matrix3 axes = to_rotation_matrix(d.axes);

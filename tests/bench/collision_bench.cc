@@ -10,7 +10,6 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "plugin_sdk/geometry/scene_shape.h"
 #include "plugin_sdk/library.h"
 #include "plugin_sdk/message_columns.h"
+#include "tests/bench/thread_clock.h"
 #include "tests/paths.h"
 #include "tests/plugin_sdk/geometry/random_shapes.h"
 
@@ -38,12 +38,6 @@ namespace {
 using Kind = SceneShape::Kind;
 constexpr std::size_t kPairs = 1000;
 constexpr std::size_t kVariants = 8;  // of the poses
-
-double processor_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 double bump(double x, double z) { return 0.3 * std::sin(0.9 * x) * std::cos(0.7 * z); }
 
@@ -372,9 +366,9 @@ void add(const std::string& title, const std::string& library, stage::Method met
         for (std::size_t i = 0; i < kVariants; ++i) subject.ask(i);
         for (auto _ : state) {
           variant = (variant + 1) % kVariants;
-          const double start = processor_seconds();
+          const double start = thread_seconds();
           found = subject.ask(variant);
-          const double spent = processor_seconds() - start;
+          const double spent = thread_seconds() - start;
           seconds += spent;
           state.SetIterationTime(spent);
         }

@@ -10,7 +10,6 @@
 // with its pair cache, neither exact nor sorted.
 #include <benchmark/benchmark.h>
 
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "plugin_sdk/library.h"
 #include "plugin_sdk/message_columns.h"
 #include "plugin_sdk/property_value.h"
+#include "tests/bench/thread_clock.h"
 #include "tests/paths.h"
 
 #ifdef GRAVITAS_HAS_BULLET
@@ -204,13 +204,6 @@ class BulletSpaceUnderLoad {
 };
 
 #endif
-
-// Of this thread: what else the machine does falls out of a comparison.
-double thread_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 template <typename Space>
 void find_pairs(benchmark::State& state, const std::string& name, const Layout& layout, const Motion& motion) {

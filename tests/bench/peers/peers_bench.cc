@@ -8,7 +8,6 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <ctime>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -16,18 +15,12 @@
 
 #include "tests/bench/peers/engine.h"
 #include "tests/bench/peers/scene.h"
+#include "tests/bench/thread_clock.h"
 
 namespace gravitas::peers {
 namespace {
 
 constexpr double kFarAway = 1e6;  // m; who gets there has blown up
-
-// Of this thread: what else the machine does falls out of a comparison.
-double thread_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 struct Run {
   double seconds = 0.0;  // of all steps
