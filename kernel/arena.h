@@ -97,6 +97,14 @@ class Column {
   ColumnId id_ = 0;
 };
 
+// Columns as the C interface has them, until the arena moves.
+inline std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> plain_columns(const Arena& arena,
+                                                                       std::span<const ColumnId> columns) {
+  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> plain;
+  for (std::size_t i = 0; i < columns.size(); ++i) plain[i] = {arena.data(columns[i]), arena.count(columns[i])};
+  return plain;
+}
+
 // Columns of a request or reply, in the order of its contract.
 template <typename... T>
 std::array<ColumnId, sizeof...(T)> ids(const Column<T>&... columns) {

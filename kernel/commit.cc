@@ -161,8 +161,7 @@ void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   const DiscrepancyAnswer& d = data_.discrepancies;
   const DiscrepancyColumns columns = d.columns();
-  const std::vector<std::string>& solves = solver_.description().plugins[0].declaration.capabilities;
-  const bool leaves_no_error = std::ranges::find(solves, "closes_joints") != solves.end();
+  const bool leaves_no_error = has_capability(solver_.description().plugins[0].declaration, "closes_joints");
   const auto body = [&](std::uint32_t i) {
     if (i == kNone) return JointBody{};
     return JointBody{pose_of(data_.trial_position, data_.trial_orientation, i),

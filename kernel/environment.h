@@ -241,15 +241,25 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::string find_misfit(const SavedState& saved) const;
 
   // forces.cc
-  std::span<const ColumnId> trial_columns() const override;
-  ColumnId wrench_column() const override { return told_wrench().id(); }
+  std::span<const ColumnId> trial_columns() const override { return trial_columns_; }
+  std::span<const ColumnId> answer_columns() const override { return answer_columns_; }
   const Column<double>& told_wrench() const { return knows_reactions() ? data_.wrench_with_reactions : data_.wrench; }
   void begin_attempt(bool counts) override;
   void evaluate() override;
   // At the time in data_.derivative_time.
   void ask_forces(const Column<double>& position, const Column<double>& orientation,
                   const Column<double>& linear_velocity, const Column<double>& angular_velocity);
+  template <typename... State>
+  auto force_request(const ForceGroup& group, const State&... state) const {
+    return ids(data_.derivative_time, group.type, group.parameter_begin, group.parameter, group.application,
+               model_.mass, model_.geometry_position, model_.geometry_orientation, state..., model_.body_shape,
+               model_.shape_type, model_.shape_parameter_begin, model_.shape_parameter);
+  }
   void sum_wrenches();
+  // True for a group of forces whose wrenches never change.
+  bool is_constant(std::size_t group) const;
+  void count_jacobian_blocks();
+  void ask_jacobians();
 
   // exchange.cc: others in a slot.
   StageSlot& slot_of(Slot slot);
@@ -333,16 +343,16 @@ class Environment : private DerivativeSource, private SlotObserver {
   StageSlot space_, collision_, constraint_, force_, solver_, integrator_;
   const std::array<StageSlot*, 6> slots_ = {&integrator_, &force_, &space_, &collision_, &constraint_, &solver_};
 
-  const std::array<ColumnId, 5> trial_columns_;
+  const std::array<ColumnId, 6> trial_columns_;
+  const std::array<ColumnId, 3> answer_columns_;
   std::vector<std::vector<ColumnId>> discrepancy_reply_;  // per constraint group
 
   // Known once the forces have been asked at the start.
   bool wrench_is_constant_ = true;
   bool has_impulses_ = false;
-  std::vector<double> initial_potential_;  // per application
   bool start_wrench_known_ = false;
   bool attempt_counts_ = true;
-  std::vector<std::size_t> next_in_group_;  // scratch of sum_wrenches()
+  std::vector<std::size_t> next_in_group_;  // scratch of merge_discrepancies()
 
   CommitFigures figures_;
   Hash state_hash_, chain_hash_;

@@ -70,7 +70,7 @@ std::string Environment::why_unfit(const PluginDeclaration& plugin) const {
   const bool is_smooth = knows_reactions(), asks = is_smooth || description_.simulator == Simulator::kContinuous;
   const char* capability = is_smooth ? "reactions" : "times_of_impact";
   if (!asks || plugin.slot != (is_smooth ? Slot::kSolver : Slot::kCollision)) return {};
-  if (std::ranges::find(plugin.capabilities, capability) != plugin.capabilities.end()) return {};
+  if (has_capability(plugin, capability)) return {};
   return std::string("the simulator ") + (is_smooth ? "Smooth" : "Continuous") +
          " needs a plugin with the capability '" + capability + "' in slot " + slot_name(plugin.slot) + ", and " +
          plugin.name + " has it not";
@@ -121,6 +121,7 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   if (now.name == before.declaration.name) return;
   wakes_all_ = true;
   find_sleepers();
+  if (slot.which() == Slot::kForce) count_jacobian_blocks();
   if (slot.which() == Slot::kIntegrator) {
     data_.theta[0] = now.theta;
     for (const State& state : states_) {
@@ -130,11 +131,10 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   }
   if (slot.which() == Slot::kCollision) {
     // its features have other numbers
-    for (const State& state : states_) {
-      for (const Column<std::uint32_t>* column : {&state.contact_body, &state.contact_feature}) column->resize(0);
-      for (const Column<double>* column : {&state.contact_impulse, &state.contact_correction}) column->resize(0);
-      state.contact_key.resize(0);
-    }
+    for (const State& state : states_)
+      state.visit_columns([](const char*, StateRows rows, std::uint32_t, const auto& column) {
+        if (rows == StateRows::kContact) column.resize(0);
+      });
   }
 }
 

@@ -2,20 +2,16 @@
 #include <algorithm>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas::kernel {
-
-std::span<const ColumnId> Environment::trial_columns() const { return trial_columns_; }
 
 void Environment::ask_forces(const Column<double>& position, const Column<double>& orientation,
                              const Column<double>& linear_velocity, const Column<double>& angular_velocity) {
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     const ForceAnswer& answer = data_.force_answers[g];
-    const auto request = ids(data_.derivative_time, group.type, group.parameter_begin, group.parameter,
-                             group.application, model_.mass, model_.geometry_position, model_.geometry_orientation,
-                             position, orientation, linear_velocity, angular_velocity, model_.body_shape,
-                             model_.shape_type, model_.shape_parameter_begin, model_.shape_parameter);
+    const auto request = force_request(group, position, orientation, linear_velocity, angular_velocity);
     const auto reply = ids(answer.wrench, answer.impulse, answer.potential, answer.flags);
     const StageCall call{stage::Method::kForceWrenches, group.target, request, reply};
     ask(Stage::kForce, &force_, call, nullptr, [&](const auto& got) { return validator_.wrenches(got, answer); });
@@ -25,24 +21,50 @@ void Environment::ask_forces(const Column<double>& position, const Column<double
 void Environment::sum_wrenches() {
   const std::span<double> sum = data_.wrench.span();
   std::ranges::fill(sum, 0.0);
-  if (model_.force_groups.size() == 1) {
-    const std::span<const double> wrench = data_.force_answers[0].wrench.span();
-    for (std::size_t i = 0; i < model_.application_body.size(); ++i)
-      for (std::size_t k = 0; k < 6; ++k) sum[6 * model_.application_body[i] + k] += wrench[6 * i + k];
-    return;
+  for (const Model::Application& one : model_.applications) {
+    const double* wrench = &data_.force_answers[one.group].wrench[6 * one.place];
+    for (std::size_t k = 0; k < 6; ++k) sum[6 * one.body + k] += wrench[k];
   }
-  // several plugins: walk all applications in the scene's order
-  std::vector<std::size_t>& next = next_in_group_;
-  next.assign(model_.force_groups.size(), 0);
-  for (std::uint32_t row = 0; row < model_.application_count; ++row) {
-    for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
-      const ForceGroup& group = model_.force_groups[g];
-      if (next[g] == group.row.size() || group.row[next[g]] != row) continue;
-      const std::span<const double> wrench = data_.force_answers[g].wrench.span();
-      for (std::size_t k = 0; k < 6; ++k) sum[6 * model_.application_body[row] + k] += wrench[6 * next[g] + k];
-      ++next[g];
-      break;
-    }
+}
+
+bool Environment::is_constant(std::size_t group) const {
+  const std::span<const std::uint32_t> flags = data_.force_answers[group].flags.span();
+  return std::ranges::all_of(flags, [](std::uint32_t bits) { return (bits & kConstantWrench) != 0; });
+}
+
+// Joints that answer in derivatives have none.
+void Environment::count_jacobian_blocks() {
+  std::uint64_t blocks = 0;
+  bool can_all = !knows_reactions();
+  for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
+    const ForceGroup& group = model_.force_groups[g];
+    if (is_constant(g)) continue;
+    can_all = can_all && has_capability(force_.description().plugins[group.target].declaration, "jacobians");
+    blocks += kMostBlocksOfApplication * group.row.size();
+  }
+  data_.jacobian_blocks[0] = can_all ? static_cast<std::uint32_t>(blocks) : 0;
+}
+
+// One group's blocks behind the other's.
+void Environment::ask_jacobians() {
+  data_.jacobian_body.resize(0), data_.jacobian.resize(0);
+  if (data_.derivative_with_jacobian[0] == 0 || data_.jacobian_blocks[0] == 0) return;
+  const auto append = [](const auto& more, const auto& all) {
+    const std::size_t old = all.size();
+    all.resize(old + more.size());
+    std::ranges::copy(more.span(), all.data() + old);
+  };
+  for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
+    const ForceGroup& group = model_.force_groups[g];
+    if (is_constant(g)) continue;
+    const auto request = force_request(group, data_.derivative_position, data_.derivative_orientation,
+                                       data_.derivative_linear_velocity, data_.derivative_angular_velocity);
+    const auto reply = ids(data_.block_body, data_.block);
+    const StageCall call{stage::Method::kForceJacobians, group.target, request, reply};
+    ask(Stage::kForce, &force_, call, nullptr, [&](const auto& got) {
+      return validator_.jacobians(got, data_.block_body, kMostBlocksOfApplication * group.row.size());
+    });
+    append(data_.block_body, data_.jacobian_body), append(data_.block, data_.jacobian);
   }
 }
 
@@ -64,6 +86,7 @@ void Environment::evaluate() {
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);
     sum_wrenches();
+    ask_jacobians();
     if (sleepers_ > 0 && attempt_counts_) look_for_pushes();
   }
   if (knows_reactions()) ask_reactions();
@@ -74,29 +97,19 @@ void Environment::evaluate() {
 }
 
 double Environment::potential_energy() {
+  if (force_.is_running()) {
+    data_.derivative_time[0] = time();
+    ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
+  }
   double sum = 0.0;
-  bool asked = false;
-  for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
-    const ForceGroup& group = model_.force_groups[g];
-    const ForceAnswer& answer = data_.force_answers[g];
-    for (std::size_t i = 0; i < group.row.size(); ++i) {
-      if ((answer.flags[i] & kHasPotential) == 0) continue;
-      const bool constant = (answer.flags[i] & kConstantWrench) != 0;
-      if (!constant && !asked && force_.is_running()) {
-        data_.derivative_time[0] = time();
-        ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
-        asked = true;
-      }
-      if (!constant) {
-        sum += answer.potential[i];
-        continue;
-      }
-      // a constant force has a potential that falls along it
-      const std::uint32_t body = group.application[2 * i + 1];
-      const Vector3 moved = vector_at(front().position.span(), body) - description_.bodies[body].pose.position;
-      sum += initial_potential_[group.row[i]] -
-             Vector3(answer.wrench[6 * i], answer.wrench[6 * i + 1], answer.wrench[6 * i + 2]).dot(moved);
-    }
+  for (const Model::Application& one : model_.applications) {
+    const ForceAnswer& answer = data_.force_answers[one.group];
+    if ((answer.flags[one.place] & kHasPotential) == 0) continue;
+    sum += answer.potential[one.place];
+    if (force_.is_running()) continue;
+    // asked at the start: the potential of a constant force falls along it
+    const Vector3 moved = vector_at(front().position.span(), one.body) - description_.bodies[one.body].pose.position;
+    sum -= vector_at(answer.wrench.span(), 2 * one.place).dot(moved);
   }
   return sum;
 }

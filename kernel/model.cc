@@ -82,19 +82,19 @@ Model::Model(Arena* arena, const EnvironmentDescription& d)
   }
   for (std::uint32_t plugin = 0; plugin < d.force.plugins.size(); ++plugin) {
     const auto served = served_by(d.forces, plugin);
-    std::uint64_t applications = 0;
+    std::uint64_t rows = 0;
     for (const BodyDescription& body : d.bodies)
-      applications +=
+      rows +=
           static_cast<std::uint64_t>(std::count_if(body.forces.begin(), body.forces.end(), [&](std::uint32_t force) {
             return d.forces[force].plugin == plugin;
           }));
-    if (applications == 0) continue;
+    if (rows == 0) continue;
     ForceGroup& group = force_groups.emplace_back();
     group.target = plugin;
     group.type = Column<std::uint64_t>(arena, served.size(), 0);
     group.parameter_begin = Column<std::uint32_t>(arena, served.size() + 1, 0);
     group.parameter = Column<double>(arena, parameter_count(served), 0);
-    group.application = Column<std::uint32_t>(arena, 2 * applications, 0);
+    group.application = Column<std::uint32_t>(arena, 2 * rows, 0);
   }
   for (std::uint32_t plugin = 0; plugin < d.constraint.plugins.size(); ++plugin) {
     const auto served = served_by(d.constraints, plugin);
@@ -138,8 +138,9 @@ void Model::write(const EnvironmentDescription& d) {
   }
   write_parameters(pointers(d.shapes), shape_parameter_begin, shape_parameter);
 
-  // applications in the order of the bodies and their lists, which is the order of summation
-  for (ForceGroup& group : force_groups) {
+  applications.resize(application_count);
+  for (std::uint32_t g = 0; g < force_groups.size(); ++g) {
+    ForceGroup& group = force_groups[g];
     std::vector<std::uint32_t> row_in_group(d.forces.size(), 0);
     std::vector<const ForceDescription*> served;
     for (std::size_t f = 0; f < d.forces.size(); ++f) {
@@ -155,14 +156,13 @@ void Model::write(const EnvironmentDescription& d) {
         if (d.forces[force].plugin == group.target) {
           group.application[2 * group.row.size()] = row_in_group[force];
           group.application[2 * group.row.size() + 1] = body;
+          applications[global] = {body, g, static_cast<std::uint32_t>(group.row.size())};
           group.row.push_back(global);
         }
         ++global;
       }
     }
   }
-  for (std::uint32_t body = 0; body < body_count; ++body)
-    application_body.insert(application_body.end(), d.bodies[body].forces.size(), body);
 
   for (ConstraintGroup& group : constraint_groups) {
     const auto served = served_by(d.constraints, group.target);

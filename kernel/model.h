@@ -67,7 +67,11 @@ struct Model {
   std::vector<double> material_pairs;
 
   std::vector<ForceGroup> force_groups;
-  std::vector<std::uint32_t> application_body;  // body of each application, in the order of the scene
+  // In the order of the scene, which is the order of summation; `place` in the group's.
+  struct Application {
+    std::uint32_t body, group, place;
+  };
+  std::vector<Application> applications;
   std::vector<ConstraintGroup> constraint_groups;
   std::vector<ConstraintDescription> constraints;
 };

@@ -30,7 +30,9 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       solver_(Slot::kSolver, description_.solver),
       integrator_(Slot::kIntegrator, description_.integrator),
       trial_columns_(ids(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
-                         data_.derivative_linear_velocity, data_.derivative_angular_velocity)) {
+                         data_.derivative_linear_velocity, data_.derivative_angular_velocity,
+                         data_.derivative_with_jacobian)),
+      answer_columns_(ids(told_wrench(), data_.jacobian_body, data_.jacobian)) {
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
   const bool has_inner_steps =
       description_.simulator >= Simulator::kBisection || description_.substeps > 1 || !description_.switches.empty();
@@ -88,13 +90,11 @@ void Environment::ask_constant_forces() {
   ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
   sum_wrenches();
 
-  initial_potential_.assign(model_.application_count, 0.0);
   std::ranges::fill(data_.impulse.span(), 0.0);
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     const ForceAnswer& answer = data_.force_answers[g];
     for (std::size_t i = 0; i < group.row.size(); ++i) {
-      initial_potential_[group.row[i]] = answer.potential[i];
       wrench_is_constant_ &= (answer.flags[i] & kConstantWrench) != 0;
       for (std::size_t k = 0; k < 6; ++k) {
         data_.impulse[6 * group.application[2 * i + 1] + k] += answer.impulse[6 * i + k];
@@ -104,6 +104,7 @@ void Environment::ask_constant_forces() {
   }
   if (!wrench_is_constant_) {
     remember_wrenches();
+    count_jacobian_blocks();
     return;
   }
   force_.stop();

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <string>
 #include <tuple>
 
@@ -82,16 +81,12 @@ std::string find_wrong_body(const State& state, const State& initial, const Mode
     return at_row("orientation", row) + " is not of unit length";
   if (!are_flags(state.intact.span())) return "intact is neither 0 nor 1";
   if (!are_flags(state.state_changed.span())) return "state_changed is neither 0 nor 1";
-  for (std::uint32_t i = 0; i < model.body_count; ++i) {
-    if ((model.flags[i] & (kMovable | kKinematic)) != 0) continue;
-    const auto differs = [&](const Column<double>& a, const Column<double>& b, std::size_t components) {
-      return std::memcmp(&a[i * components], &b[i * components], components * sizeof(double)) != 0;
-    };
-    if (differs(state.position, initial.position, 3) || differs(state.orientation, initial.orientation, 4) ||
-        differs(state.linear_velocity, initial.linear_velocity, 3) ||
-        differs(state.angular_velocity, initial.angular_velocity, 3))
-      return "the immovable body '" + model.body_id[i] + "' has moved";
-  }
+  const std::size_t moved = first_changed_body(model.flags.span(), kMovable | kKinematic,
+                                               {{state.position.span(), initial.position.span()},
+                                                {state.orientation.span(), initial.orientation.span()},
+                                                {state.linear_velocity.span(), initial.linear_velocity.span()},
+                                                {state.angular_velocity.span(), initial.angular_velocity.span()}});
+  if (moved != kNoRow) return "the immovable body '" + model.body_id[moved] + "' has moved";
   const std::uint32_t sleeper = find_wrong_sleeper(bodies_at_rest(model, state), state.rested.span());
   return sleeper == kNone ? "" : "the body '" + model.body_id[sleeper] + "' sleeps, and may not or moves";
 }

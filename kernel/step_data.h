@@ -49,9 +49,13 @@ struct StepData {
   // Trial state of a derivative request, and its time. Written by the carrier of Stage::kIntegrate.
   Column<double> derivative_time, derivative_position, derivative_orientation, derivative_linear_velocity,
       derivative_angular_velocity;
+  Column<std::uint32_t> derivative_with_jacobian;
   // Stage::kForce: answers per group; sum per body (6); impulses per body (6), asked once.
   std::vector<ForceAnswer> force_answers;
   Column<double> wrench, impulse;
+  // How many blocks there may be, what a plugin answers, and all of them, where they are asked for.
+  Column<std::uint32_t> jacobian_blocks, block_body, jacobian_body;
+  Column<double> block, jacobian;
   // Wrenches at S_n for the solver, which may differ from the last ones that the integrator asked for.
   Column<double> start_wrench;
 

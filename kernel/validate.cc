@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <string>
 
 #include "plugin_sdk/answer_checks.h"
@@ -28,25 +27,9 @@ void require_physics(const std::string& problem) {
   if (!problem.empty()) throw StageFault(FaultKind::kBadPhysics, "physics", "its answer breaks a law: " + problem);
 }
 
-// The columns of a request as its view takes them.
-class RequestColumns {
- public:
-  RequestColumns(const Arena& arena, const StageCall& call) {
-    for (std::size_t i = 0; i < call.request.size(); ++i)
-      columns_[i] = {arena.data(call.request[i]), arena.count(call.request[i])};
-  }
-  const gravitas_column* data() const { return columns_.data(); }
-
- private:
-  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns_;
-};
+bool is_zero(double number) { return number == 0.0; }
 
 std::string at_row(const char* what, std::size_t row) { return std::string(what) + " of row " + std::to_string(row); }
-
-// True if a row of two columns has the same bits.
-bool same_row(std::span<const double> a, std::span<const double> b, std::size_t row, std::size_t components) {
-  return std::memcmp(&a[row * components], &b[row * components], components * sizeof(double)) == 0;
-}
 
 }  // namespace
 
@@ -72,21 +55,26 @@ Trusted<Wrenches> Validator::wrenches(const Untrusted<StageCall>& answer, const 
   return Trusted<Wrenches>({});
 }
 
+Trusted<Wrenches> Validator::jacobians(const Untrusted<StageCall>& answer, const Column<std::uint32_t>& bodies,
+                                       std::uint64_t most) const {
+  check_structure_and_finiteness(answer.value_);
+  require(check_block_rows(bodies.span(), model_.body_count, most));
+  return Trusted<Wrenches>({});
+}
+
 Trusted<TrialState> Validator::trial_state(const Untrusted<StageCall>& answer, const StepData& data,
                                            const State& start) const {
   check_structure_and_finiteness(answer.value_);
   if (const std::size_t row = first_not_unit(data.trial_orientation.span(), 4); row != kNoRow)
     bad_numbers(at_row("orientation", row) + " is not of unit length");
-  for (std::size_t i = 0; i < model_.body_count; ++i) {
-    if ((data.flags[i] & (kMovable | kKinematic)) != 0) continue;
-    if (!same_row(data.trial_position.span(), start.position.span(), i, 3) ||
-        !same_row(data.trial_orientation.span(), start.orientation.span(), i, 4) ||
-        !same_row(data.trial_linear_velocity.span(), start.linear_velocity.span(), i, 3) ||
-        !same_row(data.trial_angular_velocity.span(), start.angular_velocity.span(), i, 3))
-      bad_numbers("it moved the immovable body '" + model_.body_id[i] + "'");
-  }
+  const std::size_t moved = first_changed_body(data.flags.span(), kMovable | kKinematic,
+                                               {{data.trial_position.span(), start.position.span()},
+                                                {data.trial_orientation.span(), start.orientation.span()},
+                                                {data.trial_linear_velocity.span(), start.linear_velocity.span()},
+                                                {data.trial_angular_velocity.span(), start.angular_velocity.span()}});
+  if (moved != kNoRow) bad_numbers("it moved the immovable body '" + model_.body_id[moved] + "'");
   if (samples_physics_) {
-    const RequestColumns columns(arena_, answer.value_);
+    const auto columns = plain_columns(arena_, answer.value_.request);
     require_physics(check_integration(stage::IntegratorIntegrateRequest(columns.data()),
                                       {data.trial_position.span(), data.trial_orientation.span(),
                                        data.trial_linear_velocity.span(), data.trial_angular_velocity.span()},
@@ -106,7 +94,7 @@ Trusted<Pairs> Validator::pairs(const Untrusted<StageCall>& answer, const StepDa
   check_structure_and_finiteness(answer.value_);
   require(check_pairs(data.pair.span(), model_.flags.span()));
   if (samples_physics_) {
-    const RequestColumns columns(arena_, answer.value_);
+    const auto columns = plain_columns(arena_, answer.value_.request);
     require_physics(pair_check_.check(stage::SpacePairsRequest(columns.data()), data.pair.span()));
   }
   return Trusted<Pairs>({});
@@ -124,7 +112,7 @@ Trusted<Contacts> Validator::contacts(const Untrusted<StageCall>& answer, const 
   require(check_contact_rows(data.contact_pair.span(), data.contact_feature.span(), data.contact_normal.span(),
                              data.pair.size() / 2));
   if (samples_physics_) {
-    const RequestColumns columns(arena_, answer.value_);
+    const auto columns = plain_columns(arena_, answer.value_.request);
     require_physics(check_contacts(stage::CollisionManifoldsRequest(columns.data()),
                                    {data.contact_pair.span(), data.contact_normal.span(), data.contact_point.span(),
                                     data.contact_depth.span(), data.contact_relative_velocity.span()}));
@@ -154,14 +142,13 @@ Trusted<Reactions> Validator::reactions(const Untrusted<StageCall>& answer) cons
 
 Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const StepData& data) const {
   check_structure_and_finiteness(answer.value_);
-  for (std::size_t i = 0; i < model_.body_count; ++i) {
-    if ((data.flags[i] & kMovable) != 0) continue;
-    const std::span<const double> change = data.pose_change.span().subspan(6 * i, 6);
-    if (!same_row(data.solved_linear_velocity.span(), data.trial_linear_velocity.span(), i, 3) ||
-        !same_row(data.solved_angular_velocity.span(), data.trial_angular_velocity.span(), i, 3) ||
-        std::ranges::any_of(change, [](double number) { return number != 0.0; }))
-      bad_numbers("it pushed the body '" + model_.body_id[i] + "', which nothing can push");
-  }
+  std::size_t pushed = first_changed_body(data.flags.span(), kMovable,
+                                          {{data.solved_linear_velocity.span(), data.trial_linear_velocity.span()},
+                                           {data.solved_angular_velocity.span(), data.trial_angular_velocity.span()}});
+  const std::span<const double> change = data.pose_change.span();
+  for (std::size_t i = 0; i < model_.body_count && pushed == kNoRow; ++i)
+    if ((data.flags[i] & kMovable) == 0 && !std::ranges::all_of(change.subspan(6 * i, 6), is_zero)) pushed = i;
+  if (pushed != kNoRow) bad_numbers("it pushed the body '" + model_.body_id[pushed] + "', which nothing can push");
 
   const SolutionColumns solution = {
       data.solved_linear_velocity.span(), data.solved_angular_velocity.span(), data.pose_change.span(),
@@ -169,7 +156,7 @@ Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const 
       data.contact_correction.span(),     data.contact_direction.span(),       data.stop_reason[0]};
   require(check_multipliers(solution, data.contact_material.span(), data.discrepancies.mode.span()));
   if (samples_physics_) {
-    const RequestColumns columns(arena_, answer.value_);
+    const auto columns = plain_columns(arena_, answer.value_.request);
     require_physics(solution_check_.check(stage::SolverSolveRequest(columns.data()), solution));
   }
   return Trusted<Solution>({});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 namespace gravitas {
 namespace {
@@ -83,6 +84,18 @@ std::string RowCheck::check(stage::Method method, ColumnCounts request, ColumnCo
   std::ranges::copy(request, passed.request.begin());
   std::ranges::copy(reply, passed.reply.begin());
   return problem;
+}
+
+std::size_t first_changed_body(std::span<const std::uint32_t> flags, std::uint32_t movers,
+                               std::initializer_list<ColumnPair> columns) {
+  for (std::size_t i = 0; i < flags.size(); ++i) {
+    if ((flags[i] & movers) != 0) continue;
+    for (const ColumnPair& pair : columns) {
+      const std::size_t components = pair.a.size() / flags.size();
+      if (std::memcmp(&pair.a[i * components], &pair.b[i * components], components * sizeof(double)) != 0) return i;
+    }
+  }
+  return kNoRow;
 }
 
 }  // namespace gravitas

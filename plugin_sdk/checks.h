@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <string>
 
@@ -41,5 +42,13 @@ class RowCheck {
   };
   std::array<Counts, stage::kMethodCount> passed_;
 };
+
+// First body (kNoRow: none) that has none of these flags and whose numbers are not the same, bit for bit, in both columns of
+// a pair.
+struct ColumnPair {
+  std::span<const double> a, b;
+};
+std::size_t first_changed_body(std::span<const std::uint32_t> flags, std::uint32_t movers,
+                               std::initializer_list<ColumnPair> columns);
 
 }  // namespace gravitas

@@ -28,24 +28,35 @@ inline void require_shape(const stage::ForceWrenchesRequest& request, std::uint3
     throw Refusal("body " + std::to_string(body) + " has a shape that does not exist");
 }
 
+// Who acts on whom, by the row of the applications.
+struct Application {
+  std::uint32_t force, body;
+  PropertyCursor properties;  // of the force
+};
+
+// Throws Refusal for an index outside the request.
+inline Application application_at(const stage::ForceWrenchesRequest& request, std::size_t row) {
+  const std::span<const std::uint32_t> begin = request.force_parameter_begin();
+  const std::uint32_t force = request.application()[2 * row], body = request.application()[2 * row + 1];
+  if (force + std::size_t{1} >= begin.size() || body >= request.mass().size() || begin[force] > begin[force + 1] ||
+      begin[force + 1] > request.force_parameter().size())
+    throw Refusal("application " + std::to_string(row) + " names a force or body that does not exist");
+  require_shape(request, body);
+  return {force, body,
+          PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force]))};
+}
+
 // Calls answer(type id, flattened properties of the force, body) for every application in order and writes what it
 // returns. Throws Refusal for an index outside the request, and for an answer that is not finite.
 template <typename Answer>
 void for_each_application(const stage::ForceWrenchesRequest& request, const stage::ForceWrenchesReply& reply,
                           Answer&& answer) {
-  const std::span<const std::uint32_t> applications = request.application(), begin = request.force_parameter_begin();
-  for (std::size_t i = 0; i + 1 < applications.size(); i += 2) {
-    const std::uint32_t force = applications[i], body = applications[i + 1];
-    if (force + std::size_t{1} >= begin.size() || body >= request.mass().size() || begin[force] > begin[force + 1] ||
-        begin[force + 1] > request.force_parameter().size())
-      throw Refusal("application " + std::to_string(i / 2) + " names a force or body that does not exist");
-    require_shape(request, body);
-    const ApplicationAnswer a =
-        answer(request.force_type()[force],
-               PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force])), body);
+  for (std::size_t row = 0; row < request.application().size() / 2; ++row) {
+    const Application one = application_at(request, row);
+    const ApplicationAnswer a = answer(request.force_type()[one.force], one.properties, one.body);
     if (!a.wrench.force.allFinite() || !a.wrench.torque.allFinite() || !a.impulse.force.allFinite() ||
         !a.impulse.torque.allFinite() || !std::isfinite(a.potential))
-      throw Refusal("the wrench of application " + std::to_string(i / 2) + " on body " + std::to_string(body) +
+      throw Refusal("the wrench of application " + std::to_string(row) + " on body " + std::to_string(one.body) +
                     " is not finite: the force's properties or the body's mass or state are not, or too large");
     const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
       column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());

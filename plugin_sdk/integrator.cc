@@ -11,6 +11,10 @@ namespace {
 
 gravitas_column column_of(std::span<const double> numbers) { return {numbers.data(), numbers.size()}; }
 
+std::array<std::span<const double>, 4> columns_of(const TrialColumns& trial) {
+  return {trial.position, trial.orientation, trial.linear_velocity, trial.angular_velocity};
+}
+
 }  // namespace
 
 void TrialColumns::resize(std::size_t bodies) {
@@ -36,27 +40,60 @@ Derivatives::Derivatives(const stage::IntegratorIntegrateRequest& request, Host&
 std::span<const double> Derivatives::wrenches_at_start() {
   if (request_.wrench_is_constant() != 0) return request_.wrench();
   return ask(request_.time(),
-             {request_.position(), request_.orientation(), request_.linear_velocity(), request_.angular_velocity()});
+             {request_.position(), request_.orientation(), request_.linear_velocity(), request_.angular_velocity()},
+             nullptr);
 }
 
 std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial) {
   if (request_.wrench_is_constant() != 0) return request_.wrench();
+  require_finite(trial);
+  return ask(time, columns_of(trial), nullptr);
+}
+
+std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial, WrenchJacobian* jacobian) {
+  jacobian->bodies_.clear(), jacobian->numbers_.clear();
+  jacobian->is_known_ = request_.wrench_is_constant() != 0;
+  if (jacobian->is_known_ || request_.jacobian_blocks() == 0) return wrenches(time, trial);
+  require_finite(trial);
+  const std::span<const double> answer = ask(time, columns_of(trial), jacobian);
+  jacobian->is_known_ = jacobian->size() > 0;
+  return answer;
+}
+
+std::span<const double> Derivatives::ask(double time, const std::array<std::span<const double>, 4>& state,
+                                         WrenchJacobian* jacobian) {
+  answer_.resize(6 * size());
+  const std::uint32_t with_jacobian = jacobian != nullptr ? 1 : 0;
+  const std::array<gravitas_column, 6> question = {column_of({&time, 1}), column_of(state[0]),
+                                                   column_of(state[1]),   column_of(state[2]),
+                                                   column_of(state[3]),   gravitas_column{&with_jacobian, 1}};
+  std::array<gravitas_reply_column, 3> answer = {{{answer_.data(), answer_.size(), 0}, {}, {}}};
+  if (jacobian != nullptr) {
+    const std::size_t blocks = request_.jacobian_blocks();
+    jacobian->bodies_.resize(2 * blocks), jacobian->numbers_.resize(kBlockNumbers * blocks);
+    answer[1] = {jacobian->bodies_.data(), jacobian->bodies_.size(), 0};
+    answer[2] = {jacobian->numbers_.data(), jacobian->numbers_.size(), 0};
+  }
+  host_.derivative(question.data(), answer.data());
+  if (answer[0].count != answer_.size()) throw std::runtime_error("the derivative has the wrong size");
+  require_finite(answer_, 6, "wrench");
+  if (jacobian == nullptr) return answer_;
+  if (answer[2].count != kBlockNumbers / 2 * answer[1].count)
+    throw std::runtime_error("the Jacobian has the wrong size");
+  jacobian->bodies_.resize(answer[1].count), jacobian->numbers_.resize(answer[2].count);
+  for (const std::uint32_t body : jacobian->bodies_)
+    if (body >= size()) throw std::runtime_error("the Jacobian names a body that does not exist");
+  if (const std::size_t index = first_not_finite(jacobian->numbers_); index != kNoRow)
+    throw Refusal("the Jacobian of the wrench of body " + std::to_string(jacobian->body(index / kBlockNumbers)) +
+                  " is not finite: forces, or the properties of the one that acts there, overflow");
+  return answer_;
+}
+
+void Derivatives::require_finite(const TrialColumns& trial) const {
   require_finite(trial.position, 3, "trial position");
   require_finite(trial.orientation, 4, "trial attitude");
   require_finite(trial.linear_velocity, 3, "trial velocity");
   require_finite(trial.angular_velocity, 3, "trial angular velocity");
-  return ask(time, {trial.position, trial.orientation, trial.linear_velocity, trial.angular_velocity});
-}
-
-std::span<const double> Derivatives::ask(double time, const std::array<std::span<const double>, 4>& state) {
-  answer_.resize(6 * size());
-  const std::array<gravitas_column, 5> question = {column_of({&time, 1}), column_of(state[0]), column_of(state[1]),
-                                                   column_of(state[2]), column_of(state[3])};
-  gravitas_reply_column answer = {answer_.data(), answer_.size(), 0};
-  host_.derivative(question.data(), &answer);
-  if (answer.count != answer_.size()) throw std::runtime_error("the derivative has the wrong size");
-  require_finite(answer_, 6, "wrench");
-  return answer_;
 }
 
 void Derivatives::require_finite(std::span<const double> column, std::size_t components, const char* what) const {

@@ -7,6 +7,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas {
 
@@ -42,6 +43,8 @@ class Derivatives {
   // naming the body, for a trial state that is not finite, and for wrenches that are not.
   std::span<const double> wrenches_at_start();
   std::span<const double> wrenches(double time, const TrialColumns& trial);
+  // The same, and how they change with the states of the bodies.
+  std::span<const double> wrenches(double time, const TrialColumns& trial, WrenchJacobian* jacobian);
 
   // Acceleration of one body in a state, under its part of `wrenches`.
   Acceleration acceleration(std::size_t body, const BodyState& state, std::span<const double> wrenches) const;
@@ -51,7 +54,9 @@ class Derivatives {
 
  private:
   void require_finite(std::span<const double> column, std::size_t components, const char* what) const;
-  std::span<const double> ask(double time, const std::array<std::span<const double>, 4>& state);
+  void require_finite(const TrialColumns& trial) const;
+  std::span<const double> ask(double time, const std::array<std::span<const double>, 4>& state,
+                              WrenchJacobian* jacobian);
 
   const stage::IntegratorIntegrateRequest& request_;
   Host& host_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <span>
 
+#include "plugin_sdk/solver/islands.h"
+
 namespace gravitas {
 namespace {
 
@@ -42,6 +44,24 @@ std::vector<std::vector<std::size_t>> interaction_groups(const stage::Integrator
   if (interact) return {movable};
   std::vector<std::vector<std::size_t>> groups;
   for (const std::size_t row : movable) groups.push_back({row});
+  return groups;
+}
+
+std::vector<std::vector<std::size_t>> interaction_groups(const stage::IntegratorIntegrateRequest& request,
+                                                         const WrenchJacobian& jacobian) {
+  const std::span<const std::uint32_t> flags = request.flags();
+  BodyUnion joined(flags.size());
+  for (std::size_t i = 0; i < jacobian.size(); ++i)
+    if ((flags[jacobian.body(i)] & flags[jacobian.by(i)] & kMovable) != 0)
+      joined.join(jacobian.body(i), jacobian.by(i));
+  std::vector<std::vector<std::size_t>> groups;
+  std::vector<std::size_t> group_of(flags.size());
+  for (std::uint32_t row = 0; row < flags.size(); ++row) {
+    if ((flags[row] & kMovable) == 0) continue;
+    const std::uint32_t root = joined.root(row);
+    if (root == row) group_of[row] = groups.size(), groups.emplace_back();
+    groups[group_of[root]].push_back(row);
+  }
   return groups;
 }
 

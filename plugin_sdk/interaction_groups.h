@@ -20,4 +20,8 @@ std::vector<std::vector<std::size_t>> interaction_groups(const stage::Integrator
                                                          Derivatives* derivatives, double time,
                                                          const TrialColumns& trial);
 
+// The same from the blocks of a Jacobian: a group for all movable bodies that are connected by blocks.
+std::vector<std::vector<std::size_t>> interaction_groups(const stage::IntegratorIntegrateRequest& request,
+                                                         const WrenchJacobian& jacobian);
+
 }  // namespace gravitas

@@ -95,9 +95,17 @@ bool ConstraintPlugin::dispatch(stage::Method method, const gravitas_column* req
 
 bool ForcePlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
                            Host& host) {
+  if (method == stage::Method::kForceJacobians) {
+    jacobians(stage::ForceWrenchesRequest(request), stage::ForceJacobiansReply(reply), host);
+    return true;
+  }
   if (method != stage::Method::kForceWrenches) return false;
   wrenches(stage::ForceWrenchesRequest(request), stage::ForceWrenchesReply(reply), host);
   return true;
+}
+
+void ForcePlugin::jacobians(const stage::ForceWrenchesRequest&, const stage::ForceJacobiansReply&, Host&) {
+  throw UnknownMethod();
 }
 
 bool SolverPlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,

@@ -20,6 +20,7 @@
 #include <mutex>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -60,6 +61,10 @@ struct PluginDeclaration {
   // Euler 0, SemiImplicitEuler 1, methods of order two and more 1/2.
   double theta = 0.5;
 };
+
+inline bool has_capability(const PluginDeclaration& declaration, std::string_view name) {
+  return std::ranges::find(declaration.capabilities, name) != declaration.capabilities.end();
+}
 
 // The request is impossible, and why.
 class Refusal : public std::runtime_error {
@@ -119,7 +124,7 @@ class Host {
     });
   }
 
-  // Wrenches of all bodies (six numbers each) in a trial state. `columns` are those of
+  // Wrenches of all bodies (six numbers each) in a trial state, and the blocks of their Jacobian. The columns are those of
   // Integrator.Derivative. Throws std::runtime_error when they cannot be had: let it pass.
   void derivative(const gravitas_column* request, gravitas_reply_column* reply) const {
     if (host_->derivative == nullptr || host_->derivative(host_->context, request, reply) != GRAVITAS_OK)
@@ -176,6 +181,9 @@ class ForcePlugin {
   virtual ~ForcePlugin() = default;
   virtual void wrenches(const stage::ForceWrenchesRequest& request, const stage::ForceWrenchesReply& reply,
                         Host& host) = 0;
+  // For forces with the capability `jacobians` (plugin_sdk/force_jacobians.h helps).
+  virtual void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                         Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 

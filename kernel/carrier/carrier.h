@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <span>
@@ -42,19 +43,22 @@ struct CallResult {
   std::uint64_t check_ns = 0;         // time the frame of the answer was checked
 };
 
-// Answers Integrator.Derivative while an Integrate call is open. `request` names arena columns that hold the
-// trial state; the answer is in the arena column `wrench`.
+// Answers Integrator.Derivative while an Integrate call is open, from and to columns of the arena.
 class DerivativeSource {
  public:
   virtual ~DerivativeSource() = default;
   // Before each attempt at a call; `counts` is false if its answer is only compared.
   virtual void begin_attempt(bool /*counts*/) {}
-  // Columns that the trial state is to be copied to (kColumnCount of the request).
+  // Columns that the request, the trial state, is to be copied to, and those of the reply.
   virtual std::span<const ColumnId> trial_columns() const = 0;
-  virtual ColumnId wrench_column() const = 0;
-  // Evaluates the wrenches of the state in the trial columns. Throws StageFault.
+  virtual std::span<const ColumnId> answer_columns() const = 0;
+  // Evaluates what is asked of the state in the trial columns. Throws StageFault.
   virtual void evaluate() = 0;
 };
+
+// gravitas_host::derivative of plugins in this process. What is thrown meanwhile is kept in `nested`.
+std::int32_t answer_derivative(DerivativeSource* source, Arena* arena, const gravitas_column* request,
+                               gravitas_reply_column* reply, std::exception_ptr* nested);
 
 class Carrier {
  public:

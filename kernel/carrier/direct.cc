@@ -32,7 +32,6 @@ class DirectCarrier final : public Carrier {
     DerivativeSource* derivatives;
     std::exception_ptr nested_fault;
   };
-  static std::int32_t derivative(void* context, const gravitas_column* request, gravitas_reply_column* reply);
 
   std::vector<PluginLibrary> libraries_;
   std::vector<void*> instances_;
@@ -57,32 +56,9 @@ DirectCarrier::~DirectCarrier() {
   for (std::size_t i = 0; i < instances_.size(); ++i) libraries_[i].table->destroy(instances_[i]);
 }
 
-// The plugin's trial state is copied into the arena, where the force slot can see it wherever it is hosted.
-std::int32_t DirectCarrier::derivative(void* context, const gravitas_column* request, gravitas_reply_column* reply) {
-  OpenCall& open = *static_cast<OpenCall*>(context);
-  const std::span<const ColumnId> trial = open.derivatives->trial_columns();
-  for (std::size_t i = 0; i < trial.size(); ++i) {
-    if (request[i].count != open.arena->count(trial[i])) return GRAVITAS_CALLBACK_FAILED;
-    std::memcpy(open.arena->data(trial[i]), request[i].data, request[i].count * sizeof(double));
-  }
-  try {
-    open.derivatives->evaluate();
-  } catch (...) {
-    open.nested_fault = std::current_exception();
-    return GRAVITAS_CALLBACK_FAILED;
-  }
-  const ColumnId wrench = open.derivatives->wrench_column();
-  reply[0].count = open.arena->count(wrench);
-  if (reply[0].count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
-  std::memcpy(reply[0].data, open.arena->data(wrench), reply[0].count * sizeof(double));
-  return GRAVITAS_OK;
-}
-
 CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
-  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> request;
+  const auto request = plain_columns(*arena, call.request);
   std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply;
-  for (std::size_t i = 0; i < call.request.size(); ++i)
-    request[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
   for (std::size_t i = 0; i < call.reply.size(); ++i)
     reply[i] = {arena->data(call.reply[i]), arena->capacity(call.reply[i]), 0};
 
@@ -94,7 +70,11 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
                          void* argument) {
     static_cast<OpenCall*>(context)->threads->parallel_for(count, body, argument);
   };
-  host.derivative = derivatives != nullptr ? &DirectCarrier::derivative : nullptr;
+  if (derivatives != nullptr)
+    host.derivative = [](void* context, const gravitas_column* asked, gravitas_reply_column* answer) {
+      OpenCall& one = *static_cast<OpenCall*>(context);
+      return answer_derivative(one.derivatives, one.arena, asked, answer, &one.nested_fault);
+    };
 
   const std::uint32_t control = floating_point_control();
   gravitas_error error;
@@ -124,6 +104,30 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
 }
 
 }  // namespace
+
+// The plugin's trial state is copied into the arena, where the force slot can see it wherever it is hosted.
+std::int32_t answer_derivative(DerivativeSource* source, Arena* arena, const gravitas_column* request,
+                               gravitas_reply_column* reply, std::exception_ptr* nested) {
+  const stage::MethodInfo& method = stage::method_info(stage::Method::kIntegratorDerivative);
+  const std::span<const ColumnId> trial = source->trial_columns(), answer = source->answer_columns();
+  for (std::size_t i = 0; i < trial.size(); ++i) {
+    if (request[i].count != arena->count(trial[i])) return GRAVITAS_CALLBACK_FAILED;
+    std::memcpy(arena->data(trial[i]), request[i].data, request[i].count * element_size(method.request[i].type));
+  }
+  try {
+    source->evaluate();
+  } catch (...) {
+    *nested = std::current_exception();
+    return GRAVITAS_CALLBACK_FAILED;
+  }
+  for (std::size_t i = 0; i < answer.size(); ++i) {
+    reply[i].count = arena->count(answer[i]);
+    if (reply[i].count > reply[i].capacity) return GRAVITAS_CALLBACK_FAILED;
+    if (reply[i].count > 0)
+      std::memcpy(reply[i].data, arena->data(answer[i]), reply[i].count * element_size(method.reply[i].type));
+  }
+  return GRAVITAS_OK;
+}
 
 std::unique_ptr<Carrier> make_direct_carrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads) {
   return std::make_unique<DirectCarrier>(plugins, threads);

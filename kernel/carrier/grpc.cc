@@ -201,9 +201,7 @@ void GrpcCarrier::leave_out_known(Stream* stream, const MethodInfo& method, std:
 CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
   if (link_.has_ended()) link_.report_death(true);
   const MethodInfo& method = call.info();
-  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> columns;
-  for (std::size_t i = 0; i < call.request.size(); ++i)
-    columns[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
+  auto columns = plain_columns(*arena, call.request);
   const std::span<gravitas_column> request = std::span(columns).first(call.request.size());
 
   const std::uint64_t deadline_ns = call.deadline_ns != 0 ? call.deadline_ns : slot_deadline_ns_;
@@ -291,8 +289,7 @@ void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& rea
   const std::uint64_t pause = channel::now_ns() - asked;
   patience->until += pause;
   patience->cap += pause;
-  const ColumnId wrench = derivatives->wrench_column();
-  const std::array<gravitas_column, 1> answer = {gravitas_column{arena->data(wrench), arena->count(wrench)}};
+  const auto answer = plain_columns(*arena, derivatives->answer_columns());
   write(stream, wire::to_byte_buffer({{}, {}, &header, kDerivative.reply, answer}), patience);
 }
 

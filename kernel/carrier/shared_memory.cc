@@ -283,8 +283,7 @@ void SharedMemoryCarrier::answer_callback(const gravitas_frame_header& header, s
   gravitas_frame_header answer{};
   answer.kind = GRAVITAS_FRAME_ANSWER;
   answer.method = method;
-  const std::array<ColumnId, 1> wrench = {derivatives->wrench_column()};
-  post_frame(answer, wrench, *arena);
+  post_frame(answer, derivatives->answer_columns(), *arena);
 }
 
 }  // namespace

@@ -25,6 +25,12 @@ const char* level_name(Level level) {
   return "C?";
 }
 
+MessageColumns DerivativeAnswer::columns() const {
+  MessageColumns all(stage::method_info(stage::Method::kIntegratorDerivative).reply);
+  all.f64("wrench") = wrench, all.u32("jacobian_body") = jacobian_body, all.f64("jacobian") = jacobian;
+  return all;
+}
+
 std::vector<Case> number_cases(const PluginDeclaration& declaration) {
   switch (declaration.slot) {
     case Slot::kSpace:

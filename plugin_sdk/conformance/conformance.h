@@ -43,8 +43,19 @@ struct Answer {
   bool ok() const { return fault.empty() && status == GRAVITAS_OK; }
 };
 
-// Answers Integrator.Derivative: six numbers per body.
-using DerivativeFunction = std::function<std::vector<double>(const stage::IntegratorDerivativeRequest&)>;
+// What answers Integrator.Derivative: six numbers per body, and blocks where a Jacobian is wanted.
+struct DerivativeAnswer {
+  // NOLINTNEXTLINE(google-explicit-constructor): most functions give wrenches alone
+  DerivativeAnswer(std::vector<double> wrenches, std::vector<std::uint32_t> bodies = {},
+                   std::vector<double> blocks = {})
+      : wrench(std::move(wrenches)), jacobian_body(std::move(bodies)), jacobian(std::move(blocks)) {}
+  MessageColumns columns() const;
+
+  std::vector<double> wrench;
+  std::vector<std::uint32_t> jacobian_body;
+  std::vector<double> jacobian;
+};
+using DerivativeFunction = std::function<DerivativeAnswer(const stage::IntegratorDerivativeRequest&)>;
 
 // A plugin under examination, wherever it is hosted. An answer with status OK has passed check_rows().
 class Subject {

@@ -11,6 +11,7 @@
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/force.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas::conformance {
 namespace {
@@ -253,6 +254,94 @@ void judge_force_hostile(Subject& subject) {
   inquiry.answer_or_refusal(kWrenches, foreign.request());
 }
 
+// ---- how wrenches change
+
+constexpr stage::Method kJacobians = stage::Method::kForceJacobians;
+
+// Six rows and twelve columns a body.
+Eigen::MatrixXd jacobian_of(Inquiry* inquiry, const Forces& forces) {
+  const MessageColumns reply = inquiry->answer(kJacobians, forces.request());
+  const std::vector<std::uint32_t>& bodies = reply.u32("block_body");
+  const auto count = static_cast<Eigen::Index>(forces.bodies.size());
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(6 * count, 12 * count);
+  inquiry->expect(bodies.size() <= kMostBlocksOfApplication * forces.applications.size(),
+                  "there are more than four blocks for each application");
+  for (std::size_t i = 0; i < bodies.size() / 2; ++i) {
+    inquiry->expect(bodies[2 * i] < forces.bodies.size() && bodies[2 * i + 1] < forces.bodies.size(),
+                    "block " + std::to_string(i) + " names a body that does not exist");
+    all.block<6, 12>(6 * bodies[2 * i], 12 * bodies[2 * i + 1]) +=
+        Eigen::Map<const JacobianBlock>(&reply.f64("block")[kBlockNumbers * i]);
+  }
+  return all;
+}
+
+Eigen::VectorXd wrenches_of(Inquiry* inquiry, const Forces& forces) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(6 * static_cast<Eigen::Index>(forces.bodies.size()));
+  const std::vector<ForceAnswer> answers = ask(inquiry, forces);
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    auto of_body = sum.segment<6>(6 * static_cast<Eigen::Index>(forces.applications[2 * i + 1]));
+    of_body.head<3>() += answers[i].wrench.force, of_body.tail<3>() += answers[i].wrench.torque;
+  }
+  return sum;
+}
+
+void move(PushedBody* body, int number, double by) {
+  const Vector3 change = by * Vector3::Unit(number % 3);
+  if (number < 6) {
+    body->pose = displaced(body->pose, number < 3 ? change : Vector3::Zero(), number < 3 ? Vector3::Zero() : change);
+  } else {
+    (number < 9 ? body->twist.linear : body->twist.angular) += change;
+  }
+}
+
+void judge_jacobians(Subject& subject) {
+  constexpr double kMoved = 1e-5, kTolerance = 1e-4;
+  Draw draw(39);
+  Forces forces = mixture(subject, 3, &draw);
+  Inquiry inquiry(subject, "forces of all types on three bodies");
+  const Eigen::MatrixXd came = jacobian_of(&inquiry, forces);
+  const double scale = std::max(1.0, came.cwiseAbs().maxCoeff());
+  for (std::size_t body = 0; body < forces.bodies.size(); ++body) {
+    const PushedBody before = forces.bodies[body];
+    for (int number = 0; number < 12; ++number) {
+      move(&forces.bodies[body], number, kMoved);
+      const Eigen::VectorXd after = wrenches_of(&inquiry, forces);
+      forces.bodies[body] = before;
+      move(&forces.bodies[body], number, -kMoved);
+      const Eigen::VectorXd slope = (after - wrenches_of(&inquiry, forces)) / (2.0 * kMoved);
+      forces.bodies[body] = before;
+      const Eigen::Index column = 12 * static_cast<Eigen::Index>(body) + number;
+      Eigen::Index row = 0;
+      (slope - came.col(column)).cwiseAbs().maxCoeff(&row);
+      inquiry.expect_near("change of wrench number " + std::to_string(row % 6) + " of body " + std::to_string(row / 6) +
+                              " with number " + std::to_string(number) + " of the state of body " +
+                              std::to_string(body),
+                          came(row, column), slope[row], kTolerance * scale);
+    }
+  }
+}
+
+// The same blocks whatever the state.
+void judge_jacobian_pattern(Subject& subject) {
+  Draw draw(40);
+  Forces forces = mixture(subject, 3, &draw);
+  Inquiry inquiry(subject, "forces of all types on three bodies, in one state and in another");
+  const std::vector<std::uint32_t> here = inquiry.answer(kJacobians, forces.request()).u32("block_body");
+  for (PushedBody& body : forces.bodies) body = random_body(&draw);
+  const std::vector<std::uint32_t> there = inquiry.answer(kJacobians, forces.request()).u32("block_body");
+  inquiry.expect(here == there, "answered other blocks");
+  forces.applications.clear();
+  inquiry.now_asked("forces and bodies, nothing applied");
+  inquiry.expect(inquiry.answer(kJacobians, forces.request()).u32("block_body").empty(), "answered blocks");
+}
+
+void judge_jacobian_hostile(Subject& subject) {
+  Draw draw(41);
+  const MessageColumns request = mixture(subject, 2, &draw).request();
+  expect_hostile_numbers_survived(subject, "forces of all types on two bodies", kJacobians, request);
+  expect_foreign_indices_refused(subject, "forces of all types on two bodies", kJacobians, request);
+}
+
 // ---- known answers of the scene language
 
 // f = m g at the centre of mass, U = -m g.x.
@@ -373,6 +462,16 @@ std::vector<Case> force_cases(const PluginDeclaration& declaration) {
     cases.push_back(
         make_case("force/basic-table", "A force by a table is linear between its rows.", judge_basic_table));
   }
+  if (!has_capability(declaration, "jacobians")) {
+    cases.push_back(unknown_case("force/jacobians-unknown", kJacobians));
+    return cases;
+  }
+  cases.push_back(make_case("force/jacobians", "Jacobians are the slopes of the wrenches.", judge_jacobians));
+  cases.push_back(
+      make_case("force/jacobian-blocks", "Which blocks there are depends on no state.", judge_jacobian_pattern));
+  cases.push_back(make_case("force/jacobian-hostile",
+                            "Hostile numbers are refused with a reason, or answered with finite ones.",
+                            judge_jacobian_hostile));
   return cases;
 }
 
@@ -382,6 +481,9 @@ std::vector<Question> force_questions(Subject& subject, Draw* draw) {
     Forces forces = mixture(subject, count, draw);
     questions.push_back(
         {"forces of every type on " + std::to_string(count) + " bodies", kWrenches, forces.request(), {}});
+    if (has_capability(subject.declaration(), "jacobians"))
+      questions.push_back(
+          {"Jacobians of such forces on " + std::to_string(count) + " bodies", kJacobians, forces.request(), {}});
   }
   return questions;
 }

@@ -7,6 +7,7 @@ MessageColumns FreeBodies::request() const {
   columns.f64("time") = {time};
   columns.f64("time_step") = {time_step};
   columns.u32("wrench_is_constant") = {derivative ? 0U : 1U};
+  columns.u32("jacobian_blocks") = {jacobian_blocks};
   columns.f64("plugin_state") = plugin_state;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const FreeBody& body = bodies[i];

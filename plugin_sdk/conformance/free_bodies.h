@@ -27,6 +27,7 @@ class FreeBodies {
   std::vector<std::uint32_t> changed;  // empty: nothing was
   // Answers the derivative; without it the bodies' own wrenches, said to be constant.
   DerivativeFunction derivative;
+  std::uint32_t jacobian_blocks = 0;  // that it answers, at most
 
   MessageColumns request() const;
   // What answers the derivatives of request().

@@ -235,6 +235,62 @@ void judge_derivative(Subject& subject) {
                       1e-12);
 }
 
+// Two bodies on a damped spring: told how its wrenches change, an integrator answers as it does when it finds out itself.
+void judge_jacobian(Subject& subject) {
+  constexpr double kStiffness = 300.0, kDamping = 4.0;
+  FreeBodies free;
+  free.time_step = 0.02;
+  free.bodies = {FreeBody{}, FreeBody{}, FreeBody{}};
+  free.bodies[1].state.pose.position = Vector3(1.5, 0.2, -0.3);
+  free.bodies[1].state.twist = {Vector3(0.3, -0.5, 0.1), Vector3(1, 2, -1)};
+  free.bodies[2].state.twist.angular = Vector3(-1, 0.5, 3);
+  std::string wrong;
+  int wanted = 0;
+  free.derivative = [&](const stage::IntegratorDerivativeRequest& question) -> DerivativeAnswer {
+    const Vector3 force =
+        kStiffness * (vector_at(question.position(), 1) - vector_at(question.position(), 0)) +
+        kDamping * (vector_at(question.linear_velocity(), 1) - vector_at(question.linear_velocity(), 0));
+    std::vector<double> wrench(18, 0.0);
+    set_vector(wrench, 0, force), set_vector(wrench, 2, -force);
+    if (question.with_jacobian() == 0) return wrench;
+    ++wanted;
+    if (free.jacobian_blocks == 0) wrong = "asked for a Jacobian that cannot be had";
+    JacobianBlock block = JacobianBlock::Zero();
+    block.block<3, 3>(0, 0) = -kStiffness * Matrix3::Identity(),
+                         block.block<3, 3>(0, 6) = -kDamping * Matrix3::Identity();
+    DerivativeAnswer answer(wrench, {0, 0, 0, 1, 1, 0, 1, 1});
+    for (const double sign : {1.0, -1.0, -1.0, 1.0})
+      for (Eigen::Index i = 0; i < block.size(); ++i) answer.jacobian.push_back(sign * block.data()[i]);
+    return answer;
+  };
+  Inquiry inquiry(subject, "two bodies of 2 kg on a spring of 300 N/m, and one that turns freely");
+  const MessageColumns without = free.ask(&inquiry);
+  free.jacobian_blocks = 6;
+  inquiry.now_asked("the same with the spring's Jacobian");
+  const MessageColumns with = free.ask(&inquiry);
+  inquiry.expect(wrong.empty(), wrong);
+  for (std::size_t body = 0; body < 3; ++body) {
+    const BodyState a = FreeBodies::state_in(without, body), b = FreeBodies::state_in(with, body);
+    const std::string of = " of body " + std::to_string(body);
+    inquiry.expect_near("position" + of, b.pose.position, a.pose.position, 1e-5);
+    inquiry.expect_near("angle" + of, log_rotation(b.pose.orientation * a.pose.orientation.conjugate()),
+                        Vector3::Zero(), 1e-5);
+    inquiry.expect_near("velocity" + of, b.twist.linear, a.twist.linear, 1e-4);
+    inquiry.expect_near("angular velocity" + of, b.twist.angular, a.twist.angular, 1e-4);
+  }
+  if (wanted == 0) return;
+  // what it may have been promised is not there any more
+  inquiry.now_asked("the same with a Jacobian that was promised and does not come");
+  const DerivativeFunction full = free.derivative;
+  free.derivative = [&](const stage::IntegratorDerivativeRequest& question) -> DerivativeAnswer {
+    return full(question).wrench;
+  };
+  const MessageColumns late = free.ask(&inquiry);
+  for (std::size_t body = 0; body < 3; ++body)
+    inquiry.expect_near("position of body " + std::to_string(body), FreeBodies::state_in(late, body).pose.position,
+                        FreeBodies::state_in(without, body).pose.position, 1e-5);
+}
+
 // ---- rotation
 
 // Turning about a principal axis: w stays, the angle is w T to the method's order.
@@ -480,6 +536,7 @@ std::vector<Case> integrator_cases(const PluginDeclaration&) {
       make_case("integrator/damping", "Damping c leaves exp(-c h) of both velocities.", judge_damping),
       make_case("integrator/derivative", "Where the wrench is not constant the derivative's answers count.",
                 judge_derivative),
+      make_case("integrator/jacobian", "A Jacobian changes the work, not the answer.", judge_jacobian),
       make_case("integrator/principal-axis", "About a principal axis w stays and the angle is w t.",
                 judge_principal_axis),
       make_case("integrator/unit", "Attitudes stay unit at any speed.", judge_unit),

@@ -27,8 +27,11 @@ gravitas_host host_of(Call* call) {
   host.derivative = [](void* context, const gravitas_column* columns, gravitas_reply_column* answer) -> std::int32_t {
     const DerivativeFunction& derivative = *static_cast<Call*>(context)->derivative;
     if (!derivative) return GRAVITAS_CALLBACK_FAILED;
-    const stage::ReplyColumn<double> wrench(answer);
-    for (const double number : derivative(stage::IntegratorDerivativeRequest(columns))) wrench.push(number);
+    const DerivativeAnswer came = derivative(stage::IntegratorDerivativeRequest(columns));
+    const stage::IntegratorDerivativeReply reply(answer);
+    for (const double number : came.wrench) reply.wrench().push(number);
+    for (const std::uint32_t body : came.jacobian_body) reply.jacobian_body().push(body);
+    for (const double number : came.jacobian) reply.jacobian().push(number);
     return GRAVITAS_OK;
   };
   return host;

@@ -128,10 +128,6 @@ Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration
                    });
 }
 
-bool has_capability(const PluginDeclaration& declaration, std::string_view name) {
-  return std::ranges::find(declaration.capabilities, name) != declaration.capabilities.end();
-}
-
 double capability_number(const PluginDeclaration& declaration, std::string_view name, double otherwise) {
   for (const std::string& capability : declaration.capabilities) {
     if (!capability.starts_with(name) || capability.size() <= name.size() || capability[name.size()] != '=') continue;

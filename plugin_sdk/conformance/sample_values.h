@@ -42,8 +42,7 @@ std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration,
 // A case by which there is at least one.
 Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&)> askable);
 
-// True if the plugin declares the capability; the number behind `name=`, or `otherwise`.
-bool has_capability(const PluginDeclaration& declaration, std::string_view name);
+// The number behind the capability `name=`, or `otherwise`.
 double capability_number(const PluginDeclaration& declaration, std::string_view name, double otherwise);
 
 }  // namespace gravitas::conformance

@@ -73,7 +73,8 @@ bool MailboxLoop::receive_segments() {
       mine_ = reinterpret_cast<channel::Mailbox*>(worker_segment_.data());
       break;
     case SegmentRole::kState:
-      if (depth_ > 0) former_states_.push_back(std::move(state_));
+      // a call that is open reads it
+      former_states_.push_back(std::move(state_));
       state_ = std::move(segment);
       state_generation_ = message.generation;
       break;
@@ -251,15 +252,19 @@ std::int32_t MailboxLoop::ask_derivative(OpenCall* call, const gravitas_column* 
     if (!was_mapped) return GRAVITAS_CALLBACK_FAILED;
   }
   if (!map_announced_segments(answer)) return GRAVITAS_CALLBACK_FAILED;
-  const gravitas_frame_column& wrench = kernel_->columns[0];
-  const std::size_t bytes = static_cast<std::size_t>(wrench.count) * sizeof(double);
-  if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || answer.column_count != 1 ||
-      channel::frame_digest(answer, std::span(kernel_->columns).first(1), {}, nullptr) != answer.digest ||
-      !fits(state_, wrench.offset, wrench.count, stage::element_size(method.reply[0].type)))
+  const std::span<const gravitas_frame_column> came = std::span(kernel_->columns).first(method.reply.size());
+  if (answer.kind != GRAVITAS_FRAME_ANSWER || answer.status != GRAVITAS_OK || answer.column_count != came.size() ||
+      channel::frame_digest(answer, came, {}, nullptr) != answer.digest)
     return GRAVITAS_CALLBACK_FAILED;
-  reply[0].count = wrench.count;
-  if (wrench.count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
-  std::memcpy(reply[0].data, state_.data() + wrench.offset, bytes);
+  for (std::size_t i = 0; i < came.size(); ++i) {
+    const gravitas_frame_column column = came[i];
+    reply[i].count = column.count;
+    if (column.count > reply[i].capacity ||
+        !fits(state_, column.offset, column.count, stage::element_size(method.reply[i].type)))
+      return GRAVITAS_CALLBACK_FAILED;
+    if (column.count > 0)
+      std::memcpy(reply[i].data, state_.data() + column.offset, bytes_of(method.reply[i], column.count));
+  }
   return GRAVITAS_OK;
 }
 

@@ -114,7 +114,7 @@ struct StreamLoop::OpenCall final : CallServices {
     for (std::size_t i = 0; i < kDerivative.reply.size(); ++i) {
       answer[i].count = reader.count(i);
       if (answer[i].count > answer[i].capacity) return GRAVITAS_CALLBACK_FAILED;
-      reader.copy(i, answer[i].data);
+      if (answer[i].count > 0) reader.copy(i, answer[i].data);
     }
     return GRAVITAS_OK;
   }

@@ -120,22 +120,7 @@ class SimulatedCarrier::Derivatives final : public host::CallServices {
   void mark_progress() override {}
   std::int32_t derivative(const gravitas_column* request, gravitas_reply_column* reply) override {
     if (source_ == nullptr) return GRAVITAS_CALLBACK_FAILED;
-    const std::span<const kernel::ColumnId> trial = source_->trial_columns();
-    for (std::size_t i = 0; i < trial.size(); ++i) {
-      if (request[i].count != arena_->count(trial[i])) return GRAVITAS_CALLBACK_FAILED;
-      std::memcpy(arena_->data(trial[i]), request[i].data, request[i].count * sizeof(double));
-    }
-    try {
-      source_->evaluate();
-    } catch (...) {
-      nested_ = std::current_exception();
-      return GRAVITAS_CALLBACK_FAILED;
-    }
-    const kernel::ColumnId wrench = source_->wrench_column();
-    reply[0].count = arena_->count(wrench);
-    if (reply[0].count > reply[0].capacity) return GRAVITAS_CALLBACK_FAILED;
-    std::memcpy(reply[0].data, arena_->data(wrench), reply[0].count * sizeof(double));
-    return GRAVITAS_OK;
+    return kernel::answer_derivative(source_, arena_, request, reply, &nested_);
   }
   void rethrow() const {
     if (nested_) std::rethrow_exception(nested_);
@@ -206,11 +191,9 @@ kernel::CallResult SimulatedCarrier::call(OpenCall* open, const kernel::StageCal
   open->sequence = ++sequence_;
 
   // rooms and columns, as in a response segment
-  std::array<gravitas_column, GRAVITAS_MAX_COLUMNS> request;
+  const auto request = kernel::plain_columns(*arena, call.request);
   std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply;
   std::uint64_t words = 0;
-  for (std::size_t i = 0; i < call.request.size(); ++i)
-    request[i] = {arena->data(call.request[i]), arena->count(call.request[i])};
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     open->rooms[i] = {8 * words, arena->capacity(call.reply[i])};
     words += (open->rooms[i].capacity + 7) / 8 * 8;

@@ -49,14 +49,13 @@ class RecordedDerivatives final : public kernel::DerivativeSource {
       : source_(source), arena_(arena), record_(record) {}
   void begin_attempt(bool counts) override { source_->begin_attempt(counts); }
   std::span<const kernel::ColumnId> trial_columns() const override { return source_->trial_columns(); }
-  kernel::ColumnId wrench_column() const override { return source_->wrench_column(); }
+  std::span<const kernel::ColumnId> answer_columns() const override { return source_->answer_columns(); }
   void evaluate() override {
     const stage::MethodInfo& method = stage::method_info(stage::Method::kIntegratorDerivative);
     v1::CapsuleDerivative* one = record_->add_derivatives();
     copy_columns(arena_, trial_columns(), method.request, one->mutable_trial());
     source_->evaluate();
-    const kernel::ColumnId answer = wrench_column();
-    copy_columns(arena_, {&answer, 1}, method.reply, one->mutable_answer());
+    copy_columns(arena_, answer_columns(), method.reply, one->mutable_answer());
   }
 
  private:

@@ -58,14 +58,14 @@ bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRe
   const stage::IntegratorDerivativeRequest was(plain.data());
   return was.time() == asked.time() && same(was.position(), asked.position()) &&
          same(was.orientation(), asked.orientation()) && same(was.linear_velocity(), asked.linear_velocity()) &&
-         same(was.angular_velocity(), asked.angular_velocity());
+         same(was.angular_velocity(), asked.angular_velocity()) && was.with_jacobian() == asked.with_jacobian();
 }
 
 Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
   const stage::MethodInfo& method = *method_named(call.method());
   const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
   int asked = 0;
-  const auto answer = [&](const stage::IntegratorDerivativeRequest& trial) {
+  const auto answer = [&](const stage::IntegratorDerivativeRequest& trial) -> conformance::DerivativeAnswer {
     if (is_poison) return std::vector<double>(2 * trial.position().size());
     if (asked >= call.derivatives_size())
       throw OtherDerivative(fmt::format("it asks for more than {} derivatives", call.derivatives_size()));
@@ -73,7 +73,8 @@ Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
     ++asked;
     if (!is_same(columns_of(recorded.trial(), derivative.request), trial))
       throw OtherDerivative(fmt::format("derivative {} is asked at another state", asked));
-    return columns_of(recorded.answer(), derivative.reply).f64("wrench");
+    const MessageColumns all = columns_of(recorded.answer(), derivative.reply);
+    return {all.f64("wrench"), all.u32("jacobian_body"), all.f64("jacobian")};
   };
   Answer came = subject_.ask(method_of(call), columns_of(call.request(), method.request), answer);
   if (!is_poison && came.ok() && asked < call.derivatives_size())

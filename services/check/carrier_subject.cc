@@ -40,15 +40,13 @@ class CarrierSubject::Derivatives final : public kernel::DerivativeSource {
   Derivatives(CarrierSubject* subject, const DerivativeFunction& function) : subject_(*subject), function_(function) {}
 
   std::span<const ColumnId> trial_columns() const override { return subject_.request_columns_[kDerivativeMethod]; }
-  ColumnId wrench_column() const override { return subject_.reply_columns_[kDerivativeMethod][0]; }
+  std::span<const ColumnId> answer_columns() const override { return subject_.reply_columns_[kDerivativeMethod]; }
   void evaluate() override {
     const std::span<const stage::ColumnInfo> infos = stage::kMethods[kDerivativeMethod].request;
     const MessageColumns trial = subject_.take(trial_columns(), infos);
     const std::vector<gravitas_column> columns = trial.plain();
-    MessageColumns wrench(stage::kMethods[kDerivativeMethod].reply);
-    wrench.f64("wrench") = function_(stage::IntegratorDerivativeRequest(columns.data()));
-    const std::array<ColumnId, 1> to = {wrench_column()};
-    subject_.put(to, wrench, stage::kMethods[kDerivativeMethod].reply);
+    const MessageColumns answer = function_(stage::IntegratorDerivativeRequest(columns.data())).columns();
+    subject_.put(answer_columns(), answer, stage::kMethods[kDerivativeMethod].reply);
   }
 
   // Room for a trial state of as many bodies as are asked for.
@@ -60,7 +58,7 @@ class CarrierSubject::Derivatives final : public kernel::DerivativeSource {
       arena.grow(trial_columns()[i], count);
       arena.set_count(trial_columns()[i], count);
     }
-    arena.grow(wrench_column(), 6 * bodies);
+    arena.grow(answer_columns()[0], 6 * bodies);
   }
 
  private:

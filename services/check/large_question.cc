@@ -61,14 +61,16 @@ conformance::DerivativeFunction repeated_derivative(const conformance::Derivativ
     const std::array<double, 1> time = {all.time()};
     const std::array<std::span<const double>, 4> states = {all.position(), all.orientation(), all.linear_velocity(),
                                                            all.angular_velocity()};
+    const std::uint32_t no_jacobian = 0;
     std::vector<double> wrenches;
     for (std::size_t copy = 0; copy < copies; ++copy) {
-      std::array<gravitas_column, 5> columns = {gravitas_column{time.data(), 1}};
+      std::array<gravitas_column, 6> columns = {gravitas_column{time.data(), 1}};
+      columns[5] = {&no_jacobian, 1};
       for (std::size_t k = 0; k < states.size(); ++k) {
         const std::size_t size = states[k].size() / copies;
         columns[k + 1] = {states[k].data() + copy * size, size};
       }
-      const std::vector<double> part = one(stage::IntegratorDerivativeRequest(columns.data()));
+      const std::vector<double> part = one(stage::IntegratorDerivativeRequest(columns.data())).wrench;
       wrenches.insert(wrenches.end(), part.begin(), part.end());
     }
     wrenches.resize(std::size_t{6} * bodies * copies);

@@ -19,10 +19,9 @@ namespace {
 
 constexpr std::uint64_t kGeneration = 1;
 constexpr std::uint64_t kLookNs = 20'000'000;
-// The state segment has the request's columns, and behind them the one that a derivative is answered in.
-constexpr std::size_t kWrenchColumn = GRAVITAS_MAX_COLUMNS - 1;
-
 const stage::MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDerivative);
+// The state segment has the request's columns, and behind them those that a derivative is answered in.
+const std::size_t kFirstOfAnswer = GRAVITAS_MAX_COLUMNS - kDerivative.reply.size();
 
 }  // namespace
 
@@ -88,15 +87,19 @@ void MailboxTalk::answer_derivative(const Question& question, const Frame& asked
   for (std::size_t i = 0; i < kDerivative.request.size(); ++i)
     trial[i] = {response_.data() + asked.rooms[first_room + i].offset,
                 std::min(boxes_.theirs->columns[i].count, elements_)};
-  const std::vector<double> wrench = question.derivative(stage::IntegratorDerivativeRequest(trial.data()));
+  const MessageColumns numbers = question.derivative(stage::IntegratorDerivativeRequest(trial.data())).columns();
   Frame answer;
   answer.header = asked.header;
   answer.header.kind = GRAVITAS_FRAME_ANSWER;
   answer.header.method = static_cast<std::uint32_t>(stage::Method::kIntegratorDerivative);
-  answer.header.column_count = 1;
+  answer.header.column_count = static_cast<std::uint32_t>(kDerivative.reply.size());
   answer.header.reply_count = 0;
-  answer.columns = {place(kWrenchColumn, wrench.size())};
-  std::memcpy(state_.data() + answer.columns[0].offset, wrench.data(), wrench.size() * sizeof(double));
+  const std::vector<gravitas_column> plain = numbers.plain();
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    answer.columns.push_back(place(kFirstOfAnswer + i, plain[i].count));
+    const std::size_t bytes = plain[i].count * stage::element_size(kDerivative.reply[i].type);
+    if (bytes > 0) std::memcpy(state_.data() + answer.columns[i].offset, plain[i].data, bytes);
+  }
   answer.seal();
   post(answer);
 }

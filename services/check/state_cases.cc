@@ -90,7 +90,7 @@ std::string judge_killed(Examination& examination) {
 
 std::string judge_declared(Examination& examination) {
   const PluginDeclaration& declaration = examination.examinee.declaration;
-  if (declaration.slot != Slot::kIntegrator || conformance::has_capability(declaration, "plugin_state")) return {};
+  if (declaration.slot != Slot::kIntegrator || has_capability(declaration, "plugin_state")) return {};
   for (const Answer& answer : examination.answers())
     if (const std::size_t size = answer.columns.f64("plugin_state").size(); size > 0)
       return fmt::format("it answers {} numbers of plugin_state and does not declare the capability plugin_state",

@@ -156,10 +156,10 @@ StreamReply StreamTalk::receive(const Question& question, const Call& call) {
       if (!question.derivative || !trial.parse(reader.derivative().bytes).empty())
         throw std::runtime_error("it asks for a derivative that cannot be answered");
       const MessageColumns columns = columns_of(trial, kDerivativeInfo.request);
-      MessageColumns wrench(kDerivativeInfo.reply);
-      wrench.f64("wrench") = question.derivative(stage::IntegratorDerivativeRequest(columns.plain().data()));
+      const MessageColumns answer =
+          question.derivative(stage::IntegratorDerivativeRequest(columns.plain().data())).columns();
       send(submessage(wire::kHeader, call.SerializeAsString()) +
-           submessage(wire::kDerivative, columns_bytes(kDerivativeInfo.reply, wrench)));
+           submessage(wire::kDerivative, columns_bytes(kDerivativeInfo.reply, answer)));
       continue;
     }
     reply.epoch = outcome.epoch();

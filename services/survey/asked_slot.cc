@@ -77,7 +77,7 @@ void AskedSlot::stop() {
 
 bool AskedSlot::has_capability(std::string_view name) const {
   return !is_empty() && std::ranges::all_of(description_.plugins, [&](const kernel::PluginChoice& plugin) {
-    return std::ranges::find(plugin.declaration.capabilities, name) != plugin.declaration.capabilities.end();
+    return gravitas::has_capability(plugin.declaration, name);
   });
 }
 

@@ -21,6 +21,7 @@ TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHosting) {
     const RunResult result = run(
         options, [] { return false; }, [](const Progress&) {});
     EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    EXPECT_EQ(result.report.faults_size(), 0);
     return result.report.chain_hash();
   };
   const std::string reference = hash_of(Hosting::kDirect, 1);

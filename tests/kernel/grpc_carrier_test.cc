@@ -236,7 +236,7 @@ class SlowForces final : public kernel::DerivativeSource {
  public:
   SlowForces(const OneCall& call, double deadline) : call_(call), nanoseconds_(static_cast<long>(3e9 * deadline)) {}
   std::span<const kernel::ColumnId> trial_columns() const override { return call_.trial; }
-  kernel::ColumnId wrench_column() const override { return call_.wrench; }
+  std::span<const kernel::ColumnId> answer_columns() const override { return call_.derivative; }
   void evaluate() override {
     const timespec pause = {nanoseconds_ / 1'000'000'000, nanoseconds_ % 1'000'000'000};
     nanosleep(&pause, nullptr);

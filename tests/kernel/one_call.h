@@ -33,7 +33,8 @@ class OneCall {
     for (const stage::ColumnInfo& column : info().reply) add(column, reply_room, &reply);
     for (const stage::ColumnInfo& column : stage::method_info(stage::Method::kIntegratorDerivative).request)
       add(column, 16, &trial);
-    wrench = arena.add(stage::ElementType::kF64, 6 * bodies, 6 * bodies);
+    for (const stage::ColumnInfo& column : stage::method_info(stage::Method::kIntegratorDerivative).reply)
+      add(column, 16, &derivative);
     arena.seal();
   }
 
@@ -65,8 +66,7 @@ class OneCall {
   }
 
   kernel::Arena arena;
-  std::vector<kernel::ColumnId> request, reply, trial;
-  kernel::ColumnId wrench = 0;
+  std::vector<kernel::ColumnId> request, reply, trial, derivative;
 
  private:
   stage::Method method_;

@@ -62,6 +62,7 @@ class Step {
     request_[C::kLinearVelocity] = request_column_of(state.linear_velocity);
     request_[C::kAngularVelocity] = request_column_of(state.angular_velocity);
     request_[C::kStateChanged] = request_column_of(changed);
+    request_[C::kJacobianBlocks] = request_column_of(jacobian_blocks);
     const auto room = [](std::vector<double>& numbers) {
       return gravitas_reply_column{numbers.data(), numbers.size(), 0};
     };
@@ -77,7 +78,7 @@ class Step {
   std::uint64_t count(Reply::Column column) const { return reply_[column].count; }
 
   std::vector<double> time = {2.0}, time_step = {0.1};
-  std::vector<std::uint32_t> constant = {1}, flags, changed;
+  std::vector<std::uint32_t> constant = {1}, flags, changed, jacobian_blocks = {0};
   std::vector<double> inverse_mass, inertia, inverse_inertia, damping, wrench;
   TrialColumns state, trial;
   std::vector<double> error_estimate = {7.0};

@@ -77,7 +77,8 @@ class Constraint(Plugin):
 
 
 class Force(Plugin):
-    slot, methods = "force", {"Wrenches": "wrenches"}
+    # the last one is asked only of plugins that declare the capability of that name
+    slot, methods = "force", {"Wrenches": "wrenches", "Jacobians": "jacobians"}
 
 
 class Solver(Plugin):

@@ -16,6 +16,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/force_jacobians.h"
 #include "plugin_sdk/force_shapes.h"
 
 namespace gravitas {
@@ -82,6 +83,7 @@ class Aerodynamic final : public ForcePlugin {
             .version = "1.0",
             .slot = Slot::kForce,
             .meaning = "Pressure of a flow on the faces that look into it.",
+            .capabilities = {"jacobians"},
             .types = {{"Aerodynamic",
                        "Pushes against the faces of a body that move into the fluid.",
                        {Property::number("FluidDensity", "kg/m^3").above(0.0).required().means("Density of the fluid."),
@@ -100,6 +102,10 @@ class Aerodynamic final : public ForcePlugin {
       flow.drag = cursor.number();
       return answer(flow, request, body);
     });
+  }
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                 Host& host) override {
+    difference_own_states(*this, request, reply, host);
   }
 
  private:

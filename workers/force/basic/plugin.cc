@@ -9,6 +9,7 @@
 #include <span>
 
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/force_jacobians.h"
 
 namespace gravitas {
 namespace {
@@ -59,6 +60,7 @@ class BasicForce final : public ForcePlugin {
         .version = "1.0",
         .slot = Slot::kForce,
         .meaning = "A given force at a point of the body, constant, over time, or as an impulse.",
+        .capabilities = {"jacobians"},
         .types = {
             {"Basic",
              "A given force at a point of the body.",
@@ -87,6 +89,10 @@ class BasicForce final : public ForcePlugin {
     for_each_application(request, reply, [&](std::uint64_t, PropertyCursor cursor, std::uint32_t body) {
       return answer(read(cursor), request, body);
     });
+  }
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                 Host& host) override {
+    difference_own_states(*this, request, reply, host);
   }
 
  private:

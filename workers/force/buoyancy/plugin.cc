@@ -15,6 +15,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/force_jacobians.h"
 #include "plugin_sdk/force_shapes.h"
 #include "workers/force/buoyancy/submerged.h"
 
@@ -56,7 +57,7 @@ class Buoyancy final : public ForcePlugin {
             .version = "1.0",
             .slot = Slot::kForce,
             .meaning = "Lift and drag of a fluid on the submerged part of a body.",
-            .capabilities = {"potential"},
+            .capabilities = {"potential", "jacobians"},
             .types = {
                 {"Buoyancy",
                  "Lifts a body by the weight of the fluid that it displaces.",
@@ -82,6 +83,10 @@ class Buoyancy final : public ForcePlugin {
     for_each_application(request, reply, [&](std::uint64_t, PropertyCursor cursor, std::uint32_t body) {
       return answer(read(cursor), request, body);
     });
+  }
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                 Host& host) override {
+    difference_own_states(*this, request, reply, host);
   }
 
  private:

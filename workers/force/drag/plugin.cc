@@ -8,6 +8,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/force_jacobians.h"
 
 namespace gravitas {
 namespace {
@@ -20,6 +21,7 @@ class Drag final : public ForcePlugin {
         .version = "1.0",
         .slot = Slot::kForce,
         .meaning = "Resistance of a medium at rest, linear and quadratic in the speed.",
+        .capabilities = {"jacobians"},
         .types = {{"Drag",
                    "Resists the velocity of the centre of mass.",
                    {Property::number("LinearCoefficient", "N*s/m").at_least(0.0).required().means("Force per speed."),
@@ -36,6 +38,10 @@ class Drag final : public ForcePlugin {
       const Vector3 v = vector_at(request.linear_velocity(), body);
       return ApplicationAnswer{.wrench = {.force = -(linear + quadratic * v.norm()) * v}};
     });
+  }
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                 Host& host) override {
+    difference_own_states(*this, request, reply, host);
   }
 };
 

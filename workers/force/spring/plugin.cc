@@ -14,6 +14,8 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/force_jacobians.h"
+#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
@@ -48,6 +50,26 @@ MovingPoint point_of(const stage::ForceWrenchesRequest& request, std::uint32_t b
           vector_at(request.linear_velocity(), body) + vector_at(request.angular_velocity(), body).cross(arm), arm};
 }
 
+// From the anchor to the attachment.
+struct Span {
+  MovingPoint attachment, anchor;
+  Vector3 d, rate;
+  double length;
+  Vector3 direction;  // zero where there is none
+};
+
+Span span_of(const Parameters& p, const stage::ForceWrenchesRequest& request, std::uint32_t body) {
+  Span span;
+  span.attachment = point_of(request, body, p.attachment);
+  span.anchor = p.anchor_body == kNone ? MovingPoint{p.anchor, Vector3::Zero(), Vector3::Zero()}
+                                       : point_of(request, p.anchor_body, p.anchor);
+  span.d = span.attachment.position - span.anchor.position;
+  span.rate = span.attachment.velocity - span.anchor.velocity;
+  span.length = span.d.stableNorm();
+  span.direction = span.length > 0.0 ? Vector3(span.d / span.length) : Vector3::Zero();
+  return span;
+}
+
 // The force on the attachment, and what acts on either side.
 struct Pull {
   Vector3 force;
@@ -55,18 +77,57 @@ struct Pull {
   double potential;
 };
 
-Pull pull_of(const Parameters& p, const stage::ForceWrenchesRequest& request, std::uint32_t body) {
-  const MovingPoint attachment = point_of(request, body, p.attachment);
-  const bool is_world = p.anchor_body == kNone;
-  const MovingPoint anchor =
-      is_world ? MovingPoint{p.anchor, Vector3::Zero(), Vector3::Zero()} : point_of(request, p.anchor_body, p.anchor);
-  const Vector3 d = attachment.position - anchor.position, rate = attachment.velocity - anchor.velocity;
+Pull pull_of(const Parameters& p, const Span& s) {
   if (p.rest_length == 0.0)
-    return {-p.stiffness * d - p.damping * rate, attachment.arm, anchor.arm, 0.5 * p.stiffness * d.squaredNorm()};
-  const double length = d.stableNorm(), stretched = length - p.rest_length;
-  const Vector3 n = length > 0.0 ? Vector3(d / length) : Vector3::Zero();
-  return {-(p.stiffness * stretched + p.damping * n.dot(rate)) * n, attachment.arm, anchor.arm,
-          0.5 * p.stiffness * stretched * stretched};
+    return {-p.stiffness * s.d - p.damping * s.rate, s.attachment.arm, s.anchor.arm,
+            0.5 * p.stiffness * s.d.squaredNorm()};
+  const double stretched = s.length - p.rest_length;
+  return {-(p.stiffness * stretched + p.damping * s.direction.dot(s.rate)) * s.direction, s.attachment.arm,
+          s.anchor.arm, 0.5 * p.stiffness * stretched * stretched};
+}
+
+Pull pull_of(const Parameters& p, const stage::ForceWrenchesRequest& request, std::uint32_t body) {
+  return pull_of(p, span_of(p, request, body));
+}
+
+using ForceBlock = Eigen::Matrix<double, 3, 12>;
+
+// How the position and the velocity of a point change with the state of its body.
+struct PointChange {
+  ForceBlock position = ForceBlock::Zero(), velocity = ForceBlock::Zero();
+
+  PointChange(const MovingPoint& point, const Vector3& angular_velocity) {
+    position.leftCols<3>() = velocity.middleCols<3>(6) = Matrix3::Identity();
+    position.middleCols<3>(3) = velocity.rightCols<3>() = -skew(point.arm);
+    velocity.middleCols<3>(3) = -skew(angular_velocity) * skew(point.arm);
+  }
+};
+
+// How the force on the attachment changes with d and its rate.
+struct ForceChange {
+  Matrix3 by_d, by_rate;
+
+  ForceChange(const Parameters& p, const Span& s) {
+    by_d = -p.stiffness * Matrix3::Identity(), by_rate = -p.damping * Matrix3::Identity();
+    if (p.rest_length == 0.0) return;
+    const Vector3& n = s.direction;
+    by_rate = -p.damping * n * n.transpose();
+    by_d.setZero();
+    if (!(s.length > 0.0)) return;
+    const Matrix3 across = (Matrix3::Identity() - n * n.transpose()) / s.length;
+    const double pull = p.stiffness * (s.length - p.rest_length) + p.damping * n.dot(s.rate);
+    by_d = -n * (p.stiffness * n.transpose() + p.damping * s.rate.transpose() * across) - pull * across;
+  }
+  ForceBlock by(const PointChange& point) const { return by_d * point.position + by_rate * point.velocity; }
+};
+
+// Of a force that acts at an arm; `turns` if the arm is of the body by whose state.
+JacobianBlock wrench_block(const ForceBlock& by, const Vector3& arm, const Vector3& force, bool turns) {
+  JacobianBlock block;
+  block.topRows<3>() = by;
+  block.bottomRows<3>() = skew(arm) * by;
+  if (turns) block.block<3, 3>(3, 3) += skew(force) * skew(arm);
+  return block;
 }
 
 class Spring final : public ForcePlugin {
@@ -77,7 +138,7 @@ class Spring final : public ForcePlugin {
         .version = "1.0",
         .slot = Slot::kForce,
         .meaning = "Damped spring between two bodies, or a body and the world.",
-        .capabilities = {"potential"},
+        .capabilities = {"potential", "jacobians"},
         .types = {
             {"Spring",
              "Pulls a point of the body towards an anchor, or pushes it off.",
@@ -99,8 +160,7 @@ class Spring final : public ForcePlugin {
     for_each_application(request, reply, [&](std::uint64_t, PropertyCursor cursor, std::uint32_t body) {
       const Parameters p = read(cursor);
       const std::uint32_t force = request.application()[2 * row++];
-      if (p.anchor_body != kNone && p.anchor_body >= request.mass().size())
-        throw Refusal("AnchorBody is no row of the bodies");
+      demand_anchor(p, request);
       if (p.anchor_body == body) return reaction(p, request, force);
       const Pull pull = pull_of(p, request, body);
       return ApplicationAnswer{
@@ -108,7 +168,42 @@ class Spring final : public ForcePlugin {
     });
   }
 
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply, Host&) override {
+    const std::size_t rows = request.application().size() / 2;
+    // forces that answer at their anchor, too
+    std::vector<std::uint8_t> reacts(request.force_type().size());
+    for (std::size_t row = 0; row < rows; ++row) {
+      const Application one = application_at(request, row);
+      const Parameters p = read(one.properties);
+      demand_anchor(p, request);
+      if (p.anchor_body == one.body) reacts[one.force] = 1;
+    }
+    for (std::size_t row = 0; row < rows; ++row) {
+      const Application one = application_at(request, row);
+      const Parameters p = read(one.properties);
+      if (p.anchor_body == one.body) continue;
+      const Span span = span_of(p, request, one.body);
+      const Pull pull = pull_of(p, span);
+      const ForceChange change(p, span);
+      const ForceBlock by_own =
+          change.by(PointChange(span.attachment, vector_at(request.angular_velocity(), one.body)));
+      push_block(reply, one.body, one.body, wrench_block(by_own, pull.arm, pull.force, true));
+      if (p.anchor_body == kNone) continue;
+      const ForceBlock by_anchor =
+          -change.by(PointChange(span.anchor, vector_at(request.angular_velocity(), p.anchor_body)));
+      push_block(reply, one.body, p.anchor_body, wrench_block(by_anchor, pull.arm, pull.force, false));
+      if (reacts[one.force] == 0) continue;
+      push_block(reply, p.anchor_body, one.body, wrench_block(-by_own, pull.anchor_arm, -pull.force, false));
+      push_block(reply, p.anchor_body, p.anchor_body, wrench_block(-by_anchor, pull.anchor_arm, -pull.force, true));
+    }
+  }
+
  private:
+  static void demand_anchor(const Parameters& p, const stage::ForceWrenchesRequest& request) {
+    if (p.anchor_body != kNone && p.anchor_body >= request.mass().size())
+      throw Refusal("AnchorBody is no row of the bodies");
+  }
+
   // What all bodies on the spring do to its anchor. The energy is counted with them.
   static ApplicationAnswer reaction(const Parameters& p, const stage::ForceWrenchesRequest& request,
                                     std::uint32_t force) {

@@ -10,6 +10,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
+#include "plugin_sdk/force_jacobians.h"
 
 namespace gravitas {
 namespace {
@@ -22,6 +23,7 @@ class Vortex final : public ForcePlugin {
         .version = "1.0",
         .slot = Slot::kForce,
         .meaning = "Columnar vortex around an axis.",
+        .capabilities = {"jacobians"},
         .types = {{"Vortex",
                    "Drives bodies around an axis, towards it and along it.",
                    {Property::vector("Centre", "m", "world").required().means("A point of the axis."),
@@ -52,6 +54,10 @@ class Vortex final : public ForcePlugin {
       const Vector3 force = 2.0 * profile * (strength * along.cross(out) - inflow * out) + profile * lift * along;
       return ApplicationAnswer{.wrench = {.force = force}};
     });
+  }
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                 Host& host) override {
+    difference_own_states(*this, request, reply, host);
   }
 };
 

@@ -10,8 +10,8 @@
 // in x, to O(h^2) without drift elsewhere; momentum always. Damping acts in two halves around the step, e^(-c h) in all.
 // Sources: Simo, Wong, Int. J. Numer. Meth. Eng. 31 (1991) 19; Austin, Krishnaprasad, Wang, J. Comput. Phys. 107 (1993).
 // The equations in (v_bar, W) are solved to rounding: by iteration where that contracts, else by Newton's method with
-// the matrix by differences of the force (six derivatives per body of the largest group that
-// feels each other, interaction_groups.h). Stability: none is lost at any h k; but
+// the matrix from the forces' Jacobian where it can be had (wrench_jacobian.h), else by differences (six derivatives per
+// body of the largest group that feels each other, interaction_groups.h). Stability: none is lost at any h k; but
 // the method does not damp, so what it does not resolve keeps ringing (Rosenbrock damps). Known failure: attitudes of a
 // body that turns by more than a radian a step lag (tan of the half angle); where no solution is found (forces that
 // jump, h |w| in the tens and unequal moments) the step is refused.
@@ -85,6 +85,12 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     }
   };
   using Vector6 = Eigen::Matrix<double, 6, 1>;  // v_bar, W
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  using MiddleChange = Eigen::Matrix<double, 12, 6>;
+  // Of a body that is pushed: its group, counted from 1, and its place there.
+  struct Member {
+    std::size_t group = 0, place = 0;
+  };
 
   void begin() {
     bodies_.clear();
@@ -113,17 +119,20 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return all.segment<6>(static_cast<Eigen::Index>(6 * body));
   }
 
+  BodyState middle_of(const Body& body, const Vector6& z) const {
+    const Vector3 v = z.head<3>(), w = z.tail<3>();
+    // half way: the Cayley map of half the tangent of the half angle's half, which normalising the mean gives
+    const Quaternion whole = cayley(h_ * w);
+    const Quaternion half = normalized(Quaternion(1.0 + whole.w(), whole.x(), whole.y(), whole.z()));
+    const Quaternion q = normalized(body.start.pose.orientation * half);
+    return {{body.start.pose.position + 0.5 * h_ * v, q}, {v, q * w}};
+  }
+
   // The residual of the equations, in the units of the unknown: guess minus what it leads to.
   Eigen::VectorXd residual(Eigen::VectorXd& guess) {
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const Body& body = bodies_[b];
-      const Vector6 z = at(guess, b);
-      const Vector3 v = z.head<3>(), w = z.tail<3>();
-      // half way: the Cayley map of half the tangent of the half angle's half, which normalising the mean gives
-      const Quaternion whole = cayley(h_ * w);
-      const Quaternion half = normalized(Quaternion(1.0 + whole.w(), whole.x(), whole.y(), whole.z()));
-      const Quaternion q = normalized(body.start.pose.orientation * half);
-      trial_.set(body.row, {{body.start.pose.position + 0.5 * h_ * v, q}, {v, q * w}});
+      trial_.set(body.row, middle_of(body, at(guess, b)));
     }
     const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + 0.5 * h_, trial_);
     Eigen::VectorXd left(guess.size());
@@ -191,9 +200,16 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       trial_.set(bodies_[b].row, bodies_[b].start);
     }
     const double middle = request_->time() + 0.5 * h_;
-    for (const std::vector<std::size_t>& rows : interaction_groups(*request_, derivatives_, middle, trial_)) {
+    derivatives_->wrenches(middle, trial_, &jacobian_);
+    member_.assign(derivatives_->size(), {});
+    for (const std::vector<std::size_t>& rows : jacobian_.is_known()
+                                                    ? interaction_groups(*request_, jacobian_)
+                                                    : interaction_groups(*request_, derivatives_, middle, trial_)) {
       Group& group = groups_.emplace_back();
-      for (const std::size_t row : rows) group.body.push_back(place[row]);
+      for (const std::size_t row : rows) {
+        member_[row] = {groups_.size(), group.body.size()};
+        group.body.push_back(place[row]);
+      }
     }
   }
 
@@ -221,8 +237,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return false;
   }
 
-  // The matrix of the residual by differences at the unknown, group by group.
+  // The matrix of the residual at the unknown, group by group.
   void factor(const Eigen::VectorXd& left) {
+    if (jacobian_.is_known() && compose()) return;
     Eigen::Index columns = 0;
     for (const Group& group : groups_) columns = std::max(columns, group.size());
     std::vector<Eigen::MatrixXd> matrices;
@@ -233,7 +250,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       for (const Group& group : groups_) {
         if (k >= group.size()) continue;
         const Eigen::Index at = group.number(k);
-        shifted[at] += kDifference * std::max(unknown_.segment<3>(at - at % 3).norm(), 1e-3);
+        shifted[at] += shift(unknown_.segment<6>(at - at % 6), at % 6);
       }
       const Eigen::VectorXd change = residual(shifted) - left;
       for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -245,6 +262,77 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     }
     for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.compute(matrices[g]);
   }
+
+  // From the Jacobian of the forces at the middle; of what else depends on a body's own numbers, differences. False where
+  // it cannot be had any more.
+  bool compose() {
+    for (std::size_t b = 0; b < bodies_.size(); ++b) trial_.set(bodies_[b].row, middle_of(bodies_[b], at(unknown_, b)));
+    const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + 0.5 * h_, trial_, &jacobian_);
+    if (!jacobian_.is_known()) return false;
+    std::vector<Eigen::MatrixXd> matrices;
+    std::vector<MiddleChange> changes;
+    for (const Group& group : groups_) {
+      matrices.emplace_back(Eigen::MatrixXd::Zero(group.size(), group.size()));
+      for (std::size_t m = 0; m < group.body.size(); ++m)
+        matrices.back().block<6, 6>(first_of(m), first_of(m)) =
+            own_change(bodies_[group.body[m]], at(unknown_, group.body[m]),
+                       vector_at(wrenches, 2 * bodies_[group.body[m]].row + 1));
+    }
+    for (std::size_t b = 0; b < bodies_.size(); ++b) changes.push_back(middle_change(bodies_[b], at(unknown_, b)));
+    for (std::size_t i = 0; i < jacobian_.size(); ++i) {
+      const Member pushed = member_[jacobian_.body(i)], by = member_[jacobian_.by(i)];
+      if (pushed.group == 0 || by.group == 0) continue;  // what nothing pushes
+      if (pushed.group != by.group) throw Refusal("the blocks of the forces' Jacobian change within the step");
+      const Group& group = groups_[pushed.group - 1];
+      const Body& body = bodies_[group.body[pushed.place]];
+      const Matrix6 force = jacobian_[i] * changes[group.body[by.place]];
+      auto block = matrices[pushed.group - 1].block<6, 6>(first_of(pushed.place), first_of(by.place));
+      block.topRows<3>() -= 0.5 * h_ * body.inverse_mass * force.topRows<3>();
+      block.bottomRows<3>() -=
+          0.5 * h_ * torque_effect(body, at(unknown_, group.body[pushed.place])) * force.bottomRows<3>();
+    }
+    for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.compute(matrices[g]);
+    return true;
+  }
+
+  // How the state in the middle changes with (v_bar, W).
+  MiddleChange middle_change(const Body& body, const Vector6& z) const {
+    const BodyState middle = middle_of(body, z);
+    MiddleChange change;
+    for (Eigen::Index k = 0; k < 6; ++k) {
+      Vector6 shifted = z;
+      shifted[k] += shift(z, k);
+      const BodyState other = middle_of(body, shifted);
+      change.col(k) << other.pose.position - middle.pose.position,
+          log_rotation(other.pose.orientation * middle.pose.orientation.conjugate()),
+          other.twist.linear - middle.twist.linear, other.twist.angular - middle.twist.angular;
+      change.col(k) /= shifted[k] - z[k];
+    }
+    return change;
+  }
+
+  // Of the residual with the wrench as it is.
+  Matrix6 own_change(const Body& body, const Vector6& z, const Vector3& torque) const {
+    Matrix6 change = Matrix6::Identity();
+    const Vector3 w = z.tail<3>(), here = turning_residual(body, w, torque);
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      Vector3 shifted = w;
+      shifted[k] += shift(z, k + 3);
+      change.block<3, 1>(3, 3 + k) = (turning_residual(body, shifted, torque) - here) / (shifted[k] - w[k]);
+    }
+    return change;
+  }
+
+  // What a torque makes of W: I^-1 cay(h W)^T q^T.
+  Matrix3 torque_effect(const Body& body, const Vector6& z) const {
+    const Quaternion back = cayley(h_ * z.tail<3>()).conjugate() * body.start.pose.orientation.conjugate();
+    return body.inverse_moments.asDiagonal() * to_rotation_matrix(back);
+  }
+
+  static double shift(const Vector6& z, Eigen::Index k) {
+    return kDifference * std::max(z.segment<3>(k - k % 3).norm(), 1e-3);
+  }
+  static Eigen::Index first_of(std::size_t place) { return 6 * static_cast<Eigen::Index>(place); }
 
   Eigen::VectorXd solved(const Eigen::VectorXd& left) const {
     Eigen::VectorXd change(left.size());
@@ -281,6 +369,8 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   std::vector<Group> groups_;
   std::vector<Body> bodies_;  // scratch, as all that follows
   Eigen::VectorXd unknown_;   // v_bar (m/s, world) and W (rad/s, body) of each
+  WrenchJacobian jacobian_;
+  std::vector<Member> member_;  // by row
   TrialColumns trial_;
   std::vector<double> room_;
 };

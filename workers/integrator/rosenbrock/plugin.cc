@@ -6,9 +6,9 @@
 //   (1/(g h) - J) u_i = f(alpha_i h, y + sum_j a_ij u_j) + sum_j c_ij/h u_j + g_i h f_s,    i = 1 ... 6,  g = 1/4
 //   y' = y + sum_j a_5j u_j + u_5 + u_6                                       error: u_6
 //
-// the method RODAS, stiffly accurate: stiff, damped motion comes to rest at its balance in one inner step. J and f_s are
-// differences of the forces: twelve derivatives a body of the largest group of bodies that feel each other (one where
-// they do not; interaction_groups.h), dense in a group. The error is scaled and held to Accuracy, and inner steps end on
+// the method RODAS, stiffly accurate: stiff, damped motion comes to rest at its balance in one inner step. J is made of the
+// forces' Jacobian where it can be had (wrench_jacobian.h), else of differences: twelve derivatives a body of the largest
+// group of bodies that feel each other (interaction_groups.h). It is dense in a group; f_s is a difference. The error is scaled and held to Accuracy, and inner steps end on
 // the step's boundary, as in DormandPrince54. Stability: A- and L-stable; the test equation's amplification at h k -> inf
 // is 0, so oscillations that the accuracy does not resolve are damped away. Known failure: that damping is not physics;
 // of an undamped stiff spring the energy is lost as soon as its swing is below Accuracy. Damping with c times the time
@@ -19,6 +19,7 @@
 #include <cmath>
 
 #include "plugin_sdk/interaction_groups.h"
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
 #include "plugin_sdk/motion_stages.h"
 
@@ -72,10 +73,10 @@ class Rosenbrock final : public IntegratorPlugin {
                  Host& host) override {
     Derivatives derivatives(request, host, &room_);
     request_ = &request, derivatives_ = &derivatives;
+    done_ = 0.0;
     begin();
     const double whole = request.time_step();
     double inner = whole, worst = 0.0;
-    done_ = 0.0;
     bool has_matrix = false;
     while (done_ < whole && !bodies_.empty()) {
       host.mark_progress();
@@ -122,6 +123,12 @@ class Rosenbrock final : public IntegratorPlugin {
     Eigen::PartialPivLU<Eigen::MatrixXd> factors;
   };
 
+  // Of a movable body: its group, and its place there.
+  struct Member {
+    Group* group = nullptr;
+    std::size_t place = 0;
+  };
+
   void begin() {
     bodies_.clear(), groups_.clear();
     trial_.resize(derivatives_->size());
@@ -137,7 +144,10 @@ class Rosenbrock final : public IntegratorPlugin {
       start.twist = {kept * start.twist.linear, kept * start.twist.angular};
       bodies_.push_back({i, start, start.pose.position, Vector3::Zero(), in_halves ? 0.0 : damping, kept});
     }
-    for (const std::vector<std::size_t>& rows : interaction_groups(*request_, derivatives_, request_->time(), trial_)) {
+    ask_jacobian();
+    for (const std::vector<std::size_t>& rows :
+         jacobian_.is_known() ? interaction_groups(*request_, jacobian_)
+                              : interaction_groups(*request_, derivatives_, request_->time(), trial_)) {
       Group& group = groups_.emplace_back();
       for (const std::size_t row : rows) group.body.push_back(place[row]);
       const auto size = static_cast<Eigen::Index>(rows.size()) * kNumbers;
@@ -156,12 +166,16 @@ class Rosenbrock final : public IntegratorPlugin {
             {slowed * y.segment<3>(6), slowed * y.segment<3>(9)}};
   }
 
-  // f at a time after the start of the inner step; false where the state is not finite.
-  bool evaluate(double elapsed, const Eigen::VectorXd& y, Eigen::VectorXd* f) {
-    if (!y.allFinite()) return false;
+  void carry_kinematic(double elapsed) {
     for (std::size_t i = 0; i < derivatives_->size(); ++i)
       if ((request_->flags()[i] & (kMovable | kKinematic)) == kKinematic)
         trial_.set(i, detail::keep_moving(derivatives_->start(i), done_ + elapsed));
+  }
+
+  // f at a time after the start of the inner step; false where the state is not finite.
+  bool evaluate(double elapsed, const Eigen::VectorXd& y, Eigen::VectorXd* f) {
+    if (!y.allFinite()) return false;
+    carry_kinematic(elapsed);
     for (std::size_t b = 0; b < bodies_.size(); ++b)
       trial_.set(bodies_[b].row, state_of(bodies_[b], y.segment<kNumbers>(first_of(b)), elapsed));
     const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + done_ + elapsed, trial_);
@@ -185,6 +199,10 @@ class Rosenbrock final : public IntegratorPlugin {
     const double time = kTimeDifference * h;
     evaluate(time, state_, &time_rate_);
     time_rate_ = (time_rate_ - rate_at_start_) / time;
+    if (jacobian_.is_known()) {
+      if (done_ > 0.0) ask_jacobian();
+      if (jacobian_.is_known()) return compose();
+    }
 
     Eigen::Index columns = 0;
     for (const Group& group : groups_) columns = std::max(columns, group.matrix.cols());
@@ -207,6 +225,43 @@ class Rosenbrock final : public IntegratorPlugin {
               (rate_.segment<kNumbers>(first) - rate_at_start_.segment<kNumbers>(first)) / by;
         }
       }
+    }
+  }
+
+  // At the start of an inner step.
+  void ask_jacobian() {
+    carry_kinematic(0.0);
+    for (const Body& body : bodies_) trial_.set(body.row, body.start);
+    const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + done_, trial_, &jacobian_);
+    wrenches_.assign(wrenches.begin(), wrenches.end());
+  }
+
+  // J from the Jacobian of the forces.
+  void compose() {
+    member_.assign(derivatives_->size(), {});
+    for (Group& group : groups_) {
+      group.matrix.setZero();
+      for (std::size_t m = 0; m < group.body.size(); ++m) {
+        const Body& body = bodies_[group.body[m]];
+        const Vector3& w = body.start.twist.angular;
+        auto own = group.matrix.block<kNumbers, kNumbers>(first_of(m), first_of(m));
+        own.block<3, 3>(0, 6) = own.block<3, 3>(3, 9) = Matrix3::Identity();
+        own.block<3, 3>(3, 3) = 0.5 * skew(w);
+        own.bottomRows<6>() = acceleration_jacobian(
+            body.start.pose.orientation, w, vector_at(request_->inertia(), body.row),
+            vector_at(request_->inverse_inertia(), body.row), vector_at(wrenches_, 2 * body.row + 1));
+        member_[body.row] = {&group, m};
+      }
+    }
+    for (std::size_t i = 0; i < jacobian_.size(); ++i) {
+      const std::uint32_t row = jacobian_.body(i);
+      const Member &pushed = member_[row], &by = member_[jacobian_.by(i)];
+      if (pushed.group == nullptr || by.group == nullptr) continue;  // what nothing pushes
+      if (pushed.group != by.group)
+        throw Refusal("the blocks of the forces' Jacobian are not those of the start of the step");
+      pushed.group->matrix.block<6, kNumbers>(first_of(pushed.place) + 6, first_of(by.place)) +=
+          accelerated_block(trial_.at(row).pose.orientation, request_->inverse_mass()[row],
+                            vector_at(request_->inverse_inertia(), row), jacobian_[i]);
     }
   }
 
@@ -284,6 +339,9 @@ class Rosenbrock final : public IntegratorPlugin {
   std::array<Eigen::VectorXd, kStages> u_;
   TrialColumns trial_;
   std::vector<double> room_;
+  WrenchJacobian jacobian_;  // of the start of the inner step
+  std::vector<double> wrenches_;
+  std::vector<Member> member_;  // by row
 };
 
 }  // namespace

@@ -1,0 +1,121 @@
+#include "plugin_sdk/force_jacobians.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/body.h"
+#include "plugin_sdk/message_columns.h"
+
+namespace gravitas {
+namespace {
+
+constexpr double kStep = 1e-6;
+
+std::vector<double> numbers_of(std::span<const double> column) { return {column.begin(), column.end()}; }
+
+// The bodies of a request, moved.
+class MovedBodies {
+ public:
+  explicit MovedBodies(const stage::ForceWrenchesRequest& request)
+      : request_(request),
+        position_(numbers_of(request.position())),
+        orientation_(numbers_of(request.orientation())),
+        linear_velocity_(numbers_of(request.linear_velocity())),
+        angular_velocity_(numbers_of(request.angular_velocity())) {}
+
+  // Moves number `k` of each body's twelve by its step times `sign`; one number at a time.
+  void move(std::size_t k, double sign) {
+    for (std::size_t i = 0; i < request_.mass().size(); ++i) {
+      if (k >= 3 && k < 6) {
+        const Quaternion q = quaternion_at(request_.orientation(), i);
+        set_quaternion(orientation_, i,
+                       displaced({Vector3::Zero(), q}, Vector3::Zero(), sign * kStep * axis(k)).orientation);
+        continue;
+      }
+      std::vector<double>& column = k < 3 ? position_ : k < 9 ? linear_velocity_ : angular_velocity_;
+      const std::size_t at = 3 * i + k % 3;
+      column[at] = start(k)[at] + sign * step(k, i);
+    }
+  }
+  void put_back(std::size_t k) {
+    if (k >= 3 && k < 6) {
+      std::ranges::copy(request_.orientation(), orientation_.begin());
+    } else {
+      std::ranges::copy(start(k), (k < 3 ? position_ : k < 9 ? linear_velocity_ : angular_velocity_).begin());
+    }
+  }
+  // Of a body's number: the difference of the two moved states, as it is in rounded numbers.
+  double width(std::size_t k, std::size_t body) const {
+    if (k >= 3 && k < 6) return 2.0 * kStep;
+    const double at = start(k)[3 * body + k % 3], by = step(k, body);
+    return (at + by) - (at - by);
+  }
+
+  MessageColumns wrenches(ForcePlugin& force, Host& host) const {
+    using Request = stage::ForceWrenchesRequest;
+    std::array<gravitas_column, Request::kColumnCount> columns;
+    std::copy_n(request_.plain(), columns.size(), columns.begin());
+    columns[Request::kPosition].data = position_.data(), columns[Request::kOrientation].data = orientation_.data();
+    columns[Request::kLinearVelocity].data = linear_velocity_.data();
+    columns[Request::kAngularVelocity].data = angular_velocity_.data();
+    const std::size_t rows = request_.application().size() / 2;
+    MessageColumns answer(stage::method_info(stage::Method::kForceWrenches).reply);
+    answer.f64("wrench").resize(6 * rows), answer.f64("impulse").resize(6 * rows);
+    answer.f64("potential").resize(rows), answer.u32("flags").resize(rows);
+    std::vector<gravitas_reply_column> rooms = answer.rooms();
+    force.wrenches(Request(columns.data()), stage::ForceWrenchesReply(rooms.data()), host);
+    return answer;
+  }
+
+ private:
+  static Vector3 axis(std::size_t k) { return Vector3::Unit(static_cast<Eigen::Index>(k % 3)); }
+  std::span<const double> start(std::size_t k) const {
+    return k < 3 ? request_.position() : k < 9 ? request_.linear_velocity() : request_.angular_velocity();
+  }
+  double step(std::size_t k, std::size_t body) const {
+    const double size = vector_at(start(k), body).norm();
+    return kStep * (k < 3 ? 1.0 + 1e-3 * size : std::max(1.0, size));
+  }
+
+  const stage::ForceWrenchesRequest& request_;
+  std::vector<double> position_, orientation_, linear_velocity_, angular_velocity_;
+};
+
+}  // namespace
+
+void push_block(const stage::ForceJacobiansReply& reply, std::uint32_t body, std::uint32_t by,
+                const JacobianBlock& block) {
+  if (!block.allFinite())
+    throw Refusal("the Jacobian of the wrench on body " + std::to_string(body) +
+                  " is not finite: the force's properties or a body's mass or state are not, or too large");
+  reply.block_body().push(body, by);
+  for (Eigen::Index row = 0; row < block.rows(); ++row)
+    for (Eigen::Index column = 0; column < block.cols(); ++column) reply.block().push(block(row, column));
+}
+
+void difference_own_states(ForcePlugin& force, const stage::ForceWrenchesRequest& request,
+                           const stage::ForceJacobiansReply& reply, Host& host) {
+  MovedBodies bodies(request);
+  const MessageColumns here = bodies.wrenches(force, host);
+  const std::vector<std::uint32_t>& flags = here.u32("flags");
+  std::vector<JacobianBlock> blocks(flags.size(), JacobianBlock::Zero());
+  for (std::size_t k = 0; k < 12; ++k) {
+    bodies.move(k, 1.0);
+    const MessageColumns after = bodies.wrenches(force, host);
+    bodies.move(k, -1.0);
+    const MessageColumns before = bodies.wrenches(force, host);
+    bodies.put_back(k);
+    for (std::size_t i = 0; i < blocks.size(); ++i)
+      for (std::size_t row = 0; row < 6; ++row)
+        blocks[i](static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(k)) =
+            (after.f64("wrench")[6 * i + row] - before.f64("wrench")[6 * i + row]) /
+            bodies.width(k, request.application()[2 * i + 1]);
+  }
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    if ((flags[i] & kConstantWrench) == 0)
+      push_block(reply, request.application()[2 * i + 1], request.application()[2 * i + 1], blocks[i]);
+}
+
+}  // namespace gravitas
