@@ -2,9 +2,9 @@
 // hi + lo. transcendental.cc carries its leading terms this way, so that each function rounds once
 // at its end.
 //
-// Plain IEEE double arithmetic in round-to-nearest only: a fused multiply-add would be exact too,
-// but its speed depends on the target, and a compiler that contracts or reassociates on its own
-// would break the identities below. Source: T. J. Dekker, "A floating-point technique for
+// IEEE double arithmetic in round-to-nearest: a compiler that contracts or reassociates on its own would break the
+// identities below. Where the target has a fused multiply-add it finds the rest of a product, with the same bits. Source:
+// T. J. Dekker, "A floating-point technique for
 // extending the available precision", Numer. Math. 18 (1971).
 #pragma once
 
@@ -44,10 +44,14 @@ inline DoubleDouble split(double a) {
 // zero or at least 2^-968 in magnitude (below that the error term itself underflows).
 inline DoubleDouble two_product(double a, double b) {
   const double product = a * b;
+#ifdef __FMA__
+  return {product, __builtin_fma(a, b, -product)};
+#else
   const DoubleDouble as = split(a);
   const DoubleDouble bs = split(b);
   const double error = ((as.hi * bs.hi - product) + as.hi * bs.lo + as.lo * bs.hi) + as.lo * bs.lo;
   return {product, error};
+#endif
 }
 
 // a / b to about 2^-104 relative. Preconditions: b.hi != 0, both normalised, and the ranges of

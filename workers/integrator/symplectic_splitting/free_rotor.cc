@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 #include "workers/integrator/symplectic_splitting/elliptic.h"
 
 namespace gravitas {
@@ -102,6 +103,66 @@ Matrix3 frame_of(const Vector3& n, int k) {
   return frame;
 }
 
+// Of a short motion: u up to which n's series is summed, and how many terms it takes (poles are pi/2 away).
+constexpr double kShort = 0.06;
+constexpr std::size_t kMostTerms = 12;
+std::size_t terms_for(double u_squared) { return u_squared > 9e-4 ? kMostTerms : u_squared > 2.5e-5 ? 9 : 6; }
+
+// Gauss-Legendre on 0 … 1, four points.
+const Eigen::Array4d kFourPoints(0.069431844202973712, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629);
+const Eigen::Array4d kFourWeights(0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693);
+
+// R(0)^T R(t) is the shortest turn that takes n_t to n_0 and then one by phi about n_0, where
+//   phi' = 2T/G - n_0.(n x n') / (1 + n_0.n).
+// The second term is that of the area between n's path and the arc, and of third order.
+RotorMotion short_motion(const Vector3& inverse_moments, const Vector3& momentum, const Vector3& n, double size,
+                         double time, std::size_t terms) {
+  using Lanes = Eigen::Array4d;
+  // n' = n x J n in powers of the share s of the time
+  const Vector3& J = inverse_moments;
+  const double scale = size * time;
+  const Lanes factor(scale * (J[2] - J[1]), scale * (J[0] - J[2]), scale * (J[1] - J[0]), 0.0);
+  std::array<Lanes, kMostTerms + 1> power, after, before;  // of axes i, i + 1, i + 2
+  const auto keep = [&](std::size_t m, const Lanes& c) {
+    power[m] = c, after[m] = Lanes(c[1], c[2], c[0], 0.0), before[m] = Lanes(c[2], c[0], c[1], 0.0);
+  };
+  keep(0, Lanes(n[0], n[1], n[2], 0.0));
+  for (std::size_t m = 0; m < terms; ++m) {
+    // two sums that do not wait for each other
+    Lanes even = after[0] * before[m], odd = Lanes::Zero();
+    for (std::size_t i = 1; i < m; i += 2) {
+      odd += after[i] * before[m - i];
+      even += after[i + 1] * before[m - i - 1];
+    }
+    if (m % 2 == 1) odd += after[m] * before[0];
+    keep(m + 1, factor * (even + odd) * (1.0 / static_cast<double>(m + 1)));
+  }
+  std::array<Lanes, 3> change, rate;
+  change.fill(Lanes::Zero()), rate.fill(Lanes::Zero());
+  Lanes whole = Lanes::Zero();
+  for (std::size_t m = terms; m > 0; --m) {
+    const Lanes c = power[m], slope = static_cast<double>(m) * c;
+    whole += c;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      rate[k] = rate[k] * kFourPoints + slope[lane];
+      change[k] = (change[k] + c[lane]) * kFourPoints;
+    }
+  }
+  const Lanes area = n[0] * (change[1] * rate[2] - change[2] * rate[1]) +
+                     n[1] * (change[2] * rate[0] - change[0] * rate[2]) +
+                     n[2] * (change[0] * rate[1] - change[1] * rate[0]);
+  const Lanes along = n[0] * change[0] + n[1] * change[1] + n[2] * change[2];
+  const double angle = scale * n.dot(J.cwiseProduct(n)) - (kFourWeights * area / (2.0 + along)).sum();
+
+  const Vector3 moved = whole.head<3>();
+  const double cosine = std::sqrt(1.0 - 0.25 * moved.squaredNorm());  // of half the angle between n_0 and n_t
+  const Vector3 axis = moved.cross(n) * (0.5 / cosine);
+  const math::SinCos half = math::sincos(0.5 * angle);
+  const Quaternion about(half.cos, half.sin * n[0], half.sin * n[1], half.sin * n[2]);
+  return {momentum + size * moved, about * Quaternion(cosine, axis.x(), axis.y(), axis.z())};
+}
+
 RotorMotion steady(const Vector3& inverse_moments, const Vector3& momentum, double time) {
   return {momentum, exp_rotation(time * inverse_moments.cwiseProduct(momentum))};
 }
@@ -109,11 +170,21 @@ RotorMotion steady(const Vector3& inverse_moments, const Vector3& momentum, doub
 }  // namespace
 
 RotorMotion free_rotor(const Vector3& inverse_moments, const Vector3& momentum, double time) {
-  const double size = momentum.stableNorm();
+  const double square = momentum.squaredNorm();
+  const double size = square > 1e-250 && square < 1e250 ? std::sqrt(square) : momentum.stableNorm();
   if (size == 0.0 || time == 0.0) return {momentum, Quaternion::Identity()};
+  // the square of what u moves by, or up to twice as much
+  const Vector3 direction_at_start = momentum / size;
+  const Vector3 apart(inverse_moments[1] - inverse_moments[2], inverse_moments[2] - inverse_moments[0],
+                      inverse_moments[0] - inverse_moments[1]);
+  const Vector3 products(apart[1] * apart[2], apart[2] * apart[0], apart[0] * apart[1]);
+  const double u_squared = size * time * (size * time) * products.cwiseAbs().dot(direction_at_start.cwiseAbs2());
+  if (u_squared <= kShort * kShort)
+    return short_motion(inverse_moments, momentum, direction_at_start, size, time, terms_for(u_squared));
+
   const SortedAxes axes(inverse_moments);
   const Vector3 J(inverse_moments[axes.axis[0]], inverse_moments[axes.axis[1]], inverse_moments[axes.axis[2]]);
-  const Vector3 n = axes.sorted(momentum / size).normalized();
+  const Vector3 n = axes.sorted(direction_at_start).normalized();
   const double a1 = J[1] - J[2], a2 = J[0] - J[2], a3 = J[0] - J[1];
   if (!(a2 > 0.0)) return steady(inverse_moments, momentum, time);  // a ball
 

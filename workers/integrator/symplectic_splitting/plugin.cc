@@ -196,9 +196,12 @@ class SymplecticSplitting final : public IntegratorPlugin {
   // Rates of the velocities without the gyroscopic term, which belongs to the drift.
   Twist rate(std::size_t body, std::span<const double> wrenches) const {
     const Vector3 inverse_moments = vector_at(request_->inverse_inertia(), body);
+    const Vector3 torque = vector_at(wrenches, 2 * body + 1);
+    Twist rate{request_->inverse_mass()[body] * vector_at(wrenches, 2 * body), Vector3::Zero()};
+    if (torque.isZero(0.0)) return rate;
     const Quaternion q = quaternion_at(trial_.orientation, body);
-    return {request_->inverse_mass()[body] * vector_at(wrenches, 2 * body),
-            q * inverse_moments.cwiseProduct(q.conjugate() * vector_at(wrenches, 2 * body + 1))};
+    rate.angular = q * inverse_moments.cwiseProduct(q.conjugate() * torque);
+    return rate;
   }
   void push(std::size_t body, const BodyState& from, const Twist& rate, double s) {
     trial_.set(body, {from.pose, {from.twist.linear + s * rate.linear, from.twist.angular + s * rate.angular}});
