@@ -163,10 +163,11 @@ Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const 
       bad_numbers("it pushed the body '" + model_.body_id[i] + "', which nothing can push");
   }
 
-  const SolutionColumns solution = {
+  SolutionColumns solution = {
       data.solved_linear_velocity.span(), data.solved_angular_velocity.span(), data.pose_change.span(),
       data.discrepancy_impulse.span(),    data.discrepancy_correction.span(),  data.contact_impulse.span(),
-      data.contact_correction.span(),     data.contact_direction.span(),       data.stop_reason[0]};
+      data.contact_correction.span(),     data.contact_direction.span(),       data.contact_turning.span()};
+  solution.stop_reason = data.stop_reason[0];
   require(check_multipliers(solution, data.contact_material.span(), data.discrepancies.mode.span()));
   if (samples_physics_) {
     const RequestColumns columns(arena_, answer.value_);
