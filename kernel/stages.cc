@@ -272,12 +272,13 @@ Trusted<Solution> Environment::solve() {
   const auto reply =
       ids(data_.solved_linear_velocity, data_.solved_angular_velocity, data_.pose_change, data_.discrepancy_impulse,
           data_.discrepancy_correction, data_.contact_impulse, data_.contact_correction, data_.contact_direction,
-          data_.iterations, data_.residual, data_.stop_reason);
+          data_.iterations, data_.residual, data_.stop_reason, data_.contact_turning);
   // a solver answers a row per discrepancy and contact: make room, so that it is not asked twice
   const std::size_t discrepancies = joints.mode.size(), contacts = data_.contact_key.size();
   for (const Column<double>* column : {&data_.discrepancy_impulse, &data_.discrepancy_correction})
     column->resize(3 * discrepancies);
-  for (const Column<double>* column : {&data_.contact_impulse, &data_.contact_direction}) column->resize(3 * contacts);
+  for (const Column<double>* column : {&data_.contact_impulse, &data_.contact_direction, &data_.contact_turning})
+    column->resize(3 * contacts);
   data_.contact_correction.resize(contacts);
   if (discrepancies + contacts == 0 && solver_.may_be_spared()) {
     // without joints and contacts S* stands

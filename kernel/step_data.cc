@@ -126,7 +126,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   solved_linear_velocity = bodies_if(has_reactions, 3), solved_angular_velocity = bodies_if(has_reactions, 3);
   pose_change = bodies_if(has_reactions, 6);
   discrepancy_impulse = axis_numbers(), discrepancy_correction = axis_numbers();
-  contact_impulse = contact_numbers(3), contact_correction = contact_numbers(1), contact_direction = contact_numbers(3);
+  contact_impulse = contact_numbers(3), contact_correction = contact_numbers(1);
+  contact_direction = contact_numbers(3), contact_turning = contact_numbers(3);
   iterations = Column<std::uint32_t>(arena, 1, 0), stop_reason = Column<std::uint32_t>(arena, 1, 0);
   residual = Column<double>(arena, 1, 0);
 }

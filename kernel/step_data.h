@@ -97,7 +97,8 @@ struct StepData {
 
   // Stage::kSolve.
   Column<double> solved_linear_velocity, solved_angular_velocity, pose_change;
-  Column<double> discrepancy_impulse, discrepancy_correction, contact_impulse, contact_correction, contact_direction;
+  Column<double> discrepancy_impulse, discrepancy_correction;
+  Column<double> contact_impulse, contact_correction, contact_direction, contact_turning;
   Column<std::uint32_t> iterations, stop_reason;
   Column<double> residual;
 };

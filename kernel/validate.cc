@@ -27,8 +27,6 @@ void require_physics(const std::string& problem) {
   if (!problem.empty()) throw StageFault(FaultKind::kBadPhysics, "physics", "its answer breaks a law: " + problem);
 }
 
-bool is_zero(double number) { return number == 0.0; }
-
 std::string at_row(const char* what, std::size_t row) { return std::string(what) + " of row " + std::to_string(row); }
 
 }  // namespace
@@ -84,10 +82,10 @@ Trusted<TrialState> Validator::trial_state(const Untrusted<StageCall>& answer, c
 }
 
 void Validator::derivative_request(const StepData& data) const {
-  const auto finite = [](const Column<double>& column) { return first_not_finite(column.span()) == kNoRow; };
-  if (!finite(data.derivative_time) || !finite(data.derivative_position) || !finite(data.derivative_orientation) ||
-      !finite(data.derivative_linear_velocity) || !finite(data.derivative_angular_velocity))
-    bad_numbers("it asked for a derivative in a state that is not finite");
+  for (const Column<double>* column : {&data.derivative_time, &data.derivative_position, &data.derivative_orientation,
+                                       &data.derivative_linear_velocity, &data.derivative_angular_velocity})
+    if (first_not_finite(column->span()) != kNoRow)
+      bad_numbers("it asked for a derivative in a state that is not finite");
 }
 
 Trusted<Pairs> Validator::pairs(const Untrusted<StageCall>& answer, const StepData& data) const {
@@ -147,13 +145,14 @@ Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const 
                                            {data.solved_angular_velocity.span(), data.trial_angular_velocity.span()}});
   const std::span<const double> change = data.pose_change.span();
   for (std::size_t i = 0; i < model_.body_count && pushed == kNoRow; ++i)
-    if ((data.flags[i] & kMovable) == 0 && !std::ranges::all_of(change.subspan(6 * i, 6), is_zero)) pushed = i;
+    if ((data.flags[i] & kMovable) == 0 && std::ranges::count(change.subspan(6 * i, 6), 0.0) != 6) pushed = i;
   if (pushed != kNoRow) bad_numbers("it pushed the body '" + model_.body_id[pushed] + "', which nothing can push");
 
-  const SolutionColumns solution = {
+  SolutionColumns solution = {
       data.solved_linear_velocity.span(), data.solved_angular_velocity.span(), data.pose_change.span(),
       data.discrepancy_impulse.span(),    data.discrepancy_correction.span(),  data.contact_impulse.span(),
-      data.contact_correction.span(),     data.contact_direction.span(),       data.stop_reason[0]};
+      data.contact_correction.span(),     data.contact_direction.span(),       data.contact_turning.span()};
+  solution.stop_reason = data.stop_reason[0];
   require(check_multipliers(solution, data.contact_material.span(), data.discrepancies.mode.span()));
   if (samples_physics_) {
     const auto columns = plain_columns(arena_, answer.value_.request);

@@ -2,7 +2,7 @@
 // only these functions make a Trusted<...> of it, which is what the next stage takes.
 //
 // Four layers: wire (the carrier's: sizes, epoch, digest), structure (rows, ids, order, uniqueness), numbers (finite,
-// unit, signs, friction cone), always; and in every so many steps physics (plugin_sdk/physics_checks.h). A violation
+// unit, signs, bounds of friction), always; and in every so many steps physics (plugin_sdk/physics_checks.h). A violation
 // throws StageFault.
 #pragma once
 

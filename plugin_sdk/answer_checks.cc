@@ -1,6 +1,7 @@
 #include "plugin_sdk/answer_checks.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -117,6 +118,12 @@ AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const d
     const double friction = std::max(row[kStaticFriction], row[kDynamicFriction]);
     if ((impulse - along * normal).norm() > friction * along + tolerance)
       return bad_number("contact_impulse", i, " leaves the friction cone");
+    const Vector3 turning = vector_at(answer.contact_turning, i);
+    const double spinning = normal.dot(turning), pressed = along + tolerance, rounding = kRounding * turning.norm();
+    if (std::fabs(spinning) > row[kSpinningFriction] * pressed + rounding)
+      return bad_number("contact_turning", i, " spins by more than spinning friction can");
+    if ((turning - spinning * normal).norm() > row[kRollingFriction] * pressed + rounding)
+      return bad_number("contact_turning", i, " rolls by more than rolling friction can");
     if (answer.contact_correction[i] < 0.0) return bad_number("contact_correction", i, " is negative");
   }
   for (std::size_t i = 0; i < mode.size(); ++i) {

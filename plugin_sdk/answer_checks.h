@@ -43,7 +43,8 @@ AnswerProblem check_block_rows(std::span<const std::uint32_t> block_body, std::u
 AnswerProblem check_discrepancy_rows(std::span<const std::uint32_t> constraint, std::span<const std::uint32_t> intact,
                                      const DiscrepancyColumns& rows);
 
-// Multipliers: contacts push, inside the friction cone of their material, along unit directions; one-sided axes too.
+// Multipliers: contacts push along unit directions, with no more friction of each kind than their material allows;
+// one-sided axes too.
 AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const double> material,
                                 std::span<const std::uint32_t> mode);
 

@@ -91,15 +91,14 @@ std::string check_contacts(const stage::CollisionManifoldsRequest& request, cons
 struct SolutionColumns {
   std::span<const double> linear_velocity, angular_velocity, pose_change;
   std::span<const double> discrepancy_impulse, discrepancy_correction;
-  std::span<const double> contact_impulse, contact_correction, contact_direction;
+  std::span<const double> contact_impulse, contact_correction, contact_direction, contact_turning;
   std::uint32_t stop_reason = 0;
 };
 
 // With J as in discrepancy.h and contacts pushed at their points:
 //   momentum   M (v_{n+1} - v*) = sum of J^T lambda, linear and angular, all directions at S*, or all at S* (+) delta
 //              (linear axes turn with body 1). Arms at either, of a contact to its point or the body's own surface: what
-//              that moves of them is allowed for, and so is what rolling and spinning friction can turn, of which nothing
-//              is reported
+//              that moves of them is allowed for
 //   pose       M delta = sum of J^T mu + theta h J^T lambda of the rows on velocity alone (friction, drives, soft ones),
 //              or of another lambda up to twice that large where the solver says that it stopped before it was done
 //   energy     kinetic energy does not grow where nothing drives: no desired velocity, no compliance, no kinematic body
@@ -114,10 +113,9 @@ class SolutionCheck {
   // Impulse (N s, N m s) on a body, or the same of displacements (kg m, kg m^2), and the magnitudes it is made of.
   struct Push {
     Vector3 linear = Vector3::Zero(), angular = Vector3::Zero();
-    double size = 0.0;    // sum of the linear magnitudes
-    double moment = 0.0;  // sum of magnitudes times arms
-    // turning by what is not told: rolling and spinning friction, and at which surface a contact pushes
-    double unreported = 0.0;
+    double size = 0.0;        // sum of the linear magnitudes
+    double moment = 0.0;      // sum of magnitudes times arms
+    double unreported = 0.0;  // turning that depends on the surface at which a contact pushes
   };
   struct Pushes {
     Push velocity, pose;

@@ -116,21 +116,23 @@ class Balance {
       const double along = direction.dot(impulse), correction = answer_.contact_correction[i];
       const Vector3 friction = impulse - along * direction;
       const Vector3 normal = vector_at(request_.contact_normal(), i);
-      const double* material = &request_.contact_material()[kMaterialColumns * i];
-      const double turning = std::max(0.0, along) * (material[kRollingFriction] + material[kSpinningFriction]);
+      const Vector3 turning = vector_at(answer_.contact_turning, i);
       // from the middle to either surface
       const double to_surface = 0.5 * std::fabs(request_.contact_depth()[i]) * normal.cross(impulse).norm();
       for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i),
                [&](Pushes& body, const Vector3& arm, double sign) {
                  push_at(arm, sign * impulse, &body.velocity);
-                 body.velocity.unreported += turning + to_surface;
+                 push_couple(sign * turning, &body.velocity);
+                 body.velocity.unreported += to_surface;
                  push_at(arm, sign * correction * normal, &body.pose);
                  push_at(arm, sign * share * friction, &body.pose);
+                 push_couple(sign * share * turning, &body.pose);
                  // of an impulse that is taken apart, rounding stays
                  body.pose.size += share * impulse.norm();
                  body.pose.moment += share * impulse.norm() * arm.norm();
-                 body.pose.unreported += share * (turning + to_surface);
+                 body.pose.unreported += share * to_surface;
                  loosen(share * friction.norm(), arm, &body);
+                 body.loose_moment += share * turning.norm();
                });
     }
   }
@@ -228,9 +230,12 @@ class Balance {
                    arms(velocity, turning.norm()) + kOfSolution * spin, "I (w - w*) is the sum of the moments, N m s");
     if (!wrong.empty()) return wrong;
     const Vector3 displaced = inertia * change.angular;
+    // a turn settles by what it moves at the radius of gyration
+    const double give = vector_at(request_.inverse_inertia(), i).mean();
+    const double gyration = inverse_mass > 0.0 && give > 0.0 ? std::sqrt(inverse_mass / give) : 1.0;
     return off_by("pose_change", i, (displaced - pose.angular).norm(),
                   arms(pose, displaced.norm()) + before_last * pushes_[i].loose_moment +
-                      kOfSolution * displaced.norm() + inertia.norm() * settled,
+                      kOfSolution * displaced.norm() + inertia.norm() * settled / gyration,
                   "I delta is the sum of the corrections' moments, kg m^2");
   }
 

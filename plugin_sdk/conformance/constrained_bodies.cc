@@ -1,6 +1,7 @@
 #include "plugin_sdk/conformance/constrained_bodies.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace gravitas::conformance {
 namespace {
@@ -102,7 +103,8 @@ void ConstrainedBodies::append_contacts(MessageColumns* request) const {
     request->f64("contact_depth").push_back(contact.depth);
     request->u64("contact_key").push_back(contact.key);
     std::vector<double>& material = request->f64("contact_material");
-    material.insert(material.end(), {contact.restitution, contact.friction, contact.friction, 0.0, 0.0, 0.0});
+    material.insert(material.end(), {contact.restitution, contact.friction, contact.friction, contact.rolling_friction,
+                                     contact.spinning_friction, 0.0});
     add_row(request, "contact_warm_impulse", contact.warm_impulse);
     request->f64("contact_warm_correction").push_back(contact.warm_correction);
   }
@@ -152,6 +154,12 @@ Solution ConstrainedBodies::ask(Inquiry* inquiry) const {
     inquiry->expect_at_most("friction impulse" + of + " (normal impulse " + number_text(along) + ", coefficient " +
                                 number_text(contacts[i].friction) + ")",
                             (impulse - along * normal).norm(), contacts[i].friction * along + rounding);
+    const Vector3 turning = solution.contact_turning(i);
+    const double spinning = normal.dot(turning), pressed = along + rounding, turned = 1e-9 * turning.norm();
+    inquiry->expect_at_most("spinning friction" + of + " (normal impulse " + number_text(along) + ")",
+                            std::fabs(spinning), contacts[i].spinning_friction * pressed + turned);
+    inquiry->expect_at_most("rolling friction" + of + " (normal impulse " + number_text(along) + ")",
+                            (turning - spinning * normal).norm(), contacts[i].rolling_friction * pressed + turned);
     inquiry->expect(solution.contact_correction(i) >= 0.0,
                     "correction" + of + " is " + number_text(solution.contact_correction(i)) + ": it pulls");
   }

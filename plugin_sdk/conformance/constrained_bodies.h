@@ -13,6 +13,11 @@
 
 namespace gravitas::conformance {
 
+// Share of the speeds that meet, also for iterative methods: the problems are small and well conditioned.
+constexpr double kAccuracy = 1e-6;
+constexpr double kGravity = 9.81;
+inline const Vector3 kDown(0.0, -kGravity, 0.0);
+
 struct ConstrainedBody {
   double mass = 1.0;  // 0: immovable
   // Principal, kg m^2; zero: not turned by anything.
@@ -28,6 +33,7 @@ struct BodyContact {
   Vector3 point = Vector3::Zero();
   double depth = 0.0;
   double restitution = 0.0, friction = 0.0;
+  double rolling_friction = 0.0, spinning_friction = 0.0;  // m
   std::uint64_t key = 1;
   Vector3 warm_impulse = Vector3::Zero();
   double warm_correction = 0.0;
@@ -49,6 +55,7 @@ class Solution {
   Vector3 translation(std::size_t body) const { return vector_at(reply_.f64("pose_change"), 2 * body); }
   Vector3 rotation(std::size_t body) const { return vector_at(reply_.f64("pose_change"), 2 * body + 1); }
   Vector3 contact_impulse(std::size_t contact) const { return vector_at(reply_.f64("contact_impulse"), contact); }
+  Vector3 contact_turning(std::size_t contact) const { return vector_at(reply_.f64("contact_turning"), contact); }
   double contact_correction(std::size_t contact) const { return reply_.f64("contact_correction")[contact]; }
   Vector3 contact_direction(std::size_t contact) const { return vector_at(reply_.f64("contact_direction"), contact); }
   // Along the axes of the discrepancy.
@@ -86,7 +93,7 @@ class ConstrainedBodies {
   // Of the second question, at S_n, without drag and accelerations.
   MessageColumns reactions_request() const;
   // The answer, checked for what the kernel demands of every solution: bodies that nothing can push are left alone,
-  // contacts push and stay in their cones.
+  // contacts push, and all kinds of friction stay in their bounds.
   Solution ask(Inquiry* inquiry) const;
 
   // The pose that the answer commits.

@@ -14,6 +14,8 @@ struct ContactLaw {
   double static_friction = 0.0;         // never below the dynamic one
   double dynamic_friction = 0.0;
   double rolling_friction = 0.0, spinning_friction = 0.0;  // m
+
+  bool has_turning() const { return rolling_friction > 0.0 || spinning_friction > 0.0; }
 };
 
 // Of contact `i` of the request, between two bodies.

@@ -376,10 +376,9 @@ class IslandSolver {
       if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
   }
 
-  static bool has_turning(const ContactLaw& law) { return law.rolling_friction > 0.0 || law.spinning_friction > 0.0; }
   bool may_turn() const {
     return std::any_of(contacts_.begin(), contacts_.end(),
-                       [](const EndContact& c) { return c.is_closed && has_turning(c.law); });
+                       [](const EndContact& c) { return c.is_closed && c.law.has_turning(); });
   }
   bool is_turned() const {
     return std::any_of(contacts_.begin(), contacts_.end(), [](const EndContact& c) { return !c.turning.isZero(0.0); });
@@ -410,7 +409,7 @@ class IslandSolver {
     ConeContact& cone = cone_.contacts.emplace_back();
     cone.first = static_cast<std::uint32_t>(cone_.rows.size());
     cone.has_friction = law.static_friction > 0.0;
-    cone.has_turning = with_turning && has_turning(law) && !(inverse1 + inverse2).isZero(0.0);
+    cone.has_turning = with_turning && law.has_turning() && !(inverse1 + inverse2).isZero(0.0);
     cone.target = law.target;
     cone.slides = contact.slides;
     cone.static_friction = law.static_friction, cone.dynamic_friction = law.dynamic_friction;
@@ -540,6 +539,8 @@ class IslandSolver {
       answer_.velocity[rows_[i]] = velocity_[i];
       answer_.displacement[rows_[i]] = displacement_[i];
     }
+    for (const EndContact& contact : contacts_)
+      set_vector(answer_.contact_turning, contact.row, contact.law.frame * contact.turning);
   }
 
   const stage::SolverSolveRequest& request_;

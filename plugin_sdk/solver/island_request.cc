@@ -75,6 +75,7 @@ void IslandRequest::store(const SolverSolution& part, SolverSolution* whole) con
   put_rows(part.joint_impulse, 3, island_->discrepancies, &whole->joint_impulse);
   put_rows(part.joint_correction, 3, island_->discrepancies, &whole->joint_correction);
   put_rows(part.contact_impulse, 3, island_->contacts, &whole->contact_impulse);
+  put_rows(part.contact_turning, 3, island_->contacts, &whole->contact_turning);
   put_rows(part.contact_correction, 1, island_->contacts, &whole->contact_correction);
   put_rows(part.contact_direction, 3, island_->contacts, &whole->contact_direction);
 }

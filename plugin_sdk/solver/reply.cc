@@ -22,6 +22,7 @@ void set_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& 
   solution->joint_impulse.assign(3 * joints, 0.0);
   solution->joint_correction.assign(3 * joints, 0.0);
   solution->contact_impulse.assign(3 * contacts, 0.0);
+  solution->contact_turning.assign(3 * contacts, 0.0);
   solution->contact_correction.assign(contacts, 0.0);
   solution->contact_direction.assign(request.contact_normal().begin(), request.contact_normal().end());
 }
@@ -54,6 +55,7 @@ void write(const SolverSolution& solution, const SolverOutcome& outcome, const s
   put(reply.contact_impulse(), solution.contact_impulse);
   put(reply.contact_correction(), solution.contact_correction);
   put(reply.contact_direction(), solution.contact_direction);
+  put(reply.contact_turning(), solution.contact_turning);
   reply.iterations().set(outcome.iterations);
   reply.residual().set(std::isfinite(outcome.residual) ? outcome.residual : kUnlimited);
   reply.stop_reason().set(static_cast<std::uint32_t>(outcome.stop_reason));

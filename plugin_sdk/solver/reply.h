@@ -11,10 +11,10 @@
 namespace gravitas {
 
 struct SolverSolution {
-  BodyMotion velocity, displacement;                       // v_{n+1}, delta; the world's rows last
-  std::vector<double> joint_impulse, joint_correction;     // three a discrepancy
-  std::vector<double> contact_impulse, contact_direction;  // three a contact
-  std::vector<double> contact_correction;                  // one a contact
+  BodyMotion velocity, displacement;                                        // v_{n+1}, delta; the world's rows last
+  std::vector<double> joint_impulse, joint_correction;                      // three a discrepancy
+  std::vector<double> contact_impulse, contact_turning, contact_direction;  // three a contact
+  std::vector<double> contact_correction;                                   // one a contact
 };
 
 // What holds where nobody is pushed: bodies keep v*.

@@ -181,6 +181,13 @@ int show_instrumentation(const CtlLine& line, ControlClient* client) {
   return kDone;
 }
 
+// The lines of the file of `gravitas run --reactions`.
+int show_reactions(const CtlLine&, ControlClient* client) {
+  const api::Reactions last = client->reactions();
+  for (const report::v1::Reaction& reaction : last.reactions()) std::cout << to_json(reaction, JsonForm::kLine);
+  return kDone;
+}
+
 // A page that is rewritten in place on a terminal, a line per second elsewhere.
 int watch(const CtlLine& line, ControlClient* client) {
   const bool is_terminal = isatty(STDOUT_FILENO) == 1 && !line.json;
@@ -302,6 +309,8 @@ void add_ctl(CLI::App* app, Action* action) {
       ->delimiter(',')
       ->allow_extra_args(false);
   picture->add_option("--out", line->out, "File: JSON, or a picture if its name ends in .svg");
+  add("reactions", "Forces and torques of joints and contacts in the last step, as JSON lines", "reactions",
+      show_reactions);
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);
   CLI::App* events_command = add("events", "Print events from now on as JSON lines, until Ctrl-C or the server ends",
                                  "events --kinds collision_start,fault,swap", show_events);

@@ -124,6 +124,10 @@ instrumentation::v1::Frame ControlClient::instrumentation(const api::Instrumenta
   return connection_->call(&api::Control::Stub::GetInstrumentation, request);
 }
 
+api::Reactions ControlClient::reactions() {
+  return connection_->call(&api::Control::Stub::GetReactions, api::ReactionsRequest());
+}
+
 void ControlClient::watch(std::uint32_t interval_ms, const std::function<bool(const api::Status&)>& show) {
   grpc::ClientContext context;
   api::WatchRequest request;

@@ -99,6 +99,7 @@ void ServedRun::begin_environment() {
     return tally;
   });
   event_source_.emplace(events_.get());
+  reactions_.emplace("", description_, 0.0);
   with_subscriptions([](Subscription* one) { one->source().begin_again(); });
   environment_->set_commit_listener(this);
   pair_decisions_.forget();
@@ -445,6 +446,14 @@ instrumentation::v1::Frame ServedRun::instrumentation(const api::Instrumentation
   });
 }
 
+api::Reactions ServedRun::reactions() {
+  return between_steps([&] {
+    api::Reactions reactions;
+    for (report::v1::Reaction& one : reactions_->last(*environment_)) *reactions.add_reactions() = std::move(one);
+    return reactions;
+  });
+}
+
 std::shared_ptr<Subscription> ServedRun::subscribe(const api::EventsRequest& request) {
   const std::vector<std::string> names(request.kinds().begin(), request.kinds().end());
   const double rate = request.ongoing_rate() == 0.0 ? kOngoingRate : request.ongoing_rate();
@@ -499,6 +508,7 @@ void ServedRun::leave_aside(const std::string& why) {
 }
 
 void ServedRun::on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  reactions_->add(environment, inner);
   event_source_->on_inner_step(environment, inner);
   with_subscriptions([&](Subscription* one) { one->source().on_inner_step(environment, inner); });
 }

@@ -29,6 +29,7 @@
 #include "services/control/subscription.h"
 #include "services/events/event_source.h"
 #include "services/recorder/event_log.h"
+#include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
 #include "services/run/session.h"
@@ -87,6 +88,7 @@ class ServedRun final : private kernel::CommitListener {
   // Of the state that the last step committed (services/survey/); a run that stands can be asked, too.
   query::v1::Answers query(const query::v1::Batch& batch);
   instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
+  api::Reactions reactions();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -166,6 +168,7 @@ class ServedRun final : private kernel::CommitListener {
   // What a checkpoint holds besides the state.
   std::unique_ptr<EventLog> events_;
   std::optional<EventSource> event_source_;
+  std::optional<ReactionLog> reactions_;
   std::unique_ptr<Figures> figures_;
   std::unique_ptr<Recorder> recorder_;
   const std::shared_ptr<capsule::Tape> tape_ = std::make_shared<capsule::Tape>();

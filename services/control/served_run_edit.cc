@@ -64,6 +64,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     if (listener_) environment_->set_pair_arbiter(&pair_decisions_);
     recorder_->note_edit(edit);
     event_source_->begin_again();
+    reactions_->begin_again();
     figures_->begin_again(environment_.get());
     with_subscriptions([](Subscription* one) { one->source().begin_again(); });
     Event event{EventKind::kEdit, environment_->step_count(), environment_->time()};

@@ -112,6 +112,9 @@ class ControlServer::Service final : public api::Control::Service {
                                   instrumentation::v1::Frame* reply) override {
     return answered([&] { *reply = run_.instrumentation(*request); });
   }
+  grpc::Status GetReactions(grpc::ServerContext*, const api::ReactionsRequest*, api::Reactions* reply) override {
+    return answered([&] { *reply = run_.reactions(); });
+  }
   grpc::Status WatchEvents(grpc::ServerContext* context, const api::EventsRequest* request,
                            grpc::ServerWriter<events::v1::Event>* writer) override {
     return answered([&] {

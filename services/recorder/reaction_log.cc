@@ -46,6 +46,7 @@ void ReactionLog::add(const kernel::Environment& environment, const kernel::Inne
     Sum& sum = contacts_[{data.contact_body[2 * i], data.contact_body[2 * i + 1], data.contact_feature[i]}];
     sum.point = vector_at(data.contact_point.span(), i);
     sum.impulse += impulse;
+    sum.turn += vector_at(data.contact_turning.span(), i);
   }
 }
 
@@ -81,6 +82,7 @@ report::v1::Reaction ReactionLog::message(const kernel::Environment& environment
   reaction.set_step(step_);
   put(sum.point, reaction.mutable_point());
   put(sum.impulse / length_, reaction.mutable_force());
+  put(sum.turn / length_, reaction.mutable_torque());
   return reaction;
 }
 
@@ -96,7 +98,6 @@ std::vector<report::v1::Reaction> ReactionLog::last(const kernel::Environment& e
     reaction.set_constraint(description_.constraints[joint].id);
     add_body(description_.constraints[joint].body1, &reaction);
     add_body(description_.constraints[joint].body2, &reaction);
-    put(sum.turn / length_, reaction.mutable_torque());
   }
   for (const auto& [contact, sum] : contacts_) {
     report::v1::Reaction& reaction = all.emplace_back(message(environment, sum));

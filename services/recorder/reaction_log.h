@@ -2,8 +2,9 @@
 // of each sampled step (Reaction of report.proto).
 //
 // Force = the solver's impulses of all inner steps of the step, over its length; so a joint's force is that of the
-// middle of a step to first order. With the simulator Smooth joints act within the derivatives: their force is that of
-// the last one asked for in the step, and the solver's impulses come on top.
+// middle of a step to first order. A contact's torque likewise: of rolling and spinning friction, about its point. With
+// the simulator Smooth joints act within the derivatives: their force is that of the last one asked for in the step, and
+// the solver's impulses come on top.
 #pragma once
 
 #include <array>

@@ -1,6 +1,7 @@
 // What becomes of a plugin that fails: it is replaced, and the record says which slot, which plugin, what happened and
 // how it was noticed. Where it fails on, the environment pauses at its last commit.
 #include <dirent.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -140,6 +141,21 @@ TEST(FailingPlugins, ContactsThatPullAreRefused) {
   ASSERT_EQ(world.step(), StepOutcome::kPaused);
   EXPECT_EQ(world.fault()->fault.kind, FaultKind::kBadNumbers);
   EXPECT_NE(world.fault()->fault.text().find("pulls"), std::string::npos) << world.fault()->fault.text();
+}
+
+TEST(FailingPlugins, FrictionOfTurningThatIsNotToldBreaksALaw) {
+  const auto outcome = [](bool is_told) {
+    WorldBuilder builder = ball_on_ground(Hosting::kDirect);
+    builder.material({.rolling_friction = 0.02});
+    if (!is_told) builder.plugin(Slot::kSolver, faulty_plugin_path("solver_hides_turning"));
+    builder.body().twist = {Vector3(1, 0, 0), Vector3(0, 0, -2)};
+    builder.description().check_physics_every = 1;
+    Environment world(builder.description());
+    (void)world.step();
+    return world.fault() ? world.fault()->fault.text() : "";
+  };
+  EXPECT_EQ(outcome(true), "");
+  EXPECT_THAT(outcome(false), ::testing::HasSubstr("angular_velocity of body 1"));
 }
 
 TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {

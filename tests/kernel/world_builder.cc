@@ -66,7 +66,8 @@ WorldBuilder& WorldBuilder::plugin(Slot slot, const std::string& path, std::vect
 }
 
 WorldBuilder& WorldBuilder::material(const Material& m) {
-  description_.material_pairs = {m.restitution, m.static_friction, m.dynamic_friction, 0.0, 0.0, m.perturbation};
+  description_.material_pairs = {m.restitution,      m.static_friction,   m.dynamic_friction,
+                                 m.rolling_friction, m.spinning_friction, m.perturbation};
   return *this;
 }
 

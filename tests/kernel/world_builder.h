@@ -16,6 +16,7 @@ std::string faulty_plugin_path(const std::string& name);
 
 struct Material {
   double restitution = 0.0, static_friction = 0.5, dynamic_friction = 0.5, perturbation = 0.0;
+  double rolling_friction = 0.0, spinning_friction = 0.0;  // m
 };
 
 // Makes kernel::EnvironmentDescription step by step. All bodies share one material.

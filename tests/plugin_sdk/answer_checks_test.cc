@@ -119,6 +119,7 @@ TEST(AnswerChecks, Discrepancies) {
 }
 
 TEST(AnswerChecks, Multipliers) {
+  const Numbers still(3);
   const Ids mode{pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kUnilateral)};
   Numbers material(kMaterialColumns);
   material[kStaticFriction] = 0.5;
@@ -129,6 +130,7 @@ TEST(AnswerChecks, Multipliers) {
     answer.contact_impulse = impulse;
     answer.contact_correction = contact_correction;
     answer.contact_direction = direction;
+    answer.contact_turning = still;
     answer.discrepancy_impulse = axis_impulse;
     answer.discrepancy_correction = axis_correction;
     return check_multipliers(answer, material, mode);
@@ -139,6 +141,31 @@ TEST(AnswerChecks, Multipliers) {
   expect_number(check({0.3, 1, 0.401}, 0, {0, 0, 0}), "contact_impulse of row 0 leaves the friction cone");
   expect_number(check({0, 1, 0}, -1e-9, {0, 0, 0}), "contact_correction of row 0 is negative");
   expect_number(check({0, 1, 0}, 0, {0, 0, -1e-9}), "discrepancy_impulse of row 0 pulls along a one-sided axis");
+}
+
+// Of a contact that is pressed by 2 N s, and slides.
+TEST(AnswerChecks, FrictionOfTurning) {
+  const auto check = [](double rolling, double spinning, const Numbers& turning) {
+    Numbers material(kMaterialColumns);
+    material[kStaticFriction] = material[kDynamicFriction] = 0.5;
+    material[kRollingFriction] = rolling, material[kSpinningFriction] = spinning;
+    const Numbers impulse{0, 2, 1}, correction{0}, direction{0, 1, 0};
+    SolutionColumns answer;
+    answer.contact_impulse = impulse;
+    answer.contact_correction = correction;
+    answer.contact_direction = direction;
+    answer.contact_turning = turning;
+    return check_multipliers(answer, material, {});
+  };
+  EXPECT_EQ(check(0, 0, {0, 0, 0}).text, "");
+  EXPECT_EQ(check(0.05, 0.03, {0.06, -0.06, -0.08}).text, "");  // both at their bounds
+  EXPECT_EQ(check(0.05, 0, {0.06, 1e-17, 0.08}).text, "");
+  const char* const spins = "contact_turning of row 0 spins by more than spinning friction can";
+  const char* const rolls = "contact_turning of row 0 rolls by more than rolling friction can";
+  expect_number(check(0.05, 0.03, {0, 0.0601, 0}), spins);
+  expect_number(check(0.05, 0, {0, -1e-6, 0}), spins);
+  expect_number(check(0.05, 0.03, {0.0601, 0, 0.08}), rolls);
+  expect_number(check(0, 0.03, {0, 0, 1e-6}), rolls);
 }
 
 }  // namespace

@@ -232,7 +232,7 @@ class Scene:
         warm = numpy.zeros((len(normal), 6))
         warm[:, :3] = apply(self.frame, r.contact_warm_impulse)
         self.contact_warm = warm.reshape(-1), r.contact_warm_correction
-        self.contact_impulse = numpy.zeros((len(normal), 3))
+        self.contact_impulse, self.contact_turning = numpy.zeros((len(normal), 3)), numpy.zeros((len(normal), 3))
         self.contact_correction = numpy.zeros(len(normal))
 
     def _impact(self, r, normal, gap):
@@ -291,7 +291,7 @@ class Scene:
         reply.pose_change = self.displacement[:count]
         reply.discrepancy_impulse, reply.discrepancy_correction = self.joint_impulse, self.joint_correction
         reply.contact_impulse, reply.contact_correction = self.contact_impulse, self.contact_correction
-        reply.contact_direction = self.direction
+        reply.contact_direction, reply.contact_turning = self.direction, self.contact_turning
 
 
 class Island:
@@ -428,9 +428,14 @@ class Island:
         scene.contact_correction[self._contacts] = self._corrections[count:]
         scene.joint_impulse[self._joints] = self._multipliers[:count]
         for contact, number in zip(self._velocity_contacts, self._contacts[self._closed]):
-            impulse = self._multipliers[contact.first : contact.first + 3, None]
-            frame = scene.frame[number]
-            scene.contact_impulse[number] = (impulse[0] * frame[0] + impulse[1] * frame[1]) + impulse[2] * frame[2]
+            scene.contact_impulse[number] = self._in_world(contact.first, number)
+            if contact.turns():
+                scene.contact_turning[number] = self._in_world(contact.first + 3, number)
+
+    def _in_world(self, row, contact):
+        """Three multipliers from a row on, which are along a contact's normal and tangents."""
+        part, frame = self._multipliers[row : row + 3, None], self._scene.frame[contact]
+        return (part[0] * frame[0] + part[1] * frame[1]) + part[2] * frame[2]
 
 
 def check_request(r):

@@ -33,6 +33,7 @@ class GainsEnergy final : public SolverPlugin {
       const Vector3 impulse = push_apart(request, i, &twists);
       push(reply.contact_impulse(), impulse);
       push(reply.contact_direction(), vector_at(request.contact_normal(), i));
+      push(reply.contact_turning(), Vector3::Zero());
       reply.contact_correction().push(0.0);
     }
     for (const Twist& twist : twists) {

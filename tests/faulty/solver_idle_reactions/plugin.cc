@@ -36,6 +36,7 @@ class IdleReactions final : public SolverPlugin {
     }
     for (std::size_t i = 0; i < request.contact_depth().size(); ++i) {
       reply.contact_impulse().push(0, 0, 0);
+      reply.contact_turning().push(0, 0, 0);
       for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) reply.contact_direction().push(request.contact_normal()[k]);
       reply.contact_correction().push(0.0);
     }

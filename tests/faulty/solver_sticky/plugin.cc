@@ -31,6 +31,7 @@ class StickySolver final : public SolverPlugin {
     for (std::size_t i = 0; i < request.contact_depth().size(); ++i) {
       const Vector3 impulse = -vector_at(request.contact_normal(), i);
       reply.contact_impulse().push(impulse.x(), impulse.y(), impulse.z());
+      reply.contact_turning().push(0, 0, 0);
       reply.contact_correction().push(0.0);
     }
     reply.iterations().set(1);

@@ -413,5 +413,20 @@ TEST(ServedRun, AnswersQuestionsAboutItsState) {
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }
 
+TEST(ServedRun, TellsTheReactionsOfTheLastStep) {
+  Served served;
+  EXPECT_EQ(served.client.reactions().reactions_size(), 0) << "no step has been made";
+  served.client.step(10);
+  const api::Reactions reactions = served.client.reactions();
+  ASSERT_GE(reactions.reactions_size(), 1);
+  for (const report::v1::Reaction& one : reactions.reactions()) {
+    EXPECT_EQ(one.step(), 10U);
+    EXPECT_EQ(one.force_size(), 3);
+    EXPECT_EQ(one.torque_size(), 3);
+  }
+  served.client.reset();
+  EXPECT_EQ(served.client.reactions().reactions_size(), 0);
+}
+
 }  // namespace
 }  // namespace gravitas::control

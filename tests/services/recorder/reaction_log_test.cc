@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "services/run/session.h"
@@ -88,6 +89,53 @@ TEST(ReactionLog, IsSampledLikeTheTrajectory) {
     EXPECT_DOUBLE_EQ(one.time(), 0.01 * one.step());
   }
   EXPECT_EQ(steps, (std::vector<std::uint32_t>{20, 40, 50}));
+}
+
+// Two balls of 2 kg on felt, and one on glass. The one that rolls along x is held back by mu_r m g, the one that spins about
+// the normal by mu_sp m g.
+constexpr const char* kBallsScene = R"(
+Geometries { Geometry { Type = "Sphere" Id = "Round" CustomProperties { Radius = 0.5 } }
+             Geometry { Type = "Halfspace" Id = "Plane" } }
+Materials { Material { Id = "Felt" RollingFrictionCoefficient = 0.02 SpinningFrictionCoefficient = 0.01 }
+            Material { Id = "Glass" } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Basic" Id = "Main" CustomProperties { TimeStep = 0.01 Duration = 0.2 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Ground" GeometryId = "Plane" Immovable = true Material = "Felt" }
+    Body { Id = "Rolls" GeometryId = "Round" Mass = 2 Material = "Felt" Forces = { "Down" }
+           KineticProperties { Position = {0, 0.5, 0} LinearVelocity = {3, 0, 0} AngularVelocity = {0, 0, -6} } }
+    Body { Id = "Spins" GeometryId = "Round" Mass = 2 Material = "Felt" Forces = { "Down" }
+           KineticProperties { Position = {0, 0.5, 5} AngularVelocity = {0, 7, 0} } }
+    Body { Id = "Slips" GeometryId = "Round" Mass = 2 Material = "Glass" Forces = { "Down" }
+           KineticProperties { Position = {0, 0.5, 9} AngularVelocity = {0, 7, -6} } }
+  } }
+})";
+
+TEST(ReactionLog, HasTheTorquesOfRollingAndSpinningFriction) {
+  const ScratchFolder folder;
+  for (const char* solver : {"Newton", "Direct", "Sequential"}) {
+    for (const char* simulator : {"Basic", "Substepping", "Continuous"}) {
+      SCOPED_TRACE(std::string(solver) + ", " + simulator);
+      RunOptions options;
+      options.scenes = {folder.write("balls", kBallsScene)};
+      options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+      options.overrides = {std::string("Solver=") + solver, std::string("Simulator=") + simulator};
+      if (simulator == std::string_view("Substepping")) options.overrides.push_back("Simulator.Substeps=3");
+      options.reactions = folder.path("reactions.jsonl");
+      const RunResult result = run(
+          options, [] { return false; }, [](const Progress&) {});
+      ASSERT_EQ(result.report.reactions_size(), 3);
+      const double load = 2 * 9.81;
+      const Vector3 right[] = {{0, 0, 0.02 * load}, {0, -0.01 * load, 0}, {0, 0, 0}};
+      for (int i = 0; i < 3; ++i) {
+        const report::v1::Reaction& one = result.report.reactions(i);
+        SCOPED_TRACE(one.bodies(1));
+        EXPECT_NEAR(one.force(1), load, 1e-8);
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(one.torque(k), right[i][k], 1e-8);
+      }
+    }
+  }
 }
 
 TEST(ReactionLog, ThatCannotBeMadeIsBadInput) {

@@ -188,9 +188,11 @@ TEST(SequentialFriction, SpinningFrictionSlowsAndStopsASpin) {
   const double mu = 0.02, inertia = 0.2, load = 2.0 * kGravity * 0.01;
   const SolverAnswer slows = ball_on_ground(Vector3::Zero(), {0, 5.0, 0}, 0.0, 0.0, mu).solve(solver_with(1000));
   EXPECT_NEAR(slows.turning(1).y(), 5.0 - mu * load / inertia, 1e-14);
+  EXPECT_LE((slows.torque_impulse(0) - Vector3(0, -mu * load, 0)).norm(), 1e-14);
   const SolverAnswer stops = ball_on_ground(Vector3::Zero(), {0, 0.01, 0}, 0.0, 0.0, mu).solve(solver_with(1000));
   EXPECT_NEAR(stops.turning(1).y(), 0.0, 1e-16);
   EXPECT_EQ(stops.turning(1).x(), 0.0);
+  EXPECT_LE((stops.torque_impulse(0) - Vector3(0, -0.01 * inertia, 0)).norm(), 1e-14);
 }
 
 TEST(SequentialFriction, RollingFrictionSlowsARollingBallInEveryDirection) {
@@ -208,6 +210,7 @@ TEST(SequentialFriction, RollingFrictionSlowsARollingBallInEveryDirection) {
     const double rate = speed / radius - mu * load / (inertia + mass * radius * radius);
     EXPECT_LE((answer.velocity(1) - rate * radius * way).norm(), 1e-12 * speed) << direction;
     EXPECT_LE((answer.turning(1) - rate * Vector3::UnitY().cross(way)).norm(), 1e-12 * rate);
+    EXPECT_LE((answer.torque_impulse(0) + mu * load * Vector3::UnitY().cross(way)).norm(), 1e-12 * load);
   }
   // it stops in finite time and does not turn back
   const SolverAnswer stops = ball_on_ground({0.0005, 0, 0}, {0, 0, -0.001}, 0.8, mu, 0.0).solve(solver_with(5000));
@@ -221,6 +224,7 @@ TEST(SequentialFriction, SlidingStartsToRollByTwoSeventhsAtRest) {
   const SolverAnswer answer = ball_on_ground({0.1, 0, 0}, Vector3::Zero(), 10.0, 0.0, 0.0).solve(solver_with(1000));
   EXPECT_NEAR(answer.velocity(1).x(), 0.1 * 5.0 / 7.0, 1e-15);
   EXPECT_NEAR(answer.turning(1).z(), -0.1 * 5.0 / 7.0 / 0.5, 1e-15);
+  EXPECT_EQ(answer.torque_impulse(0), Vector3::Zero());
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ namespace gravitas {
 
 struct SolverAnswer {
   std::vector<double> linear_velocity, angular_velocity, pose_change, discrepancy_impulse, discrepancy_correction,
-      contact_impulse, contact_correction, contact_direction;
+      contact_impulse, contact_correction, contact_direction, contact_turning;
   std::vector<std::uint32_t> iterations, stop_reason;
   std::vector<double> residual;
 
@@ -37,6 +37,7 @@ struct SolverAnswer {
   Vector3 translation(std::size_t body) const { return vector_at(pose_change, 2 * body); }
   Vector3 rotation(std::size_t body) const { return vector_at(pose_change, 2 * body + 1); }
   Vector3 impulse(std::size_t contact) const { return vector_at(contact_impulse, contact); }
+  Vector3 torque_impulse(std::size_t contact) const { return vector_at(contact_turning, contact); }
   Vector3 direction(std::size_t contact) const { return vector_at(contact_direction, contact); }
   bool converged() const { return stop_reason[0] == static_cast<std::uint32_t>(StopReason::kConverged); }
   // All bytes of the answer.
@@ -44,7 +45,7 @@ struct SolverAnswer {
     std::string all;
     for (const auto* column :
          {&linear_velocity, &angular_velocity, &pose_change, &discrepancy_impulse, &discrepancy_correction,
-          &contact_impulse, &contact_correction, &contact_direction, &residual})
+          &contact_impulse, &contact_correction, &contact_direction, &contact_turning, &residual})
       all.append(reinterpret_cast<const char*>(column->data()), column->size() * sizeof(double));
     for (const auto* column : {&iterations, &stop_reason})
       all.append(reinterpret_cast<const char*>(column->data()), column->size() * sizeof(std::uint32_t));
@@ -254,6 +255,7 @@ class SolverProblem {
     a.contact_impulse.resize(3 * contact_key.size());
     a.contact_correction.resize(contact_key.size());
     a.contact_direction.resize(3 * contact_key.size());
+    a.contact_turning.resize(3 * contact_key.size());
     a.iterations.resize(1);
     a.residual.resize(1);
     a.stop_reason.resize(1);
@@ -267,7 +269,8 @@ class SolverProblem {
                                                         room(a.contact_direction),
                                                         room(a.iterations),
                                                         room(a.residual),
-                                                        room(a.stop_reason)};
+                                                        room(a.stop_reason),
+                                                        room(a.contact_turning)};
     solver.solve(Request(columns), Reply(reply));
     return a;
   }

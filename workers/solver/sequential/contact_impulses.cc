@@ -305,10 +305,15 @@ void ContactImpulses::let_stick() {
   for (Row& row : rows_) row.slides = false;
 }
 
-void ContactImpulses::store(std::vector<double>& impulses, std::vector<double>& directions) const {
+void ContactImpulses::store(SolverSolution* solution) const {
+  std::ranges::fill(solution->contact_impulse, 0.0);
+  solution->contact_turning.assign(solution->contact_impulse.size(), 0.0);
   for (const Row& row : rows_) {
-    set_vector(impulses, row.contact, row.frame * row.impulse);
-    set_vector(directions, row.contact, row.frame.col(0));
+    set_vector(solution->contact_impulse, row.contact, row.frame * row.impulse);
+    set_vector(solution->contact_direction, row.contact, row.frame.col(0));
+    if (row.rolling < 0) continue;
+    const Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
+    set_vector(solution->contact_turning, row.contact, row.frame * rolling.impulse);
   }
 }
 

@@ -27,6 +27,7 @@
 
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/contact_law.h"
+#include "plugin_sdk/solver/reply.h"
 #include "workers/solver/sequential/contact_patch.h"
 #include "workers/solver/sequential/friction_disc.h"
 #include "workers/solver/sequential/relaxation_blocks.h"
@@ -76,9 +77,9 @@ class ContactImpulses final : public RelaxationBlocks {
   // All stick again, for a solution anew.
   void let_stick();
 
-  // Writes impulses (world, on the second body) and directions of the rows that are there; leaves
-  // the others.
-  void store(std::vector<double>& impulses, std::vector<double>& directions) const;
+  // Writes impulses, turning (world, on the second body) and directions of the rows that are there; the others push
+  // nothing, and their directions stay.
+  void store(SolverSolution* solution) const;
 
   // ---- the bound on energy (sequential.h) ----
 

@@ -202,8 +202,7 @@ void SequentialSolver::solve_velocity() {
   relax_velocity();
   bound_energy();
   velocity_joints_.store(solution_.joint_impulse);
-  std::fill(solution_.contact_impulse.begin(), solution_.contact_impulse.end(), 0.0);
-  impulses_.store(solution_.contact_impulse, solution_.contact_direction);
+  impulses_.store(&solution_);
 }
 
 // solution_.velocity and the multipliers of the velocity rows.
