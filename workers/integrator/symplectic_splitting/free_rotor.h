@@ -18,7 +18,7 @@
 // quadrature of eight points on panels so short (0.35 in u; the nearest pole is pi/4 away) that it is exact to rounding;
 // whole periods are counted, not summed.
 //
-// Where u moves by 0.06 at most, as in most steps, n is summed from its Taylor series, and R(0)^T R(t) is the shortest turn
+// Where u moves by 0.08 at most, as in most steps, n is summed from its Taylor series, and R(0)^T R(t) is the shortest turn
 // from n_t to n_0 and one about n_0 by 2T t/G less the area between the path of n and the arc (by quadrature): without axes
 // and elliptic functions, in a fifth of the time, and as exact.
 //
