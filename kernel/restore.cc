@@ -81,11 +81,12 @@ std::string find_wrong_body(const State& state, const State& initial, const Mode
     return at_row("orientation", row) + " is not of unit length";
   if (!are_flags(state.intact.span())) return "intact is neither 0 nor 1";
   if (!are_flags(state.state_changed.span())) return "state_changed is neither 0 nor 1";
-  const std::size_t moved = first_changed_body(model.flags.span(), kMovable | kKinematic,
-                                               {{state.position.span(), initial.position.span()},
-                                                {state.orientation.span(), initial.orientation.span()},
-                                                {state.linear_velocity.span(), initial.linear_velocity.span()},
-                                                {state.angular_velocity.span(), initial.angular_velocity.span()}});
+  const std::size_t moved = first_changed_body(model.flags.span(), kMovable | kKinematic, [&] {
+    return std::array{ColumnPair{state.position.span(), initial.position.span()},
+                      ColumnPair{state.orientation.span(), initial.orientation.span()},
+                      ColumnPair{state.linear_velocity.span(), initial.linear_velocity.span()},
+                      ColumnPair{state.angular_velocity.span(), initial.angular_velocity.span()}};
+  });
   if (moved != kNoRow) return "the immovable body '" + model.body_id[moved] + "' has moved";
   const std::uint32_t sleeper = find_wrong_sleeper(bodies_at_rest(model, state), state.rested.span());
   return sleeper == kNone ? "" : "the body '" + model.body_id[sleeper] + "' sleeps, and may not or moves";

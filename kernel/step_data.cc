@@ -72,8 +72,7 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   derivative_time = Column<double>(arena, 1, 0);
   derivative_position = bodies_if(has_forces, 3), derivative_orientation = bodies_if(has_forces, 4);
   derivative_linear_velocity = bodies_if(has_forces, 3), derivative_angular_velocity = bodies_if(has_forces, 3);
-  derivative_with_jacobian = Column<std::uint32_t>(arena, 1, 0);
-  jacobian_blocks = Column<std::uint32_t>(arena, 1, 0);
+  derivative_with_jacobian = Column<std::uint32_t>(arena, 1, 0), jacobian_blocks = Column<std::uint32_t>(arena, 1, 0);
   block_body = Column<std::uint32_t>(arena, 0, 0), jacobian_body = Column<std::uint32_t>(arena, 0, 0);
   block = Column<double>(arena, 0, 0), jacobian = Column<double>(arena, 0, 0);
   for (const ForceGroup& group : model.force_groups) {

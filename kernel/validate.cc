@@ -65,11 +65,12 @@ Trusted<TrialState> Validator::trial_state(const Untrusted<StageCall>& answer, c
   check_structure_and_finiteness(answer.value_);
   if (const std::size_t row = first_not_unit(data.trial_orientation.span(), 4); row != kNoRow)
     bad_numbers(at_row("orientation", row) + " is not of unit length");
-  const std::size_t moved = first_changed_body(data.flags.span(), kMovable | kKinematic,
-                                               {{data.trial_position.span(), start.position.span()},
-                                                {data.trial_orientation.span(), start.orientation.span()},
-                                                {data.trial_linear_velocity.span(), start.linear_velocity.span()},
-                                                {data.trial_angular_velocity.span(), start.angular_velocity.span()}});
+  const std::size_t moved = first_changed_body(data.flags.span(), kMovable | kKinematic, [&] {
+    return std::array{ColumnPair{data.trial_position.span(), start.position.span()},
+                      ColumnPair{data.trial_orientation.span(), start.orientation.span()},
+                      ColumnPair{data.trial_linear_velocity.span(), start.linear_velocity.span()},
+                      ColumnPair{data.trial_angular_velocity.span(), start.angular_velocity.span()}};
+  });
   if (moved != kNoRow) bad_numbers("it moved the immovable body '" + model_.body_id[moved] + "'");
   if (samples_physics_) {
     const auto columns = plain_columns(arena_, answer.value_.request);
@@ -140,13 +141,14 @@ Trusted<Reactions> Validator::reactions(const Untrusted<StageCall>& answer) cons
 
 Trusted<Solution> Validator::solution(const Untrusted<StageCall>& answer, const StepData& data) const {
   check_structure_and_finiteness(answer.value_);
-  std::size_t pushed = first_changed_body(data.flags.span(), kMovable,
-                                          {{data.solved_linear_velocity.span(), data.trial_linear_velocity.span()},
-                                           {data.solved_angular_velocity.span(), data.trial_angular_velocity.span()}});
+  const std::size_t pushed = first_changed_body(data.flags.span(), kMovable, [&] {
+    return std::array{ColumnPair{data.solved_linear_velocity.span(), data.trial_linear_velocity.span()},
+                      ColumnPair{data.solved_angular_velocity.span(), data.trial_angular_velocity.span()}};
+  });
   const std::span<const double> change = data.pose_change.span();
-  for (std::size_t i = 0; i < model_.body_count && pushed == kNoRow; ++i)
-    if ((data.flags[i] & kMovable) == 0 && std::ranges::count(change.subspan(6 * i, 6), 0.0) != 6) pushed = i;
-  if (pushed != kNoRow) bad_numbers("it pushed the body '" + model_.body_id[pushed] + "', which nothing can push");
+  for (std::size_t i = 0; i < model_.body_count; ++i)
+    if (i == pushed || ((data.flags[i] & kMovable) == 0 && std::ranges::count(change.subspan(6 * i, 6), 0.0) != 6))
+      bad_numbers("it pushed the body '" + model_.body_id[i] + "', which nothing can push");
 
   SolutionColumns solution = {
       data.solved_linear_velocity.span(), data.solved_angular_velocity.span(), data.pose_change.span(),

@@ -83,7 +83,6 @@ class Validator {
   Trusted<Bound> bound(const Untrusted<StageCall>& answer, const ConstraintGroup& group) const;
   Trusted<Discrepancies> discrepancies(const Untrusted<StageCall>& answer, const DiscrepancyAnswer& columns,
                                        std::span<const std::uint32_t> intact) const;
-  // At most `most` blocks, of bodies that exist.
   Trusted<Wrenches> jacobians(const Untrusted<StageCall>& answer, const Column<std::uint32_t>& bodies,
                               std::uint64_t most) const;
   Trusted<Reactions> reactions(const Untrusted<StageCall>& answer) const;

@@ -86,16 +86,11 @@ std::string RowCheck::check(stage::Method method, ColumnCounts request, ColumnCo
   return problem;
 }
 
-std::size_t first_changed_body(std::span<const std::uint32_t> flags, std::uint32_t movers,
-                               std::initializer_list<ColumnPair> columns) {
-  for (std::size_t i = 0; i < flags.size(); ++i) {
-    if ((flags[i] & movers) != 0) continue;
-    for (const ColumnPair& pair : columns) {
-      const std::size_t components = pair.a.size() / flags.size();
-      if (std::memcmp(&pair.a[i * components], &pair.b[i * components], components * sizeof(double)) != 0) return i;
-    }
-  }
-  return kNoRow;
+bool is_changed(std::size_t row, std::size_t rows, std::span<const ColumnPair> columns) {
+  return std::ranges::any_of(columns, [&](const ColumnPair& pair) {
+    const std::size_t components = pair.a.size() / rows;
+    return std::memcmp(&pair.a[row * components], &pair.b[row * components], components * sizeof(double)) != 0;
+  });
 }
 
 }  // namespace gravitas

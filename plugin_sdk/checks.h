@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <initializer_list>
 #include <span>
 #include <string>
 
@@ -43,12 +42,18 @@ class RowCheck {
   std::array<Counts, stage::kMethodCount> passed_;
 };
 
-// First body (kNoRow: none) that has none of these flags and whose numbers are not the same, bit for bit, in both columns of
-// a pair.
+// Two columns of `rows` rows. True if a row's numbers are not the same in both, bit for bit, of any pair.
 struct ColumnPair {
   std::span<const double> a, b;
 };
-std::size_t first_changed_body(std::span<const std::uint32_t> flags, std::uint32_t movers,
-                               std::initializer_list<ColumnPair> columns);
+bool is_changed(std::size_t row, std::size_t rows, std::span<const ColumnPair> columns);
+
+// First body (kNoRow: none) that has none of these flags and whose numbers are changed; columns() gives an array of pairs.
+template <typename Columns>
+std::size_t first_changed_body(std::span<const std::uint32_t> flags, std::uint32_t movers, Columns&& columns) {
+  for (std::size_t i = 0; i < flags.size(); ++i)
+    if ((flags[i] & movers) == 0 && is_changed(i, flags.size(), columns())) return i;
+  return kNoRow;
+}
 
 }  // namespace gravitas
