@@ -45,27 +45,27 @@ void Environment::count_jacobian_blocks() {
   data_.jacobian_blocks[0] = can_all ? static_cast<std::uint32_t>(blocks) : 0;
 }
 
-// One group's blocks behind the other's.
+// One group's blocks behind the other's; none where a plugin has taken over that gives none.
 void Environment::ask_jacobians() {
   data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   if (data_.derivative_with_jacobian[0] == 0 || data_.jacobian_blocks[0] == 0) return;
-  const auto append = [](const auto& more, const auto& all) {
-    const std::size_t old = all.size();
-    all.resize(old + more.size());
-    std::ranges::copy(more.span(), all.data() + old);
-  };
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     if (is_constant(g)) continue;
     const auto request = force_request(group, data_.derivative_position, data_.derivative_orientation,
                                        data_.derivative_linear_velocity, data_.derivative_angular_velocity);
+    data_.block_body.resize(0), data_.block.resize(0);
     const auto reply = ids(data_.block_body, data_.block);
     const StageCall call{stage::Method::kForceJacobians, group.target, request, reply};
     ask(Stage::kForce, &force_, call, nullptr, [&](const auto& got) {
       return validator_.jacobians(got, data_.block_body, kMostBlocksOfApplication * group.row.size());
     });
-    append(data_.block_body, data_.jacobian_body), append(data_.block, data_.jacobian);
+    const std::size_t pairs = data_.jacobian_body.size(), numbers = data_.jacobian.size();
+    data_.jacobian_body.resize(pairs + data_.block_body.size()), data_.jacobian.resize(numbers + data_.block.size());
+    std::ranges::copy(data_.block_body.span(), data_.jacobian_body.data() + pairs);
+    std::ranges::copy(data_.block.span(), data_.jacobian.data() + numbers);
   }
+  if (data_.jacobian_blocks[0] == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
 }
 
 void Environment::begin_attempt(bool counts) {

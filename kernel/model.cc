@@ -84,10 +84,7 @@ Model::Model(Arena* arena, const EnvironmentDescription& d)
     const auto served = served_by(d.forces, plugin);
     std::uint64_t rows = 0;
     for (const BodyDescription& body : d.bodies)
-      rows +=
-          static_cast<std::uint64_t>(std::count_if(body.forces.begin(), body.forces.end(), [&](std::uint32_t force) {
-            return d.forces[force].plugin == plugin;
-          }));
+      for (const std::uint32_t force : body.forces) rows += d.forces[force].plugin == plugin ? 1 : 0;
     if (rows == 0) continue;
     ForceGroup& group = force_groups.emplace_back();
     group.target = plugin;

@@ -140,7 +140,7 @@ TEST_P(Reactions, OfATablesFeetFollowTheLever) {
       EXPECT_TRUE(reaction.constraint().empty());
       EXPECT_EQ(reaction.bodies(0), "Ground");
       EXPECT_EQ(reaction.bodies(1), "Table");
-      EXPECT_EQ(reaction.torque_size(), 0);
+      EXPECT_EQ(vector_of(reaction.torque()), Vector3::Zero());
       std::size_t foot = 0;
       while (foot < 2 && (vector_of(reaction.point()) - feet[foot]).norm() > 0.1) ++foot;
       const Vector3 force = vector_of(reaction.force());
