@@ -28,27 +28,20 @@ class MovedBodies {
   // Moves number `k` of each body's twelve by its step times `sign`; one number at a time.
   void move(std::size_t k, double sign) {
     for (std::size_t i = 0; i < request_.mass().size(); ++i) {
-      if (k >= 3 && k < 6) {
+      if (is_turn(k)) {
         const Quaternion q = quaternion_at(request_.orientation(), i);
-        set_quaternion(orientation_, i,
-                       displaced({Vector3::Zero(), q}, Vector3::Zero(), sign * kStep * axis(k)).orientation);
-        continue;
+        const Vector3 turn = sign * kStep * Vector3::Unit(static_cast<Eigen::Index>(k % 3));
+        set_quaternion(orientation_, i, displaced({Vector3::Zero(), q}, Vector3::Zero(), turn).orientation);
+      } else {
+        const std::size_t at = 3 * i + k % 3;
+        moved(k)[at] = start(k)[at] + sign * step(k, i);
       }
-      std::vector<double>& column = k < 3 ? position_ : k < 9 ? linear_velocity_ : angular_velocity_;
-      const std::size_t at = 3 * i + k % 3;
-      column[at] = start(k)[at] + sign * step(k, i);
     }
   }
-  void put_back(std::size_t k) {
-    if (k >= 3 && k < 6) {
-      std::ranges::copy(request_.orientation(), orientation_.begin());
-    } else {
-      std::ranges::copy(start(k), (k < 3 ? position_ : k < 9 ? linear_velocity_ : angular_velocity_).begin());
-    }
-  }
+  void put_back(std::size_t k) { std::ranges::copy(start(k), moved(k).begin()); }
   // Of a body's number: the difference of the two moved states, as it is in rounded numbers.
   double width(std::size_t k, std::size_t body) const {
-    if (k >= 3 && k < 6) return 2.0 * kStep;
+    if (is_turn(k)) return 2.0 * kStep;
     const double at = start(k)[3 * body + k % 3], by = step(k, body);
     return (at + by) - (at - by);
   }
@@ -70,9 +63,15 @@ class MovedBodies {
   }
 
  private:
-  static Vector3 axis(std::size_t k) { return Vector3::Unit(static_cast<Eigen::Index>(k % 3)); }
+  static bool is_turn(std::size_t k) { return k / 3 == 1; }
   std::span<const double> start(std::size_t k) const {
-    return k < 3 ? request_.position() : k < 9 ? request_.linear_velocity() : request_.angular_velocity();
+    const std::span<const double> all[] = {request_.position(), request_.orientation(), request_.linear_velocity(),
+                                           request_.angular_velocity()};
+    return all[k / 3];
+  }
+  std::vector<double>& moved(std::size_t k) {
+    std::vector<double>* const all[] = {&position_, &orientation_, &linear_velocity_, &angular_velocity_};
+    return *all[k / 3];
   }
   double step(std::size_t k, std::size_t body) const {
     const double size = vector_at(start(k), body).norm();

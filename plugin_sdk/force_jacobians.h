@@ -19,4 +19,13 @@ void push_block(const stage::ForceJacobiansReply& reply, std::uint32_t body, std
 void difference_own_states(ForcePlugin& force, const stage::ForceWrenchesRequest& request,
                            const stage::ForceJacobiansReply& reply, Host& host);
 
+// The base of such forces, which declare the capability `jacobians`.
+class OwnStateForce : public ForcePlugin {
+ public:
+  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
+                 Host& host) override {
+    difference_own_states(*this, request, reply, host);
+  }
+};
+
 }  // namespace gravitas

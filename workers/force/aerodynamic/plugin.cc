@@ -76,7 +76,7 @@ Wrench on_surface(const Surface& surface, const Pose& from_centre, const Slip& s
   return sum;
 }
 
-class Aerodynamic final : public ForcePlugin {
+class Aerodynamic final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {.name = "Aerodynamic",
@@ -102,10 +102,6 @@ class Aerodynamic final : public ForcePlugin {
       flow.drag = cursor.number();
       return answer(flow, request, body);
     });
-  }
-  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
-                 Host& host) override {
-    difference_own_states(*this, request, reply, host);
   }
 
  private:

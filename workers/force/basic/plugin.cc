@@ -52,7 +52,7 @@ Vector3 force_at(const Parameters& p, double time) {
   return (1.0 - share) * row_force(next - 1) + share * row_force(next);
 }
 
-class BasicForce final : public ForcePlugin {
+class BasicForce final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {
@@ -89,10 +89,6 @@ class BasicForce final : public ForcePlugin {
     for_each_application(request, reply, [&](std::uint64_t, PropertyCursor cursor, std::uint32_t body) {
       return answer(read(cursor), request, body);
     });
-  }
-  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
-                 Host& host) override {
-    difference_own_states(*this, request, reply, host);
   }
 
  private:

@@ -50,7 +50,7 @@ bool contains(const Fluid& fluid, const Vector3& point) {
   return true;
 }
 
-class Buoyancy final : public ForcePlugin {
+class Buoyancy final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {.name = "Buoyancy",
@@ -83,10 +83,6 @@ class Buoyancy final : public ForcePlugin {
     for_each_application(request, reply, [&](std::uint64_t, PropertyCursor cursor, std::uint32_t body) {
       return answer(read(cursor), request, body);
     });
-  }
-  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
-                 Host& host) override {
-    difference_own_states(*this, request, reply, host);
   }
 
  private:

@@ -13,7 +13,7 @@
 namespace gravitas {
 namespace {
 
-class Drag final : public ForcePlugin {
+class Drag final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {
@@ -38,10 +38,6 @@ class Drag final : public ForcePlugin {
       const Vector3 v = vector_at(request.linear_velocity(), body);
       return ApplicationAnswer{.wrench = {.force = -(linear + quadratic * v.norm()) * v}};
     });
-  }
-  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
-                 Host& host) override {
-    difference_own_states(*this, request, reply, host);
   }
 };
 

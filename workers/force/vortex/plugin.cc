@@ -15,7 +15,7 @@
 namespace gravitas {
 namespace {
 
-class Vortex final : public ForcePlugin {
+class Vortex final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {
@@ -54,10 +54,6 @@ class Vortex final : public ForcePlugin {
       const Vector3 force = 2.0 * profile * (strength * along.cross(out) - inflow * out) + profile * lift * along;
       return ApplicationAnswer{.wrench = {.force = force}};
     });
-  }
-  void jacobians(const stage::ForceWrenchesRequest& request, const stage::ForceJacobiansReply& reply,
-                 Host& host) override {
-    difference_own_states(*this, request, reply, host);
   }
 };
 

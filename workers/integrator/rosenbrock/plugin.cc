@@ -8,9 +8,9 @@
 //
 // the method RODAS, stiffly accurate: stiff, damped motion comes to rest at its balance in one inner step. J is made of the
 // forces' Jacobian where it can be had (wrench_jacobian.h), else of differences: twelve derivatives a body of the largest
-// group of bodies that feel each other (interaction_groups.h). It is dense in a group; f_s is a difference. The error is scaled and held to Accuracy, and inner steps end on
-// the step's boundary, as in DormandPrince54. Stability: A- and L-stable; the test equation's amplification at h k -> inf
-// is 0, so oscillations that the accuracy does not resolve are damped away. Known failure: that damping is not physics;
+// group of bodies that feel each other (interaction_groups.h). It is dense in a group; f_s is a difference. The error is
+// scaled and held to Accuracy, and inner steps end on the step's boundary, as in DormandPrince54. Stability: A- and
+// L-stable; the test equation's amplification at h k -> inf is 0, so oscillations that the accuracy does not resolve are damped away. Known failure: that damping is not physics;
 // of an undamped stiff spring the energy is lost as soon as its swing is below Accuracy. Damping with c times the time
 // step above 1 acts in two halves around the step instead. Source: Hairer, Wanner, Solving ODEs II, IV.7 and the code RODAS.
 #include <Eigen/LU>
