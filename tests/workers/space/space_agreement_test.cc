@@ -122,6 +122,8 @@ TEST_P(SpaceAgreement, HoldsForManyThatDriftThroughEachOther) {
   }
   for (int step = 0; step < harness::unless_sanitized(240, 4); ++step) {
     for (std::size_t i = 1; i < bodies.size(); ++i) {
+      // each rests for a third of the time, often outside of where it was when its place was last noted
+      if ((i + static_cast<std::size_t>(step)) / 4 % 3 == 0) continue;
       Vector3& velocity = velocities[i - 1];
       for (int k = 0; k < 3; ++k)
         if (std::fabs(bodies[i].lower[k]) > 5.0) velocity[k] = -std::copysign(velocity[k], bodies[i].lower[k]);

@@ -70,11 +70,9 @@ void BoundingTree::split(std::uint32_t level, std::uint32_t i) {
   split(level + 1, 2 * i + 1);
 }
 
-void BoundingTree::move(std::uint32_t body, const Box& box) {
-  const std::uint32_t p = place_[body];
-  box_[p] = box;
-  mark_[p] = 1;
-}
+void BoundingTree::move(std::uint32_t body, const Box& box) { box_[place_[body]] = box; }
+
+void BoundingTree::mark(std::uint32_t body) { mark_[place_[body]] = 1; }
 
 void BoundingTree::refit() {
   const std::uint32_t leaves = 1U << levels_;

@@ -50,8 +50,9 @@ class BoundingTree {
   // Orders the bodies; boxes[i] is that of body i, and marked[i] says whether it is marked.
   void build(std::span<const std::uint32_t> bodies, std::span<const Box> boxes, std::span<const std::uint8_t> marked);
 
-  // New box of a body of the build, which is marked: call refit() when all are there.
+  // New box of a body of the build, and a mark for one: call refit() when all are there.
   void move(std::uint32_t body, const Box& box);
+  void mark(std::uint32_t body);
   void refit();
 
   // Calls found(a, b) for every two bodies of which one is marked and whose boxes overlap, each pair once. Those marked

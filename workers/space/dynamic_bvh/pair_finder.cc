@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 namespace gravitas::dynamic_bvh {
 namespace {
@@ -18,16 +19,20 @@ constexpr double kFarthestAhead = 0.5;
 constexpr std::size_t kRenewedShare = 16;
 constexpr double kGrowth = 2.0;
 constexpr std::uint32_t kBodiesOfProgress = 4096;
+// Compared at once, before each of them is.
+constexpr std::size_t kBodiesOfComparison = 16;
 
 Box everything() {
   const double infinity = std::numeric_limits<double>::infinity();
   return {_mm256_set1_pd(-infinity), _mm256_set1_pd(infinity)};
 }
 
-// Bit for bit, so that a number that is none equals itself.
-bool has_changed(std::span<const double> now, const std::vector<double>& before) {
-  return now.size() != before.size() || (!now.empty() && std::memcmp(now.data(), before.data(), now.size_bytes()) != 0);
+// Bodies [begin, end), bit for bit, so that a number that is none equals itself.
+bool are_equal(std::span<const double> now, const std::vector<double>& before, std::size_t begin, std::size_t end) {
+  return std::memcmp(&now[3 * begin], &before[3 * begin], 3 * (end - begin) * sizeof(double)) == 0;
 }
+
+std::uint32_t partner_of(std::uint64_t candidate) { return static_cast<std::uint32_t>(candidate >> 32); }
 
 double mean_extent(const Box& box) {
   alignas(32) double lanes[4];
@@ -41,10 +46,12 @@ void PairFinder::find(const stage::SpacePairsRequest& request, const stage::Spac
   const PairRule rule(request);
   ++call_;
   const bool is_other = is_other_scene(request);
-  if (is_other || has_changed(request.lower(), lower_) || has_changed(request.upper(), upper_)) {
+  if (is_other) {
     lower_.assign(request.lower().begin(), request.lower().end());
     upper_.assign(request.upper().begin(), request.upper().end());
-    if (is_other) birth_.clear();
+    birth_.clear();
+  }
+  if (is_other || take_bounds(request)) {
     if (is_other || look_for_moved(request, rule)) {
       build(request, rule);
     } else if (!moved_.empty()) {
@@ -63,9 +70,32 @@ bool PairFinder::is_other_scene(const stage::SpacePairsRequest& request) const {
          !std::ranges::equal(request.filter_mask(), mask_);
 }
 
+bool PairFinder::take_bounds(const stage::SpacePairsRequest& request) {
+  const std::span<const double> lower = request.lower(), upper = request.upper();
+  const std::size_t bodies = flags_.size();
+  for (const std::uint32_t i : changed_bodies_) state_[i] &= kFresh;
+  changed_bodies_.clear();
+  for (std::size_t begin = 0; begin < bodies; begin += kBodiesOfComparison) {
+    const std::size_t end = std::min(begin + kBodiesOfComparison, bodies);
+    if (are_equal(lower, lower_, begin, end) && are_equal(upper, upper_, begin, end)) continue;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (are_equal(lower, lower_, i, i + 1) && are_equal(upper, upper_, i, i + 1)) continue;
+      std::copy_n(&lower[3 * i], 3, &lower_[3 * i]);
+      std::copy_n(&upper[3 * i], 3, &upper_[3 * i]);
+      note_change(static_cast<std::uint32_t>(i));
+    }
+  }
+  return !changed_bodies_.empty();
+}
+
+void PairFinder::note_change(std::uint32_t body) {
+  if ((state_[body] & kChanged) == 0) changed_bodies_.push_back(body);
+  state_[body] |= kChanged;
+}
+
 bool PairFinder::look_for_moved(const stage::SpacePairsRequest& request, const PairRule& rule) {
   moved_.clear();
-  for (std::uint32_t i = 0; i < rule.bodies(); ++i)
+  for (const std::uint32_t i : changed_bodies_)
     if (!contains(fat_[i], box_at(request.lower(), request.upper(), i))) moved_.push_back(i);
   if (std::ranges::any_of(moved_, [&](std::uint32_t body) { return !rule.is_regular(body); })) return true;
   if (moved_.size() <= members_.size() / kRenewedShare) return false;
@@ -84,6 +114,10 @@ void PairFinder::build(const stage::SpacePairsRequest& request, const PairRule& 
   mask_.assign(request.filter_mask().begin(), request.filter_mask().end());
 
   members_.clear(), outsiders_.clear();
+  changed_bodies_.resize(bodies);
+  std::iota(changed_bodies_.begin(), changed_bodies_.end(), 0U);
+  state_.assign(bodies, kChanged);
+  fresh_bodies_.clear(), fresh_.clear();
   fat_.assign(bodies, everything());
   has_moved_.assign(bodies, 0);
   double sum = 0.0;
@@ -106,7 +140,8 @@ void PairFinder::build(const stage::SpacePairsRequest& request, const PairRule& 
   edges_at_build_ = tree_.edges();
   find_candidates(rule);
   begin_.assign(bodies + std::size_t{1}, 0);
-  partner_.clear();
+  candidate_.clear();
+  overlaps_.clear();
   merge_found();
 }
 
@@ -114,16 +149,50 @@ void PairFinder::update(const stage::SpacePairsRequest& request, const PairRule&
   has_moved_.assign(rule.bodies(), 0);
   for (const std::uint32_t i : moved_) {
     fat_[i] = fat_box(i, box_at(request.lower(), request.upper(), i));
-    has_moved_[i] = 1;
     tree_.move(i, fat_[i]);
+    has_moved_[i] = 1;
+    if ((state_[i] & kFresh) == 0) fresh_bodies_.push_back(i);
+    state_[i] |= kFresh;
   }
+  const bool is_merging = fresh_bodies_.size() > members_.size() / kRenewedShare;
+  for (std::size_t k = 0; is_merging && k < fresh_bodies_.size(); ++k) tree_.mark(fresh_bodies_[k]);
   tree_.refit();
   if (tree_.edges() > kGrowth * edges_at_build_) {
     build(request, rule);
     return;
   }
+  if (!is_merging) {
+    find_fresh(rule);
+    return;
+  }
+  for (const std::uint32_t i : fresh_bodies_) {
+    has_moved_[i] = 1;
+    state_[i] &= kChanged;
+    note_change(i);  // it may stand still now: its candidates are new
+  }
+  fresh_bodies_.clear(), fresh_.clear();
   find_candidates(rule);
   merge_found();
+}
+
+// Candidates of those that moved.
+void PairFinder::find_fresh(const PairRule& rule) {
+  const auto has_moved = [&](std::uint64_t pair) {
+    return (has_moved_[pair >> 32] | has_moved_[pair & 0xFFFFFFFF]) != 0;
+  };
+  std::erase_if(fresh_, has_moved);
+  const auto old = static_cast<std::ptrdiff_t>(fresh_.size());
+  for (const std::uint32_t m : moved_) {
+    const Box& box = fat_[m];
+    tree_.visit_met([&](const Box& node) { return overlap(node, box); },
+                    [&](std::uint32_t other) {
+                      if (other == m || (has_moved_[other] != 0 && other < m) || !overlap(fat_[other], box)) return;
+                      const auto [a, b] = std::minmax(other, m);
+                      if (rule.may_touch(a, b)) fresh_.push_back(std::uint64_t{a} << 32 | b);
+                    });
+  }
+  std::sort(fresh_.begin() + old, fresh_.end());
+  std::inplace_merge(fresh_.begin(), fresh_.begin() + old, fresh_.end());
 }
 
 Box PairFinder::fat_box(std::uint32_t body, const Box& bounds) {
@@ -157,59 +226,107 @@ void PairFinder::find_candidates(const PairRule& rule) {
 void PairFinder::merge_found() {
   const auto bodies = static_cast<std::uint32_t>(has_moved_.size());
   next_begin_.resize(bodies + std::size_t{1});
-  next_partner_.resize(partner_.size() + found_.size());
-  std::uint32_t* const out = next_partner_.data();
+  next_candidate_.resize(candidate_.size() + found_.size());
+  next_overlaps_.resize(next_candidate_.size());
   std::uint64_t k = 0;
+  std::uint64_t* const candidate = next_candidate_.data();
+  std::uint8_t* const overlaps = next_overlaps_.data();
+  const auto keep = [&, old_candidate = candidate_.data(), old_overlaps = overlaps_.data(),
+                     has_moved = has_moved_.data()](std::uint64_t i) {
+    candidate[k] = old_candidate[i];
+    overlaps[k] = old_overlaps[i];
+    k += has_moved[partner_of(old_candidate[i])] == 0;
+  };
   for (std::uint32_t a = 0; a < bodies; ++a) {
     next_begin_[a] = k;
     std::uint64_t i = has_moved_[a] != 0 ? begin_[a + 1] : begin_[a];
     for (const std::uint32_t b : found_.partners(a)) {
-      for (; i < begin_[a + 1] && partner_[i] < b; ++i) {
-        out[k] = partner_[i];
-        k += has_moved_[partner_[i]] == 0;
-      }
-      out[k++] = b;
+      for (; i < begin_[a + 1] && partner_of(candidate_[i]) < b; ++i) keep(i);
+      candidate[k++] = a | std::uint64_t{b} << 32;
     }
-    for (; i < begin_[a + 1]; ++i) {
-      out[k] = partner_[i];
-      k += has_moved_[partner_[i]] == 0;
-    }
+    for (; i < begin_[a + 1]; ++i) keep(i);
   }
   next_begin_[bodies] = k;
-  next_partner_.resize(k);
+  next_candidate_.resize(k);
+  next_overlaps_.resize(k);
   begin_.swap(next_begin_);
-  partner_.swap(next_partner_);
+  candidate_.swap(next_candidate_);
+  overlaps_.swap(next_overlaps_);
+}
+
+void PairFinder::add_pairs(const stage::SpacePairsRequest& request, std::uint64_t i, std::uint64_t end) {
+  const std::uint8_t* const state = state_.data();
+  const std::uint64_t* const candidate = candidate_.data();
+  std::uint8_t* const overlaps = overlaps_.data();
+  std::uint32_t* const out = pairs_.data();
+  std::size_t k = pair_end_;
+  for (; i < end; ++i) {
+    const std::uint32_t a = static_cast<std::uint32_t>(candidate[i]), b = partner_of(candidate[i]);
+    if (const int now = state[a] | state[b]; now != 0)
+      overlaps[i] = (now & kFresh) == 0 && overlap(box_at(request.lower(), request.upper(), a),
+                                                   box_at(request.lower(), request.upper(), b))
+                        ? 1
+                        : 0;
+    std::memcpy(out + k, &candidate[i], sizeof candidate[i]);
+    k += 2 * std::size_t{overlaps[i]};
+  }
+  pair_end_ = k;
 }
 
 void PairFinder::find_pairs(const stage::SpacePairsRequest& request, const PairRule& rule, Host& host) {
   const std::uint32_t bodies = rule.bodies();
-  std::size_t k = 0;
-  std::size_t next = 0;  // of the outsiders
-  for (std::uint32_t a = 0; a < bodies; ++a) {
-    if (a % kBodiesOfProgress == 0) host.mark_progress();
-    const bool is_outsider = next < outsiders_.size() && outsiders_[next] == a;
-    next += is_outsider ? 1 : 0;
-    const std::size_t most = is_outsider ? bodies - a : begin_[a + 1] - begin_[a] + outsiders_.size() - next;
-    if (pairs_.size() < k + 2 * most) pairs_.resize(2 * (k + 2 * most));
-    if (is_outsider) {
-      for (std::uint32_t b = a + 1; b < bodies; ++b)
-        if (rule(a, b)) pairs_[k++] = a, pairs_[k++] = b;
+  std::size_t next = 0, fresh = 0;  // of the outsiders, of fresh_
+  const auto add = [&](std::uint32_t a, std::uint32_t b) {
+    pairs_[pair_end_] = a, pairs_[pair_end_ + 1] = b;
+    pair_end_ += 2;
+  };
+  pair_end_ = 0;
+  for (std::uint32_t a = 0; a < bodies;) {
+    host.mark_progress();
+    // candidates alone, up to the next outsider, or body with fresh candidates
+    std::uint32_t end = std::min(bodies, a + kBodiesOfProgress);
+    if (next < outsiders_.size()) end = a;
+    if (fresh < fresh_.size()) end = std::min(end, static_cast<std::uint32_t>(fresh_[fresh] >> 32));
+    if (end > a) {
+      make_room(begin_[end] - begin_[a]);
+      add_pairs(request, begin_[a], begin_[end]);
+      a = end;
       continue;
     }
-    // both lists ascend: candidates between two outsiders, then the outsider
+    if (next < outsiders_.size() && outsiders_[next] == a) {
+      ++next;
+      make_room(bodies - a);
+      for (std::uint32_t b = a + 1; b < bodies; ++b)
+        if (rule(a, b)) add(a, b);
+      ++a;
+      continue;
+    }
+    // three lists ascend: candidates up to the next outsider or fresh candidate, then that one
+    std::size_t fresh_end = fresh;
+    while (fresh_end < fresh_.size() && fresh_[fresh_end] >> 32 == a) ++fresh_end;
+    make_room(begin_[a + 1] - begin_[a] + outsiders_.size() - next + fresh_end - fresh);
     const Box box = box_at(request.lower(), request.upper(), a);
     std::uint64_t i = begin_[a];
-    for (std::size_t o = next; o <= outsiders_.size(); ++o) {
-      const std::uint32_t limit = o < outsiders_.size() ? outsiders_[o] : bodies;
-      for (; i < begin_[a + 1] && partner_[i] < limit; ++i) {
-        const std::uint32_t b = partner_[i];
-        pairs_[k] = a, pairs_[k + 1] = b;
-        k += overlap(box, box_at(request.lower(), request.upper(), b)) ? 2 : 0;
-      }
-      if (limit < bodies && rule(a, limit)) pairs_[k++] = a, pairs_[k++] = limit;
+    for (std::size_t o = next;;) {
+      const std::uint32_t outsider = o < outsiders_.size() ? outsiders_[o] : bodies;
+      const std::uint32_t new_one = fresh < fresh_end ? static_cast<std::uint32_t>(fresh_[fresh]) : bodies;
+      const std::uint32_t limit = std::min(outsider, new_one);
+      const std::uint64_t begin = i;
+      while (i < begin_[a + 1] && partner_of(candidate_[i]) < limit) ++i;
+      add_pairs(request, begin, i);
+      if (limit == bodies) break;
+      if (limit == outsider ? rule(a, limit) : overlap(box, box_at(request.lower(), request.upper(), limit)))
+        add(a, limit);
+      (limit == outsider ? o : fresh) += 1;
     }
+    ++a;
   }
-  pair_end_ = k;
+}
+
+// For so many pairs more.
+void PairFinder::make_room(std::size_t pairs) {
+  const std::size_t wanted = pair_end_ + 2 * pairs;
+  if (pairs_.size() < wanted) pairs_.resize(2 * wanted);
 }
 
 }  // namespace gravitas::dynamic_bvh
