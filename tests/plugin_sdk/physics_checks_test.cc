@@ -473,6 +473,40 @@ TEST(CheckSolution, FindsAnImpulseThatPushesWhatIsSeparating) {
   EXPECT_THAT(s.check(), IsEmpty());
 }
 
+// What stops to rounding beside a body that flies at 10 m/s.
+TEST(CheckSolution, AllowsWhatSeparatesByRoundingOfTheFastest) {
+  using Request = Solution::Request;
+  Solution s;
+  s.joint_impulse = s.turning = {0, 0, 0};
+  s.before = {Vector3(0, -1e-9, 0), Vector3::Zero()};
+  for (const auto column : {Request::kLinearVelocity, Request::kTrialLinearVelocity}) {
+    std::vector<double>& v = s.request.f64(column);
+    v = {0, 0, 0, 0, -1e-9, 0, 10, 0, 0};
+  }
+  s.impulse = {0, 1e-10, 0};
+  s.request.f64(Request::kAngularVelocity) = s.request.f64(Request::kTrialAngularVelocity) =
+      std::vector<double>(9, 0.0);
+  s.request.f64(Request::kContactMaterial)[kRestitution] = 0.0;
+  s.request.u32(Request::kFlags).push_back(kMovable);
+  s.request.f64(Request::kInverseMass).push_back(1.0);
+  for (const auto column : {Request::kInverseInertia, Request::kPosition, Request::kTrialPosition})
+    put(&s.request.f64(column), Vector3(1, 1, 1));
+  for (const auto column : {Request::kOrientation, Request::kTrialOrientation})
+    put(&s.request.f64(column), Quaternion::Identity());
+  s.linear = {0, 0, 0, 0, 0, 0, 10, 0, 0}, s.angular.assign(9, 0.0), s.change.assign(18, 0.0);
+  const auto leaves_at = [&](double speed) {
+    // the impulse that turns and lifts the corner so that it goes at this speed
+    const Vector3 arm = s.point - Vector3(0, 0.5, 0), n = Vector3::UnitY();
+    const double response = 0.5 + n.dot(arm.cross(n).cwiseQuotient(s.inertia).cross(arm));
+    s.impulse = {0, (speed + 1e-9) / response, 0};
+    s.solve(1.0);
+    s.close_joint();
+    return s.check();
+  };
+  EXPECT_THAT(leaves_at(5e-11), IsEmpty());
+  EXPECT_THAT(leaves_at(1e-9), HasSubstr("contact_impulse of row 0"));
+}
+
 // Its multipliers and its pose change are of one mind, and do to the joint what they should not.
 TEST(CheckSolution, FindsAJointThatIsLeftOpen) {
   for (const double factor : {-1.0, 0.0, 0.5, 2.0, 1000.0}) {
