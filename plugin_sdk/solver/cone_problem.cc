@@ -20,6 +20,16 @@ constexpr double kGuessRounding = 1024.0 * kEpsilon;
 // A contact slips if it does so this much faster than what counts as converged.
 constexpr double kSlip = 1e3;
 
+// What is left of held rows is rounding where it is this many units of what their multipliers do.
+constexpr double kRefined = 4.0;
+
+// Empty lists that keep their room.
+template <typename List>
+void clear_lists(std::size_t count, std::vector<List>* lists) {
+  lists->resize(count);
+  for (List& list : *lists) list.clear();
+}
+
 }  // namespace
 
 double ConeProblem::coupling(const SolverBodies& bodies, std::uint32_t r, std::uint32_t s) const {
@@ -107,7 +117,7 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
 
 // W_EE = L D L^T, and the side of the held rows.
 void ConeProblem::factorise(const SolverBodies& bodies) {
-  held_of_body_.assign(bodies.count() + 1, {});
+  clear_lists(bodies.count() + 1, &held_of_body_);
   std::vector<std::size_t> first(held_.size());
   side_.assign(held_.size(), 0.0);
   for (std::uint32_t i = 0; i < held_.size(); ++i) {
@@ -135,7 +145,7 @@ void ConeProblem::factorise(const SolverBodies& bodies) {
 void ConeProblem::reduce(const SolverBodies& bodies) {
   const auto count = static_cast<Eigen::Index>(other_.size());
   const auto held = static_cast<Eigen::Index>(held_.size());
-  to_held_.assign(other_.size(), {});
+  clear_lists(other_.size(), &to_held_);
   carried_.resize(held, count);
   start_others_.resize(count);
   std::vector<double> holding = side_;
@@ -163,7 +173,7 @@ void ConeProblem::reduce(const SolverBodies& bodies) {
   // only rows of one body meet, unless held rows carry from one to the other
   factored_.clear();
   response_.setZero(count, count);
-  others_of_body_.assign(bodies.count() + 1, {});
+  clear_lists(bodies.count() + 1, &others_of_body_);
   for (std::uint32_t a = 0; a < other_.size(); ++a) {
     const std::uint32_t r = other_[a];
     for (const std::uint32_t body : {rows[r].body1, rows[r].body2}) {
@@ -239,6 +249,32 @@ void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
   }
 }
 
+double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
+  classify(bodies, x0);
+  factorise(bodies);
+  const double contradiction = make_consistent(smallest);
+  for (std::size_t i = 0; i < held_.size() && contradiction > 0.0; ++i) {
+    JointLaw& law = rows[held_[i]].law;
+    law.lower_target = law.upper_target = free_[held_[i]] + scale_[held_[i]] * side_[i];
+  }
+  return contradiction;
+}
+
+// The largest of what meets in a row, and is asked of one; m/s, m.
+double ConeProblem::size() const {
+  double size = motion_;
+  for (const std::uint32_t r : held_) size = std::max(size, std::fabs(rows[r].law.lower_target) * rows[r].length);
+  return size;
+}
+
+double ConeProblem::make_consistent(double smallest) {
+  if (factor_.dropped() == 0) return 0.0;
+  double largest = 0.0;
+  for (const std::uint32_t r : held_) largest = std::max(largest, scale_[r] * rows[r].length);
+  const double distance = largest * factor_.make_consistent(&side_);
+  return distance > std::max(smallest, 1e-9 * size()) ? distance : 0.0;
+}
+
 ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
                                const ConeSettings& settings) {
   ConeSummary summary;
@@ -248,15 +284,8 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     return summary;
   }
   factorise(bodies);
-  double size = motion_;
-  for (const std::uint32_t r : held_) size = std::max(size, std::fabs(rows[r].law.lower_target) * rows[r].length);
-  if (factor_.dropped() > 0) {
-    double largest = 0.0;
-    for (const std::uint32_t r : held_) largest = std::max(largest, scale_[r] * rows[r].length);
-    const double distance = largest * factor_.make_consistent(&side_);
-    if (distance > std::max(smallest, 1e-9 * size)) summary.contradiction = distance;
-  }
-  const double tolerance = std::max(smallest, settings.tolerance * size);
+  summary.contradiction = make_consistent(smallest);
+  const double tolerance = std::max(smallest, settings.tolerance * size());
   lambda_.resize(static_cast<Eigen::Index>(other_.size()));
   for (std::size_t o = 0; o < other_.size(); ++o)
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
@@ -274,15 +303,22 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
   if (!held_.empty()) {
     for (const std::uint32_t r : held_) rows[r].multiplier = 0.0;
     summary.iterations += 1;
-    // once for the answer, twice for what rounding left of it
-    double missing = 0.0;
-    for (int repeat = 0; repeat < 3; ++repeat) missing = refine_held(bodies, x0);
-    summary.residual = std::max(summary.residual, missing);
     // what a row's own multiplier does to it is what rounding goes by
-    double summed = 0.0;
-    for (const std::uint32_t r : held_)
-      summed = std::max(summed, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
-    summary.has_converged = summary.has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * summed);
+    const auto summed = [&] {
+      double most = 0.0;
+      for (const std::uint32_t r : held_)
+        most = std::max(most, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
+      return most;
+    };
+    // once for the answer, and for what rounding left of it: twice if that was much
+    double missing = refine_held(bodies, x0);
+    for (int repeat = 0; repeat < 2; ++repeat) {
+      const double rounding = kRefined * kEpsilon * summed();
+      missing = refine_held(bodies, x0);
+      if (missing <= rounding) break;
+    }
+    summary.residual = std::max(summary.residual, missing);
+    summary.has_converged = summary.has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * summed());
   }
   return summary;
 }

@@ -95,6 +95,10 @@ class ConeProblem {
   // Sets the multipliers. `smallest` is what counts as nothing in any case (m/s, m).
   ConeSummary solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest, const ConeSettings& settings);
 
+  // Gives rows that hold always and contradict each other the nearest targets that some motion meets (least squares of the
+  // scaled rows). Returns by how much they were off (m/s, m), 0 if by no more than `smallest` or rounding.
+  double reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest);
+
   // x += M^-1 J^T lambda
   void push(const SolverBodies& bodies, BodyMotion* x) const;
 
@@ -115,6 +119,9 @@ class ConeProblem {
   double value(const BodyMotion& x, std::uint32_t r) const;
   void classify(const SolverBodies& bodies, const BodyMotion& x0);
   void factorise(const SolverBodies& bodies);
+  double size() const;
+  // The side of the held rows; as reconcile().
+  double make_consistent(double smallest);
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
   bool is_solved_by_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance, double* residual);

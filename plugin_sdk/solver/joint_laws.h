@@ -59,6 +59,7 @@ struct JointLaw {
   bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }
   // An equality that nothing softens or bounds.
   bool is_rigid() const { return is_equality() && gamma == 0.0 && bound == std::numeric_limits<double>::infinity(); }
+  void shift(double amount) { lower_target += amount, upper_target += amount; }
 };
 
 // What the laws of one axis are made from.

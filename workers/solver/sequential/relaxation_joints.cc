@@ -46,6 +46,7 @@ void RelaxationJoints::build(const SolverBodies& bodies, const std::vector<Relax
                              const Laws& laws, const Multipliers& warm) {
   rows_.clear();
   blocks_.clear();
+  left_out_.clear();
   std::size_t end = 0;
   for (std::size_t first = 0; first < discrepancies.size(); first = end) {
     const RelaxationDiscrepancy& d = discrepancies[first];
@@ -119,6 +120,10 @@ void RelaxationJoints::factorise(Block& block, double inverse_masses) {
     }
     factor_[chosen][column] = root;
   }
+
+  for (std::size_t i = 0; i < count; ++i)
+    if (std::find(kept.begin(), kept.begin() + block.rigid, i) == kept.begin() + block.rigid)
+      left_out_.push_back({block.body1, block.body2, rigid_[i].own, rigid_[i].law.lower_target, rigid_[i].length});
 
   // inverse = S L^-T L^-1 S, S the scaling of the rows
   using Matrix = Eigen::Matrix<double, kBlock, kBlock>;
@@ -270,6 +275,13 @@ double RelaxationJoints::largest_violation(const BodyMotion& x) const {
       largest = std::max(largest, violation * row.length);
     }
   }
+  return largest;
+}
+
+double RelaxationJoints::largest_left_out(const BodyMotion& x) const {
+  double largest = 0.0;
+  for (const LeftOut& row : left_out_)
+    largest = std::max(largest, std::fabs(row.own.along(x[row.body1], x[row.body2]) - row.target) * row.length);
   return largest;
 }
 

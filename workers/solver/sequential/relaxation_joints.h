@@ -71,6 +71,8 @@ class RelaxationJoints final : public RelaxationBlocks {
   // rounding goes by. m or m/s, angles times their length.
   double largest_violation(const BodyMotion& x) const;
   double largest_motion(const BodyMotion& x) const;
+  // The same of rigid rows that depend on others of their two bodies, and are therefore not asked for.
+  double largest_left_out(const BodyMotion& x) const;
   void clear_multipliers();
 
   // Of the rows, locks go a share of their way, others at most the whole.
@@ -110,6 +112,11 @@ class RelaxationJoints final : public RelaxationBlocks {
     std::uint32_t place = 0;             // 3 * discrepancy + axis
     std::array<double, kBlock> share{};  // K_BB^-1 K_Br
   };
+  struct LeftOut {
+    std::uint32_t body1, body2;
+    ConstraintDirection own;
+    double target, length;
+  };
   struct Block {
     std::uint32_t body1 = 0, body2 = 0;
     std::uint32_t first = 0, end = 0;  // rows
@@ -129,6 +136,7 @@ class RelaxationJoints final : public RelaxationBlocks {
 
   std::vector<Row> rows_;
   std::vector<Block> blocks_;
+  std::vector<LeftOut> left_out_;
   std::vector<Row> rigid_, others_;                 // of the block that is being built
   std::vector<std::array<double, kBlock>> factor_;  // of its rigid rows
   std::vector<double> pivot_;

@@ -8,6 +8,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/cone_problem.h"
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/request_check.h"
 #include "workers/solver/sequential/shock_propagation.h"
@@ -19,6 +20,9 @@ namespace {
 constexpr double kStillness = 128.0 * kEpsilon;
 // With shock propagation: and so many of the largest load.
 constexpr double kLoadRounding = 8.0 * kEpsilon;
+
+// Rows that are off by a smaller share of what meets do not contradict each other.
+constexpr double kContradiction = 1e-9;
 
 // A contact slips if it does so this much faster than a sweep still changes it: what converges
 // slowly is further from its end than one change.
@@ -44,6 +48,24 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
 
 SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& request) {
   load(request);
+  solve_rows(request);
+  const bool contradicts = reconcile();
+  if (contradicts) {
+    used_up_ = false;
+    solve_rows(request);
+  }
+  const bool has_rows =
+      !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
+  summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
+  if (contradicts) summary_.stop_reason = StopReason::kContradiction;
+  if (used_up_) summary_.stop_reason = StopReason::kIterations;
+  pose_joints_.store(solution_.joint_correction);
+  gaps_.store(solution_.contact_correction);
+  return summary_;
+}
+
+void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
+  begin(request);
   solve_pose();
   find_closed();
   build_velocity(request);
@@ -60,14 +82,59 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
       solve_pose();
     }
   }
+}
 
-  const bool has_rows =
-      !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
-  summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
-  if (used_up_) summary_.stop_reason = StopReason::kIterations;
-  pose_joints_.store(solution_.joint_correction);
-  gaps_.store(solution_.contact_correction);
-  return summary_;
+// Sweeps ran out, or rows that were left out are not met: was something asked for that no motion can do? Rows that hold
+// always and contradict each other then get the nearest targets that agree, and true is returned. Rows of loops and of frames
+// contradict each other, too, because they are taken at S*, where joints are open, and not where they close: by the square of
+// the step's turn, and by that times what is open. That is none.
+bool SequentialSolver::reconcile() {
+  if (discrepancies_.empty()) return false;
+  double spin = 0.0, turn = 0.0, reach = 0.0, open = 0.0;
+  for (std::uint32_t i = 0; i < bodies_.count(); ++i) {
+    spin = std::max({spin, bodies_[i].trial_velocity.angular.norm(), solution_.velocity[i].angular.norm()});
+    turn = std::max({turn, solution_.displacement[i].angular.norm(), time_step_ * spin});
+  }
+  for (std::size_t i = 0; i < pose_laws_.size(); ++i) {
+    const RelaxationDiscrepancy& d = discrepancies_[i / 3];
+    const ConstraintDirection& direction = d.directions[i % 3];
+    reach = std::max({reach, d.length * direction.angular1.norm(), d.length * direction.angular2.norm()});
+    if (pose_laws_[i].is_rigid()) open = std::max(open, d.length * std::fabs(d.axes[i % 3].error_at_trial));
+  }
+  const double fastest =
+      std::max(velocity_joints_.largest_motion(trial_velocity_), velocity_joints_.largest_motion(solution_.velocity));
+  const double moved = std::max(kContradiction, 4.0 * turn * turn) * fastest + 4.0 * open * spin;
+  const double placed = std::max(kContradiction, 4.0 * turn * turn) * reach + 4.0 * open * turn;
+  std::vector<double> shift(pose_laws_.size(), 0.0);
+  if (used_up_ || velocity_joints_.largest_left_out(solution_.velocity) > moved)
+    shifted_velocity_ = reconcile(velocity_laws_, trial_velocity_, moved, &velocity_shift_);
+  if (used_up_ || pose_joints_.largest_left_out(solution_.displacement) > placed)
+    shifted_pose_ = reconcile(pose_laws_, BodyMotion(trial_velocity_.size()), placed, &shift);
+  for (std::size_t i = 0; i < shift.size(); ++i) pose_laws_[i].shift(shift[i]);
+  return shifted_velocity_ > 0.0 || shifted_pose_ > 0.0;
+}
+
+double SequentialSolver::reconcile(const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
+                                   std::vector<double>* shift) const {
+  ConeProblem problem;
+  std::vector<std::size_t> place;
+  for (std::size_t i = 0; i < laws.size(); ++i) {
+    if (!laws[i].is_rigid()) continue;
+    const RelaxationDiscrepancy& d = discrepancies_[i / 3];
+    ConeRow& row = problem.rows.emplace_back();
+    row.body1 = d.body1, row.body2 = d.body2;
+    row.direction = d.directions[i % 3];
+    row.length = d.length;
+    row.law = laws[i];
+    place.push_back(i);
+  }
+  if (place.empty() || problem.reconcile(bodies_, start, smallest) == 0.0) return 0.0;
+  double largest = 0.0;
+  for (std::size_t k = 0; k < place.size(); ++k) {
+    (*shift)[place[k]] = problem.rows[k].law.lower_target - laws[place[k]].lower_target;
+    largest = std::max(largest, std::fabs((*shift)[place[k]]) * problem.rows[k].length);
+  }
+  return largest;
 }
 
 void SequentialSolver::load(const stage::SolverSolveRequest& request) {
@@ -76,12 +143,6 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   time_step_ = request.time_step();
   coordinates_ = 0.0;
   bodies_.load(request);
-  copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
-  copy(request.discrepancy_warm_correction(), solution_.joint_correction);
-  copy(request.contact_warm_impulse(), solution_.contact_impulse);
-  copy(request.contact_warm_correction(), solution_.contact_correction);
-  copy(request.contact_normal(), solution_.contact_direction);
-
   const DiscrepancyColumns columns = columns_of(request);
   discrepancies_.clear();
   pose_laws_.clear();
@@ -94,12 +155,22 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
+  velocity_shift_.assign(pose_laws_.size(), 0.0);
+  shifted_pose_ = shifted_velocity_ = 0.0;
+  trial_velocity_.clear();
+  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);
+}
+
+// Rows and multipliers as before the first sweep.
+void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
+  copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
+  copy(request.discrepancy_warm_correction(), solution_.joint_correction);
+  copy(request.contact_warm_impulse(), solution_.contact_impulse);
+  copy(request.contact_warm_correction(), solution_.contact_correction);
+  copy(request.contact_normal(), solution_.contact_direction);
   pose_joints_.build(bodies_, discrepancies_, pose_laws_, solution_.joint_correction);
   gaps_.build(bodies_, request, settings_.correction_factor, solution_.contact_correction);
   coordinates_ = std::max(coordinates_, gaps_.coordinates());
-
-  trial_velocity_.clear();
-  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);
   offset_.assign(bodies_.count() + 1, Twist{});
   closed_.assign(request.contact_key().size(), 0);
   velocity_laws_.assign(pose_laws_.size(), JointLaw{});
@@ -115,7 +186,7 @@ void SequentialSolver::solve_pose() {
   const double motion =
       std::max(pose_joints_.largest_motion(solution_.displacement), gaps_.largest_motion(solution_.displacement));
   check_range(violation, motion);
-  const double representable = 0.25 * kEpsilon * coordinates_;
+  const double representable = std::max(0.25 * kEpsilon * coordinates_, kStillness * shifted_pose_);
   if (violation <= std::max(representable, kEpsilon * motion)) {
     // nothing is missing, so zero multipliers are the solution
     pose_joints_.clear_multipliers();
@@ -176,7 +247,8 @@ bool SequentialSolver::find_closed() {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double moved = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
       const double error = d.axes[axis].error_at_trial + moved;
-      const JointLaw law = velocity_law(d.axes[axis], error, d.slop, time_step_);
+      JointLaw law = velocity_law(d.axes[axis], error, d.slop, time_step_);
+      if (law.is_rigid()) law.shift(velocity_shift_[3 * i + axis]);
       JointLaw& known = velocity_laws_[3 * i + axis];
       added = added || (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
       const bool has_lower = law.has_lower || known.has_lower;
@@ -215,14 +287,14 @@ void SequentialSolver::relax_velocity() {
   const double motion =
       std::max(velocity_joints_.largest_motion(solution_.velocity), impulses_.largest_motion(solution_.velocity));
   check_range(violation, motion);
-  if (violation <= kEpsilon * motion) {
+  if (violation <= std::max(kEpsilon * motion, kStillness * shifted_velocity_)) {
     velocity_joints_.clear_multipliers();
     impulses_.clear_multipliers();
     velocity_converged_ = true;
     return;
   }
   impulses_.let_stick();
-  double tolerance = kStillness * std::max(violation, motion);
+  double tolerance = kStillness * std::max({violation, motion, shifted_velocity_});
   sweep_.begin(bodies_, {&velocity_joints_, &impulses_});
   velocity_joints_.push_all(bodies_, solution_.velocity);
   if (settings_.shock_propagation) {

@@ -50,6 +50,10 @@
 // layer by layer from what nothing pushes (shock_propagation.h), used where it leaves smaller errors than last step's
 // multipliers. They change the way, not what is asked for: what converges obeys the same laws.
 //
+// Joints that contradict each other: where sweeps ran out, rows that hold always are asked whether they depend on each
+// other (cone_problem.h); those that no motion can meet together get the nearest targets that it can (least squares), and
+// the sweeps begin anew. `stop_reason` says so.
+//
 // Islands are solved each by itself (sequential_islands.h).
 //
 // Convergence is linear: one joint, one contact, or one patch of contacts that rests or sticks is
@@ -116,6 +120,11 @@ class SequentialSolver {
 
  private:
   void load(const stage::SolverSolveRequest& request);
+  void begin(const stage::SolverSolveRequest& request);
+  void solve_rows(const stage::SolverSolveRequest& request);
+  bool reconcile();
+  double reconcile(const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
+                   std::vector<double>* shift) const;
   void solve_pose();
   bool find_closed();
   void build_velocity(const stage::SolverSolveRequest& request);
@@ -143,6 +152,9 @@ class SequentialSolver {
   SolverBodies bodies_;
   std::vector<RelaxationDiscrepancy> discrepancies_;
   RelaxationJoints::Laws pose_laws_, velocity_laws_;
+  // of rows that contradict each other: by how much their targets are moved, and the most, m and m/s
+  std::vector<double> velocity_shift_;
+  double shifted_pose_ = 0.0, shifted_velocity_ = 0.0;
   RelaxationJoints pose_joints_, velocity_joints_;
   ContactGaps gaps_;
   ContactImpulses impulses_;
