@@ -34,6 +34,7 @@ void clear_lists(std::size_t count, std::vector<List>* lists) {
 
 double ConeProblem::coupling(const SolverBodies& bodies, std::uint32_t r, std::uint32_t s) const {
   const ConeRow &a = rows[r], &b = rows[s];
+  if (a.body1 != b.body1 && a.body1 != b.body2 && a.body2 != b.body1 && a.body2 != b.body2) return 0.0;
   const double along = a.direction.linear.dot(b.direction.linear);
   double sum = 0.0;
   if (a.body1 == b.body1) sum += bodies[a.body1].inverse_mass * along + a.direction.angular1.dot(b.direction.turn1);

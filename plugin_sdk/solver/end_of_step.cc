@@ -72,8 +72,9 @@ class IslandSolver {
     velocity_ = start_motion(&SolverBody::trial_velocity);
     displacement_ = offset_ = start_motion(nullptr);
     end_.resize(bodies_.count() + 1);
+    for (std::uint32_t i = 0; i <= bodies_.count(); ++i) gyration_.push_back(bodies_[i].gyration());
     for (std::uint32_t i = 0; i <= bodies_.count(); ++i)
-      end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
+      end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia, Matrix3::Identity()};
     for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
     const DiscrepancyColumns columns = columns_of(request_);
     for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
@@ -172,6 +173,7 @@ class IslandSolver {
     for (const std::uint32_t i : pushed_) {
       const Twist& d = displacement_[i];
       end_[i].pose = displaced(bodies_[i].trial, d.linear, d.angular);
+      end_[i].turn = to_rotation_matrix(exp_rotation(d.angular));
       end_[i].inverse_inertia =
           d.angular.isZero(0.0)
               ? bodies_[i].inverse_inertia
@@ -232,19 +234,17 @@ class IslandSolver {
       }
       return;
     }
-    const Vector3 point1 = carried(d.point1, one.trial, end1.pose);
-    const Vector3 point2 = carried(d.point2, two.trial, end2.pose);
+    const Vector3 point1 = end1.pose.position + end1.turn * (d.point1 - one.trial.position);
+    const Vector3 point2 = end2.pose.position + end2.turn * (d.point2 - two.trial.position);
     const Vector3 error = point2 - point1;
     const double length = error.norm();
-    const bool is_turned = !displacement_[joint->body1].angular.isZero(0.0);
-    const Quaternion turn = exp_rotation(displacement_[joint->body1].angular);
     // axes fixed in body 1 push where body 2's point is, midway along what is held; a drive where it is in body 1
     Vector3 at = holds_pose(d) ? point2 : point1;
     std::array<Vector3, 3> axes;
     for (std::size_t k = 0; k < 3; ++k) {
       const Vector3 axis = joint->axes.col(static_cast<Eigen::Index>(k));
       const bool is_radial = d.is_radial() && k == 0 && length > 0.0;
-      axes[k] = is_radial ? Vector3(error / length) : is_turned ? turn * axis : axis;
+      axes[k] = is_radial ? Vector3(error / length) : Vector3(end1.turn * axis);
       joint->errors[static_cast<Eigen::Index>(k)] = is_radial ? length : axes[k].dot(error);
       if (is_held(axis_mode(d.modes, static_cast<int>(k))))
         at -= 0.5 * joint->errors[static_cast<Eigen::Index>(k)] * axes[k];
@@ -517,14 +517,13 @@ class IslandSolver {
   double largest_change(const BodyMotion& a, const BodyMotion& b) const {
     double most = 0.0;
     for (const std::uint32_t i : pushed_)
-      most = std::max(
-          most, (a[i].linear - b[i].linear).norm() + bodies_[i].gyration() * (a[i].angular - b[i].angular).norm());
+      most = std::max(most, (a[i].linear - b[i].linear).norm() + gyration_[i] * (a[i].angular - b[i].angular).norm());
     return most;
   }
   double largest(const BodyMotion& a) const {
     double most = 0.0;
     for (const std::uint32_t i : pushed_)
-      most = std::max(most, a[i].linear.norm() + bodies_[i].gyration() * a[i].angular.norm());
+      most = std::max(most, a[i].linear.norm() + gyration_[i] * a[i].angular.norm());
     return most;
   }
 
@@ -555,6 +554,7 @@ class IslandSolver {
   std::vector<EndJoint> joints_;
   std::vector<EndContact> contacts_;
   std::vector<EndBody> end_;
+  std::vector<double> gyration_;  // radii, m
   double coordinates_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   ConeSummary summary_;

@@ -16,7 +16,8 @@ namespace gravitas {
 struct EndBody {
   Pose pose;
   Matrix3 inverse_inertia;
-  Matrix3 stiffened;  // inverse of inertia and geometric stiffness, for a step of the pose change
+  Matrix3 stiffened;                   // inverse of inertia and geometric stiffness, for a step of the pose change
+  Matrix3 turn = Matrix3::Identity();  // from S*
 };
 
 // A joint's discrepancy and its laws.

@@ -12,6 +12,12 @@ constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
 constexpr double kDoubtful = 1e-4;  // of a diagonal: pivots that may be rounding
 
 double dot(const double* a, const double* b, std::size_t count) {
+  constexpr std::size_t kShort = 8;  // rows of joints in a chain
+  if (count < kShort) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
+    return sum;
+  }
   const auto size = static_cast<Eigen::Index>(count);
   return Eigen::Map<const Eigen::VectorXd>(a, size).dot(Eigen::Map<const Eigen::VectorXd>(b, size));
 }
