@@ -73,6 +73,7 @@ class RelaxationJoints final : public RelaxationBlocks {
   double largest_motion(const BodyMotion& x) const;
   // The same of rigid rows that depend on others of their two bodies, and are therefore not asked for.
   double largest_left_out(const BodyMotion& x) const;
+  bool leaves_out() const { return !left_out_.empty(); }
   void clear_multipliers();
 
   // Of the rows, locks go a share of their way, others at most the whole.

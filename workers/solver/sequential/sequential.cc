@@ -22,7 +22,7 @@ constexpr double kStillness = 128.0 * kEpsilon;
 constexpr double kLoadRounding = 8.0 * kEpsilon;
 
 // Rows that are off by a smaller share of what meets do not contradict each other.
-constexpr double kContradiction = 1e-9;
+constexpr double kLeastContradiction = 1e-9;
 
 // A contact slips if it does so this much faster than a sweep still changes it: what converges
 // slowly is further from its end than one change.
@@ -89,7 +89,7 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
 // contradict each other, too, because they are taken at S*, where joints are open, and not where they close: by the square of
 // the step's turn, and by that times what is open. That is none.
 bool SequentialSolver::reconcile() {
-  if (discrepancies_.empty()) return false;
+  if (!used_up_ && !pose_joints_.leaves_out() && !velocity_joints_.leaves_out()) return false;
   double spin = 0.0, turn = 0.0, reach = 0.0, open = 0.0;
   for (std::uint32_t i = 0; i < bodies_.count(); ++i) {
     spin = std::max({spin, bodies_[i].trial_velocity.angular.norm(), solution_.velocity[i].angular.norm()});
@@ -103,8 +103,8 @@ bool SequentialSolver::reconcile() {
   }
   const double fastest =
       std::max(velocity_joints_.largest_motion(trial_velocity_), velocity_joints_.largest_motion(solution_.velocity));
-  const double moved = std::max(kContradiction, 4.0 * turn * turn) * fastest + 4.0 * open * spin;
-  const double placed = std::max(kContradiction, 4.0 * turn * turn) * reach + 4.0 * open * turn;
+  const double moved = std::max(kLeastContradiction, 4.0 * turn * turn) * fastest + 4.0 * open * spin;
+  const double placed = std::max(kLeastContradiction, 4.0 * turn * turn) * reach + 4.0 * open * turn;
   std::vector<double> shift(pose_laws_.size(), 0.0);
   if (used_up_ || velocity_joints_.largest_left_out(solution_.velocity) > moved)
     shifted_velocity_ = reconcile(velocity_laws_, trial_velocity_, moved, &velocity_shift_);

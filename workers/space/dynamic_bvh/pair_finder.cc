@@ -282,7 +282,7 @@ void PairFinder::find_pairs(const stage::SpacePairsRequest& request, const PairR
   };
   pair_end_ = 0;
   for (std::uint32_t a = 0; a < bodies;) {
-    host.mark_progress();
+    if (a % kBodiesOfProgress == 0) host.mark_progress();
     // candidates alone, up to the next outsider, or body with fresh candidates
     std::uint32_t end = std::min(bodies, a + kBodiesOfProgress);
     if (next < outsiders_.size()) end = a;
@@ -290,6 +290,7 @@ void PairFinder::find_pairs(const stage::SpacePairsRequest& request, const PairR
     if (end > a) {
       make_room(begin_[end] - begin_[a]);
       add_pairs(request, begin_[a], begin_[end]);
+      host.mark_progress();
       a = end;
       continue;
     }
