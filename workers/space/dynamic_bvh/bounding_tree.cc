@@ -4,6 +4,17 @@
 #include <limits>
 
 namespace gravitas::dynamic_bvh {
+namespace {
+
+__m256d edges_of(const Box& box) { return _mm256_sub_pd(box.upper, box.lower); }
+
+double sum(__m256d edges) {
+  alignas(32) double lanes[4];
+  _mm256_store_pd(lanes, edges);
+  return lanes[0] + lanes[1] + lanes[2];
+}
+
+}  // namespace
 
 void BoundingTree::build(std::span<const std::uint32_t> bodies, std::span<const Box> boxes,
                          std::span<const std::uint8_t> marked) {
@@ -70,31 +81,51 @@ void BoundingTree::split(std::uint32_t level, std::uint32_t i) {
   split(level + 1, 2 * i + 1);
 }
 
-void BoundingTree::move(std::uint32_t body, const Box& box) { box_[place_[body]] = box; }
+// The leaf whose places p is among.
+std::uint32_t BoundingTree::leaf_of(std::uint32_t p) const {
+  auto i = static_cast<std::uint32_t>((std::uint64_t{p} << levels_) / body_.size());
+  while (place(levels_, i + 1) <= p) ++i;
+  return i;
+}
 
-void BoundingTree::mark(std::uint32_t body) { mark_[place_[body]] = 1; }
+Box BoundingTree::box_of_leaf(std::uint32_t i) const {
+  Box box = {_mm256_set1_pd(std::numeric_limits<double>::infinity()),
+             _mm256_set1_pd(-std::numeric_limits<double>::infinity())};
+  for (std::uint32_t p = place(levels_, i); p < place(levels_, i + 1); ++p) box = united(box, box_[p]);
+  return box;
+}
+
+void BoundingTree::move(std::uint32_t body, const Box& box) {
+  set(body, box);
+  const std::uint32_t leaf = leaf_of(place_[body]);
+  Box changed = box_of_leaf(leaf);
+  __m256d edges = _mm256_setzero_pd();
+  for (std::uint32_t k = node(levels_, leaf);; k = (k - 1) / 2) {
+    edges = _mm256_add_pd(edges, _mm256_sub_pd(edges_of(changed), edges_of(node_box_[k])));
+    node_box_[k] = changed;
+    if (k == 0) break;
+    const std::uint32_t parent = (k - 1) / 2;
+    changed = united(node_box_[2 * parent + 1], node_box_[2 * parent + 2]);
+  }
+  edges_ += sum(edges);
+}
 
 void BoundingTree::refit() {
   const std::uint32_t leaves = 1U << levels_;
   __m256d edges = _mm256_setzero_pd();
   for (std::uint32_t i = 0; i < leaves; ++i) {
     const std::uint32_t begin = place(levels_, i), end = place(levels_, i + 1), leaf = node(levels_, i);
-    Box box = {_mm256_set1_pd(std::numeric_limits<double>::infinity()),
-               _mm256_set1_pd(-std::numeric_limits<double>::infinity())};
-    std::uint8_t mark = 0;
-    for (std::uint32_t p = begin; p < end; ++p) box = united(box, box_[p]), mark |= mark_[p];
-    node_box_[leaf] = box, node_mark_[leaf] = mark;
-    if (begin < end) edges = _mm256_add_pd(edges, _mm256_sub_pd(box.upper, box.lower));
+    node_box_[leaf] = box_of_leaf(i);
+    node_mark_[leaf] = 0;
+    for (std::uint32_t p = begin; p < end; ++p) node_mark_[leaf] |= mark_[p];
+    if (begin < end) edges = _mm256_add_pd(edges, edges_of(node_box_[leaf]));
   }
   for (std::uint32_t k = leaves - 1; k-- > 0;) {
-    const Box box = united(node_box_[2 * k + 1], node_box_[2 * k + 2]);
-    node_box_[k] = box;
+    node_box_[k] = united(node_box_[2 * k + 1], node_box_[2 * k + 2]);
     node_mark_[k] = node_mark_[2 * k + 1] | node_mark_[2 * k + 2];
-    edges = _mm256_add_pd(edges, _mm256_sub_pd(box.upper, box.lower));
+    edges = _mm256_add_pd(edges, edges_of(node_box_[k]));
   }
-  alignas(32) double lanes[4];
-  _mm256_store_pd(lanes, edges);
-  edges_ = lanes[0] + lanes[1] + lanes[2];
+  edges_ = sum(edges);
 }
 
 }  // namespace gravitas::dynamic_bvh

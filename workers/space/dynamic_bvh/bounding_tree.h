@@ -50,9 +50,11 @@ class BoundingTree {
   // Orders the bodies; boxes[i] is that of body i, and marked[i] says whether it is marked.
   void build(std::span<const std::uint32_t> bodies, std::span<const Box> boxes, std::span<const std::uint8_t> marked);
 
-  // New box of a body of the build, and a mark for one: call refit() when all are there.
+  // New box of a body of the build, and the nodes above it: O(log n).
   void move(std::uint32_t body, const Box& box);
-  void mark(std::uint32_t body);
+  // The same for many, and marks: call refit() when all are there, O(n).
+  void set(std::uint32_t body, const Box& box) { box_[place_[body]] = box; }
+  void mark(std::uint32_t body) { mark_[place_[body]] = 1; }
   void refit();
 
   // Calls found(a, b) for every two bodies of which one is marked and whose boxes overlap, each pair once. Those marked
@@ -78,7 +80,7 @@ class BoundingTree {
     if (!body_.empty()) visit_met(0, 0, meets, found);
   }
 
-  // Sum of the edges of all nodes' boxes, m: what finding pairs costs grows with it. Written by build() and refit().
+  // Sum of the edges of all nodes' boxes, m: what finding pairs costs grows with it.
   double edges() const { return edges_; }
 
  private:
@@ -95,6 +97,8 @@ class BoundingTree {
   }
   std::uint32_t node(std::uint32_t level, std::uint32_t i) const { return (1U << level) - 1 + i; }
 
+  std::uint32_t leaf_of(std::uint32_t p) const;
+  Box box_of_leaf(std::uint32_t i) const;
   void split(std::uint32_t level, std::uint32_t i);
 
   template <typename Meets, typename Found>

@@ -149,14 +149,17 @@ void PairFinder::update(const stage::SpacePairsRequest& request, const PairRule&
   has_moved_.assign(rule.bodies(), 0);
   for (const std::uint32_t i : moved_) {
     fat_[i] = fat_box(i, box_at(request.lower(), request.upper(), i));
-    tree_.move(i, fat_[i]);
     has_moved_[i] = 1;
     if ((state_[i] & kFresh) == 0) fresh_bodies_.push_back(i);
     state_[i] |= kFresh;
   }
   const bool is_merging = fresh_bodies_.size() > members_.size() / kRenewedShare;
-  for (std::size_t k = 0; is_merging && k < fresh_bodies_.size(); ++k) tree_.mark(fresh_bodies_[k]);
-  tree_.refit();
+  if (is_merging) {
+    for (const std::uint32_t i : fresh_bodies_) tree_.set(i, fat_[i]), tree_.mark(i);
+    tree_.refit();
+  } else {
+    for (const std::uint32_t i : moved_) tree_.move(i, fat_[i]);
+  }
   if (tree_.edges() > kGrowth * edges_at_build_) {
     build(request, rule);
     return;
