@@ -23,7 +23,7 @@ BOUNDS = [
     ("integrate_call/shm/1000/real_time", "Integrate, 1000 bodies, shm", None, None, "us"),
     ("integrate_call/grpc/1000/real_time", "Integrate, 1000 bodies, gRPC", None, 400, "us"),
     ("integrate_call/grpc/10000/real_time", "Integrate, 10,000 bodies, gRPC", None, 3000, "us"),
-    ("free_body/direct/real_time", "step of one free body, direct", None, 0.5, "us"),
+    ("free_body/direct/real_time", "step of one free body, direct", None, 0.3, "us"),
     ("free_body/shm/real_time", "step of one free body, shm", None, None, "us"),
     ("free_body/grpc/real_time", "step of one free body, gRPC", None, None, "us"),
     ("four_derivatives/direct/1/real_time", "step with four derivatives, one body, direct", None, None, "us"),
