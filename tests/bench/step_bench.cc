@@ -168,7 +168,7 @@ void memory(benchmark::State& state) {
 constexpr std::uint32_t kFlying = 100;
 constexpr double kFlightStep = 1e-6;
 
-enum class Use { kNothing, kSleep, kJoints, kContacts };
+enum class Use { kNothing, kSleep, kJoints, kContacts, kBoxes };
 
 Vector3 start_of_flight(std::uint32_t body) { return {2.0 * (body % 10), 2.0 * (body / 10), 0}; }
 Twist twist_of_flight() { return {Vector3(1, 0, 0), Vector3(0, 1, 0)}; }
@@ -179,6 +179,8 @@ WorldBuilder flight_with(Use use, Hosting hosting) {
   const auto add = [&](const Vector3& position) {
     if (use == Use::kContacts)
       builder.sphere(0.5, 1.0, position);
+    else if (use == Use::kBoxes)
+      builder.box(Vector3(0.5, 0.4, 0.3), 1.0, position);
     else
       builder.point(1.0, Vector3(0.1, 0.1, 0.1), position);
     builder.body().twist = twist_of_flight();
@@ -245,6 +247,7 @@ BENCHMARK_CAPTURE(plan, nothing, Use::kNothing)->UseRealTime();
 BENCHMARK_CAPTURE(plan, sleep, Use::kSleep)->UseRealTime();
 BENCHMARK_CAPTURE(plan, joints, Use::kJoints)->UseRealTime();
 BENCHMARK_CAPTURE(plan, contacts, Use::kContacts)->UseRealTime();
+BENCHMARK_CAPTURE(plan, boxes, Use::kBoxes)->UseRealTime();
 BENCHMARK(start_to_first_step)->UseRealTime()->Iterations(20)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pile_in_workers, cheap, 0)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(pile_in_workers, physics, 1)->UseRealTime()->Iterations(100)->Unit(benchmark::kMillisecond);

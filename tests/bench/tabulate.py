@@ -105,11 +105,12 @@ def table(context, runs):
     lines += ["", "![cost per step](cost_per_step.svg)", "",
               "What leaving out saves: a hundred bodies in free flight, microseconds a step (direct), processes and their memory",
               "(shm); below a use of one feature is added, that of joints far away, and at the top there is no engine at all:",
-              "the same motion in a loop.", "",
+              "the same motion in a loop. Rays have nothing to be left out: who asks for one, beside a run, starts workers for it.", "",
               "| what runs | step | processes | memory |", "| --- | --- | --- | --- |"]
     for name, what in (("without_engine", "a loop, no engine"), ("plan/nothing", "what bodies in free flight need"),
                        ("plan/sleep", "the same, and they may fall asleep"), ("plan/joints", "the same, and a joint"),
-                       ("plan/contacts", "the same, and all can collide")):
+                       ("plan/contacts", "the same, and all can collide: balls"),
+                       ("plan/boxes", "the same, boxes, whose bounds turn with them")):
         run = runs[name + "/real_time"]
         lines.append(f"| {what} | {shown(microseconds(run))} us | {run.get('processes', 0):.0f} "
                      f"| {shown(run.get('megabytes', 0))} MB |")
