@@ -30,7 +30,7 @@ constexpr double kNearly = 1e-3;
 // The same by any turn, however large.
 constexpr double kMostLeft = 0.25;
 // Speed at which a method may stop, of the fastest body's: it knows one measure for all.
-constexpr double kOfFastest = 1e-11;
+constexpr double kOfFastest = 1e-12;
 // Share of the largest correction that none is.
 constexpr double kNegligible = 1e-6;
 

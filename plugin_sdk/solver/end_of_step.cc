@@ -72,9 +72,10 @@ class IslandSolver {
     velocity_ = start_motion(&SolverBody::trial_velocity);
     displacement_ = offset_ = start_motion(nullptr);
     end_.resize(bodies_.count() + 1);
-    for (std::uint32_t i = 0; i <= bodies_.count(); ++i) gyration_.push_back(bodies_[i].gyration());
-    for (std::uint32_t i = 0; i <= bodies_.count(); ++i)
-      end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia, Matrix3::Identity()};
+    for (std::uint32_t i = 0; i <= bodies_.count(); ++i) {
+      end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
+      gyration_.push_back(bodies_[i].gyration());
+    }
     for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
     const DiscrepancyColumns columns = columns_of(request_);
     for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);

@@ -239,7 +239,7 @@ void add(const std::string& name, const std::string& library, std::int64_t most,
       benchmark::internal::Benchmark* const bench = benchmark::RegisterBenchmark(
           title.c_str(), [=](benchmark::State& state) { find_pairs<Space>(state, library, layout, motion); });
       bench->RangeMultiplier(10)->Range(fewest, most)->UseManualTime()->Unit(benchmark::kMicrosecond);
-      calls > 0 ? bench->Iterations(calls) : bench->MinTime(0.05);
+      calls > 0 ? bench->Iterations(calls)->Repetitions(1) : bench->MinTime(0.05);
     }
   }
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
+#include <string>
 
 #include "kernel/environment.h"
 #include "tests/kernel/run_to_end.h"
@@ -88,6 +90,52 @@ TEST(Plan, SleepIsLeftOutWhereNothingCanFallAsleep) {
     builder->description().simulator = Simulator::kSmooth;
   };
   EXPECT_EQ(why(make_smooth), "the simulator Smooth stops no motion");
+}
+
+// Two bodies turn and drift, and a third rests far away: it alone has a use for what is left out, or all of it.
+enum class Use { kNothing, kConstantForce, kForce, kJoint, kContacts, kSleep, kAll };
+
+WorldBuilder in_flight(Use use, const std::string& integrator) {
+  const auto has = [&](Use one) { return use == one || use == Use::kAll; };
+  WorldBuilder builder;
+  builder.steps(200, 0.01).integrator(integrator);
+  builder.box(Vector3(0.5, 0.4, 0.3), 2.0, Vector3(0.1, 0.2, 0.3), Vector3(1, -2, 0.5));
+  builder.body().twist.angular = Vector3(0.3, 2, -0.7);
+  builder.body().damping = 0.1;
+  builder.box(Vector3(0.2, 0.4, 0.6), 3.0, Vector3(50, 0.2, 0.3), Vector3(1, 2, 0.5));
+  builder.body().twist.angular = Vector3(-4, 1, 0.7);
+  builder.sphere(0.5, 1.0, Vector3(1000, 0, 0));
+  const bool can_touch = has(Use::kContacts) || has(Use::kSleep);
+  for (BodyDescription& body : builder.description().bodies) body.filter_mask = can_touch ? ~std::uint64_t{0} : 0;
+  builder.description().sleep.energy = has(Use::kSleep) ? 1e-6 : 0.0;
+  if (has(Use::kSleep)) builder.body().flags |= kCanSleep;
+  if (has(Use::kConstantForce)) builder.force("Gravity", "force_gravity", {0, 0, 0});
+  const double absent = std::numeric_limits<double>::quiet_NaN();
+  if (has(Use::kForce)) builder.force("Spring", "force_spring", {9, 1, 1, 0, 0, 0, absent, 1001, 0, 0});
+  if (has(Use::kJoint)) builder.joint("Spherical", "constraint_spherical", kNone, 2, {1000, 0, 0});
+  return builder;
+}
+
+TEST(Plan, WhatIsLeftOutChangesNoBit) {
+  for (const char* integrator : {"integrator_euler", "integrator_semi_implicit_euler", "integrator_verlet",
+                                 "integrator_basic_verlet", "integrator_rk4", "integrator_rkmk4"}) {
+    Environment shortest(in_flight(Use::kNothing, integrator).description());
+    EXPECT_EQ(shortest.plan().slots.size(), 1U);
+    run_to_end(&shortest);
+    struct Row {
+      Use use;
+      std::size_t slots, left_out;
+    };
+    // of seven: six slots and sleep; a constant force is asked once, before the first step
+    for (const Row& row : {Row{Use::kConstantForce, 1, 6}, Row{Use::kForce, 2, 5}, Row{Use::kJoint, 3, 4},
+                           Row{Use::kContacts, 4, 3}, Row{Use::kSleep, 4, 2}, Row{Use::kAll, 6, 0}}) {
+      Environment longer(in_flight(row.use, integrator).description());
+      EXPECT_EQ(longer.plan().slots.size(), row.slots);
+      EXPECT_EQ(longer.plan().left_out.size(), row.left_out);
+      run_to_end(&longer);
+      EXPECT_EQ(longer.chain_hash(), shortest.chain_hash()) << integrator << ", use " << static_cast<int>(row.use);
+    }
+  }
 }
 
 // Two balls fly towards each other and touch after 0.5 s; a third flies elsewhere.

@@ -503,8 +503,8 @@ TEST(CheckSolution, AllowsWhatSeparatesByRoundingOfTheFastest) {
     s.close_joint();
     return s.check();
   };
-  EXPECT_THAT(leaves_at(5e-11), IsEmpty());
-  EXPECT_THAT(leaves_at(1e-9), HasSubstr("contact_impulse of row 0"));
+  EXPECT_THAT(leaves_at(5e-12), IsEmpty());
+  EXPECT_THAT(leaves_at(5e-11), HasSubstr("contact_impulse of row 0"));
 }
 
 // Its multipliers and its pose change are of one mind, and do to the joint what they should not.

@@ -122,7 +122,8 @@ void RelaxationJoints::factorise(Block& block, double inverse_masses) {
   }
 
   for (std::size_t i = 0; i < count; ++i)
-    if (std::find(kept.begin(), kept.begin() + block.rigid, i) == kept.begin() + block.rigid)
+    if (rigid_[i].response > 0.0 &&
+        std::find(kept.begin(), kept.begin() + block.rigid, i) == kept.begin() + block.rigid)
       left_out_.push_back({block.body1, block.body2, rigid_[i].own, rigid_[i].law.lower_target, rigid_[i].length});
 
   // inverse = S L^-T L^-1 S, S the scaling of the rows
