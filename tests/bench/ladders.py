@@ -7,7 +7,7 @@ from tabulate import plt
 
 WORST, FINEST = 10.0, 1e-17  # edges of the axis of errors; failed runs stand at the worst
 ROUNDING = 1e-15  # what references of 17 digits leave open, and doubles
-MARKS = "osD^v<>ph*Xd"
+MARKS = "osD^v<>ph*Xd8P"
 
 
 @dataclass

@@ -50,7 +50,8 @@ std::vector<MotionMethod> fixed_step_methods() {
 
 std::vector<MotionMethod> adaptive_methods(double accuracy) {
   return {{"DormandPrince54", "integrator_dormand_prince54", {accuracy}, 5, 5},
-          {"Rosenbrock", "integrator_rosenbrock", {accuracy}, 4, 0}};
+          {"Rosenbrock", "integrator_rosenbrock", {accuracy}, 4, 0},
+          {"Radau", "integrator_radau", {accuracy}, 5, 0}};
 }
 
 MotionProblem tumbling_box() {

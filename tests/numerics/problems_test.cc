@@ -30,6 +30,7 @@ MotionMethod dormand_prince(double accuracy) {
   return at_accuracy("DormandPrince54", "integrator_dormand_prince54", accuracy);
 }
 MotionMethod rosenbrock(double accuracy) { return at_accuracy("Rosenbrock", "integrator_rosenbrock", accuracy); }
+MotionMethod radau(double accuracy) { return at_accuracy("Radau", "integrator_radau", accuracy); }
 
 // What is wanted of a run; 0: nothing.
 struct Wanted {
@@ -126,6 +127,8 @@ TEST(Problems, PendulumChallenge) {
 // IFToMM A05: stiff, some 2.7e4/s.
 TEST(Problems, FlyballGovernor) {
   expect_run(harness::flyball_governor(), rosenbrock(1e-5), 1000, {.error = 1e-4});
+  expect_run(harness::flyball_governor(), radau(1e-5), 1000, {.error = 1e-4});
+  expect_run(harness::flyball_governor(), radau(1e-5), 100, {.error = 1e-8});
   expect_run(harness::flyball_governor(), dormand_prince(1e-5), 100, {.error = 1e-8});
 }
 

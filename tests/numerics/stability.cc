@@ -111,6 +111,15 @@ Eigen::MatrixXd rodas(double k, double c) {
   return sum;
 }
 
+// The Pade approximation of e^z with degrees 2 and 3, with products of bounded factors as above.
+Eigen::MatrixXd radau(double k, double c) {
+  const Matrix2 z = rates(k, c), one = Matrix2::Identity();
+  // the denominator's real zero, and the pair of others: (1 - z/g)(1 - 2 a z/(a^2 + b^2) + z^2/(a^2 + b^2))
+  const double g = 3.637834252744496, a = 2.681082873627752, b = 3.050430199247411, d = a * a + b * b;
+  const Matrix2 real = (one - z / g).inverse(), pair = (one - 2.0 * a / d * z + z * z / d).inverse();
+  return real * (pair * (one + 0.4 * z + 0.05 * z * z));
+}
+
 const std::map<std::string, Theory>& theories() {
   static const std::map<std::string, Theory> all = {{"Euler", euler},
                                                     {"SemiImplicitEuler", semi_implicit_euler},
@@ -123,7 +132,8 @@ const std::map<std::string, Theory>& theories() {
                                                     {"SymplecticSplitting 4", splitting4},
                                                     {"SymplecticSplitting 6", splitting6},
                                                     {"DormandPrince54", dormand_prince},
-                                                    {"Rosenbrock", rodas}};
+                                                    {"Rosenbrock", rodas},
+                                                    {"Radau", radau}};
   return all;
 }
 

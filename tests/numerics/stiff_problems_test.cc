@@ -41,13 +41,19 @@ double damped_swing(double w, double zeta, double t) {
   return (fast * std::exp(-slow * t) - slow * std::exp(-fast * t)) / (fast - slow);
 }
 
-TEST(StiffProblems, DampedSpringsFollowTheirClosedForms) {
+struct Damper {
+  std::string name, library;
+};
+const Damper kDampers[] = {{"Rosenbrock 1e-06, 1/60 s", "integrator_rosenbrock"},
+                           {"Radau 1e-06, 1/60 s", "integrator_radau"}};
+
+void expect_damped_springs(const Damper& method) {
   for (const double zeta : {0.1, 1.0, 100.0}) {
     double worst = 0.0;
     const CpuClock clock;
     for (int exponent = 2; exponent <= 14; ++exponent) {
       const double w = std::pow(10.0, 0.5 * exponent);
-      WorldBuilder builder = world_with("integrator_rosenbrock", {1e-6});
+      WorldBuilder builder = world_with(method.library, {1e-6});
       harness::spring_between(&builder, {w * w, 2.0 * zeta * w, 0.0}, Vector3::Zero(), kNone, Vector3::Zero());
       Environment world(builder.description());
       while (world.step_count() < kSteps) {
@@ -57,8 +63,12 @@ TEST(StiffProblems, DampedSpringsFollowTheirClosedForms) {
     }
     char text[64];
     std::snprintf(text, sizeof text, "springs 1e2 ... 1e14 N/m, zeta %g", zeta);
-    expect_reached({text, "Rosenbrock 1e-06, 1/60 s", "position, m", 1e-4, worst, clock.seconds()});
+    expect_reached({text, method.name, "position, m", 1e-4, worst, clock.seconds()});
   }
+}
+
+TEST(StiffProblems, DampedSpringsFollowTheirClosedForms) {
+  for (const Damper& method : kDampers) expect_damped_springs(method);
 }
 
 // What it does not resolve keeps ringing, with the energy that it had.
@@ -80,13 +90,13 @@ TEST(StiffProblems, UndampedSpringsKeepTheirEnergyAtAnyStiffness) {
 }
 
 // c dt/m from 1e-2 to 1e6.
-TEST(StiffProblems, DragsFollowTheirClosedForms) {
+void expect_drags(const Damper& method) {
   for (const bool is_quadratic : {false, true}) {
     double worst = 0.0, rises = 0.0, reversal = 0.0;
     const CpuClock clock;
     for (int exponent = -2; exponent <= 6; ++exponent) {
       const double c = kSteps * std::pow(10.0, exponent);
-      WorldBuilder builder = world_with("integrator_rosenbrock", {1e-6});
+      WorldBuilder builder = world_with(method.library, {1e-6});
       builder.body().twist.linear = {1, 0, 0};
       builder.force("Drag", "force_drag", {is_quadratic ? 0.0 : c, is_quadratic ? c : 0.0});
       Environment world(builder.description());
@@ -100,10 +110,14 @@ TEST(StiffProblems, DragsFollowTheirClosedForms) {
       }
     }
     const char* problem = is_quadratic ? "quadratic drag, c v dt/m to 1e6" : "linear drag, c dt/m to 1e6";
-    expect_reached({problem, "Rosenbrock 1e-06, 1/60 s", "speed, m/s", 1e-4, worst, clock.seconds()});
-    expect_reached({problem, "Rosenbrock 1e-06, 1/60 s", "rise of the speed, m/s", 0.0, rises, clock.seconds(), 1e-6});
-    expect_reached({problem, "Rosenbrock 1e-06, 1/60 s", "reversed speed, m/s", 0.0, reversal, clock.seconds(), 1e-6});
+    expect_reached({problem, method.name, "speed, m/s", 1e-4, worst, clock.seconds()});
+    expect_reached({problem, method.name, "rise of the speed, m/s", 0.0, rises, clock.seconds(), 1e-6});
+    expect_reached({problem, method.name, "reversed speed, m/s", 0.0, reversal, clock.seconds(), 1e-6});
   }
+}
+
+TEST(StiffProblems, DragsFollowTheirClosedForms) {
+  for (const Damper& method : kDampers) expect_drags(method);
 }
 
 // Eight masses at the corners of a box, each two joined by a spring, set turning; or the rigid body of them.

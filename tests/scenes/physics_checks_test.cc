@@ -49,6 +49,7 @@ const Methods kMethods[] = {
     {"ImplicitMidpoint", {"Integrator=ImplicitMidpoint"}},
     {"DormandPrince54", {"Integrator=DormandPrince54"}},
     {"Rosenbrock", {"Integrator=Rosenbrock"}},
+    {"Radau", {"Integrator=Radau"}},
     {"LongSteps", {"Simulator.TimeStep=0.05"}},
 };
 

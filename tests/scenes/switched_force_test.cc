@@ -32,8 +32,9 @@ constexpr double kSpeed = 4.0 * 0.395, kWay = 0.5 * 4.0 * 0.395 * 0.395 + kSpeed
 constexpr double kRounding = 1e-13;
 
 TEST(SwitchedForce, ActsAsLongAsItIsOnWithEveryIntegrator) {
-  for (const std::string integrator : {"Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4",
-                                       "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54", "Rosenbrock"}) {
+  for (const std::string integrator :
+       {"Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4", "SymplecticSplitting",
+        "ImplicitMidpoint", "DormandPrince54", "Rosenbrock", "Radau"}) {
     SCOPED_TRACE(integrator);
     SceneRun run(kScene, {set("Integrator", integrator)});
     run.to_end();

@@ -305,7 +305,7 @@ TEST(DormandPrince54, RefusesWhatNoStepCanFollow) {
   EXPECT_NE(problem.plugin.refusal(stage::Method::kIntegratorIntegrate, problem.request()), "");
 }
 
-// ---- Rosenbrock: PROBLEMS 27
+// ---- Rosenbrock and Radau: PROBLEMS 27
 
 // x'' = -k x - c x': closed form.
 double spring_position(double k, double c, double t) {
@@ -319,10 +319,13 @@ double spring_position(double k, double c, double t) {
   return (slow * std::exp(fast * t) - fast * std::exp(slow * t)) / (slow - fast);
 }
 
-TEST(Rosenbrock, FollowsDampedSpringsOfAnyStiffness) {
+class StiffMotion : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(With, StiffMotion, ::testing::Values("integrator_rosenbrock", "integrator_radau"));
+
+TEST_P(StiffMotion, FollowsDampedSpringsOfAnyStiffness) {
   for (double k = 1e2; k < 2e14; k *= 100.0) {
     for (const double ratio : {0.1, 1.0, 100.0}) {
-      IntegratorProblem problem("integrator_rosenbrock", {1e-6});
+      IntegratorProblem problem(GetParam(), {1e-6});
       const double c = 2.0 * ratio * std::sqrt(k);
       put_on_spring(&problem, k, c);
       problem.time_step = 1.0 / 60.0;
@@ -333,9 +336,9 @@ TEST(Rosenbrock, FollowsDampedSpringsOfAnyStiffness) {
   }
 }
 
-TEST(Rosenbrock, StaysBoundedWithoutDamping) {
+TEST_P(StiffMotion, StaysBoundedWithoutDamping) {
   for (double k = 1e2; k < 2e14; k *= 1e4) {
-    IntegratorProblem problem("integrator_rosenbrock", {1e-2});
+    IntegratorProblem problem(GetParam(), {1e-2});
     put_on_spring(&problem, k, 0.0);
     problem.bodies[0].state.pose.position = Vector3(1e-4, 0, 0);
     problem.time_step = 1.0 / 60.0;
@@ -346,9 +349,9 @@ TEST(Rosenbrock, StaysBoundedWithoutDamping) {
 }
 
 // Linear drag c dt / m from 1e-2 to 1e6: the closed form e^(-c t), no change of sign.
-TEST(Rosenbrock, SlowsByAnyDrag) {
+TEST_P(StiffMotion, SlowsByAnyDrag) {
   for (double share = 1e-2; share < 2e6; share *= 10.0) {
-    IntegratorProblem problem("integrator_rosenbrock", {1e-6});
+    IntegratorProblem problem(GetParam(), {1e-6});
     problem.wrench_is_constant = false;
     problem.bodies = {FreeBody{.mass = 1.0}};
     problem.bodies[0].state.twist.linear = Vector3(1, 0, 0);
@@ -371,8 +374,8 @@ TEST(Rosenbrock, SlowsByAnyDrag) {
 }
 
 // Bodies on a stiff spring between them are solved for together.
-TEST(Rosenbrock, SolvesForBodiesTogether) {
-  IntegratorProblem problem("integrator_rosenbrock", {1e-8});
+TEST_P(StiffMotion, SolvesForBodiesTogether) {
+  IntegratorProblem problem(GetParam(), {1e-8});
   problem.wrench_is_constant = false;
   problem.bodies = {FreeBody{.mass = 1.0}, FreeBody{.mass = 3.0}};
   problem.bodies[1].state.pose.position = Vector3(1.1, 0, 0);
@@ -394,6 +397,42 @@ TEST(Rosenbrock, SolvesForBodiesTogether) {
   EXPECT_NEAR(d.cross(u).z(), 0.44, 5e-5);
   const Vector3 momentum = problem.bodies[0].state.twist.linear + 3.0 * problem.bodies[1].state.twist.linear;
   EXPECT_LT((momentum - Vector3(0, 1.2, 0)).norm(), 1e-9);
+}
+
+// Two masses on a stiff, damped spring that turn about each other, at the length at which it holds them: they stay there.
+// The spring bends away from its direction at the start of a step, which costs a linearly implicit method its long steps.
+TEST(Radau, TakesLongStepsWhereStiffSpringsTurn) {
+  const double k = 1e8, c = 1e5, mass = 2.0, rate = 3.0, rest = 1.0;
+  // k (r - l) = (m/2) rate^2 r
+  const double length = k * rest / (k - 0.5 * mass * rate * rate);
+  const auto run = [&](const char* library, double* place) {
+    IntegratorProblem problem(library, {1e-6});
+    problem.wrench_is_constant = false;
+    problem.bodies = {FreeBody{.mass = mass}, FreeBody{.mass = mass}};
+    for (const std::size_t i : {0U, 1U}) {
+      BodyState& state = problem.bodies[i].state;
+      state.pose.position = Vector3(i == 0 ? -0.5 * length : 0.5 * length, 0, 0);
+      state.twist = {Vector3(0, rate * state.pose.position.x(), 0), Vector3(0, 0, rate)};
+    }
+    int derivatives = 0;
+    problem.plugin.derivative = [&](const stage::IntegratorDerivativeRequest& q) {
+      ++derivatives;
+      const Vector3 d = vector_at(q.position(), 1) - vector_at(q.position(), 0);
+      const Vector3 u = vector_at(q.linear_velocity(), 1) - vector_at(q.linear_velocity(), 0);
+      const Vector3 f = (k * (d.norm() - rest) + c * u.dot(d.normalized())) * d.normalized();
+      return std::vector<double>{f.x(), f.y(), f.z(), 0, 0, 0, -f.x(), -f.y(), -f.z(), 0, 0, 0};
+    };
+    problem.time_step = 0.1;
+    problem.steps(10);
+    const Vector3 exact(0.5 * length * std::cos(rate), 0.5 * length * std::sin(rate), 0.0);
+    *place = (problem.bodies[1].state.pose.position - exact).norm();
+    return derivatives;
+  };
+  double radau = 0.0, rosenbrock = 0.0;
+  const int few = run("integrator_radau", &radau), many = run("integrator_rosenbrock", &rosenbrock);
+  EXPECT_LT(radau, 1e-6);
+  EXPECT_LT(rosenbrock, 1e-3);
+  EXPECT_LT(10 * few, many) << "derivatives";
 }
 
 // ---- all

@@ -35,7 +35,9 @@ std::vector<Method> methods() {
           {"integrator_rkmk4", {}, 4, 64},
           {"integrator_symplectic_splitting", {2}, 2, 128},
           {"integrator_symplectic_splitting", {4}, 4, 32},
-          {"integrator_symplectic_splitting", {6}, 6, 8}};
+          {"integrator_symplectic_splitting", {6}, 6, 8},
+          // one inner step each
+          {"integrator_radau", {1}, 5, 16}};
 }
 
 // A smooth motion of one body over a second.

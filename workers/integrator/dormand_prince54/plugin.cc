@@ -10,7 +10,7 @@
 // gathers them. The answer's error_estimate is the largest E / Accuracy of the step.
 // Sources: Dormand, Prince, J. Comput. Appl. Math. 6 (1980) 19; Hairer, Norsett, Wanner, Solving ODEs I, II.4, IV.2.
 // Six derivatives an inner step and one more a step. Damping as in motion_stages.h. Stability: explicit, so that a
-// stiff force (h sqrt(k/m) > 3) costs as many inner steps as it takes; see Rosenbrock. Known failure: energy drifts by
+// stiff force (h sqrt(k/m) > 3) costs as many inner steps as it takes; see Radau. Known failure: energy drifts by
 // what the accuracy lets through. Refused, with the body's number: what no inner step can follow.
 #include <algorithm>
 #include <array>

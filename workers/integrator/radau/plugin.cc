@@ -1,0 +1,307 @@
+// Integrator `Radau`: the implicit Runge-Kutta method Radau IIA of three stages, order 5, with error control, for stiff
+// motion that bends: springs and dampers of any stiffness that turn with their bodies, mechanisms under them. With the state
+// y around the start of an inner step and y' = f(s, y) (local_motion.h), nodes c = ((4 - 6^1/2)/10, (4 + 6^1/2)/10, 1),
+//
+//   z_i = h sum_j a_ij f(c_j h, y + z_j),   i = 1 ... 3,      y' = y + z_3.
+//
+// The stages are found by Newton's method with J = df/dy, kept from one inner step to the next while it gains a digit in
+// a round; A^-1 = T diag(g, a +- i b) T^-1 makes one real and one complex system of it (ShiftedJacobian). Rounds end where
+// what they leave of z counts for less than a hundredth of the estimated error, or than its power 3/2, which falls as fast
+// as the method's own. With f_0 at the start, the error is estimated as
+//
+//   e = (g/h - J)^-1 (f_0 + (d_1 z_1 + d_2 z_2 + d_3 z_3)/h),
+//
+// of order 3 and bounded for any stiffness; one above Accuracy is taken again with f(0, y + e) for f_0. It is scaled and
+// held to Accuracy, and inner steps end on the step's boundary, as in DormandPrince54; the length that the last one would
+// have had is kept in plugin_state for the step to come. Stability: A- and L-stable. Known failure: as for Rosenbrock,
+// oscillations that Accuracy does not resolve are damped away. Where nothing is stiff, DormandPrince54 costs a fifth.
+// Source: Hairer, Wanner, Solving ODEs II, IV.8 and the code RADAU5.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+
+#include "plugin_sdk/interaction_groups.h"
+#include "plugin_sdk/local_motion.h"
+#include "plugin_sdk/math/transcendental.h"
+
+namespace gravitas {
+namespace {
+
+constexpr std::size_t kStages = 3;
+constexpr std::array<double, kStages> kNodes = {0.15505102572168219, 0.64494897427831781, 1.0};
+constexpr double kReal = 3.637834252744496;                                        // g
+constexpr std::complex<double> kComplex = {2.681082873627752, 3.050430199247411};  // a + i b
+constexpr double kFrom[kStages][kStages] = {{9.1232394870892943e-2, -0.14125529502095421, -3.0029194105147425e-2},
+                                            {0.24171793270710702, 0.20412935229379993, 0.38294211275726194},
+                                            {0.96604818261509294, 1.0, 0.0}};  // T
+constexpr double kInto[kStages][kStages] = {{4.3255798900631554, 0.33919925181580987, 0.54177053993587487},
+                                            {-4.1787185915519047, -0.32768282076106239, 0.47662355450055045},
+                                            {-0.50287263494578688, 2.5719269498556054, -0.59603920482822493}};
+constexpr double kInverse[kStages][kStages] = {{3.2247448713915890, 1.1678400846904055, -0.2531972647421810},
+                                               {-3.5678400846904054, 0.7752551286084110, 1.0531972647421810},
+                                               {5.5319726474218110, -7.5319726474218110, 5.0}};        // A^-1
+constexpr std::array<double, kStages> kError = {-10.048809399827415, 1.3821427331607483, -1.0 / 3.0};  // d
+
+constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 8.0;
+constexpr double kLonger = 1.1;
+constexpr double kShortest = 1e-12;  // inner step, per step
+constexpr int kMostRounds = 10;
+constexpr double kFar = 5.0;          // growth of the second round that ends them
+constexpr double kKeeps = 0.1;        // of what is left, that a round may leave for J to be kept
+constexpr double kRounding = 1e-15, kStagnant = 1e-12;  // of scaled states: rounds gain nothing below
+constexpr double kOfEstimate = 1e-2;  // what rounds may leave
+constexpr double kOfRejected = 0.1;
+
+class Radau final : public IntegratorPlugin {
+ public:
+  static PluginDeclaration declaration() {
+    return {.name = "Radau",
+            .version = "1.0",
+            .slot = Slot::kIntegrator,
+            .meaning = "Implicit method Radau IIA, L-stable, order 5, with error control, for stiff forces that turn.",
+            .capabilities = {"order=5", "plugin_state"},
+            .properties = {Property::number("Accuracy", "1")
+                               .above(0.0)
+                               .at_most(1.0)
+                               .defaults_to({1e-6})
+                               .means("Largest estimated error of an inner step, in m, rad, and relative to speeds "
+                                      "above 1 m/s, 1 rad/s.")},
+            .theta = 0.5};
+  }
+  explicit Radau(PropertyCursor settings) : accuracy_(settings.number()) { fix_eigen_blocks(); }
+
+  void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
+                 Host& host) override {
+    Derivatives derivatives(request, host, &room_);
+    motion_.begin(request, &derivatives);
+    const double whole = request.time_step();
+    const std::span<const double> history = request.plugin_state();
+    const bool has_history = history.size() == 1 && history[0] >= kShortest * whole && std::isfinite(history[0]);
+    double inner = has_history ? history[0] : whole, worst = 0.0;
+    double longest = HUGE_VAL;  // for a while after rounds that did not end
+    int failures = 0;
+    has_rate_ = has_matrix_ = false;
+    guess_ = has_history ? Guess::kSmooth : Guess::kNone;
+    while (motion_.done() < whole && !motion_.is_empty()) {
+      host.mark_progress();
+      prepare();
+      const double left = whole - motion_.done();
+      // two equal ones in place of a long and a short one
+      const double h = inner >= left ? left : std::min(inner, 0.5 * left);
+      if (!find_stages(h)) {
+        // an old matrix may be all that is wrong; a guess that led nowhere twice is no better than none
+        if (is_fresh_) {
+          inner = 0.5 * h;
+          longest = 0.7 * h;
+          if (++failures > 1 || guess_ == Guess::kSmooth) guess_ = Guess::kNone;
+        }
+        has_matrix_ = is_fresh_;
+      } else {
+        const double error = error_ / accuracy_;
+        const double safety = kSafety * (2 * kMostRounds + 1) / (2 * kMostRounds + rounds_);
+        const double factor =
+            std::clamp(safety * math::pow(std::max(error, 1e-10), -0.25), kSlowest, error <= 1.0 ? kFastest : 0.9);
+        if (error <= 1.0) {
+          worst = std::max(worst, error);
+          accept(h);
+          // a step cut short at a boundary says little of long ones
+          inner = std::min(longest, factor < kFastest ? factor * h : std::max(inner, factor * h));
+          longest *= kLonger;
+          failures = 0;
+          continue;
+        }
+        inner = factor * h;
+      }
+      if (!(inner > kShortest * whole))
+        throw Refusal("Accuracy cannot be met by any step: forces are not smooth, or the state overflows");
+    }
+    motion_.write(reply);
+    reply.plugin_state().push(inner);
+    reply.error_estimate().set(worst);
+  }
+
+ private:
+  using Complex = std::complex<double>;
+  // Of the stages: where the step starts, as if nothing were stiff, or as the inner step before goes on.
+  enum class Guess : std::uint8_t { kNone, kSmooth, kGoesOn };
+  using Stages = std::array<Eigen::VectorXd, kStages>;
+
+  // f and J where the inner step starts.
+  void prepare() {
+    if (!has_rate_ && !motion_.evaluate(0.0, motion_.start(), &rate_at_start_))
+      throw Refusal("the state is not finite");
+    has_rate_ = true;
+    if (has_matrix_) return;
+    motion_.differentiate(rate_at_start_);
+    has_matrix_ = is_fresh_ = true;
+    factored_step_ = 0.0;
+  }
+
+  // Stages of an inner step, their error and how the rounds went; false where there are none to be found.
+  bool find_stages(double h) {
+    if (factored_step_ != h) {
+      real_.factorise(motion_, kReal / h);
+      complex_.factorise(motion_, kComplex / h);
+      factored_step_ = h;
+    }
+    guess(h);
+    find_turns(h);
+    double last = HUGE_VAL;
+    for (rounds_ = 1; rounds_ <= kMostRounds; ++rounds_) {
+      const double size = improve(h);
+      if (!std::isfinite(size)) return false;
+      error_ = estimate(h, rate_at_start_);
+      rate_ = size / last;
+      last = size;
+      const bool gains_nothing = rounds_ > 2 && rate_ > 0.5 && size <= std::max(kStagnant, kOfEstimate * accuracy_);
+      if (size <= kRounding || gains_nothing) return has_error(h);
+      // the first round straightens what bends: it says nothing of the next ones
+      if (rounds_ == 1 || (rounds_ == 2 && rate_ < kFar)) continue;
+      if (rate_ >= 1.0) return false;
+      const double remains = size * rate_ / (1.0 - rate_);
+      const double allowed =
+          error_ <= accuracy_ ? error_ * std::min(kOfEstimate, std::sqrt(error_)) : kOfRejected * error_;
+      if (remains <= allowed) return has_error(h);
+      if (remains * math::pow(rate_, kMostRounds - rounds_) > allowed) return false;
+    }
+    return false;
+  }
+
+  // An error that is too large may be that of a stiff transient: its own start is taken for the estimate.
+  bool has_error(double h) {
+    if (!std::isfinite(error_) || !motion_.is_in_chart(motion_.start() + z_[kStages - 1])) return false;
+    if (error_ <= accuracy_ || !motion_.evaluate(0.0, motion_.start() + error_vector_, &shifted_rate_)) return true;
+    const double again = estimate(h, shifted_rate_);
+    if (again <= error_) error_ = again;
+    return true;
+  }
+
+  // One round for all stages; by how much they changed.
+  double improve(double h) {
+    for (std::size_t i = 0; i < kStages; ++i)
+      if (!motion_.evaluate(kNodes[i] * h, motion_.start() + z_[i], &rates_[i])) return HUGE_VAL;
+    for (std::size_t i = 0; i < kStages; ++i) {
+      for (std::size_t j = 0; j < kStages; ++j) rates_[i] -= kInverse[i][j] / h * z_[j];
+      turn(i, true, &rates_[i]);
+    }
+    Stages change = combined(kInto, rates_);
+    real_.solve(&change[0]);
+    Eigen::VectorXcd pair(change[1].size());
+    pair.real() = change[1], pair.imag() = change[2];
+    complex_.solve(&pair);
+    change[1] = pair.real(), change[2] = pair.imag();
+    change = combined(kFrom, change);
+    double size = 0.0;
+    for (std::size_t i = 0; i < kStages; ++i) {
+      if (!change[i].allFinite()) return HUGE_VAL;
+      turn(i, false, &change[i]);
+      z_[i] += change[i];
+      size = std::max(size, motion_.size_of(change[i]));
+    }
+    return size;
+  }
+
+  // What is stiff turns with the bodies: rounds in axes that do not let a share h s (h |w|)^2 of an error through, s the rate
+  // of the stiffest motion; in axes that turn steadily with each body it is h |w|.
+  void find_turns(double h) {
+    double turn = 0.0, stiffness = 0.0;
+    for (std::size_t b = 0; b < motion_.bodies(); ++b)
+      turn = std::max(turn, h * motion_.twist_at_start(b).angular.norm());
+    for (const LocalMotion::Group& group : motion_.groups()) {
+      double positions = 0.0, velocities = 0.0;
+      for (Eigen::Index k = 0; k < group.accelerations.cols(); ++k)
+        (k % LocalMotion::kNumbers < 6 ? positions : velocities) += group.accelerations.col(k).squaredNorm();
+      stiffness = std::max(stiffness, h * (std::sqrt(velocities) + h * std::sqrt(positions)));
+    }
+    turns_.clear();
+    if (!(stiffness * turn > 1.0)) return;
+    for (const double node : kNodes)
+      for (std::size_t b = 0; b < motion_.bodies(); ++b)
+        turns_.push_back(to_rotation_matrix(exp_rotation(node * h * motion_.twist_at_start(b).angular)));
+  }
+
+  // Into the axes of a stage, or back.
+  void turn(std::size_t stage, bool into, Eigen::VectorXd* y) const {
+    for (std::size_t b = 0; b < motion_.bodies() && !turns_.empty(); ++b) {
+      const Matrix3& by = turns_[stage * motion_.bodies() + b];
+      for (Eigen::Index k = 0; k < LocalMotion::kNumbers; k += 3) {
+        auto part = y->segment<3>(LocalMotion::kNumbers * static_cast<Eigen::Index>(b) + k);
+        part = into ? Vector3(by.transpose() * part) : Vector3(by * part);
+      }
+    }
+  }
+
+  double estimate(double h, const Eigen::VectorXd& rate) {
+    error_vector_ = rate;
+    for (std::size_t i = 0; i < kStages; ++i) error_vector_ += kError[i] / h * z_[i];
+    real_.solve(&error_vector_);
+    return error_vector_.allFinite() ? motion_.size_of(error_vector_) : HUGE_VAL;
+  }
+
+  void guess(double h) {
+    const Eigen::VectorXd& start = motion_.start();
+    for (std::size_t i = 0; i < kStages; ++i) {
+      z_[i].setZero(start.size());
+      if (guess_ == Guess::kSmooth) {
+        const double s = kNodes[i] * h;
+        z_[i] = s * rate_at_start_;
+        for (Eigen::Index n = 0; n < start.size(); n += LocalMotion::kNumbers)
+          z_[i].segment<6>(n) += 0.5 * s * s * rate_at_start_.segment<6>(n + 6);
+      } else if (guess_ == Guess::kGoesOn) {
+        // Lagrange's polynomial, through 0 at 0 and the stages at their nodes
+        const double at = 1.0 + kNodes[i] * h / last_step_;
+        Eigen::VectorXd y = last_start_;
+        for (std::size_t j = 0; j < kStages; ++j) {
+          double share = at / kNodes[j];
+          for (std::size_t k = 0; k < kStages; ++k)
+            if (k != j) share *= (at - kNodes[k]) / (kNodes[j] - kNodes[k]);
+          y += share * last_z_[j];
+        }
+        z_[i] = motion_.around_end(last_step_, last_end_, y) - start;
+      }
+    }
+  }
+
+  void accept(double h) {
+    last_step_ = h;
+    last_start_ = motion_.start();
+    last_z_ = z_;
+    last_end_ = motion_.start() + z_[kStages - 1];
+    motion_.accept(h, last_end_);
+    has_rate_ = is_fresh_ = false;
+    has_matrix_ = rate_ <= kKeeps;
+    guess_ = Guess::kGoesOn;
+    factored_step_ = 0.0;
+  }
+
+  static Stages combined(const double (&weights)[kStages][kStages], const Stages& from) {
+    Stages to;
+    for (std::size_t i = 0; i < kStages; ++i)
+      to[i] = weights[i][0] * from[0] + weights[i][1] * from[1] + weights[i][2] * from[2];
+    return to;
+  }
+
+  double accuracy_;
+  // of the call in hand
+  LocalMotion motion_;
+  ShiftedJacobian<double> real_;
+  ShiftedJacobian<Complex> complex_;
+  double factored_step_ = 0.0;                                     // that they are for
+  bool has_rate_ = false, has_matrix_ = false, is_fresh_ = false;  // the matrix: of this inner step's start
+  Stages z_, rates_;
+  std::vector<Matrix3> turns_;  // by stage and body; empty: none
+  double error_ = 0.0, rate_ = 0.0;
+  int rounds_ = 0;
+  Guess guess_ = Guess::kNone;
+  double last_step_ = 0.0;  // of the inner step before
+  Stages last_z_;
+  Eigen::VectorXd last_start_, last_end_;
+  Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_;
+  std::vector<double> room_;
+};
+
+}  // namespace
+}  // namespace gravitas
+
+GRAVITAS_PLUGIN(gravitas::Radau)
