@@ -89,6 +89,22 @@ struct ConstraintDirection {
   void subtract(double share, const ConstraintDirection& other);
 };
 
+// J_a M^-1 J_b^T of rows with bodies and directions, by what their bodies share.
+template <typename Row, typename Bodies>
+double coupling(const Row& a, const Row& b, const Bodies& bodies) {
+  const bool one_one = a.body1 == b.body1, one_two = a.body1 == b.body2, two_one = a.body2 == b.body1,
+             two_two = a.body2 == b.body2;
+  if (!(one_one || one_two || two_one || two_two)) return 0.0;
+  const ConstraintDirection &da = a.direction, &db = b.direction;
+  const double along = da.linear.dot(db.linear);
+  double sum = 0.0;
+  if (one_one) sum += bodies[a.body1].inverse_mass * along + da.angular1.dot(db.turn1);
+  if (one_two) sum += da.angular1.dot(db.turn2) - bodies[a.body1].inverse_mass * along;
+  if (two_one) sum += da.angular2.dot(db.turn1) - bodies[a.body2].inverse_mass * along;
+  if (two_two) sum += bodies[a.body2].inverse_mass * along + da.angular2.dot(db.turn2);
+  return sum;
+}
+
 // Velocity (of a point, world) that an impulse at the arm `from` of a body gives the end of its arm
 // `at`, per unit of the impulse: 1/m - [at] I^-1 [from].
 Matrix3 point_response(const SolverBody& body, const Vector3& at, const Vector3& from);

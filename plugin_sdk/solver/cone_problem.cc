@@ -32,18 +32,6 @@ void clear_lists(std::size_t count, std::vector<List>* lists) {
 
 }  // namespace
 
-double ConeProblem::coupling(const SolverBodies& bodies, std::uint32_t r, std::uint32_t s) const {
-  const ConeRow &a = rows[r], &b = rows[s];
-  if (a.body1 != b.body1 && a.body1 != b.body2 && a.body2 != b.body1 && a.body2 != b.body2) return 0.0;
-  const double along = a.direction.linear.dot(b.direction.linear);
-  double sum = 0.0;
-  if (a.body1 == b.body1) sum += bodies[a.body1].inverse_mass * along + a.direction.angular1.dot(b.direction.turn1);
-  if (a.body1 == b.body2) sum += a.direction.angular1.dot(b.direction.turn2) - bodies[a.body1].inverse_mass * along;
-  if (a.body2 == b.body1) sum += a.direction.angular2.dot(b.direction.turn1) - bodies[a.body2].inverse_mass * along;
-  if (a.body2 == b.body2) sum += bodies[a.body2].inverse_mass * along + a.direction.angular2.dot(b.direction.turn2);
-  return sum;
-}
-
 double ConeProblem::value(const BodyMotion& x, std::uint32_t r) const {
   const ConeRow& row = rows[r];
   return row.start + row.direction.along(x[row.body1], x[row.body2]);
@@ -64,7 +52,7 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
   held_.clear(), other_.clear(), blocks_.clear();
   motion_ = 0.0;
   const auto response = [&](std::uint32_t r) {
-    const double own = coupling(bodies, r, r) + rows[r].law.gamma;
+    const double own = coupling(rows[r], rows[r], bodies) + rows[r].law.gamma;
     return own > 0.0 && std::isfinite(own) && std::isfinite(1.0 / own) ? own : 0.0;
   };
   speeds_.clear();
@@ -134,7 +122,7 @@ void ConeProblem::factorise(const SolverBodies& bodies) {
   factor_.start(first);
   for (std::uint32_t i = 0; i < held_.size(); ++i) {
     for (std::size_t j = first[i]; j <= i; ++j) {
-      double entry = coupling(bodies, held_[i], held_[j]);
+      double entry = coupling(rows[held_[i]], rows[held_[j]], bodies);
       if (i == j) entry += rows[held_[i]].law.gamma;
       factor_.entry(i, j) = entry / (scale_[held_[i]] * scale_[held_[j]]);
     }
@@ -158,7 +146,7 @@ void ConeProblem::reduce(const SolverBodies& bodies) {
     for (const std::uint32_t body : {row.body1, row.body2}) {
       for (const std::uint32_t i : held_of_body_[body]) {
         if (column[i] != 0.0) continue;  // reached through the other body
-        column[i] = coupling(bodies, held_[i], other_[o]) / (scale_[held_[i]] * scale_[other_[o]]);
+        column[i] = coupling(rows[held_[i]], rows[other_[o]], bodies) / (scale_[held_[i]] * scale_[other_[o]]);
         if (column[i] != 0.0) to_held_[o].emplace_back(i, column[i]);
       }
     }
@@ -182,9 +170,9 @@ void ConeProblem::reduce(const SolverBodies& bodies) {
       std::vector<std::uint32_t>& list = others_of_body_[body];
       if (list.empty() || list.back() != a) list.push_back(a);
       for (const std::uint32_t b : list)
-        response_(a, b) = coupling(bodies, r, other_[b]) / (scale_[r] * scale_[other_[b]]);
+        response_(a, b) = coupling(rows[r], rows[other_[b]], bodies) / (scale_[r] * scale_[other_[b]]);
     }
-    response_(a, a) = (coupling(bodies, r, r) + rows[r].law.gamma) / (scale_[r] * scale_[r]);
+    response_(a, a) = (coupling(rows[r], rows[r], bodies) + rows[r].law.gamma) / (scale_[r] * scale_[r]);
   }
   for (Eigen::Index a = 0; a < count; ++a) {
     for (Eigen::Index b = 0; b <= a; ++b) {
@@ -429,7 +417,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
       for (std::uint32_t j = 0; j < block.count; ++j) {
         const std::uint32_t r = other_[block.first + i], s = other_[block.first + j];
         const double gamma = i == j ? rows[r].law.gamma : 0.0;
-        own[b](i, j) = (coupling(bodies, r, s) + gamma) / (scale_[r] * scale_[s]);
+        own[b](i, j) = (coupling(rows[r], rows[s], bodies) + gamma) / (scale_[r] * scale_[s]);
       }
     }
   }

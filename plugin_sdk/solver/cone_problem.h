@@ -115,7 +115,6 @@ class ConeProblem {
     std::uint32_t turning = 0;  // first row of turning in the block; 0: none
   };
 
-  double coupling(const SolverBodies& bodies, std::uint32_t r, std::uint32_t s) const;
   double value(const BodyMotion& x, std::uint32_t r) const;
   void classify(const SolverBodies& bodies, const BodyMotion& x0);
   void factorise(const SolverBodies& bodies);

@@ -22,8 +22,6 @@ double dot(const double* a, const double* b, std::size_t count) {
   return Eigen::Map<const Eigen::VectorXd>(a, size).dot(Eigen::Map<const Eigen::VectorXd>(b, size));
 }
 
-double dot(const std::vector<double>& a, const std::vector<double>& b) { return dot(a.data(), b.data(), a.size()); }
-
 }  // namespace
 
 void ProfileLdlt::start(const std::vector<std::size_t>& first) {
@@ -107,28 +105,65 @@ void ProfileLdlt::solve(std::vector<double>* b) const {
   for (const std::size_t row : dropped_) x[row] = 0.0;
 }
 
+// Combinations of rows of one joint end where they begin: what is zero to rounding is left out of all sums.
 void ProfileLdlt::find_null_space() const {
+  constexpr double kNothing = 1e-15;
   for (const std::size_t row : dropped_) {
-    std::vector<double> z = difference(row);  // A z = 0
-    for (int repeat = 0; repeat < 2; ++repeat) {
-      for (const std::vector<double>& other : null_) {
-        const double share = dot(other, z);
-        for (std::size_t i = 0; i < z.size(); ++i) z[i] -= share * other[i];
-      }
-    }
-    const double length = std::sqrt(dot(z, z));
-    for (double& number : z) number /= length;
+    NullVector z{0, difference(row)};  // A z = 0
+    z.number.resize(row + 1);
+    double largest = 0.0;
+    for (const double number : z.number) largest = std::max(largest, std::fabs(number));
+    for (double& number : z.number)
+      if (std::fabs(number) < kNothing * largest) number = 0.0;
+    while (z.number[z.first] == 0.0) ++z.first;
+    for (int repeat = 0; repeat < 2; ++repeat)
+      for (const NullVector& other : null_)
+        if (other.number.size() > z.first) add(-product(other, z), other, &z);
+    const double length = std::sqrt(product(z, z));
+    for (double& number : z.number) number /= length;
     null_.push_back(std::move(z));
   }
 }
 
+// Over what both have.
+double ProfileLdlt::product(const NullVector& a, const NullVector& b) {
+  const std::size_t from = std::max(a.first, b.first), to = std::min(a.number.size(), b.number.size());
+  return from < to ? dot(&a.number[from], &b.number[from], to - from) : 0.0;
+}
+
+void ProfileLdlt::add(double share, const NullVector& a, NullVector* b) {
+  if (share == 0.0) return;
+  for (std::size_t i = a.first; i < a.number.size(); ++i) b->number[i] += share * a.number[i];
+  b->first = std::min(a.first, b->first);
+}
+
+// What is left of a dropped row's number by substitution is z^T b of its combination z.
+bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
+  constexpr double kAgrees = 64.0 * std::numeric_limits<double>::epsilon();
+  std::vector<double> y = b;
+  double largest = 0.0;
+  for (const double number : b) largest = std::max(largest, std::fabs(number));
+  for (std::size_t i = 0; i < size(); ++i) {
+    double terms = std::fabs(y[i]);
+    for (std::size_t j = first_[i]; j < i; ++j) {
+      if (!(pivot_[j] > 0.0)) continue;
+      const double term = values_[begin_[i] + j - first_[i]] * y[j];
+      y[i] -= term;
+      terms += std::fabs(term);
+    }
+    if (!(pivot_[i] > 0.0) && !(std::fabs(y[i]) <= kAgrees * std::max(terms, largest))) return false;
+  }
+  return true;
+}
+
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {
+  if (dropped_.empty() || is_consistent(*b)) return 0.0;
   if (null_.empty()) find_null_space();
   double square = 0.0;
-  for (const std::vector<double>& z : null_) {
-    const double share = dot(z, *b);
+  for (const NullVector& z : null_) {
+    const double share = dot(&z.number[z.first], &(*b)[z.first], z.number.size() - z.first);
     square += share * share;
-    for (std::size_t i = 0; i < z.size(); ++i) (*b)[i] -= share * z[i];
+    for (std::size_t i = z.first; i < z.number.size(); ++i) (*b)[i] -= share * z.number[i];
   }
   return std::sqrt(square);
 }

@@ -33,13 +33,23 @@ class ProfileLdlt {
   std::size_t dropped() const { return dropped_.size(); }
   // x with A x = b; entries of dropped rows are 0 and not looked at.
   void solve(std::vector<double>* b) const;
-  // The side nearest to b that A x can be. Returns the distance.
+  // The side nearest to b that A x can be. Returns the distance; 0, and leaves b, where it is only of rounding.
   double make_consistent(std::vector<double>* b) const;
 
  private:
+  // Zero before `first` and after the numbers.
+  struct NullVector {
+    std::size_t first = 0;
+    std::vector<double> number;
+  };
+  static double product(const NullVector& a, const NullVector& b);
+  // b += share a
+  static void add(double share, const NullVector& a, NullVector* b);
+
   // 1 at the row, and minus its combination of the rows before.
   std::vector<double> difference(std::size_t row) const;
   double rounding_of_pivot(std::size_t row) const;
+  bool is_consistent(const std::vector<double>& b) const;
   void find_null_space() const;
   // L^-T applied in place.
   void solve_transposed(std::vector<double>* x) const;
@@ -49,7 +59,7 @@ class ProfileLdlt {
   double least_pivot_ = 1.0;
   std::size_t weakest_ = 0;
   std::vector<std::size_t> dropped_;
-  mutable std::vector<std::vector<double>> null_;  // orthonormal: what is missing of the range; found when asked for
+  mutable std::vector<NullVector> null_;  // orthonormal: what is missing of the range; found when asked for
 };
 
 }  // namespace gravitas

@@ -62,26 +62,25 @@ bool holds_always(const Discrepancy& d, int axis) {
 
 class ReactionSolver {
  public:
-  explicit ReactionSolver(const stage::SolverReactionsRequest& request) : request_(request) {
+  // Multipliers by row. Returns what the rows are missed by. The request must live until write().
+  double solve(const stage::SolverReactionsRequest& request) {
+    request_ = &request;
+    has_moved_ = false;
     load_bodies();
     load_joints();
     make_rows();
     factorise(0.0);
     if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
     accelerate();
-  }
-
-  // Multipliers by row. Returns what the rows are missed by.
-  double solve() {
-    std::vector<double> side(rows_.size());
+    std::vector<double>& side = multipliers_;
+    side.resize(rows_.size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const Row& row = rows_[i];
       const double along = row.direction.along(bodies_[row.body1].acceleration, bodies_[row.body2].acceleration);
       side[i] = -(row.gamma + along) / row.scale;
     }
-    const double missed = factor_.dropped() > 0 ? factor_.make_consistent(&side) : 0.0;
+    const double missed = factor_.make_consistent(&side);
     factor_.solve(&side);
-    multipliers_ = std::move(side);
     for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
     return missed;
   }
@@ -89,7 +88,7 @@ class ReactionSolver {
   void write(double residual, const stage::SolverReactionsReply& reply) const {
     const std::size_t count = bodies_.size() - 1;
     std::vector<Wrench> reactions(count + 1);
-    std::vector<double> forces(3 * request_.mode().size(), 0.0);
+    std::vector<double> forces(3 * request_->mode().size(), 0.0);
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const Row& row = rows_[i];
       const ConstraintDirection& d = row.direction;
@@ -121,34 +120,34 @@ class ReactionSolver {
   static constexpr double kMargin = 100.0, kMostMargin = 1e9;
 
   void load_bodies() {
-    const std::size_t count = request_.flags().size();
-    bodies_.resize(count + 1);
+    const std::size_t count = request_->flags().size();
+    bodies_.assign(count + 1, {});
     for (std::size_t i = 0; i < count; ++i) {
       Body& body = bodies_[i];
-      body.asked = body.pose = {vector_at(request_.position(), i), quaternion_at(request_.orientation(), i)};
-      body.velocity = {vector_at(request_.linear_velocity(), i), vector_at(request_.angular_velocity(), i)};
+      body.asked = body.pose = {vector_at(request_->position(), i), quaternion_at(request_->orientation(), i)};
+      body.velocity = {vector_at(request_->linear_velocity(), i), vector_at(request_->angular_velocity(), i)};
       if (!is_free(i)) continue;
-      body.inverse_mass = request_.inverse_mass()[i];
-      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_.inverse_inertia(), i));
+      body.inverse_mass = request_->inverse_mass()[i];
+      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
     }
   }
 
   bool is_free(std::size_t body) const {
-    return (request_.flags()[body] & kMovable) != 0 && (request_.flags()[body] & kKinematic) == 0;
+    return (request_->flags()[body] & kMovable) != 0 && (request_->flags()[body] & kKinematic) == 0;
   }
 
   // What forces, the gyroscopic term and drag make of the bodies.
   void accelerate() {
     for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
       Body& body = bodies_[i];
-      body.acceleration = {vector_at(request_.acceleration(), 2 * i), vector_at(request_.acceleration(), 2 * i + 1)};
+      body.acceleration = {vector_at(request_->acceleration(), 2 * i), vector_at(request_->acceleration(), 2 * i + 1)};
       if (!is_free(i)) continue;
-      const double drag = request_.drag()[i];
-      const Vector3 force = vector_at(request_.wrench(), 2 * i), torque = vector_at(request_.wrench(), 2 * i + 1);
+      const double drag = request_->drag()[i];
+      const Vector3 force = vector_at(request_->wrench(), 2 * i), torque = vector_at(request_->wrench(), 2 * i + 1);
       body.acceleration.linear = body.inverse_mass * force - drag * body.velocity.linear;
       body.acceleration.angular =
-          angular_acceleration(body.pose.orientation, body.velocity.angular, vector_at(request_.inertia(), i),
-                               vector_at(request_.inverse_inertia(), i), torque) -
+          angular_acceleration(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), i),
+                               vector_at(request_->inverse_inertia(), i), torque) -
           drag * body.velocity.angular;
     }
   }
@@ -158,13 +157,14 @@ class ReactionSolver {
   }
 
   void load_joints() {
-    const DiscrepancyColumns columns{request_.point1(),     request_.point2(),       request_.velocity(),
-                                     request_.correction(), request_.axes(),         request_.mode(),
-                                     request_.lower(),      request_.upper(),        request_.compliance(),
-                                     request_.damping(),    request_.maximum_force()};
+    joints_.clear();
+    const DiscrepancyColumns columns{request_->point1(),     request_->point2(),       request_->velocity(),
+                                     request_->correction(), request_->axes(),         request_->mode(),
+                                     request_->lower(),      request_->upper(),        request_->compliance(),
+                                     request_->damping(),    request_->maximum_force()};
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      const std::uint32_t one = row_of(request_.discrepancy_body()[2 * i]);
-      const std::uint32_t two = row_of(request_.discrepancy_body()[2 * i + 1]);
+      const std::uint32_t one = row_of(request_->discrepancy_body()[2 * i]);
+      const std::uint32_t two = row_of(request_->discrepancy_body()[2 * i + 1]);
       if (bodies_[one].is_pushed() || bodies_[two].is_pushed()) joints_.push_back({3 * i, one, two, columns.at(i)});
     }
   }
@@ -174,7 +174,7 @@ class ReactionSolver {
     rows_.clear();
     longest_ = 0.0;
     for (const Joint& joint : joints_) {
-      const Discrepancy d = at_pose(joint);
+      const Discrepancy& d = at_pose(joint);
       const Matrix3 axes = to_rotation_matrix(d.axes);
       for (int axis = 0; axis < 3; ++axis) {
         if (!holds_always(d, axis)) continue;
@@ -197,10 +197,11 @@ class ReactionSolver {
   }
 
   // The joint's discrepancy, carried along with its bodies: exactly but for an angular error, which is to first order.
-  Discrepancy at_pose(const Joint& joint) const {
+  const Discrepancy& at_pose(const Joint& joint) {
+    if (!has_moved_) return joint.discrepancy;
     const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
-    Discrepancy d = joint.discrepancy;
-    if (!has_moved_) return d;
+    Discrepancy& d = carried_;
+    d = joint.discrepancy;
     const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
     if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
     d.point2 = d.point1 + error;
@@ -324,7 +325,7 @@ class ReactionSolver {
       Body& body = bodies_[i];
       if (!body.is_pushed()) continue;
       body.pose = displaced(body.pose, change[i].linear, change[i].angular);
-      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_.inverse_inertia(), i));
+      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
     }
     has_moved_ = true;
     make_rows();
@@ -349,49 +350,35 @@ class ReactionSolver {
     return change;
   }
 
-  // Of rows that share a body that can be pushed.
-  double coupling(const Row& a, const Row& b) const {
-    double sum = 0.0;
-    const auto add = [&](std::uint32_t body, double sign_a, const Vector3& turn_a, std::uint32_t other, double sign_b,
-                         const Vector3& angular_b) {
-      if (body != other || !bodies_[body].is_pushed()) return;
-      sum += sign_a * sign_b * bodies_[body].inverse_mass * a.direction.linear.dot(b.direction.linear) +
-             turn_a.dot(angular_b);
-    };
-    const ConstraintDirection &da = a.direction, &db = b.direction;
-    add(a.body1, -1.0, da.turn1, b.body1, -1.0, db.angular1);
-    add(a.body1, -1.0, da.turn1, b.body2, 1.0, db.angular2);
-    add(a.body2, 1.0, da.turn2, b.body1, -1.0, db.angular1);
-    add(a.body2, 1.0, da.turn2, b.body2, 1.0, db.angular2);
-    return sum;
-  }
-
   // Rows whose pivot is less than `least` of their diagonal count as dependent.
   void factorise(double least) {
     constexpr std::size_t kNowhere = std::numeric_limits<std::size_t>::max();
-    std::vector<std::size_t> first_of_body(bodies_.size(), kNowhere), first(rows_.size());
+    first_of_body_.assign(bodies_.size(), kNowhere);
+    first_.resize(rows_.size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      first[i] = i;
+      first_[i] = i;
       for (const std::uint32_t body : {rows_[i].body1, rows_[i].body2}) {
         if (!bodies_[body].is_pushed()) continue;
-        first_of_body[body] = std::min(first_of_body[body], i);
-        first[i] = std::min(first[i], first_of_body[body]);
+        first_of_body_[body] = std::min(first_of_body_[body], i);
+        first_[i] = std::min(first_[i], first_of_body_[body]);
       }
     }
-    factor_.start(first);
+    factor_.start(first_);
     for (std::size_t i = 0; i < rows_.size(); ++i)
-      for (std::size_t j = first[i]; j <= i; ++j)
-        factor_.entry(i, j) = coupling(rows_[i], rows_[j]) / (rows_[i].scale * rows_[j].scale);
+      for (std::size_t j = first_[i]; j <= i; ++j)
+        factor_.entry(i, j) = coupling(rows_[i], rows_[j], bodies_) / (rows_[i].scale * rows_[j].scale);
     factor_.factorise(least);
   }
 
-  const stage::SolverReactionsRequest& request_;
+  const stage::SolverReactionsRequest* request_ = nullptr;
   std::vector<Body> bodies_;  // the world last
   std::vector<Joint> joints_;
   double longest_ = 0.0;    // reach of a row
   bool has_moved_ = false;  // bodies, from where they were asked
+  Discrepancy carried_;     // of at_pose()
   std::vector<Row> rows_;
   ProfileLdlt factor_;
+  std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;
 };
 
@@ -399,8 +386,9 @@ class ReactionSolver {
 
 void solve_reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply) {
   check_reactions_request(request);
-  ReactionSolver solver(request);
-  const double residual = solver.solve();
+  // memory is all that stays of it
+  thread_local ReactionSolver solver;
+  const double residual = solver.solve(request);
   solver.write(residual, reply);
 }
 

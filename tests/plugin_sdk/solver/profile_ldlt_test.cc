@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 #include "plugin_sdk/conformance/draw.h"
@@ -97,6 +98,27 @@ TEST(ProfileLdlt, ContradictionsEndAtLeastSquares) {
         b.matrix * Eigen::Map<Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
     EXPECT_LE((reached - best).norm(), 1e-9);
   }
+}
+
+// Two pairs of equal rows that meet in nothing: each contradiction is halved where it is, and no rounding reaches the other;
+// one of rounding alone stays as it is.
+TEST(ProfileLdlt, ContradictionsStayAmongTheRowsThatDepend) {
+  ProfileLdlt factor;
+  factor.start({0, 0, 0, 0});
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t j = 0; j <= i; ++j) factor.entry(i, j) = i / 2 == j / 2 ? 2.0 : 1e-17;
+  factor.factorise();
+  ASSERT_EQ(factor.dropped(), 2U);
+  std::vector<double> side = {1.0, 2.0, 3.0, 3.0};
+  EXPECT_NEAR(factor.make_consistent(&side), std::sqrt(0.5), 1e-15);
+  EXPECT_NEAR(side[0], 1.5, 1e-15);
+  EXPECT_NEAR(side[1], 1.5, 1e-15);
+  EXPECT_EQ(side[2], 3.0);
+  EXPECT_EQ(side[3], 3.0);
+  std::vector<double> rounded = {1.0, 1.0 + 1e-15, 3.0, 3.0};
+  const std::vector<double> before = rounded;
+  EXPECT_EQ(factor.make_consistent(&rounded), 0.0);
+  EXPECT_EQ(rounded, before);
 }
 
 TEST(ProfileLdlt, OfNothing) {
