@@ -111,7 +111,7 @@ TEST(Problems, FourBarPassesItsSingularities) {
 
 // Andrews' mechanism of the DAE test set.
 TEST(Problems, Squeezer) {
-  expect_run(harness::squeezer(), dormand_prince(1e-11), 30, {.error = 1e-9, .joint_error = 1e-12});
+  expect_run(harness::squeezer(), dormand_prince(3e-10), 6, {.error = 1e-9, .joint_error = 1e-12});
 }
 
 // IFToMM A04.

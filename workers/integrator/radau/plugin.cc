@@ -4,10 +4,12 @@
 //
 //   z_i = h sum_j a_ij f(c_j h, y + z_j),   i = 1 ... 3,      y' = y + z_3.
 //
-// The stages are found by Newton's method with J = df/dy, kept from one inner step to the next while it gains a digit in
-// a round; A^-1 = T diag(g, a +- i b) T^-1 makes one real and one complex system of it (ShiftedJacobian). Rounds end where
-// what they leave of z counts for less than a hundredth of the estimated error, or than its power 3/2, which falls as fast
-// as the method's own. With f_0 at the start, the error is estimated as
+// The stages are found by Newton's method with J = df/dy, kept from one inner step to the next, turned with the bodies, while
+// it gains a digit in a round; A^-1 = T diag(g, a +- i b) T^-1 makes one real and one complex system of it
+// (ShiftedJacobian). What is stiff turns within a step, too, and J does not: where that would let errors grow from round to
+// round, rounds are made in axes that turn steadily with each body (find_turns). They end where what they leave of z counts
+// for less than a hundredth of the estimated error, or than its power 3/2, which falls as fast as the method's own, and
+// where they gain nothing more. With f_0 at the start, the error is estimated as
 //
 //   e = (g/h - J)^-1 (f_0 + (d_1 z_1 + d_2 z_2 + d_3 z_3)/h),
 //
@@ -47,10 +49,10 @@ constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 8.0;
 constexpr double kLonger = 1.1;
 constexpr double kShortest = 1e-12;  // inner step, per step
 constexpr int kMostRounds = 10;
-constexpr double kFar = 5.0;          // growth of the second round that ends them
-constexpr double kKeeps = 0.1;        // of what is left, that a round may leave for J to be kept
+constexpr double kFar = 5.0;                            // growth of the second round that ends them
+constexpr double kKeeps = 0.1;                          // of what is left, that a round may leave for J to be kept
 constexpr double kRounding = 1e-15, kStagnant = 1e-12;  // of scaled states: rounds gain nothing below
-constexpr double kOfEstimate = 1e-2;  // what rounds may leave
+constexpr double kOfEstimate = 1e-2;                    // what rounds may leave
 constexpr double kOfRejected = 0.1;
 
 class Radau final : public IntegratorPlugin {
@@ -202,8 +204,8 @@ class Radau final : public IntegratorPlugin {
     return size;
   }
 
-  // What is stiff turns with the bodies: rounds in axes that do not let a share h s (h |w|)^2 of an error through, s the rate
-  // of the stiffest motion; in axes that turn steadily with each body it is h |w|.
+  // With s the rate of the stiffest motion, a round leaves a share h s (h |w|)^2 of an error in axes that stand still, and
+  // h |w| in axes that turn with the bodies: the lesser one.
   void find_turns(double h) {
     double turn = 0.0, stiffness = 0.0;
     for (std::size_t b = 0; b < motion_.bodies(); ++b)
