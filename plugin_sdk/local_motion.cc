@@ -1,6 +1,8 @@
 #include "plugin_sdk/local_motion.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <span>
 
 #include "plugin_sdk/interaction_groups.h"
@@ -10,6 +12,7 @@ namespace gravitas {
 namespace {
 
 constexpr double kLargestTurn = 2.0;  // rad in an inner step: the chart ends at 2 pi
+constexpr double kNearly = 0.9;
 constexpr double kDifference = 1e-7;
 
 Eigen::Index first_number(std::size_t body) { return static_cast<Eigen::Index>(body) * LocalMotion::kNumbers; }
@@ -101,20 +104,21 @@ bool LocalMotion::evaluate(double elapsed, const Eigen::VectorXd& y, Eigen::Vect
   return true;
 }
 
-// J in axes that have turned with the bodies since it was made.
-void LocalMotion::turn(const Eigen::VectorXd& y, Group* group) const {
-  for (std::size_t m = 0; m < group->body.size(); ++m) {
-    const Matrix3 turned = to_rotation_matrix(exp_rotation(y.segment<3>(first_number(group->body[m]) + 3)));
-    const auto place = static_cast<Eigen::Index>(m);
-    for (Eigen::Index k = 0; k < 2; ++k) {
-      auto rows = group->accelerations.middleRows<3>(6 * place + 3 * k);
-      rows = (turned * rows).eval();
+void LocalMotion::turn_jacobian(const Eigen::VectorXd& y) {
+  for (Group& group : groups_) {
+    for (std::size_t m = 0; m < group.body.size(); ++m) {
+      const Matrix3 turned = to_rotation_matrix(exp_rotation(y.segment<3>(first_number(group.body[m]) + 3)));
+      const auto place = static_cast<Eigen::Index>(m);
+      for (Eigen::Index k = 0; k < 2; ++k) {
+        auto rows = group.accelerations.middleRows<3>(6 * place + 3 * k);
+        rows = (turned * rows).eval();
+      }
+      for (Eigen::Index k = 0; k < 4; ++k) {
+        auto columns = group.accelerations.middleCols<3>(kNumbers * place + 3 * k);
+        columns = (columns * turned.transpose()).eval();
+      }
+      group.spin[m] = bodies_[group.body[m]].start.twist.angular;
     }
-    for (Eigen::Index k = 0; k < 4; ++k) {
-      auto columns = group->accelerations.middleCols<3>(kNumbers * place + 3 * k);
-      columns = (columns * turned.transpose()).eval();
-    }
-    group->spin[m] = bodies_[group->body[m]].start.twist.angular;
   }
 }
 
@@ -183,12 +187,13 @@ void LocalMotion::compose() {
       throw Refusal("the blocks of the forces' Jacobian are not those of the start of the step");
     pushed.group->accelerations.block<6, kNumbers>(6 * static_cast<Eigen::Index>(pushed.place),
                                                    first_number(by.place)) +=
-        accelerated_block(trial_.at(row).pose.orientation, request_->inverse_mass()[row],
-                          vector_at(request_->inverse_inertia(), row), jacobian_[i]);
+        accelerated_block(bodies_[pushed.group->body[pushed.place]].start.pose.orientation,
+                          request_->inverse_mass()[row], vector_at(request_->inverse_inertia(), row), jacobian_[i]);
   }
 }
 
 double LocalMotion::size_of(const Eigen::VectorXd& change) const {
+  if (!change.allFinite()) return HUGE_VAL;
   double largest = 0.0;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const Numbers e = change.segment<kNumbers>(first_number(b));
@@ -196,9 +201,25 @@ double LocalMotion::size_of(const Eigen::VectorXd& change) const {
     for (const double part :
          {e.segment<3>(0).norm(), e.segment<3>(3).norm(), e.segment<3>(6).norm() / std::max(1.0, twist.linear.norm()),
           e.segment<3>(9).norm() / std::max(1.0, twist.angular.norm())})
-      largest = part <= largest ? largest : part;
+      largest = std::max(largest, part);
   }
   return largest;
+}
+
+double LocalMotion::rounding(double rate) const {
+  double largest = 0.0;
+  for (const Body& body : bodies_) {
+    const Twist& twist = body.start.twist;
+    const double answered = rate / std::max(1.0, std::min(twist.linear.norm(), twist.angular.norm()));
+    largest = std::max(largest, (1.0 + body.start.pose.position.norm()) * std::max(1.0, answered));
+  }
+  return std::numeric_limits<double>::epsilon() * largest;
+}
+
+double LocalMotion::longest() const {
+  double fastest = 0.0;
+  for (const Body& body : bodies_) fastest = std::max(fastest, body.start.twist.angular.norm());
+  return kNearly * kLargestTurn / fastest;
 }
 
 bool LocalMotion::is_in_chart(const Eigen::VectorXd& y) const {
@@ -227,7 +248,6 @@ void LocalMotion::accept(double h, const Eigen::VectorXd& y) {
     body.moved += end.segment<3>(0);
     if (!body.moved.isZero(0.0)) body.start.pose.position = body.origin + body.moved;
   }
-  for (Group& group : groups_) turn(y, &group);
   done_ = h == request_->time_step() - done_ ? request_->time_step() : done_ + h;
   start_inner_step();
 }

@@ -12,7 +12,7 @@
 // twelve derivatives a body of the largest group of bodies that feel each other (interaction_groups.h).
 #pragma once
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <vector>
 
 #include "plugin_sdk/integrator.h"
@@ -44,18 +44,25 @@ class LocalMotion {
   const std::vector<Group>& groups() const { return groups_; }
   std::size_t bodies() const { return bodies_.size(); }
   const Twist& twist_at_start(std::size_t body) const { return bodies_[body].start.twist; }
+  // Length (s) of an inner step in which the fastest body turns nearly as far as is_in_chart allows.
+  double longest() const;
 
-  // f(elapsed, y); false where the state is not finite.
+  // f(elapsed, y); false where the state is not finite. Throws Refusal where forces refuse it.
   bool evaluate(double elapsed, const Eigen::VectorXd& y, Eigen::VectorXd* f);
   // J where the inner step starts, with f there. Throws Refusal where it cannot be had.
   void differentiate(const Eigen::VectorXd& f);
-  // The largest of (m, rad, and relative to speeds at the start above 1 m/s, 1 rad/s) over bodies.
+  // The largest of (m, rad, and relative to speeds at the start above 1 m/s, 1 rad/s) over bodies; infinite where a number is
+  // not finite.
   double size_of(const Eigen::VectorXd& change) const;
-  // True while no body has turned so far that its chart ends (2 pi).
+  // Size of the change that the rounding of places in the world (of parts of bodies of about 1 m) and of attitudes may be
+  // taken for, where stiff forces answer it with velocities at `rate` (1/s).
+  double rounding(double rate) const;
+  // True while no body has turned by more than 2 rad; the chart ends at 2 pi.
   bool is_in_chart(const Eigen::VectorXd& y) const;
-  // Ends an inner step of h at y; the next one starts there. J is turned with the bodies, which leaves it that of a mechanism
-  // that turns as a whole.
+  // Ends an inner step of h at y; the next one starts there.
   void accept(double h, const Eigen::VectorXd& y);
+  // After accept(h, y): J is turned with the bodies, which leaves it that of a mechanism that turns as a whole.
+  void turn_jacobian(const Eigen::VectorXd& y);
   // What y would be around the end of an inner step of h.
   Eigen::VectorXd around_end(double h, const Eigen::VectorXd& end, const Eigen::VectorXd& y) const;
 
@@ -82,7 +89,6 @@ class LocalMotion {
   void ask_jacobian();
   void compose();
   void take_differences(const Eigen::VectorXd& f);
-  void turn(const Eigen::VectorXd& y, Group* group) const;
 
   const stage::IntegratorIntegrateRequest* request_ = nullptr;  // of the call in hand, as the next
   Derivatives* derivatives_ = nullptr;
@@ -95,86 +101,6 @@ class LocalMotion {
   WrenchJacobian jacobian_;  // of the start of the inner step
   std::vector<double> wrenches_;
   std::vector<Member> member_;  // by row
-};
-
-// (s - J) z = b for a shift s, 1/s, real or complex. Positions and attitudes are eliminated, so that the matrices have six
-// rows a body: with P = (s - A)^-1, b = (p, q) and z = (x, v),
-//
-//   (s - D - C P) v = q + C P p,    x = P (p + v),    C = dv'/dx, D = dv'/dv.
-template <typename Scalar>
-class ShiftedJacobian {
- public:
-  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
-
-  // Call fix_eigen_blocks() once before.
-  void factorise(const LocalMotion& motion, Scalar shift) {
-    groups_.resize(motion.groups().size());
-    for (std::size_t g = 0; g < groups_.size(); ++g) {
-      const LocalMotion::Group& from = motion.groups()[g];
-      Group& group = groups_[g];
-      group.body = &from.body;
-      group.turns.clear();
-      group.carried.resize(from.accelerations.rows(), from.accelerations.rows());
-      for (std::size_t m = 0; m < from.body.size(); ++m) {
-        const Matrix3 half = 0.5 * skew(from.spin[m]);
-        group.turns.push_back((shift * Block::Identity() - half.cast<Scalar>()).inverse());
-        const Eigen::Index column = kRates * static_cast<Eigen::Index>(m);
-        const auto positions = from.accelerations.template middleCols<kRates>(2 * column);
-        group.carried.template middleCols<3>(column) = positions.template leftCols<3>().template cast<Scalar>() / shift;
-        group.carried.template middleCols<3>(column + 3) =
-            positions.template rightCols<3>().template cast<Scalar>() * group.turns.back();
-      }
-      Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> matrix = -group.carried;
-      for (std::size_t m = 0; m < from.body.size(); ++m) {
-        const Eigen::Index column = kRates * static_cast<Eigen::Index>(m);
-        matrix.template middleCols<kRates>(column) -=
-            from.accelerations.template middleCols<kRates>(2 * column + kRates).template cast<Scalar>();
-      }
-      matrix.diagonal().array() += shift;
-      group.factors.compute(matrix);
-    }
-    shift_ = shift;
-  }
-
-  // In place; b has all bodies' numbers.
-  void solve(Vector* b) const {
-    for (const Group& group : groups_) {
-      const auto count = static_cast<Eigen::Index>(group.body->size());
-      Vector positions(kRates * count), rates(kRates * count);
-      for (Eigen::Index m = 0; m < count; ++m) {
-        const Eigen::Index from = first_of(group, m);
-        positions.template segment<kRates>(kRates * m) = b->template segment<kRates>(from);
-        rates.template segment<kRates>(kRates * m) = b->template segment<kRates>(from + kRates);
-      }
-      rates += group.carried * positions;
-      rates = group.factors.solve(rates).eval();
-      positions += rates;
-      for (Eigen::Index m = 0; m < count; ++m) {
-        const Eigen::Index to = first_of(group, m);
-        b->template segment<3>(to) = positions.template segment<3>(kRates * m) / shift_;
-        b->template segment<3>(to + 3) =
-            group.turns[static_cast<std::size_t>(m)] * positions.template segment<3>(kRates * m + 3);
-        b->template segment<kRates>(to + kRates) = rates.template segment<kRates>(kRates * m);
-      }
-    }
-  }
-
- private:
-  static constexpr Eigen::Index kRates = 6;
-  using Block = Eigen::Matrix<Scalar, 3, 3>;
-
-  struct Group {
-    const std::vector<std::size_t>* body = nullptr;
-    std::vector<Block> turns;                                       // of P, for attitudes
-    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> carried;  // C P
-    Eigen::PartialPivLU<Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>> factors;
-  };
-  static Eigen::Index first_of(const Group& group, Eigen::Index m) {
-    return LocalMotion::kNumbers * static_cast<Eigen::Index>((*group.body)[static_cast<std::size_t>(m)]);
-  }
-
-  std::vector<Group> groups_;
-  Scalar shift_ = 0.0;
 };
 
 }  // namespace gravitas

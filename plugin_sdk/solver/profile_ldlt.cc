@@ -35,7 +35,7 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
 }
 
 void ProfileLdlt::factorise(double least) {
-  least_pivot_ = 1.0;
+  least_pivot_ = 1.0, weakest_ = 0;
   for (std::size_t i = 0; i < size(); ++i) {
     double* row = &values_[begin_[i]];
     const std::size_t from = first_[i];
@@ -137,12 +137,21 @@ void ProfileLdlt::add(double share, const NullVector& a, NullVector* b) {
   b->first = std::min(a.first, b->first);
 }
 
-// What is left of a dropped row's number by substitution is z^T b of its combination z.
+// What is left of a dropped row's number by substitution is z^T b of its combination z. Rounding of a side is told by its
+// largest number among rows that are connected, by way of others, with this one.
 bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
   constexpr double kAgrees = 64.0 * std::numeric_limits<double>::epsilon();
-  std::vector<double> y = b;
+  std::vector<double> y = b, rounding(size());
   double largest = 0.0;
-  for (const double number : b) largest = std::max(largest, std::fabs(number));
+  std::size_t lowest = size();
+  for (std::size_t i = size(), end = size(); i-- > 0;) {
+    lowest = std::min(lowest, first_[i]);
+    largest = std::max(largest, std::fabs(b[i]));
+    if (lowest < i) continue;
+    std::fill(rounding.begin() + static_cast<std::ptrdiff_t>(i), rounding.begin() + static_cast<std::ptrdiff_t>(end),
+              largest);
+    end = i, largest = 0.0;
+  }
   for (std::size_t i = 0; i < size(); ++i) {
     double terms = std::fabs(y[i]);
     for (std::size_t j = first_[i]; j < i; ++j) {
@@ -151,7 +160,7 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
       y[i] -= term;
       terms += std::fabs(term);
     }
-    if (!(pivot_[i] > 0.0) && !(std::fabs(y[i]) <= kAgrees * std::max(terms, largest))) return false;
+    if (!(pivot_[i] > 0.0) && !(std::fabs(y[i]) <= kAgrees * std::max(terms, rounding[i]))) return false;
   }
   return true;
 }

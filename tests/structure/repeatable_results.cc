@@ -24,6 +24,8 @@ const std::vector<Rule>& rules() {
        "libm's result depends on the processor: use plugin_sdk/math/transcendental.h", false},
       {std::regex("\\b(AngleAxis[df]?|Rotation2D[df]?|angularDistance|slerp|eulerAngles)\\b"),
        "Eigen calls libm inside: use plugin_sdk/math/rotation.h", false},
+      {std::regex("\\bstd::complex\\b|\\bMatrixXc[df]\\b|\\bVectorXc[df]\\b"),
+       "its products and pivots call functions of the system: use real systems of twice the size", true},
       {std::regex("\\bunordered_(multi)?(map|set)\\b"), "its order depends on addresses: use an ordered container",
        true},
   };

@@ -35,7 +35,8 @@ INSTANTIATE_TEST_SUITE_P(Every, Unrepeatable,
                          testing::Values("y = std::sin(x);", "y=std::atan2 (a, b);", "y = ::exp(x);",
                                          "y = __builtin_cosf(x);", "y = std::acosh(x);", "y = std::powl(x, z);",
                                          "y = std::tgamma(x);", "q = Eigen::AngleAxisd(a, n);", "q = p.slerp(t, r);",
-                                         "std::unordered_map<int, int> m;", "std::unordered_multiset<int> m;"));
+                                         "std::complex<double> z;", "std::unordered_map<int, int> m;",
+                                         "std::unordered_multiset<int> m;"));
 
 TEST(RepeatableResults, OtherCallsPass) {
   for (const std::string line :

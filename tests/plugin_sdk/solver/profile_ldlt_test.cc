@@ -121,6 +121,20 @@ TEST(ProfileLdlt, ContradictionsStayAmongTheRowsThatDepend) {
   EXPECT_EQ(rounded, before);
 }
 
+// Large sides of a mechanism hide no contradiction of another one.
+TEST(ProfileLdlt, ContradictionsAreSeenBesideLargerSides) {
+  ProfileLdlt factor;
+  factor.start({0, 0, 2, 2, 4, 4});
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t j = i - i % 2; j <= i; ++j) factor.entry(i, j) = 2.0;
+  factor.factorise();
+  ASSERT_EQ(factor.dropped(), 3U);
+  std::vector<double> side = {1e12, 1e12, 1.0, 1.001, -1e12, -1e12};
+  EXPECT_NEAR(factor.make_consistent(&side), 1e-3 * std::sqrt(0.5), 1e-12);
+  EXPECT_NEAR(side[2], 1.0005, 1e-12);
+  EXPECT_NEAR(side[3], 1.0005, 1e-12);
+}
+
 TEST(ProfileLdlt, OfNothing) {
   ProfileLdlt factor;
   factor.start({});

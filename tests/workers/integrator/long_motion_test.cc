@@ -400,39 +400,70 @@ TEST_P(StiffMotion, SolvesForBodiesTogether) {
 }
 
 // Two masses on a stiff, damped spring that turn about each other, at the length at which it holds them: they stay there.
-// The spring bends away from its direction at the start of a step, which costs a linearly implicit method its long steps.
-TEST(Radau, TakesLongStepsWhereStiffSpringsTurn) {
-  const double k = 1e8, c = 1e5, mass = 2.0, rate = 3.0, rest = 1.0;
-  // k (r - l) = (m/2) rate^2 r
-  const double length = k * rest / (k - 0.5 * mass * rate * rate);
-  const auto run = [&](const char* library, double* place) {
-    IntegratorProblem problem(library, {1e-6});
+class TurningSpring {
+ public:
+  TurningSpring(const char* library, double accuracy, const Vector3& centre = Vector3::Zero())
+      : problem(library, {accuracy}), centre_(centre) {
     problem.wrench_is_constant = false;
-    problem.bodies = {FreeBody{.mass = mass}, FreeBody{.mass = mass}};
+    problem.bodies = {FreeBody{.mass = kMass}, FreeBody{.mass = kMass}};
     for (const std::size_t i : {0U, 1U}) {
-      BodyState& state = problem.bodies[i].state;
-      state.pose.position = Vector3(i == 0 ? -0.5 * length : 0.5 * length, 0, 0);
-      state.twist = {Vector3(0, rate * state.pose.position.x(), 0), Vector3(0, 0, rate)};
+      const Vector3 arm(i == 0 ? -0.5 * kLength : 0.5 * kLength, 0, 0);
+      problem.bodies[i].state = {{centre + arm, Quaternion::Identity()},
+                                 {Vector3(0, kRate * arm.x(), 0), Vector3(0, 0, kRate)}};
     }
-    int derivatives = 0;
-    problem.plugin.derivative = [&](const stage::IntegratorDerivativeRequest& q) {
+    problem.plugin.derivative = [this](const stage::IntegratorDerivativeRequest& q) {
       ++derivatives;
       const Vector3 d = vector_at(q.position(), 1) - vector_at(q.position(), 0);
       const Vector3 u = vector_at(q.linear_velocity(), 1) - vector_at(q.linear_velocity(), 0);
-      const Vector3 f = (k * (d.norm() - rest) + c * u.dot(d.normalized())) * d.normalized();
+      const Vector3 f = (kStiffness * (d.norm() - kRest) + kDamping * u.dot(d.normalized())) * d.normalized();
       return std::vector<double>{f.x(), f.y(), f.z(), 0, 0, 0, -f.x(), -f.y(), -f.z(), 0, 0, 0};
     };
-    problem.time_step = 0.1;
-    problem.steps(10);
-    const Vector3 exact(0.5 * length * std::cos(rate), 0.5 * length * std::sin(rate), 0.0);
-    *place = (problem.bodies[1].state.pose.position - exact).norm();
-    return derivatives;
-  };
-  double radau = 0.0, rosenbrock = 0.0;
-  const int few = run("integrator_radau", &radau), many = run("integrator_rosenbrock", &rosenbrock);
-  EXPECT_LT(radau, 1e-6);
-  EXPECT_LT(rosenbrock, 1e-3);
-  EXPECT_LT(10 * few, many) << "derivatives";
+  }
+
+  // Of the second mass after some steps.
+  double distance(double time_step, int steps) {
+    problem.time_step = time_step;
+    problem.steps(steps);
+    const double turned = kRate * time_step * steps;
+    const Vector3 exact(0.5 * kLength * std::cos(turned), 0.5 * kLength * std::sin(turned), 0.0);
+    return (problem.bodies[1].state.pose.position - centre_ - exact).norm();
+  }
+
+  IntegratorProblem problem;
+  int derivatives = 0;
+
+ private:
+  static constexpr double kStiffness = 1e8, kDamping = 1e5, kMass = 2.0, kRate = 3.0, kRest = 1.0;
+  // k (r - l) = (m/2) rate^2 r
+  static constexpr double kLength = kStiffness * kRest / (kStiffness - 0.5 * kMass * kRate * kRate);
+  Vector3 centre_;
+};
+
+// The spring bends away from its direction at the start of a step, which costs a linearly implicit method its long steps.
+TEST(Radau, TakesLongStepsWhereStiffSpringsTurn) {
+  TurningSpring few("integrator_radau", 1e-6), many("integrator_rosenbrock", 1e-6);
+  EXPECT_LT(few.distance(0.1, 10), 1e-6);
+  EXPECT_LT(many.distance(0.1, 10), 1e-3);
+  EXPECT_LT(10 * few.derivatives, many.derivatives);
+}
+
+// Its rounds end where the rounding of places far from the origin, which the spring answers with velocities, ends them.
+TEST(Radau, TakesLongStepsFarFromTheOrigin) {
+  for (const double away : {1e3, 1e5}) {
+    TurningSpring here("integrator_radau", 1e-6), there("integrator_radau", 1e-6, Vector3(away, -away, away));
+    here.distance(0.02, 10);
+    EXPECT_LT(there.distance(0.02, 10), 1e-6 + 1e-13 * away);
+    EXPECT_LT(there.derivatives, 2 * here.derivatives) << away;
+  }
+}
+
+TEST(Radau, TakesShortTimeStepsAtOnce) {
+  for (const double time_step : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
+    TurningSpring spring("integrator_radau", 1e-6);
+    EXPECT_LT(spring.distance(time_step, 20), 1e-8) << time_step;
+    // a step of one inner step, asked twice: who feels whom, a Jacobian, the start, and ten rounds
+    EXPECT_LT(spring.derivatives, 20 * 2 * (4 + 24 + 1 + 3 * 10)) << time_step;
+  }
 }
 
 // ---- all
@@ -456,6 +487,32 @@ TEST_P(EveryIntegrator, BearsExtremeBodiesOrRefuses) {
     EXPECT_LT((problem.bodies[0].state.pose.position - needle.state.pose.position - 5 * h * Vector3(1, 2, 3)).norm(),
               2e-7);
     EXPECT_EQ(problem.bodies[1].state.pose.position, rest.state.pose.position);
+  }
+}
+
+// A step that was refused half way leaves nothing behind: the next one has the bits of a first one.
+TEST_P(EveryIntegrator, ForgetsAStepThatWasRefused) {
+  const auto start = [](IntegratorProblem* problem) {
+    make_oscillator(problem, 30.0);
+    problem->bodies[0].state.twist.angular = Vector3(1, 2, 3);
+  };
+  IntegratorProblem quiet(GetParam().first, GetParam().second);
+  start(&quiet);
+  const MessageColumns right = quiet.plugin.ask(stage::Method::kIntegratorIntegrate, quiet.request());
+  for (int until = 1; until < quiet.plugin.derivatives_asked; until += 1 + until / 4) {
+    IntegratorProblem problem(GetParam().first, GetParam().second);
+    start(&problem);
+    const auto spring = problem.plugin.derivative;
+    int asked = 0;
+    problem.plugin.derivative = [&](const stage::IntegratorDerivativeRequest& question) {
+      if (++asked > until) return std::vector<double>{HUGE_VAL, 0, 0, 0, 0, 0};
+      return spring(question);
+    };
+    EXPECT_NE(problem.plugin.refusal(stage::Method::kIntegratorIntegrate, problem.request()), "");
+    problem.plugin.derivative = spring;
+    const MessageColumns again = problem.plugin.ask(stage::Method::kIntegratorIntegrate, problem.request());
+    for (const char* column : {"position", "orientation", "linear_velocity", "angular_velocity", "plugin_state"})
+      EXPECT_EQ(again.f64(column), right.f64(column)) << column << " after " << until;
   }
 }
 

@@ -8,8 +8,8 @@
 // it gains a digit in a round; A^-1 = T diag(g, a +- i b) T^-1 makes one real and one complex system of it
 // (ShiftedJacobian). What is stiff turns within a step, too, and J does not: where that would let errors grow from round to
 // round, rounds are made in axes that turn steadily with each body (find_turns). They end where what they leave of z counts
-// for less than a hundredth of the estimated error, or than its power 3/2, which falls as fast as the method's own, and
-// where they gain nothing more. With f_0 at the start, the error is estimated as
+// for less than a hundredth of the estimated error and than its power 3/2, which falls as fast as the method's own; where
+// they gain little, for less than a hundredth of Accuracy; and where what they change is rounding. With f_0 at the start, the error is estimated as
 //
 //   e = (g/h - J)^-1 (f_0 + (d_1 z_1 + d_2 z_2 + d_3 z_3)/h),
 //
@@ -21,19 +21,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/local_motion.h"
 #include "plugin_sdk/math/transcendental.h"
+#include "plugin_sdk/shifted_jacobian.h"
 
 namespace gravitas {
 namespace {
 
 constexpr std::size_t kStages = 3;
 constexpr std::array<double, kStages> kNodes = {0.15505102572168219, 0.64494897427831781, 1.0};
-constexpr double kReal = 3.637834252744496;                                        // g
-constexpr std::complex<double> kComplex = {2.681082873627752, 3.050430199247411};  // a + i b
+constexpr double kReal = 3.637834252744496;                                         // g
+constexpr std::array<double, 2> kComplex = {2.681082873627752, 3.050430199247411};  // a, b
 constexpr double kFrom[kStages][kStages] = {{9.1232394870892943e-2, -0.14125529502095421, -3.0029194105147425e-2},
                                             {0.24171793270710702, 0.20412935229379993, 0.38294211275726194},
                                             {0.96604818261509294, 1.0, 0.0}};  // T
@@ -49,10 +49,12 @@ constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 8.0;
 constexpr double kLonger = 1.1;
 constexpr double kShortest = 1e-12;  // inner step, per step
 constexpr int kMostRounds = 10;
-constexpr double kFar = 5.0;                            // growth of the second round that ends them
-constexpr double kKeeps = 0.1;                          // of what is left, that a round may leave for J to be kept
-constexpr double kRounding = 1e-15, kStagnant = 1e-12;  // of scaled states: rounds gain nothing below
-constexpr double kOfEstimate = 1e-2;                    // what rounds may leave
+constexpr double kFar = 5.0;          // growth of the second round that ends them
+constexpr double kKeeps = 0.1;        // of what is left, that a round may leave for J to be kept
+constexpr double kGainsLittle = 0.5;  // of what was left, that a round leaves
+constexpr double kAnswered = 12.0;    // d(rate)/d(position) of a stage, per inner step: |A^-1|
+constexpr double kOfRounding = 16.0, kNothing = 1e-15;
+constexpr double kOfEstimate = 1e-2;  // what rounds may leave
 constexpr double kOfRejected = 0.1;
 
 class Radau final : public IntegratorPlugin {
@@ -90,13 +92,16 @@ class Radau final : public IntegratorPlugin {
       prepare();
       const double left = whole - motion_.done();
       // two equal ones in place of a long and a short one
-      const double h = inner >= left ? left : std::min(inner, 0.5 * left);
+      const double most = std::min(inner, motion_.longest());
+      const double h = most >= left ? left : std::min(most, 0.5 * left);
       if (!find_stages(h)) {
-        // an old matrix may be all that is wrong; a guess that led nowhere twice is no better than none
-        if (is_fresh_) {
+        // an old matrix may be all that is wrong, or a guess; one that led nowhere twice is no better than none
+        if (is_fresh_ && guess_ == Guess::kSmooth) {
+          guess_ = Guess::kNone;
+        } else if (is_fresh_) {
           inner = 0.5 * h;
           longest = 0.7 * h;
-          if (++failures > 1 || guess_ == Guess::kSmooth) guess_ = Guess::kNone;
+          if (++failures > 1) guess_ = Guess::kNone;
         }
         has_matrix_ = is_fresh_;
       } else {
@@ -114,6 +119,7 @@ class Radau final : public IntegratorPlugin {
           continue;
         }
         inner = factor * h;
+        has_matrix_ = is_fresh_;
       }
       if (!(inner > kShortest * whole))
         throw Refusal("Accuracy cannot be met by any step: forces are not smooth, or the state overflows");
@@ -124,7 +130,6 @@ class Radau final : public IntegratorPlugin {
   }
 
  private:
-  using Complex = std::complex<double>;
   // Of the stages: where the step starts, as if nothing were stiff, or as the inner step before goes on.
   enum class Guess : std::uint8_t { kNone, kSmooth, kGoesOn };
   using Stages = std::array<Eigen::VectorXd, kStages>;
@@ -144,55 +149,57 @@ class Radau final : public IntegratorPlugin {
   bool find_stages(double h) {
     if (factored_step_ != h) {
       real_.factorise(motion_, kReal / h);
-      complex_.factorise(motion_, kComplex / h);
+      complex_.factorise(motion_, kComplex[0] / h, kComplex[1] / h);
       factored_step_ = h;
     }
     guess(h);
     find_turns(h);
-    double last = HUGE_VAL;
+    const double rounding = kOfRounding * motion_.rounding(kAnswered / h);
+    double last = HUGE_VAL, remains = HUGE_VAL;
     for (rounds_ = 1; rounds_ <= kMostRounds; ++rounds_) {
       const double size = improve(h);
       if (!std::isfinite(size)) return false;
       error_ = estimate(h, rate_at_start_);
       rate_ = size / last;
       last = size;
-      const bool gains_nothing = rounds_ > 2 && rate_ > 0.5 && size <= std::max(kStagnant, kOfEstimate * accuracy_);
-      if (size <= kRounding || gains_nothing) return has_error(h);
+      if (size <= kNothing || (size <= rounding && rate_ > kGainsLittle)) return has_error(h);
       // the first round straightens what bends: it says nothing of the next ones
       if (rounds_ == 1 || (rounds_ == 2 && rate_ < kFar)) continue;
       if (rate_ >= 1.0) return false;
-      const double remains = size * rate_ / (1.0 - rate_);
+      remains = size * rate_ / (1.0 - rate_);
       const double allowed =
           error_ <= accuracy_ ? error_ * std::min(kOfEstimate, std::sqrt(error_)) : kOfRejected * error_;
-      if (remains <= allowed) return has_error(h);
-      if (remains * math::pow(rate_, kMostRounds - rounds_) > allowed) return false;
+      const double enough = std::max(allowed, kOfEstimate * accuracy_);
+      if (remains <= (rate_ > kGainsLittle ? enough : allowed)) return has_error(h);
+      if (remains * math::pow(rate_, kMostRounds - rounds_) > enough) return false;
     }
-    return false;
+    return remains <= kOfEstimate * accuracy_ && has_error(h);
   }
 
   // An error that is too large may be that of a stiff transient: its own start is taken for the estimate.
   bool has_error(double h) {
     if (!std::isfinite(error_) || !motion_.is_in_chart(motion_.start() + z_[kStages - 1])) return false;
-    if (error_ <= accuracy_ || !motion_.evaluate(0.0, motion_.start() + error_vector_, &shifted_rate_)) return true;
+    if (error_ <= accuracy_) return true;
+    shifted_ = motion_.start() + error_vector_;
+    if (!motion_.is_in_chart(shifted_) || !motion_.evaluate(0.0, shifted_, &shifted_rate_)) return true;
     const double again = estimate(h, shifted_rate_);
     if (again <= error_) error_ = again;
     return true;
   }
 
-  // One round for all stages; by how much they changed.
+  // One round for all stages; by how much they changed, infinite where one cannot be taken.
   double improve(double h) {
-    for (std::size_t i = 0; i < kStages; ++i)
-      if (!motion_.evaluate(kNodes[i] * h, motion_.start() + z_[i], &rates_[i])) return HUGE_VAL;
+    for (std::size_t i = 0; i < kStages; ++i) {
+      shifted_ = motion_.start() + z_[i];
+      if (!motion_.is_in_chart(shifted_) || !motion_.evaluate(kNodes[i] * h, shifted_, &rates_[i])) return HUGE_VAL;
+    }
     for (std::size_t i = 0; i < kStages; ++i) {
       for (std::size_t j = 0; j < kStages; ++j) rates_[i] -= kInverse[i][j] / h * z_[j];
       turn(i, true, &rates_[i]);
     }
     Stages change = combined(kInto, rates_);
     real_.solve(&change[0]);
-    Eigen::VectorXcd pair(change[1].size());
-    pair.real() = change[1], pair.imag() = change[2];
-    complex_.solve(&pair);
-    change[1] = pair.real(), change[2] = pair.imag();
+    complex_.solve(&change[1], &change[2]);
     change = combined(kFrom, change);
     double size = 0.0;
     for (std::size_t i = 0; i < kStages; ++i) {
@@ -205,7 +212,7 @@ class Radau final : public IntegratorPlugin {
   }
 
   // With s the rate of the stiffest motion, a round leaves a share h s (h |w|)^2 of an error in axes that stand still, and
-  // h |w| in axes that turn with the bodies: the lesser one.
+  // h |w| in axes that turn with the bodies: those with the lesser share are taken.
   void find_turns(double h) {
     double turn = 0.0, stiffness = 0.0;
     for (std::size_t b = 0; b < motion_.bodies(); ++b)
@@ -243,6 +250,7 @@ class Radau final : public IntegratorPlugin {
 
   void guess(double h) {
     const Eigen::VectorXd& start = motion_.start();
+    bool is_wild = false;
     for (std::size_t i = 0; i < kStages; ++i) {
       z_[i].setZero(start.size());
       if (guess_ == Guess::kSmooth) {
@@ -262,7 +270,9 @@ class Radau final : public IntegratorPlugin {
         }
         z_[i] = motion_.around_end(last_step_, last_end_, y) - start;
       }
+      is_wild = is_wild || !z_[i].allFinite() || !motion_.is_in_chart(start + z_[i]);
     }
+    for (std::size_t i = 0; i < kStages && is_wild; ++i) z_[i].setZero();
   }
 
   void accept(double h) {
@@ -273,6 +283,7 @@ class Radau final : public IntegratorPlugin {
     motion_.accept(h, last_end_);
     has_rate_ = is_fresh_ = false;
     has_matrix_ = rate_ <= kKeeps;
+    if (has_matrix_) motion_.turn_jacobian(last_end_);
     guess_ = Guess::kGoesOn;
     factored_step_ = 0.0;
   }
@@ -287,8 +298,7 @@ class Radau final : public IntegratorPlugin {
   double accuracy_;
   // of the call in hand
   LocalMotion motion_;
-  ShiftedJacobian<double> real_;
-  ShiftedJacobian<Complex> complex_;
+  ShiftedJacobian real_, complex_;
   double factored_step_ = 0.0;                                     // that they are for
   bool has_rate_ = false, has_matrix_ = false, is_fresh_ = false;  // the matrix: of this inner step's start
   Stages z_, rates_;
@@ -299,7 +309,7 @@ class Radau final : public IntegratorPlugin {
   double last_step_ = 0.0;  // of the inner step before
   Stages last_z_;
   Eigen::VectorXd last_start_, last_end_;
-  Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_;
+  Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_, shifted_;
   std::vector<double> room_;
 };
 

@@ -18,6 +18,7 @@
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/local_motion.h"
 #include "plugin_sdk/math/transcendental.h"
+#include "plugin_sdk/shifted_jacobian.h"
 
 namespace gravitas {
 namespace {
@@ -72,7 +73,7 @@ class Rosenbrock final : public IntegratorPlugin {
     bool has_matrix = false;
     while (motion_.done() < whole && !motion_.is_empty()) {
       host.mark_progress();
-      const double h = std::min(inner, whole - motion_.done());
+      const double h = std::min({inner, motion_.longest(), whole - motion_.done()});
       if (!has_matrix) differentiate(h);
       has_matrix = true;
       const double error = attempt(h) / accuracy_;
@@ -124,7 +125,7 @@ class Rosenbrock final : public IntegratorPlugin {
   double accuracy_;
   // scratch: states y, rates f, and the stages
   LocalMotion motion_;
-  ShiftedJacobian<double> factors_;
+  ShiftedJacobian factors_;
   Eigen::VectorXd rate_, rate_at_start_, time_rate_, sum_;
   std::array<Eigen::VectorXd, kStages> u_;
   std::vector<double> room_;
