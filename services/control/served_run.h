@@ -161,7 +161,7 @@ class ServedRun final : private kernel::CommitListener {
   const kernel::EnvironmentDescription first_description_;
   kernel::EnvironmentDescription description_;
   kernel::EnvironmentDescription active_;  // its slots alone: who answers, with which settings
-  // Faults and swaps of environments before the last edit.
+  // Faults and swaps of environments before the last edit; the edits.
   report::v1::Report past_;
   std::vector<api::ServedSwap> past_swaps_;
 

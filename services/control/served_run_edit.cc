@@ -47,6 +47,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
       tell({EventKind::kCollisionEnd, environment_->step_count(), environment_->time(), a, b});
     past_swaps_ = swap_messages();
     write_faults(*environment_, &past_);
+    note_edit(edit, &past_);
     forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
     orders_.clear();
     next_collection_ = {};

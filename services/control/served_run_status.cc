@@ -91,6 +91,9 @@ api::Status ServedRun::status() {
     status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
     status.mutable_faults()->Swap(report.mutable_faults());
     keep_last(status.mutable_faults());
+    status.set_edit_count(static_cast<std::uint32_t>(report.edits_size()));
+    status.mutable_edits()->Swap(report.mutable_edits());
+    keep_last(status.mutable_edits());
     collect_warnings();
     status.set_warning_count(static_cast<std::uint32_t>(warnings_.size()));
     if (!warnings_.empty()) status.set_last_warning(warnings_.back());

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 
+#include "services/run/report.h"
+
 namespace gravitas::control {
 namespace {
 
 namespace api = control_api::v1;
 
-// Swaps and faults that a page shows.
+// Swaps, edits and faults that a page shows.
 constexpr int kMostListed = 5;
 
 std::string duration_text(double microseconds) {
@@ -61,6 +63,9 @@ std::string status_page(const api::Status& status) {
   heading("swaps", status.swap_count());
   for (int i = std::max(0, status.swaps_size() - kMostListed); i < status.swaps_size(); ++i)
     text += fmt::format("  {}\n", swap_line(status.swaps(i)));
+  heading("edits", status.edit_count());
+  for (int i = std::max(0, status.edits_size() - kMostListed); i < status.edits_size(); ++i)
+    text += fmt::format("  {}\n", edit_line(status.edits(i)));
   heading("faults", status.fault_count());
   for (int i = std::max(0, status.faults_size() - kMostListed); i < status.faults_size(); ++i) {
     const report::v1::FaultRecord& fault = status.faults(i);

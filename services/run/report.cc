@@ -66,6 +66,16 @@ void write_faults(const kernel::Environment& environment, report::v1::Report* re
   }
 }
 
+void note_edit(const edit::v1::Edit& edit, report::v1::Report* report) {
+  report::v1::EditRecord* record = report->add_edits();
+  record->set_step(edit.step());
+  record->set_changes(static_cast<std::uint32_t>(edit.changes_size()));
+}
+
+std::string edit_line(const report::v1::EditRecord& edit) {
+  return fmt::format("edit before step {}: {} change{}", edit.step(), edit.changes(), edit.changes() == 1 ? "" : "s");
+}
+
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {
   for (const kernel::SwapRecord& one : environment.swaps()) {
     report::v1::SwapRecord* swap = one.only_compared ? report->add_comparisons() : report->add_swaps();

@@ -1,6 +1,9 @@
 // What the report of a run takes from its environment.
 #pragma once
 
+#include <string>
+
+#include "gravitas/edit/v1/edit.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 
@@ -14,6 +17,10 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 void write_stages(const kernel::Environment& environment, report::v1::Report* report);
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
+void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
+
+// "edit before step 31: 2 changes".
+std::string edit_line(const report::v1::EditRecord& edit);
 
 // The environment whose swaps have been written is replaced by another: probation has passed.
 void settle_swaps(report::v1::Report* report);

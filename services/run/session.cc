@@ -365,6 +365,7 @@ class Run final : private kernel::CommitListener {
     take(edited);
     environment_ = std::move(next);
     edits_.note(*edit);
+    note_edit(*edit, &result_.report);
     if (recorder_) {
       recorder_->set_decisions(decisions_);
       recorder_->note_edit(*edit);

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <set>
+
+#include "services/run/report.h"
 
 namespace gravitas {
 namespace {
@@ -38,7 +41,7 @@ std::string hosts(const report::v1::Plan& plan) {
                            : fmt::format("{} worker processes: {}", processes.size(), names);
 }
 
-// Faults that were survived, and swaps; a line each for the first ones.
+// Faults that were survived, swaps and edits; of faults and edits a line each for the first ones.
 std::string exchanges(const report::v1::Report& report) {
   std::string text;
   int survived = 0;
@@ -53,6 +56,9 @@ std::string exchanges(const report::v1::Report& report) {
   for (const report::v1::SwapRecord& swap : report.swaps())
     text += fmt::format("  swap before step {}: {} {} -> {}, {}{}\n", swap.step(), swap.slot(), swap.from(), swap.to(),
                         swap.outcome(), swap.reason().empty() ? "" : ": " + swap.reason());
+  const int edits = std::min(report.edits_size(), static_cast<int>(kMostNamed));
+  for (int i = 0; i < edits; ++i) text += fmt::format("  {}\n", edit_line(report.edits(i)));
+  if (report.edits_size() > edits) text += fmt::format("  {} more edits\n", report.edits_size() - edits);
   for (const report::v1::SwapRecord& one : report.comparisons())
     text += fmt::format("  compared: {} {} with {}: {} of {} answers differ\n", one.slot(), one.from(), one.to(),
                         one.shadow().differing_calls(), one.shadow().calls());

@@ -126,7 +126,7 @@ TEST_P(SharedProcess, DiesInACallOfAnySlot) {
 // Two may be open: the integrator's, and within it one of the forces.
 TEST_P(SharedProcess, HangsInsideANestedCall) {
   WorldBuilder builder = together(GetParam(), kAll);
-  for (const Slot slot : kSlots) builder.description().slot(slot).deadline = 0.3;
+  for (const Slot slot : kSlots) builder.description().slot(slot).deadline = 1.0;
   Environment world(builder.description());
   world.inject({Slot::kForce, "hang", 5});
   world.inject({Slot::kIntegrator, "hang", 9});

@@ -93,7 +93,7 @@ TEST_P(Supervised, DeathsThatNobodyAsksAboutHoldNoDescriptor) {
 
 TEST_P(Supervised, AHangingWorkerIsReplacedAtItsDeadline) {
   WorldBuilder hanging = builder();
-  hanging.description().collision.deadline = 0.5;
+  hanging.description().collision.deadline = 1.0;
   Environment world(hanging.description());
   world.inject({Slot::kCollision, "hang", 4});
   run_to_end(&world);
@@ -154,7 +154,7 @@ TEST_P(Supervised, ActiveAndStandbyMayDieTogether) {
 
 TEST_P(Supervised, ADeadlineAloneNeverMakesARequestPoison) {
   WorldBuilder slow = builder();
-  slow.description().solver.deadline = 0.5;
+  slow.description().solver.deadline = 1.0;
   Environment world(slow.description());
   world.inject({Slot::kSolver, "hang", 6, 3});
   run_to_end(&world);

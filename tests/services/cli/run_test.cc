@@ -227,7 +227,7 @@ TEST(Run, AnInterruptKeepsWhatWasComputed) {
 // A scene whose integrator is one of the deliberately bad plugins.
 ProgramResult run_with_bad_integrator(const std::string& library, const ScratchFolder& folder) {
   const std::string plugins =
-      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Deadline = 0.2 Library = \"" +
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Deadline = 0.5 Library = \"" +
                                            in_build("/lib/gravitas-faulty/") + library + ".so\" } }");
   return run_program({"run", kSample, plugins, "--set", "Integrator=Faulty", "--report", folder.path("report.json"),
                       "--trajectory", folder.path("motion.csv"), "--checkpoint", folder.path("kept")},
@@ -259,7 +259,7 @@ TEST(Run, AWorkerThatHangsIsReplacedAtItsDeadline) {
   const ProgramResult result = run_with_bad_integrator("integrator_hangs", folder);
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.err, HasSubstr("paused at step 11: slot integrator"));
-  EXPECT_THAT(result.err, HasSubstr("within its deadline of 200 ms"));
+  EXPECT_THAT(result.err, HasSubstr("within its deadline of 500 ms"));
 }
 
 TEST(Run, LooksForTheKindsOfEventsThatAreAskedFor) {

@@ -4,7 +4,9 @@
 
 #include <string>
 
+#include "services/control/status_text.h"
 #include "services/run/edit_spec.h"
+#include "services/run/summary.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -39,6 +41,7 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
   EXPECT_EQ(status.step(), 30U);
   // what was before is not forgotten, and who took over stays
   EXPECT_EQ(status.fault_count(), 1U);
+  EXPECT_THAT(status_page(status), HasSubstr("edits: 1\n  edit before step 31: 2 changes\n"));
   ASSERT_EQ(status.swaps_size(), 1);
   EXPECT_EQ(status.swaps(0).outcome(), "committed");
   for (const api::PlannedSlot& slot : status.plan().slots()) {
@@ -55,10 +58,13 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
   const RunResult result = run(
       options, [] { return false; }, [](const Progress&) {});
   EXPECT_EQ(status.chain_hash(), result.report.chain_hash());
+  EXPECT_THAT(summarize(result.report, {}),
+              HasSubstr("  edit before step 31: 2 changes\n  edit before step 61: 1 change\n"));
   EXPECT_THAT(refusal([&] { edit(&served, {move}); }), HasSubstr("the run has made its last step"));
 
   served.client.reset();
   EXPECT_EQ(served.client.status().fault_count(), 0U);
+  EXPECT_EQ(served.client.status().edit_count(), 0U);
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }
 
