@@ -206,12 +206,12 @@ double LocalMotion::size_of(const Eigen::VectorXd& change) const {
   return largest;
 }
 
-double LocalMotion::rounding(double rate) const {
+double LocalMotion::rounding(double h, double rate) const {
   double largest = 0.0;
   for (const Body& body : bodies_) {
     const Twist& twist = body.start.twist;
-    const double answered = rate / std::max(1.0, std::min(twist.linear.norm(), twist.angular.norm()));
-    largest = std::max(largest, (1.0 + body.start.pose.position.norm()) * std::max(1.0, answered));
+    const double slower = std::max(1.0, std::min(twist.linear.norm(), twist.angular.norm()));
+    largest = std::max(largest, (1.0 + body.start.pose.position.norm()) * rate * std::max(h, 1.0 / slower));
   }
   return std::numeric_limits<double>::epsilon() * largest;
 }

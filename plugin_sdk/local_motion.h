@@ -44,7 +44,8 @@ class LocalMotion {
   const std::vector<Group>& groups() const { return groups_; }
   std::size_t bodies() const { return bodies_.size(); }
   const Twist& twist_at_start(std::size_t body) const { return bodies_[body].start.twist; }
-  // Length (s) of an inner step in which the fastest body turns nearly as far as is_in_chart allows.
+  // Length (s) of an inner step in which the fastest body turns nearly as far as is_in_chart allows; infinite where none
+  // turns.
   double longest() const;
 
   // f(elapsed, y); false where the state is not finite. Throws Refusal where forces refuse it.
@@ -54,9 +55,9 @@ class LocalMotion {
   // The largest of (m, rad, and relative to speeds at the start above 1 m/s, 1 rad/s) over bodies; infinite where a number is
   // not finite.
   double size_of(const Eigen::VectorXd& change) const;
-  // Size of the change that the rounding of places in the world (of parts of bodies of about 1 m) and of attitudes may be
-  // taken for, where stiff forces answer it with velocities at `rate` (1/s).
-  double rounding(double rate) const;
+  // Size of the change in h that comes of rounding alone, where forces answer that of places in the world (of parts of
+  // bodies of about 1 m) with velocities at `rate` (1/s).
+  double rounding(double h, double rate) const;
   // True while no body has turned by more than 2 rad; the chart ends at 2 pi.
   bool is_in_chart(const Eigen::VectorXd& y) const;
   // Ends an inner step of h at y; the next one starts there.

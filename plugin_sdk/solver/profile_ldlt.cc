@@ -141,16 +141,20 @@ void ProfileLdlt::add(double share, const NullVector& a, NullVector* b) {
 // largest number among rows that are connected, by way of others, with this one.
 bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
   constexpr double kAgrees = 64.0 * std::numeric_limits<double>::epsilon();
-  std::vector<double> y = b, rounding(size());
-  double largest = 0.0;
-  std::size_t lowest = size();
-  for (std::size_t i = size(), end = size(); i-- > 0;) {
-    lowest = std::min(lowest, first_[i]);
-    largest = std::max(largest, std::fabs(b[i]));
-    if (lowest < i) continue;
-    std::fill(rounding.begin() + static_cast<std::ptrdiff_t>(i), rounding.begin() + static_cast<std::ptrdiff_t>(end),
-              largest);
-    end = i, largest = 0.0;
+  std::vector<std::size_t> next(size());  // of the same part; the last one's is itself
+  const auto last_of = [&](std::size_t row) {
+    while (next[row] != row) row = next[row] = next[next[row]];
+    return row;
+  };
+  for (std::size_t i = 0; i < size(); ++i) {
+    next[i] = i;
+    for (std::size_t j = first_[i]; j < i; ++j)
+      if (values_[begin_[i] + j - first_[i]] != 0.0) next[last_of(j)] = i;
+  }
+  std::vector<double> y = b, largest(size(), 0.0);
+  for (std::size_t i = 0; i < size(); ++i) {
+    double& number = largest[last_of(i)];
+    number = std::max(number, std::fabs(b[i]));
   }
   for (std::size_t i = 0; i < size(); ++i) {
     double terms = std::fabs(y[i]);
@@ -160,7 +164,7 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
       y[i] -= term;
       terms += std::fabs(term);
     }
-    if (!(pivot_[i] > 0.0) && !(std::fabs(y[i]) <= kAgrees * std::max(terms, rounding[i]))) return false;
+    if (!(pivot_[i] > 0.0) && !(std::fabs(y[i]) <= kAgrees * std::max(terms, largest[last_of(i)]))) return false;
   }
   return true;
 }

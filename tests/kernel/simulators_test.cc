@@ -255,8 +255,8 @@ class Doubling final : public kernel::Carrier {
 // One of the derivatives of a step is another's first: it makes them all. The other has no Jacobians, which implicit methods
 // ask for.
 TEST(Simulators, AForceThatTakesOverMakesTheWholeStep) {
-  const std::pair<const char*, std::vector<double>> integrators[] = {{"integrator_rk4", {}},
-                                                                     {"integrator_rosenbrock", {1e-3}}};
+  const std::pair<const char*, std::vector<double>> integrators[] = {
+      {"integrator_rk4", {}}, {"integrator_rosenbrock", {1e-3}}, {"integrator_radau", {1e-3}}};
   for (const auto& [integrator, settings] : integrators) {
     WorldBuilder builder = WorldBuilder().steps(1, 0.1);
     builder.plugin(Slot::kIntegrator, plugin_path(integrator), settings);

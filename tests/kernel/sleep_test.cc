@@ -137,7 +137,8 @@ TEST(Sleep, EveryIntegratorLeavesSleepersAloneAndTakesThemUpAgain) {
                                                                                 {"implicit_midpoint", {}},
                                                                                 {"symplectic_splitting", {4}},
                                                                                 {"dormand_prince54", {1e-8}},
-                                                                                {"rosenbrock", {1e-6}}};
+                                                                                {"rosenbrock", {1e-6}},
+                                                                                {"radau", {1e-6}}};
   for (const auto& [integrator, settings] : integrators) {
     SCOPED_TRACE(integrator);
     expect_an_impact_upon_a_sleeper(Simulator::kBasic, "integrator_" + integrator, settings);

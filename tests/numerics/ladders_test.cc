@@ -1,7 +1,7 @@
 // Work against precision: every method climbs a ladder of settings (the step by halves, the accuracy by sqrt(10)) on five
 // problems, from useless to rounding. With GRAVITAS_TABLES each run is a row of motion.csv, which
-// tests/bench/motion_ladders.py draws, of all problems or of the one whose number is GRAVITAS_LADDER; without, two rungs
-// show that errors fall as work grows.
+// tests/bench/motion_ladders.py draws, of all problems or of the one whose number is GRAVITAS_LADDER, of all methods or of
+// GRAVITAS_LADDER_METHOD; without, two rungs show that errors fall as work grows.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <ranges>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -108,17 +109,18 @@ class Table {
 TEST(Ladders, AreClimbedWhereATableIsAskedFor) {
   if (harness::table_folder() == nullptr) GTEST_SKIP() << "GRAVITAS_TABLES is not set";
   Table table(std::string(harness::table_folder()) + "/motion.csv");
-  const char* only = std::getenv("GRAVITAS_LADDER");
+  const char *only = std::getenv("GRAVITAS_LADDER"), *climber = std::getenv("GRAVITAS_LADDER_METHOD");
+  const auto climbs = [&](const MotionMethod& method) { return climber == nullptr || method.name == climber; };
   for (const Ladder& ladder : ladders()) {
     if (only != nullptr && std::string(only) != ladder.number) continue;
-    for (const MotionMethod& method : harness::fixed_step_methods())
+    for (const MotionMethod& method : harness::fixed_step_methods() | std::views::filter(climbs))
       for (int rung = 0; rung < ladder.rungs; ++rung) {
         const std::uint32_t steps = ladder.coarsest << rung;
         table.write(ladder, method, "time_step_s", ladder.problem.duration / steps, steps);
       }
     for (int half_digits = 4; half_digits <= 26; ++half_digits) {
       const double accuracy = std::pow(10.0, -0.5 * half_digits);
-      for (const MotionMethod& method : harness::adaptive_methods(accuracy))
+      for (const MotionMethod& method : harness::adaptive_methods(accuracy) | std::views::filter(climbs))
         table.write(ladder, method, "accuracy", accuracy, ladder.adaptive_steps);
     }
   }

@@ -239,9 +239,9 @@ TEST(LocalMotion, MeasuresChanges) {
     EXPECT_EQ(motion.size_of(change), HUGE_VAL);
   }
   // places are rounded to 1e-10 m there, which makes 1e-7 m/s of a spring that answers within a millisecond
-  EXPECT_NEAR(motion.rounding(0.0), 2.2e-10, 1e-11);
-  EXPECT_GT(motion.rounding(1e3), 5e-8);
-  EXPECT_LE(motion.rounding(1e3), 2.3e-7);
+  EXPECT_EQ(motion.rounding(1e-3, 0.0), 0.0);
+  EXPECT_GT(motion.rounding(1e-3, 1e3), 5e-8);
+  EXPECT_LE(motion.rounding(1e-3, 1e3), 2.3e-7);
   Eigen::VectorXd y = motion.start();
   y.segment<3>(3) = motion.longest() * motion.twist_at_start(0).angular;
   EXPECT_TRUE(motion.is_in_chart(y));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -121,18 +122,33 @@ TEST(ProfileLdlt, ContradictionsStayAmongTheRowsThatDepend) {
   EXPECT_EQ(rounded, before);
 }
 
-// Large sides of a mechanism hide no contradiction of another one.
+// Large sides of a mechanism hide no contradiction of another one, whichever way their rows are ordered.
 TEST(ProfileLdlt, ContradictionsAreSeenBesideLargerSides) {
-  ProfileLdlt factor;
-  factor.start({0, 0, 2, 2, 4, 4});
-  for (std::size_t i = 0; i < 6; ++i)
-    for (std::size_t j = i - i % 2; j <= i; ++j) factor.entry(i, j) = 2.0;
-  factor.factorise();
-  ASSERT_EQ(factor.dropped(), 3U);
-  std::vector<double> side = {1e12, 1e12, 1.0, 1.001, -1e12, -1e12};
-  EXPECT_NEAR(factor.make_consistent(&side), 1e-3 * std::sqrt(0.5), 1e-12);
-  EXPECT_NEAR(side[2], 1.0005, 1e-12);
-  EXPECT_NEAR(side[3], 1.0005, 1e-12);
+  for (const std::vector<std::size_t>& mechanism :
+       {std::vector<std::size_t>{0, 0, 1, 1, 2, 2}, std::vector<std::size_t>{0, 1, 0, 1, 2, 2}}) {
+    std::vector<std::size_t> first(6);
+    for (std::size_t i = 0; i < 6; ++i)
+      first[i] =
+          static_cast<std::size_t>(std::find(mechanism.begin(), mechanism.end(), mechanism[i]) - mechanism.begin());
+    ProfileLdlt factor;
+    factor.start(first);
+    for (std::size_t i = 0; i < 6; ++i)
+      for (std::size_t j = first[i]; j <= i; ++j) factor.entry(i, j) = mechanism[i] == mechanism[j] ? 2.0 : 0.0;
+    factor.factorise();
+    ASSERT_EQ(factor.dropped(), 3U);
+    std::vector<double> side;
+    double contradicts = 0.0;
+    for (const std::size_t which : mechanism) {
+      side.push_back(which == 0 ? 1e12 : which == 2 ? -1e12 : 1.0 + contradicts);
+      if (which == 1) contradicts = 1e-3;
+    }
+    EXPECT_NEAR(factor.make_consistent(&side), 1e-3 * std::sqrt(0.5), 1e-12);
+    for (std::size_t i = 0; i < 6; ++i) {
+      if (mechanism[i] == 1) {
+        EXPECT_NEAR(side[i], 1.0005, 1e-12);
+      }
+    }
+  }
 }
 
 TEST(ProfileLdlt, OfNothing) {

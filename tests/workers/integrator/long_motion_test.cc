@@ -399,6 +399,23 @@ TEST_P(StiffMotion, SolvesForBodiesTogether) {
   EXPECT_LT((momentum - Vector3(0, 1.2, 0)).norm(), 1e-9);
 }
 
+// One that turns 1e14 times in the step is not followed for ever.
+TEST_P(StiffMotion, EndsWhateverTurns) {
+  for (const double rate : {1e16, 1e40}) {
+    IntegratorProblem problem(GetParam(), {1e-6});
+    problem.wrench_is_constant = false;
+    problem.bodies = {FreeBody{.moments = Vector3(1, 1, 1)}};
+    problem.bodies[0].state.twist.angular = Vector3(0, 0, rate);
+    int derivatives = 0;
+    problem.plugin.derivative = [&](const stage::IntegratorDerivativeRequest&) {
+      // some 1e4 inner steps
+      EXPECT_LT(++derivatives, 100'000);
+      return std::vector<double>{derivatives < 100'000 ? 0.0 : HUGE_VAL, 0, 0, 0, 0, 0};
+    };
+    problem.plugin.refusal(stage::Method::kIntegratorIntegrate, problem.request());
+  }
+}
+
 // Two masses on a stiff, damped spring that turn about each other, at the length at which it holds them: they stay there.
 class TurningSpring {
  public:
@@ -457,6 +474,73 @@ TEST(Radau, TakesLongStepsFarFromTheOrigin) {
   }
 }
 
+// A stiff rate that falls within the step: the error's second estimate, from the state that it leads to, is small, and what
+// the rounds leave has to be, too.
+TEST(Radau, EndsItsRoundsWhereATransientEnds) {
+  for (const double slope : {-4.0, 0.0, 3.0}) {
+    for (const double speed : {1e-2, 1e-1}) {
+      IntegratorProblem problem("integrator_radau", {1e-6});
+      problem.wrench_is_constant = false;
+      problem.bodies = {FreeBody{.mass = 1.0}};
+      problem.bodies[0].state.twist.linear = Vector3(speed, 0, 0);
+      problem.plugin.derivative = [=](const stage::IntegratorDerivativeRequest& q) {
+        return std::vector<double>{-1e8 * (1.0 + slope * q.time()) * q.linear_velocity()[0], 0, 0, 0, 0, 0};
+      };
+      problem.step();
+      EXPECT_LT(std::fabs(problem.bodies[0].state.twist.linear.x()), 1e-6) << slope << ' ' << speed;
+    }
+  }
+}
+
+// A body on a stiff spring of a length, kicked along it after a quiet step: it is not thrown through the anchor.
+TEST(Radau, GuessesNoStatesThatStiffForcesDoNotReach) {
+  for (const double stiffness : {1e10, 1e12, 1e14}) {
+    for (const double ratio : {0.1, 1.0}) {
+      for (const double time_step : {1.0 / 60.0, 0.1}) {
+        IntegratorProblem problem("integrator_radau", {1e-3});
+        problem.wrench_is_constant = false;
+        problem.bodies = {FreeBody{.mass = 1.0}};
+        problem.bodies[0].state.pose.position = Vector3(1, 0, 0);
+        const double damping = 2.0 * ratio * std::sqrt(stiffness);
+        problem.plugin.derivative = [=](const stage::IntegratorDerivativeRequest& q) {
+          const Vector3 d = vector_at(q.position(), 0), along = d.normalized();
+          const Vector3 force =
+              -(stiffness * (d.norm() - 1.0) + damping * along.dot(vector_at(q.linear_velocity(), 0))) * along;
+          return std::vector<double>{force.x(), force.y(), force.z(), 0, 0, 0};
+        };
+        problem.time_step = time_step;
+        problem.step();
+        problem.bodies[0].state.twist.linear = Vector3(10, 0, 0);
+        problem.changed = {1};
+        problem.steps(3);
+        EXPECT_NEAR(problem.bodies[0].state.pose.position.x(), 1.0, 1e-3)
+            << stiffness << ' ' << ratio << ' ' << time_step;
+      }
+    }
+  }
+}
+
+// What rounding leaves of fast bodies ends rounds, too.
+TEST(Radau, MovesFastBodiesInOneInnerStep) {
+  for (const auto& [speed, turning, time_step, accuracy] :
+       {std::array{1e3, 1.0, 1.0, 1e-6}, {3e4, 10.0, 0.1, 1e-12}, {1e5, 50.0, 0.03, 1e-10}, {0.0, 1.0, 1.0, 1e-6}}) {
+    IntegratorProblem problem("integrator_radau", {accuracy});
+    problem.wrench_is_constant = false;
+    problem.bodies = {FreeBody{.mass = 1.0, .moments = Vector3(1, 1, 1)}};
+    problem.bodies[0].state.twist = {Vector3(speed, -speed, 0.3 * speed), Vector3(0, 0.6 * turning, 0.8 * turning)};
+    const double force = speed == 0.0 ? 1e6 : 1.0;
+    int derivatives = 0;
+    problem.plugin.derivative = [&](const stage::IntegratorDerivativeRequest&) {
+      ++derivatives;
+      return std::vector<double>{force, 0, 0, 0, 0, 0};
+    };
+    problem.time_step = time_step;
+    problem.steps(20);
+    // a step of one inner step, asked twice: a Jacobian and ten rounds
+    EXPECT_LT(derivatives, 20 * 2 * (1 + 12 + 3 * 10)) << speed;
+  }
+}
+
 TEST(Radau, TakesShortTimeStepsAtOnce) {
   for (const double time_step : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
     TurningSpring spring("integrator_radau", 1e-6);
@@ -499,7 +583,7 @@ TEST_P(EveryIntegrator, ForgetsAStepThatWasRefused) {
   IntegratorProblem quiet(GetParam().first, GetParam().second);
   start(&quiet);
   const MessageColumns right = quiet.plugin.ask(stage::Method::kIntegratorIntegrate, quiet.request());
-  for (int until = 1; until < quiet.plugin.derivatives_asked; until += 1 + until / 4) {
+  for (int until = 0; until < quiet.plugin.derivatives_asked; until += 1 + until / 4) {
     IntegratorProblem problem(GetParam().first, GetParam().second);
     start(&problem);
     const auto spring = problem.plugin.derivative;
@@ -540,7 +624,8 @@ INSTANTIATE_TEST_SUITE_P(Integrators, EveryIntegrator,
                                          std::pair{"integrator_implicit_midpoint", std::vector<double>{}},
                                          std::pair{"integrator_symplectic_splitting", std::vector<double>{4.0}},
                                          std::pair{"integrator_dormand_prince54", std::vector<double>{1e-8}},
-                                         std::pair{"integrator_rosenbrock", std::vector<double>{1e-6}}),
+                                         std::pair{"integrator_rosenbrock", std::vector<double>{1e-6}},
+                                         std::pair{"integrator_radau", std::vector<double>{1e-10}}),
                          [](const auto& given) { return std::string(given.param.first); });
 
 }  // namespace

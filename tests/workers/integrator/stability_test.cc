@@ -36,7 +36,8 @@ std::vector<StabilityMethod> stability_methods() {
           {"integrator_symplectic_splitting", {4}, 2.72},
           {"integrator_symplectic_splitting", {6}, 2.532},
           {"integrator_implicit_midpoint", {}, HUGE_VAL},
-          {"integrator_rosenbrock", {1e-2}, HUGE_VAL}};
+          {"integrator_rosenbrock", {1e-2}, HUGE_VAL},
+          {"integrator_radau", {1e-2}, HUGE_VAL}};
 }
 
 // By how much the energy of a 1 kg oscillator grows in some steps of one second; infinite where a step is refused.

@@ -4,12 +4,13 @@
 //
 //   z_i = h sum_j a_ij f(c_j h, y + z_j),   i = 1 ... 3,      y' = y + z_3.
 //
-// The stages are found by Newton's method with J = df/dy, kept from one inner step to the next, turned with the bodies, while
-// it gains a digit in a round; A^-1 = T diag(g, a +- i b) T^-1 makes one real and one complex system of it
-// (ShiftedJacobian). What is stiff turns within a step, too, and J does not: where that would let errors grow from round to
-// round, rounds are made in axes that turn steadily with each body (find_turns). They end where what they leave of z counts
-// for less than a hundredth of the estimated error and than its power 3/2, which falls as fast as the method's own; where
-// they gain little, for less than a hundredth of Accuracy; and where what they change is rounding. With f_0 at the start, the error is estimated as
+// The stages are found by Newton's method with J = df/dy, kept from one inner step to the next, turned with the bodies,
+// while it gains a digit in a round; A^-1 = T diag(g, a +- i b) T^-1 makes one real and one complex system of it
+// (ShiftedJacobian). What is stiff turns within a step, too, and J does not: where that would let errors grow from round
+// to round, rounds are made in axes that turn steadily with each body (find_turns). They end where what they leave of z
+// counts for less than a hundredth of the estimated error and than its power 3/2, which falls as fast as the method's own;
+// where they gain little, for less than a hundredth of Accuracy; and where what they change is rounding. With f_0 at the
+// start, the error is estimated as
 //
 //   e = (g/h - J)^-1 (f_0 + (d_1 z_1 + d_2 z_2 + d_3 z_3)/h),
 //
@@ -21,9 +22,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <span>
+#include <vector>
 
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/local_motion.h"
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
 #include "plugin_sdk/shifted_jacobian.h"
 
@@ -40,9 +45,9 @@ constexpr double kFrom[kStages][kStages] = {{9.1232394870892943e-2, -0.141255295
 constexpr double kInto[kStages][kStages] = {{4.3255798900631554, 0.33919925181580987, 0.54177053993587487},
                                             {-4.1787185915519047, -0.32768282076106239, 0.47662355450055045},
                                             {-0.50287263494578688, 2.5719269498556054, -0.59603920482822493}};
-constexpr double kInverse[kStages][kStages] = {{3.2247448713915890, 1.1678400846904055, -0.2531972647421810},
-                                               {-3.5678400846904054, 0.7752551286084110, 1.0531972647421810},
-                                               {5.5319726474218110, -7.5319726474218110, 5.0}};        // A^-1
+constexpr double kInverse[kStages][kStages] = {{3.2247448713915889, 1.1678400846904056, -0.25319726474218083},
+                                               {-3.5678400846904057, 0.77525512860841095, 1.0531972647421808},
+                                               {5.5319726474218083, -7.5319726474218083, 5.0}};        // A^-1
 constexpr std::array<double, kStages> kError = {-10.048809399827415, 1.3821427331607483, -1.0 / 3.0};  // d
 
 constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 8.0;
@@ -52,8 +57,8 @@ constexpr int kMostRounds = 10;
 constexpr double kFar = 5.0;          // growth of the second round that ends them
 constexpr double kKeeps = 0.1;        // of what is left, that a round may leave for J to be kept
 constexpr double kGainsLittle = 0.5;  // of what was left, that a round leaves
-constexpr double kAnswered = 12.0;    // d(rate)/d(position) of a stage, per inner step: |A^-1|
-constexpr double kOfRounding = 16.0, kNothing = 1e-15;
+constexpr double kAnswered = 12.0;    // most of d(velocity)/d(position) of a stage, per inner step: |A^-1|
+constexpr double kOfRounding = 16.0, kNothing = 1e-15, kEpsilon = std::numeric_limits<double>::epsilon();
 constexpr double kOfEstimate = 1e-2;  // what rounds may leave
 constexpr double kOfRejected = 0.1;
 
@@ -93,6 +98,10 @@ class Radau final : public IntegratorPlugin {
       const double left = whole - motion_.done();
       // two equal ones in place of a long and a short one
       const double most = std::min(inner, motion_.longest());
+      if (!(most > kShortest * whole))
+        throw Refusal(
+            "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state "
+            "overflows");
       const double h = most >= left ? left : std::min(most, 0.5 * left);
       if (!find_stages(h)) {
         // an old matrix may be all that is wrong, or a guess; one that led nowhere twice is no better than none
@@ -121,8 +130,6 @@ class Radau final : public IntegratorPlugin {
         inner = factor * h;
         has_matrix_ = is_fresh_;
       }
-      if (!(inner > kShortest * whole))
-        throw Refusal("Accuracy cannot be met by any step: forces are not smooth, or the state overflows");
     }
     motion_.write(reply);
     reply.plugin_state().push(inner);
@@ -130,7 +137,7 @@ class Radau final : public IntegratorPlugin {
   }
 
  private:
-  // Of the stages: where the step starts, as if nothing were stiff, or as the inner step before goes on.
+  // Of the stages: where the step starts, as it goes on from there, or as the inner step before goes on.
   enum class Guess : std::uint8_t { kNone, kSmooth, kGoesOn };
   using Stages = std::array<Eigen::VectorXd, kStages>;
 
@@ -152,39 +159,46 @@ class Radau final : public IntegratorPlugin {
       complex_.factorise(motion_, kComplex[0] / h, kComplex[1] / h);
       factored_step_ = h;
     }
-    guess(h);
     find_turns(h);
-    const double rounding = kOfRounding * motion_.rounding(kAnswered / h);
-    double last = HUGE_VAL, remains = HUGE_VAL;
+    guess(h);
+    const double placed = motion_.rounding(h, std::min(kAnswered, answers_) / h);
+    double last = HUGE_VAL;
     for (rounds_ = 1; rounds_ <= kMostRounds; ++rounds_) {
       const double size = improve(h);
       if (!std::isfinite(size)) return false;
       error_ = estimate(h, rate_at_start_);
       rate_ = size / last;
+      const double rounding = kOfRounding * std::max(placed, kEpsilon * motion_.size_of(z_[kStages - 1]));
+      if (size <= kNothing || (std::max(size, last) <= rounding && rate_ > kGainsLittle)) {
+        rate_ = 0.0;  // it says nothing of J
+        if (error_ > accuracy_) estimate_again(h);
+        return has_end();
+      }
       last = size;
-      if (size <= kNothing || (size <= rounding && rate_ > kGainsLittle)) return has_error(h);
       // the first round straightens what bends: it says nothing of the next ones
       if (rounds_ == 1 || (rounds_ == 2 && rate_ < kFar)) continue;
-      if (rate_ >= 1.0) return false;
-      remains = size * rate_ / (1.0 - rate_);
+      if (rate_ >= 1.0) {
+        if (size <= rounding) continue;
+        return false;
+      }
+      const double remains = size * rate_ / (1.0 - rate_);
+      if (error_ > accuracy_ && remains <= kOfRejected * error_) estimate_again(h);
       const double allowed =
           error_ <= accuracy_ ? error_ * std::min(kOfEstimate, std::sqrt(error_)) : kOfRejected * error_;
       const double enough = std::max(allowed, kOfEstimate * accuracy_);
-      if (remains <= (rate_ > kGainsLittle ? enough : allowed)) return has_error(h);
+      if (remains <= (rate_ > kGainsLittle || rounds_ == kMostRounds ? enough : allowed)) return has_end();
       if (remains * math::pow(rate_, kMostRounds - rounds_) > enough) return false;
     }
-    return remains <= kOfEstimate * accuracy_ && has_error(h);
+    return false;
   }
 
+  bool has_end() const { return std::isfinite(error_) && motion_.is_in_chart(motion_.start() + z_[kStages - 1]); }
+
   // An error that is too large may be that of a stiff transient: its own start is taken for the estimate.
-  bool has_error(double h) {
-    if (!std::isfinite(error_) || !motion_.is_in_chart(motion_.start() + z_[kStages - 1])) return false;
-    if (error_ <= accuracy_) return true;
+  void estimate_again(double h) {
     shifted_ = motion_.start() + error_vector_;
-    if (!motion_.is_in_chart(shifted_) || !motion_.evaluate(0.0, shifted_, &shifted_rate_)) return true;
-    const double again = estimate(h, shifted_rate_);
-    if (again <= error_) error_ = again;
-    return true;
+    if (!motion_.is_in_chart(shifted_) || !motion_.evaluate(0.0, shifted_, &shifted_rate_)) return;
+    error_ = std::min(error_, estimate(h, shifted_rate_));
   }
 
   // One round for all stages; by how much they changed, infinite where one cannot be taken.
@@ -215,13 +229,15 @@ class Radau final : public IntegratorPlugin {
   // h |w| in axes that turn with the bodies: those with the lesser share are taken.
   void find_turns(double h) {
     double turn = 0.0, stiffness = 0.0;
+    answers_ = 0.0;
     for (std::size_t b = 0; b < motion_.bodies(); ++b)
       turn = std::max(turn, h * motion_.twist_at_start(b).angular.norm());
     for (const LocalMotion::Group& group : motion_.groups()) {
       double positions = 0.0, velocities = 0.0;
       for (Eigen::Index k = 0; k < group.accelerations.cols(); ++k)
         (k % LocalMotion::kNumbers < 6 ? positions : velocities) += group.accelerations.col(k).squaredNorm();
-      stiffness = std::max(stiffness, h * (std::sqrt(velocities) + h * std::sqrt(positions)));
+      answers_ = std::max(answers_, h * h * std::sqrt(positions));
+      stiffness = std::max(stiffness, h * std::sqrt(velocities) + h * h * std::sqrt(positions));
     }
     turns_.clear();
     if (!(stiffness * turn > 1.0)) return;
@@ -248,19 +264,26 @@ class Radau final : public IntegratorPlugin {
     return error_vector_.allFinite() ? motion_.size_of(error_vector_) : HUGE_VAL;
   }
 
+  // Smooth: s f_0 + s^2/2 J f_0 to that order, and bounded for any stiffness: s R (1 + (g s/2h - 1) (R - 1)) f_0 with
+  // R = (1 - h/g J)^-1.
   void guess(double h) {
     const Eigen::VectorXd& start = motion_.start();
+    if (guess_ == Guess::kSmooth) {
+      mean_rate_ = kReal / h * rate_at_start_;
+      real_.solve(&mean_rate_);
+      bent_ = kReal / h * mean_rate_;
+      real_.solve(&bent_);
+      bent_ -= mean_rate_;
+    }
     bool is_wild = false;
     for (std::size_t i = 0; i < kStages; ++i) {
+      const double s = kNodes[i] * h;
       z_[i].setZero(start.size());
       if (guess_ == Guess::kSmooth) {
-        const double s = kNodes[i] * h;
-        z_[i] = s * rate_at_start_;
-        for (Eigen::Index n = 0; n < start.size(); n += LocalMotion::kNumbers)
-          z_[i].segment<6>(n) += 0.5 * s * s * rate_at_start_.segment<6>(n + 6);
+        z_[i] = s * (mean_rate_ + (0.5 * kReal * kNodes[i] - 1.0) * bent_);
       } else if (guess_ == Guess::kGoesOn) {
         // Lagrange's polynomial, through 0 at 0 and the stages at their nodes
-        const double at = 1.0 + kNodes[i] * h / last_step_;
+        const double at = 1.0 + s / last_step_;
         Eigen::VectorXd y = last_start_;
         for (std::size_t j = 0; j < kStages; ++j) {
           double share = at / kNodes[j];
@@ -302,6 +325,7 @@ class Radau final : public IntegratorPlugin {
   double factored_step_ = 0.0;                                     // that they are for
   bool has_rate_ = false, has_matrix_ = false, is_fresh_ = false;  // the matrix: of this inner step's start
   Stages z_, rates_;
+  double answers_ = 0.0;        // h times the rate at which velocities answer positions, at most
   std::vector<Matrix3> turns_;  // by stage and body; empty: none
   double error_ = 0.0, rate_ = 0.0;
   int rounds_ = 0;
@@ -309,7 +333,7 @@ class Radau final : public IntegratorPlugin {
   double last_step_ = 0.0;  // of the inner step before
   Stages last_z_;
   Eigen::VectorXd last_start_, last_end_;
-  Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_, shifted_;
+  Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_, shifted_, mean_rate_, bent_;
   std::vector<double> room_;
 };
 

@@ -73,7 +73,12 @@ class Rosenbrock final : public IntegratorPlugin {
     bool has_matrix = false;
     while (motion_.done() < whole && !motion_.is_empty()) {
       host.mark_progress();
-      const double h = std::min({inner, motion_.longest(), whole - motion_.done()});
+      const double most = std::min(inner, motion_.longest());
+      if (!(most > kShortest * whole))
+        throw Refusal(
+            "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state "
+            "overflows");
+      const double h = std::min(most, whole - motion_.done());
       if (!has_matrix) differentiate(h);
       has_matrix = true;
       const double error = attempt(h) / accuracy_;
@@ -84,8 +89,6 @@ class Rosenbrock final : public IntegratorPlugin {
         worst = std::max(worst, error);
         motion_.accept(h, sum_);
         has_matrix = false;
-      } else if (!(inner > kShortest * whole)) {
-        throw Refusal("Accuracy cannot be met by any step: forces are not smooth, or the state overflows");
       }
     }
     motion_.write(reply);
