@@ -32,10 +32,14 @@ StepOutcome Environment::step() {
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
     finish_step();
-  } catch (const StageFault& fault) {
+  } catch (...) {
     return_to_start();
     figures_ = figures;
-    fault_ = FaultRecord{step_count_ + 1, fault};
+    try {
+      throw;
+    } catch (const StageFault& fault) {
+      fault_ = FaultRecord{step_count_ + 1, fault};
+    }
     return StepOutcome::kPaused;
   }
   step_profile_.add(lap_between(start, lap_ns_));

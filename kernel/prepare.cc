@@ -82,8 +82,7 @@ void Environment::bind(const ConstraintGroup& group) {
       [&](const auto& answer) { return validator_.bound(answer, group); });
 }
 
-// The forces are asked once in the initial state. If all say that this is their answer for ever, they are not
-// asked again and their host is let go.
+// Forces are asked in the initial state. If all say that it is their answer for ever, their host is let go.
 void Environment::ask_constant_forces() {
   if (!force_.is_running()) return;
   data_.derivative_time[0] = 0.0;

@@ -1,7 +1,5 @@
 #include "kernel/spare.h"
 
-#include <utility>
-
 namespace gravitas::kernel {
 
 Spare::Spare(SlotDescription host, std::uint32_t threads, const HostStarter& start)
@@ -12,6 +10,8 @@ Spare::Spare(SlotDescription host, std::uint32_t threads, const HostStarter& sta
           carrier = start(host, threads, stop);
         } catch (const StageFault& failed) {
           fault = failed;
+        } catch (const std::exception& failed) {
+          fault.emplace(FaultKind::kHandshake, "start", failed.what());
         }
         const std::lock_guard lock(mutex_);
         carrier_ = std::move(carrier);

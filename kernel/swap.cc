@@ -214,8 +214,7 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, Arena* aren
   }
 }
 
-// The same request to another process of the same plugins: other bytes mean that one of the two is wrong, and a third
-// says which.
+// The same request to another process of the same plugins: of two that differ one is wrong, and a third says which.
 void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
                       const std::function<void()>& recheck) {
   const std::size_t host = routes_[call.target].host;

@@ -97,8 +97,7 @@ void SharedMemoryCarrier::drain() {
 
 SharedMemoryCarrier::~SharedMemoryCarrier() { drain(); }
 
-// Room in the response segment for the reply's columns, as much as the arena has, and behind it for the trial
-// states of derivative requests.
+// Room in the response segment for the reply's columns, as the arena has, and behind it for trial states of derivatives.
 void SharedMemoryCarrier::make_rooms(const StageCall& call, const Arena& arena, const DerivativeSource* derivatives) {
   std::uint64_t offset = 0;
   open_->room_count = 0;

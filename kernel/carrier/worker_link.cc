@@ -32,8 +32,7 @@ std::string program = [] {
 
 bool sandboxed = true;
 
-// What a worker may take of address space: `gravitas-worker` has this limit of its own, and more only with threads in
-// hundreds, whose stacks count.
+// What a worker may take of address space, as `gravitas-worker` has it; more with threads in hundreds, for their stacks.
 constexpr std::uint64_t kWorkerMemory = std::uint64_t{4} << 30;
 constexpr std::uint64_t kThreadMemory = std::uint64_t{16} << 20;
 

@@ -54,8 +54,7 @@ void ProfileLdlt::factorise(double least) {
       row[j - from] = scaled / pivot_[j];
       pivot -= scaled * row[j - from];
     }
-    if (pivot > std::max(least, kDependent) * diagonal &&
-        (pivot > kDoubtful * diagonal || pivot > rounding_of_pivot(i))) {
+    if (pivot > std::max(least, kDependent) * diagonal && (pivot > kDoubtful * diagonal || !is_rounding(i, pivot))) {
       pivot_[i] = pivot;
       if (pivot < least_pivot_ * diagonal) least_pivot_ = pivot / diagonal, weakest_ = i;
     } else {
@@ -73,11 +72,29 @@ std::vector<double> ProfileLdlt::difference(std::size_t row) const {
   return z;
 }
 
-double ProfileLdlt::rounding_of_pivot(std::size_t row) const {
-  const std::vector<double> z = difference(row);
-  double sum = 0.0;
-  for (std::size_t k = 0; k <= row; ++k) sum += z[k] * z[k] * values_[begin_[k + 1] - 1];
-  return kRounding * sum;
+// z is found from its row down, and no further than where the rest, however much it grows, adds too little.
+bool ProfileLdlt::is_rounding(std::size_t row, double pivot) {
+  constexpr double kGrowth = 1e3;        // of squares, times the least pivot
+  constexpr std::size_t kRowsOfOne = 6;  // joint: what is to come is looked at now and then
+  const double most = pivot / kRounding;
+  const auto diagonal = [&](std::size_t k) { return values_[begin_[k + 1] - 1]; };
+  combination_.assign(row, 0.0);
+  std::size_t lowest = first_[row];
+  for (std::size_t j = first_[row]; j < row; ++j)
+    if (pivot_[j] > 0.0) combination_[j] = -values_[begin_[row] + j - first_[row]];
+  double sum = diagonal(row);
+  for (std::size_t k = row; k-- > lowest && sum < most;) {
+    const double known = combination_[k];
+    if (known == 0.0) continue;
+    sum += known * known * diagonal(k);
+    lowest = std::min(lowest, first_[k]);
+    for (std::size_t j = first_[k]; j < k; ++j) combination_[j] -= values_[begin_[k] + j - first_[k]] * known;
+    if (k % kRowsOfOne != 0) continue;
+    double rest = 0.0;
+    for (std::size_t j = lowest; j < k; ++j) rest += combination_[j] * combination_[j] * diagonal(j);
+    if (sum + kGrowth / least_pivot_ * rest < most) return false;
+  }
+  return sum >= most;
 }
 
 void ProfileLdlt::solve_transposed(std::vector<double>* x) const {

@@ -48,7 +48,8 @@ class ProfileLdlt {
 
   // 1 at the row, and minus its combination of the rows before.
   std::vector<double> difference(std::size_t row) const;
-  double rounding_of_pivot(std::size_t row) const;
+  // May the pivot of a row be what rounding left there?
+  bool is_rounding(std::size_t row, double pivot);
   bool is_consistent(const std::vector<double>& b) const;
   void find_null_space() const;
   // L^-T applied in place.
@@ -56,6 +57,7 @@ class ProfileLdlt {
 
   std::vector<std::size_t> first_, begin_;
   std::vector<double> values_, pivot_;  // 0: dropped
+  std::vector<double> combination_;     // scratch
   double least_pivot_ = 1.0;
   std::size_t weakest_ = 0;
   std::vector<std::size_t> dropped_;

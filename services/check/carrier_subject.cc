@@ -159,6 +159,7 @@ std::string CarrierSubject::last_call() const {
 }
 
 Answer CarrierSubject::ask(stage::Method method, const MessageColumns& request, const DerivativeFunction& derivative) {
+  if (patience_.ends && patience_.ends()) throw Interrupted();
   last_method_ = method;
   last_request_ = std::make_unique<MessageColumns>(request);
   Derivatives derivatives(this, derivative);

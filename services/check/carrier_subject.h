@@ -5,6 +5,7 @@
 #include <array>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -19,10 +20,14 @@
 namespace gravitas::check {
 
 struct Patience {
-  double deadline = 2.0;  // s, of a call from its last mark of progress
-  double cap = 20.0;      // s, of a call whatever its marks
-  double start = 10.0;    // s, to describe itself or to answer a greeting
+  double deadline = 2.0;            // s, of a call from its last mark of progress
+  double cap = 20.0;                // s, of a call whatever its marks
+  double start = 10.0;              // s, to describe itself or to answer a greeting
+  std::function<bool()> ends = {};  // asked before each call; absent: never
 };
+
+// Instead of an answer, where patience ends.
+struct Interrupted {};
 
 class CarrierSubject final : public conformance::Subject {
  public:

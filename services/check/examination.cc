@@ -44,7 +44,9 @@ class Run {
  public:
   Run(const Examinee& examinee, const Options& options, const std::function<void(const Progress&)>& progress,
       const std::function<bool()>& interrupted)
-      : examination_(examinee, options, progress), interrupted_(interrupted) {}
+      : examination_(examinee, options, progress), interrupted_(interrupted) {
+    examination_.patience.ends = interrupted;
+  }
 
   report::v1::CheckReport report();
 
@@ -126,7 +128,13 @@ void Run::judge_level(Level level, const std::vector<CheckCase>& cases) {
     examination_.now = {conformance::level_name(level), one.name, 0, 0};
     examination_.show(0, 0);
     examination_.blamed_call.clear();
-    const std::string finding = judge(one);
+    std::string finding;
+    try {
+      finding = judge(one);
+    } catch (const Interrupted&) {
+      verdict.set_left_out(verdict.left_out() + 1);
+      continue;
+    }
     verdict.set_cases(verdict.cases() + 1);
     if (finding.empty()) continue;
     verdict.set_failed(verdict.failed() + 1);

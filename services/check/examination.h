@@ -40,7 +40,7 @@ class Examination {
 
   const Examinee& examinee;
   const Options options;
-  const Patience patience;
+  Patience patience;
 
   // The ordinary questions. Throws std::runtime_error if they cannot be put.
   const std::vector<conformance::Question>& questions();
@@ -95,7 +95,7 @@ std::vector<CheckCase> numbers_cases(const PluginDeclaration& declaration);
 // All cases of a plugin, in the order of the levels.
 std::vector<CheckCase> all_cases(const PluginDeclaration& declaration);
 
-// Runs them. `interrupted` is asked between cases.
+// Runs them. `interrupted` is asked between cases and before each call.
 report::v1::CheckReport examine(const Examinee& examinee, const Options& options,
                                 const std::function<void(const Progress&)>& progress,
                                 const std::function<bool()>& interrupted);

@@ -101,6 +101,12 @@ void print_solutions(const report::v1::ReplayReport& report) {
                              one.stop_reason());
 }
 
+// A damaged capsule shows nothing of the calls that cannot be read.
+int verdict(const report::v1::ReplayReport& report, std::uint64_t failures) {
+  if (failures > 0) return kExaminedFailed;
+  return report.note().empty() ? kDone : kBadInput;
+}
+
 int replay(ReplayLine* line) {
   line->options.hosting = parse_hosting_mode("--hosting", line->hosting, line->hosting);
   if (!line->plugin.empty()) line->options.plugin = line->plugin;
@@ -123,7 +129,7 @@ int replay(ReplayLine* line) {
     print_first(report);
   }
   if (interrupted()) return kInterrupted;
-  return report.different() + report.failed_again() == 0 ? kDone : kExaminedFailed;
+  return verdict(report, report.different() + report.failed_again());
 }
 
 int bisect(ReplayLine* line) {
@@ -143,7 +149,7 @@ int bisect(ReplayLine* line) {
     print_first(report);
   }
   if (interrupted()) return kInterrupted;
-  return report.different() == 0 ? kDone : kExaminedFailed;
+  return verdict(report, report.different());
 }
 
 void add_replay_options(CLI::App* command, ReplayLine* line) {
@@ -183,7 +189,7 @@ void add_replay(CLI::App* app, Action* action) {
       "         gravitas replay solver.capsule --plugin Newton --json\n"
       "Of a solver it says how each problem ended: iterations, residual, why it stopped. The file is described in "
       "schemas/gravitas/recorder/v1/capsule.proto.\n"
-      "Exits with 4 if an answer differs from the run's, or if there is none.");
+      "Exits with 4 if an answer differs from the run's, or if there is none; else with 2 if the file is damaged.");
   add_replay_options(command, line.get());
   command->add_option("--plugin", line->plugin,
                       "A library, a command or the name of an installed plugin, instead of the one that answered");

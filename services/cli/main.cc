@@ -1,6 +1,9 @@
 // gravitas: one program, sub-commands. Results go to standard output, everything else to standard error.
+#include <sys/resource.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -25,6 +28,14 @@ std::string unknown_subcommand(const CLI::App& app, const std::vector<std::strin
     command = command->get_subcommand(word);
   }
   return {};
+}
+
+// Workers of many slots, with their standbys, take more files than shells allow at first.
+void raise_descriptor_limit() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(RLIMIT_NOFILE, &limit);
 }
 
 }  // namespace
@@ -62,8 +73,12 @@ int main(int argc, char** argv) {
     const int code = app.exit(error, std::cout, std::cerr);
     return code == 0 ? cli::kDone : cli::kBadInput;
   }
+  raise_descriptor_limit();
   try {
-    return action();
+    const int code = action();
+    if (std::cout.flush() && std::fflush(stdout) == 0) return code;
+    std::cerr << "gravitas: standard output cannot be written\n";
+    return cli::kOurFault;
   } catch (const BadInput& problem) {
     std::cerr << problem.what() << '\n';
     return cli::kBadInput;

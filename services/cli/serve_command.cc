@@ -55,9 +55,11 @@ int serve(ServeLine* line) {
                              server.address().empty() ? "" : " and " + server.address())
               << std::flush;
     loop.run();
+    run.interrupt();
   }
-  std::cout << control::status_page(run.status());
-  return kDone;
+  const control_api::v1::Status status = run.status();
+  std::cout << control::status_page(status);
+  return status.state() == "finished" ? kDone : kInterrupted;
 }
 
 }  // namespace
@@ -68,9 +70,8 @@ void add_serve(CLI::App* app, Action* action) {
   command->footer(
       "Example: gravitas serve deploy/scenes/two_spheres_motor.gravitas --headless --duration 3600 &\n"
       "         gravitas ctl status; gravitas ctl swap solver=Sequential,hosting=direct\n"
-      "Ends with Ctrl-C. The socket is the only guard: whoever may open it, or reaches the address, controls the run "
-      "and "
-      "what it loads.");
+      "Ends with Ctrl-C (exit code 130; 0 after the last step). The socket is the only guard: whoever may open it, or "
+      "reaches the address, controls the run and what it loads.");
   line->scene.add_to(command);
   command->add_flag("--headless", line->headless, "The control API alone, without the page");
   command->add_option("--speed", line->options.speed,

@@ -78,11 +78,18 @@ ServedRun::ServedRun(const ServeOptions& options)
   });
 }
 
-ServedRun::~ServedRun() { loop_.stop(); }
+ServedRun::~ServedRun() {
+  interrupt();
+  loop_.stop();
+}
+
+kernel::HostStarter ServedRun::starter() {
+  return interruptible(capsule::recording(tape_), [this] { return is_ending_.load(); });
+}
 
 void ServedRun::begin_environment() {
   // where the new one cannot be made the old one stays
-  auto environment = start(first_description_, capsule::recording(tape_));
+  auto environment = start(first_description_, starter());
   close_capture();
   survey_.reset();
   environment_ = std::move(environment);
@@ -178,6 +185,8 @@ void ServedRun::make_step() {
       return keep_faulted_state();
     }
     figures_->follow(environment_.get());
+  } catch (const StepInterrupted&) {
+    return;
   } catch (const std::exception& problem) {
     fault_ = problem.what();
     return keep_faulted_state();

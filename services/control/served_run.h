@@ -8,6 +8,7 @@
 // What can never be throws BadInput, what cannot be now NotNow; both say what is allowed.
 #pragma once
 
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -32,6 +33,7 @@
 #include "services/recorder/reaction_log.h"
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
+#include "services/run/interruptible_host.h"
 #include "services/run/session.h"
 #include "services/survey/instrumentation.h"
 
@@ -61,6 +63,9 @@ class ServedRun final : private kernel::CommitListener {
   const std::string& scene() const { return scene_name_; }
   // Of the reader, for whoever started it.
   const std::vector<std::string>& scene_warnings() const { return scene_warnings_; }
+
+  // Gives up the step in hand, and makes no other one; what was committed can still be asked for. From any thread.
+  void interrupt() { is_ending_ = true; }
 
   api::Status status();
   void pause();
@@ -113,6 +118,8 @@ class ServedRun final : private kernel::CommitListener {
     boost::asio::post(loop_, std::move(task));
     return done.get();
   }
+
+  kernel::HostStarter starter();
 
   // All of these in the stepping thread.
   void begin_environment();
@@ -198,6 +205,7 @@ class ServedRun final : private kernel::CommitListener {
   std::uint32_t anchor_step_ = 0, rate_step_ = 0;
   double rate_ = 0.0;  // 1/s
 
+  std::atomic<bool> is_ending_ = false;
   boost::asio::io_context loop_;
   boost::asio::steady_timer timer_;
   bool is_scheduled_ = false;

@@ -84,7 +84,8 @@ void Figures::follow(kernel::Environment* environment) {
   last_ = totals(environment);
   if (!initial_) reference_energy_ = (initial_ = last_)->energy();
   largest_kinetic_ = std::max(largest_kinetic_, last_.kinetic);
-  largest_deviation_ = std::max(largest_deviation_, std::fabs(last_.energy() - reference_energy_));
+  const double deviation = std::fabs(last_.energy() - reference_energy_);
+  largest_deviation_ = std::max(largest_deviation_, std::isfinite(deviation) ? deviation : HUGE_VAL);
   penetration_ = std::max(penetration_, environment->figures().penetration);
   joint_error_ = std::max(joint_error_, environment->figures().joint_error);
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());

@@ -28,6 +28,7 @@
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
+#include "services/run/interruptible_host.h"
 #include "services/run/kernel_names.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
@@ -48,37 +49,6 @@ std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
 
 std::string paused_checkpoint(const RunOptions& options) {
   return checkpoint_target(std::filesystem::path(options.scenes[0]).stem().string() + ".paused.checkpoint");
-}
-
-recorder::v1::CapsuleHeader capsule_header(const RunOptions& options, Slot slot) {
-  recorder::v1::CapsuleHeader header;
-  header.set_build(GRAVITAS_BUILD_ID);
-  header.set_scene(fmt::format("{}", fmt::join(options.scenes, " ")));
-  header.set_slot(slot_name(slot));
-  header.set_threads(options.threads);
-  return header;
-}
-
-std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, const kernel::PoisonedCall& poisoned) {
-  recorder::v1::CapsuleHeader header = capsule_header(options, poisoned.plugin.declaration.slot);
-  header.set_poison(true);
-  recorder::v1::CapsuleCall call = capsule::begin_call(poisoned.call, poisoned.arena);
-  call.set_step(step);
-  call.set_fault(poisoned.fault.text());
-  const std::string path = fmt::format("{}.{}.step{}.capsule", std::filesystem::path(options.scenes[0]).stem().string(),
-                                       header.slot(), step);
-  try {
-    capsule::Writer writer(path, header);
-    writer.add_plugin(poisoned.plugin);
-    writer.add_call(call);
-    writer.close();
-    return fmt::format(
-        "slot {}, plugin {}: the request that it fails at in step {} is kept; to ask it alone: gravitas replay {}",
-        header.slot(), poisoned.plugin.declaration.name, step, path);
-  } catch (const std::system_error& problem) {
-    return fmt::format("the request that plugin {} fails at in step {} could not be kept: {}",
-                       poisoned.plugin.declaration.name, step, problem.what());
-  }
 }
 
 namespace {
@@ -106,8 +76,9 @@ bool is_full(const std::error_code& code) {
 // A run in its phases. What fails on the way ends the stepping and is kept; the phases after it still do what they can.
 class Run final : private kernel::CommitListener {
  public:
-  explicit Run(const RunOptions& options)
+  Run(const RunOptions& options, const std::function<bool()>& interrupted)
       : options_(options),
+        interrupted_(interrupted),
         description_(load(options, &warnings_, &catalog_, &scene_)),
         identity_(identity_of(description_)) {}
 
@@ -121,7 +92,7 @@ class Run final : private kernel::CommitListener {
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
-    environment_ = start(begun, options_.starter);
+    environment_ = start(begun, starter());
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
     if (options_.listener) begin_listening();
     attend();
@@ -155,18 +126,16 @@ class Run final : private kernel::CommitListener {
       event_source_.emplace(events_.get(), event_kinds_, options_.ongoing_rate.value_or(kOngoingRate));
   }
 
-  void go(const std::function<bool()>& interrupted, const std::function<void(const Progress&)>& progress) {
+  void go(const std::function<void(const Progress&)>& progress) {
     const Clock::time_point begin = Clock::now();
     guard([&] {
       offer_sample(is_done());
       while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
-        if (interrupted()) {
+        if (interrupted_()) {
           result_.outcome = RunOutcome::kInterrupted;
         } else if (!make_due_edit()) {
           break;
-        } else if (environment_->step() == kernel::StepOutcome::kPaused) {
-          pause(*environment_->fault());
-        } else {
+        } else if (make_step()) {
           figures_->follow(environment_.get());
           offer_sample(is_done());
           progress({environment_->time(), environment_->time_step() * description_.steps, environment_->step_count(),
@@ -175,6 +144,25 @@ class Run final : private kernel::CommitListener {
       }
     });
     wall_seconds_ = std::chrono::duration<double>(Clock::now() - begin).count();
+  }
+
+  // False if it ended the run.
+  bool make_step() {
+    is_stepping_ = true;
+    try {
+      if (environment_->step() == kernel::StepOutcome::kPaused) pause(*environment_->fault());
+    } catch (const StepInterrupted&) {
+      result_.outcome = RunOutcome::kInterrupted;
+    } catch (...) {
+      is_stepping_ = false;
+      throw;
+    }
+    is_stepping_ = false;
+    return result_.outcome == RunOutcome::kCompleted;
+  }
+
+  kernel::HostStarter starter() {
+    return interruptible(options_.starter, [this] { return is_stepping_ && interrupted_(); });
   }
 
   // Whatever ended the run: the last commit is kept where a checkpoint is wanted or needed.
@@ -352,7 +340,7 @@ class Run final : private kernel::CommitListener {
     kernel::EnvironmentDescription active = description_, begun = edited.description();
     put_in_place(&active);
     keep_who_answers(description_, active, &begun);
-    std::unique_ptr<kernel::Environment> next = start(begun, options_.starter);
+    std::unique_ptr<kernel::Environment> next = start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
     for (const std::string& warning : edited.warnings())
@@ -520,6 +508,8 @@ class Run final : private kernel::CommitListener {
   void write_past();
 
   const RunOptions& options_;
+  const std::function<bool()>& interrupted_;
+  bool is_stepping_ = false;
   std::vector<std::string> warnings_;
   Catalog catalog_;
   scene::v1::Scene scene_;
@@ -589,10 +579,10 @@ void Run::write_report() {
 
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {
-  Run one(options);
+  Run one(options, interrupted);
   one.prepare();
   one.open_files();
-  one.go(interrupted, progress);
+  one.go(progress);
   one.keep_last_state();
   one.finish();
   return one.take_result();

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <iterator>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -89,6 +91,20 @@ TEST_P(Supervised, DeathsThatNobodyAsksAboutHoldNoDescriptor) {
   // what has died is put away in threads of their own
   for (int i = 0; i < 1000 && descriptors() > before; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_LE(descriptors(), before);
+}
+
+// Whatever ends the start of a worker, it is told, and ends nothing else.
+TEST_P(Supervised, AHostThatCannotBeStartedForWantOfFilesIsAFault) {
+  const kernel::HostStarter starter = [](const kernel::SlotDescription&, std::uint32_t,
+                                         std::stop_token) -> std::unique_ptr<kernel::Carrier> {
+    throw std::system_error(EMFILE, std::generic_category(), "memfd_create");
+  };
+  try {
+    Environment world(builder().description(), starter);
+    FAIL();
+  } catch (const kernel::StageFault& fault) {
+    EXPECT_THAT(fault.text(), HasSubstr("memfd_create: Too many open files"));
+  }
 }
 
 TEST_P(Supervised, AHangingWorkerIsReplacedAtItsDeadline) {

@@ -189,6 +189,21 @@ TEST(Capsule, BytesOfAnyKindAreReadWithoutHarm) {
   }
 }
 
+// What cannot be read shows nothing of the plugin.
+TEST(Capsule, ADamagedOneIsBadInput) {
+  const ScratchFolder folder;
+  const std::string whole = harness::read_file(capture("solver", folder));
+  for (const std::size_t size : {whole.size() - 10, whole.size() / 2}) {
+    const std::string cut = folder.write("cut.capsule", whole.substr(0, size));
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"replay", cut}, {"bisect", cut, "Sequential", "Sequential"}}) {
+      const ProgramResult result = run_program(words, folder);
+      EXPECT_EQ(result.exit_code, 2) << result.out;
+      EXPECT_THAT(result.err, HasSubstr("it is cut short"));
+    }
+  }
+}
+
 TEST(Capsule, RefusalsSayWhatIsAllowed) {
   const ScratchFolder folder;
   const std::string scene = shipped_scene("two_spheres_motor"), out = folder.path("x.capsule");

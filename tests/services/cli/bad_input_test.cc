@@ -1,6 +1,9 @@
 // Bad input from outside: exit code 2, the place, what is wrong, what is allowed; in a second or two.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
 
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
@@ -211,6 +214,14 @@ TEST(BadInput, AReportThatCannotBeWrittenIsRefusedBeforeTheRun) {
       {"run", kSample, "--steps", "2", "--hosting", "direct", "--report", folder.path("nowhere/report.json")}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("nowhere/report.json"));
+}
+
+// What could not be printed is not done.
+TEST(StandardOutput, ThatCannotBeWrittenIsAFailure) {
+  for (const char* words : {"plan --json", "run --duration 0.1 --hosting direct --json"}) {
+    const std::string command = in_build("/bin/gravitas") + " " + words + " " + kSample + " > /dev/full 2> /dev/null";
+    EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 1) << words;
+  }
 }
 
 }  // namespace

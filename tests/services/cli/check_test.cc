@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "gravitas/report/v1/check.pb.h"
+#include "services/check/describe.h"
+#include "services/check/examination.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
@@ -47,6 +49,22 @@ TEST(Check, ExitCodeAndLastLineAreTheVerdict) {
   EXPECT_EQ(bad.exit_code, 4);
   EXPECT_THAT(bad.out, HasSubstr("again  gravitas check " + kBad + " --case"));
   EXPECT_TRUE(bad.out.ends_with("does not conform: fails C0\n")) << bad.out;
+}
+
+// In the middle of a case of 100,000 calls.
+TEST(Check, EndsAtAnInterruptWithinACase) {
+  check::Examinee examinee = check::find_examinee(kGood);
+  check::complete(&examinee, false);
+  check::Options options;
+  options.level = "C4";
+  int asked = 0;
+  const report::v1::CheckReport report = check::examine(
+      examinee, options, [](const check::Progress&) {}, [&] { return ++asked > 500; });
+  EXPECT_LT(asked, 600);
+  EXPECT_EQ(report.levels(4).why(), "interrupted");
+  EXPECT_EQ(report.levels(4).verdict(), "not judged");
+  EXPECT_EQ(report.findings_size(), 0);
+  EXPECT_FALSE(report.conforms());
 }
 
 TEST(Check, JsonHasTheSameFindings) {

@@ -89,7 +89,7 @@ TEST_P(EndedBy, NothingIsLeft) {
   std::vector<int> workers;
   for (const control_api::v1::PlannedSlot& slot : status.plan().slots()) workers.push_back(slot.pid());
   const ProgramResult result = served.end(GetParam());
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.exit_code, 130) << result.err;
   EXPECT_THAT(result.out, HasSubstr("chain hash"));
   EXPECT_FALSE(std::filesystem::exists(served.socket()));
   EXPECT_FALSE(std::filesystem::exists(std::filesystem::path(served.socket()).parent_path()));

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -48,6 +49,13 @@ Environment { Space { Bodies {
   }
   Body { Id = "Rock" Immovable = true KineticProperties { Position = {100, 0, 0} } }
 } } })";
+
+// An energy that overflows is no energy that stays.
+TEST(Figures, ADriftThatHasNoNumberIsNotZero) {
+  std::string fast = kTwoBodies;
+  fast.replace(fast.find("{3, 0, 0}"), 9, "{1e200, 0, 0}");
+  EXPECT_FALSE(std::isfinite(figures_of(fast, 1).energy().max_relative_drift()));
+}
 
 TEST(Figures, EnergyAndMomentaAreThoseOfTheMovableBodies) {
   const report::v1::Report report = figures_of(kTwoBodies, 0);

@@ -153,6 +153,9 @@ TEST(Build, RefusesContradictoryPluginBlocks) {
   EXPECT_THAT(plugins("Plugin { Slot = \"solver\" }\nPlugin { Slot = \"solver\" }"),
               ElementsAre("scene:3:17: error: the slot \"solver\" has a Plugin already, at "
                           "scene:2:1; allowed: one"));
+  EXPECT_THAT(plugins("Plugin { Slot = \"force\" Deadline = 1e7 Standby = 65 }"),
+              ElementsAre("scene:2:36: error: Deadline is 1e+07; allowed: a number in (0, 1e+06]",
+                          "scene:2:50: error: Standby is 65; allowed: a whole number in [0, 64]"));
   EXPECT_THAT(plugins("Plugin { Slot = \"force\" Deadline = 1 }\nPlugin { Slot = \"force\" Deadline = 2 }"),
               ElementsAre("scene:3:36: error: Deadline differs from that at scene:2:1; allowed: one for "
                           "the whole slot "
