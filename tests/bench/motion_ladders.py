@@ -109,7 +109,10 @@ def mapped(path):
 
 def draw_stability(methods, path):
     """Colour: measured on one mass; line: the theory's limit; dots: the lattice, full where stable."""
-    figure, axes = plt.subplots(3, 4, figsize=(15, 9), sharex=True, sharey=True, layout="constrained")
+    columns = math.ceil(len(methods) / 3)
+    figure, axes = plt.subplots(3, columns, figsize=(3.7 * columns, 9), sharex=True, sharey=True, layout="constrained")
+    for axis in axes.flat[len(methods):]:
+        axis.set_visible(False)
     for axis, (method, worlds) in zip(axes.flat, methods.items()):
         cells = worlds["mass"]
         stiffness, zeta = sorted({k for k, _ in cells}), sorted({z for _, z in cells})
