@@ -243,7 +243,10 @@ Eigen::VectorXd LocalMotion::around_end(double h, const Eigen::VectorXd& end, co
 void LocalMotion::accept(double h, const Eigen::VectorXd& y) {
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     Body& body = bodies_[b];
-    const Numbers end = y.segment<kNumbers>(first_number(b));
+    Numbers end = y.segment<kNumbers>(first_number(b));
+    // what underflows changes no sign
+    for (double& number : end)
+      if (std::fabs(number) < std::numeric_limits<double>::min()) number = 0.0;
     body.start = state_of(body, end, h);
     body.moved += end.segment<3>(0);
     if (!body.moved.isZero(0.0)) body.start.pose.position = body.origin + body.moved;
