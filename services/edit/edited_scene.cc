@@ -76,15 +76,27 @@ EditedScene::EditedScene(const RunOptions& options, const scene::v1::Scene& scen
   place();
 }
 
+std::string EditedScene::named(const std::string& problem) const {
+  return fmt::format("edit before step {}: {}", edit_.step(), problem);
+}
+
 void EditedScene::read_changes(const RunOptions& options, Catalog* catalog) {
   scene::Problems problems;
-  const auto what = [&] { return fmt::format("edit before step {}: ", edit_.step()); };
   if (!scene::apply_changes(edit_.changes(), &scene_, &log_, &problems))
-    throw BadInput(what() + scene::to_string(problems.errors.at(0)));
+    throw BadInput(named(scene::to_string(problems.errors.at(0))));
   try {
     description_ = build_scene(options, scene_, catalog, &warnings_);
   } catch (const BadInput& problem) {
-    throw BadInput(what() + problem.what());
+    throw BadInput(named(problem.what()));
+  }
+}
+
+std::unique_ptr<kernel::Environment> EditedScene::start(const kernel::EnvironmentDescription& begun,
+                                                        const kernel::HostStarter& starter) const {
+  try {
+    return gravitas::start(begun, starter, &scene_);
+  } catch (const BadInput& problem) {
+    throw BadInput(named(problem.what()));
   }
 }
 

@@ -32,19 +32,10 @@
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
+#include "services/scene/refusal.h"
 #include "services/survey/frame_file.h"
 
 namespace gravitas {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
-  return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
-                     fault.text(), fault_kind_name(fault.kind));
-}
-
-}  // namespace
 
 std::string paused_checkpoint(const RunOptions& options) {
   return checkpoint_target(std::filesystem::path(options.scenes[0]).stem().string() + ".paused.checkpoint");
@@ -82,6 +73,8 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
 }
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 const char* outcome_name(RunOutcome outcome) {
   switch (outcome) {
@@ -121,7 +114,7 @@ class Run final : private kernel::CommitListener {
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
-    environment_ = start(begun, options_.starter);
+    environment_ = start(begun, options_.starter, &scene_);
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
     if (options_.listener) begin_listening();
     attend();
@@ -342,6 +335,7 @@ class Run final : private kernel::CommitListener {
       make(&*edit);
     } catch (const BadInput& problem) {
       fail(problem.what());
+      result_.is_bad_input = true;
     }
     return result_.outcome == RunOutcome::kCompleted;
   }
@@ -352,7 +346,7 @@ class Run final : private kernel::CommitListener {
     kernel::EnvironmentDescription active = description_, begun = edited.description();
     put_in_place(&active);
     keep_who_answers(description_, active, &begun);
-    std::unique_ptr<kernel::Environment> next = start(begun, options_.starter);
+    std::unique_ptr<kernel::Environment> next = edited.start(begun, options_.starter);
     const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
     for (const std::string& warning : edited.warnings())
@@ -478,7 +472,9 @@ class Run final : private kernel::CommitListener {
 
   void pause(const kernel::FaultRecord& record) {
     result_.outcome = RunOutcome::kPaused;
-    result_.fault = fault_text(record.step, record.fault);
+    result_.fault = fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", record.step,
+                                slot_name(record.fault.slot), record.fault.plugin,
+                                scene::refusal_text(description_, record.fault), fault_kind_name(record.fault.kind));
   }
 
   void fail(const std::string& why) {
