@@ -199,6 +199,11 @@ TEST(BadInput, AnEditThatAPluginRefusesIsNamedAndWhatWasComputedIsKept) {
               HasSubstr("stopped after step 4: edit before step 5: set "
                         "Constraint.MyAngularMotor.BindAxisPoint2={0,1,0}: Constraint "
                         "\"MyAngularMotor\": AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same"));
+  // where what is refused stands elsewhere
+  const std::string heavy = folder.write("heavy.gravitas", with_force("Gravity", "Acceleration = {0, -9.81, 0}"));
+  EXPECT_THAT(run_program({"run", heavy, "--hosting", "direct", "--edit", "set Body.B.Mass=1e308@step=5"}, folder).err,
+              HasSubstr("stopped after step 4: edit before step 5 (set Body.B.Mass=1e308): " + heavy +
+                        ":1:10: error: Force \"F\" on Body \"B\" ("));
   EXPECT_EQ(harness::read_report(harness::read_file(report)).steps(), 4U);
   EXPECT_EQ(harness::read_report(harness::read_file(report)).outcome(), "failed");
   EXPECT_THAT(harness::read_file(trajectory), HasSubstr("\n0.0666"));
