@@ -52,7 +52,7 @@ Plan make_plan(EnvironmentDescription* d) {
   if (d->simulator == Simulator::kSmooth && has_contacts)
     throw std::invalid_argument(
         "the simulator Smooth moves bodies that cannot touch, and some of these can: leave out their geometry, forbid "
-        "the pairs in CollisionFilter, or use the simulator Basic");
+        "the pairs in CollisionFilter, or use Type = \"Basic\", \"Substepping\", \"Continuous\" or \"Bisection\"");
   if (has_contacts) {
     add(&plan, Slot::kSpace, d->space);
     add(&plan, Slot::kCollision, d->collision);

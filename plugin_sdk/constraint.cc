@@ -11,7 +11,7 @@ void push_vector(const stage::ReplyColumn<double>& column, const Vector3& v) { c
 Pose pose_of(std::span<const double> position, std::span<const double> orientation, std::uint32_t body) {
   if (body == kNone) return {};
   if (3 * (std::size_t{body} + 1) > position.size() || 4 * (std::size_t{body} + 1) > orientation.size())
-    throw Refusal("a joint names body " + std::to_string(body) + ", which does not exist");
+    throw Refusal("it names body " + std::to_string(body) + ", which does not exist");
   return {vector_at(position, body), quaternion_at(orientation, body)};
 }
 
@@ -27,16 +27,15 @@ JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<
 
 std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row) {
   if (row + 1 >= begin.size() || begin[row] > begin[row + 1] || begin[row + 1] > numbers.size())
-    throw Refusal("the parameters of joint " + std::to_string(row) + " lie outside their column");
+    throw Refusal("its parameters lie outside their column");
   return numbers.subspan(begin[row], begin[row + 1] - begin[row]);
 }
 
-void push_bound(const stage::ConstraintBindReply& reply, std::size_t joint, std::span<const double> numbers) {
+void push_bound(const stage::ConstraintBindReply& reply, std::span<const double> numbers) {
   for (const double number : numbers) {
     if (!std::isfinite(number))
-      throw Refusal("joint " + std::to_string(joint) +
-                    " binds to numbers that are not finite: its properties or the poses of its bodies are not, or too "
-                    "large");
+      throw Refusal(
+          "it binds to numbers that are not finite: its properties or the poses of its bodies are not, or too large");
     reply.bound().push(number);
   }
 }
@@ -45,14 +44,12 @@ void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::siz
   if (!d.point1.allFinite() || !d.point2.allFinite() || !d.velocity.allFinite() || !std::isfinite(d.correction) ||
       !d.axes.coeffs().allFinite() || !d.lower.allFinite() || !d.upper.allFinite() || !d.compliance.allFinite() ||
       !d.damping.allFinite() || !d.maximum_force.allFinite())
-    throw Refusal("joint " + std::to_string(joint) +
-                  " has a discrepancy that is not finite: its bound numbers or the poses of its bodies are not, or too "
-                  "large");
+    throw Refusal(
+        "it has a discrepancy that is not finite: its bound numbers or the poses of its bodies are not, or too large");
   if ((d.lower.array() > d.upper.array()).any() || d.compliance.minCoeff() < 0.0 || d.damping.minCoeff() < 0.0 ||
       d.maximum_force.minCoeff() < 0.0 || std::fabs(d.axes.norm() - 1.0) > 1e-6)
     throw Refusal(
-        "joint " + std::to_string(joint) +
-        " has a discrepancy with crossed limits, negative numbers or axes that are not unit: its bound numbers "
+        "it has a discrepancy with crossed limits, negative numbers or axes that are not unit: its bound numbers "
         "are none of a joint of this type");
   reply.constraint().push(joint);
   push_vector(reply.point1(), d.point1);

@@ -1,5 +1,7 @@
 // For authors of joints: the loops over the joints of Constraint.Bind and Constraint.Discrepancies.
 //
+// What is refused in them says which joint it is about (plugin_sdk/refused_row.h), so that a text need not.
+//
 // Bind turns what the scene says in world coordinates at the start into numbers that are fixed in the bodies.
 // Discrepancies turns those numbers and a state into discrepancies (plugin_sdk/discrepancy.h).
 #pragma once
@@ -9,6 +11,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/refused_row.h"
 
 namespace gravitas {
 
@@ -31,7 +34,7 @@ class BoundWriter {
 namespace detail {
 JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
                       std::span<const double> orientation, std::size_t joint);
-void push_bound(const stage::ConstraintBindReply& reply, std::size_t joint, std::span<const double> numbers);
+void push_bound(const stage::ConstraintBindReply& reply, std::span<const double> numbers);
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d);
 std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row);
 }  // namespace detail
@@ -42,10 +45,13 @@ template <typename Bind>
 void bind_each(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Bind&& bind) {
   reply.bound_begin().push(0);
   for (std::size_t i = 0; i < request.constraint_type().size(); ++i) {
-    BoundWriter writer;
-    bind(request.constraint_type()[i], PropertyCursor(detail::slice(request.parameter(), request.parameter_begin(), i)),
-         detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i), writer);
-    detail::push_bound(reply, i, writer.numbers());
+    name_refused_row(kJointRow, i, [&] {
+      BoundWriter writer;
+      bind(request.constraint_type()[i],
+           PropertyCursor(detail::slice(request.parameter(), request.parameter_begin(), i)),
+           detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i), writer);
+      detail::push_bound(reply, writer.numbers());
+    });
     reply.bound_begin().push(reply.bound().count());
   }
 }
@@ -57,9 +63,11 @@ void describe_each(const stage::ConstraintDiscrepanciesRequest& request,
                    const stage::ConstraintDiscrepanciesReply& reply, Describe&& describe) {
   for (std::size_t i = 0; i < request.constraint_type().size(); ++i) {
     if (request.intact()[i] == 0) continue;
-    describe(request.constraint_type()[i], PropertyCursor(detail::slice(request.bound(), request.bound_begin(), i)),
-             detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i),
-             [&](const Discrepancy& d) { detail::push_discrepancy(reply, i, d); });
+    name_refused_row(kJointRow, i, [&] {
+      describe(request.constraint_type()[i], PropertyCursor(detail::slice(request.bound(), request.bound_begin(), i)),
+               detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i),
+               [&](const Discrepancy& d) { detail::push_discrepancy(reply, i, d); });
+    });
   }
 }
 

@@ -1,4 +1,5 @@
-// For authors of forces: the loop over the applications of a Force.Wrenches call.
+// For authors of forces: the loop over the applications of a Force.Wrenches call. What is refused in it says which
+// application it is about (plugin_sdk/refused_row.h), so that a text need not.
 #pragma once
 
 #include <cmath>
@@ -7,6 +8,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/refused_row.h"
 
 namespace gravitas {
 
@@ -46,6 +48,21 @@ inline Application application_at(const stage::ForceWrenchesRequest& request, st
           PropertyCursor(request.force_parameter().subspan(begin[force], begin[force + 1] - begin[force]))};
 }
 
+namespace detail {
+inline void push_answer(const stage::ForceWrenchesReply& reply, const ApplicationAnswer& a) {
+  if (!a.wrench.force.allFinite() || !a.wrench.torque.allFinite() || !a.impulse.force.allFinite() ||
+      !a.impulse.torque.allFinite() || !std::isfinite(a.potential))
+    throw Refusal("the wrench is not finite: the force's properties or the body's mass or state are not, or too large");
+  const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
+    column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());
+  };
+  push(reply.wrench(), a.wrench);
+  push(reply.impulse(), a.impulse);
+  reply.potential().push(a.potential);
+  reply.flags().push(a.flags);
+}
+}  // namespace detail
+
 // Calls answer(type id, flattened properties of the force, body) for every application in order and writes what it
 // returns. Throws Refusal for an index outside the request, and for an answer that is not finite.
 template <typename Answer>
@@ -53,18 +70,9 @@ void for_each_application(const stage::ForceWrenchesRequest& request, const stag
                           Answer&& answer) {
   for (std::size_t row = 0; row < request.application().size() / 2; ++row) {
     const Application one = application_at(request, row);
-    const ApplicationAnswer a = answer(request.force_type()[one.force], one.properties, one.body);
-    if (!a.wrench.force.allFinite() || !a.wrench.torque.allFinite() || !a.impulse.force.allFinite() ||
-        !a.impulse.torque.allFinite() || !std::isfinite(a.potential))
-      throw Refusal("the wrench of application " + std::to_string(row) + " on body " + std::to_string(one.body) +
-                    " is not finite: the force's properties or the body's mass or state are not, or too large");
-    const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
-      column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());
-    };
-    push(reply.wrench(), a.wrench);
-    push(reply.impulse(), a.impulse);
-    reply.potential().push(a.potential);
-    reply.flags().push(a.flags);
+    name_refused_row(kApplicationRow, row, [&] {
+      detail::push_answer(reply, answer(request.force_type()[one.force], one.properties, one.body));
+    });
   }
 }
 

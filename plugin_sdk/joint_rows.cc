@@ -17,7 +17,7 @@ Vector3 first_axis(const Quaternion& q) { return q * Vector3::UnitX(); }
 }  // namespace
 
 void demand_type(std::uint64_t type, std::string_view name) {
-  if (type != type_id(name)) throw Refusal("a joint is of a type that this plugin does not know");
+  if (type != type_id(name)) throw Refusal("it is of a type that this plugin does not know");
 }
 
 Vector3 unit_axis(const Vector3& axis, std::string_view field) {

@@ -98,15 +98,16 @@ int run_scene(RunLine* line) {
   }
   std::cerr << fmt::format("gravitas: stopped after step {}: {}\n", result.report.steps(), result.fault);
   print_checkpoint(*line, result);
-  return kOurFault;
+  return result.is_bad_input ? kBadInput : kOurFault;
 }
 
 int plan_scene(RunLine* line) {
   line->scene.apply();
   std::vector<std::string> warnings;
-  const kernel::EnvironmentDescription description = load(line->options, &warnings);
+  scene::v1::Scene scene;
+  const kernel::EnvironmentDescription description = load(line->options, &warnings, nullptr, &scene);
   for (const std::string& warning : warnings) std::cerr << warning << '\n';
-  report::v1::Plan plan = plan_message(*start(description), description);
+  report::v1::Plan plan = plan_message(*start(description, kernel::start_host, &scene), description);
   // the workers that were started to find out are gone again
   for (report::v1::PlannedSlot& slot : *plan.mutable_slots()) slot.set_pid(0);
   if (line->json) {

@@ -17,6 +17,7 @@
 #include "services/run/fault_spec.h"
 #include "services/run/kernel_names.h"
 #include "services/scene/parser.h"
+#include "services/scene/refusal.h"
 #include "services/survey/queries.h"
 
 namespace gravitas::control {
@@ -89,7 +90,7 @@ kernel::HostStarter ServedRun::starter() {
 
 void ServedRun::begin_environment() {
   // where the new one cannot be made the old one stays
-  auto environment = start(first_description_, starter());
+  auto environment = start(first_description_, starter(), &first_scene_);
   close_capture();
   survey_.reset();
   environment_ = std::move(environment);
@@ -181,7 +182,8 @@ void ServedRun::make_step() {
     if (environment_->step() == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
       fault_ = fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(record.fault.slot),
-                           record.fault.plugin, record.fault.text(), fault_kind_name(record.fault.kind));
+                           record.fault.plugin, scene::refusal_text(description_, record.fault),
+                           fault_kind_name(record.fault.kind));
       return keep_faulted_state();
     }
     figures_->follow(environment_.get());

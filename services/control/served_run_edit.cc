@@ -34,7 +34,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     kernel::EnvironmentDescription begun = edited.description(), active = description_;
     for (const Slot slot : kSlots) active.slot(slot) = active_.slot(slot);
     keep_who_answers(description_, active, &begun);
-    std::unique_ptr<kernel::Environment> next = start(begun, starter());
+    std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
 

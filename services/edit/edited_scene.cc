@@ -51,6 +51,12 @@ Hash digest_of(const edit::v1::Edit& edit) {
   return {hash.low64, hash.high64};
 }
 
+// As on a command line.
+std::string text_of(const edit::v1::Change& change) {
+  if (change.has_add()) return "add " + change.add().name();
+  return change.kind_case() == edit::v1::Change::kRemove ? "remove " + change.remove() : "set " + change.set();
+}
+
 // Forces of a scene that act once.
 std::set<std::string> impulses_in(const scene::v1::Scene& scene) {
   std::set<std::string> ids;
@@ -76,15 +82,35 @@ EditedScene::EditedScene(const RunOptions& options, const scene::v1::Scene& scen
   place();
 }
 
+// By the changes, where the problem does not stand in one of them.
+std::string EditedScene::named(const std::string& problem) const {
+  std::string changes;
+  for (const edit::v1::Change& change : edit_.changes()) {
+    const std::string what = text_of(change);
+    if (problem.starts_with(change.has_add() ? change.add().name() : what))
+      return fmt::format("edit before step {}: {}", edit_.step(), problem);
+    changes += (changes.empty() ? "" : ", ") + what;
+  }
+  return fmt::format("edit before step {} ({}): {}", edit_.step(), changes, problem);
+}
+
 void EditedScene::read_changes(const RunOptions& options, Catalog* catalog) {
   scene::Problems problems;
-  const auto what = [&] { return fmt::format("edit before step {}: ", edit_.step()); };
   if (!scene::apply_changes(edit_.changes(), &scene_, &log_, &problems))
-    throw BadInput(what() + scene::to_string(problems.errors.at(0)));
+    throw BadInput(named(scene::to_string(problems.errors.at(0))));
   try {
     description_ = build_scene(options, scene_, catalog, &warnings_);
   } catch (const BadInput& problem) {
-    throw BadInput(what() + problem.what());
+    throw BadInput(named(problem.what()));
+  }
+}
+
+std::unique_ptr<kernel::Environment> EditedScene::start(const kernel::EnvironmentDescription& begun,
+                                                        const kernel::HostStarter& starter) const {
+  try {
+    return gravitas::start(begun, starter, &scene_);
+  } catch (const BadInput& problem) {
+    throw BadInput(named(problem.what()));
   }
 }
 

@@ -2,7 +2,7 @@
 // takes over the state at a step boundary.
 //
 //   EditedScene next(options, scene, before, catalog, &edit, &now);      throws BadInput, and nothing has changed
-//   auto environment = start(next.description());                        new processes
+//   auto environment = next.start(next.description());                   new processes; throws BadInput
 //   next.hand_over(now, environment.get());                              the state, its hash chain with the edit in it
 //
 // A body, joint, force … that keeps its id goes on: a body where it is and as fast as it is, but for what the edit sets
@@ -19,6 +19,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,10 @@ class EditedScene {
   // Of scene and builder.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
+  // Starts the environment of description(), whoever answers there. Throws BadInput that names the edit.
+  std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& begun,
+                                             const kernel::HostStarter& starter = kernel::start_host) const;
+
   // Bodies that slept, and whom the edit wakes.
   std::vector<std::uint32_t> woken(const kernel::Environment& now) const;
 
@@ -52,6 +57,7 @@ class EditedScene {
   std::vector<std::array<std::uint32_t, 2>> hand_over(const kernel::Environment& now, kernel::Environment* next) const;
 
  private:
+  std::string named(const std::string& problem) const;
   void read_changes(const RunOptions& options, Catalog* catalog);
   void find_kept();
   void find_motions(const kernel::Environment& now);

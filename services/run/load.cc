@@ -10,6 +10,7 @@
 #include "services/scene/build.h"
 #include "services/scene/overrides.h"
 #include "services/scene/reader.h"
+#include "services/scene/refusal.h"
 
 namespace gravitas {
 namespace {
@@ -108,14 +109,20 @@ kernel::EnvironmentDescription build_scene(const RunOptions& options, const scen
 }
 
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
-                                           const kernel::HostStarter& starter) {
+                                           const kernel::HostStarter& starter, const scene::v1::Scene* scene) {
+  const auto require_none = [](const std::optional<scene::SceneError>& refused) {
+    if (refused) throw BadInput(scene::to_string(*refused));
+  };
   try {
     auto environment = std::make_unique<kernel::Environment>(description, starter);
     for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
     return environment;
   } catch (const kernel::StageFault& fault) {
-    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin, fault.text()));
+    if (scene != nullptr) require_none(scene::find_refused(*scene, description, fault));
+    throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin,
+                               scene::refusal_text(description, fault)));
   } catch (const std::invalid_argument& problem) {
+    if (scene != nullptr) require_none(scene::find_refused(*scene, problem.what()));
     throw BadInput(problem.what());
   }
 }

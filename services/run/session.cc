@@ -33,25 +33,18 @@
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
+#include "services/scene/refusal.h"
 #include "services/survey/frame_file.h"
 
 namespace gravitas {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-std::string fault_text(std::uint32_t step, const kernel::StageFault& fault) {
-  return fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", step, slot_name(fault.slot), fault.plugin,
-                     fault.text(), fault_kind_name(fault.kind));
-}
-
-}  // namespace
 
 std::string paused_checkpoint(const RunOptions& options) {
   return checkpoint_target(std::filesystem::path(options.scenes[0]).stem().string() + ".paused.checkpoint");
 }
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 const char* outcome_name(RunOutcome outcome) {
   switch (outcome) {
@@ -92,7 +85,7 @@ class Run final : private kernel::CommitListener {
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
-    environment_ = start(begun, starter());
+    environment_ = start(begun, starter(), &scene_);
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
     if (options_.listener) begin_listening();
     attend();
@@ -330,6 +323,7 @@ class Run final : private kernel::CommitListener {
       make(&*edit);
     } catch (const BadInput& problem) {
       fail(problem.what());
+      result_.is_bad_input = true;
     }
     return result_.outcome == RunOutcome::kCompleted;
   }
@@ -340,7 +334,7 @@ class Run final : private kernel::CommitListener {
     kernel::EnvironmentDescription active = description_, begun = edited.description();
     put_in_place(&active);
     keep_who_answers(description_, active, &begun);
-    std::unique_ptr<kernel::Environment> next = start(begun, starter());
+    std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
     for (const std::string& warning : edited.warnings())
@@ -466,7 +460,9 @@ class Run final : private kernel::CommitListener {
 
   void pause(const kernel::FaultRecord& record) {
     result_.outcome = RunOutcome::kPaused;
-    result_.fault = fault_text(record.step, record.fault);
+    result_.fault = fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", record.step,
+                                slot_name(record.fault.slot), record.fault.plugin,
+                                scene::refusal_text(description_, record.fault), fault_kind_name(record.fault.kind));
   }
 
   void fail(const std::string& why) {

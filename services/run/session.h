@@ -66,8 +66,9 @@ enum class RunOutcome {
 struct RunResult {
   RunOutcome outcome = RunOutcome::kCompleted;
   report::v1::Report report;
-  std::string summary;  // what happened, for a person
-  std::string fault;    // why the run paused (slot, plugin, cause, step) or failed
+  std::string summary;        // what happened, for a person
+  std::string fault;          // why the run paused (slot, plugin, cause, step) or failed
+  bool is_bad_input = false;  // it failed by an edit that could not be made
   // File with the state that the run ended in (after a failure: that of the last checkpoint), and its step; empty if
   // none was written.
   std::string checkpoint;
@@ -90,9 +91,11 @@ void apply_hosting(const std::vector<HostingChoice>& choices, kernel::Environmen
 // (CheckPhysicsEvery), another process confirms them.
 inline constexpr Slot kConfirmed[] = {Slot::kConstraint, Slot::kForce};
 
-// Starts the environment of a description. A plugin that cannot be used is BadInput.
+// Starts the environment of a description. A plugin that cannot be used, or refuses what is described, is BadInput: with
+// the place of what it refuses where the scene is given.
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
-                                           const kernel::HostStarter& starter = kernel::start_host);
+                                           const kernel::HostStarter& starter = kernel::start_host,
+                                           const scene::v1::Scene* scene = nullptr);
 
 // Called now and then while a run goes on.
 struct Progress {

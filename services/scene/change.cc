@@ -94,6 +94,7 @@ class Changing {
       for (SceneError& one : *said)
         if (one.file == "--set " + text) one.file = "set " + text;
     if (!is_set) return false;
+    *scene_->mutable_files()->rbegin() = "set " + text;
     if (root == "Body") note_motion(text);
     return true;
   }

@@ -139,18 +139,47 @@ std::string refusal(Spoil spoil) {
 }
 
 TEST(JointLoops, RefuseBodiesThatDoNotExist) {
-  EXPECT_EQ(refusal([](Joints* joints) { joints->body[1] = 2; }), "a joint names body 2, which does not exist");
+  EXPECT_EQ(refusal([](Joints* joints) { joints->body[1] = 2; }), "joint 0: it names body 2, which does not exist");
   EXPECT_EQ(refusal([](Joints* joints) { joints->body[3] = kNone - 1; }),
-            "a joint names body 4294967294, which does not exist");
+            "joint 1: it names body 4294967294, which does not exist");
 }
 
 TEST(JointLoops, RefuseParametersOutsideTheirColumn) {
-  EXPECT_EQ(refusal([](Joints* joints) { joints->begin[3] = 4; }),
-            "the parameters of joint 2 lie outside their column");
-  EXPECT_EQ(refusal([](Joints* joints) { joints->begin[1] = 3; }),
-            "the parameters of joint 1 lie outside their column");
+  EXPECT_EQ(refusal([](Joints* joints) { joints->begin[3] = 4; }), "joint 2: its parameters lie outside their column");
+  EXPECT_EQ(refusal([](Joints* joints) { joints->begin[1] = 3; }), "joint 1: its parameters lie outside their column");
   EXPECT_EQ(refusal([](Joints* joints) { joints->begin.pop_back(); }),
-            "the parameters of joint 2 lie outside their column");
+            "joint 2: its parameters lie outside their column");
+}
+
+// An author's text need not say which joint it is about; nor need a cursor that is read too far.
+TEST(JointLoops, NameTheJointThatIsRefused) {
+  const auto refused = [](auto act) -> std::string {
+    try {
+      act();
+    } catch (const Refusal& error) {
+      return error.what();
+    }
+    return "nothing was refused";
+  };
+  Joints joints;
+  EXPECT_EQ(refused([&] {
+              joints.bind([](std::uint64_t type, PropertyCursor, const JointBodies&, BoundWriter&) {
+                if (type == 30) throw Refusal("Axis is missing");
+              });
+            }),
+            "joint 2: Axis is missing");
+  EXPECT_EQ(refused([&] {
+              joints.describe([](std::uint64_t type, PropertyCursor, const JointBodies&, auto&&) {
+                if (type == 20) throw Refusal("Axis is missing");
+              });
+            }),
+            "joint 1: Axis is missing");
+  const std::string beyond = refused([&] {
+    joints.bind([](std::uint64_t type, PropertyCursor properties, const JointBodies&, BoundWriter&) {
+      if (type == 20) properties.number();
+    });
+  });
+  EXPECT_EQ(beyond.substr(0, 9), "joint 1: ");
 }
 
 TEST(JointLoops, RefuseNumbersThatAreNotFinite) {

@@ -40,6 +40,42 @@ std::string with_geometry(const std::string& properties) {
          "Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" } } } }\n";
 }
 
+const char* good_joint(const std::string& type) {
+  if (type == "Spherical") return "BindPoint = {0, 2, 0}";
+  if (type == "Slider") return "BindPoint = {0, 2, 0} Axis = {0, 1, 0}";
+  if (type == "Distance") return "BindPoint1 = {0, 0, 0} BindPoint2 = {0, 4, 0}";
+  if (type == "Universal" || type == "ConstantVelocity")
+    return "BindPoint = {0, 2, 0} Axis1 = {0, 1, 0} Axis2 = {1, 0, 0}";
+  if (type == "Axle") return "BindPoint = {0, 2, 0} SteeringAxis = {0, 1, 0} RollingAxis = {1, 0, 0}";
+  if (type == "AngularMotor") return "BindAxisPoint1 = {0, 2, 0} BindAxisPoint2 = {0, 3, 0} AngularSpeed = 1";
+  return "BindAxisPoint1 = {0, 2, 0} BindAxisPoint2 = {0, 3, 0}";
+}
+
+// Two balls, a good joint of both on line 4, and what `more` says on line 5.
+std::string with_joint(const std::string& type, const std::string& properties, const std::string& simulator = "Basic") {
+  return "Geometries { Geometry { Type = \"Sphere\" Id = \"S\" CustomProperties { Radius = 0.5 } } }\n"
+         "Simulator { Type = \"" +
+         simulator +
+         "\" CustomProperties { Duration = 0.1 } }\n"
+         "Environment { Space { Bodies { Body { Id = \"A\" GeometryId = \"S\" Mass = 1 } Body { Id = \"B\" GeometryId "
+         "= "
+         "\"S\" Mass = 1 KineticProperties { Position = {0, 4, 0} } } } } Constraints {\n"
+         "Constraint { Type = \"" +
+         type + "\" Id = \"J1\" Body1 = \"A\" Body2 = \"B\" CustomProperties { " + good_joint(type) +
+         " } }\n"
+         "Constraint { Type = \"" +
+         type + "\" Id = \"J2\" Body1 = \"A\" CustomProperties {\n" + properties + " } } } }\n";
+}
+
+// Two balls, of which the second alone feels the force `F` of line 1 and has a mass.
+std::string with_force(const std::string& type, const std::string& properties, const std::string& mass = "1") {
+  return "Forces { Force { Type = \"" + type + "\" Id = \"F\" CustomProperties {\n" + properties +
+         " } } }\n"
+         "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} }\n"
+         "Body { Id = \"B\" Mass = " +
+         mass + " PrincipalMoments = {1, 1, 1} Forces = { \"F\" } } } } }\n";
+}
+
 const BadScene kBadScenes[] = {
     {"unknown_block", "Enviroment { }\n", "1:1", "Environment"},
     {"unknown_property", with_body("Body { Type = \"Rigid\" Id = \"A\" GeometryId = \"S\" Masss = 1 }"), "4:49",
@@ -69,6 +105,45 @@ const BadScene kBadScenes[] = {
          with_body(""),
      "2:1", "Table has the time 1 after 1"},
     {"unbalanced", "Environment {\n", "2:1", "}"},
+    {"no_axis", with_joint("Spherical", "BindPoint = {0, 2, 0} ReachConeAngle = 1"), "5:1",
+     "error: Constraint \"J2\": Spherical: Axis is missing"},
+    {"axis_of_length_0", with_joint("Spherical", "BindPoint = {0, 2, 0} ReachConeAngle = 1\nAxis = {0, 0, 0}"), "7:1",
+     "error: Constraint \"J2\": Spherical: Axis has no direction"},
+    {"reach_cone", with_joint("Spherical", "BindPoint = {0, 2, 0} Axis = {1, 0, 0}\nReachCone = {{0, 1}}"), "7:1",
+     "error: Constraint \"J2\": Spherical: ReachCone"},
+    {"hinge_of_one_point", with_joint("Revolute", "BindAxisPoint1 = {0, 2, 0}\nBindAxisPoint2 = {0, 2, 0}"), "7:1",
+     "error: Constraint \"J2\": Revolute: BindAxisPoint1 and BindAxisPoint2 are the same point"},
+    {"limits_of_a_turn",
+     with_joint("Revolute", "BindAxisPoint1 = {0, 2, 0} BindAxisPoint2 = {0, 3, 0} LowerLimit = -5\nUpperLimit = 5"),
+     "7:1", "error: Constraint \"J2\": Revolute: UpperLimit"},
+    {"motor_of_one_point",
+     with_joint("AngularMotor", "BindAxisPoint1 = {0, 2, 0} BindAxisPoint2 = {0, 2, 0} AngularSpeed = 1"), "6:28",
+     "error: Constraint \"J2\": AngularMotor: BindAxisPoint1"},
+    {"slider", with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 0, 0}"), "6:23",
+     "error: Constraint \"J2\": Slider: Axis has no direction"},
+    {"force_without_speed", with_joint("Slider", "BindPoint = {0, 2, 0} Axis = {0, 1, 0}\nMaximumForce = 3"), "7:1",
+     "error: Constraint \"J2\": Slider: MaximumForce is given without Speed"},
+    {"crossed_distances",
+     with_joint("Distance", "BindPoint1 = {0, 0, 0} BindPoint2 = {0, 4, 0} MinimumDistance = 3\nMaximumDistance = 2"),
+     "7:1", "error: Constraint \"J2\": Distance: MinimumDistance"},
+    {"universal", with_joint("Universal", "BindPoint = {0, 2, 0} Axis1 = {0, 1, 0}\nAxis2 = {0, 1, 0}"), "7:1",
+     "error: Constraint \"J2\": Universal: Axis2 is parallel to Axis1"},
+    {"constant_velocity", with_joint("ConstantVelocity", "BindPoint = {0, 2, 0} Axis1 = {0, 1, 0}\nAxis2 = {0, -1, 0}"),
+     "7:1", "error: Constraint \"J2\": ConstantVelocity: Axis"},
+    {"axle", with_joint("Axle", "BindPoint = {0, 2, 0} SteeringAxis = {0, 1, 0}\nRollingAxis = {0, 1, 0}"), "7:1",
+     "error: Constraint \"J2\": Axle: RollingAxis is parallel to SteeringAxis"},
+    {"vortex", with_force("Vortex", "Centre = {0, 0, 0} Strength = 1 Axis = {0, 0, 0}"), "2:33",
+     "error: Force \"F\" on Body \"B\" ("},
+    {"buoyancy", with_force("Buoyancy", "FluidDensity = 1000 FluidLevel = 0 Region = {{1, 1, 1}}"), "2:36",
+     "error: Force \"F\" on Body \"B\" ("},
+    {"far_too_heavy", with_force("Gravity", "Acceleration = {0, -9.81, 0}", "1e308"), "1:10",
+     ":4:1): the wrench is not finite"},
+    {"order",
+     "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} } } }\n"
+     "KineticIntegrator { Type = \"SymplecticSplitting\" CustomProperties { Order = 3 } } }\n",
+     "2:69", "error: SymplecticSplitting: Order: allowed are 2, 4 and 6"},
+    {"smooth_contacts", with_joint("Spherical", "BindPoint = {0, 0, 0}", "Smooth"), "2:20",
+     "or use Type = \"Basic\", \"Substepping\", \"Continuous\" or \"Bisection\""},
     {"deep", std::string(100'000, '{'), "1:", ""},
 };
 
@@ -86,6 +161,56 @@ TEST_P(Refused, WithItsPlaceAndWhatIsAllowed) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Refused, ::testing::ValuesIn(kBadScenes),
                          [](const auto& one) { return std::string(one.param.name); });
+
+TEST(BadInput, WhatPluginsRefuseIsAsPlainOnEveryCarrierAndInAPlan) {
+  const ScratchFolder folder;
+  const std::string joint =
+      folder.write("joint.gravitas", with_joint("Spherical", "BindPoint = {0, 2, 0} ReachConeAngle = 1"));
+  const std::string force =
+      folder.write("force.gravitas", with_force("Vortex", "Centre = {0, 0, 0} Strength = 1 Axis = {0, 0, 0}"));
+  const std::string good = folder.write("good.gravitas", with_body("Body { Id = \"A\" GeometryId = \"S\" Mass = 1 }"));
+  for (const std::vector<std::string>& how : {std::vector<std::string>{"run", "--hosting", "direct"},
+                                              {"run", "--hosting", "shm"},
+                                              {"run", "--hosting", "grpc"},
+                                              {"plan"}}) {
+    for (const auto& [what, expected] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+             {{joint},
+              joint + ":5:1: error: Constraint \"J2\": Spherical: Axis is missing, which reach cone and twist "
+                      "limits are measured from\n"},
+             {{force}, force + ":2:33: error: Force \"F\" on Body \"B\" (" + force + ":4:1): Axis: a direction"},
+             {{good, "--set", "Integrator=SymplecticSplitting", "--set", "Integrator.Order=3"},
+              "--set Integrator.Order=3: SymplecticSplitting: Order: allowed are 2, 4 and 6\n"}}) {
+      std::vector<std::string> arguments = how;
+      arguments.insert(arguments.end(), what.begin(), what.end());
+      const ProgramResult result = run_program(arguments, folder);
+      EXPECT_EQ(result.exit_code, 2) << how.back();
+      EXPECT_EQ(result.out, "");
+      EXPECT_THAT(result.err, HasSubstr(expected)) << how.back();
+    }
+  }
+}
+
+TEST(BadInput, AnEditThatAPluginRefusesIsNamedAndWhatWasComputedIsKept) {
+  const ScratchFolder folder;
+  const std::string trajectory = folder.path("motion.csv"), report = folder.path("report.json");
+  const ProgramResult result =
+      run_program({"run", kSample, "--duration", "1", "--hosting", "direct", "--trajectory", trajectory, "--report",
+                   report, "--edit", "set Constraint.MyAngularMotor.BindAxisPoint2={0,1,0}@step=5"},
+                  folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err,
+              HasSubstr("stopped after step 4: edit before step 5: set "
+                        "Constraint.MyAngularMotor.BindAxisPoint2={0,1,0}: Constraint "
+                        "\"MyAngularMotor\": AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same"));
+  // where what is refused stands elsewhere
+  const std::string heavy = folder.write("heavy.gravitas", with_force("Gravity", "Acceleration = {0, -9.81, 0}"));
+  EXPECT_THAT(run_program({"run", heavy, "--hosting", "direct", "--edit", "set Body.B.Mass=1e308@step=5"}, folder).err,
+              HasSubstr("stopped after step 4: edit before step 5 (set Body.B.Mass=1e308): " + heavy +
+                        ":1:10: error: Force \"F\" on Body \"B\" ("));
+  EXPECT_EQ(harness::read_report(harness::read_file(report)).steps(), 4U);
+  EXPECT_EQ(harness::read_report(harness::read_file(report)).outcome(), "failed");
+  EXPECT_THAT(harness::read_file(trajectory), HasSubstr("\n0.0666"));
+}
 
 TEST(BadInput, AQuaternionThatIsNearlyUnitIsRepairedWithAWarning) {
   const ScratchFolder folder;

@@ -209,13 +209,13 @@ TEST_F(AngularMotor, BrokenHasNoDiscrepancy) {
 TEST_F(AngularMotor, RefusesAnAxisOfOnePoint) {
   point2_ = point1_;
   EXPECT_EQ(plugin_.refusal(stage::Method::kConstraintBind, joint_.bind_request(properties(1.0))),
-            "AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
+            "joint 0: AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
 }
 
 TEST_F(AngularMotor, RefusesAJointOfAnotherType) {
   const JointProblem foreign(&plugin_, "Spherical");
   EXPECT_EQ(plugin_.refusal(stage::Method::kConstraintBind, foreign.bind_request(properties(1.0))),
-            "a joint is of a type that this plugin does not know");
+            "joint 0: it is of a type that this plugin does not know");
 }
 
 }  // namespace

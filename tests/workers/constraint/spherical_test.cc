@@ -127,13 +127,13 @@ TEST_F(Spherical, BrokenHasNoDiscrepancy) {
 TEST_F(Spherical, RefusesABodyThatDoesNotExist) {
   joint_.ends = {0, 2};
   EXPECT_EQ(plugin_.refusal(stage::Method::kConstraintBind, joint_.bind_request({0, 0, 0})),
-            "a joint names body 2, which does not exist");
+            "joint 0: it names body 2, which does not exist");
 }
 
 TEST_F(Spherical, RefusesAJointOfAnotherType) {
   const JointProblem foreign(&plugin_, "AngularMotor");
   EXPECT_EQ(plugin_.refusal(stage::Method::kConstraintBind, foreign.bind_request({0, 0, 0})),
-            "a joint is of a type that this plugin does not know");
+            "joint 0: it is of a type that this plugin does not know");
 }
 
 }  // namespace

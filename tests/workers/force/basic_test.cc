@@ -127,8 +127,8 @@ TEST_F(BasicForce, RefusesATableWhoseTimesDoNotAscend) {
     const ForceProblem problem{0.0, {type_id("Basic")}, {properties.flat()}, {ForcedBody{}}, {0, 0}};
     return force_.refusal(stage::Method::kForceWrenches, problem.request());
   };
-  EXPECT_EQ(refusal({1, 0, 0, 0, 0.5, 1, 0, 0}), "Table: times must ascend");
-  EXPECT_EQ(refusal({1, 0, 0, 0, 1, 1, 0, 0, 1, 2, 0, 0}), "Table: more than two rows of one time");
+  EXPECT_EQ(refusal({1, 0, 0, 0, 0.5, 1, 0, 0}), "application 0: Table: times must ascend");
+  EXPECT_EQ(refusal({1, 0, 0, 0, 1, 1, 0, 0, 1, 2, 0, 0}), "application 0: Table: more than two rows of one time");
 }
 
 TEST_F(BasicForce, ATableJumpsWhereTwoRowsHaveOneTime) {

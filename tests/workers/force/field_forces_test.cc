@@ -58,7 +58,8 @@ TEST(Vortex, RefusesAnAxisWithoutDirection) {
   PluginUnderTest force("force_vortex");
   const ForceProblem problem{
       0.0, {type_id("Vortex")}, {vortex(Vector3::Zero(), Vector3::Zero(), 1, 0, 0, 1)}, {ForcedBody{}}, {0, 0}};
-  EXPECT_EQ(force.refusal(stage::Method::kForceWrenches, problem.request()), "Axis: a direction has a length above 0");
+  EXPECT_EQ(force.refusal(stage::Method::kForceWrenches, problem.request()),
+            "application 0: Axis: a direction has a length above 0");
 }
 
 // ---- Spring
@@ -155,7 +156,8 @@ TEST_F(Spring, PullsBothBodiesAlike) {
 
 TEST_F(Spring, RefusesAnAnchorThatIsNoBody) {
   ForceProblem problem{0.0, {type_id("Spring")}, {SpringProperties{.anchor_body = 5}.flat()}, {ForcedBody{}}, {0, 0}};
-  EXPECT_EQ(spring_.refusal(stage::Method::kForceWrenches, problem.request()), "AnchorBody is no row of the bodies");
+  EXPECT_EQ(spring_.refusal(stage::Method::kForceWrenches, problem.request()),
+            "application 0: AnchorBody is no row of the bodies");
 }
 
 }  // namespace

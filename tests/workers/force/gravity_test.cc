@@ -38,9 +38,8 @@ TEST_F(Gravity, RefusesWhatIsNotFinite) {
     problem.bodies = {ForcedBody{.mass = 20.0}};
     problem.applications = {0, 0};
     EXPECT_EQ(gravity_.refusal(stage::Method::kForceWrenches, problem.request()),
-              "the wrench of application 0 on body 0 is not finite: the force's properties or the body's mass or state "
-              "are not, "
-              "or too large");
+              "application 0: the wrench is not finite: the force's properties or the body's mass or state are not, or "
+              "too large");
   }
 }
 
@@ -96,7 +95,7 @@ TEST_F(Gravity, RefusesApplicationsToNobody) {
 TEST_F(Gravity, RefusesTooFewNumbers) {
   ForceProblem problem{0.0, {type_id("Gravity")}, {{0, -10}}, {ForcedBody{}}, {0, 0}};
   EXPECT_EQ(gravity_.refusal(stage::Method::kForceWrenches, problem.request()),
-            "fewer numbers than the declared properties take");
+            "application 0: fewer numbers than the declared properties take");
 }
 
 }  // namespace

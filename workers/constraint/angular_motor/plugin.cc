@@ -44,8 +44,7 @@ class AngularMotor final : public ConstraintPlugin {
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
     bind_each(request, reply,
               [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-                if (type != type_id("AngularMotor"))
-                  throw Refusal("a joint is of a type that this plugin does not know");
+                if (type != type_id("AngularMotor")) throw Refusal("it is of a type that this plugin does not know");
                 const Vector3 point1 = properties.vector();
                 const Vector3 point2 = properties.vector();
                 const double speed = properties.number();
