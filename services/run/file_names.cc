@@ -1,0 +1,60 @@
+#include "services/run/file_names.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "services/recorder/recorder.h"
+#include "services/run/resumption.h"
+
+namespace gravitas {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_same_file(const std::string& a, const std::string& b) {
+  std::error_code none;
+  const fs::file_status one = fs::status(a, none), other = fs::status(b, none);
+  if (fs::exists(one) != fs::exists(other)) return false;
+  if (fs::exists(one)) return fs::is_regular_file(one) && fs::equivalent(a, b, none);
+  // neither is there yet
+  return fs::weakly_canonical(fs::absolute(a), none) == fs::weakly_canonical(fs::absolute(b), none);
+}
+
+void require_other(const NamedFile& output, const NamedFile& file) {
+  if (output.path.empty() || file.path.empty() || !is_same_file(output.path, file.path)) return;
+  throw BadInput(fmt::format("{} {}: it is the same file as {} {}; allowed: a file of its own", output.what,
+                             output.path, file.what, file.path));
+}
+
+}  // namespace
+
+void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    for (const NamedFile& input : inputs) require_other(outputs[i], input);
+    for (std::size_t j = 0; j < i; ++j) require_other(outputs[i], outputs[j]);
+  }
+}
+
+void require_separate_files(const RunOptions& options) {
+  const auto journal = [](const std::string& path) { return path.empty() ? "" : journal_of(path); };
+  const std::string target = options.checkpoint.empty() ? "" : checkpoint_target(options.checkpoint);
+  std::vector<NamedFile> inputs, outputs = {{"--trajectory", options.trajectory},
+                                            {"--report", options.report},
+                                            {"--events", options.events},
+                                            {"--reactions", options.reactions},
+                                            {"--instrumentation", options.instrumentation}};
+  const std::vector<NamedFile> kept = {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
+  const std::vector<NamedFile> resumed = {{"--resume", options.resume},
+                                          {"the journal of --resume", journal(options.resume)}};
+  for (const std::string& scene : options.scenes) inputs.push_back({"the scene", scene});
+  require_separate(inputs, kept);
+  const bool goes_on = !target.empty() && !options.resume.empty() && is_same_file(target, options.resume);
+  if (!goes_on) require_separate(resumed, kept);
+  for (const std::vector<NamedFile>* others : {&kept, &resumed})
+    inputs.insert(inputs.end(), others->begin(), others->end());
+  require_separate(inputs, outputs);
+}
+
+}  // namespace gravitas
