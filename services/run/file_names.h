@@ -20,4 +20,7 @@ void require_separate(const std::vector<NamedFile>& inputs, const std::vector<Na
 // Of a run. The checkpoint alone may replace what the run is resumed from.
 void require_separate_files(const RunOptions& options);
 
+// The same of the meshes that its scene names.
+void require_separate_meshes(const RunOptions& options, const scene::v1::Scene& scene);
+
 }  // namespace gravitas

@@ -109,6 +109,7 @@ class Run final : private kernel::CommitListener {
 
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
+    require_separate_meshes(options_, scene_);
     std::optional<Resumption> resumed;
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);

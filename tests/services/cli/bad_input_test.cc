@@ -124,6 +124,25 @@ TEST(BadInput, WhatIsReadIsNotWrittenOver) {
                                       scene + "; allowed: a file of its own"));
     EXPECT_EQ(harness::read_file(scene), text);
   }
+  // files that a scene or an edit names
+  const std::string mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const std::string obj = folder.write("x.obj", mesh);
+  const std::string solid = folder.write(
+      "solid.gravitas",
+      "Geometries { Geometry { Type = \"TriangleMesh\" Id = \"X\" CustomProperties { File = \"x.obj\" } } }");
+  const std::string added = folder.write("added.gravitas", "Materials { Material { Id = \"Ice\" } }");
+  for (const auto& [options, problem] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{solid, "--report", "x.obj"}, "--report x.obj: it is the same file as a mesh of the scene, " + obj},
+           {{solid, "--checkpoint", "x.obj"}, "the same file as a mesh of the scene, " + obj},
+           {{"--edit", "add added.gravitas@step=1", "--events", added},
+            "the same file as --edit add added.gravitas"}}) {
+    std::vector<std::string> arguments = {"run", scene};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(problem));
+  }
+  EXPECT_EQ(harness::read_file(obj), mesh);
   const ProgramResult capture =
       run_program({"capture", scene, "--steps", "1", "--slot", "solver", "--out", scene}, folder);
   EXPECT_EQ(capture.exit_code, 2);
