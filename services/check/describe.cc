@@ -46,6 +46,7 @@ Examinee find_installed(const std::string& name) {
 }  // namespace
 
 Examinee find_examinee(const std::string& argument) {
+  if (argument.empty()) throw BadInput(fmt::format("'' is no plugin; {}", kAllowed));
   Examinee examinee;
   examinee.argument = argument;
   const std::string path = std::filesystem::absolute(argument).lexically_normal().string();
@@ -68,7 +69,7 @@ Examinee find_examinee(const std::string& argument) {
     examinee.command = argument;
     return examinee;
   }
-  if (argument.empty() || argument.find('/') != std::string::npos || argument.ends_with(".so"))
+  if (argument.find('/') != std::string::npos || argument.ends_with(".so"))
     throw BadInput(fmt::format("'{}' is no file that can be read; {}", argument, kAllowed));
   return find_installed(argument);
 }

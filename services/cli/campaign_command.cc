@@ -10,6 +10,7 @@
 #include "services/campaign/endurance.h"
 #include "services/campaign/table.h"
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
@@ -118,7 +119,7 @@ void add_campaign(CLI::App* app, Action* action) {
   command->add_option("SCENE", options.scenes,
                       "Scene files, or built-in scenes: contacts, joints, all, shared (these four if absent)");
   command->add_option("--faults", options.faults, "How many, at least, over all shards")
-      ->check(CLI::Range(1ULL, 1'000'000'000'000ULL))
+      ->check(whole_number(1, 1'000'000'000'000))
       ->capture_default_str();
   command->add_option("--seed", options.seed, "All that is drawn comes from it")->capture_default_str();
   command->add_option("--shard", arguments->shard, "I/K: the I-th of K parts")->capture_default_str();
@@ -132,7 +133,7 @@ void add_campaign(CLI::App* app, Action* action) {
       ->capture_default_str();
   command->add_option("--out", options.out, "Folder for trials.jsonl, table.txt, table.json and index.html");
   command->add_option("--per-trial", options.draw.faults_per_trial, "Faults in one run, at most")
-      ->check(CLI::Range(1U, 24U))
+      ->check(whole_number(1, 24))
       ->capture_default_str();
   command->add_option("--jobs", options.jobs, "Processes that make trials; 0: one for each core")
       ->capture_default_str();

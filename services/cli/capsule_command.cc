@@ -10,10 +10,12 @@
 #include "services/capsule/recording_host.h"
 #include "services/capsule/replay.h"
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/cli/scene_options.h"
 #include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/exchange_spec.h"
+#include "services/run/file_names.h"
 #include "services/run/session.h"
 
 namespace gravitas::cli {
@@ -28,6 +30,9 @@ struct CaptureLine {
 
 int capture(CaptureLine* line) {
   line->scene.apply();
+  std::vector<NamedFile> scenes;
+  for (const std::string& scene : line->options.scenes) scenes.push_back({"the scene", scene});
+  require_separate(scenes, {{"--out", line->out}});
   capsule::Tape& tape = *line->tape;
   tape.slot = parse_slot("--slot", line->slot, line->slot);
   listen_to_interrupts();
@@ -158,8 +163,8 @@ void add_replay_options(CLI::App* command, ReplayLine* line) {
       "--hosting", line->hosting,
       "Where the plugin is asked: shm, grpc, or direct: in this process, for a debugger, a sanitizer or "
       "a profiler [shm]");
-  command->add_option("--deadline", line->options.deadline, "Of a call, s [2]")->check(CLI::PositiveNumber);
-  command->add_option("--call", line->options.only, "That call alone, counted from 1")->check(CLI::PositiveNumber);
+  command->add_option("--deadline", line->options.deadline, "Of a call, s [2]")->check(positive_seconds());
+  command->add_option("--call", line->options.only, "That call alone, counted from 1")->check(whole_number(1));
   command->add_flag("--json", line->json, "Print JSON");
 }
 
@@ -175,8 +180,8 @@ void add_capture(CLI::App* app, Action* action) {
   command->add_option("--slot", line->slot, "space, collision, constraint, force, solver or integrator")->required();
   command->add_option("--out", line->out, "The capsule's file")->required();
   command->add_option("--from-step", line->tape->first_step, "First step whose calls are kept [1]")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--calls", line->tape->most_calls, "Stop after so many calls")->check(CLI::PositiveNumber);
+      ->check(whole_number(1));
+  command->add_option("--calls", line->tape->most_calls, "Stop after so many calls")->check(whole_number(1));
   command->callback([=] { *action = [=] { return capture(line.get()); }; });
 }
 
@@ -194,7 +199,7 @@ void add_replay(CLI::App* app, Action* action) {
   command->add_option("--plugin", line->plugin,
                       "A library, a command or the name of an installed plugin, instead of the one that answered");
   command->add_option("--times", line->options.times, "Ask each call so often, for a profiler [1]")
-      ->check(CLI::PositiveNumber);
+      ->check(whole_number(1));
   command->callback([=] { *action = [=] { return replay(line.get()); }; });
 }
 

@@ -8,6 +8,7 @@
 #include "services/check/describe.h"
 #include "services/check/examination.h"
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
@@ -75,7 +76,7 @@ void add_check(CLI::App* app, Action* action) {
   command->add_option("--case", arguments->options.only_case, "Judge this case only, as a finding names it")
       ->excludes(level);
   command->add_option("--calls", arguments->options.calls, "Calls of level C4")
-      ->check(CLI::Range(1000U, 1000000000U))
+      ->check(whole_number(1000, 1'000'000'000))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([=] { *action = [=] { return check_plugin(*arguments); }; });

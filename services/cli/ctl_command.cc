@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/cli/query_text.h"
 #include "services/cli/scene_options.h"
 #include "services/control/client.h"
@@ -252,7 +253,8 @@ void add_ctl(CLI::App* app, Action* action) {
   add("pause", "Pause after the step that is being made", "pause", then_line(&ControlClient::pause));
   add("resume", "Go on", "resume", then_line(&ControlClient::resume));
   add("step", "Make steps of a paused run; Ctrl-C ends them", "step 10", make_steps)
-      ->add_option("N", line->steps, "Number of steps [1]");
+      ->add_option("N", line->steps, "Number of steps [1]")
+      ->check(whole_number(0));
   add("reset", "Back to t = 0, with the plugins of the scene", "reset", then_line(&ControlClient::reset));
   const auto add_order = [&](const char* name, const char* meaning, const char* example, Order order, const char* word,
                              const char* form) {
@@ -289,7 +291,7 @@ void add_ctl(CLI::App* app, Action* action) {
                 "space, collision, constraint, force, solver or integrator");
   capture_command->add_option("--out", line->out, "The capsule's file, on the server's machine")->required();
   capture_command->add_option("--steps", line->captured_steps, "For so many steps")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1))
       ->capture_default_str();
   CLI::App* query_command =
       add("query", "Ask about the bodies where they are now: rays, shape casts, overlap, closest points",

@@ -12,6 +12,7 @@
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/near_miss.h"
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/run/session.h"
 
 namespace {
@@ -36,6 +37,14 @@ void raise_descriptor_limit() {
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
   limit.rlim_cur = limit.rlim_max;
   setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+// `--name=`, whose value would be taken from the next word; empty: there is none.
+std::string option_without_value(const std::vector<std::string>& words) {
+  for (const std::string& word : words)
+    if (word.starts_with("--") && word.find('=') == word.size() - 1)
+      return word + ": \"\"; allowed: a value that is not empty, or leave the option out";
+  return {};
 }
 
 }  // namespace
@@ -63,8 +72,11 @@ int main(int argc, char** argv) {
   cli::add_campaign(&app, &action);
   cli::add_serve(&app, &action);
   cli::add_ctl(&app, &action);
-  if (const std::string unknown = unknown_subcommand(app, {argv + 1, argv + argc}); !unknown.empty()) {
-    std::cerr << "gravitas: " << unknown << '\n';
+  cli::refuse_empty_values(&app);
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  for (const std::string& problem : {unknown_subcommand(app, words), option_without_value(words)}) {
+    if (problem.empty()) continue;
+    std::cerr << "gravitas: " << problem << '\n';
     return cli::kBadInput;
   }
   try {

@@ -110,6 +110,8 @@ int describe(const std::string& name, bool json) {
   std::string problem;
   if (name.find('/') != std::string::npos || name.ends_with(".so")) {
     if (const InstalledPlugin* plugin = catalog.add_library(name, &problem)) found.push_back(*plugin);
+    problem = fmt::format("'{}': {}; allowed: the path of a plugin library, or the name of a plugin or a type", name,
+                          problem);
   } else {
     // names are unique inside a slot only; a type's name stands for the plugin that serves it
     for (const InstalledPlugin& plugin : catalog.plugins())

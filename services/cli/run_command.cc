@@ -3,10 +3,10 @@
 
 #include <csignal>
 #include <iostream>
-#include <limits>
 #include <memory>
 
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/cli/scene_options.h"
 #include "services/cli/terminal.h"
 #include "services/recorder/json.h"
@@ -135,8 +135,10 @@ void add_run(CLI::App* app, Action* action) {
   line->scene.add_to(command);
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
-  command->add_option("--sample-every", options.sample_every,
-                      "Interval of the samples of trajectory, instrumentation and reactions, s; every step if absent");
+  command
+      ->add_option("--sample-every", options.sample_every,
+                   "Interval of the samples of trajectory, instrumentation and reactions, s; every step if absent")
+      ->check(any_number("a finite number of seconds > 0"));
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option("--reactions", options.reactions,
                       "Write the force of each joint and contact that is awake, and joints' torque, to this file (JSON "
@@ -160,7 +162,7 @@ void add_run(CLI::App* app, Action* action) {
       "Keep a checkpoint in this file (replaced as a whole) and a journal in FILE.journal: at the start, where the run "
       "ends, and as --checkpoint-every says");
   command->add_option("--checkpoint-every", options.checkpoint_every, "Steps between checkpoints, counted from t = 0")
-      ->check(CLI::Range(1U, std::numeric_limits<std::uint32_t>::max()))
+      ->check(whole_number(1))
       ->needs(checkpoint);
   command->add_option("--resume", options.resume,
                       "Go on from this checkpoint; --steps and --duration count from t = 0. Files of output hold what "

@@ -4,6 +4,7 @@
 
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/channel/address.h"
+#include "services/cli/option_checks.h"
 #include "services/run/exchange_spec.h"
 
 namespace gravitas::cli {
@@ -63,14 +64,16 @@ void add_event_options(CLI::App* command, const char* name, std::optional<std::v
                    "collision_start, collision_end, break, wake, sleep. What is not looked for costs nothing")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--ongoing-rate", *ongoing_rate, "How often collision_ongoing is told, Hz [10]");
+  command->add_option("--ongoing-rate", *ongoing_rate, "How often collision_ongoing is told, Hz [10]")
+      ->check(any_number("a finite number of Hz > 0"));
 }
 
 void SceneOptions::add_to(CLI::App* command) {
   command->add_option("SCENE", run_->scenes, "Scene files; several are read as one scene")->required();
-  command->add_option("--duration", run_->duration, "Simulated time, s");
-  command->add_option("--steps", run_->steps, "Number of steps");
-  command->add_option("--dt", run_->time_step, "Time step, s");
+  command->add_option("--duration", run_->duration, "Simulated time, s")
+      ->check(any_number("a finite number of seconds >= 0"));
+  command->add_option("--steps", run_->steps, "Number of steps")->check(whole_number(0));
+  command->add_option("--dt", run_->time_step, "Time step, s")->check(any_number("a finite number of seconds > 0"));
   add_list(command, "--set", &run_->overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50");
   add_list(command, "--hosting", &hosting_,
            "direct, shm or grpc, for all slots or for one: solver=direct; SLOT=grpc:ADDRESS: a worker of this machine "
@@ -78,7 +81,7 @@ void SceneOptions::add_to(CLI::App* command) {
   add_list(command, "--attach", &attached_,
            "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "
            "SLOT=ADDRESS, where `gravitas-worker --listen ADDRESS LIBRARY` listens");
-  command->add_option("--threads", run_->threads, "Threads of each host")->check(CLI::Range(1, 1024));
+  command->add_option("--threads", run_->threads, "Threads of each host")->check(whole_number(1, 1024));
   command->add_flag("--no-sandbox", no_sandbox_, "Let worker processes do what they like: for debuggers");
 }
 

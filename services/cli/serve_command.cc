@@ -10,6 +10,7 @@
 
 #include "plugin_sdk/channel/address.h"
 #include "services/cli/commands.h"
+#include "services/cli/option_checks.h"
 #include "services/cli/scene_options.h"
 #include "services/control/served_run.h"
 #include "services/control/server.h"
@@ -74,8 +75,10 @@ void add_serve(CLI::App* app, Action* action) {
       "reaches the address, controls the run and what it loads.");
   line->scene.add_to(command);
   command->add_flag("--headless", line->headless, "The control API alone, without the page");
-  command->add_option("--speed", line->options.speed,
-                      "Simulated seconds per second; 0: as fast as possible [1: real time]");
+  command
+      ->add_option("--speed", line->options.speed,
+                   "Simulated seconds per second; 0: as fast as possible [1: real time]")
+      ->check(any_number("a finite number > 0, or 0: as fast as possible"));
   command->add_flag("--paused", line->options.is_paused, "Begin paused");
   CLI::Option* listen =
       command->add_option("--listen", line->listen, "Listen at ADDR:PORT of this machine, too; port 0: a free one");

@@ -45,6 +45,11 @@ void write_and_sync(const std::string& path, std::span<const std::byte> bytes) {
 
 }  // namespace
 
+bool is_disk_error(const std::error_code& code) {
+  return code == std::errc::no_space_on_device || code == std::errc::file_too_large || code == std::errc::io_error ||
+         code == std::error_code(EDQUOT, std::generic_category());
+}
+
 void write_all(int file, std::span<const std::byte> bytes, const std::string& what) {
   while (!bytes.empty()) {
     const ssize_t written = write(file, bytes.data(), bytes.size());

@@ -4,12 +4,16 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 namespace gravitas {
 
 // Writes all bytes to a file descriptor; throws std::system_error naming `what`.
 void write_all(int file, std::span<const std::byte> bytes, const std::string& what);
+
+// An error of the disk (full, broken) rather than of a name.
+bool is_disk_error(const std::error_code& code);
 
 // Puts `bytes` into the place of the file: PATH.tmp in the same folder, fsync, rename, fsync of the folder. On failure
 // throws std::system_error naming the file; what was at `path` is still there, and PATH.tmp is gone.

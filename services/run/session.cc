@@ -17,6 +17,7 @@
 #include "services/events/event_source.h"
 #include "services/recorder/checkpoint.h"
 #include "services/recorder/decision.h"
+#include "services/recorder/durable_file.h"
 #include "services/recorder/event_log.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/json.h"
@@ -28,6 +29,7 @@
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
+#include "services/run/file_names.h"
 #include "services/run/interruptible_host.h"
 #include "services/run/kernel_names.h"
 #include "services/run/report.h"
@@ -60,12 +62,6 @@ const char* outcome_name(RunOutcome outcome) {
   return "failed";
 }
 
-// Errors of a disk rather than of a name.
-bool is_full(const std::error_code& code) {
-  return code == std::errc::no_space_on_device || code == std::errc::file_too_large || code == std::errc::io_error ||
-         code == std::error_code(EDQUOT, std::generic_category());
-}
-
 // A run in its phases. What fails on the way ends the stepping and is kept; the phases after it still do what they can.
 class Run final : private kernel::CommitListener {
  public:
@@ -77,6 +73,7 @@ class Run final : private kernel::CommitListener {
 
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
+    require_separate_meshes(options_, scene_);
     std::optional<Resumption> resumed;
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
@@ -493,7 +490,7 @@ class Run final : private kernel::CommitListener {
       recorder_->keep(checkpoint_path_, options_.checkpoint_every, goes_on ? journal_ : JournalReading{},
                       *environment_);
     } catch (const std::system_error& error) {
-      if (is_full(error.code())) throw;
+      if (is_disk_error(error.code())) throw;
       throw BadInput(error.what());
     } catch (const std::runtime_error& problem) {
       throw BadInput(problem.what());
@@ -575,6 +572,7 @@ void Run::write_report() {
 
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {
+  require_separate_files(options);
   Run one(options, interrupted);
   one.prepare();
   one.open_files();

@@ -52,6 +52,7 @@ class BodyBuilder {
     set_bound(description);
     set_material(description);
     set_forces(description);
+    check_visual();
   }
 
  private:
@@ -194,7 +195,13 @@ class BodyBuilder {
     description->pose = coincide ? X_WG : compose(X_WG, X_GB);
     description->geometry = coincide ? Pose{} : inverse(X_GB);
     description->twist = {vector_of(kinetic.linear_velocity()), vector_of(kinetic.angular_velocity())};
-    if (is_movable_) description->damping = kinetic.damping_coefficient();
+    // of an immovable one it goes without saying: the seed's sample writes it
+    if (is_movable_) {
+      description->damping = kinetic.damping_coefficient();
+    } else if (body_.kinematic() && kinetic.damping_coefficient() != 0.0) {
+      diagnostics_.warning(place_of(kinetic, KineticProperties::kDampingCoefficientFieldNumber),
+                           what() + " is kinematic: its DampingCoefficient does nothing and is dropped");
+    }
     const bool moves = description->twist.linear != Vector3::Zero() || description->twist.angular != Vector3::Zero();
     if (is_movable_ || body_.kinematic() || !moves) return;
     description->twist = {};
@@ -296,6 +303,27 @@ class BodyBuilder {
     description->forces.clear();
     diagnostics_.warning(position, what() + " is " + (body_.kinematic() ? "kinematic" : "immovable") +
                                        ": its Forces do nothing and are dropped");
+  }
+
+  // Nothing of the physics, and yet no place for what nobody can read.
+  void check_visual() {
+    const int field = Body::kVisualTransformFieldNumber;
+    if (!written(field)) return;
+    const PropertyValue given = from_message(body_.visual_transform());
+    const auto is_list = [](const PropertyValue& value, std::size_t length) {
+      return value.kind == PropertyValue::Kind::kList && value.list.size() == length;
+    };
+    if (!is_list(given, 2) || !is_list(given.list[0], 3) || !is_list(given.list[1], 4)) {
+      refuse(field, "has a VisualTransform that is " + shown(given) + "; allowed: {{px, py, pz}, {qw, qx, qy, qz}}");
+      return;
+    }
+    std::vector<double> unused;
+    std::vector<PropertyProblem> problems;
+    flatten_value(Property::vector("the position of VisualTransform", "m", "geometry"), given.list[0], &unused,
+                  &problems);
+    flatten_value(Property::quaternion("the orientation of VisualTransform", "geometry"), given.list[1], &unused,
+                  &problems);
+    diagnostics_.add(problems, place(field), what() + ": ");
   }
 
   const Body& body_;

@@ -11,7 +11,8 @@ struct ObjMesh {
   std::vector<double> triangles;  // three indices each, from 0
 };
 
-// False, and in *why the reason, where the file cannot be read, is none, or has no face.
+// False, and in *why what comes behind the name of the file (`:LINE: ` where there is one, what is wrong, what is allowed),
+// where it cannot be read, is none, or has no face.
 bool read_obj(const std::string& path, ObjMesh* mesh, std::string* why);
 
 }  // namespace gravitas::scene

@@ -1,12 +1,6 @@
 #include "services/scene/reader.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <cstdint>
-#include <cstring>
 #include <map>
 #include <utility>
 #include <vector>
@@ -14,15 +8,13 @@
 #include "plugin_sdk/near_miss.h"
 #include "services/scene/assign.h"
 #include "services/scene/grammar.h"
+#include "services/scene/input_file.h"
 #include "services/scene/parser.h"
 
 namespace gravitas::scene {
 namespace {
 
 namespace pb = google::protobuf;
-
-// More than any scene and less than what would fill the memory of a small machine.
-constexpr std::int64_t kLargestFile = std::int64_t{4} << 30;
 
 // Thrown when enough errors have been found.
 struct EnoughErrors {};
@@ -236,37 +228,6 @@ class Reader {
   std::vector<std::pair<std::string, TextPosition>> open_;
 };
 
-// The contents of a file; on failure the reason.
-bool read_file(const std::string& path, std::string* text, std::string* why) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat about = {};
-  bool good = file >= 0 && ::fstat(file, &about) == 0;
-  if (!good) {
-    *why = std::strerror(errno);
-  } else if (S_ISDIR(about.st_mode)) {
-    *why = "it is a folder";
-    good = false;
-  } else if (about.st_size > kLargestFile) {
-    *why = "it is larger than 4 GiB";
-    good = false;
-  }
-  std::size_t size = 0;
-  while (good) {
-    text->resize(std::max<std::size_t>(size + 65536, static_cast<std::size_t>(about.st_size) + 1));
-    const ssize_t got = ::read(file, text->data() + size, text->size() - size);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0 || static_cast<std::int64_t>(size) > kLargestFile) {
-      *why = got < 0 ? std::strerror(errno) : "it is larger than 4 GiB";
-      good = false;
-    }
-    if (got <= 0) break;
-    size += static_cast<std::size_t>(got);
-  }
-  text->resize(good ? size : 0);
-  if (file >= 0) ::close(file);
-  return good;
-}
-
 // Reads one text after another into one scene.
 class SceneReading {
  public:
@@ -329,7 +290,7 @@ bool read_files(std::span<const std::string> paths, SceneDocument* document, Pro
   for (const std::string& path : paths) {
     const std::uint32_t file = reading.add_file(path);
     std::string text, why;
-    if (read_file(path, &text, &why)) {
+    if (read_input_file(path, &text, &why)) {
       reading.read(text, file);
     } else {
       reading.diagnostics().error({file, 1, 1}, "cannot be read: " + why + "; a scene is a readable text file");

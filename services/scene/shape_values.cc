@@ -106,12 +106,13 @@ bool expand_mesh(const std::string& folder, std::vector<NamedValue>* values, Sha
   if (file->value.kind != PropertyValue::Kind::kText)
     return refuse(position, "File is " + shown(file->value) + "; allowed: the path of an OBJ file in double quotes",
                   problems);
+  if (file->value.text.empty()) return refuse(position, "File is empty; allowed: the path of an OBJ file", problems);
   if (given != nullptr || find(values, "Vertices") != nullptr)
     return refuse(position, "File stands beside Vertices or Faces; allowed: one of both", problems);
   const std::string path = file->value.text.starts_with("/") ? file->value.text : folder + file->value.text;
   ObjMesh mesh;
   std::string why;
-  if (!read_obj(path, &mesh, &why)) return refuse(position, path + ": " + why, problems);
+  if (!read_obj(path, &mesh, &why)) return refuse(position, path + why, problems);
   expansion->vertices = std::move(mesh.vertices);
   expansion->faces = std::move(mesh.triangles);
   expansion->prefix = path + ": ";

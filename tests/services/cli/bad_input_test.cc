@@ -5,6 +5,8 @@
 
 #include <cstdlib>
 
+#include <filesystem>
+
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
@@ -231,6 +233,73 @@ TEST(BadInput, FilesThatCannotBeRead) {
   }
 }
 
+TEST(BadInput, FilesThatDoNotEndAreNotRead) {
+  const ScratchFolder folder;
+  const ProgramResult scene = run_program({"run", "/dev/zero"}, folder);
+  EXPECT_EQ(scene.exit_code, 2);
+  EXPECT_THAT(scene.err, HasSubstr("/dev/zero:1:1: error: cannot be read: it is no file that ends but a device"));
+}
+
+TEST(BadInput, WhatIsReadIsNotWrittenOver) {
+  const ScratchFolder folder;
+  const std::string text = harness::read_file(kSample), scene = folder.write("scene.gravitas", text);
+  for (const char* option :
+       {"--trajectory", "--report", "--events", "--reactions", "--instrumentation", "--checkpoint"}) {
+    const ProgramResult result =
+        run_program({"run", scene, "--steps", "1", "--hosting", "direct", option, "./scene.gravitas"}, folder);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr(std::string(option) + " ./scene.gravitas: it is the same file as the scene " +
+                                      scene + "; allowed: a file of its own"));
+    EXPECT_EQ(harness::read_file(scene), text);
+  }
+  // files that a scene or an edit names
+  const std::string mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const std::string obj = folder.write("x.obj", mesh);
+  const std::string solid = folder.write(
+      "solid.gravitas",
+      "Geometries { Geometry { Type = \"TriangleMesh\" Id = \"X\" CustomProperties { File = \"x.obj\" } } }");
+  const std::string added = folder.write("added.gravitas", "Materials { Material { Id = \"Ice\" } }");
+  for (const auto& [options, problem] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{solid, "--report", "x.obj"}, "--report x.obj: it is the same file as a mesh of the scene, " + obj},
+           {{solid, "--checkpoint", "x.obj"}, "the same file as a mesh of the scene, " + obj},
+           {{"--edit", "add added.gravitas@step=1", "--events", added},
+            "the same file as --edit add added.gravitas"}}) {
+    std::vector<std::string> arguments = {"run", scene};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(problem));
+  }
+  EXPECT_EQ(harness::read_file(obj), mesh);
+  const ProgramResult capture =
+      run_program({"capture", scene, "--steps", "1", "--slot", "solver", "--out", scene}, folder);
+  EXPECT_EQ(capture.exit_code, 2);
+  EXPECT_EQ(harness::read_file(scene), text);
+}
+
+TEST(BadInput, NoFileIsWrittenTwice) {
+  const ScratchFolder folder;
+  const auto run = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> arguments = {"run", kSample, "--steps", "1", "--hosting", "direct"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run_program(arguments, folder);
+  };
+  const ProgramResult result = run({"--trajectory", "x", "--report", folder.path("x")});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("/x: it is the same file as --trajectory x; allowed: a file of its own"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("x")));
+  EXPECT_EQ(run({"--report", "/dev/null", "--events", "/dev/null"}).exit_code, 0);
+
+  // a checkpoint may take the place of the one that the run goes on from, and nothing else may
+  EXPECT_EQ(run({"--checkpoint", "c"}).exit_code, 0);
+  EXPECT_EQ(run({"--resume", "c", "--checkpoint", "./c"}).exit_code, 0);
+  EXPECT_EQ(run({"--resume", "c", "--report", "c"}).exit_code, 2);
+  EXPECT_EQ(run({"--resume", "c", "--events", "c.journal"}).exit_code, 2);
+  EXPECT_EQ(run({"--resume", "c", "--checkpoint", "c.journal"}).exit_code, 2);
+  EXPECT_EQ(run({"--checkpoint", "d", "--events", "d.journal"}).exit_code, 2);
+  EXPECT_EQ(run({"--resume", "c"}).exit_code, 0);
+}
+
 TEST(BadInput, AFileThatIsNoSceneAtAll) {
   const ScratchFolder folder;
   const std::string path = folder.write("noise", std::string("\x7f"
@@ -299,7 +368,13 @@ TEST(BadInput, OptionsOfTheCommandLine) {
            {{"--dt", "0"}, "--dt 0: it must be"},
            {{"--duration", "-1"}, "--duration -1: it must be"},
            {{"--steps", "many"}, "--steps"},
-           {{"--threads", "0"}, "--threads"},
+           {{"--threads", "0"}, "--threads: \"0\"; allowed: a whole number from 1 to 1024"},
+           {{"--steps", "-1"}, "--steps: \"-1\"; allowed: a whole number from 0 to 4294967295"},
+           {{"--steps", "1.5"}, "--steps: \"1.5\"; allowed: a whole number"},
+           {{"--steps", "4294967296"}, "--steps: \"4294967296\"; allowed: a whole number"},
+           {{"--dt", "abc"}, "--dt: \"abc\"; allowed: a finite number of seconds > 0"},
+           {{"--duration", "abc"}, "--duration: \"abc\"; allowed: a finite number of seconds >= 0"},
+           {{"--sample-every", "1s"}, "--sample-every: \"1s\"; allowed: a finite number of seconds > 0"},
            {{"--set", "Solver.Iteration=5"}, "Iterations"},
            {{"--set", "Solver.Iterations=none"}, "--set Solver.Iterations=none"},
            {{"--set", "Integrator=RK9"}, "Euler"},
@@ -312,6 +387,53 @@ TEST(BadInput, OptionsOfTheCommandLine) {
     EXPECT_EQ(result.exit_code, 2) << option[0];
     EXPECT_EQ(result.out, "");
     EXPECT_THAT(result.err, HasSubstr(expected));
+  }
+}
+
+// An empty value would count as an option that is left out.
+TEST(BadInput, EmptyValuesOfOptions) {
+  const ScratchFolder folder;
+  for (const auto& [command, options] : std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>>{
+           {{"run", kSample, "--steps", "1"},
+            {"--resume", "--trajectory", "--report", "--checkpoint", "--events", "--reactions", "--instrumentation"}},
+           {{"capture", kSample, "--slot", "solver"}, {"--out"}},
+           {{"replay", "s.caps"}, {"--plugin", "--hosting", "--call"}},
+           {{"serve", kSample, "--headless"}, {"--socket", "--listen"}},
+           {{"ctl", "status"}, {"--socket"}}}) {
+    for (const std::string& option : options) {
+      std::vector<std::string> arguments = command;
+      arguments.insert(arguments.end(), {option, ""});
+      const ProgramResult result = run_program(arguments, folder);
+      EXPECT_EQ(result.exit_code, 2) << option;
+      EXPECT_THAT(result.err, HasSubstr(option + ": \"\"; allowed: "));
+      arguments.resize(command.size());
+      arguments.insert(arguments.end(), {option + "=", "--json"});
+      const ProgramResult joined = run_program(arguments, folder);
+      EXPECT_EQ(joined.exit_code, 2) << option;
+      EXPECT_THAT(joined.err, HasSubstr(option + "=: \"\"; allowed: "));
+    }
+  }
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"run", ""}, {"check", ""}, {"bisect", "s.caps", "", "Sequential"}, {"describe", ""}}) {
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2) << arguments[0];
+    EXPECT_THAT(result.err, HasSubstr("allowed: a value that is not empty"));
+  }
+}
+
+TEST(BadInput, NumbersOfReplayAndCapture) {
+  const ScratchFolder folder;
+  const std::string whole = "\"0\"; allowed: a whole number from 1 to 4294967295";
+  for (const auto& [arguments, message] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"replay", "s.caps", "--call", "0"}, "--call: " + whole},
+           {{"replay", "s.caps", "--times", "0"}, "--times: " + whole},
+           {{"replay", "s.caps", "--deadline", "0"}, "--deadline: \"0\"; allowed: a finite number of seconds > 0"},
+           {{"replay", "s.caps", "--deadline", "nan"}, "--deadline: \"nan\"; allowed: a finite number of seconds > 0"},
+           {{"capture", kSample, "--slot", "solver", "--out", "c", "--calls", "0"}, "--calls: " + whole},
+           {{"capture", kSample, "--slot", "solver", "--out", "c", "--from-step", "0"}, "--from-step: " + whole}}) {
+    const ProgramResult result = run_program(arguments, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(message));
   }
 }
 

@@ -181,6 +181,25 @@ TEST(BuildBodies, WhatNothingCanDoIsDroppedAndSaid) {
                                             "keeps them is Kinematic)",
                                             "scene:2:48: warning: Body \"Ball\" is immovable: its "
                                             "Forces do nothing and are dropped"));
+  const BuiltScene damped =
+      build(scene_with_body("GeometryId = \"Brick\" Kinematic = true\nKineticProperties { DampingCoefficient = 3 }"));
+  EXPECT_THAT(damped.warnings(), ElementsAre("scene:3:42: warning: Body \"Ball\" is kinematic: its DampingCoefficient "
+                                             "does nothing and is dropped"));
+}
+
+TEST(BuildBodies, APictureIsPlacedByAPose) {
+  const std::string picture = "GeometryId = \"Unit\" MassDensity = 1\nVisualTransform = ",
+                    what = "scene:3:19: error: Body \"Ball\"";
+  body(picture + "{{1, 2, 3}, {1, 0, 0, 0}}");
+  const std::string allowed = "; allowed: {{px, py, pz}, {qw, qx, qy, qz}}";
+  EXPECT_THAT(body_errors_of(picture + "\"x\""), ElementsAre(what + " has a VisualTransform that is \"x\"" + allowed));
+  EXPECT_THAT(body_errors_of(picture + "{\"a\", {true}}"),
+              ElementsAre(what + " has a VisualTransform that is a list of 2" + allowed));
+  EXPECT_THAT(body_errors_of(picture + "{{1, 2, true}, {1, 0, 0, 0}}"),
+              ElementsAre(HasSubstr(
+                  "scene:3:27: error: Body \"Ball\": an element of the position of VisualTransform is true")));
+  EXPECT_THAT(body_errors_of(picture + "{{1, 2, 3}, {2, 0, 0, 0}}"),
+              ElementsAre(HasSubstr("the orientation of VisualTransform has the norm 2")));
 }
 
 // ---- poses

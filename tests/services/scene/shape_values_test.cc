@@ -100,7 +100,13 @@ TEST(ShapeValues, RefusalsNameThePlaceAndTheFace) {
   EXPECT_THAT(error(geometry("TriangleMesh", "Vertices = {{0,0,0}}")), HasSubstr("Faces is missing"));
   EXPECT_THAT(error(geometry("TriangleMesh", "Vertices = {{0,0,0}} Faces = {{0,1}}")),
               HasSubstr("face 0 is a list of 2; allowed"));
-  EXPECT_THAT(error(geometry("TriangleMesh", "File = \"nowhere.obj\"")), HasSubstr("nowhere.obj: cannot be opened"));
+  EXPECT_THAT(error(geometry("TriangleMesh", "File = \"nowhere.obj\"")),
+              HasSubstr("nowhere.obj: cannot be read: No such file or directory; allowed: an OBJ file"));
+  EXPECT_THAT(error(geometry("TriangleMesh", "File = \"/tmp\"")), HasSubstr("/tmp: cannot be read: it is a folder"));
+  EXPECT_THAT(error(geometry("TriangleMesh", "File = \"/dev/zero\"")),
+              HasSubstr("3:8: error: TriangleMesh \"A\": /dev/zero: cannot be read: it is no file that ends"));
+  EXPECT_THAT(error(geometry("TriangleMesh", "File = \"\"")),
+              HasSubstr("3:8: error: TriangleMesh \"A\": File is empty; allowed: the path of an OBJ file"));
   EXPECT_THAT(error(geometry("Compound", "Children = {{\"Nobody\",{0,0,0},{1,0,0,0}}}")),
               HasSubstr("child 0 names no Geometry: \"Nobody\""));
   EXPECT_THAT(error(geometry("Compound", "Children = {{\"A\",{0,0,0},{1,0,0,0}}}")),
@@ -153,8 +159,30 @@ TEST_F(ObjFile, TrianglesWithoutAreaAreCountedAndOpenOnesSaidToBeShells) {
 
 TEST_F(ObjFile, RefusalsNameTheFile) {
   EXPECT_THAT(with("v 0 0 0\n").errors(), ElementsAre(HasSubstr("x.obj: has no face")));
-  EXPECT_THAT(with("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 9\n").errors(), ElementsAre(HasSubstr("x.obj: ")));
-  EXPECT_THAT(with("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 0 1 2\n").errors(), ElementsAre(HasSubstr("x.obj: ")));
+}
+
+// None of them is left out in silence.
+TEST_F(ObjFile, LinesThatAreNoVertexOrFaceAreRefusedByTheirNumber) {
+  const std::string good = "v 0 0 0\nv 1 0 0\r\nv 0 1 0\rv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
+  const std::string corner = "; allowed: a vertex from 1 to 4, or from -1 to -4 counted backwards";
+  EXPECT_THAT(with(good + "f 2 3 4\n").errors(), IsEmpty());
+  for (const auto& [line, problem] : std::vector<std::pair<std::string, std::string>>{
+           {"f 2 3", "a face has 2 corners; allowed: three or more"},
+           {"f", "a face has 0 corners; allowed: three or more"},
+           {"f 1 2 9", "a corner is \"9\"" + corner},
+           {"f 0 1 2", "a corner is \"0\"" + corner},
+           {"f 1 2 -5", "a corner is \"-5\"" + corner},
+           {"f 1 2 99999999999999999999", "a corner is \"99999999999999999999\"" + corner},
+           {"f 1 2 3x", "a corner is \"3x\"" + corner},
+           {"v 1 0", "a vertex has 2 coordinates; allowed: v and three finite numbers"},
+           {"v a 0 0", "a coordinate is \"a\"; allowed: v and three finite numbers"},
+           {"v 0 nan 0", "a coordinate is \"nan\"; allowed: v and three finite numbers"},
+           {"v 0 0 1e999", "a coordinate is \"1e999\"; allowed: v and three finite numbers"}})
+    EXPECT_THAT(with(good + line + "\n").errors(), ElementsAre(HasSubstr("x.obj:8: " + problem)));
+}
+
+TEST_F(ObjFile, AFaceMayComeBeforeItsVertices) {
+  EXPECT_THAT(with("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n").errors(), IsEmpty());
 }
 
 }  // namespace

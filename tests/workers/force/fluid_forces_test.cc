@@ -1,4 +1,5 @@
 // Forces `Buoyancy` and `Aerodynamic` against closed forms.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -182,6 +183,17 @@ TEST(Buoyancy, EndsWithItsRegion) {
   EXPECT_GT(ask(&force, "Buoyancy", fluid.flat(), body).wrench.force.y(), 0.0);
   body.pose.position.x() = 1.1;
   EXPECT_EQ(ask(&force, "Buoyancy", fluid.flat(), body).wrench.force.y(), 0.0);
+}
+
+TEST(Buoyancy, RefusesRegionsThatAreNoBoxes) {
+  PluginUnderTest force("force_buoyancy");
+  for (const std::vector<double>& region : {std::vector<double>{1, 1, 1}, std::vector<double>{-1, 1, -1, 1, -1, 1}}) {
+    ForceProblem problem{
+        0.0, {type_id("Buoyancy")}, {FluidProperties{.region = region}.flat()}, {ForcedBody{}}, {0, 0}};
+    problem.bodies[0].shape = 0;
+    problem.shapes = kShapes;
+    EXPECT_THAT(force.refusal(stage::Method::kForceWrenches, problem.request()), ::testing::HasSubstr("min <= max"));
+  }
 }
 
 TEST(Buoyancy, RefusesShapesThatItDoesNotKnow) {

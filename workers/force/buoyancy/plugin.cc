@@ -37,7 +37,11 @@ Fluid read(PropertyCursor cursor) {
   f.region = cursor.table(3);
   f.velocity = cursor.vector();
   f.linear_drag = cursor.number(), f.angular_drag = cursor.number();
-  if (!f.region.empty() && f.region.size() != 6) throw Refusal("Region: allowed are two rows, {min} and {max}");
+  const auto is_box = [](std::span<const double> r) {
+    return r.size() == 6 && r[0] <= r[3] && r[1] <= r[4] && r[2] <= r[5];
+  };
+  if (!f.region.empty() && !is_box(f.region))
+    throw Refusal("Region: allowed are two rows, {min} and {max}, with min <= max");
   return f;
 }
 

@@ -1,0 +1,63 @@
+#include "services/cli/option_checks.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <functional>
+
+namespace gravitas::cli {
+namespace {
+
+// Takes what `is_allowed`; otherwise says what is.
+CLI::Validator check_of(std::function<bool(const std::string&)> is_allowed, std::string allowed) {
+  return CLI::Validator(
+      [=](const std::string& text) {
+        return is_allowed(text) ? std::string() : fmt::format("\"{}\"; allowed: {}", text, allowed);
+      },
+      "");
+}
+
+template <typename Number>
+bool is_read(const std::string& text, Number* number) {
+  return CLI::detail::lexical_cast(text, *number);
+}
+
+}  // namespace
+
+CLI::Validator whole_number(std::uint64_t least, std::uint64_t most) {
+  return check_of(
+      [=](const std::string& text) {
+        std::uint64_t number = 0;
+        return is_read(text, &number) && number >= least && number <= most;
+      },
+      fmt::format("a whole number from {} to {}", least, most));
+}
+
+CLI::Validator any_number(const std::string& allowed) {
+  return check_of(
+      [](const std::string& text) {
+        double number = 0.0;
+        return is_read(text, &number);
+      },
+      allowed);
+}
+
+CLI::Validator positive_seconds() {
+  return check_of(
+      [](const std::string& text) {
+        double number = 0.0;
+        return is_read(text, &number) && std::isfinite(number) && number > 0.0;
+      },
+      "a finite number of seconds > 0");
+}
+
+void refuse_empty_values(CLI::App* app) {
+  for (CLI::Option* option : app->get_options())
+    if (option->get_items_expected_max() > 0)
+      option->check(check_of([](const std::string& text) { return !text.empty(); },
+                             option->get_positional() ? "a value that is not empty"
+                                                      : "a value that is not empty, or leave the option out"));
+  for (CLI::App* command : app->get_subcommands(nullptr)) refuse_empty_values(command);
+}
+
+}  // namespace gravitas::cli

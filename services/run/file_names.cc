@@ -1,0 +1,90 @@
+#include "services/run/file_names.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "services/recorder/recorder.h"
+#include "services/run/resumption.h"
+
+namespace gravitas {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_same_file(const std::string& a, const std::string& b) {
+  std::error_code none;
+  const fs::file_status one = fs::status(a, none), other = fs::status(b, none);
+  if (fs::exists(one) != fs::exists(other)) return false;
+  if (fs::exists(one)) return fs::is_regular_file(one) && fs::equivalent(a, b, none);
+  // neither is there yet
+  return fs::weakly_canonical(fs::absolute(a), none) == fs::weakly_canonical(fs::absolute(b), none);
+}
+
+void require_other(const NamedFile& output, const NamedFile& file) {
+  if (output.path.empty() || file.path.empty() || !is_same_file(output.path, file.path)) return;
+  throw BadInput(fmt::format("{} {}: it is the same file as {} {}; allowed: a file of its own", output.what,
+                             output.path, file.what, file.path));
+}
+
+std::string journal(const std::string& path) { return path.empty() ? "" : journal_of(path); }
+
+std::vector<NamedFile> outputs_of(const RunOptions& options) {
+  return {{"--trajectory", options.trajectory},
+          {"--report", options.report},
+          {"--events", options.events},
+          {"--reactions", options.reactions},
+          {"--instrumentation", options.instrumentation}};
+}
+
+std::vector<NamedFile> kept_by(const RunOptions& options) {
+  const std::string target = options.checkpoint.empty() ? "" : checkpoint_target(options.checkpoint);
+  return {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
+}
+
+// The file of an edit "add FILE@step=N"; empty: it adds none.
+std::string added_file(const std::string& edit) {
+  const std::size_t begin = edit.starts_with("add ") ? edit.find_first_not_of(' ', 4) : std::string::npos;
+  return begin == std::string::npos ? "" : edit.substr(begin, edit.rfind("@step=") - begin);
+}
+
+}  // namespace
+
+void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    for (const NamedFile& input : inputs) require_other(outputs[i], input);
+    for (std::size_t j = 0; j < i; ++j) require_other(outputs[i], outputs[j]);
+  }
+}
+
+void require_separate_files(const RunOptions& options) {
+  std::vector<NamedFile> inputs;
+  const std::vector<NamedFile> kept = kept_by(options);
+  const std::vector<NamedFile> resumed = {{"--resume", options.resume},
+                                          {"the journal of --resume", journal(options.resume)}};
+  for (const std::string& scene : options.scenes) inputs.push_back({"the scene", scene});
+  for (const std::string& edit : options.edits) inputs.push_back({"--edit add", added_file(edit)});
+  require_separate(inputs, kept);
+  const bool goes_on =
+      !options.checkpoint.empty() && !options.resume.empty() && is_same_file(kept[0].path, options.resume);
+  if (!goes_on) require_separate(resumed, kept);
+  for (const std::vector<NamedFile>* others : {&kept, &resumed})
+    inputs.insert(inputs.end(), others->begin(), others->end());
+  require_separate(inputs, outputs_of(options));
+}
+
+void require_separate_meshes(const RunOptions& options, const scene::v1::Scene& scene) {
+  std::vector<NamedFile> meshes;
+  for (const scene::v1::Geometry& geometry : scene.geometries().geometry()) {
+    const auto file = static_cast<int>(geometry.location().file());
+    const fs::path folder = file < scene.files_size() ? fs::path(scene.files(file)).parent_path() : fs::path();
+    for (const scene::v1::Property& property : geometry.custom_properties().property())
+      if (property.name() == "File" && !property.value().text().empty())
+        meshes.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
+  }
+  require_separate(meshes, kept_by(options));
+  require_separate(meshes, outputs_of(options));
+}
+
+}  // namespace gravitas

@@ -1,0 +1,26 @@
+// Files that a command reads and writes: none is written over that it reads, or writes under another option.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "services/run/session.h"
+
+namespace gravitas {
+
+struct NamedFile {
+  std::string what;  // for errors: "--trajectory", "the scene"
+  std::string path;  // none if empty
+};
+
+// Throws BadInput if an output is the same file as an input or as another output, by whatever names. Files that are not
+// ordinary ones (devices, pipes) may be named twice.
+void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
+
+// Of a run. The checkpoint alone may replace what the run is resumed from.
+void require_separate_files(const RunOptions& options);
+
+// The same of the meshes that its scene names.
+void require_separate_meshes(const RunOptions& options, const scene::v1::Scene& scene);
+
+}  // namespace gravitas
