@@ -86,8 +86,8 @@ std::string EnvironmentDescription::validate() const {
   for (const ConstraintDescription& joint : constraints)
     if (std::string problem = validate_joint(*this, joint); !problem.empty()) return problem;
   for (const Slot which : kSlots)
-    if (!(slot(which).deadline > 0.0 && slot(which).deadline <= 1e6))
-      return std::string("the deadline of slot ") + slot_name(which) + " must be in (0, 1e6] s";
+    if (!(slot(which).deadline > 0.0 && slot(which).deadline <= kAttachedDeadline))
+      return std::string("the deadline of slot ") + slot_name(which) + " must be in (0, 1e8] s";
   return {};
 }
 

@@ -49,10 +49,11 @@ inline Application application_at(const stage::ForceWrenchesRequest& request, st
 }
 
 namespace detail {
-inline void push_answer(const stage::ForceWrenchesReply& reply, const ApplicationAnswer& a) {
+inline void push_answer(const stage::ForceWrenchesReply& reply, std::uint32_t body, const ApplicationAnswer& a) {
   if (!a.wrench.force.allFinite() || !a.wrench.torque.allFinite() || !a.impulse.force.allFinite() ||
       !a.impulse.torque.allFinite() || !std::isfinite(a.potential))
-    throw Refusal("the wrench is not finite: the force's properties or the body's mass or state are not, or too large");
+    throw Refusal("the wrench on body " + std::to_string(body) +
+                  " is not finite: the force's properties or the body's mass or state are not, or too large");
   const auto push = [](const stage::ReplyColumn<double>& column, const Wrench& w) {
     column.push(w.force.x(), w.force.y(), w.force.z(), w.torque.x(), w.torque.y(), w.torque.z());
   };
@@ -71,7 +72,7 @@ void for_each_application(const stage::ForceWrenchesRequest& request, const stag
   for (std::size_t row = 0; row < request.application().size() / 2; ++row) {
     const Application one = application_at(request, row);
     name_refused_row(kApplicationRow, row, [&] {
-      detail::push_answer(reply, answer(request.force_type()[one.force], one.properties, one.body));
+      detail::push_answer(reply, one.body, answer(request.force_type()[one.force], one.properties, one.body));
     });
   }
 }

@@ -69,8 +69,7 @@ std::string who(const RefusedRow& row, const std::string& place_of_body = "") {
   return "Force \"" + row.force->id + "\" on Body \"" + row.body->id + "\"" + place_of_body + ": ";
 }
 
-// ---- places
-// ----------------------------------------------------------------------------------------------------------
+// ---- places ------------------------------------------------------------------------------------------
 
 template <typename Blocks>
 auto* find_block(const Blocks& blocks, const std::string& id) {

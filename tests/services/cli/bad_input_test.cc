@@ -135,10 +135,10 @@ const BadScene kBadScenes[] = {
      "error: Constraint \"J2\": Axle: RollingAxis is parallel to SteeringAxis"},
     {"vortex", with_force("Vortex", "Centre = {0, 0, 0} Strength = 1 Axis = {0, 0, 0}"), "2:33",
      "error: Force \"F\" on Body \"B\" ("},
-    {"buoyancy", with_force("Buoyancy", "FluidDensity = 1000 FluidLevel = 0 Region = {{1, 1, 1}}"), "2:36",
-     "error: Force \"F\" on Body \"B\" ("},
+    {"buoyancy", with_force("Buoyancy", "FluidDensity = 1000 FluidLevel = 0 Region = {{1, 1, 1}}"), "2:45",
+     "error: Buoyancy \"F\": Region is a list of 1; allowed: two rows"},
     {"far_too_heavy", with_force("Gravity", "Acceleration = {0, -9.81, 0}", "1e308"), "1:10",
-     ":4:1): the wrench is not finite"},
+     ":4:1): the wrench on body 1 is not finite"},
     {"order",
      "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} } } }\n"
      "KineticIntegrator { Type = \"SymplecticSplitting\" CustomProperties { Order = 3 } } }\n",

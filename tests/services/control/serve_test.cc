@@ -123,7 +123,7 @@ TEST(Serve, CtlControlsIt) {
   ProgramResult refused = served.ctl({"swap", "solver=Sequentail"});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("did you mean \"Sequential\"?"));
-  EXPECT_EQ(served.end(SIGTERM).exit_code, 0);
+  EXPECT_EQ(served.end(SIGTERM).exit_code, 130);
   refused = served.ctl({"status"});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("start one: gravitas serve SCENE --headless"));
@@ -163,7 +163,7 @@ TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   const pid_t watch = harness::start_program({"ctl", "watch", "--socket", served.socket()}, own);
   for (int i = 0; i < 3000 && read_file(own.path("stdout")).empty(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  EXPECT_EQ(served.end(SIGTERM).exit_code, 0);
+  EXPECT_EQ(served.end(SIGTERM).exit_code, 130);
   const ProgramResult result = harness::finish_program(watch, own);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, ::testing::StartsWith("step "));

@@ -38,7 +38,8 @@ TEST_F(Gravity, RefusesWhatIsNotFinite) {
     problem.bodies = {ForcedBody{.mass = 20.0}};
     problem.applications = {0, 0};
     EXPECT_EQ(gravity_.refusal(stage::Method::kForceWrenches, problem.request()),
-              "application 0: the wrench is not finite: the force's properties or the body's mass or state are not, or "
+              "application 0: the wrench on body 0 is not finite: the force's properties or the body's mass or state "
+              "are not, or "
               "too large");
   }
 }
