@@ -10,7 +10,7 @@
 namespace gravitas::scene {
 namespace {
 
-constexpr const char *kGravity = "Gravity", *kRegion = "Region";
+constexpr const char* kGravity = "Gravity";
 
 // Calls visit(property, its numbers) for each property of flattened parameters.
 template <typename Visit>
@@ -76,27 +76,6 @@ void float_bodies(std::uint32_t force, const TypeDeclaration& type, BuildContext
   if (splits.empty()) std::fill_n(absent_gravity(type, &forces[force].parameters), 3, 0.0);
 }
 
-// A table `Region` of three columns is a box: two rows, of which the second is nowhere less.
-void check_region(const Property& declared, const PropertyValue& given, std::vector<PropertyProblem>* problems) {
-  if (declared.kind != PropertyKind::kTable || declared.columns != 3 || declared.name != kRegion) return;
-  std::vector<double> numbers;
-  std::vector<PropertyProblem> known;
-  if (!flatten_value(declared, given, &numbers, &known) || given.list.empty()) return;
-  constexpr const char* kAllowed = "; allowed: two rows, {min} and {max}, with min <= max";
-  if (given.list.size() != 2) {
-    problems->push_back({given.position, declared.name + " is " + shown(given) + kAllowed, false});
-    return;
-  }
-  for (std::size_t k = 1; k <= 3; ++k) {
-    if (numbers[k] <= numbers[k + 3]) continue;
-    problems->push_back({given.position,
-                         declared.name + " goes from " + number_text(numbers[k]) + " to " +
-                             number_text(numbers[k + 3]) + " along " + "xyz"[k - 1] + kAllowed,
-                         false});
-    return;
-  }
-}
-
 }  // namespace
 
 void flatten_force(const TypeDeclaration& type, const v1::Force& force, const IdIndex& bodies, BuildContext* context,
@@ -119,10 +98,6 @@ void flatten_force(const TypeDeclaration& type, const v1::Force& force, const Id
   }
   std::vector<PropertyProblem> problems;
   flatten(type.properties, values, parameters, &problems);
-  for (const NamedValue& value : values) {
-    const auto declared = std::ranges::find(type.properties, value.name, &Property::name);
-    if (declared != type.properties.end()) check_region(*declared, value.value, &problems);
-  }
   const TextPosition written = place_of(force.custom_properties().location());
   context->diagnostics->add(problems, written.known() ? written : place_of(force.location()),
                             force.type() + " \"" + force.id() + "\": ");

@@ -7,8 +7,7 @@
 
 namespace gravitas::scene {
 
-// Flattens the properties of a force; those of kind body get the row of the body that they name. A table
-// `Region` of three columns must be {min} and {max} of a box, if it has a row.
+// Flattens the properties of a force; those of kind body get the row of the body that they name.
 void flatten_force(const TypeDeclaration& type, const v1::Force& force, const IdIndex& bodies, BuildContext* context,
                    std::vector<double>* parameters);
 

@@ -21,8 +21,7 @@ Catalog force_catalog() {
   forces.slot = Slot::kForce;
   forces.types = {
       {"Link", "", {Property::table("Rows", 2, "1", "world"), Property::body("AnchorBody")}},
-      {"Lake", "", {Property::vector("Gravity", "m/s^2", "world"), Property::number("Level", "m").defaults_to({0})}},
-      {"Pool", "", {Property::table("Region", 3, "m", "world")}}};
+      {"Lake", "", {Property::vector("Gravity", "m/s^2", "world"), Property::number("Level", "m").defaults_to({0})}}};
   plugins.push_back({"/plugins/force_forces.so", forces});
   return Catalog(std::move(plugins));
 }
@@ -86,21 +85,6 @@ TEST(ForceBodies, FloatInTheSumOfTheirGravity) {
   EXPECT_THAT(d.forces[3].parameters, ElementsAre(2, -9, 0, 3));
   EXPECT_THAT(d.bodies[0].forces, ElementsAre(1, 0));
   EXPECT_THAT(d.bodies[1].forces, ElementsAre(3, 2, 1));
-}
-
-TEST(ForceBodies, ARegionIsABox) {
-  const auto pool = [](const std::string& region) {
-    return built_with("Force { Type = \"Pool\" Id = \"P\" CustomProperties {\nRegion = " + region + " } }", "\"P\"");
-  };
-  EXPECT_THAT(pool("{}").errors(), IsEmpty());
-  EXPECT_THAT(pool("{{0, 0, 0}, {1, 0, 2}}").errors(), IsEmpty());
-  EXPECT_THAT(pool("{{1, 1, 1}, {2, -1, 2}}").errors(),
-              ElementsAre("scene:2:10: error: Pool \"P\": Region goes from 1 to -1 along y; allowed: two rows, {min} "
-                          "and {max}, with min <= max"));
-  EXPECT_THAT(pool("{{1, 1, 1}}").errors(),
-              ElementsAre("scene:2:10: error: Pool \"P\": Region is a list of 1; allowed: two rows, {min} and {max}, "
-                          "with min <= max"));
-  EXPECT_THAT(pool("{{1, 1}}").errors(), ElementsAre(HasSubstr("a row of Region has 2 numbers")));
 }
 
 TEST(ForceBodies, KeepAGravityThatIsGiven) {
