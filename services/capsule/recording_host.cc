@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernel/fault.h"
+#include "services/capsule/forwarding_host.h"
 
 namespace gravitas::capsule {
 
@@ -12,21 +13,14 @@ namespace v1 = recorder::v1;
 
 namespace {
 
-class RecordingHost final : public kernel::Carrier {
+class RecordingHost final : public ForwardingHost {
  public:
   RecordingHost(std::unique_ptr<kernel::Carrier> host, std::vector<kernel::PluginChoice> plugins,
                 std::shared_ptr<Tape> tape)
-      : host_(std::move(host)), plugins_(std::move(plugins)), tape_(std::move(tape)) {}
+      : ForwardingHost(std::move(host)), plugins_(std::move(plugins)), tape_(std::move(tape)) {}
 
   kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives) override;
-  void drain() override { host_->drain(); }
-  void kill() override { host_->kill(); }
-  bool is_alive() const override { return host_->is_alive(); }
-  int process_id() const override { return host_->process_id(); }
-  kernel::Hosting hosting() const override { return host_->hosting(); }
-  std::vector<std::string> take_complaints() override { return host_->take_complaints(); }
-  std::vector<std::string> sandbox() const override { return host_->sandbox(); }
 
  private:
   bool is_kept(std::uint32_t target) const {
@@ -35,7 +29,6 @@ class RecordingHost final : public kernel::Carrier {
   }
   void keep(v1::CapsuleCall* record, std::uint32_t target);
 
-  std::unique_ptr<kernel::Carrier> host_;
   const std::vector<kernel::PluginChoice> plugins_;
   const std::shared_ptr<Tape> tape_;
   std::shared_ptr<Writer> known_to_;  // the writer whose capsule has the plugins, in these rows

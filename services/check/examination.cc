@@ -37,6 +37,8 @@ constexpr const char* kMeanings[] = {"handshake and refusals",           "wire a
 constexpr Level kOrder[] = {Level::kHandshake, Level::kPurity, Level::kWire,
                             Level::kState,     Level::kLimits, Level::kNumbers};
 
+constexpr const char* kInterrupted = "interrupted";
+
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // The run of one examination.
@@ -44,7 +46,7 @@ class Run {
  public:
   Run(const Examinee& examinee, const Options& options, const std::function<void(const Progress&)>& progress,
       const std::function<bool()>& interrupted)
-      : examination_(examinee, options, progress), interrupted_(interrupted) {
+      : examination_(examinee, options, progress) {
     examination_.patience.ends = interrupted;
   }
 
@@ -62,7 +64,6 @@ class Run {
   void conclude();
 
   Examination examination_;
-  const std::function<bool()>& interrupted_;
   report::v1::CheckReport report_;
   Clock::time_point start_ = Clock::now();
   bool is_unusable_ = false;
@@ -84,7 +85,7 @@ std::string Run::premise_of(Level level) const {
 }
 
 std::string Run::reason_to_stop(Level level, std::uint32_t faults) const {
-  if (interrupted_()) return "interrupted";
+  if (examination_.patience.ends()) return kInterrupted;
   if (faults >= kMostFaults) return fmt::format("its processes died or hung {} times", faults);
   const bool is_late = examination_.options.quick && Clock::now() - start_ > kQuickBudget;
   if (is_late && report_.findings_size() > 0) return "it has failed, and the time of --quick is over";
@@ -132,6 +133,7 @@ void Run::judge_level(Level level, const std::vector<CheckCase>& cases) {
     try {
       finding = judge(one);
     } catch (const Interrupted&) {
+      why = kInterrupted;
       verdict.set_left_out(verdict.left_out() + 1);
       continue;
     }

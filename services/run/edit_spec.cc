@@ -5,10 +5,9 @@
 #include <charconv>
 #include <filesystem>
 #include <map>
-#include <stdexcept>
 
-#include "services/recorder/durable_file.h"
 #include "services/run/session.h"
+#include "services/scene/input_file.h"
 
 namespace gravitas {
 namespace {
@@ -31,13 +30,11 @@ edit::v1::Change parse_change(const std::string& text) {
   } else if (verb == "set") {
     change.set_set(rest);
   } else if (verb == "add") {
-    try {
-      const std::vector<std::byte> bytes = read_whole_file(rest);
-      change.mutable_add()->set_name(std::filesystem::absolute(rest).lexically_normal().string());
-      change.mutable_add()->set_text(bytes.data(), bytes.size());
-    } catch (const std::runtime_error& problem) {
-      throw BadInput(fmt::format("edit \"{}\": {}", text, problem.what()));
-    }
+    std::string why;
+    if (!scene::read_input_file(rest, change.mutable_add()->mutable_text(), &why))
+      throw BadInput(
+          fmt::format("edit \"{}\": '{}' cannot be read: {}; a scene is a readable text file", text, rest, why));
+    change.mutable_add()->set_name(std::filesystem::absolute(rest).lexically_normal().string());
   } else {
     throw BadInput(fmt::format("edit \"{}\": {}", text, kAllowedChanges));
   }

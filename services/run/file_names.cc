@@ -43,10 +43,16 @@ std::vector<NamedFile> kept_by(const RunOptions& options) {
   return {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
 }
 
-// The file of an edit "add FILE@step=N"; empty: it adds none.
-std::string added_file(const std::string& edit) {
-  const std::size_t begin = edit.starts_with("add ") ? edit.find_first_not_of(' ', 4) : std::string::npos;
-  return begin == std::string::npos ? "" : edit.substr(begin, edit.rfind("@step=") - begin);
+std::vector<NamedFile> meshes_of(const scene::v1::Scene& scene) {
+  std::vector<NamedFile> meshes;
+  for (const scene::v1::Geometry& geometry : scene.geometries().geometry()) {
+    const auto file = static_cast<int>(geometry.location().file());
+    const fs::path folder = file < scene.files_size() ? fs::path(scene.files(file)).parent_path() : fs::path();
+    for (const scene::v1::Property& property : geometry.custom_properties().property())
+      if (property.name() == "File" && !property.value().text().empty())
+        meshes.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
+  }
+  return meshes;
 }
 
 }  // namespace
@@ -58,13 +64,16 @@ void require_separate(const std::vector<NamedFile>& inputs, const std::vector<Na
   }
 }
 
-void require_separate_files(const RunOptions& options) {
-  std::vector<NamedFile> inputs;
+void require_separate_files(const RunOptions& options, const scene::v1::Scene& scene,
+                            const std::vector<edit::v1::Edit>& edits) {
+  std::vector<NamedFile> inputs = meshes_of(scene);
   const std::vector<NamedFile> kept = kept_by(options);
   const std::vector<NamedFile> resumed = {{"--resume", options.resume},
                                           {"the journal of --resume", journal(options.resume)}};
-  for (const std::string& scene : options.scenes) inputs.push_back({"the scene", scene});
-  for (const std::string& edit : options.edits) inputs.push_back({"--edit add", added_file(edit)});
+  for (const std::string& one : options.scenes) inputs.push_back({"the scene", one});
+  for (const edit::v1::Edit& edit : edits)
+    for (const edit::v1::Change& change : edit.changes())
+      if (change.has_add()) inputs.push_back({"--edit add", change.add().name()});
   require_separate(inputs, kept);
   const bool goes_on =
       !options.checkpoint.empty() && !options.resume.empty() && is_same_file(kept[0].path, options.resume);
@@ -72,19 +81,6 @@ void require_separate_files(const RunOptions& options) {
   for (const std::vector<NamedFile>* others : {&kept, &resumed})
     inputs.insert(inputs.end(), others->begin(), others->end());
   require_separate(inputs, outputs_of(options));
-}
-
-void require_separate_meshes(const RunOptions& options, const scene::v1::Scene& scene) {
-  std::vector<NamedFile> meshes;
-  for (const scene::v1::Geometry& geometry : scene.geometries().geometry()) {
-    const auto file = static_cast<int>(geometry.location().file());
-    const fs::path folder = file < scene.files_size() ? fs::path(scene.files(file)).parent_path() : fs::path();
-    for (const scene::v1::Property& property : geometry.custom_properties().property())
-      if (property.name() == "File" && !property.value().text().empty())
-        meshes.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
-  }
-  require_separate(meshes, kept_by(options));
-  require_separate(meshes, outputs_of(options));
 }
 
 }  // namespace gravitas

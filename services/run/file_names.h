@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "gravitas/edit/v1/edit.pb.h"
 #include "services/run/session.h"
 
 namespace gravitas {
@@ -17,10 +18,9 @@ struct NamedFile {
 // ordinary ones (devices, pipes) may be named twice.
 void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
-// Of a run. The checkpoint alone may replace what the run is resumed from.
-void require_separate_files(const RunOptions& options);
-
-// The same of the meshes that its scene names.
-void require_separate_meshes(const RunOptions& options, const scene::v1::Scene& scene);
+// Of a run of a scene: the scene's files and meshes, those of edits, and what it is resumed from, which the checkpoint alone
+// may replace.
+void require_separate_files(const RunOptions& options, const scene::v1::Scene& scene,
+                            const std::vector<edit::v1::Edit>& edits);
 
 }  // namespace gravitas

@@ -3,29 +3,23 @@
 #include <memory>
 #include <utility>
 
+#include "services/capsule/forwarding_host.h"
+
 namespace gravitas {
 namespace {
 
-class InterruptibleHost final : public kernel::Carrier {
+class InterruptibleHost final : public capsule::ForwardingHost {
  public:
   InterruptibleHost(std::unique_ptr<kernel::Carrier> host, const std::function<bool()>& interrupted)
-      : host_(std::move(host)), interrupted_(interrupted) {}
+      : ForwardingHost(std::move(host)), interrupted_(interrupted) {}
 
   kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives) override {
     if (interrupted_()) throw StepInterrupted();
     return host_->call(call, arena, derivatives);
   }
-  void drain() override { host_->drain(); }
-  void kill() override { host_->kill(); }
-  bool is_alive() const override { return host_->is_alive(); }
-  int process_id() const override { return host_->process_id(); }
-  kernel::Hosting hosting() const override { return host_->hosting(); }
-  std::vector<std::string> take_complaints() override { return host_->take_complaints(); }
-  std::vector<std::string> sandbox() const override { return host_->sandbox(); }
 
  private:
-  std::unique_ptr<kernel::Carrier> host_;
   std::function<bool()> interrupted_;
 };
 

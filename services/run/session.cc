@@ -73,7 +73,6 @@ class Run final : private kernel::CommitListener {
 
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
-    require_separate_meshes(options_, scene_);
     std::optional<Resumption> resumed;
     if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
@@ -133,6 +132,7 @@ class Run final : private kernel::CommitListener {
         }
       }
     });
+    is_stepping_ = false;  // whatever threw
     wall_seconds_ = std::chrono::duration<double>(Clock::now() - begin).count();
   }
 
@@ -143,9 +143,6 @@ class Run final : private kernel::CommitListener {
       if (environment_->step() == kernel::StepOutcome::kPaused) pause(*environment_->fault());
     } catch (const StepInterrupted&) {
       result_.outcome = RunOutcome::kInterrupted;
-    } catch (...) {
-      is_stepping_ = false;
-      throw;
     }
     is_stepping_ = false;
     return result_.outcome == RunOutcome::kCompleted;
@@ -297,6 +294,7 @@ class Run final : private kernel::CommitListener {
   // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.
   void read_edits(const Resumption* resumed) {
     edits_.plan(parse_edits(options_.edits));
+    require_separate_files(options_, scene_, edits_.to_come());
     if (resumed != nullptr) {
       for (edit::v1::Edit one : resumed->checkpoint.edits()) {
         take(EditedScene(options_, scene_, description_, &catalog_, &one, nullptr));
@@ -572,7 +570,6 @@ void Run::write_report() {
 
 RunResult run(const RunOptions& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {
-  require_separate_files(options);
   Run one(options, interrupted);
   one.prepare();
   one.open_files();

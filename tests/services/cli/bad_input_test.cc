@@ -234,6 +234,9 @@ TEST(BadInput, FilesThatCannotBeRead) {
 
 TEST(BadInput, FilesThatDoNotEndAreNotRead) {
   const ScratchFolder folder;
+  const ProgramResult edit = run_program({"run", kSample, "--edit", "add /dev/zero@step=5"}, folder);
+  EXPECT_EQ(edit.exit_code, 2);
+  EXPECT_THAT(edit.err, HasSubstr("'/dev/zero' cannot be read: it is no file that ends but a device"));
   const ProgramResult scene = run_program({"run", "/dev/zero"}, folder);
   EXPECT_EQ(scene.exit_code, 2);
   EXPECT_THAT(scene.err, HasSubstr("/dev/zero:1:1: error: cannot be read: it is no file that ends but a device"));
@@ -262,7 +265,7 @@ TEST(BadInput, WhatIsReadIsNotWrittenOver) {
            {{solid, "--report", "x.obj"}, "--report x.obj: it is the same file as a mesh of the scene, " + obj},
            {{solid, "--checkpoint", "x.obj"}, "the same file as a mesh of the scene, " + obj},
            {{"--edit", "add added.gravitas@step=1", "--events", added},
-            "the same file as --edit add added.gravitas"}}) {
+            "the same file as --edit add " + added + "; allowed"}}) {
     std::vector<std::string> arguments = {"run", scene};
     arguments.insert(arguments.end(), options.begin(), options.end());
     const ProgramResult result = run_program(arguments, folder);

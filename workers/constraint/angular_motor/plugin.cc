@@ -12,6 +12,7 @@
 // six is redundant, along the axis) and the drive. |l| is free; half the distance of the anchors keeps the rows
 // of the anchors and of the drive of one size. MaximumTorque is shared by the four points, each with lever |l|.
 #include "plugin_sdk/constraint.h"
+#include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
@@ -44,7 +45,7 @@ class AngularMotor final : public ConstraintPlugin {
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
     bind_each(request, reply,
               [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-                if (type != type_id("AngularMotor")) throw Refusal("it is of a type that this plugin does not know");
+                demand_type(type, "AngularMotor");
                 const Vector3 point1 = properties.vector();
                 const Vector3 point2 = properties.vector();
                 const double speed = properties.number();

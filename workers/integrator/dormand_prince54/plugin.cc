@@ -16,6 +16,7 @@
 #include <array>
 #include <cmath>
 
+#include "plugin_sdk/error_control.h"
 #include "plugin_sdk/math/transcendental.h"
 #include "plugin_sdk/motion_stages.h"
 
@@ -37,8 +38,6 @@ constexpr std::array<double, kStages> kError = {71.0 / 57600.0,      0.0,       
 
 constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 5.0;
 constexpr double kExponent = 0.17, kMemory = 0.04;
-// Shortest inner step, per step.
-constexpr double kShortest = 1e-12;
 
 class DormandPrince54 final : public IntegratorPlugin {
  public:
@@ -48,12 +47,7 @@ class DormandPrince54 final : public IntegratorPlugin {
             .slot = Slot::kIntegrator,
             .meaning = "Runge-Kutta pair of Dormand and Prince, order 5, with error control.",
             .capabilities = {"order=5"},
-            .properties = {Property::number("Accuracy", "1")
-                               .above(0.0)
-                               .at_most(1.0)
-                               .defaults_to({1e-8})
-                               .means("Largest estimated error of an inner step, in m, rad, and relative to speeds "
-                                      "above 1 m/s, 1 rad/s.")},
+            .properties = {accuracy_property(1e-8)},
             .theta = 0.5};
   }
   explicit DormandPrince54(PropertyCursor settings) : accuracy_(settings.number()) {}
@@ -78,8 +72,7 @@ class DormandPrince54 final : public IntegratorPlugin {
         continue;
       }
       inner = h * std::min(1.0, std::isfinite(error) ? factor(error, 1.0) : 0.1);
-      if (!(inner > kShortest * whole))
-        throw Refusal("Accuracy cannot be met by any step: forces are not smooth, or the state overflows");
+      require_inner_step(inner, whole);
     }
     for_each_body(request, reply, [&](std::size_t i, const BodyState&) { return stages_.start(i); });
     reply.error_estimate().set(worst);

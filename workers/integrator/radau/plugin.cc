@@ -26,6 +26,7 @@
 #include <span>
 #include <vector>
 
+#include "plugin_sdk/error_control.h"
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/local_motion.h"
 #include "plugin_sdk/math/rotation.h"
@@ -52,7 +53,6 @@ constexpr std::array<double, kStages> kError = {-10.048809399827415, 1.382142733
 
 constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 8.0;
 constexpr double kLonger = 1.1;
-constexpr double kShortest = 1e-12;  // inner step, per step
 constexpr int kMostRounds = 10;
 constexpr double kFar = 5.0;          // growth of the second round that ends them
 constexpr double kKeeps = 0.1;        // of what is left, that a round may leave for J to be kept
@@ -70,12 +70,7 @@ class Radau final : public IntegratorPlugin {
             .slot = Slot::kIntegrator,
             .meaning = "Implicit method Radau IIA, L-stable, order 5, with error control, for stiff forces that turn.",
             .capabilities = {"order=5", "plugin_state"},
-            .properties = {Property::number("Accuracy", "1")
-                               .above(0.0)
-                               .at_most(1.0)
-                               .defaults_to({1e-6})
-                               .means("Largest estimated error of an inner step, in m, rad, and relative to speeds "
-                                      "above 1 m/s, 1 rad/s.")},
+            .properties = {accuracy_property(1e-6)},
             .theta = 0.5};
   }
   explicit Radau(PropertyCursor settings) : accuracy_(settings.number()) { fix_eigen_blocks(); }
@@ -86,7 +81,8 @@ class Radau final : public IntegratorPlugin {
     motion_.begin(request, &derivatives);
     const double whole = request.time_step();
     const std::span<const double> history = request.plugin_state();
-    const bool has_history = history.size() == 1 && history[0] >= kShortest * whole && std::isfinite(history[0]);
+    const bool has_history =
+        history.size() == 1 && history[0] > kShortestInnerStep * whole && std::isfinite(history[0]);
     double inner = has_history ? history[0] : whole, worst = 0.0;
     double longest = HUGE_VAL;  // for a while after rounds that did not end
     int failures = 0;
@@ -98,10 +94,7 @@ class Radau final : public IntegratorPlugin {
       const double left = whole - motion_.done();
       // two equal ones in place of a long and a short one
       const double most = std::min(inner, motion_.longest());
-      if (!(most > kShortest * whole))
-        throw Refusal(
-            "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state "
-            "overflows");
+      require_inner_step(most, whole);
       const double h = most >= left ? left : std::min(most, 0.5 * left);
       if (!find_stages(h)) {
         // an old matrix may be all that is wrong, or a guess; one that led nowhere twice is no better than none

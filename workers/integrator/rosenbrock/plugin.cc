@@ -15,6 +15,7 @@
 #include <array>
 #include <cmath>
 
+#include "plugin_sdk/error_control.h"
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/local_motion.h"
 #include "plugin_sdk/math/transcendental.h"
@@ -43,7 +44,6 @@ constexpr double kCouplings[kStages][kStages - 1] = {
     {8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054}};
 
 constexpr double kSafety = 0.9, kSlowest = 0.2, kFastest = 5.0;
-constexpr double kShortest = 1e-12;       // inner step, per step
 constexpr double kTimeDifference = 1e-6;  // per inner step
 
 class Rosenbrock final : public IntegratorPlugin {
@@ -54,12 +54,7 @@ class Rosenbrock final : public IntegratorPlugin {
             .slot = Slot::kIntegrator,
             .meaning = "Linearly implicit method RODAS, L-stable, order 4, with error control, for stiff forces.",
             .capabilities = {"order=4"},
-            .properties = {Property::number("Accuracy", "1")
-                               .above(0.0)
-                               .at_most(1.0)
-                               .defaults_to({1e-6})
-                               .means("Largest estimated error of an inner step, in m, rad, and relative to speeds "
-                                      "above 1 m/s, 1 rad/s.")},
+            .properties = {accuracy_property(1e-6)},
             .theta = 0.5};
   }
   explicit Rosenbrock(PropertyCursor settings) : accuracy_(settings.number()) { fix_eigen_blocks(); }
@@ -74,10 +69,7 @@ class Rosenbrock final : public IntegratorPlugin {
     while (motion_.done() < whole && !motion_.is_empty()) {
       host.mark_progress();
       const double most = std::min(inner, motion_.longest());
-      if (!(most > kShortest * whole))
-        throw Refusal(
-            "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state "
-            "overflows");
+      require_inner_step(most, whole);
       const double h = std::min(most, whole - motion_.done());
       if (!has_matrix) differentiate(h);
       has_matrix = true;

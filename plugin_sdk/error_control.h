@@ -1,0 +1,26 @@
+// For authors of integrators with error control: what `Accuracy` is, and where no step meets it.
+#pragma once
+
+#include "plugin_sdk/plugin.h"
+
+namespace gravitas {
+
+inline Property accuracy_property(double without) {
+  return Property::number("Accuracy", "1")
+      .above(0.0)
+      .at_most(1.0)
+      .defaults_to({without})
+      .means("Largest estimated error of an inner step, in m, rad, and relative to speeds above 1 m/s, 1 rad/s.");
+}
+
+// Of inner steps, as a share of the step.
+inline constexpr double kShortestInnerStep = 1e-12;
+
+// Throws Refusal where an inner step would be shorter.
+inline void require_inner_step(double inner, double whole) {
+  if (!(inner > kShortestInnerStep * whole))
+    throw Refusal(
+        "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state overflows");
+}
+
+}  // namespace gravitas
