@@ -86,7 +86,10 @@ void add_all() {
 
 std::vector<Engine> engines_for(const Scene& scene) {
   std::vector<Engine> engines = {gravitas_for(scene)};
-  const auto append = [&](const std::vector<Engine>& more) { engines.insert(engines.end(), more.begin(), more.end()); };
+  // no other engine may be here
+  [[maybe_unused]] const auto append = [&](const std::vector<Engine>& more) {
+    engines.insert(engines.end(), more.begin(), more.end());
+  };
 #ifdef GRAVITAS_HAS_BULLET
   append(bullet_for(scene));
 #endif
