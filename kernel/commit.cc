@@ -165,6 +165,7 @@ void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   const DiscrepancyAnswer& d = data_.discrepancies;
   const DiscrepancyColumns columns = d.columns();
+  const std::span<const double> reactions = knows_reactions() ? data_.discrepancy_force.span() : std::span<double>();
   const bool leaves_no_error = has_capability(solver_.description().plugins[0].declaration, "closes_joints");
   const auto body = [&](std::uint32_t i) {
     if (i == kNone) return JointBody{};
@@ -178,7 +179,7 @@ void Environment::update_joints() {
     const ConstraintDescription& description = model_.constraints[joint];
     while (row < columns.size() && d.constraint[row] == joint) ++row;
     const JointBody one = body(description.body1), two = body(description.body2);
-    const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row};
+    const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
     const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
     const JointLoad load = joint_load(rows, one, two, h);
     const bool breaks = (force > 0.0 && load.force > force) ||

@@ -91,7 +91,7 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   trial_position = bodies(3), trial_orientation = bodies(4), trial_linear_velocity = bodies(3);
   trial_angular_velocity = bodies(3);
   error_estimate = Column<double>(arena, 1, 0);
-  next_plugin_state = Column<double>(arena, 0, 0);
+  next_plugin_state = Column<double>(arena, 0, 8);  // a plugin that needs more room is asked twice
 
   lower = bodies_if(has_shapes, 3), upper = bodies_if(has_shapes, 3);
   pair = Column<std::uint32_t>(arena, 0, 2 * contacts);

@@ -1,6 +1,10 @@
 // For authors of integrators with error control: what `Accuracy` is, and where no step meets it.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <span>
+
 #include "plugin_sdk/plugin.h"
 
 namespace gravitas {
@@ -22,5 +26,15 @@ inline void require_inner_step(double inner, double whole) {
     throw Refusal(
         "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state overflows");
 }
+
+// The inner step that the step before left in plugin_state for this one; 0 where there is none.
+inline double remembered_inner_step(std::span<const double> plugin_state, double whole) {
+  const bool is_one =
+      plugin_state.size() == 1 && plugin_state[0] > kShortestInnerStep * whole && std::isfinite(plugin_state[0]);
+  return is_one ? plugin_state[0] : 0.0;
+}
+
+// Length of the next inner step, with `left` to the step's boundary: two equal ones in place of a long and a short one.
+inline double next_inner_step(double inner, double left) { return inner >= left ? left : std::min(inner, 0.5 * left); }
 
 }  // namespace gravitas

@@ -15,7 +15,11 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
     const bool rests = 2.0 * top <= shortest_flight || 0.5 * encounter.start_speed * top <= target_gap;
     return {rests ? length : std::min(length, top)};
   }
-  if (encounter.fraction <= 0.0) return {length};
+  if (encounter.fraction <= 0.0) {
+    const double closing = -encounter.start_speed;
+    if (encounter.gap <= target_gap || closing <= 0.0) return {length};
+    return {std::min(length, (encounter.gap + 2.0 * target_gap) / closing)};
+  }
   if (encounter.gap > target_gap) return {time};
   const double closing = -(encounter.start_speed + acceleration * time);
   const double bend = 0.5 * std::fabs(acceleration) * time;

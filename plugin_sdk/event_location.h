@@ -23,7 +23,8 @@ struct NextStop {
 //
 // A pair that starts closed and parts, to come back within the trial, is followed to the top of its flight, and so is one
 // that the straight motion lets meet before; flights shorter than `shortest_flight`, or lower than the target gap, are
-// none: the pair rests. One that comes from afar is met where the trial, taken for
+// none: the pair rests. One that starts so near that the collision slot calls it met, but no nearer than target_gap, flies on
+// until it is. One that comes from afar is met where the trial, taken for
 // the straight motion between its ends, deviates from it by less than half the target (by |a| t (length - t) / 2 at the
 // time t). Until then trials are shortened to twice the time of the meeting, and steps end before it, each squaring the
 // distance. The step that meets ends a little after it, two target gaps deep, so that the contact is closed.

@@ -9,8 +9,10 @@ namespace gravitas {
 namespace {
 
 // Impulse of a row, world.
-Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::size_t row) {
-  return discrepancy.axes * vector_at(joint.impulses, row);
+Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::size_t row, double time_step) {
+  Vector3 along = vector_at(joint.impulses, row);
+  if (!joint.forces.empty()) along += time_step * vector_at(joint.forces, row);
+  return discrepancy.axes * along;
 }
 
 // Velocity per impulse along a row, 1/kg.
@@ -28,7 +30,7 @@ JointLoad joint_load(const JointRows& joint, const JointBody& body1, const Joint
     const Discrepancy discrepancy = joint.rows.at(row);
     load.error = std::max(
         load.error, joint_error(discrepancy, error_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next)));
-    if (!discrepancy.is_angular()) sum += impulse_of(joint, discrepancy, row);
+    if (!discrepancy.is_angular()) sum += impulse_of(joint, discrepancy, row, time_step);
   }
   load.force = sum.norm() / time_step;
   return load;
@@ -46,7 +48,8 @@ double held_back(const JointRows& joint, const JointBody& body1, const JointBody
   double most = 0.0;
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
-    most = std::max(most, held_back(discrepancy, impulse_of(joint, discrepancy, row), body1, body2, time_step));
+    most =
+        std::max(most, held_back(discrepancy, impulse_of(joint, discrepancy, row, time_step), body1, body2, time_step));
   }
   return most;
 }

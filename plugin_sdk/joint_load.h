@@ -15,11 +15,13 @@ struct JointBody {
   Vector3 inverse_moments = Vector3::Zero();  // principal, 1/(kg m^2)
 };
 
-// Rows [first, end) of one joint, with the impulses (N s, along each row's axes) that the solver answered.
+// Rows [first, end) of one joint, with the impulses (N s, along each row's axes) that the solver answered, and the forces (N)
+// that acted beside them where the joint is in the derivative.
 struct JointRows {
   const DiscrepancyColumns& rows;
   std::span<const double> impulses;
   std::size_t first, end;
+  std::span<const double> forces = {};
 };
 
 struct JointLoad {

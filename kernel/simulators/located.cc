@@ -6,7 +6,8 @@
 //                stop. Pairs that touch at the start are the solver's: what they run into next, while they touch, is
 //                found at S* only.
 //   Bisection    (§ 1.4) halves trials until one ends just after a contact closes. It sees contacts at S* alone: what
-//                passes through within a trial is missed.
+//                passes through within a trial is missed. Pairs that touch at the start and do not fly up are the
+//                solver's here, too.
 //
 // Both also end inner steps where surfaces stop sliding on each other (slides.cc).
 //
@@ -26,6 +27,13 @@ constexpr double kShortestFlight = 1e-6;  // of the step
 constexpr double kTargetShare = 1e-8;     // of the margin: gap at which a pair has met
 constexpr double kLead = 0.9;             // of the way to an impact is one step, the rest another
 constexpr double kFinest = 1e-13;         // of the step: how closely a halving ends
+
+// Is the pair the next one of these? Both ascend, so that those before it are dropped.
+bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint32_t>* touching) {
+  while (!touching->empty() && std::ranges::lexicographical_compare(touching->first(2), pair))
+    *touching = touching->subspan(2);
+  return !touching->empty() && std::ranges::equal(touching->first(2), pair);
+}
 
 }  // namespace
 
@@ -69,11 +77,9 @@ double Environment::first_impact(const Trusted<TrialState>& trial, double begin,
     std::span<const std::uint32_t> touching = front().touching.span();
     for (std::size_t k = 0; k < data_.impact_pair.size(); ++k) {
       const auto pair = data_.pair.span().subspan(2 * data_.impact_pair[k], 2);
-      while (!touching.empty() && std::ranges::lexicographical_compare(touching.first(2), pair))
-        touching = touching.subspan(2);
       Encounter met = encounter(k);
       // the solver has them, whatever gap it left
-      if (!touching.empty() && std::ranges::equal(touching.first(2), pair)) met.fraction = 0.0;
+      if (starts_with(pair, &touching)) met.fraction = met.gap = 0.0;
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;
     }
@@ -101,10 +107,25 @@ Encounter Environment::encounter(std::size_t impact) const {
 }
 
 double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {
+  const double nothing = kTargetShare * margin_;
+  const auto start_speed = [&](std::size_t contact) {
+    const auto velocity = [&](std::uint32_t body) {
+      const Vector3 arm = vector_at(data_.contact_point.span(), contact) - vector_at(data_.trial_position.span(), body);
+      return Vector3(vector_at(start_linear_velocity().span(), body) +
+                     vector_at(start_angular_velocity().span(), body).cross(arm));
+    };
+    const std::uint32_t* pair = &data_.contact_body[2 * contact];
+    return vector_at(data_.contact_normal.span(), contact).dot(velocity(pair[1]) - velocity(pair[0]));
+  };
   const auto closes = [&](const Trusted<TrialState>& at) {
     look_up_contacts(find_contacts(bound_and_pair(at)));
-    for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
-      if (data_.contact_depth[i] > kTargetShare * margin_ && gap_at(i, front()) > kTargetShare * margin_) return true;
+    std::span<const std::uint32_t> touching = front().touching.span();
+    for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+      // what rolls or slides on is the solver's, what flies up is not
+      const bool goes_on = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touching) &&
+                           start_speed(i) * data_.time_step[0] <= nothing;
+      if (!goes_on && data_.contact_depth[i] > nothing && gap_at(i, front()) > nothing) return true;
+    }
     return false;
   };
   if (!closes(trial)) return length;

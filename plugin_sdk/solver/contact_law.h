@@ -22,7 +22,16 @@ struct ContactLaw {
 ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
                        const SolverBody& two);
 
-// e s of a contact whose impulse did work on its bodies: a half, a quarter, then zero. `times` counts.
-inline double lowered_target(double target, std::uint32_t* times) { return ++*times < 3 ? 0.5 * target : 0.0; }
+// Lowers e s of a contact whose impulse did work on its bodies: to the speed at which they arrive where the step ends, if that
+// is little less; else to a half, a quarter, then zero. `times` counts the latter. False if nothing is to be lowered.
+inline bool lower_target(const Gain& own, double arrival, double* target, std::uint32_t* times) {
+  constexpr double kSafely = 1.0 - 1e-10;
+  const double fair = kSafely * arrival;
+  if (!own.is_real()) return false;
+  const bool lacks_little = fair < *target && fair > 0.5 * *target;
+  if (!lacks_little && !own.is_to_blame()) return false;
+  *target = lacks_little ? fair : ++*times < 3 ? 0.5 * *target : 0.0;
+  return true;
+}
 
 }  // namespace gravitas

@@ -65,6 +65,8 @@ class IslandSolver {
  private:
   static constexpr int kRounds = 12, kFreeRounds = 4;
   static constexpr int kPoseSteps = 30;
+  // Corrections move a body by no more than so many times the ways to S* and what is overlapped or missed there, summed.
+  static constexpr double kOfWay = 16.0, kOfOverlap = 2.0;
 
   // ---- what does not change within the step
 
@@ -76,7 +78,10 @@ class IslandSolver {
       end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
       gyration_.push_back(bodies_[i].gyration());
     }
-    for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
+    for (const std::uint32_t row : island_.bodies) {
+      const std::uint32_t i = pushed_.emplace_back(place_of(row));
+      most_recovery_ += kOfWay * way_of(bodies_[i], gyration_[i], request_.time_step());
+    }
     const DiscrepancyColumns columns = columns_of(request_);
     for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
     for (const std::uint32_t row : island_.contacts) load_contact(row);
@@ -113,6 +118,7 @@ class IslandSolver {
       const auto place = static_cast<std::size_t>(k);
       joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
       joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
+      most_recovery_ += kOfOverlap * joint.length * missed_by(joint.pose_laws[place]);
       const auto at = 3 * row + static_cast<std::uint32_t>(k);
       answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at];
       answer_.joint_impulse[at] = request_.discrepancy_warm_impulse()[at];
@@ -132,6 +138,8 @@ class IslandSolver {
     const Vector3 to_surface = (-0.5 * contact.gap) * normal;
     contact.gap_target = 0.0 - contact.gap;
     contact.slop = closing_slop(point, one, two);
+    const Vector3 way = carried(point, one.trial, one.start) - carried(point, two.trial, two.start);
+    most_recovery_ += kOfWay * way.norm() + kOfOverlap * std::max(0.0, contact.gap_target);
     contact.law = contact_law(request_, row, one, two);
     contact.arm1 = point + to_surface - one.trial.position;
     contact.arm2 = point - to_surface - two.trial.position;
@@ -193,12 +201,8 @@ class IslandSolver {
       Vector3 push = Vector3::Zero();
       for (std::size_t k = 0; k < 3; ++k)
         push += answer_.joint_correction[3 * joint.row + k] * joint.directions[k].linear;
-      const auto add = [&](std::uint32_t body, const Vector3& arm, const Vector3& p) {
-        const Matrix3 product = p * arm.transpose();
-        stiffness[body] += p.dot(arm) * Matrix3::Identity() - 0.5 * (product + product.transpose());
-      };
-      add(joint.body1, joint.arm1, -push);
-      add(joint.body2, joint.arm2, push);
+      stiffness[joint.body1] += geometric_stiffness(joint.arm1, -push);
+      stiffness[joint.body2] += geometric_stiffness(joint.arm2, push);
     }
     for (const std::uint32_t i : pushed_) {
       end_[i].stiffened = stiffness[i].isZero(0.0)
@@ -214,8 +218,7 @@ class IslandSolver {
     for (const std::uint32_t i : pushed_) {
       const Vector3 missing = offset_[i].angular - displacement_[i].angular;
       if (missing.isZero(0.0) || end_[i].stiffened == end_[i].inverse_inertia) continue;
-      Vector3 moments = vector_at(request_.inverse_inertia(), rows_[i]);
-      for (double& moment : moments) moment = moment > 0.0 ? 1.0 / moment : 0.0;
+      const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
       x0[i].angular =
           displacement_[i].angular + end_[i].stiffened * (world_inertia(end_[i].pose.orientation, moments) * missing);
     }
@@ -223,35 +226,8 @@ class IslandSolver {
   }
 
   void move_to_end(EndJoint* joint) const {
-    const Discrepancy& d = joint->discrepancy;
-    const SolverBody &one = bodies_[joint->body1], &two = bodies_[joint->body2];
-    const EndBody &end1 = end_[joint->body1], &end2 = end_[joint->body2];
-    if (d.is_angular()) {
-      const Vector3 error =
-          d.point2 - d.point1 + displacement_[joint->body2].angular - displacement_[joint->body1].angular;
-      for (int k = 0; k < 3; ++k) {
-        joint->directions[static_cast<std::size_t>(k)] = turning_about(joint->axes.col(k));
-        joint->errors[k] = joint->axes.col(k).dot(error);
-      }
-      return;
-    }
-    const Vector3 point1 = end1.pose.position + end1.turn * (d.point1 - one.trial.position);
-    const Vector3 point2 = end2.pose.position + end2.turn * (d.point2 - two.trial.position);
-    const Vector3 error = point2 - point1;
-    const double length = error.norm();
-    // axes fixed in body 1 push where body 2's point is, midway along what is held; a drive where it is in body 1
-    Vector3 at = holds_pose(d) ? point2 : point1;
-    std::array<Vector3, 3> axes;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vector3 axis = joint->axes.col(static_cast<Eigen::Index>(k));
-      const bool is_radial = d.is_radial() && k == 0 && length > 0.0;
-      axes[k] = is_radial ? Vector3(error / length) : Vector3(end1.turn * axis);
-      joint->errors[static_cast<Eigen::Index>(k)] = is_radial ? length : axes[k].dot(error);
-      if (is_held(axis_mode(d.modes, static_cast<int>(k))))
-        at -= 0.5 * joint->errors[static_cast<Eigen::Index>(k)] * axes[k];
-    }
-    joint->arm1 = at - end1.pose.position, joint->arm2 = at - end2.pose.position;
-    for (std::size_t k = 0; k < 3; ++k) joint->directions[k] = direction_at(axes[k], joint->arm1, joint->arm2);
+    const Vector3 turn = displacement_[joint->body2].angular - displacement_[joint->body1].angular;
+    move_joint(bodies_[joint->body1], bodies_[joint->body2], end_[joint->body1], end_[joint->body2], turn, joint);
   }
 
   // ---- pose change
@@ -281,7 +257,23 @@ class IslandSolver {
       if (step > 3 && !(change < 0.9 * last) && change <= 1e-9 * size) break;
       last = change;
     }
+    const double share = shorten(offset_, &displacement_);
+    for (ConeRow& row : cone_.rows) row.multiplier *= share;
+    keep_corrections();
     move_to_end();
+  }
+
+  // Contacts that leave a body no room ask for ways without end along what is nearly flat between them. The share of the way
+  // from `from` that is left.
+  double shorten(const BodyMotion& from, BodyMotion* motion) const {
+    const double moved = contacts_.empty() ? 0.0 : largest_change(*motion, from);
+    if (!(moved > most_recovery_)) return 1.0;
+    const double share = most_recovery_ / moved;
+    for (const std::uint32_t i : pushed_) {
+      (*motion)[i].linear = from[i].linear + share * ((*motion)[i].linear - from[i].linear);
+      (*motion)[i].angular = from[i].angular + share * ((*motion)[i].angular - from[i].angular);
+    }
+    return share;
   }
 
   void build_pose() {
@@ -360,6 +352,7 @@ class IslandSolver {
       summary_.iterations += without.iterations;
       if (without.has_converged) keep_impulses();
     }
+    const BodyMotion before = velocity_of_joints(trial);
     for (int round = 0;; ++round) {
       build_velocity(true);
       const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_);
@@ -370,22 +363,38 @@ class IslandSolver {
       velocity_ = trial;
       cone_.push(bodies_, &velocity_);
       keep_impulses();
-      if (!lower_restitution(trial, round)) break;
+      if (!lower_restitution(before, round)) break;
     }
     std::size_t cone = 0;
     for (EndContact& contact : contacts_)
       if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
   }
 
+  bool arrives() const {
+    return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; });
+  }
+  // What the joints alone make of v*, where something arrives: what an impact gains is counted from there.
+  BodyMotion velocity_of_joints(BodyMotion velocity) {
+    if (joints_.empty() || !arrives()) return velocity;
+    build_velocity_of_joints();
+    summary_.iterations += cone_.solve(bodies_, velocity, 0.0, settings_).iterations;
+    cone_.push(bodies_, &velocity);
+    return velocity;
+  }
   bool may_turn() const {
-    return std::any_of(contacts_.begin(), contacts_.end(),
-                       [](const EndContact& c) { return c.is_closed && c.law.has_turning(); });
+    return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.has_turning(); });
   }
   bool is_turned() const {
-    return std::any_of(contacts_.begin(), contacts_.end(), [](const EndContact& c) { return !c.turning.isZero(0.0); });
+    return std::ranges::any_of(contacts_, [](const EndContact& c) { return !c.turning.isZero(0.0); });
   }
 
   void build_velocity(bool with_turning) {
+    build_velocity_of_joints();
+    for (const EndContact& contact : contacts_)
+      if (contact.is_closed) build_velocity(contact, with_turning);
+  }
+
+  void build_velocity_of_joints() {
     cone_.rows.clear();
     cone_.contacts.clear();
     for (const EndJoint& joint : joints_) {
@@ -400,8 +409,6 @@ class IslandSolver {
         row.multiplier = answer_.joint_impulse[3 * joint.row + k];
       }
     }
-    for (const EndContact& contact : contacts_)
-      if (contact.is_closed) build_velocity(contact, with_turning);
   }
 
   void build_velocity(const EndContact& contact, bool with_turning) {
@@ -454,38 +461,30 @@ class IslandSolver {
 
   // ---- energy
 
-  // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy. Lowers e s where it is positive;
-  // true if anything was, and the velocities are to be found anew.
+  // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy, from what the joints allow to what
+  // joints and contacts do. Lowers e s where it is positive; true if anything was, and the velocities are to be found anew.
   bool lower_restitution(const BodyMotion& before, int round) {
     constexpr int kRoundsOfLowering = 4;
-    const bool arrives = std::any_of(contacts_.begin(), contacts_.end(),
-                                     [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; });
-    if (!arrives || round >= kRoundsOfLowering) return false;
-    const auto add_work_of = [&](std::size_t r, Gain* gain) {
-      const ConeRow& row = cone_.rows[r];
-      const double start = row.direction.along(before[row.body1], before[row.body2]);
-      const double end = row.direction.along(velocity_[row.body1], velocity_[row.body2]);
-      gain->add(0.5 * row.multiplier * (start + end),
-                0.5 * std::fabs(row.multiplier) * (std::fabs(start) + std::fabs(end)));
-    };
+    if (!arrives() || round >= kRoundsOfLowering) return false;
     Gain all;
     const std::size_t scalars = cone_.contacts.front().first;
     for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
       // a drive's or spring's work is real
       if (r < scalars && (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0)) continue;
-      add_work_of(r, &all);
+      add_work(cone_.rows[r], before, velocity_, &all);
     }
-    if (!all.is_real()) return false;
+    // multipliers of joints do work on what the solution leaves of their rows
+    if (!(joints_.empty() ? all.is_real() : all.is_to_blame())) return false;
     bool any = false;
     std::size_t cone = 0;
     for (EndContact& contact : contacts_) {
       if (!contact.is_closed) continue;
       const ConeContact& rows = cone_.contacts[cone++];
       Gain own;
-      for (std::uint32_t k = 0; k < rows.count(); ++k) add_work_of(rows.first + k, &own);
-      if (!(contact.law.target > 0.0) || !own.is_to_blame()) continue;
-      contact.law.target = lowered_target(contact.law.target, &contact.lowered);
-      any = true;
+      for (std::uint32_t k = 0; k < rows.count(); ++k) add_work(cone_.rows[rows.first + k], before, velocity_, &own);
+      const ConeRow& normal = cone_.rows[rows.first];
+      const double arrival = -normal.direction.along(before[normal.body1], before[normal.body2]);
+      if (contact.law.target > 0.0) any = lower_target(own, arrival, &contact.law.target, &contact.lowered) || any;
     }
     // no one contact is to blame, or lowering was not enough
     if (!any || round + 1 == kRoundsOfLowering)
@@ -506,8 +505,10 @@ class IslandSolver {
     };
     for (std::size_t r = 0; r < scalars; ++r)
       if (cone_.rows[r].law.is_velocity_only) push(cone_.rows[r]);
+    const BodyMotion driven = next;
     for (const ConeContact& contact : cone_.contacts)
       for (std::uint32_t k = 1; k < contact.count(); ++k) push(cone_.rows[contact.first + k]);
+    shorten(driven, &next);
     const bool changes = is_change(next, offset_, 0.0);
     offset_ = std::move(next);
     return changes;
@@ -556,7 +557,7 @@ class IslandSolver {
   std::vector<EndContact> contacts_;
   std::vector<EndBody> end_;
   std::vector<double> gyration_;  // radii, m
-  double coordinates_ = 0.0;
+  double coordinates_ = 0.0, most_recovery_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   ConeSummary summary_;
   double pose_contradiction_ = 0.0;

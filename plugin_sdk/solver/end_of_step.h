@@ -18,6 +18,10 @@
 // velocity row's arms end at each body's own surface point, which is where the two meet when the gap is closed (a ball that
 // sank by d rolls on its radius, not on a radius less d/2).
 //
+// Recovery is bounded: contacts that leave a body no room (walls that crush it, shapes one in another) ask for a pose change
+// without end. Where it goes beyond 16 times the ways of the step (S_n to S*, and h v*) and twice what is overlapped at S*,
+// summed over the island, all of it is shortened, and what overlaps stays for the steps to come.
+//
 // Laws: joint_laws.h, contact_law.h; solution of the rows: cone_problem.h. Energy. Restitution with friction in coupled
 // impacts can create energy (Kane's paradox): where an island gains, e s of the contacts that arrive and do positive work
 // is lowered, to a half, a quarter, zero, and if it gains still, all of them to zero.

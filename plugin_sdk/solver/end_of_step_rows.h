@@ -7,6 +7,7 @@
 
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/cone_problem.h"
 #include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/joint_laws.h"
 
@@ -54,6 +55,22 @@ ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const
 ConstraintDirection turning_about(const Vector3& axis);
 ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2);
 
+// The joint's directions, arms and errors with the bodies at their ends; `turn`: of body 2 against body 1, from S*.
+void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end1, const EndBody& end2,
+                const Vector3& turn, EndJoint* joint);
+
+// By how much a pose law is missed where its row's value is 0, m or rad.
+double missed_by(const JointLaw& law);
+// From S_n to S*, and as far again as v* goes, m.
+double way_of(const SolverBody& body, double gyration, double h);
+
+// lambda (J before + J after)/2
+void add_work(const ConeRow& row, const BodyMotion& before, const BodyMotion& after, Gain* gain);
+
+// 0 where the inverse is.
+Vector3 moments_of(const Vector3& inverse_moments);
+// What a turn adds to the moment that a push at an arm exerts: (p.r) 1 - (p r^T + r p^T)/2.
+Matrix3 geometric_stiffness(const Vector3& arm, const Vector3& push);
 // (I + K)^-1 of a body with inverse moments D in its principal axes R: R D^1/2 (1 + D^1/2 R^T K R D^1/2)^-1 D^1/2 R^T.
 // Directions in which K would take away more than half of the inertia count as half.
 Matrix3 stiffened_inverse(const Quaternion& orientation, const Vector3& inverse_moments, const Matrix3& stiffness);

@@ -189,13 +189,13 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {
   if (dropped_.empty() || is_consistent(*b)) return 0.0;
   if (null_.empty()) find_null_space();
-  double square = 0.0;
-  for (const NullVector& z : null_) {
-    const double share = dot(&z.number[z.first], &(*b)[z.first], z.number.size() - z.first);
-    square += share * share;
+  Eigen::VectorXd shares(static_cast<Eigen::Index>(null_.size()));
+  for (Eigen::Index k = 0; k < shares.size(); ++k) {
+    const NullVector& z = null_[static_cast<std::size_t>(k)];
+    const double share = shares[k] = dot(&z.number[z.first], &(*b)[z.first], z.number.size() - z.first);
     for (std::size_t i = z.first; i < z.number.size(); ++i) (*b)[i] -= share * z.number[i];
   }
-  return std::sqrt(square);
+  return shares.stableNorm();
 }
 
 }  // namespace gravitas

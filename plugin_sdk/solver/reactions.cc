@@ -86,6 +86,10 @@ class ReactionSolver {
   }
 
   void write(double residual, const stage::SolverReactionsReply& reply) const {
+    const auto require_finite = [](double number) {
+      if (!std::isfinite(number)) throw Refusal("a reaction is not finite: masses, velocities or forces overflow");
+    };
+    require_finite(residual);
     const std::size_t count = bodies_.size() - 1;
     std::vector<Wrench> reactions(count + 1);
     std::vector<double> forces(3 * request_->mode().size(), 0.0);
@@ -93,7 +97,7 @@ class ReactionSolver {
       const Row& row = rows_[i];
       const ConstraintDirection& d = row.direction;
       const double force = multipliers_[i];
-      if (!std::isfinite(force)) throw Refusal("a reaction is not finite: masses, velocities or forces overflow");
+      require_finite(force);
       forces[row.place] = force;
       reactions[row.body1].force -= force * d.linear;
       reactions[row.body1].torque += force * d.angular1;

@@ -97,10 +97,10 @@ void hand_on_accuracy(BuildContext* context) {
     integrator.settings[at] = properties.accuracy();
     return;
   }
-  context->diagnostics->error(place,
-                              "the integrator \"" + integrator.declaration.name +
-                                  "\" has no Accuracy; allowed: \"DormandPrince54\", \"Rosenbrock\", \"Radau\", or a "
-                                  "smaller TimeStep instead");
+  context->diagnostics->error(
+      place, "the integrator \"" + integrator.declaration.name +
+                 "\" has no Accuracy; allowed: \"DormandPrince54\", \"DormandPrince853\", \"Rosenbrock\", "
+                 "\"Radau\", or a smaller TimeStep instead");
 }
 
 void build_forces(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {

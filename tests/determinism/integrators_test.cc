@@ -32,8 +32,8 @@ TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHosting) {
 
 INSTANTIATE_TEST_SUITE_P(Integrators, EveryIntegrator,
                          ::testing::Values("Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4",
-                                           "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54", "Rosenbrock",
-                                           "Radau"),
+                                           "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54",
+                                           "DormandPrince853", "Rosenbrock", "Radau"),
                          [](const auto& which) { return std::string(which.param); });
 
 }  // namespace

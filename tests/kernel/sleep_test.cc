@@ -137,6 +137,7 @@ TEST(Sleep, EveryIntegratorLeavesSleepersAloneAndTakesThemUpAgain) {
                                                                                 {"implicit_midpoint", {}},
                                                                                 {"symplectic_splitting", {4}},
                                                                                 {"dormand_prince54", {1e-8}},
+                                                                                {"dormand_prince853", {1e-8}},
                                                                                 {"rosenbrock", {1e-6}},
                                                                                 {"radau", {1e-6}}};
   for (const auto& [integrator, settings] : integrators) {

@@ -147,6 +147,71 @@ TEST(ContactProblems, APlateAtAHundredMetresPerSecondMeetsAPlate) {
   expect_reached({"plate at 100 m/s", method, "overlap at a committed step, m", 1e-9, deepest, clock.seconds()});
 }
 
+// Of any size against what hits it.
+TEST(ContactProblems, NothingPassesAPlateHoweverLargeItIs) {
+  const CpuClock clock;
+  double worst = 0.0;
+  for (const double half : {0.5, 3.0, 6.0, 40.0, 1e3, 1e5}) {
+    for (const double speed : {0.3, 100.0, 300.0, 1000.0}) {
+      const double gap = 1.2, length = gap / speed / 2.7;
+      WorldBuilder builder = contact_world(6, length, {0.6, 0.0, 0.0, 0.0});
+      builder.box({half, 0.1, half}, 1.0, {0, 0, 0});
+      builder.body().flags &= ~kMovable, builder.body().mass = 0.0, builder.body().inertia.setZero();
+      builder.sphere(0.25, 1.0, {0.1, 0.35 + gap, 0.2}, {0, -speed, 0});
+      Environment world(builder.description());
+      while (world.step_count() < world.total_steps()) ASSERT_NO_FATAL_FAILURE(step(&world));
+      const double back = 0.6 * speed * (6 * length - gap / speed);
+      worst = std::max(worst, std::fabs(position(world, 1).y() - 0.35 - back) / gap);
+    }
+  }
+  expect_reached(
+      {"ball on plates of 1 m to 200 km", "Continuous, Verlet, Newton", "way, relative", 1e-9, worst, clock.seconds()});
+}
+
+// A single contact without friction loses nothing, however the bodies turn while they meet.
+TEST(ContactProblems, ElasticBoxesKeepTheirEnergy) {
+  const CpuClock clock;
+  std::mt19937_64 numbers(8);
+  const auto number = [&] { return 2.0 * static_cast<double>(numbers() >> 11) * 0x1p-53 - 1.0; };
+  const auto vector = [&](double size) { return Vector3(size * number(), size * number(), size * number()); };
+  double worst = 0.0;
+  for (int i = 0; i < 30; ++i) {
+    WorldBuilder builder = contact_world(200, 0.005, {1.0, 0.0, 0.0, 0.0});
+    builder.box({0.2, 0.3, 0.4}, 1.0, {-1, 0, 0}, Vector3(1.5, 0, 0) + vector(0.3));
+    builder.body().twist.angular = vector(3.0);
+    builder.box({0.3, 0.2, 0.3}, 2.0, {1, 0.1, 0.1}, Vector3(-1.5, 0, 0) + vector(0.3));
+    builder.body().twist.angular = vector(3.0);
+    Environment world(builder.description());
+    const auto energy = [&] {
+      double sum = 0.0;
+      for (std::size_t b = 0; b < 2; ++b) {
+        const Vector3 moments = vector_at(world.model().inertia.span(), b);
+        const Vector3 w = quaternion_at(world.state().orientation, b).conjugate() * spin(world, b);
+        sum +=
+            0.5 * (velocity(world, b).squaredNorm() / world.model().inverse_mass[b] + w.dot(moments.cwiseProduct(w)));
+      }
+      return sum;
+    };
+    const double before = energy();
+    while (world.step_count() < world.total_steps()) ASSERT_NO_FATAL_FAILURE(step(&world));
+    worst = std::max(worst, std::fabs(energy() / before - 1.0));
+  }
+  expect_reached({"elastic boxes, 30 pairs", "Continuous, Verlet, Newton, 5 ms", "energy, relative", 1e-3, worst,
+                  clock.seconds()});
+}
+
+// Its points come down all the time, but it does not land.
+TEST(ContactProblems, ARollingBallIsNotHalved) {
+  WorldBuilder builder = contact_world(120, 1.0 / 60, {0.0, 0.5, 0.5, 0.0});
+  builder.ground().sphere(0.2, 1.0, {0, 0.2, 0}, {1, 0, 0}).gravity({0, -kGravity, 0});
+  builder.body().twist.angular = {0, 0, -5};
+  builder.description().simulator = Simulator::kBisection;
+  Environment world(builder.description());
+  while (world.step_count() < world.total_steps()) ASSERT_NO_FATAL_FAILURE(step(&world));
+  EXPECT_NEAR(position(world, 1).x(), 2.0, 1e-9);
+  EXPECT_LE(world.stage_time(kernel::Stage::kIntegrate).count(), 4U * 120U);
+}
+
 TEST(ContactProblems, TwoCubesMeetHeadOnAtFiveHundredMetresPerSecond) {
   WorldBuilder builder = contact_world(3, 0.01, {1.0, 0.0, 0.0, 0.0});
   builder.box({0.05, 0.05, 0.05}, 1.0, {-4, 0, 0}, {500, 0, 0}).box({0.05, 0.05, 0.05}, 1.0, {3, 0, 0}, {-500, 0, 0});

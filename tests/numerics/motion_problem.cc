@@ -50,6 +50,7 @@ std::vector<MotionMethod> fixed_step_methods() {
 
 std::vector<MotionMethod> adaptive_methods(double accuracy) {
   return {{"DormandPrince54", "integrator_dormand_prince54", {accuracy}, 5, 5},
+          {"DormandPrince853", "integrator_dormand_prince853", {accuracy}, 8, 8},
           {"Rosenbrock", "integrator_rosenbrock", {accuracy}, 4, 0},
           {"Radau", "integrator_radau", {accuracy}, 5, 0}};
 }

@@ -29,6 +29,9 @@ MotionMethod at_accuracy(const char* name, const char* library, double accuracy)
 MotionMethod dormand_prince(double accuracy) {
   return at_accuracy("DormandPrince54", "integrator_dormand_prince54", accuracy);
 }
+MotionMethod dormand_prince8(double accuracy) {
+  return at_accuracy("DormandPrince853", "integrator_dormand_prince853", accuracy);
+}
 MotionMethod rosenbrock(double accuracy) { return at_accuracy("Rosenbrock", "integrator_rosenbrock", accuracy); }
 MotionMethod radau(double accuracy) { return at_accuracy("Radau", "integrator_radau", accuracy); }
 
@@ -89,6 +92,7 @@ TEST(Problems, SphericalPendulum) {
 TEST(Problems, HeavyTop) {
   expect_run(harness::heavy_top(), kRk4, 2000, {.error = 1e-4});
   expect_run(harness::heavy_top(), dormand_prince(1e-12), 100, {.error = 1e-9, .joint_error = 1e-13});
+  expect_run(harness::heavy_top(), dormand_prince8(1e-10), 100, {.error = 1e-9, .joint_error = 1e-13});
 }
 
 TEST(Problems, LagrangeTop) {
@@ -112,6 +116,7 @@ TEST(Problems, FourBarPassesItsSingularities) {
 // Andrews' mechanism of the DAE test set.
 TEST(Problems, Squeezer) {
   expect_run(harness::squeezer(), dormand_prince(3e-10), 6, {.error = 1e-9, .joint_error = 1e-12});
+  expect_run(harness::squeezer(), dormand_prince8(1e-9), 3, {.error = 1e-9, .joint_error = 1e-12});
 }
 
 // IFToMM A04.

@@ -97,6 +97,24 @@ Eigen::MatrixXd dormand_prince(double k, double c) {
   return polynomial(kWeights, z);
 }
 
+// Beyond z^8 its stages add four terms more.
+Eigen::MatrixXd dormand_prince8(double k, double c) {
+  constexpr double kWeights[] = {1.0,
+                                 1.0,
+                                 1.0 / 2,
+                                 1.0 / 6,
+                                 1.0 / 24,
+                                 1.0 / 120,
+                                 1.0 / 720,
+                                 1.0 / 5040,
+                                 1.0 / 40320,
+                                 2.691692200169086e-6,
+                                 2.341345108209780e-7,
+                                 1.494736485459155e-8,
+                                 3.613324578128243e-10};
+  return polynomial(kWeights, rates(k, c));
+}
+
 // P(z) / (1 - z/4)^6: up to z^4 P is that of order 4, the rest follows from the coefficients of RODAS.
 Eigen::MatrixXd rodas(double k, double c) {
   constexpr double kWeights[] = {1.0, -1.0 / 2, -1.0 / 16, 1.0 / 24, 5.0 / 768, -0.00215865480625998};
@@ -132,6 +150,7 @@ const std::map<std::string, Theory>& theories() {
                                                     {"SymplecticSplitting 4", splitting4},
                                                     {"SymplecticSplitting 6", splitting6},
                                                     {"DormandPrince54", dormand_prince},
+                                                    {"DormandPrince853", dormand_prince8},
                                                     {"Rosenbrock", rodas},
                                                     {"Radau", radau}};
   return all;

@@ -79,6 +79,18 @@ TEST(EventLocation, WhatTheDetectorDidNotFollowToTheEndIsLookedAtAgain) {
   EXPECT_DOUBLE_EQ(stop.length, 0.005);
 }
 
+// Beside a large body the detector tells no nearer.
+TEST(EventLocation, WhatTheDetectorCallsMetBeforeItIsFliesOnUntilItIs) {
+  constexpr double kGap = 150.0 * kTargetGap;
+  const auto stop = [](double speed) {
+    return stop_before({0.0, kGap, speed, speed}, 0.01, kTargetGap, kShortestFlight);
+  };
+  EXPECT_DOUBLE_EQ(stop(-100.0).length, (kGap + 2.0 * kTargetGap) / 100.0);
+  EXPECT_EQ(stop(-1e-9).length, 0.01);
+  EXPECT_EQ(stop(0.0).length, 0.01);
+  EXPECT_EQ(stop(1.0).length, 0.01);
+}
+
 TEST(EventLocation, PairsThatRestPartOrPressNeedNoStop) {
   const double length = 0.01;
   const auto stop = [&](double start_speed, double end_speed) {

@@ -64,6 +64,27 @@ INSTANTIATE_TEST_SUITE_P(Each, Breaking,
                            return std::string(std::get<0>(one.param).type) + std::get<1>(one.param);
                          });
 
+// With joints in the derivative, too: judged by what they bear where the step ends.
+TEST_P(Breaking, ComesWithSmoothAsWell) {
+  const auto& [joint, solver] = GetParam();
+  if (std::string(solver) == "Sequential") return;  // tells no reactions
+  const std::string pull =
+      "Force { Type = \"Basic\" Id = \"Pull\" CustomProperties { Table = {{0, {0,0,0}}, {10, {100,0,0}}} } }";
+  const std::string held = std::string("Constraint { Type = \"") + joint.type +
+                           "\" Id = \"Joint\" Body2 = \"Ball\" BreakingForce = 7.65 CustomProperties { " +
+                           joint.properties + " } }";
+  SceneRun run(scene_of(pull, body("Ball", 2.0, Vector3::Zero(), "\"Pull\""), held, solver),
+               {"Simulator=Smooth", "Integrator=RK4"});
+  while (run.step_count() < 90) {
+    run.step();
+    if (10.0 * run.time() < 7.64) {
+      EXPECT_TRUE(run.holds("Joint")) << run.time();
+    } else if (10.0 * run.time() > 7.76) {
+      EXPECT_FALSE(run.holds("Joint")) << run.time();
+    }
+  }
+}
+
 // A pull that grows by 10 N/s, in steps of 0.1 N: the step from t_n bears 10 t_n, and the 78th is the first with more than
 // 7.65 N. What is free afterwards is pulled on.
 TEST_P(Breaking, ComesWithTheFirstStepThatBearsMore) {

@@ -48,6 +48,7 @@ const Methods kMethods[] = {
     {"SymplecticSplitting", {"Integrator=SymplecticSplitting"}},
     {"ImplicitMidpoint", {"Integrator=ImplicitMidpoint"}},
     {"DormandPrince54", {"Integrator=DormandPrince54"}},
+    {"DormandPrince853", {"Integrator=DormandPrince853"}},
     {"Rosenbrock", {"Integrator=Rosenbrock"}},
     {"Radau", {"Integrator=Radau"}},
     {"LongSteps", {"Simulator.TimeStep=0.05"}},

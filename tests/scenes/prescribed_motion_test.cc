@@ -51,8 +51,8 @@ class PrescribedMotion : public ::testing::TestWithParam<const char*> {};
 
 INSTANTIATE_TEST_SUITE_P(EachIntegrator, PrescribedMotion,
                          ::testing::Values("Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4",
-                                           "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54", "Rosenbrock",
-                                           "Radau"),
+                                           "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54",
+                                           "DormandPrince853", "Rosenbrock", "Radau"),
                          [](const auto& which) { return std::string(which.param); });
 
 TEST_P(PrescribedMotion, IsWhereItsTableHasItWithTheVelocitiesThere) {

@@ -34,7 +34,7 @@ constexpr double kRounding = 1e-13;
 TEST(SwitchedForce, ActsAsLongAsItIsOnWithEveryIntegrator) {
   for (const std::string integrator :
        {"Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4", "SymplecticSplitting",
-        "ImplicitMidpoint", "DormandPrince54", "Rosenbrock", "Radau"}) {
+        "ImplicitMidpoint", "DormandPrince54", "DormandPrince853", "Rosenbrock", "Radau"}) {
     SCOPED_TRACE(integrator);
     SceneRun run(kScene, {set("Integrator", integrator)});
     run.to_end();

@@ -250,5 +250,27 @@ TEST(Reactions, RefuseARequestThatIsImpossible) {
   EXPECT_THAT([&] { problem.solve(); }, ::testing::ThrowsMessage<Refusal>(::testing::HasSubstr("does not exist")));
 }
 
+// A body that two pins hold cannot turn: what they miss is finite as long as its terms are.
+TEST(Reactions, OverflowOnlyWhereTheirTermsDo) {
+  const auto spinning = [](double speed) {
+    Problem problem;
+    problem.add_body(2.0, bob_at(), {0, 0, 0}, {0, -1, 0});
+    problem.angular_velocity[2] = speed;
+    problem.add_joint(kNone, 0, pin(bob_at() + Vector3(1, 0, 0)));
+    problem.add_joint(kNone, 0, pin(bob_at() - Vector3(0, 1, 0)));
+    return problem;
+  };
+  const auto missed_at = [&](double speed) {
+    Problem problem = spinning(speed);
+    problem.solve();
+    return problem.residual();
+  };
+  EXPECT_GT(missed_at(1.0), 0.1);
+  EXPECT_NEAR(missed_at(1e100), 1e200 * missed_at(1.0), 1e190);
+  Problem problem = spinning(1e200);
+  EXPECT_THAT([&] { problem.solve(); },
+              ::testing::ThrowsMessage<Refusal>(::testing::HasSubstr("a reaction is not finite")));
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -262,8 +262,22 @@ TEST(BasicVerlet, ForgetsItsHistoryWhereItMust) {
 
 // ---- DormandPrince54
 
-TEST(DormandPrince54, MeetsTheTumblingBoxWithin2000Evaluations) {
-  IntegratorProblem problem("integrator_dormand_prince54", {3e-14});
+// Of either pair.
+struct DormandPrinceCase {
+  const char* plugin;
+  double order;
+  double accuracy, angle;  // of the tumbling box, and what it leaves, rad
+};
+
+class DormandPrince : public testing::TestWithParam<DormandPrinceCase> {};
+
+INSTANTIATE_TEST_SUITE_P(Of, DormandPrince,
+                         testing::Values(DormandPrinceCase{"integrator_dormand_prince54", 5.0, 3e-14, 1e-9},
+                                         DormandPrinceCase{"integrator_dormand_prince853", 8.0, 3e-14, 1e-8}),
+                         [](const auto& given) { return std::string(given.param.plugin); });
+
+TEST_P(DormandPrince, MeetsTheTumblingBox) {
+  IntegratorProblem problem(GetParam().plugin, {GetParam().accuracy});
   problem.bodies = {tumbling_box()};
   problem.wrench_is_constant = false;
   problem.plugin.derivative = [](const stage::IntegratorDerivativeRequest&) {
@@ -271,16 +285,16 @@ TEST(DormandPrince54, MeetsTheTumblingBoxWithin2000Evaluations) {
   };
   problem.time_step = 10.0;
   problem.step();
-  EXPECT_LT(angle_apart(problem.bodies[0].state.pose.orientation, kTumbled), 1e-9);
+  EXPECT_LT(angle_apart(problem.bodies[0].state.pose.orientation, kTumbled), GetParam().angle);
   EXPECT_LE(problem.error_estimate, 1.0);
   RecordProperty("derivatives", problem.plugin.derivatives_asked);
 }
 
-// The error follows the accuracy, and the work the fifth root of it.
-TEST(DormandPrince54, ObeysItsAccuracy) {
+// The error follows the accuracy, and the work that root of it which is the order.
+TEST_P(DormandPrince, ObeysItsAccuracy) {
   int asked_before = 0;
   for (const double accuracy : {1e-4, 1e-6, 1e-8, 1e-10, 1e-12}) {
-    IntegratorProblem problem("integrator_dormand_prince54", {accuracy});
+    IntegratorProblem problem(GetParam().plugin, {accuracy});
     make_oscillator(&problem, 3.0);
     problem.time_step = 2.0;
     problem.step();
@@ -290,13 +304,13 @@ TEST(DormandPrince54, ObeysItsAccuracy) {
     // local errors of some tens of inner steps add up
     EXPECT_LT(error, 50.0 * accuracy + 1e-14) << accuracy;
     EXPECT_GT(problem.plugin.derivatives_asked, asked_before);
-    EXPECT_LT(problem.plugin.derivatives_asked, 60 * std::pow(accuracy, -0.2)) << accuracy;
+    EXPECT_LT(problem.plugin.derivatives_asked, 60 * std::pow(accuracy, -1.0 / GetParam().order)) << accuracy;
     asked_before = problem.plugin.derivatives_asked;
   }
 }
 
-TEST(DormandPrince54, RefusesWhatNoStepCanFollow) {
-  IntegratorProblem problem("integrator_dormand_prince54", {1e-8});
+TEST_P(DormandPrince, RefusesWhatNoStepCanFollow) {
+  IntegratorProblem problem(GetParam().plugin, {1e-8});
   make_oscillator(&problem, 1.0);
   int calls = 0;
   problem.plugin.derivative = [&](const stage::IntegratorDerivativeRequest&) {
@@ -490,6 +504,7 @@ INSTANTIATE_TEST_SUITE_P(Integrators, EveryIntegrator,
                                          std::pair{"integrator_implicit_midpoint", std::vector<double>{}},
                                          std::pair{"integrator_symplectic_splitting", std::vector<double>{4.0}},
                                          std::pair{"integrator_dormand_prince54", std::vector<double>{1e-8}},
+                                         std::pair{"integrator_dormand_prince853", std::vector<double>{1e-8}},
                                          std::pair{"integrator_rosenbrock", std::vector<double>{1e-6}},
                                          std::pair{"integrator_radau", std::vector<double>{1e-10}}),
                          [](const auto& given) { return std::string(given.param.first); });

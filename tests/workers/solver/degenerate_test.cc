@@ -187,6 +187,20 @@ TEST_P(Degenerate, OverlapGivesNoSpeed) {
   EXPECT_LE(answer.velocity(ball).norm(), 1e-12);
 }
 
+// Walls that leave a box no room, a little out of parallel: the way out is 0.01/1e-6 m long, and no step takes it.
+TEST_P(Degenerate, ABoxThatIsCrushedStaysWhereItIs) {
+  SolverProblem p;
+  const auto left = p.add_body({.linear = {0.1, 0, 0}, .kinematic = true});
+  const auto right = p.add_body({.linear = {-0.1, 0, 0}, .kinematic = true});
+  const auto box = p.add_body({.pose = {{0, 0, 0}, Quaternion::Identity()}});
+  p.make_trial({0, -9.81, 0});
+  const Vector3 into_left = Vector3(1, 0, 1e-6).normalized();
+  p.add_contact({.body1 = left, .body2 = box, .normal = into_left, .point = {-0.5, 0, 0}, .depth = 0.01});
+  p.add_contact({.body1 = box, .body2 = right, .normal = Vector3::UnitX(), .point = {0.5, 0, 0}, .depth = 0.01});
+  const SolverAnswer answer = solve(p);
+  EXPECT_LE(answer.translation(box).norm(), 0.5);
+}
+
 // Immovable and kinematic bodies on both sides of a joint and of a contact: nothing to push, nothing done.
 TEST_P(Degenerate, InfiniteMassesOnBothSidesAreLeftAlone) {
   SolverProblem p;

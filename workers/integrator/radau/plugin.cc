@@ -80,22 +80,18 @@ class Radau final : public IntegratorPlugin {
     Derivatives derivatives(request, host, &room_);
     motion_.begin(request, &derivatives);
     const double whole = request.time_step();
-    const std::span<const double> history = request.plugin_state();
-    const bool has_history =
-        history.size() == 1 && history[0] > kShortestInnerStep * whole && std::isfinite(history[0]);
-    double inner = has_history ? history[0] : whole, worst = 0.0;
+    const double remembered = remembered_inner_step(request.plugin_state(), whole);
+    double inner = remembered > 0.0 ? remembered : whole, worst = 0.0;
     double longest = HUGE_VAL;  // for a while after rounds that did not end
     int failures = 0;
     has_rate_ = has_matrix_ = false;
-    guess_ = has_history ? Guess::kSmooth : Guess::kNone;
+    guess_ = remembered > 0.0 ? Guess::kSmooth : Guess::kNone;
     while (motion_.done() < whole && !motion_.is_empty()) {
       host.mark_progress();
       prepare();
-      const double left = whole - motion_.done();
-      // two equal ones in place of a long and a short one
       const double most = std::min(inner, motion_.longest());
       require_inner_step(most, whole);
-      const double h = most >= left ? left : std::min(most, 0.5 * left);
+      const double h = next_inner_step(most, whole - motion_.done());
       if (!find_stages(h)) {
         // an old matrix may be all that is wrong, or a guess; one that led nowhere twice is no better than none
         if (is_fresh_ && guess_ == Guess::kSmooth) {

@@ -347,9 +347,7 @@ std::uint32_t ContactImpulses::lower_restitution(const BodyMotion& before, const
     if (!(row.target > 0.0)) continue;
     Gain gain;
     gain.work = work_of(row, before, after, &gain.size);
-    if (!gain.is_to_blame()) continue;
-    row.target = lowered_target(row.target, &row.lowered);
-    ++count;
+    if (lower_target(gain, -velocity_of(row, before).x(), &row.target, &row.lowered)) ++count;
   }
   return count;
 }

@@ -338,36 +338,51 @@ void SequentialSolver::set_offset(double factor) {
 void SequentialSolver::bound_energy() {
   const bool bounces = impulses_.has_restitution();
   if (!bounces && velocity_converged_) return;
+  const BodyMotion before = bounces ? velocity_of_joints() : trial_velocity_;
   for (int round = 0; round < 3; ++round) {
-    const std::uint32_t lowered = impulses_.lower_restitution(trial_velocity_, solution_.velocity);
+    const std::uint32_t lowered = impulses_.lower_restitution(before, solution_.velocity);
     if (lowered == 0) break;
     summary_.restitutions_lowered += lowered;
     relax_velocity();
   }
 
   group_bodies();
-  add_up_gains(solution_.velocity);
+  add_up_gains(before, solution_.velocity);
   const std::uint32_t dropped = impulses_.drop_restitution(bodies_, group_, gains_);
   summary_.restitutions_dropped += dropped;
   if (dropped > 0) relax_velocity();
   if (!velocity_converged_) scale_back();
 }
 
-// gains_: what each group's bodies gain by the impulses between v* and `after`.
-void SequentialSolver::add_up_gains(const BodyMotion& after) {
+// What the joints alone make of v*: what an impact gains is counted from there.
+BodyMotion SequentialSolver::velocity_of_joints() {
+  BodyMotion velocity = trial_velocity_;
+  if (discrepancies_.empty()) return velocity;
+  RelaxationJoints joints = velocity_joints_;
+  ContactImpulses none;
+  const double motion = joints.largest_motion(velocity);
+  sweep_.begin(bodies_, {&joints, &none});
+  joints.push_all(bodies_, velocity);
+  for (std::uint32_t done = 0; done < settings_.iterations; ++done)
+    if (sweep_.sweep(bodies_, velocity) <= kStillness * motion) break;
+  return velocity;
+}
+
+// gains_: what each group's bodies gain by the impulses between `before` and `after`.
+void SequentialSolver::add_up_gains(const BodyMotion& before, const BodyMotion& after) {
   gains_.assign(bodies_.count() + 1, Gain{});
-  impulses_.add_work(bodies_, trial_velocity_, after, group_, gains_);
-  velocity_joints_.add_work(bodies_, trial_velocity_, after, group_, gains_);
+  impulses_.add_work(bodies_, before, after, group_, gains_);
+  velocity_joints_.add_work(bodies_, before, after, group_, gains_);
 }
 
 // Groups that gain although nothing bounces: sweeps that ran out. A share f of all their impulses
 // gains f L + f^2 (W - L), W the gain of the whole and L = lambda.u_before: the largest f that
 // gains nothing.
 void SequentialSolver::scale_back() {
-  add_up_gains(trial_velocity_);
+  add_up_gains(trial_velocity_, trial_velocity_);
   factor_.clear();
   for (const Gain& gain : gains_) factor_.push_back(gain.work);
-  add_up_gains(solution_.velocity);
+  add_up_gains(trial_velocity_, solution_.velocity);
   bool any = false;
   for (std::size_t i = 0; i < factor_.size(); ++i) {
     const double along = factor_[i];

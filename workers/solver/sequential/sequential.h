@@ -32,9 +32,9 @@
 // (contact_impulses.h); with (2.64) and (2.69) in turn friction breaks the normal law in every
 // oblique impact. Restitution with friction in coupled impacts can create energy all the same
 // (Kane's paradox). Bound: the work of a contact's impulse is lambda.(u_before + u_after)/2; where
-// it is positive for a contact that arrives, e s of that contact is lowered, to a half, a quarter,
-// zero, with a solution after each. These works (with those of the locks and limits) sum to the
-// change of kinetic energy from v* to v_{n+1}; should it still be positive for a connected set of
+// it is positive for a contact that arrives, e s of that contact is lowered (contact_law.h), with a
+// solution after each. These works (with those of the locks and limits) sum to the change of kinetic
+// energy from what the joints alone make of v* to v_{n+1}; should it still be positive for a connected set of
 // bodies, e s is zero for all contacts of it. With that no solution gains; sweeps that ran out can,
 // and then all impulses of the set are scaled back to the largest share that does not.
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
@@ -135,7 +135,8 @@ class SequentialSolver {
   bool sweep_velocity(double tolerance);
   void bound_energy();
   void group_bodies();
-  void add_up_gains(const BodyMotion& after);
+  BodyMotion velocity_of_joints();
+  void add_up_gains(const BodyMotion& before, const BodyMotion& after);
   void scale_back();
   void sum_velocity();
   bool acts_on_velocity_alone() const;
