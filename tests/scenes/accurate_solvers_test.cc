@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "plugin_sdk/math/rotation.h"
@@ -134,15 +135,37 @@ TEST(AccurateStack, TenUnderAThousandTimesTheirMassStand) { expect_stands({1, 1,
 TEST(AccurateStack, TwentyStand) { expect_stands(std::vector<double>(20, 1.0), 3); }
 TEST(AccurateStack, TenUnderTenThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1e4}, 0.5); }
 
-// Sequential with its layers, and without: what the option is for.
-TEST(SequentialStack, WithShockPropagationTenUnderAThousandTimesTheirMassStand) {
+// Sequential, too, by layers; by sweeps alone it does not.
+TEST(SequentialStack, TenUnderAThousandTimesTheirMassStand) {
   const std::vector<double> masses = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1000};
-  expect_stands(masses, 5, {"Solver=Sequential", "Solver.ShockPropagation=true"});
+  expect_stands(masses, 5, solver("Sequential"));
   std::string bodies = kFloor;
   for (std::size_t i = 0; i < masses.size(); ++i) bodies += cube(static_cast<int>(i), masses[i]);
-  SceneRun plain(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, 1), ""), solver("Sequential"));
+  SceneRun plain(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, 1), ""),
+                 {"Solver=Sequential", "Solver.ShockPropagation=Never"});
   plain.to_end();
   EXPECT_GT(plain.report().max_penetration(), 1e-3);
+}
+
+// Each turned against the one below, and put or dropped upon it one after another.
+TEST(SequentialStack, TurnedAndDroppedCubesComeToRestWhereTheyAre) {
+  for (const auto& [count, turn, gap] :
+       {std::tuple{10, 0.4, 0.0}, std::tuple{11, 0.05, 0.0}, std::tuple{10, 0.1, 0.1}, std::tuple{20, 0.1, 0.1}}) {
+    std::string bodies = kFloor;
+    for (int i = 0; i < count; ++i)
+      bodies += "Body { Id = \"C" + std::to_string(i) +
+                "\" GeometryId = \"Cube\" Material = \"Wood\" KineticProperties { Position = " +
+                literal(Vector3(0, 0.5 + (1.0 + gap) * i, 0)) +
+                " Orientation = " + literal(turned({0, 1, 0}, turn * i)) + " } Forces = { \"Down\" } }\n";
+    SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, 5), ""), solver("Sequential"));
+    run.to_end();
+    for (int i = 0; i < count; ++i) {
+      const auto body = run.body("C" + std::to_string(i));
+      EXPECT_LE((body.pose.position - Vector3(0, 0.5 + i, 0)).norm(), 1e-9)
+          << count << " turned by " << turn << ": " << i;
+      EXPECT_LE(body.twist.linear.norm(), 1e-9);
+    }
+  }
 }
 
 // ---- friction

@@ -30,7 +30,10 @@ const std::vector<Solver> kSolvers = {
     {"Newton", [](const SolverProblem& p) { return p.solve(newton()); }, true},
     {"Direct", [](const SolverProblem& p) { return p.solve(direct()); }, true},
     {"Sequential", [](const SolverProblem& p) { return relaxed(p, {.iterations = 5000}); }, false},
-    {"Layered", [](const SolverProblem& p) { return relaxed(p, {.iterations = 5000, .shock_propagation = true}); },
+    {"Layered",
+     [](const SolverProblem& p) {
+       return relaxed(p, {.iterations = 5000, .shock_propagation = ShockPropagation::kAlways});
+     },
      false},
     {"Simultaneous",
      [](const SolverProblem& p) { return relaxed(p, {.iterations = 20000, .order = RelaxationOrder::kSimultaneous}); },

@@ -139,7 +139,9 @@ TEST(SequentialEnergy, NeverRisesSimultaneously) {
 }
 TEST(SequentialEnergy, NeverRisesOverRelaxed) { expect_lawful_impacts({.relaxation_factor = 1.5}, 700, 900); }
 TEST(SequentialEnergy, NeverRisesUnderRelaxed) { expect_lawful_impacts({.relaxation_factor = 0.5}, 800, 940); }
-TEST(SequentialEnergy, NeverRisesWithShockPropagation) { expect_lawful_impacts({.shock_propagation = true}, 900, 940); }
+TEST(SequentialEnergy, NeverRisesWithShockPropagation) {
+  expect_lawful_impacts({.shock_propagation = ShockPropagation::kAlways}, 900, 940);
+}
 
 TEST(SequentialEnergy, ConvergedImpactsObeyTheirLaws) {
   Recorder recorder{SequentialSolver(SequentialSettings{5000, 1.0})};

@@ -106,7 +106,7 @@ const std::vector<SequentialSettings> kWays = {{},
                                                {.iterations = 3},
                                                {.order = RelaxationOrder::kDeepestFirst},
                                                {.relaxation_factor = 1.5},
-                                               {.shock_propagation = true}};
+                                               {.shock_propagation = ShockPropagation::kAlways}};
 
 TEST(SequentialIslands, EachIsAnsweredAsIfItWereAlone) {
   constexpr std::uint32_t kIslands = 12;

@@ -47,11 +47,13 @@ class Sequential final : public SolverPlugin {
                                   .means("How far locks and contacts go, of the way to where they are right: below 1 "
                                          "careful, 1.5 to 1.9 fewer sweeps for stacks and chains; sliding contacts "
                                          "may not converge above 1."),
-                              Property::flag("ShockPropagation")
-                                  .defaults_to({0.0})
+                              Property::choice("ShockPropagation", {"Never", "Stacks", "Always"})
+                                  .defaults_to({static_cast<double>(SequentialSettings{}.shock_propagation)})
                                   .live()
-                                  .means("Starts contacts layer by layer from what is immovable, where that is closer "
-                                         "than the step before: stacks under many times their mass stand.")};
+                                  .means("Starts contacts layer by layer from what is immovable: of stacks (each body "
+                                         "rests on one other, no joints) that is the solution at any height and ratio "
+                                         "of mass; Always: of all that rests, where it is closer than the step "
+                                         "before.")};
     return declaration;
   }
 
@@ -69,12 +71,13 @@ class Sequential final : public SolverPlugin {
     if (!(correction_factor >= 0.0 && correction_factor <= 1.0)) throw Refusal("CorrectionFactor is outside 0 ... 1");
     const std::uint32_t order = settings.choice();
     const double relaxation_factor = settings.number();
-    const bool shock_propagation = settings.flag();
+    const std::uint32_t shock_propagation = settings.choice();
     if (order > 2) throw Refusal("Order is none of Given, DeepestFirst, Simultaneous");
+    if (shock_propagation > 2) throw Refusal("ShockPropagation is none of Never, Stacks, Always");
     if (!(relaxation_factor > 0.0 && relaxation_factor <= kLargestFactor))
       throw Refusal("RelaxationFactor is outside 0 ... 1.95");
     return {static_cast<std::uint32_t>(iterations), correction_factor, static_cast<RelaxationOrder>(order),
-            relaxation_factor, shock_propagation};
+            relaxation_factor, static_cast<ShockPropagation>(shock_propagation)};
   }
 
   SequentialIslands solver_;

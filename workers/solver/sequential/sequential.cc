@@ -196,7 +196,7 @@ void SequentialSolver::solve_pose() {
   double tolerance = std::max(representable, kStillness * std::max(violation, motion));
   sweep_.begin(bodies_, {&pose_joints_, &gaps_});
   pose_joints_.push_all(bodies_, solution_.displacement);
-  if (settings_.shock_propagation) {
+  if (begins_by_layers(pose_joints_, gaps_)) {
     tolerance = choose_start(BodyMotion(solution_.displacement), tolerance, &gaps_, &solution_.displacement);
   } else {
     gaps_.push_all(bodies_, solution_.displacement);
@@ -210,6 +210,13 @@ void SequentialSolver::solve_pose() {
   solution_.displacement = offset_;
   pose_joints_.push_all(bodies_, solution_.displacement);
   gaps_.push_all(bodies_, solution_.displacement);
+}
+
+template <typename Contacts>
+bool SequentialSolver::begins_by_layers(const RelaxationJoints& joints, const Contacts& contacts) const {
+  if (settings_.shock_propagation != ShockPropagation::kStacks)
+    return settings_.shock_propagation == ShockPropagation::kAlways;
+  return joints.is_empty() && is_stack(bodies_, contacts);
 }
 
 // Contacts' multipliers to begin with: those there are or, where they leave smaller errors, those by layers. x: `base`
@@ -297,7 +304,7 @@ void SequentialSolver::relax_velocity() {
   double tolerance = kStillness * std::max({violation, motion, shifted_velocity_});
   sweep_.begin(bodies_, {&velocity_joints_, &impulses_});
   velocity_joints_.push_all(bodies_, solution_.velocity);
-  if (settings_.shock_propagation) {
+  if (begins_by_layers(velocity_joints_, impulses_)) {
     tolerance = choose_start(BodyMotion(solution_.velocity), tolerance, &impulses_, &solution_.velocity);
   } else {
     impulses_.push_all(bodies_, solution_.velocity);

@@ -42,6 +42,26 @@ std::vector<std::uint32_t> layers_of(const SolverBodies& bodies, const Contacts&
   return layer;
 }
 
+// True of contacts by which each body that rests does so on one other, and not all on the ground: of stacks, where layers
+// are the solution and no start only.
+template <typename Contacts>
+bool is_stack(const SolverBodies& bodies, const Contacts& contacts) {
+  if (contacts.block_count() > bodies.count()) return false;
+  const std::vector<std::uint32_t> layer = layers_of(bodies, contacts);
+  std::uint32_t highest = 0;
+  std::size_t resting = 0, borne = 0;
+  for (const std::uint32_t k : layer) {
+    if (k == 0 || k == kNone) continue;
+    highest = std::max(highest, k);
+    ++resting;
+  }
+  for (std::size_t block = 0; block < contacts.block_count(); ++block) {
+    const auto [body1, body2] = contacts.bodies_of(block);
+    borne += layer[body1] != kNone && layer[body2] != kNone ? 1 : 0;
+  }
+  return highest > 1 && borne == resting;
+}
+
 // Sets the multipliers of `contacts` (ContactGaps or ContactImpulses) and adds what they do to x, in which no contact has
 // been pushed yet. A layer is relaxed until it changes by no more than `tolerance`, or kMostVisits times.
 template <typename Contacts>
