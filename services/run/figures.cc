@@ -1,5 +1,8 @@
 #include "services/run/figures.h"
 
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +11,9 @@
 
 namespace gravitas {
 namespace {
+
+// Joints that are open by more than this share of what they hold together hold it no more.
+constexpr double kTorn = 0.01;
 
 void write_change(const Vector3& initial, const Vector3& final_value, report::v1::VectorChange* change) {
   for (int k = 0; k < 3; ++k) {
@@ -80,20 +86,43 @@ Figures::Totals Figures::totals(kernel::Environment* environment) const {
   return sum;
 }
 
+// From end to end of the centres of bodies with joints, or the diameter of gyration of the largest of them.
+void Figures::measure_joined(kernel::Environment* environment) {
+  const kernel::StateView state = environment->state();
+  const kernel::Model& model = environment->model();
+  Eigen::AlignedBox3d centres;
+  double gyration = 0.0;
+  for (const kernel::ConstraintDescription& joint : description_.constraints) {
+    for (const std::uint32_t body : {joint.body1, joint.body2}) {
+      if (body == kNone) continue;
+      centres.extend(vector_at(state.position, body));
+      if (model.mass[body] > 0.0)
+        gyration = std::max(gyration, std::sqrt(vector_at(model.inertia.span(), body).maxCoeff() / model.mass[body]));
+    }
+  }
+  joined_size_ = centres.isEmpty() ? 0.0 : std::max(centres.diagonal().norm(), 2.0 * gyration);
+}
+
 void Figures::follow(kernel::Environment* environment) {
   last_ = totals(environment);
-  if (!initial_) reference_energy_ = (initial_ = last_)->energy();
+  if (!initial_) {
+    reference_energy_ = (initial_ = last_)->energy();
+    measure_joined(environment);
+  }
   largest_kinetic_ = std::max(largest_kinetic_, last_.kinetic);
   const double deviation = std::fabs(last_.energy() - reference_energy_);
   largest_deviation_ = std::max(largest_deviation_, std::isfinite(deviation) ? deviation : HUGE_VAL);
   penetration_ = std::max(penetration_, environment->figures().penetration);
   joint_error_ = std::max(joint_error_, environment->figures().joint_error);
+  if (!opening_step_ && joined_size_ > 0.0 && joint_error_ > kTorn * joined_size_)
+    opening_step_ = environment->step_count();
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
 }
 
 void Figures::begin_again(kernel::Environment* environment) {
   drives_.clear();
   find_drives();
+  measure_joined(environment);
   reference_energy_ = totals(environment).energy();
   follow(environment);
 }
@@ -108,6 +137,11 @@ void Figures::write(report::v1::Report* report) const {
   write_change(initial.angular, last_.angular, report->mutable_angular_momentum());
   report->set_max_penetration(penetration_);
   report->set_max_joint_error(joint_error_);
+  if (opening_step_)
+    report->add_warnings(fmt::format(
+        "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "
+        "on: TimeStep is too long for this scene, or the solver leaves its joints unfinished",
+        joint_error_, 100.0 * kTorn, joined_size_, *opening_step_));
   for (const Drive& drive : drives_) {
     report::v1::Drive* message = report->add_drives();
     message->set_constraint(description_.constraints[drive.constraint].id);

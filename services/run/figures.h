@@ -20,7 +20,7 @@ class Figures {
   // The scene was edited: energy is compared with that of now.
   void begin_again(kernel::Environment* environment);
 
-  // Energy, momenta, penetration, joint error, drives.
+  // Energy, momenta, penetration, joint error, drives; a warning where joints came open.
   void write(report::v1::Report* report) const;
 
   // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
@@ -45,6 +45,7 @@ class Figures {
 
   Totals totals(kernel::Environment* environment) const;
   void find_drives();
+  void measure_joined(kernel::Environment* environment);
   double drive_speed(const Drive& drive, const kernel::StateView& state) const;
 
   const kernel::EnvironmentDescription& description_;
@@ -54,6 +55,8 @@ class Figures {
   Totals last_;
   double largest_kinetic_ = 0.0, largest_deviation_ = 0.0;
   double penetration_ = 0.0, joint_error_ = 0.0;
+  double joined_size_ = 0.0;                   // m, what joints hold together
+  std::optional<std::uint64_t> opening_step_;  // the first in which joints came open by kTorn of it
 };
 
 }  // namespace gravitas

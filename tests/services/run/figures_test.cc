@@ -16,8 +16,10 @@ namespace gravitas {
 namespace {
 
 using harness::ScratchFolder;
+using ::testing::AllOf;
 using ::testing::DoubleNear;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 report::v1::Report figures_of(const std::string& scene, int steps) {
   const ScratchFolder folder;
@@ -95,6 +97,32 @@ Environment {
   EXPECT_EQ(report.drives(0).target(), -1.5);
   // the axis of the step in which the drive acted lies a turn of 0.02 rad behind
   EXPECT_NEAR(report.drives(0).speed(), -1.5, 1e-3);
+}
+
+// A light bob above a heavy one, both let fall: held, and with one sweep of the solver not.
+TEST(Figures, JointsThatComeOpenAreWarnedOf) {
+  const auto warnings = [](const std::string& solver) {
+    const report::v1::Report report = figures_of(R"(
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -10, 0} } } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Light" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} } Forces = { "Down" } }
+    Body { Id = "Heavy" Mass = 10000 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {4, 4, 0} } Forces = { "Down" } }
+  } }
+  Constraints {
+    Constraint { Type = "Spherical" Id = "Upper" Body2 = "Light" CustomProperties { BindPoint = {0, 0, 0} } }
+    Constraint { Type = "Spherical" Id = "Lower" Body1 = "Light" Body2 = "Heavy" CustomProperties { BindPoint = {4, 4, 0} } }
+  }
+  ConstraintSolver { )" + solver + "} }",
+                                                 100);
+    return std::vector<std::string>(report.warnings().begin(), report.warnings().end());
+  };
+  EXPECT_THAT(warnings("Type = \"Newton\""), ElementsAre());
+  EXPECT_THAT(warnings("Type = \"Sequential\" CustomProperties { Iterations = 1 }"),
+              // 3 4 5
+              ElementsAre(AllOf(HasSubstr("joints came open by up to"),
+                                HasSubstr("by more than 1 % of what they hold together (5 m) from step "))));
 }
 
 TEST(Figures, OfAnEmptyWorldAreZero) {
