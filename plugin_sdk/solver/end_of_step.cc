@@ -2,7 +2,6 @@
 #include "plugin_sdk/solver/end_of_step.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +10,7 @@
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/reply.h"
 #include "plugin_sdk/solver/request_check.h"
+#include "plugin_sdk/solver/stalled_drives.h"
 
 namespace gravitas {
 namespace {
@@ -63,7 +63,7 @@ class IslandSolver {
   }
 
  private:
-  static constexpr int kRounds = 12, kFreeRounds = 4;
+  static constexpr int kRounds = 12, kFreeRounds = 4, kRoundsOfLowering = 4;
   static constexpr int kPoseSteps = 30;
   // Corrections move a body by no more than so many times the ways to S* and what is overlapped or missed there, summed.
   static constexpr double kOfWay = 16.0, kOfOverlap = 2.0;
@@ -324,13 +324,15 @@ class IslandSolver {
     for (EndJoint& joint : joints_) {
       for (std::size_t k = 0; k < 3; ++k) {
         const JointLaw known = joint.velocity_laws[k];
-        JointLaw& law = joint.velocity_laws[k];
-        law = velocity_law_of(joint, k);
+        JointLaw& law = joint.velocity_laws[k] = velocity_law_of(joint, k);
         law.has_lower = law.has_lower || known.has_lower;
         law.has_upper = law.has_upper || known.has_upper;
-        any = any || law.has_lower != known.has_lower || law.has_upper != known.has_upper;
+        const bool changes = law.has_lower != known.has_lower || law.has_upper != known.has_upper;
+        any = any || (changes && !law.is_equality());
+        stalled_.add(joint.body1, joint.body2, joint.directions[k], &law);
       }
     }
+    stalled_.stall();
     // with others closed, what slid may stick
     if (any)
       for (EndContact& contact : contacts_) contact.slides = false;
@@ -346,7 +348,7 @@ class IslandSolver {
   void solve_velocity() {
     const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
     // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
-    if (may_turn() && !is_turned()) {
+    if (may_turn()) {
       build_velocity(false);
       const ConeSummary without = cone_.solve(bodies_, trial, 0.0, settings_);
       summary_.iterations += without.iterations;
@@ -382,10 +384,8 @@ class IslandSolver {
     return velocity;
   }
   bool may_turn() const {
-    return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.has_turning(); });
-  }
-  bool is_turned() const {
-    return std::ranges::any_of(contacts_, [](const EndContact& c) { return !c.turning.isZero(0.0); });
+    return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.has_turning(); }) &&
+           std::ranges::all_of(contacts_, [](const EndContact& c) { return c.turning.isZero(0.0); });
   }
 
   void build_velocity(bool with_turning) {
@@ -464,13 +464,13 @@ class IslandSolver {
   // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy, from what the joints allow to what
   // joints and contacts do. Lowers e s where it is positive; true if anything was, and the velocities are to be found anew.
   bool lower_restitution(const BodyMotion& before, int round) {
-    constexpr int kRoundsOfLowering = 4;
     if (!arrives() || round >= kRoundsOfLowering) return false;
     Gain all;
-    const std::size_t scalars = cone_.contacts.front().first;
     for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
       // a drive's or spring's work is real
-      if (r < scalars && (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0)) continue;
+      if (r < cone_.contacts.front().first &&
+          (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0))
+        continue;
       add_work(cone_.rows[r], before, velocity_, &all);
     }
     // multipliers of joints do work on what the solution leaves of their rows
@@ -557,10 +557,10 @@ class IslandSolver {
   std::vector<EndContact> contacts_;
   std::vector<EndBody> end_;
   std::vector<double> gyration_;  // radii, m
-  double coordinates_ = 0.0, most_recovery_ = 0.0;
+  double coordinates_ = 0.0, most_recovery_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   ConeSummary summary_;
-  double pose_contradiction_ = 0.0;
+  StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
 };
 

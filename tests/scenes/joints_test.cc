@@ -72,6 +72,35 @@ TEST_P(JointsInMotion, ASliderFallsAlongItsAxis) {
   EXPECT_LE(run.report().max_joint_error(), 1e-12);
 }
 
+// Without a bound on its force it stalls there, with gravity against it or along, and leaves where it points away.
+TEST_P(JointsInMotion, ASlidersDriveStallsAtALimit) {
+  const auto run_to_end = [&](const std::string& properties, const std::string& simulator) {
+    std::vector<std::string> overrides = solver();
+    overrides.push_back(set("Simulator", simulator));
+    SceneRun run(
+        scene(body("Sled", {0.3, 0.2, 0.1}, kFalls),
+              joint("Slider", "Guide", "", "Sled", "BindPoint = {0, 0, 0} Axis = {0, 1, 0} " + properties), 0.01, 1),
+        overrides);
+    while (!run.is_done()) {
+      run.step();
+      EXPECT_LE(run.body("Sled").pose.position.y(), 0.7031 + 1e-12) << properties << " at " << run.time();
+    }
+    EXPECT_LE(run.report().max_joint_error(), 1e-12) << properties;
+    return run.body("Sled");
+  };
+  for (const std::string simulator : {"Basic", "Smooth"}) {
+    if (simulator == "Smooth" && !is_end_of_step()) continue;
+    for (const auto& [properties, end] :
+         {std::pair{"UpperLimit = 0.5031 Speed = 1", 0.7031}, std::pair{"LowerLimit = -0.5031 Speed = -1", -0.3031},
+          std::pair{"LowerLimit = 0 UpperLimit = 2 Speed = -1", 0.2}}) {
+      const SceneRun::Motion sled = run_to_end(properties, simulator);
+      EXPECT_NEAR(sled.pose.position.y(), end, 1e-12) << properties;
+      EXPECT_NEAR(sled.twist.linear.y(), 0.0, 1e-12) << properties;
+    }
+    EXPECT_NEAR(run_to_end("LowerLimit = -2 UpperLimit = 0 Speed = -1", simulator).twist.linear.y(), -1.0, 1e-12);
+  }
+}
+
 // The drive gains F/m until it has its speed, and the limit stops it.
 TEST_P(JointsInMotion, ASlidersDriveHasItsForceSpeedAndLimit) {
   const double h = 0.01;

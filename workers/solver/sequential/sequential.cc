@@ -257,14 +257,17 @@ bool SequentialSolver::find_closed() {
       JointLaw law = velocity_law(d.axes[axis], error, d.slop, time_step_);
       if (law.is_rigid()) law.shift(velocity_shift_[3 * i + axis]);
       JointLaw& known = velocity_laws_[3 * i + axis];
-      added = added || (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
+      const bool adds = (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
+      added = added || (adds && !law.is_equality());
       const bool has_lower = law.has_lower || known.has_lower;
       const bool has_upper = law.has_upper || known.has_upper;
       known = law;
       known.has_lower = has_lower;
       known.has_upper = has_upper;
+      stalled_.add(d.body1, d.body2, d.directions[axis], &known);
     }
   }
+  stalled_.stall();
   return added;
 }
 

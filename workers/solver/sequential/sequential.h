@@ -73,6 +73,7 @@
 #include <vector>
 
 #include "plugin_sdk/solver/reply.h"
+#include "plugin_sdk/solver/stalled_drives.h"
 #include "workers/solver/sequential/contact_gaps.h"
 #include "workers/solver/sequential/contact_impulses.h"
 #include "workers/solver/sequential/relaxation_joints.h"
@@ -161,6 +162,7 @@ class SequentialSolver {
   SolverBodies bodies_;
   std::vector<RelaxationDiscrepancy> discrepancies_;
   RelaxationJoints::Laws pose_laws_, velocity_laws_;
+  StalledDrives stalled_;
   // of rows that contradict each other: by how much their targets are moved, and the most, m and m/s
   std::vector<double> velocity_shift_;
   double shifted_pose_ = 0.0, shifted_velocity_ = 0.0;
