@@ -196,7 +196,7 @@ report::v1::CheckReport Run::report() {
 }  // namespace
 
 Patience patience_of(bool is_quick) {
-  if (is_quick) return {.deadline = 0.5, .cap = 0.5, .start = 0.8};
+  if (is_quick) return {.deadline = 1.0, .cap = 2.0, .start = 2.0};
   return {};
 }
 
