@@ -39,6 +39,14 @@ enum class AxisMode : std::uint32_t {
 inline constexpr std::uint32_t kAngularDiscrepancy = 1U << 12;
 inline constexpr std::uint32_t kRadialDiscrepancy = 1U << 13;
 
+// With kAngularDiscrepancy: the angle between a direction s fixed in body 1, the second axis, and a direction r fixed in
+// body 2, the second axis turned by point2. The first axis is s x r/|s x r| and turns with both, which reactions.h must know.
+inline constexpr std::uint32_t kSwingDiscrepancy = 1U << 14;
+
+// Beside these, in SolverSolveRequest alone: what of the discrepancy acts_as_force() (solver/joint_laws.h) acted among the
+// wrenches while S* was integrated (simulator Smooth), and is not to be applied again. No mode that a constraint may answer.
+inline constexpr std::uint32_t kForcesApplied = 1U << 15;
+
 constexpr std::uint32_t pack_modes(AxisMode x, AxisMode y, AxisMode z, bool angular = false) {
   return static_cast<std::uint32_t>(x) | static_cast<std::uint32_t>(y) << 4 | static_cast<std::uint32_t>(z) << 8 |
          (angular ? kAngularDiscrepancy : 0U);
@@ -50,8 +58,9 @@ constexpr AxisMode axis_mode(std::uint32_t modes, int axis) {
 
 // True if the value is one that pack_modes() makes.
 constexpr bool is_valid_mode(std::uint32_t modes) {
-  return modes <= (kRadialDiscrepancy | 0xFFFU) && (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 &&
-         ((modes >> 8) & 0xFU) <= 5;
+  constexpr std::uint32_t kSwing = kAngularDiscrepancy | kSwingDiscrepancy;
+  return (modes <= (kRadialDiscrepancy | 0xFFFU) || (modes & ~0xFFFU) == kSwing) && (modes & 0xFU) <= 5 &&
+         ((modes >> 4) & 0xFU) <= 5 && ((modes >> 8) & 0xFU) <= 5;
 }
 
 // Stands for "no bound" in maximum_force, lower and upper (columns hold finite numbers only).
@@ -72,6 +81,8 @@ struct Discrepancy {
 
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
   bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
+  bool is_swing() const { return (modes & kSwingDiscrepancy) != 0; }
+  bool has_forces_applied() const { return (modes & kForcesApplied) != 0; }
 };
 
 // One row of the constraint Jacobian, with the arms to the point midway between the discrepancy's two.

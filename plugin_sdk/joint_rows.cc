@@ -105,6 +105,17 @@ Swing swing_between(const Vector3& first, const Vector3& second) {
   return {math::atan2(sine, first.dot(second)), axis};
 }
 
+Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle) {
+  const Swing swing = swing_between(first, second);
+  Discrepancy d = row_about(swing.axis, swing.angle, AxisMode::kLocked);
+  d.point1 = angle * swing.axis;
+  Matrix3 axes;
+  axes << swing.axis, first, swing.axis.cross(first);
+  d.axes = to_quaternion(axes);
+  d.modes |= kSwingDiscrepancy;
+  return d;
+}
+
 double twist_between(const Quaternion& frame1, const Quaternion& frame2) {
   // relative turn q = swing * twist about x: the twist is the part of q about x
   const Quaternion q = shorter_arc(frame1.conjugate() * frame2);

@@ -48,6 +48,9 @@ Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3&
 // One row about a unit axis, with the angle (rad) as its error.
 Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 
+// The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi).
+Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle);
+
 // How the second of two unit directions is turned from the first: angle (0 ... pi) and unit axis; any axis across where
 // they are parallel.
 struct Swing {

@@ -163,6 +163,9 @@ class Balance {
       const Discrepancy d = columns.at(i);
       const Matrix3 axes = axes_of(i, d, directions);
       const Vector3 point = 0.5 * (d.point1 + d.point2);
+      // at the end of the step, where the error is closed, it is where either point is
+      const bool is_closed = directions == Directions::kOfEnd && !d.is_angular();
+      const Vector3 to_point = is_closed ? Vector3(0.5 * (d.point2 - d.point1)) : Vector3(Vector3::Zero());
       is_driven_ = is_driven_ || !d.velocity.isZero(0.0);
       for (int axis = 0; axis < 3; ++axis) {
         const AxisMode mode = axis_mode(d.modes, axis);
@@ -177,6 +180,8 @@ class Balance {
         for_both(request_.discrepancy_body(), i, point, [&](Pushes& body, const Vector3& arm, double sign) {
           add(d, arm, sign * impulse, &body.velocity);
           add(d, arm, sign * correction, &body.pose);
+          body.velocity.unreported += to_point.cross(impulse).norm();
+          body.pose.unreported += to_point.cross(correction).norm();
           if (on_velocity) add(d, arm, sign * share * impulse, &body.pose);
           if (on_velocity) loosen(share * impulse.norm(), arm, &body);
         });

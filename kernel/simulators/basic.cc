@@ -94,6 +94,9 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (sleepers_ > 0 && wakes_sleepers()) return std::nullopt;
   if (constraint_.is_running()) constrain(trial);
+  // what springs of joints do came with the derivatives
+  if (knows_reactions())
+    for (std::uint32_t& mode : data_.discrepancies.mode.span()) mode |= kForcesApplied;
   return solve();
 }
 

@@ -5,7 +5,8 @@
 //
 // The integrator gets the reactions among the wrenches and need not know of joints: it integrates the index-1 form of
 // the equations and keeps its order. What that leaves of joint errors, in position and velocity, is of the size of the
-// method's own error; the solve at the end projects it away along M^-1 J^T.
+// method's own error; the solve at the end projects it away along M^-1 J^T. Springs of joints are among the reactions, so
+// that their stiffness bounds the step of an explicit method; the solve is told to leave them alone (kForcesApplied).
 #include <algorithm>
 
 #include "kernel/environment.h"

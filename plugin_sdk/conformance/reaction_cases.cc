@@ -174,6 +174,28 @@ void judge_accelerations(Subject& subject) {
   }
 }
 
+void judge_springs(Subject& subject) {
+  Mechanism sprung;
+  const std::uint32_t load = sprung.world.add({.mass = 2.0, .twist = {Vector3(0.5, 0, 0), Vector3::Zero()}});
+  BodyJoint spring{.body1 = kNone, .body2 = load, .discrepancy = {}};
+  spring.discrepancy.point1 = Vector3(-0.3, 0, 0);
+  spring.discrepancy.modes = pack_modes(AxisMode::kLocked, AxisMode::kFree, AxisMode::kFree);
+  spring.discrepancy.compliance.x() = 0.01, spring.discrepancy.damping.x() = 4.0;
+  sprung.world.joints.push_back(spring);
+  Inquiry inquiry(subject, "2 kg at 0.5 m/s on a spring of 100 N/m and 4 N s/m, 0.3 m long");
+  const Reactions came = sprung.ask(&inquiry);
+  const Vector3 pull(-32, 0, 0);
+  inquiry.expect_near("force", came.force(load), pull, 1e-10);
+  inquiry.expect_near("torque", came.torque(load), Vector3::Zero(), 1e-10);
+  inquiry.expect_near("force of the spring on body 2", came.joint_force(0), pull, 1e-10);
+
+  sprung.world.joints[0].discrepancy.modes |= kForcesApplied;
+  inquiry.now_asked("the same at the end of a step, where the spring acted already");
+  const Solution solved = sprung.world.ask(&inquiry);
+  inquiry.expect_near("impulse of the spring", solved.joint_impulse(0), Vector3::Zero(), 0.0);
+  inquiry.expect_near("velocity", sprung.world.twists(solved)[load].linear, Vector3(0.5, 0, 0), 0.0);
+}
+
 void judge_twice(Subject& subject) {
   Draw draw(92);
   Mechanism chain = swinging_chain(&draw, 3, false);
@@ -210,6 +232,8 @@ std::vector<Case> reaction_cases(const PluginDeclaration& declaration) {
       make_case("solver/reactions_hanging", "A joint bears the weight and the centripetal force of what hangs on it.",
                 judge_hanging),
       make_case("solver/reactions", "With the reactions the points of joints accelerate as one.", judge_accelerations),
+      make_case("solver/reactions_springs", "Springs of joints are among the reactions, and not applied again.",
+                judge_springs),
       make_case("solver/reactions_twice", "Joints that hold what is held already change nothing.", judge_twice),
       make_case("solver/reactions_refusals", "Bodies that do not exist and numbers that are none are refused.",
                 judge_reaction_refusals)};

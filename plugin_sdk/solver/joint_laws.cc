@@ -28,9 +28,13 @@ double force_bound(double maximum_force, double factor) {
   return maximum_force * factor;
 }
 
-bool is_soft(const JointAxisState& a) {
-  return a.compliance > 0.0 && (a.mode == AxisMode::kLocked || is_limit(a.mode));
+bool is_soft(AxisMode mode, double compliance) {
+  return compliance > 0.0 && (mode == AxisMode::kLocked || is_limit(mode));
 }
+
+bool is_soft(const JointAxisState& a) { return is_soft(a.mode, a.compliance); }
+
+bool is_drive(AxisMode mode) { return mode == AxisMode::kDriven || mode == AxisMode::kFriction; }
 
 void set_equality(JointLaw& law, double target) {
   law.has_lower = law.has_upper = true;
@@ -59,10 +63,31 @@ JointLaw soft_law(const JointAxisState& a, double h) {
 
 }  // namespace
 
+bool acts_as_force(const Discrepancy& discrepancy, int axis) {
+  const AxisMode mode = axis_mode(discrepancy.modes, axis);
+  return is_soft(mode, discrepancy.compliance[axis]) || (is_drive(mode) && discrepancy.damping[axis] > 0.0);
+}
+
+double force_of(const JointAxisState& a, double velocity) {
+  const double error = a.error_at_trial, damped = a.damping * (a.desired_velocity - velocity);
+  double force = 0.0;
+  if (is_drive(a.mode))
+    force = damped;
+  else if (is_held(a))
+    force = damped - (error - rest_error(a)) / a.compliance;
+  else if (has_lower_side(a) && error < lower_of(a))
+    force = std::max(0.0, damped - (error - lower_of(a)) / a.compliance);
+  else if (has_upper_side(a) && error > a.upper)
+    force = std::min(0.0, damped - (error - a.upper) / a.compliance);
+  const double bound = force_bound(a.maximum_force, 1.0);
+  return std::clamp(force, -bound, bound);
+}
+
 JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
                                 const Vector3& start_error) {
   JointAxisState a;
-  a.mode = axis_mode(discrepancy.modes, axis);
+  if (!discrepancy.has_forces_applied() || !acts_as_force(discrepancy, axis))
+    a.mode = axis_mode(discrepancy.modes, axis);
   a.lower = discrepancy.lower[axis];
   a.upper = discrepancy.upper[axis];
   a.compliance = discrepancy.compliance[axis];
@@ -102,7 +127,7 @@ JointLaw velocity_law(const JointAxisState& a, double error_after, double slop, 
   JointLaw law = is_soft(a) ? soft_law(a, h) : JointLaw{};
   law.bound = force_bound(a.maximum_force, h);
   if (is_soft(a)) return law;
-  if (a.mode == AxisMode::kDriven || a.mode == AxisMode::kFriction) {
+  if (is_drive(a.mode)) {
     set_equality(law, a.desired_velocity);
     law.is_velocity_only = true;
     if (a.damping > 0.0) law.gamma = 1.0 / (h * a.damping);

@@ -34,6 +34,11 @@
 // at the end of the step (implicit Euler, order one, stable for every stiffness), e being e_n less
 // the limit. A soft limit pushes only while its error is outside it at S_n or S*.
 //
+// In the derivative (reactions.h) the same axes are forces of the state, e being its error less the limit:
+//   with compliance    f = -(e/c + d (J v - v_d)); of a limit while e is outside it, and never a pull back to it
+//   driven, friction   f = d (v_d - J v), for d > 0
+// both within maximum_force. Where they acted there (kForcesApplied), the axis is free at the end of the step.
+//
 // A contact's friction cone comes with its material row; a joint's discrepancy has no coefficient,
 // so its friction axes are bounded by maximum_force, each by itself. Compliance of free, driven and
 // friction axes has no meaning and is not read.
@@ -70,6 +75,12 @@ struct JointAxisState {
   double error_at_start = 0.0;  // e_n
   double error_at_trial = 0.0;  // e*
 };
+
+// True for an axis whose law is a force of the state: with compliance, or driven or friction with damping.
+bool acts_as_force(const Discrepancy& discrepancy, int axis);
+
+// That force on body 2, N or N m, at error_at_trial and the velocity J v. Precondition: acts_as_force().
+double force_of(const JointAxisState& axis, double velocity);
 
 // All the axes of a discrepancy with error vector `start_error` (world) at S_n.
 JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,

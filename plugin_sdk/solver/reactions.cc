@@ -11,6 +11,7 @@
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
+#include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/profile_ldlt.h"
 #include "plugin_sdk/solver/request_check.h"
 
@@ -46,6 +47,12 @@ struct Row {
   double reach;  // m, the longer arm, or a rod's length; of an angular row 0
 };
 
+// What gives way, in the state as it was asked.
+struct Spring {
+  Row row;
+  double force;  // on body 2
+};
+
 bool holds_always(const Discrepancy& d, int axis) {
   if (d.maximum_force[axis] < kUnlimited) return false;
   switch (axis_mode(d.modes, axis)) {
@@ -68,6 +75,7 @@ class ReactionSolver {
     has_moved_ = false;
     load_bodies();
     load_joints();
+    load_springs();
     make_rows();
     factorise(0.0);
     if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
@@ -93,17 +101,13 @@ class ReactionSolver {
     const std::size_t count = bodies_.size() - 1;
     std::vector<Wrench> reactions(count + 1);
     std::vector<double> forces(3 * request_->mode().size(), 0.0);
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const Row& row = rows_[i];
-      const ConstraintDirection& d = row.direction;
-      const double force = multipliers_[i];
+    const auto push = [&](const Row& row, double force) {
       require_finite(force);
       forces[row.place] = force;
-      reactions[row.body1].force -= force * d.linear;
-      reactions[row.body1].torque += force * d.angular1;
-      reactions[row.body2].force += force * d.linear;
-      reactions[row.body2].torque += force * d.angular2;
-    }
+      add_force(row, force, &reactions);
+    };
+    for (std::size_t i = 0; i < rows_.size(); ++i) push(rows_[i], multipliers_[i]);
+    for (const Spring& spring : springs_) push(spring.row, spring.force);
     for (std::size_t i = 0; i < count; ++i) {
       const Wrench reaction = bodies_[i].is_pushed() ? reactions[i] : Wrench{};
       reply.reaction().push(reaction.force.x(), reaction.force.y(), reaction.force.z(), reaction.torque.x(),
@@ -140,14 +144,15 @@ class ReactionSolver {
     return (request_->flags()[body] & kMovable) != 0 && (request_->flags()[body] & kKinematic) == 0;
   }
 
-  // What forces, the gyroscopic term and drag make of the bodies.
+  // What forces, springs, the gyroscopic term and drag make of the bodies.
   void accelerate() {
     for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
       Body& body = bodies_[i];
       body.acceleration = {vector_at(request_->acceleration(), 2 * i), vector_at(request_->acceleration(), 2 * i + 1)};
       if (!is_free(i)) continue;
       const double drag = request_->drag()[i];
-      const Vector3 force = vector_at(request_->wrench(), 2 * i), torque = vector_at(request_->wrench(), 2 * i + 1);
+      const Vector3 force = vector_at(request_->wrench(), 2 * i) + sprung_[i].force;
+      const Vector3 torque = vector_at(request_->wrench(), 2 * i + 1) + sprung_[i].torque;
       body.acceleration.linear = body.inverse_mass * force - drag * body.velocity.linear;
       body.acceleration.angular =
           angular_acceleration(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), i),
@@ -173,6 +178,32 @@ class ReactionSolver {
     }
   }
 
+  void load_springs() {
+    springs_.clear();
+    sprung_.assign(bodies_.size(), {});
+    for (const Joint& joint : joints_) {
+      const Discrepancy& d = joint.discrepancy;
+      const Matrix3 axes = to_rotation_matrix(d.axes);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!acts_as_force(d, axis)) continue;
+        const Row row = row_of_axis(d, axes, axis, joint);
+        const Vector3 along = d.is_angular() ? Vector3(axes.col(axis)) : row.direction.linear;
+        const JointAxisState state = joint_axis_state(d, axis, along, d.point2 - d.point1);
+        const double velocity = row.direction.along(bodies_[joint.body1].velocity, bodies_[joint.body2].velocity);
+        const double force = force_of(state, velocity);
+        springs_.push_back({row, force});
+        add_force(row, force, &sprung_);
+      }
+    }
+  }
+
+  static void add_force(const Row& row, double force, std::vector<Wrench>* wrenches) {
+    const ConstraintDirection& d = row.direction;
+    Wrench &one = (*wrenches)[row.body1], &two = (*wrenches)[row.body2];
+    one.force -= force * d.linear, one.torque += force * d.angular1;
+    two.force += force * d.linear, two.torque += force * d.angular2;
+  }
+
   // Rows of all joints with the bodies where they are.
   void make_rows() {
     rows_.clear();
@@ -182,8 +213,7 @@ class ReactionSolver {
       const Matrix3 axes = to_rotation_matrix(d.axes);
       for (int axis = 0; axis < 3; ++axis) {
         if (!holds_always(d, axis)) continue;
-        Row row = d.is_radial() && axis == 0 ? radial_row(d, joint) : axis_row(d, axes.col(axis), joint);
-        row.place = joint.place + static_cast<std::size_t>(axis);
+        Row row = row_of_axis(d, axes, axis, joint);
         const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
         row.direction = with_turns(row.direction, one.inverse_inertia, two.inverse_inertia);
         row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
@@ -213,12 +243,18 @@ class ReactionSolver {
     return d;
   }
 
+  Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Joint& joint) const {
+    Row row = d.is_radial() && axis == 0 ? radial_row(d, joint) : axis_row(d, axes.col(axis), joint);
+    row.place = joint.place + static_cast<std::size_t>(axis);
+    return row;
+  }
+
   Row axis_row(const Discrepancy& d, const Vector3& axis, const Joint& joint) const {
     const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
     const Vector3 &w1 = first.velocity.angular, &w2 = second.velocity.angular;
     Row row{joint.body1, joint.body2, 0, turning_about(axis), axis.dot(d.point2 - d.point1), 0.0, 0.0, 0.0, 0.0};
     if (d.is_angular()) {
-      row.gamma = w1.cross(axis).dot(w2 - w1);
+      row.gamma = turning_of(d, axis, w1, w2).dot(w2 - w1);
       return row;
     }
     // a drive acts where it is in body 1
@@ -229,6 +265,15 @@ class ReactionSolver {
     row.reach = longer_arm(first, arm1, second, arm2);
     row.gamma = axis.dot(second.centripetal(arm2) - first.centripetal(arm1) - 2.0 * w1.cross(relative));
     return row;
+  }
+
+  // Rate of an angular row's axis.
+  static Vector3 turning_of(const Discrepancy& d, const Vector3& axis, const Vector3& w1, const Vector3& w2) {
+    if (!d.is_swing()) return w1.cross(axis);
+    const Vector3 s = d.axes * Vector3::UnitY(), r = exp_rotation(d.point2) * s;
+    const double sine = axis.dot(s.cross(r));
+    const Vector3 rate = w1.cross(s).cross(r) + s.cross(w2.cross(r));
+    return sine > 0.0 ? Vector3((rate - axis.dot(rate) * axis) / sine) : w1.cross(axis);
   }
 
   // Of a rod without length there is no direction: the first axis stands in.
@@ -381,6 +426,8 @@ class ReactionSolver {
   bool has_moved_ = false;  // bodies, from where they were asked
   Discrepancy carried_;     // of at_pose()
   std::vector<Row> rows_;
+  std::vector<Spring> springs_;
+  std::vector<Wrench> sprung_;  // of the springs, by body
   ProfileLdlt factor_;
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;

@@ -9,11 +9,19 @@
 //   along an axis      gamma = a.(w2 x (w2 x r2) - w1 x (w1 x r1) - 2 w1 x w),   r1, r2 the arms to body 2's point
 //   radial, e = x2-x1  gamma = e.(w2 x (w2 x r2) - w1 x (w1 x r1))/|e| + (|e'|^2 - (e.e'/|e|)^2)/|e|
 //   about an axis      gamma = (w1 x a).(w2 - w1)
+//   swing, a = s x r/|s x r|  gamma = a'.(w2 - w1), s turning with body 1 and r with body 2
 //
 // Held are axes that hold always: locked, or limited with one limit, without compliance; driven ones without damping;
-// all without a bound on the force. Limits, friction, springs and bounded drives are left to the end of the step, so
-// they are of first order; so is an angular row whose axis does not turn with body 1 (of ConstantVelocity, and of an
-// Axle's camber).
+// all without a bound on the force.
+//
+// What gives way is no row but a force among the others (joint_laws.h: acts_as_force(), force_of()): springs and dampers,
+// soft limits, drives and friction with damping, each bounded by its maximum_force. It acts along the axis on both bodies
+// at one point: where body 2's is (a drive: body 1's), a radial one along the line through both, so that a spring is the
+// gradient of e^2/2c where axes turn with body 1. `reaction` and `discrepancy_force` contain it. An integrator meets it as
+// it meets any force: at its order, and an explicit one within its stability limit, h sqrt(1/(c m)) < 2.8 for RK4.
+//
+// Limits, friction and bounded drives that do not give way are left to the end of the step, so they are of first order; so
+// is an angular row whose axis turns otherwise (of ConstantVelocity).
 //
 // Dependent rows are left out by the factorisation (profile_ldlt.h); rows that contradict each other are met as well as
 // can be (least squares), and `residual` says by how much they are missed.

@@ -87,9 +87,9 @@ void check_bodies(const stage::SolverSolveRequest& r, std::size_t bodies) {
   check_numbers("wrench", r.wrench(), bodies, 6);
 }
 
-// The columns that both questions have.
+// The columns that both questions have. `marks`: what a mode may carry beside what constraints answer.
 template <typename Request>
-void check_discrepancies(const Request& r, std::size_t bodies) {
+void check_discrepancies(const Request& r, std::size_t bodies, std::uint32_t marks) {
   const std::size_t rows = r.mode().size();
   check_pairs("discrepancy_body", r.discrepancy_body(), rows, bodies, true);
   check_numbers("point1", r.point1(), rows, 3);
@@ -103,7 +103,7 @@ void check_discrepancies(const Request& r, std::size_t bodies) {
   check_numbers("damping", r.damping(), rows, 3, 0.0);
   check_numbers("maximum_force", r.maximum_force(), rows, 3, 0.0);
   for (std::size_t row = 0; row < rows; ++row) {
-    if (!is_valid_mode(r.mode()[row])) refuse("mode", row, std::to_string(r.mode()[row]) + " is no mode");
+    if (!is_valid_mode(r.mode()[row] & ~marks)) refuse("mode", row, std::to_string(r.mode()[row]) + " is no mode");
     for (int axis = 0; axis < 3; ++axis) {
       const std::size_t i = 3 * row + static_cast<std::size_t>(axis);
       if (axis_mode(r.mode()[row], axis) == AxisMode::kLimited && r.lower()[i] > r.upper()[i])
@@ -136,7 +136,7 @@ void check_solver_request(const stage::SolverSolveRequest& request) {
   if (!(theta >= 0.0 && theta <= 1.0)) refuse("theta", 0, std::to_string(theta) + " is outside 0 ... 1");
   const std::size_t bodies = request.flags().size();
   check_bodies(request, bodies);
-  check_discrepancies(request, bodies);
+  check_discrepancies(request, bodies, kForcesApplied);
   check_numbers("discrepancy_warm_impulse", request.discrepancy_warm_impulse(), request.mode().size(), 3);
   check_numbers("discrepancy_warm_correction", request.discrepancy_warm_correction(), request.mode().size(), 3);
   check_contacts(request, bodies);
@@ -150,7 +150,7 @@ void check_reactions_request(const stage::SolverReactionsRequest& r) {
   check_state(r, bodies);
   check_numbers("wrench", r.wrench(), bodies, 6);
   check_numbers("acceleration", r.acceleration(), bodies, 6);
-  check_discrepancies(r, bodies);
+  check_discrepancies(r, bodies, 0);
 }
 
 }  // namespace gravitas

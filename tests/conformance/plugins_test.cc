@@ -91,7 +91,9 @@ const Wrong kWrong[] = {
     {"force_wrong_torque", {"force/basic", "force/basic-table"}, "torque is"},
     {"solver_gains_energy", {"solver/energy"}, "kinetic energy grew from"},
     {"solver_hides_turning", {"solver/rolling", "solver/momentum"}, "impulse of turning"},
-    {"solver_idle_reactions", {"solver/reactions", "solver/reactions_hanging"}, "relative acceleration of the points"},
+    {"solver_idle_reactions",
+     {"solver/reactions", "solver/reactions_hanging", "solver/reactions_springs"},
+     "relative acceleration of the points"},
     {"integrator_drifts", {"integrator/rotor"}, "change of its angular momentum"},
 };
 

@@ -23,7 +23,7 @@ using kernel::Hosting;
 
 const std::string kHashes = in_source("/tests/determinism/hashes.json");
 constexpr const char* kScenes[] = {"two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack",
-                                   "thruster",          "pile",   "callbacks"};
+                                   "thruster",          "pile",   "callbacks",     "suspension"};
 constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
                            Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 
@@ -35,7 +35,7 @@ struct Hashes {
 void PrintTo(const Hashes& hashes, std::ostream* out) { *out << hashes.state << " / " << hashes.chain; }
 
 std::string path_of(const std::string& scene) {
-  const bool is_ours = scene == "pile" || scene == "callbacks";
+  const bool is_ours = scene == "pile" || scene == "callbacks" || scene == "suspension";
   return in_source(is_ours ? "/tests/determinism/" : "/deploy/scenes/") + scene + ".gravitas";
 }
 

@@ -295,6 +295,42 @@ MotionProblem squeezer() {
           }};
 }
 
+// On an arm that is turned at w: r'' = w^2 r - k (r - 1) - d r', r(0) = 1, r'(0) = 0.
+MotionProblem sprung_wheel() {
+  constexpr double kTurning = 2.0, kStiffness = 40.0, kDamping = 0.6;
+  WorldBuilder world = jointed_world();
+  world.point(1.0, {1.0, 1.0, 1.0}, {0, 0, 0});
+  world.body().flags = kKinematic;
+  world.body().twist.angular = {0, 0, kTurning};
+  world.point(1.0, {0.1, 0.1, 0.2}, {1, 0, 0});
+  world.body().twist.linear = {0, kTurning, 0};
+  world.joint("Axle", "constraint_axle", 0, 1, {1, 0, 0, 1, 0, 0, 0, 0, 1, kStiffness, kDamping});
+  return {"sprung wheel", 2.0, true, world, [](const kernel::StateView& state) {
+            constexpr double kTime = 2.0, kDecay = 0.5 * kDamping;
+            const double rest = kStiffness / (kStiffness - kTurning * kTurning);
+            const double w = std::sqrt(kStiffness - kTurning * kTurning - kDecay * kDecay);
+            const double r = rest + (1.0 - rest) * std::exp(-kDecay * kTime) *
+                                        (std::cos(w * kTime) + kDecay / w * std::sin(w * kTime));
+            const double angle = kTurning * kTime;
+            return (position_of(state, 1) - r * Vector3(std::cos(angle), std::sin(angle), 0)).norm();
+          }};
+}
+
+// Its axis of symmetry stays at right angles to the steering axis, so that both rates stay: the camber bears the gyroscopic
+// couple.
+MotionProblem steered_wheel() {
+  constexpr double kSteering = 3.0, kRolling = 7.0, kTime = 2.0;
+  WorldBuilder world = jointed_world();
+  world.point(1.0, {0.1, 0.1, 0.2}, {0, 0, 0});
+  world.body().twist.angular = {0, kSteering, kRolling};
+  world.joint("Axle", "constraint_axle", kNone, 0, {0, 0, 0, 0, 1, 0, 0, 0, 1, kAbsent, kAbsent});
+  return {"steered wheel", kTime, true, world, [](const kernel::StateView& state) {
+            const Quaternion exact =
+                exp_rotation(Vector3(0, kSteering * kTime, 0)) * exp_rotation(Vector3(0, 0, kRolling * kTime));
+            return angle_between(quaternion_at(state.orientation, 0), exact);
+          }};
+}
+
 // IFToMM A05: a shaft along z, a slider on it, two arms (a rod with a ball without moments at its end) hinged to the shaft
 // at z = 1, springs from the slider to the rods' midpoints. Arms hang 30 degrees below the horizontal.
 MotionProblem flyball_governor() {

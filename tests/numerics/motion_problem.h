@@ -46,6 +46,8 @@ MotionProblem lagrange_top();                    // fast, tilted, without preces
 MotionProblem bricard();           // five rods, six hinges, over-constrained: no reference, it keeps its energy
 MotionProblem triple_pendulum();   // three links of 0.3 m: no reference, it keeps its energy
 MotionProblem squeezer();          // Andrews' seven bodies, to 0.03 s: attitudes
+MotionProblem sprung_wheel();      // an Axle's damped spring on a turning arm: position, in closed form
+MotionProblem steered_wheel();     // an Axle's, that rolls and steers at once: attitude, in closed form
 MotionProblem flyball_governor();  // stiff: height of the slider
 
 // A spring on the last body, from a point of it (its principal axes) to a point of another body, or of the world (kNone).

@@ -98,10 +98,27 @@ TEST(Orders, OfARodInSpaceAreThoseOfTheTheory) {
                                                 {"DormandPrince54", 200}});
 }
 
+// A joint's spring and damper are forces among the others, along an axis that turns.
+TEST(Orders, OfASprungJointAreThoseOfTheTheory) {
+  expect_orders(harness::sprung_wheel(), {{"SemiImplicitEuler", 4000},
+                                          {"Verlet", 200},
+                                          {"BasicVerlet", 200},
+                                          {"ImplicitMidpoint", 200},
+                                          {"RK4", 80},
+                                          {"RKMK4", 80},
+                                          {"SymplecticSplitting 2", 200},
+                                          {"DormandPrince54", 40}});
+}
+
+// The axis of an Axle's camber turns with both bodies.
+TEST(Orders, OfAWheelThatSteersAreThoseOfTheTheory) {
+  expect_orders(harness::steered_wheel(), {{"ImplicitMidpoint", 800}, {"RK4", 100}, {"RKMK4", 100}});
+}
+
 // The error of a method of order five per step falls like the accuracy asked for.
 TEST(Orders, AdaptiveMethodsKeepWhatIsAskedOfThem) {
-  for (const MotionProblem& problem :
-       {harness::double_pendulum(), harness::spherical_pendulum(), harness::point_pendulum()}) {
+  for (const MotionProblem& problem : {harness::double_pendulum(), harness::spherical_pendulum(),
+                                       harness::point_pendulum(), harness::sprung_wheel()}) {
     for (const double accuracy : {1e-6, 1e-8, 1e-10}) {
       for (const MotionMethod& method : harness::adaptive_methods(accuracy)) {
         const double error = harness::run_motion(problem, method, 100).error;

@@ -273,13 +273,14 @@ TEST(AxisModes, PackAndUnpack) {
   }
 }
 
-// Of all small codes exactly 3 * 6^3 are modes: plain, angular, radial.
+// Of all small codes exactly 4 * 6^3 are modes: plain, angular, radial, swing.
 TEST(AxisModes, OtherCodesAreInvalid) {
   int valid = 0;
   for (std::uint32_t code = 0; code < (1U << 16); ++code) valid += is_valid_mode(code) ? 1 : 0;
-  EXPECT_EQ(valid, 648);
+  EXPECT_EQ(valid, 864);
   for (int bit = 14; bit < 32; ++bit) EXPECT_FALSE(is_valid_mode(1U << bit)) << bit;
   EXPECT_FALSE(is_valid_mode(kAngularDiscrepancy | kRadialDiscrepancy));
+  EXPECT_FALSE(is_valid_mode(kRadialDiscrepancy | kSwingDiscrepancy));
   EXPECT_FALSE(is_valid_mode(0x006) || is_valid_mode(0x060) || is_valid_mode(0x600));
 }
 

@@ -85,6 +85,27 @@ TEST_P(Breaking, ComesWithSmoothAsWell) {
   }
 }
 
+// A spring that is damped critically bears the pull all but its start.
+TEST(BreakingOfASpring, ComesWithSmoothAsWell) {
+  const std::string pull =
+      "Force { Type = \"Basic\" Id = \"Pull\" CustomProperties { Table = {{0, {0,0,0}}, {10, {100,0,0}}} } }";
+  const std::string held =
+      "Constraint { Type = \"Axle\" Id = \"Joint\" Body2 = \"Ball\" BreakingForce = 7.65 CustomProperties { BindPoint "
+      "= "
+      "{0, 0, 0} SteeringAxis = {1, 0, 0} RollingAxis = {0, 0, 1} SuspensionStiffness = 2e4 SuspensionDamping = 400 } "
+      "}";
+  SceneRun run(scene_of(pull, body("Ball", 2.0, Vector3::Zero(), "\"Pull\""), held, "Newton"),
+               {"Simulator=Smooth", "Integrator=RK4"});
+  while (run.step_count() < 90) {
+    run.step();
+    if (10.0 * run.time() < 7.64) {
+      EXPECT_TRUE(run.holds("Joint")) << run.time();
+    } else if (10.0 * run.time() > 7.76) {
+      EXPECT_FALSE(run.holds("Joint")) << run.time();
+    }
+  }
+}
+
 // A pull that grows by 10 N/s, in steps of 0.1 N: the step from t_n bears 10 t_n, and the 78th is the first with more than
 // 7.65 N. What is free afterwards is pulled on.
 TEST_P(Breaking, ComesWithTheFirstStepThatBearsMore) {

@@ -201,6 +201,24 @@ TEST_P(Reactions, OfSmoothMotionAreThoseOfTheDerivative) {
   EXPECT_LE((force - 9.0 * kG * along.y() * along).norm(), 1e-4);
 }
 
+// A spring inside the derivative as much as at the end of the step: what hangs in it weighs on the joint.
+TEST_P(Reactions, OfASpringAreTheWeightThatHangsInIt) {
+  const std::string text =
+      scene("", "Body { Id = \"Bob\" Mass = 3 PrincipalMoments = {0.1, 0.1, 0.1} Forces = { \"Down\" } }\n",
+            "Constraint { Type = \"Axle\" Id = \"Spring\" Body2 = \"Bob\" CustomProperties { BindPoint = {0, 0, 0} "
+            "SteeringAxis "
+            "= {0, 1, 0} RollingAxis = {1, 0, 0} SuspensionStiffness = 1200 SuspensionDamping = 120 } }\n");
+  for (const char* simulator : {"Basic", "Smooth"}) {
+    if (GetParam() == std::string("Sequential") && simulator == std::string("Smooth")) continue;
+    Watched watched(text, solver({set("Simulator", std::string(simulator)), "Integrator=RK4"}));
+    watched.run.steps(200);
+    const auto reactions = watched.reactions();
+    ASSERT_EQ(reactions.size(), 1U);
+    // e^(-20 * 2) of the swing is left
+    EXPECT_LE((vector_of(reactions[0].force()) - Vector3(0, 3 * kG, 0)).norm(), 1e-10) << simulator;
+  }
+}
+
 TEST_P(Reactions, OfABrokenJointAreNone) {
   Watched watched(pendulum({0, -1, 0}), solver({set("Constraint.Pivot.BreakingForce", 20.0)}));
   watched.run.step();

@@ -2,15 +2,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "tests/paths.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
 namespace {
 
+using harness::literal;
 using harness::SceneRun;
 using harness::set;
 using ::testing::HasSubstr;
@@ -80,6 +84,131 @@ TEST(Smooth, HandsItsAccuracyToTheIntegrator) {
                      smooth({"Solver=Direct", "Integrator=RK4", set("Simulator.Accuracy", 1e-3)}));
       },
       ThrowsMessage<std::runtime_error>(HasSubstr("the integrator \"RK4\" has no Accuracy")));
+}
+
+// A wheel of 2 kg on an Axle's spring, from rest.
+std::string sprung(double stiffness, double damping, const Vector3& along = Vector3::UnitY()) {
+  return R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 4 } }
+Environment {
+  Space { Bodies { Body { Id = "Wheel" Mass = 2 PrincipalMoments = {0.1, 0.1, 0.2} Forces = { "Down" } } } }
+  Constraints { Constraint { Type = "Axle" Id = "Axle" Body2 = "Wheel" CustomProperties {
+    BindPoint = {0, 0, 0} SteeringAxis = )" +
+         literal(along) + " RollingAxis = {0, 0, 1} SuspensionStiffness = " + literal(stiffness) +
+         " SuspensionDamping = " + literal(damping) + R"( } } }
+  KineticIntegrator = "RK4"
+  ConstraintSolver = "Newton"
+}
+)";
+}
+
+// Deflection m g cos/k along the axis, whichever simulator comes to rest.
+TEST(Smooth, HangsInASpringAsBasicDoes) {
+  const Vector3 along = Vector3(0.6, 0.8, 0.0);
+  for (const char* simulator : {"Smooth", "Basic"}) {
+    SceneRun run(sprung(500.0, 60.0, along), {set("Simulator", std::string(simulator)), "Simulator.SleepEnergy=0"});
+    run.to_end();
+    // e^(-15 * 4) of the swing is left
+    EXPECT_LT((run.body("Wheel").pose.position + 2.0 * kG * 0.8 / 500.0 * along).norm(), 1e-12) << simulator;
+  }
+}
+
+// y = -g/w^2 (1 - cos w t) without damping, w^2 = k/m, to the accuracy asked for.
+TEST(Smooth, SwingsInASpringAsAccuratelyAsIsAsked) {
+  for (const char* integrator : {"DormandPrince54", "DormandPrince853", "Radau"}) {
+    SceneRun run(sprung(200.0, 0.0), {set("Integrator", std::string(integrator)), set("Simulator.TimeStep", 0.05),
+                                      set("Simulator.Accuracy", 1e-9), set("Simulator.Duration", 2.0)});
+    run.to_end();
+    const double w = 10.0;
+    // forty steps, each with what is asked of it
+    EXPECT_NEAR(run.body("Wheel").pose.position.y(), -kG / (w * w) * (1.0 - std::cos(w * 2.0)), 4e-8) << integrator;
+  }
+}
+
+// k h^2/m = 1e4: methods for stiff problems come to rest at m g/k, explicit ones are beyond their limit.
+TEST(Smooth, NeedsAMethodForStiffProblemsWhereASpringIsStiff) {
+  const double k = 2e8, damping = 2.0 * std::sqrt(2.0 * k), deflection = 2.0 * kG / k;
+  for (const char* integrator : {"Radau", "Rosenbrock"}) {
+    SceneRun run(sprung(k, damping),
+                 {set("Integrator", std::string(integrator)), set("Simulator.Accuracy", 1e-9), "Simulator.Duration=1"});
+    run.to_end();
+    EXPECT_NEAR(run.body("Wheel").pose.position.y(), -deflection, 1e-2 * deflection) << integrator;
+    EXPECT_LT(run.report().max_joint_error(), 1e-12);
+  }
+  // A-stable: it rings, and does not grow
+  SceneRun midpoint(sprung(k, 0.0), {"Integrator=ImplicitMidpoint", "Simulator.Duration=1"});
+  while (!midpoint.is_done()) {
+    midpoint.step();
+    ASSERT_LE(std::fabs(midpoint.body("Wheel").pose.position.y() + deflection), (1.0 + 1e-3) * deflection);
+  }
+  SceneRun explicit_one(sprung(k, 0.0), {});
+  explicit_one.steps(3);
+  EXPECT_GT(std::fabs(explicit_one.body("Wheel").pose.position.y()), 1e6 * deflection);
+}
+
+// An arm on a hinge, a bob that slides along it on a spring. No friction: energy stays as well as the method keeps it.
+struct Swing {
+  Vector3 bob;
+  double energy_error;
+};
+Swing elastic_pendulum(const std::string& integrator, double h) {
+  SceneRun run(R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 2 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Arm" Mass = 0.5 PrincipalMoments = {0.1, 0.1, 0.1} Forces = { "Down" } KineticProperties { Position = {0.5, 0, 0} } }
+    Body { Id = "Bob" Mass = 1 PrincipalMoments = {0.02, 0.02, 0.02} Forces = { "Down" } KineticProperties { Position = {1, 0, 0} } }
+  } }
+  Constraints {
+    Constraint { Type = "Revolute" Id = "Hinge" Body2 = "Arm" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} } }
+    Constraint { Type = "Axle" Id = "Spring" Body1 = "Arm" Body2 = "Bob" CustomProperties { BindPoint = {1, 0, 0} SteeringAxis = {1, 0, 0} RollingAxis = {0, 0, 1} SuspensionStiffness = 90 } }
+  }
+  KineticIntegrator = "RK4"
+  ConstraintSolver = "Direct"
+}
+)",
+               {set("Integrator", integrator), set("Simulator.TimeStep", h)});
+  const auto energy = [&] {
+    const double stretch = run.body("Bob").pose.position.norm() - 1.0;
+    return run.energy() + 0.5 * 90.0 * stretch * stretch;
+  };
+  const double start = energy();
+  double most = 0.0;
+  while (!run.is_done()) {
+    run.step();
+    most = std::max(most, std::fabs(energy() - start));
+  }
+  return {run.body("Bob").pose.position, most};
+}
+
+TEST(Smooth, KeepsTheEnergyOfAnElasticPendulumToTheOrderOfTheMethod) {
+  constexpr double kStep = 0.01;
+  const Vector3 fine = elastic_pendulum("RK4", kStep / 16.0).bob;
+  const Swing one = elastic_pendulum("RK4", kStep), half = elastic_pendulum("RK4", kStep / 2.0);
+  EXPECT_NEAR(std::log2((one.bob - fine).norm() / (half.bob - fine).norm()), 4.0, 0.3);
+  // of RK4 that of the energy is one higher
+  EXPECT_GT(std::log2(one.energy_error / half.energy_error), 3.8);
+  EXPECT_LT(half.energy_error, 1e-4);
+  EXPECT_LT(elastic_pendulum("DormandPrince853", kStep).energy_error, 1e-6);
+}
+
+// A frame that tumbles on two sprung wheels, which roll and steer: long steps are as good as short ones.
+TEST(Smooth, MovesTwoSprungAxlesAsAccuratelyAsIsAsked) {
+  const auto wheels_after = [](double h) {
+    SceneRun run(in_source("/tests/determinism/suspension.gravitas"),
+                 {"Integrator=DormandPrince853", set("Simulator.Accuracy", 1e-9), set("Simulator.TimeStep", h),
+                  set("Simulator.Duration", 1.5)});
+    run.to_end();
+    EXPECT_LT(run.report().max_joint_error(), 1e-8);
+    return std::pair(run.body("Front").pose.position, run.body("Rear").pose.position);
+  };
+  const auto [front, rear] = wheels_after(0.05);
+  const auto [fine_front, fine_rear] = wheels_after(0.003125);
+  // thirty steps of 1e-9 at most
+  EXPECT_LT((front - fine_front).norm(), 3e-8);
+  EXPECT_LT((rear - fine_rear).norm(), 3e-8);
 }
 
 }  // namespace

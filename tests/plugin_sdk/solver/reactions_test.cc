@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,8 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
@@ -224,20 +227,171 @@ TEST(Reactions, OfContradictingJointsAreACompromiseAndSaySo) {
   EXPECT_LT(problem.reaction(2).norm(), 1e-12);
 }
 
-TEST(Reactions, AreNoneOfWhatGivesWayOrIsBounded) {
-  Discrepancy soft = pin(bob_at()), bounded = pin(bob_at()), rope = rod({0, 0, 0}, bob_at()), damper = pin(bob_at());
-  soft.compliance = Vector3::Constant(1e-6);
+TEST(Reactions, AreNoneOfWhatIsBoundedOrRubs) {
+  Discrepancy bounded = pin(bob_at()), rope = rod({0, 0, 0}, bob_at()), drive = pin(bob_at());
   bounded.maximum_force = Vector3::Constant(1e6);
   rope.lower.x() = 0.0;
-  damper.modes = pack_modes(AxisMode::kDriven, AxisMode::kFriction, AxisMode::kUnilateral);
-  damper.damping = Vector3::Constant(3.0);
-  for (const Discrepancy& d : {soft, bounded, rope, damper}) {
+  drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kFriction, AxisMode::kUnilateral);
+  drive.maximum_force = Vector3::Constant(1e6);
+  for (const Discrepancy& d : {bounded, rope, drive}) {
     Problem problem;
     problem.add_body(2.0, bob_at(), {5, 0, 0}, {0, -1, 0});
     problem.add_joint(kNone, 0, d);
     problem.solve();
     EXPECT_EQ(problem.reaction(0), Vector3::Zero());
   }
+}
+
+// Of one body at the origin that moves at (0.5, 0, 0) and is off by `error` along x; only that axis is said to do anything.
+Discrepancy soft_along_x(AxisMode mode, double error) {
+  Discrepancy d;
+  d.point2.x() = error;
+  d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree);
+  d.compliance.x() = 0.01, d.damping.x() = 4.0;
+  return d;
+}
+double force_along_x(const Discrepancy& d) {
+  Problem problem;
+  problem.add_body(2.0, {0, 0, 0}, {0.5, 0, 0}, {0, 0, 0});
+  problem.add_joint(kNone, 0, d);
+  problem.solve();
+  EXPECT_EQ(problem.reaction(0), problem.force(0));
+  return problem.force(0).x();
+}
+
+TEST(Reactions, OfWhatGivesWayAreItsSpringAndDamper) {
+  constexpr double kRounding = 1e-13;
+  // -(e/c + d (v - v_d)) = -(30 + 2)
+  Discrepancy d = soft_along_x(AxisMode::kLocked, 0.3);
+  EXPECT_NEAR(force_along_x(d), -32.0, kRounding);
+  d.velocity.x() = 1.5;
+  EXPECT_NEAR(force_along_x(d), -26.0, kRounding);
+  d.maximum_force.x() = 5.0;
+  EXPECT_EQ(force_along_x(d), -5.0);
+  // one limit: the error is counted from there
+  d = soft_along_x(AxisMode::kLimited, 0.3);
+  d.lower.x() = d.upper.x() = 0.1;
+  EXPECT_NEAR(force_along_x(d), -22.0, kRounding);
+  // two: nothing between them, and no pull back to the one that is left
+  d.lower.x() = -0.2, d.upper.x() = 0.4;
+  EXPECT_EQ(force_along_x(d), 0.0);
+  d.upper.x() = 0.2;
+  EXPECT_NEAR(force_along_x(d), -12.0, kRounding);
+  d = soft_along_x(AxisMode::kUnilateral, -0.3);
+  EXPECT_NEAR(force_along_x(d), 28.0, kRounding);
+  d.point2.x() = -0.01;
+  EXPECT_EQ(force_along_x(d), 0.0);
+  d.point2.x() = 0.3;
+  EXPECT_EQ(force_along_x(d), 0.0);
+  // d (v_d - v), whatever the error
+  for (const AxisMode mode : {AxisMode::kDriven, AxisMode::kFriction}) {
+    d = soft_along_x(mode, 0.3);
+    d.velocity.x() = 2.0;
+    EXPECT_NEAR(force_along_x(d), 6.0, kRounding);
+    d.maximum_force.x() = 1.5;
+    EXPECT_EQ(force_along_x(d), 1.5);
+  }
+}
+
+TEST(Reactions, OfASpringAboutAnAxisAreCouples) {
+  Problem problem;
+  problem.add_body(2.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+  problem.add_body(1.0, {1, 2, 3}, {0, 0, 0}, {0, 0, 0});
+  problem.angular_velocity[5] = 3.0;
+  Discrepancy d;
+  d.point2 = {0, 0, 0.2};
+  d.modes = pack_modes(AxisMode::kFree, AxisMode::kFree, AxisMode::kLocked, true);
+  d.compliance.z() = 0.5, d.damping.z() = 0.25;
+  problem.add_joint(0, 1, d);
+  problem.solve();
+  EXPECT_LT((problem.torque(1) - Vector3(0, 0, -1.15)).norm(), 1e-15);
+  EXPECT_EQ(problem.torque(0), Vector3(-problem.torque(1)));
+  EXPECT_EQ(problem.reaction(0), Vector3::Zero());
+  EXPECT_EQ(problem.reaction(1), Vector3::Zero());
+}
+
+// Of any shape of spring between bodies that move and turn anyhow: it takes what it stores, -d/dt sum e^2/2c, and gives no
+// momentum to the two.
+TEST(Reactions, OfASpringAreTheGradientOfItsEnergy) {
+  const Vector3 x1(0.3, -0.4, 0.2), x2(1.1, 0.7, -0.5), v1(0.4, 0.1, -0.6), v2(-0.7, 0.9, 0.2), w1(0.5, -1.2, 0.8),
+      w2(-0.3, 0.4, 1.1);
+  Discrepancy d;
+  d.point1 = {0.5, 0.1, 0.3}, d.point2 = {0.9, 0.45, -0.2};
+  d.axes = Quaternion(0.5, 0.5, -0.1, 0.7).normalized();
+  for (const bool is_radial : {false, true}) {
+    d.modes = is_radial ? pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree) | kRadialDiscrepancy
+                        : pack_modes(AxisMode::kLocked, AxisMode::kLimited, AxisMode::kUnilateral);
+    d.lower = d.upper = Vector3(0.05, 0.1, 0.0);
+    d.compliance = {0.01, 0.03, 0.002};
+    const auto energy_at = [&](double t) {
+      const auto moved = [&](const Vector3& point, const Vector3& x, const Vector3& v, const Vector3& w) {
+        return Vector3(x + t * v + exp_rotation(t * w) * (point - x));
+      };
+      const Vector3 error = moved(d.point2, x2, v2, w2) - moved(d.point1, x1, v1, w1);
+      const Matrix3 axes = to_rotation_matrix(exp_rotation(t * w1) * d.axes);
+      if (is_radial) return 0.5 * std::pow(error.norm() - 0.05, 2) / 0.01;
+      const Vector3 along = axes.transpose() * error - Vector3(0.0, 0.1, 0.0);
+      const double third = std::min(0.0, along.z());
+      return 0.5 * (along.x() * along.x() / 0.01 + along.y() * along.y() / 0.03 + third * third / 0.002);
+    };
+    Problem problem;
+    problem.add_body(2.0, x1, v1, {0, 0, 0});
+    problem.add_body(1.0, x2, v2, {0, 0, 0});
+    for (int k = 0; k < 3; ++k) {
+      problem.angular_velocity[static_cast<std::size_t>(k)] = w1[k];
+      problem.angular_velocity[static_cast<std::size_t>(3 + k)] = w2[k];
+    }
+    problem.add_joint(0, 1, d);
+    problem.solve();
+    const double power = problem.reaction(0).dot(v1) + problem.torque(0).dot(w1) + problem.reaction(1).dot(v2) +
+                         problem.torque(1).dot(w2);
+    constexpr double kDt = 1e-5;
+    // a central difference is off by its square, and rounding over it
+    EXPECT_NEAR(power, -(energy_at(kDt) - energy_at(-kDt)) / (2.0 * kDt), 1e-7 * std::fabs(power)) << is_radial;
+    EXPECT_GT(std::fabs(power), 1.0);
+    EXPECT_LT((problem.reaction(0) + problem.reaction(1)).norm(), 1e-12);
+    const Vector3 moment =
+        problem.torque(0) + problem.torque(1) + x1.cross(problem.reaction(0)) + x2.cross(problem.reaction(1));
+    EXPECT_LT(moment.norm(), 1e-12);
+  }
+}
+
+// A bob on a rod, and a spring that pulls it along and across: the rod bears what comes along.
+TEST(Reactions, OfARodKnowTheSpringBesideIt) {
+  Problem problem = swinging();
+  Discrepancy spring = rod(bob_at() + Vector3(0.4, 0, 0), bob_at());
+  spring.lower.x() = spring.upper.x() = 0.1;
+  spring.compliance.x() = 0.01;
+  problem.add_joint(kNone, 0, spring);
+  problem.solve();
+  // a pull of 30 N along x, of which sin 0.4 is along the rod
+  EXPECT_NEAR(problem.force(1).x(), -30.0, 1e-12);
+  EXPECT_NEAR(problem.force(0).x(), -(kTension + 30.0 * std::sin(0.4)), 1e-12);
+  EXPECT_EQ(problem.residual(), 0.0);
+}
+
+TEST(Reactions, OfASpringThatOverflowsAreRefused) {
+  Problem problem;
+  problem.add_body(2.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+  Discrepancy d = soft_along_x(AxisMode::kLocked, 1e10);
+  d.compliance.x() = 1e-300;
+  problem.add_joint(kNone, 0, d);
+  EXPECT_THAT([&] { problem.solve(); },
+              ::testing::ThrowsMessage<Refusal>(::testing::HasSubstr("a reaction is not finite")));
+  problem.compliance[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT([&] { problem.solve(); },
+              ::testing::ThrowsMessage<Refusal>(::testing::HasSubstr("compliance, row 0: nan is not finite")));
+}
+
+// A wheel that steers at a about s = y and rolls at b about r = z. Steered, r turns towards x, and with it the rolling: w' has
+// a b along x, so that the camber bears I_x a b + (I_z - I_y) a b. The moments here are (1, 2, 3).
+TEST(Reactions, OfACamberAreTheGyroscopicCouple) {
+  Problem problem;
+  problem.add_body(1.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+  problem.angular_velocity = {0, 1.5, 4.0};
+  problem.add_joint(kNone, 0, swing_row(Vector3::UnitY(), Vector3::UnitZ(), 0.5 * 3.14159265358979323846));
+  problem.solve();
+  EXPECT_LT((problem.torque(0) - Vector3((1.0 + 3.0 - 2.0) * 1.5 * 4.0, 0, 0)).norm(), 1e-13);
 }
 
 TEST(Reactions, RefuseARequestThatIsImpossible) {
@@ -248,6 +402,10 @@ TEST(Reactions, RefuseARequestThatIsImpossible) {
   problem = swinging();
   problem.discrepancy_body[1] = 5;
   EXPECT_THAT([&] { problem.solve(); }, ::testing::ThrowsMessage<Refusal>(::testing::HasSubstr("does not exist")));
+  // a mark of the end of the step
+  problem = swinging();
+  problem.mode[0] |= kForcesApplied;
+  EXPECT_THAT([&] { problem.solve(); }, ::testing::ThrowsMessage<Refusal>(::testing::HasSubstr("is no mode")));
 }
 
 // A body that two pins hold cannot turn: what they miss is finite as long as its terms are.

@@ -68,8 +68,7 @@ class Axle final : public ConstraintPlugin {
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
       const bool is_sprung = compliance > 0.0;
       emit(held_point(one, two.position, {!is_sprung, true, true}));
-      const Swing swing = swing_between(steering, rolling);
-      emit(row_about(swing.axis, swing.angle - angle, AxisMode::kLocked));
+      emit(swing_row(steering, rolling, angle));
       if (!is_sprung) return;
       Discrepancy spring = row_along(steering, one.position, two.position, AxisMode::kLocked);
       spring.compliance.x() = compliance;

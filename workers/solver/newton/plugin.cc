@@ -5,10 +5,9 @@
 // their source; where its steps do not settle, from guesses along the central path (cone_path.h).
 //
 // Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); what holds at its end holds to
-// Tolerance. Stability: rigid rows at every h and mass
-// ratio, springs and dampers of joints at every stiffness (implicit Euler). Cost: cubic in the rows of contacts, limits and
-// drives of an island (dense; beyond 900 of them projected sweeps, ten for each of `Iterations`, whose convergence is
-// linear), linear in a chain's joints.
+// Tolerance. Stability: rigid rows at every h and mass ratio, springs and dampers of joints at every stiffness (implicit
+// Euler; with Smooth they are the integrator's). Cost: cubic in the rows of contacts, limits and drives of an island (dense;
+// beyond 900 of them projected sweeps, ten for each of `Iterations`, whose convergence is linear), linear in a chain's joints.
 // Known failures: Coulomb friction with large coefficients at long arms (Painlevé) may have no solution or several; then
 // `stop_reason` and `residual` say so. Random heaps that slide and turn under up to 10,000 times their mass are all solved
 // (1600 of 1600; 1599 of 1600 with rolling and spinning friction), under a million times 395 of 400. The angles of axes
