@@ -63,8 +63,7 @@ class IslandSolver {
   }
 
  private:
-  static constexpr int kRounds = 12, kFreeRounds = 4, kRoundsOfLowering = 4;
-  static constexpr int kPoseSteps = 30;
+  static constexpr int kRounds = 12, kFreeRounds = 4, kRoundsOfLowering = 4, kPoseSteps = 30;
   // Corrections move a body by no more than so many times the ways to S* and what is overlapped or missed there, summed.
   static constexpr double kOfWay = 16.0, kOfOverlap = 2.0;
 
@@ -329,10 +328,12 @@ class IslandSolver {
         law.has_upper = law.has_upper || known.has_upper;
         const bool changes = law.has_lower != known.has_lower || law.has_upper != known.has_upper;
         any = any || (changes && !law.is_equality());
-        stalled_.add(joint.body1, joint.body2, joint.directions[k], &law);
       }
     }
-    stalled_.stall();
+    stalled_.stall([&](auto&& visit) {
+      for (EndJoint& j : joints_)
+        for (std::size_t k = 0; k < 3; ++k) visit(j.body1, j.body2, j.directions[k], &j.velocity_laws[k]);
+    });
     // with others closed, what slid may stick
     if (any)
       for (EndContact& contact : contacts_) contact.slides = false;
@@ -573,7 +574,6 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSetti
   bodies.load(request);
   SolverSolution answer;
   set_unpushed(request, bodies, &answer);
-
   IslandFinder finder;
   const std::span<const Island> islands = finder.find(request, bodies);
   std::vector<ConeSummary> summaries(islands.size());

@@ -1,54 +1,60 @@
 #include "plugin_sdk/solver/stalled_drives.h"
 
-#include <algorithm>
-#include <limits>
-
 namespace gravitas {
 namespace {
 
-constexpr double kAgrees = 1e-6;
-
-// J x of b as a multiple of that of a: 1 or -1; 0 where they are not the same row.
-double same_axis(const ConstraintDirection& a, const ConstraintDirection& b, bool is_swapped) {
-  const Vector3 linear = is_swapped ? Vector3(-b.linear) : b.linear;
-  const Vector3 &angular1 = is_swapped ? b.angular2 : b.angular1, &angular2 = is_swapped ? b.angular1 : b.angular2;
-  const double size = a.linear.squaredNorm() + a.angular1.squaredNorm() + a.angular2.squaredNorm();
-  for (const double sign : {1.0, -1.0}) {
-    const double apart = (a.linear - sign * linear).squaredNorm() + (a.angular1 - sign * angular1).squaredNorm() +
-                         (a.angular2 - sign * angular2).squaredNorm();
-    if (apart <= kAgrees * kAgrees * size) return sign;
-  }
-  return 0.0;
-}
+constexpr double kAgrees = 1e-3;  // of rows: joints may be open
 
 }  // namespace
 
-void StalledDrives::add(std::uint32_t body1, std::uint32_t body2, const ConstraintDirection& direction, JointLaw* law) {
-  if (!law->is_active() || law->gamma > 0.0 || law->bound < std::numeric_limits<double>::infinity()) return;
-  if (law->is_velocity_only)
-    drives_.push_back({body1, body2, &direction, law});
-  else if (!law->is_equality())
-    limits_.push_back({body1, body2, &direction, law});
+bool StalledDrives::is_of(const Row& row, const Row& pair) {
+  return (row.body1 == pair.body1 && row.body2 == pair.body2) || (row.body1 == pair.body2 && row.body2 == pair.body1);
 }
 
-void StalledDrives::stall() {
-  for (const Row& drive : drives_) {
-    for (const Row& limit : limits_) {
-      const bool is_swapped = drive.body1 == limit.body2 && drive.body2 == limit.body1;
-      if (!is_swapped && (drive.body1 != limit.body1 || drive.body2 != limit.body2)) continue;
-      const double sign = same_axis(*limit.direction, *drive.direction, is_swapped);
-      const double along = sign * drive.law->lower_target;
+StalledDrives::Numbers StalledDrives::numbers_of(const Row& row, const Row& pair) {
+  const ConstraintDirection& d = *row.direction;
+  Numbers numbers;
+  if (row.body1 == pair.body1)
+    numbers << d.linear, d.angular1, d.angular2;
+  else
+    numbers << -d.linear, d.angular2, d.angular1;
+  return numbers;
+}
+
+void StalledDrives::stall_rows() {
+  std::vector<Numbers> held;  // orthonormal
+  // Takes the held rows out of one; what is left, unless that is nothing.
+  const auto left_of = [&](Numbers numbers) {
+    const double size = numbers.norm();
+    for (int repeat = 0; repeat < 2; ++repeat)
+      for (const Numbers& other : held) numbers -= other.dot(numbers) * other;
+    return numbers.norm() > kAgrees * size ? numbers : Numbers(Numbers::Zero());
+  };
+  for (const Row& limit : rows_) {
+    if (limit.kind != Kind::kLimit) continue;
+    held.clear();
+    for (const Row& row : rows_) {
+      if (row.kind != Kind::kHeld || !is_of(row, limit)) continue;
+      const Numbers numbers = left_of(numbers_of(row, limit));
+      if (!numbers.isZero(0.0)) held.push_back(numbers.normalized());
+    }
+    const Numbers axis = left_of(numbers_of(limit, limit));
+    if (axis.isZero(0.0)) continue;
+    for (const Row& drive : rows_) {
+      JointLaw& law = *drive.law;
+      if (drive.kind != Kind::kDrive || !law.is_equality() || !is_of(drive, limit)) continue;
+      const Numbers numbers = left_of(numbers_of(drive, limit));
+      const double share = axis.dot(numbers) / axis.squaredNorm();
+      if (numbers.isZero(0.0) || (numbers - share * axis).norm() > kAgrees * numbers.norm()) continue;
+      const double along = law.lower_target / share;
       const bool is_below = limit.law->has_lower && along < limit.law->lower_target;
       const bool is_above = limit.law->has_upper && along > limit.law->upper_target;
-      if (sign == 0.0 || is_below == is_above) continue;
-      JointLaw& law = *drive.law;
-      law.lower_target = law.upper_target = sign * (is_below ? limit.law->lower_target : limit.law->upper_target);
+      if (is_below == is_above) continue;
+      law.lower_target = law.upper_target = share * (is_below ? limit.law->lower_target : limit.law->upper_target);
       // towards the limit it pushes on
-      (is_above == (sign > 0.0) ? law.has_upper : law.has_lower) = false;
-      break;
+      (is_above == (share > 0.0) ? law.has_upper : law.has_lower) = false;
     }
   }
-  drives_.clear(), limits_.clear();
 }
 
 }  // namespace gravitas

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "plugin_sdk/math/rotation.h"
@@ -99,6 +100,31 @@ TEST_P(JointsInMotion, ASlidersDriveStallsAtALimit) {
     }
     EXPECT_NEAR(run_to_end("LowerLimit = -2 UpperLimit = 0 Speed = -1", simulator).twist.linear.y(), -1.0, 1e-12);
   }
+}
+
+// A motor without a bound on a hinge with limits: the four points that drive are no row of the hinge's limit. To the stop,
+// against gravity, and away from it.
+TEST_P(JointsInMotion, AMotorStallsAtAHingesLimit) {
+  const std::string axis = "BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 0.5} ";
+  const auto run_to_end = [&](const std::string& limit, const std::string& speed) {
+    SceneRun run(scene(body("Door", {0.8, 0, 0}, kFalls),
+                       joint("Revolute", "Hinge", "", "Door", axis + limit) +
+                           joint("AngularMotor", "Motor", "", "Door", axis + "AngularSpeed = " + speed),
+                       0.01, 1),
+                 solver());
+    run.to_end();
+    EXPECT_LE(run.report().max_joint_error(), is_end_of_step() ? 1e-9 : 1e-3) << limit;
+    return run.body("Door");
+  };
+  for (const auto& [limit, speed, angle] :
+       {std::tuple{"UpperLimit = 0.503", "1", 0.503}, std::tuple{"LowerLimit = -0.503", "-1", -0.503}}) {
+    const SceneRun::Motion door = run_to_end(limit, speed);
+    const double tolerance = is_end_of_step() ? 1e-9 : 1e-4;
+    EXPECT_NEAR(std::atan2(door.pose.position.y(), door.pose.position.x()), angle, tolerance);
+    EXPECT_NEAR(door.twist.angular.z(), 0.0, 10.0 * tolerance);
+  }
+  // the points drive along where the step's turns have left them, 1 - cos(2 h w)
+  EXPECT_NEAR(run_to_end("UpperLimit = 0", "-1").twist.angular.z(), -1.0, 2.1e-4);
 }
 
 // The drive gains F/m until it has its speed, and the limit stops it.

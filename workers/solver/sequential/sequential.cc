@@ -264,10 +264,14 @@ bool SequentialSolver::find_closed() {
       known = law;
       known.has_lower = has_lower;
       known.has_upper = has_upper;
-      stalled_.add(d.body1, d.body2, d.directions[axis], &known);
     }
   }
-  stalled_.stall();
+  stalled_.stall([&](auto&& visit) {
+    for (std::size_t i = 0; i < discrepancies_.size(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        visit(discrepancies_[i].body1, discrepancies_[i].body2, discrepancies_[i].directions[axis],
+              &velocity_laws_[3 * i + axis]);
+  });
   return added;
 }
 
