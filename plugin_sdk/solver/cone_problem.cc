@@ -13,13 +13,6 @@ namespace {
 // Of the largest terms of a row's sum, what may be left by rounding.
 constexpr double kSumRounding = 16.0 * kEpsilon;
 
-// Of those terms, what a guess may be wrong by: as if its multipliers were, by 2e-13 of themselves. A stack at rest keeps
-// its impulses then, in place of finding them anew for what rounding moves its contacts.
-constexpr double kGuessRounding = 1024.0 * kEpsilon;
-
-// A contact slips if it does so this much faster than what counts as converged.
-constexpr double kSlip = 1e3;
-
 // What is left of held rows is rounding where it is this many units of what their multipliers do.
 constexpr double kRefined = 4.0;
 
@@ -31,6 +24,10 @@ void clear_lists(std::size_t count, std::vector<List>* lists) {
 }
 
 }  // namespace
+
+void ConeProblem::start() {
+  for (HeldFactors& factors : held_factors_) factors.rows.clear();
+}
 
 double ConeProblem::value(const BodyMotion& x, std::uint32_t r) const {
   const ConeRow& row = rows[r];
@@ -52,8 +49,13 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
   held_.clear(), other_.clear(), blocks_.clear();
   motion_ = 0.0;
   const auto response = [&](std::uint32_t r) {
-    const double own = coupling(rows[r], rows[r], bodies) + rows[r].law.gamma;
-    return own > 0.0 && std::isfinite(own) && std::isfinite(1.0 / own) ? own : 0.0;
+    const ConeRow& row = rows[r];
+    const double own =
+        row.body1 == row.body2
+            ? coupling(row, row, bodies)
+            : row.direction.product(row.direction, bodies[row.body1].inverse_mass + bodies[row.body2].inverse_mass);
+    const double all = own + row.law.gamma;
+    return all > 0.0 && std::isfinite(all) && std::isfinite(1.0 / all) ? all : 0.0;
   };
   speeds_.clear();
   for (const Twist& x : x0) speeds_.emplace_back(x.linear.norm(), x.angular.norm());
@@ -62,8 +64,9 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
     free_[r] = value(x0, r);
     const auto& [speed1, spin1] = speeds_[row.body1];
     const auto& [speed2, spin2] = speeds_[row.body2];
-    const double arms = row.direction.angular1.norm() * spin1 + row.direction.angular2.norm() * spin2;
-    const double size = std::fabs(row.start) + row.direction.linear.norm() * (speed1 + speed2) + arms;
+    double size = std::fabs(row.start) + row.direction.linear.norm() * (speed1 + speed2);
+    if (spin1 != 0.0) size += row.direction.angular1.norm() * spin1;
+    if (spin2 != 0.0) size += row.direction.angular2.norm() * spin2;
     motion_ = std::max(motion_, size * row.length);
     if (!std::isfinite(motion_))
       throw Refusal("velocities, errors or arms so large that their products are not finite");
@@ -81,25 +84,28 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
       held_.push_back(r);
       continue;
     }
-    blocks_.push_back({.first = static_cast<std::uint32_t>(other_.size())});
+    blocks_.push_back({.first = static_cast<std::uint32_t>(other_.size()), .law = scaled_law(r)});
     other_.push_back(r);
   }
   for (std::size_t c = 0; c < contacts.size(); ++c) {
     const ConeContact& contact = contacts[c];
     const std::uint32_t slip = contact.has_friction ? 3 : 1;
-    double largest = 0.0, turning = 0.0;
-    for (std::uint32_t k = 0; k < slip; ++k) largest = std::max(largest, response(contact.first + k));
+    const double normal = response(contact.first);
+    double largest = normal, turning = 0.0;
+    for (std::uint32_t k = 1; k < slip; ++k) largest = std::max(largest, response(contact.first + k));
     for (std::uint32_t k = slip; k < contact.count(); ++k) turning = std::max(turning, response(contact.first + k));
-    const bool is_pushed = response(contact.first) > 0.0 && (!contact.has_turning || turning > 0.0);
+    const bool is_pushed = normal > 0.0 && (!contact.has_turning || turning > 0.0);
+    const double root = std::sqrt(largest), root_of_turning = std::sqrt(turning);
     for (std::uint32_t k = 0; k < contact.count(); ++k) {
       const std::uint32_t r = contact.first + k;
       if (!is_pushed) rows[r].multiplier = 0.0;
-      scale_[r] = is_pushed ? std::sqrt(k < slip ? largest : turning) : 0.0;
+      scale_[r] = is_pushed ? (k < slip ? root : root_of_turning) : 0.0;
     }
     if (!is_pushed) continue;
     blocks_.push_back({.first = static_cast<std::uint32_t>(other_.size()),
                        .contact = static_cast<std::int32_t>(c),
-                       .count = contact.count()});
+                       .count = contact.count(),
+                       .target = contact.target / root});
     for (std::uint32_t k = 0; k < contact.count(); ++k) other_.push_back(contact.first + k);
   }
 }
@@ -196,40 +202,6 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
   return worst <= std::max(smallest, kEpsilon * motion_);
 }
 
-// The first guess, where it is right as it stands: with the one of the step before, what rests.
-bool ConeProblem::is_solved_by_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance,
-                                     double* residual) {
-  if (!held_.empty()) return false;
-  for (std::size_t o = 0; o < other_.size(); ++o)
-    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
-  BodyMotion x = x0;
-  push(bodies, &x);
-  Eigen::VectorXd y(lambda_.size());
-  find_values(x, &y);
-  *residual = residual_of(lambda_, y);
-  // what each body's motion is summed from
-  BodyMotion terms(x0.size());
-  for (const ConeRow& row : rows) {
-    const double push = std::fabs(row.multiplier);
-    const auto add = [&](std::uint32_t body, const Vector3& turn) {
-      terms[body].linear += bodies[body].inverse_mass * push * row.direction.linear.cwiseAbs();
-      terms[body].angular += push * turn.cwiseAbs();
-    };
-    add(row.body1, row.direction.turn1);
-    add(row.body2, row.direction.turn2);
-  }
-  double sum = 0.0;
-  for (const std::uint32_t r : other_) {
-    const ConstraintDirection& d = rows[r].direction;
-    const double term = d.linear.cwiseAbs().dot(terms[rows[r].body1].linear + terms[rows[r].body2].linear) +
-                        d.angular1.cwiseAbs().dot(terms[rows[r].body1].angular) +
-                        d.angular2.cwiseAbs().dot(terms[rows[r].body2].angular);
-    sum = std::max(sum, (std::fabs(free_[r]) + term) * rows[r].length);
-  }
-  const double enough = std::max(tolerance, kGuessRounding * sum);
-  return *residual <= enough && !let_slide(lambda_, y, kSlip * enough);
-}
-
 // y of the other rows.
 void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
   for (std::size_t o = 0; o < other_.size(); ++o) {
@@ -280,36 +252,47 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     lambda_[static_cast<Eigen::Index>(o)] = rows[other_[o]].multiplier * scale_[other_[o]];
   into_cones(&lambda_);
 
-  if (is_solved_by_guess(bodies, x0, tolerance, &summary.residual)) return summary;
+  if (is_solved_near_guess(bodies, x0, tolerance, settings, &summary)) return summary;
   if (other_.size() > kDenseRows) {
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
     reduce(bodies);
     solve_dense(settings, tolerance, &summary);
   }
-  for (std::size_t o = 0; o < other_.size(); ++o)
-    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
-  if (!held_.empty()) {
+  set_multipliers();
+  if (held_.empty()) return summary;
+  summary.iterations += 1;
+  if (other_.empty()) {
+    factor_.solve(&side_);
+    for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier = side_[i] / scale_[held_[i]];
+  } else {
     for (const std::uint32_t r : held_) rows[r].multiplier = 0.0;
-    summary.iterations += 1;
-    // what a row's own multiplier does to it is what rounding goes by
-    const auto summed = [&] {
-      double most = 0.0;
-      for (const std::uint32_t r : held_)
-        most = std::max(most, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
-      return most;
-    };
-    // once for the answer, and for what rounding left of it: twice if that was much
-    double missing = refine_held(bodies, x0);
-    for (int repeat = 0; repeat < 2; ++repeat) {
-      const double rounding = kRefined * kEpsilon * summed();
-      missing = refine_held(bodies, x0);
-      if (missing <= rounding) break;
-    }
-    summary.residual = std::max(summary.residual, missing);
-    summary.has_converged = summary.has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * summed());
+    refine_held(bodies, x0);
   }
+  if (!settings.is_rough) refine(bodies, x0, smallest, settings, &summary);
   return summary;
+}
+
+void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
+                         const ConeSettings& settings, ConeSummary* summary) {
+  if (held_.empty()) return;
+  const double tolerance = std::max(smallest, settings.tolerance * size());
+  // what a row's own multiplier does to it is what rounding goes by
+  const auto summed = [&] {
+    double most = 0.0;
+    for (const std::uint32_t r : held_)
+      most = std::max(most, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
+    return most;
+  };
+  // once for what rounding left of the answer: twice if that was much
+  double missing = 0.0;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const double rounding = kRefined * kEpsilon * summed();
+    missing = refine_held(bodies, x0);
+    if (missing <= rounding) break;
+  }
+  summary->residual = std::max(summary->residual, missing);
+  summary->has_converged = summary->has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * summed());
 }
 
 double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
@@ -421,8 +404,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
       }
     }
   }
-  for (std::size_t o = 0; o < other_.size(); ++o)
-    rows[other_[o]].multiplier = lambda_[static_cast<Eigen::Index>(o)] / scale_[other_[o]];
+  set_multipliers();
   Eigen::VectorXd y(lambda_.size());
   BodyMotion x;
   summary->has_converged = false;

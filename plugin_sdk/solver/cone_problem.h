@@ -41,6 +41,7 @@
 
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/cone_path.h"
+#include "plugin_sdk/solver/held_step.h"
 #include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/profile_ldlt.h"
 
@@ -75,6 +76,8 @@ struct ConeSettings {
   double tolerance = 1e-12;  // of the largest velocity (length) that meets in a row
   std::uint32_t iterations = 500;
   double proximal = 1e-7;  // added to the diagonal of the first steps
+  bool may_rest = false;   // the first guess is kept where it is wrong by what rounding moves a body at rest
+  bool is_rough = false;   // rows that hold always are left as a first solution leaves them; refine() is to come
 };
 
 struct ConeSummary {
@@ -92,8 +95,15 @@ class ConeProblem {
   std::vector<ConeRow> rows;
   std::vector<ConeContact> contacts;
 
+  // Forgets the problems of another island or step: those to come are alike among themselves.
+  void start();
+
   // Sets the multipliers. `smallest` is what counts as nothing in any case (m/s, m).
   ConeSummary solve(const SolverBodies& bodies, const BodyMotion& x0, double smallest, const ConeSettings& settings);
+
+  // Takes away what rounding left of the rows that hold always, in the problem that was solved last in steps > 0.
+  void refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest, const ConeSettings& settings,
+              ConeSummary* summary);
 
   // Gives rows that hold always and contradict each other the nearest targets that some motion meets (least squares of the
   // scaled rows). Returns by how much they were off (m/s, m), 0 if by no more than `smallest` or rounding.
@@ -103,16 +113,27 @@ class ConeProblem {
   void push(const SolverBodies& bodies, BodyMotion* x) const;
 
  private:
+  // A contact slips if it does so this much faster than what counts as converged.
+  static constexpr double kSlip = 1e3;
+
   // Rows that one law rules.
   struct Block {
     std::uint32_t first = 0;    // place among the other rows
     std::int32_t contact = -1;  // of contacts; -1: one scalar row
     std::uint32_t count = 1;
+    // scaled: of a scalar row, of a contact's normal
+    JointLaw law = {};
+    double target = 0.0;
   };
   // Of a contact's scaled multipliers, as multiples of the normal one.
   struct Bounds {
     double friction = 0.0, spinning = 0.0, rolling = 0.0;
     std::uint32_t turning = 0;  // first row of turning in the block; 0: none
+  };
+
+  struct HeldFactors {
+    HeldStep step;
+    std::vector<Eigen::Index> rows;  // in it, among other_; empty: there are none
   };
 
   double value(const BodyMotion& x, std::uint32_t r) const;
@@ -123,7 +144,12 @@ class ConeProblem {
   double make_consistent(double smallest);
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
-  bool is_solved_by_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance, double* residual);
+  bool is_solved_near_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance,
+                            const ConeSettings& settings, ConeSummary* summary);
+  void set_multipliers();
+  bool take_held_step(const SolverBodies& bodies, double proximal, double corner, const Eigen::VectorXd& y,
+                      HeldFactors* factors);
+  double largest_sum(const SolverBodies& bodies) const;
   void find_values(const BodyMotion& x, Eigen::VectorXd* y) const;
   JointLaw scaled_law(std::uint32_t row) const;
   Bounds bounds_of(const Block& block) const;
@@ -133,7 +159,7 @@ class ConeProblem {
   void project(const Block& block, const double* lambda, const double* y, double* projected) const;
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
-  bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y);
+  bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner = 0.0);
   bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   std::uint32_t descend(double enough, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void solve_sliding();
@@ -176,6 +202,7 @@ class ConeProblem {
   double proximal_ = 0.0, factored_proximal_ = 0.0;
   std::vector<Eigen::Index> coupled_, factored_;  // rows; of sticking_
   ProfileLdlt sticking_;
+  HeldFactors held_factors_[2];  // of poses, of velocities
 };
 
 }  // namespace gravitas

@@ -57,13 +57,12 @@ void ConeProblem::confine_turning(const Bounds& bounds, double pressed, double* 
 }
 
 void ConeProblem::project(const Block& block, const double* lambda, const double* y, double* projected) const {
-  const std::uint32_t r = other_[block.first];
   if (block.contact < 0) {
-    projected[0] = relaxed_multiplier(scaled_law(r), lambda[0], y[0], 1.0);
+    projected[0] = relaxed_multiplier(block.law, lambda[0], y[0], 1.0);
     return;
   }
   for (std::uint32_t k = 0; k < block.count; ++k) projected[k] = lambda[k] - y[k];
-  projected[0] += contacts[static_cast<std::size_t>(block.contact)].target / scale_[r];
+  projected[0] += block.target;
   confine(block, projected);
 }
 
@@ -81,9 +80,11 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
 }
 
 // Equations of a step, d the change of lambda: a row that its law holds as y + W' d = target, any other as where its law
-// puts it, alone or (in sliding_, and then true is returned) together with others.
-bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) {
+// puts it, alone or (in sliding_, and then true is returned) together with others. Rows of a contact that miss being held by
+// no more than `corner` (m/s, m) are; with a corner sliding_ is not made.
+bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner) {
   const Eigen::Index count = lambda.size();
+  const bool may_slide = corner == 0.0;
   bool any_slides = false;
   kinds_.resize(other_.size());
   side_of_step_.resize(count);
@@ -94,9 +95,10 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
   const auto hold = [&](Eigen::Index i, double missing) { note(i, RowKind::kHeld, missing); };
   const auto put = [&](Eigen::Index i, double place) { note(i, RowKind::kPut, place - lambda[i]); };
   const auto start_sliding = [&](Eigen::Index i, double side) {
-    if (!any_slides) sliding_.resize(count, count);
+    if (!any_slides && may_slide) sliding_.resize(count, count);
     any_slides = true;
     note(i, RowKind::kSliding, side);
+    return may_slide;
   };
   // two rows that slide along z against a radius mu lambda_N:
   //   (1 - K) d + K W' d - mu dir d_N = mu lambda_N dir - lambda,  K = radius/|z| (1 - dir dir^T)
@@ -107,15 +109,15 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     const double share = std::min(1.0, radius / length);
     const Eigen::Matrix2d across = share * (Eigen::Matrix2d::Identity() - direction * direction.transpose());
     for (int a = 0; a < 2; ++a) {
-      start_sliding(i + a, mu * lambda[normal] * direction[a] - lambda[i + a]);
+      if (!start_sliding(i + a, mu * lambda[normal] * direction[a] - lambda[i + a])) continue;
       sliding_.row(i + a) = across(a, 0) * response_.row(i) + across(a, 1) * response_.row(i + 1);
       for (int b = 0; b < 2; ++b) sliding_(i + a, i + b) += (a == b ? 1.0 : 0.0) - across(a, b) * (1.0 - proximal_);
       sliding_(i + a, normal) -= mu * direction[a];
     }
   };
   const auto disc = [&](Eigen::Index i, Eigen::Index normal, double mu, double normal_after) {
-    const double radius = mu * normal_after;
-    if (length_of(lambda[i] - y[i], lambda[i + 1] - y[i + 1]) <= radius) {
+    const double radius = mu * normal_after, slack = corner / scale_[other_[static_cast<std::size_t>(i)]];
+    if (length_of(lambda[i] - y[i], lambda[i + 1] - y[i + 1]) <= radius + slack) {
       for (int a = 0; a < 2; ++a) hold(i + a, -y[i + a]);
     } else {
       slide(i, normal, mu, radius);
@@ -127,34 +129,43 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     double projected[6];
     project(block, &lambda[i], &y[i], projected);
     if (block.contact < 0) {
-      const JointLaw law = scaled_law(other_[block.first]);
+      const JointLaw& law = block.law;
+      const double slack = -corner / scale_[other_[block.first]];
+      const double to_lower = law.lower_target - y[i], to_upper = law.upper_target - y[i];
       const bool is_within = std::fabs(projected[0]) < law.bound;
       if (is_within && (projected[0] != 0.0 || law.is_equality())) {
         hold(i, projected[0] - lambda[i]);
+      } else if (may_slide || !is_within) {
+        put(i, projected[0]);
+      } else if (law.has_lower && lambda[i] + to_lower > slack) {
+        hold(i, to_lower);
+      } else if (law.has_upper && lambda[i] + to_upper < -slack) {
+        hold(i, to_upper);
       } else {
         put(i, projected[0]);
       }
       continue;
     }
-    const double pressed = projected[0];
-    if (!(pressed > 0.0)) {
+    const double pressed = projected[0], missing = block.target - y[i];
+    if (!(pressed > 0.0) && !(lambda[i] + missing > -corner / scale_[other_[block.first]])) {
       for (std::uint32_t k = 0; k < block.count; ++k) put(i + k, 0.0);
       continue;
     }
-    hold(i, pressed - lambda[i]);
+    hold(i, missing);
     const Bounds bounds = bounds_of(block);
     if (bounds.turning != 1 && block.count > 1) disc(i + 1, i, bounds.friction, pressed);
     if (bounds.turning == 0) continue;
     const Eigen::Index k = i + bounds.turning;
-    const double wanted = lambda[k] - y[k];
-    if (std::fabs(wanted) <= bounds.spinning * pressed) {
+    const double wanted = lambda[k] - y[k], slack = corner / scale_[other_[static_cast<std::size_t>(k)]];
+    if (std::fabs(wanted) <= bounds.spinning * pressed + slack) {
       hold(k, -y[k]);
     } else {
       const double bound = std::copysign(bounds.spinning, wanted);
-      start_sliding(k, bound * lambda[i] - lambda[k]);
-      sliding_.row(k).setZero();
-      sliding_(k, k) = 1.0;
-      sliding_(k, i) = -bound;
+      if (start_sliding(k, bound * lambda[i] - lambda[k])) {
+        sliding_.row(k).setZero();
+        sliding_(k, k) = 1.0;
+        sliding_(k, i) = -bound;
+      }
     }
     disc(k + 1, i, bounds.rolling, pressed);
   }
@@ -261,14 +272,13 @@ ConePath ConeProblem::path() const {
   ConePath path(response_, start_others_);
   for (const Block& block : blocks_) {
     const auto i = static_cast<Eigen::Index>(block.first);
-    const std::uint32_t r = other_[block.first];
     if (block.contact < 0) {
-      const JointLaw law = scaled_law(r);
+      const JointLaw& law = block.law;
       path.add_scalar(i, law.has_lower ? law.lower_target : -kInfinity, law.has_upper ? law.upper_target : kInfinity,
                       law.bound);
       continue;
     }
-    path.add_normal(i, contacts[static_cast<std::size_t>(block.contact)].target / scale_[r]);
+    path.add_normal(i, block.target);
     const Bounds bounds = bounds_of(block);
     if (bounds.turning != 1 && block.count > 1) path.add_disc(i + 1, 2, i, bounds.friction);
     if (bounds.turning == 0) continue;
@@ -281,12 +291,11 @@ ConePath ConeProblem::path() const {
 // The law of a block alone, with all others as they are.
 void ConeProblem::relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const {
   if (!(own(0, 0) > 0.0)) return;
-  const std::uint32_t r = other_[block.first];
   if (block.contact < 0) {
-    lambda[0] = relaxed_multiplier(scaled_law(r), lambda[0], y[0], own(0, 0));
+    lambda[0] = relaxed_multiplier(block.law, lambda[0], y[0], own(0, 0));
     return;
   }
-  const double target = contacts[static_cast<std::size_t>(block.contact)].target / scale_[r];
+  const double target = block.target;
   const Bounds bounds = bounds_of(block);
   if (bounds.turning != 1 && block.count > 1) {
     const Matrix3 response = 0.5 * (own.topLeftCorner<3, 3>() + own.topLeftCorner<3, 3>().transpose());
@@ -350,7 +359,7 @@ void ConeProblem::into_cones(Eigen::VectorXd* lambda) const {
       confine(block, at);
       continue;
     }
-    const JointLaw law = scaled_law(other_[block.first]);
+    const JointLaw& law = block.law;
     if (!law.has_lower) at[0] = std::min(at[0], 0.0);
     if (!law.has_upper) at[0] = std::max(at[0], 0.0);
     at[0] = std::clamp(at[0], -law.bound, law.bound);

@@ -34,6 +34,7 @@ class IslandSolver {
 
   ConeSummary solve(Host& host) {
     load();
+    cone_.start();
     const double share = request_.theta() * request_.time_step();
     guess_offset(share);
     int failures = 0;
@@ -77,11 +78,10 @@ class IslandSolver {
       end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
       gyration_.push_back(bodies_[i].gyration());
     }
-    for (const std::uint32_t row : island_.bodies) {
-      const std::uint32_t i = pushed_.emplace_back(place_of(row));
-      most_recovery_ += kOfWay * way_of(bodies_[i], gyration_[i], request_.time_step());
-    }
+    for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
     const DiscrepancyColumns columns = columns_of(request_);
+    joints_.reserve(island_.discrepancies.size());
+    contacts_.reserve(island_.contacts.size());
     for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
     for (const std::uint32_t row : island_.contacts) load_contact(row);
   }
@@ -117,7 +117,6 @@ class IslandSolver {
       const auto place = static_cast<std::size_t>(k);
       joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
       joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
-      most_recovery_ += kOfOverlap * joint.length * missed_by(joint.pose_laws[place]);
       const auto at = 3 * row + static_cast<std::uint32_t>(k);
       answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at];
       answer_.joint_impulse[at] = request_.discrepancy_warm_impulse()[at];
@@ -137,8 +136,6 @@ class IslandSolver {
     const Vector3 to_surface = (-0.5 * contact.gap) * normal;
     contact.gap_target = 0.0 - contact.gap;
     contact.slop = closing_slop(point, one, two);
-    const Vector3 way = carried(point, one.trial, one.start) - carried(point, two.trial, two.start);
-    most_recovery_ += kOfWay * way.norm() + kOfOverlap * std::max(0.0, contact.gap_target);
     contact.law = contact_law(request_, row, one, two);
     contact.arm1 = point + to_surface - one.trial.position;
     contact.arm2 = point - to_surface - two.trial.position;
@@ -232,30 +229,34 @@ class IslandSolver {
   // ---- pose change
 
   void solve_pose() {
-    double last = std::numeric_limits<double>::infinity();
-    for (int step = 0; step < kPoseSteps; ++step) {
+    settings_.is_rough = true;
+    ShrinkingSteps steps;
+    for (bool is_last = false; !is_last;) {
+      // what moves, if only by rounding, is found to rounding: errors would add up from step to step
+      settings_.may_rest = summary_.iterations == 0;
       move_to_end();
       stiffen();
       build_pose();
       const double representable = 0.25 * kEpsilon * coordinates_;
       const BodyMotion x0 = start_of_step();
-      const ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_);
-      summary_.iterations += solved.iterations;
-      has_pose_ = solved.has_converged;
+      ConeSummary solved = cone_.solve(bodies_, x0, representable, settings_);
       // where the steps end: before, redundant rows are off by the square of a turn
       pose_contradiction_ = solved.contradiction;
       BodyMotion next = x0;
       cone_.push(bodies_, &next);
-      const double change = largest_change(next, displacement_), size = largest(next);
+      is_last = steps.end_with(largest_change(next, displacement_), largest(next), 4.0 * representable) ||
+                joints_.empty() || steps.count() == kPoseSteps;
+      if (is_last && solved.iterations > 0 && !joints_.empty()) {
+        cone_.refine(bodies_, x0, representable, settings_, &solved);
+        next = x0;
+        cone_.push(bodies_, &next);
+      }
+      summary_.iterations += solved.iterations;
+      has_pose_ = solved.has_converged;
       displacement_ = std::move(next);
       keep_corrections();
-      if (joints_.empty()) break;
-      // steps shrink at a rising rate, until rounding stops them
-      const double enough = std::max(4.0 * representable, 1e-14 * size);
-      if (change <= enough || (step > 0 && change < 1e-2 * last && change * (change / last) <= enough)) break;
-      if (step > 3 && !(change < 0.9 * last) && change <= 1e-9 * size) break;
-      last = change;
     }
+    settings_.is_rough = false;
     const double share = shorten(offset_, &displacement_);
     for (ConeRow& row : cone_.rows) row.multiplier *= share;
     keep_corrections();
@@ -265,14 +266,25 @@ class IslandSolver {
   // Contacts that leave a body no room ask for ways without end along what is nearly flat between them. The share of the way
   // from `from` that is left.
   double shorten(const BodyMotion& from, BodyMotion* motion) const {
-    const double moved = contacts_.empty() ? 0.0 : largest_change(*motion, from);
-    if (!(moved > most_recovery_)) return 1.0;
-    const double share = most_recovery_ / moved;
+    if (contacts_.empty()) return 1.0;
+    const double moved = largest_change(*motion, from);
+    double most = kOfOverlap * sum_of_overlaps(joints_, contacts_);
+    if (moved > most) most += kOfWay * sum_of_ways();
+    if (!(moved > most)) return 1.0;
+    const double share = most / moved;
     for (const std::uint32_t i : pushed_) {
       (*motion)[i].linear = from[i].linear + share * ((*motion)[i].linear - from[i].linear);
       (*motion)[i].angular = from[i].angular + share * ((*motion)[i].angular - from[i].angular);
     }
     return share;
+  }
+
+  double sum_of_ways() const {
+    double sum = 0.0;
+    for (const std::uint32_t i : pushed_) sum += way_of(bodies_[i], gyration_[i], request_.time_step());
+    for (const EndContact& c : contacts_)
+      sum += way_of(vector_at(request_.contact_point(), c.row), bodies_[c.body1], bodies_[c.body2]);
+    return sum;
   }
 
   void build_pose() {
@@ -348,6 +360,7 @@ class IslandSolver {
 
   void solve_velocity() {
     const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
+    settings_.may_rest = summary_.iterations == 0;
     // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
     if (may_turn()) {
       build_velocity(false);
@@ -415,14 +428,9 @@ class IslandSolver {
   void build_velocity(const EndContact& contact, bool with_turning) {
     const Matrix3 &inverse1 = end_[contact.body1].inverse_inertia, &inverse2 = end_[contact.body2].inverse_inertia;
     const ContactLaw& law = contact.law;
-    ConeContact& cone = cone_.contacts.emplace_back();
-    cone.first = static_cast<std::uint32_t>(cone_.rows.size());
-    cone.has_friction = law.static_friction > 0.0;
-    cone.has_turning = with_turning && law.has_turning() && !(inverse1 + inverse2).isZero(0.0);
-    cone.target = law.target;
-    cone.slides = contact.slides;
-    cone.static_friction = law.static_friction, cone.dynamic_friction = law.dynamic_friction;
-    cone.rolling_friction = law.rolling_friction, cone.spinning_friction = law.spinning_friction;
+    const bool has_turning = with_turning && law.has_turning() && !(inverse1 + inverse2).isZero(0.0);
+    const auto first = static_cast<std::uint32_t>(cone_.rows.size());
+    const ConeContact& cone = cone_.contacts.emplace_back(cone_contact(contact, first, has_turning));
     const Vector3 impulse = law.frame.transpose() * vector_at(answer_.contact_impulse, contact.row);
     const auto add = [&](const ConstraintDirection& direction, double length, double multiplier) {
       ConeRow& row = cone_.rows.emplace_back();
@@ -558,7 +566,7 @@ class IslandSolver {
   std::vector<EndContact> contacts_;
   std::vector<EndBody> end_;
   std::vector<double> gyration_;  // radii, m
-  double coordinates_ = 0.0, most_recovery_ = 0.0, pose_contradiction_ = 0.0;
+  double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   ConeSummary summary_;
   StalledDrives stalled_;
@@ -583,18 +591,7 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSetti
     summaries[i] = IslandSolver(request, bodies, islands[i], settings, &cone, &answer).solve(host);
     host.mark_progress();
   });
-  SolverOutcome outcome;
-  bool has_converged = true, contradicts = false;
-  for (const ConeSummary& one : summaries) {
-    outcome.iterations += one.iterations;
-    outcome.residual = std::max(outcome.residual, one.residual);
-    has_converged = has_converged && one.has_converged;
-    contradicts = contradicts || one.contradiction > 0.0;
-  }
-  if (!islands.empty()) outcome.stop_reason = StopReason::kConverged;
-  if (contradicts) outcome.stop_reason = StopReason::kContradiction;
-  if (!has_converged) outcome.stop_reason = StopReason::kIterations;
-  write(answer, outcome, reply);
+  write(answer, outcome_of(summaries), reply);
 }
 
 }  // namespace gravitas

@@ -8,6 +8,15 @@
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
+namespace {
+
+// By how much a pose law is missed where its row's value is 0, m or rad.
+double missed_by(const JointLaw& law) {
+  return (law.has_lower ? std::max(0.0, law.lower_target) : 0.0) +
+         (law.has_upper ? std::max(0.0, -law.upper_target) : 0.0);
+}
+
+}  // namespace
 
 bool is_held(AxisMode mode) {
   return mode == AxisMode::kLocked || mode == AxisMode::kLimited || mode == AxisMode::kUnilateral;
@@ -15,27 +24,6 @@ bool is_held(AxisMode mode) {
 
 bool holds_pose(const Discrepancy& d) {
   return is_held(axis_mode(d.modes, 0)) || is_held(axis_mode(d.modes, 1)) || is_held(axis_mode(d.modes, 2));
-}
-
-ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2) {
-  ConstraintDirection d;
-  d.linear = axis;
-  d.angular1 = axis.cross(arm1);
-  d.angular2 = arm2.cross(axis);
-  return d;
-}
-
-ConstraintDirection turning_about(const Vector3& axis) {
-  ConstraintDirection d;
-  d.angular1 = -axis;
-  d.angular2 = axis;
-  return d;
-}
-
-ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2) {
-  d.turn1 = inverse1 * d.angular1;
-  d.turn2 = inverse2 * d.angular2;
-  return d;
 }
 
 void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end1, const EndBody& end2,
@@ -68,9 +56,39 @@ void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end
   for (std::size_t k = 0; k < 3; ++k) joint->directions[k] = direction_at(axes[k], joint->arm1, joint->arm2);
 }
 
-double missed_by(const JointLaw& law) {
-  return (law.has_lower ? std::max(0.0, law.lower_target) : 0.0) +
-         (law.has_upper ? std::max(0.0, -law.upper_target) : 0.0);
+ConeContact cone_contact(const EndContact& contact, std::uint32_t first, bool has_turning) {
+  const ContactLaw& law = contact.law;
+  ConeContact cone;
+  cone.first = first;
+  cone.has_friction = law.static_friction > 0.0;
+  cone.has_turning = has_turning;
+  cone.target = law.target;
+  cone.slides = contact.slides;
+  cone.static_friction = law.static_friction, cone.dynamic_friction = law.dynamic_friction;
+  cone.rolling_friction = law.rolling_friction, cone.spinning_friction = law.spinning_friction;
+  return cone;
+}
+
+bool ShrinkingSteps::end_with(double change, double size, double rounding) {
+  const std::size_t before = changes_.size();
+  const double enough = std::max(rounding, 1e-14 * size);
+  const double rate = before > 0 ? change / changes_[before - 1] : 1.0;
+  double next = change;
+  if (rate < 1e-2) {
+    next *= rate;
+    const double rate_before = before > 1 ? changes_[before - 1] / changes_[before - 2] : 0.0;
+    if (rate * rate < rate_before * rate_before * rate_before) next *= std::sqrt(rate);
+  }
+  changes_.push_back(change);
+  return next <= enough || (before > 3 && !(rate < 0.9) && change <= 1e-9 * size);
+}
+
+double sum_of_overlaps(const std::vector<EndJoint>& joints, const std::vector<EndContact>& contacts) {
+  double sum = 0.0;
+  for (const EndJoint& joint : joints)
+    for (const JointLaw& law : joint.pose_laws) sum += joint.length * missed_by(law);
+  for (const EndContact& contact : contacts) sum += std::max(0.0, contact.gap_target);
+  return sum;
 }
 
 double way_of(const SolverBody& body, double gyration, double h) {
@@ -78,6 +96,25 @@ double way_of(const SolverBody& body, double gyration, double h) {
   const Twist& velocity = body.trial_velocity;
   return (body.trial.position - body.start.position).norm() + gyration * log_rotation(turn).norm() +
          h * (velocity.linear.norm() + gyration * velocity.angular.norm());
+}
+
+SolverOutcome outcome_of(const std::vector<ConeSummary>& summaries) {
+  SolverOutcome outcome;
+  bool has_converged = true, contradicts = false;
+  for (const ConeSummary& one : summaries) {
+    outcome.iterations += one.iterations;
+    outcome.residual = std::max(outcome.residual, one.residual);
+    has_converged = has_converged && one.has_converged;
+    contradicts = contradicts || one.contradiction > 0.0;
+  }
+  if (!summaries.empty()) outcome.stop_reason = StopReason::kConverged;
+  if (contradicts) outcome.stop_reason = StopReason::kContradiction;
+  if (!has_converged) outcome.stop_reason = StopReason::kIterations;
+  return outcome;
+}
+
+double way_of(const Vector3& point, const SolverBody& one, const SolverBody& two) {
+  return (carried(point, one.trial, one.start) - carried(point, two.trial, two.start)).norm();
 }
 
 void add_work(const ConeRow& row, const BodyMotion& before, const BodyMotion& after, Gain* gain) {

@@ -10,6 +10,7 @@
 #include "plugin_sdk/solver/cone_problem.h"
 #include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/joint_laws.h"
+#include "plugin_sdk/solver/reply.h"
 
 namespace gravitas {
 
@@ -51,18 +52,55 @@ bool is_held(AxisMode mode);
 bool holds_pose(const Discrepancy& d);
 
 // Rows along an axis with the arms of either body, and about one; what they turn the bodies by comes with with_turns().
-ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2);
-ConstraintDirection turning_about(const Vector3& axis);
-ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2);
+inline ConstraintDirection direction_at(const Vector3& axis, const Vector3& arm1, const Vector3& arm2) {
+  ConstraintDirection d;
+  d.linear = axis;
+  d.angular1 = axis.cross(arm1);
+  d.angular2 = arm2.cross(axis);
+  return d;
+}
+
+inline ConstraintDirection turning_about(const Vector3& axis) {
+  ConstraintDirection d;
+  d.angular1 = -axis;
+  d.angular2 = axis;
+  return d;
+}
+
+inline ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inverse1, const Matrix3& inverse2) {
+  d.turn1 = inverse1 * d.angular1;
+  d.turn2 = inverse2 * d.angular2;
+  return d;
+}
 
 // The joint's directions, arms and errors with the bodies at their ends; `turn`: of body 2 against body 1, from S*.
 void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end1, const EndBody& end2,
                 const Vector3& turn, EndJoint* joint);
 
-// By how much a pose law is missed where its row's value is 0, m or rad.
-double missed_by(const JointLaw& law);
+// The contact's cone, with rows from `first` on.
+ConeContact cone_contact(const EndContact& contact, std::uint32_t first, bool has_turning);
+
+// When steps of Newton's method have come to their end.
+class ShrinkingSteps {
+ public:
+  // True if, after a step that changed ways of at most `size` by `change` (m), the next would change them by rounding alone:
+  // by this change times the rate of the last two, and a part of it where the rate fell as fast as that method's does.
+  bool end_with(double change, double size, double rounding);
+  std::size_t count() const { return changes_.size(); }
+
+ private:
+  std::vector<double> changes_;
+};
+
+// Of all islands.
+SolverOutcome outcome_of(const std::vector<ConeSummary>& summaries);
+
+// What is overlapped or missed at S*, m.
+double sum_of_overlaps(const std::vector<EndJoint>& joints, const std::vector<EndContact>& contacts);
 // From S_n to S*, and as far again as v* goes, m.
 double way_of(const SolverBody& body, double gyration, double h);
+// Of two bodies against each other at a point, from S_n to S*, m.
+double way_of(const Vector3& point, const SolverBody& one, const SolverBody& two);
 
 // lambda (J before + J after)/2
 void add_work(const ConeRow& row, const BodyMotion& before, const BodyMotion& after, Gain* gain);
