@@ -102,19 +102,18 @@ void ProfileLdlt::solve_transposed(std::vector<double>* x) const {
     if (!(pivot_[i] > 0.0)) continue;
     const double known = (*x)[i];
     if (known == 0.0) continue;
-    for (std::size_t j = first_[i]; j < i; ++j) (*x)[j] -= values_[begin_[i] + j - first_[i]] * known;
+    const double* row = &values_[begin_[i]];
+    double* to = &(*x)[first_[i]];
+    for (std::size_t j = 0; j < i - first_[i]; ++j) to[j] -= row[j] * known;
   }
 }
 
+// Columns of dropped rows are 0, and so are their unknowns.
 void ProfileLdlt::solve(std::vector<double>* b) const {
-  std::vector<double>& x = *b;
+  double* x = b->data();
   for (std::size_t i = 0; i < size(); ++i) {
-    if (!(pivot_[i] > 0.0)) {
-      x[i] = 0.0;
-      continue;
-    }
-    for (std::size_t j = first_[i]; j < i; ++j)
-      if (pivot_[j] > 0.0) x[i] -= values_[begin_[i] + j - first_[i]] * x[j];
+    const bool is_kept = pivot_[i] > 0.0;
+    x[i] = is_kept ? x[i] - dot(&values_[begin_[i]], x + first_[i], i - first_[i]) : 0.0;
   }
   for (std::size_t i = 0; i < size(); ++i)
     if (pivot_[i] > 0.0) x[i] /= pivot_[i];
@@ -158,6 +157,31 @@ void ProfileLdlt::add(double share, const NullVector& a, NullVector* b) {
 // largest number among rows that are connected, by way of others, with this one.
 bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
   constexpr double kAgrees = 64.0 * std::numeric_limits<double>::epsilon();
+  std::vector<double> y = b, largest;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const double* row = &values_[begin_[i]];
+    const double* before = &y[first_[i]];
+    const std::size_t count = i - first_[i];
+    if (pivot_[i] > 0.0) {
+      y[i] -= dot(row, before, count);
+      continue;
+    }
+    double terms = std::fabs(y[i]);
+    for (std::size_t j = 0; j < count; ++j) {
+      const double term = row[j] * before[j];
+      y[i] -= term;
+      terms += std::fabs(term);
+    }
+    const double left = std::fabs(y[i]);
+    if (left <= kAgrees * terms) continue;
+    if (largest.empty()) largest = largest_of_parts(b);
+    if (!(left <= kAgrees * std::max(terms, largest[i]))) return false;
+  }
+  return true;
+}
+
+// By row, the largest number of a side among rows that are connected with it.
+std::vector<double> ProfileLdlt::largest_of_parts(const std::vector<double>& b) const {
   std::vector<std::size_t> next(size());  // of the same part; the last one's is itself
   const auto last_of = [&](std::size_t row) {
     while (next[row] != row) row = next[row] = next[next[row]];
@@ -168,22 +192,13 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
     for (std::size_t j = first_[i]; j < i; ++j)
       if (values_[begin_[i] + j - first_[i]] != 0.0) next[last_of(j)] = i;
   }
-  std::vector<double> y = b, largest(size(), 0.0);
+  std::vector<double> largest(size(), 0.0);
   for (std::size_t i = 0; i < size(); ++i) {
     double& number = largest[last_of(i)];
     number = std::max(number, std::fabs(b[i]));
   }
-  for (std::size_t i = 0; i < size(); ++i) {
-    double terms = std::fabs(y[i]);
-    for (std::size_t j = first_[i]; j < i; ++j) {
-      if (!(pivot_[j] > 0.0)) continue;
-      const double term = values_[begin_[i] + j - first_[i]] * y[j];
-      y[i] -= term;
-      terms += std::fabs(term);
-    }
-    if (!(pivot_[i] > 0.0) && !(std::fabs(y[i]) <= kAgrees * std::max(terms, largest[last_of(i)]))) return false;
-  }
-  return true;
+  for (std::size_t i = 0; i < size(); ++i) largest[i] = largest[last_of(i)];
+  return largest;
 }
 
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {

@@ -51,6 +51,7 @@ class ProfileLdlt {
   // May the pivot of a row be what rounding left there?
   bool is_rounding(std::size_t row, double pivot);
   bool is_consistent(const std::vector<double>& b) const;
+  std::vector<double> largest_of_parts(const std::vector<double>& b) const;
   void find_null_space() const;
   // L^-T applied in place.
   void solve_transposed(std::vector<double>* x) const;

@@ -47,6 +47,13 @@ struct Row {
   double reach;  // m, the longer arm, or a rod's length; of an angular row 0
 };
 
+// What the rows of a discrepancy's points share.
+struct Arms {
+  Vector3 arm1, arm2;
+  Vector3 bend;  // what velocities alone do to x2 - x1, seen from axes that turn with body 1
+  double reach;
+};
+
 // What gives way, in the state as it was asked.
 struct Spring {
   Row row;
@@ -183,10 +190,12 @@ class ReactionSolver {
     sprung_.assign(bodies_.size(), {});
     for (const Joint& joint : joints_) {
       const Discrepancy& d = joint.discrepancy;
+      if (!acts_as_force(d, 0) && !acts_as_force(d, 1) && !acts_as_force(d, 2)) continue;
       const Matrix3 axes = to_rotation_matrix(d.axes);
+      const Arms arms = arms_of(d, joint);
       for (int axis = 0; axis < 3; ++axis) {
         if (!acts_as_force(d, axis)) continue;
-        const Row row = row_of_axis(d, axes, axis, joint);
+        const Row row = row_of_axis(d, axes, axis, arms, joint);
         const Vector3 along = d.is_angular() ? Vector3(axes.col(axis)) : row.direction.linear;
         const JointAxisState state = joint_axis_state(d, axis, along, d.point2 - d.point1);
         const double velocity = row.direction.along(bodies_[joint.body1].velocity, bodies_[joint.body2].velocity);
@@ -211,9 +220,10 @@ class ReactionSolver {
     for (const Joint& joint : joints_) {
       const Discrepancy& d = at_pose(joint);
       const Matrix3 axes = to_rotation_matrix(d.axes);
+      const Arms arms = arms_of(d, joint);
       for (int axis = 0; axis < 3; ++axis) {
         if (!holds_always(d, axis)) continue;
-        Row row = row_of_axis(d, axes, axis, joint);
+        Row row = row_of_axis(d, axes, axis, arms, joint);
         const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
         row.direction = with_turns(row.direction, one.inverse_inertia, two.inverse_inertia);
         row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
@@ -243,27 +253,36 @@ class ReactionSolver {
     return d;
   }
 
-  Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Joint& joint) const {
-    Row row = d.is_radial() && axis == 0 ? radial_row(d, joint) : axis_row(d, axes.col(axis), joint);
+  Arms arms_of(const Discrepancy& d, const Joint& joint) const {
+    if (d.is_angular()) return {};
+    const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
+    // a drive acts where it is in body 1
+    const Vector3 at = holds_pose(d) ? d.point2 : d.point1;
+    Arms arms{at - first.pose.position, at - second.pose.position, {}, 0.0};
+    const Vector3 relative = second.velocity_at(arms.arm2) - first.velocity_at(arms.arm1);
+    arms.bend =
+        second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(relative);
+    arms.reach = longer_arm(first, arms.arm1, second, arms.arm2);
+    return arms;
+  }
+
+  Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const {
+    Row row = d.is_radial() && axis == 0 ? radial_row(d, arms, joint) : axis_row(d, axes.col(axis), arms, joint);
     row.place = joint.place + static_cast<std::size_t>(axis);
     return row;
   }
 
-  Row axis_row(const Discrepancy& d, const Vector3& axis, const Joint& joint) const {
-    const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
-    const Vector3 &w1 = first.velocity.angular, &w2 = second.velocity.angular;
-    Row row{joint.body1, joint.body2, 0, turning_about(axis), axis.dot(d.point2 - d.point1), 0.0, 0.0, 0.0, 0.0};
+  Row axis_row(const Discrepancy& d, const Vector3& axis, const Arms& arms, const Joint& joint) const {
+    Row row{joint.body1, joint.body2, 0, {}, axis.dot(d.point2 - d.point1), 0.0, 0.0, 0.0, 0.0};
     if (d.is_angular()) {
+      const Vector3 &w1 = bodies_[joint.body1].velocity.angular, &w2 = bodies_[joint.body2].velocity.angular;
+      row.direction = turning_about(axis);
       row.gamma = turning_of(d, axis, w1, w2).dot(w2 - w1);
       return row;
     }
-    // a drive acts where it is in body 1
-    const Vector3 at = holds_pose(d) ? d.point2 : d.point1;
-    const Vector3 arm1 = at - first.pose.position, arm2 = at - second.pose.position;
-    const Vector3 relative = second.velocity_at(arm2) - first.velocity_at(arm1);
-    row.direction = direction_at(axis, arm1, arm2);
-    row.reach = longer_arm(first, arm1, second, arm2);
-    row.gamma = axis.dot(second.centripetal(arm2) - first.centripetal(arm1) - 2.0 * w1.cross(relative));
+    row.direction = direction_at(axis, arms.arm1, arms.arm2);
+    row.reach = arms.reach;
+    row.gamma = axis.dot(arms.bend);
     return row;
   }
 
@@ -277,11 +296,11 @@ class ReactionSolver {
   }
 
   // Of a rod without length there is no direction: the first axis stands in.
-  Row radial_row(const Discrepancy& d, const Joint& joint) const {
+  Row radial_row(const Discrepancy& d, const Arms& arms, const Joint& joint) const {
     const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
     const Vector3 error = d.point2 - d.point1;
     const double length = error.norm();
-    if (!(length > 0.0)) return axis_row(d, to_rotation_matrix(d.axes).col(0), joint);
+    if (!(length > 0.0)) return axis_row(d, to_rotation_matrix(d.axes).col(0), arms, joint);
     const Vector3 direction = error / length;
     const Vector3 arm1 = d.point1 - first.pose.position, arm2 = d.point2 - second.pose.position;
     const Vector3 rate = second.velocity_at(arm2) - first.velocity_at(arm1);
@@ -415,7 +434,8 @@ class ReactionSolver {
     factor_.start(first_);
     for (std::size_t i = 0; i < rows_.size(); ++i)
       for (std::size_t j = first_[i]; j <= i; ++j)
-        factor_.entry(i, j) = coupling(rows_[i], rows_[j], bodies_) / (rows_[i].scale * rows_[j].scale);
+        if (const double shared = coupling(rows_[i], rows_[j], bodies_); shared != 0.0)
+          factor_.entry(i, j) = shared / (rows_[i].scale * rows_[j].scale);
     factor_.factorise(least);
   }
 
