@@ -22,7 +22,7 @@ namespace detail {
 JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
                       std::span<const double> orientation, std::size_t joint) {
   return {pose_of(position, orientation, constraint_body[2 * joint]),
-          pose_of(position, orientation, constraint_body[2 * joint + 1])};
+          pose_of(position, orientation, constraint_body[2 * joint + 1]), constraint_body[2 * joint + 1] != kNone};
 }
 
 std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row) {

@@ -18,6 +18,11 @@ namespace gravitas {
 // A joint in a state. The world is a body at the origin, at rest.
 struct JointBodies {
   Pose pose1, pose2;  // of the centres of mass
+  bool has_body2 = true;
+
+  // The centre of mass of body 2, or where that is the world of body 1: a place that is no long way from what the joint
+  // holds, wherever the origin is.
+  const Vector3& centre() const { return has_body2 ? pose2.position : pose1.position; }
 };
 
 // Appends numbers that PropertyCursor reads back.

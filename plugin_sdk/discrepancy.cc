@@ -5,6 +5,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
 
@@ -21,11 +22,42 @@ Vector3 carried(const Vector3& point, const Pose& from, const Pose& to) {
   return to.orientation * (from.orientation.conjugate() * (point - from.position)) + to.position;
 }
 
+Swing swing_between(const Vector3& first, const Vector3& second) {
+  const Vector3 across = first.cross(second);
+  const double sine = across.norm();
+  // below, the direction is rounding's
+  const Vector3 axis = sine > 1e-12 ? Vector3(across / sine) : orthonormal_basis(first).first;
+  return {math::atan2(sine, first.dot(second)), axis};
+}
+
+SwingDirections swing_directions(const Discrepancy& swing) {
+  const Vector3 first = swing.axes * Vector3::UnitY();
+  return {first, exp_rotation(swing.point2) * first};
+}
+
+double held_angle(const Discrepancy& swing) { return (swing.axes * Vector3::UnitX()).dot(swing.point1); }
+
+void set_swing(const SwingDirections& directions, double angle, Discrepancy* swing) {
+  const Swing now = swing_between(directions.first, directions.second);
+  swing->point1 = angle * now.axis;
+  swing->point2 = now.angle * now.axis;
+  Matrix3 axes;
+  axes << now.axis, directions.first, now.axis.cross(directions.first);
+  swing->axes = to_quaternion(axes);
+}
+
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2) {
   const Vector3 error = discrepancy.point2 - discrepancy.point1;
   if (!discrepancy.is_angular())
     return carried(discrepancy.point2, now2, then2) - carried(discrepancy.point1, now1, then1);
+  if (discrepancy.is_swing()) {
+    const auto [first, second] = swing_directions(discrepancy);
+    const double angle = swing_between(then1.orientation * (now1.orientation.conjugate() * first),
+                                       then2.orientation * (now2.orientation.conjugate() * second))
+                             .angle;
+    return (angle - held_angle(discrepancy)) * (discrepancy.axes * Vector3::UnitX());
+  }
   const Vector3 turn1 = log_rotation(then1.orientation * now1.orientation.conjugate());
   const Vector3 turn2 = log_rotation(then2.orientation * now2.orientation.conjugate());
   return error + turn2 - turn1;

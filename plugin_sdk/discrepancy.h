@@ -102,8 +102,26 @@ JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, co
 // the body has pose `to`.
 Vector3 carried(const Vector3& point, const Pose& from, const Pose& to);
 
+// How the second of two unit directions is turned from the first: angle (0 ... pi) and unit axis; any axis across where
+// they are parallel.
+struct Swing {
+  double angle = 0.0;
+  Vector3 axis = Vector3::Zero();
+};
+Swing swing_between(const Vector3& first, const Vector3& second);
+
+// The two directions of a swing, and a swing as two others make it, held at the same angle.
+struct SwingDirections {
+  Vector3 first, second;
+};
+SwingDirections swing_directions(const Discrepancy& swing);
+void set_swing(const SwingDirections& directions, double angle, Discrepancy* swing);
+// The angle that a swing is held at.
+double held_angle(const Discrepancy& swing);
+
 // Error x2 - x1 (world) when the bodies are at `then` poses, for a discrepancy that was written at `now` poses.
-// Exact for points; an angular error is carried to first order in the rotation between the two.
+// Exact for points, and along the first axis for swings; other angular errors are carried to first order in the rotation
+// between the two.
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2);
 

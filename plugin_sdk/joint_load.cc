@@ -15,10 +15,10 @@ Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::
   return discrepancy.axes * along;
 }
 
-// Velocity per impulse along a row, 1/kg.
-double response(const JointBody& body, const Vector3& angular_row) {
+// Velocity per impulse along a row, 1/kg or 1/(kg m^2).
+double response(const JointBody& body, const Vector3& linear_row, const Vector3& angular_row) {
   const Vector3 local = body.trial.orientation.conjugate() * angular_row;
-  return body.inverse_mass + local.dot(body.inverse_moments.cwiseProduct(local));
+  return body.inverse_mass * linear_row.squaredNorm() + local.dot(body.inverse_moments.cwiseProduct(local));
 }
 
 }  // namespace
@@ -39,9 +39,9 @@ JointLoad joint_load(const JointRows& joint, const JointBody& body1, const Joint
 double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const JointBody& body1, const JointBody& body2,
                  double time_step) {
   const double size = impulse.norm();
-  if (discrepancy.is_angular() || !(size > 0.0)) return 0.0;
+  if (!(size > 0.0)) return 0.0;
   const JacobianRow row = jacobian_row(discrepancy, impulse / size, body1.trial.position, body2.trial.position);
-  return size * time_step * (response(body1, row.angular1) + response(body2, row.angular2));
+  return size * time_step * (response(body1, row.linear1, row.angular1) + response(body2, row.linear2, row.angular2));
 }
 
 double held_back(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {

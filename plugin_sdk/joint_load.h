@@ -32,7 +32,7 @@ struct JointLoad {
 JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
 
 // How far a discrepancy would have come open in the step without the impulse (N s, world) that held it, m:
-// |impulse| h / m_eff, with m_eff the mass that the bodies at S* show along it. 0 for the angular twin.
+// |impulse| h / m_eff, with m_eff the mass that the bodies at S* show along it; rad for the angular twin, with moments.
 double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const JointBody& body1, const JointBody& body2,
                  double time_step);
 

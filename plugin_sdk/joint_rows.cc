@@ -97,22 +97,10 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode) {
   return d;
 }
 
-Swing swing_between(const Vector3& first, const Vector3& second) {
-  const Vector3 across = first.cross(second);
-  const double sine = across.norm();
-  // below, the direction is rounding's
-  const Vector3 axis = sine > 1e-12 ? Vector3(across / sine) : orthonormal_basis(first).first;
-  return {math::atan2(sine, first.dot(second)), axis};
-}
-
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle) {
-  const Swing swing = swing_between(first, second);
-  Discrepancy d = row_about(swing.axis, swing.angle, AxisMode::kLocked);
-  d.point1 = angle * swing.axis;
-  Matrix3 axes;
-  axes << swing.axis, first, swing.axis.cross(first);
-  d.axes = to_quaternion(axes);
-  d.modes |= kSwingDiscrepancy;
+  Discrepancy d;
+  set_swing({first, second}, angle, &d);
+  d.modes = pack_modes(AxisMode::kLocked, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kSwingDiscrepancy;
   return d;
 }
 

@@ -1,8 +1,9 @@
 // For authors of joints: the rows that the shipped joints are made of, in the form of discrepancy.h.
 //
-// A joint keeps a frame in each body. The frames coincide at the start; what the joint holds is said by where points of
-// body 2's frame are in body 1's. An orientation is held by points one metre from the origin, so that an angular error of
-// 1 rad is one of 1 m, and is exact for turns of any size, which an angular row (a rotation vector) is to first order only.
+// A joint keeps a frame in each body. The frames coincide at the start; what the joint holds is said by where a point of
+// body 2's frame is in body 1's, and by angles between axes of the two frames (swings). These are exact for turns of any
+// size, which a rotation vector is to first order only, and they weigh turns by themselves: points so far from the origin
+// would weigh them against ways, which is right for bodies of about that size alone. An error of 1 rad counts as 1 m.
 #pragma once
 
 #include <string_view>
@@ -10,6 +11,8 @@
 #include "plugin_sdk/constraint.h"
 
 namespace gravitas {
+
+inline constexpr double kQuarterTurn = 1.57079632679489661923;
 
 // Throws Refusal if a joint is not of the type.
 void demand_type(std::uint64_t type, std::string_view name);
@@ -51,13 +54,19 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 // The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi).
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle);
 
-// How the second of two unit directions is turned from the first: angle (0 ... pi) and unit axis; any axis across where
-// they are parallel.
-struct Swing {
-  double angle = 0.0;
-  Vector3 axis = Vector3::Zero();
-};
-Swing swing_between(const Vector3& first, const Vector3& second);
+// Calls emit with the rows that keep axes of two frames across each other: the first of frame 2 across the second and
+// third of frame 1, so that frame 2 turns about it only; and its second across the third of frame 1, which leaves no turn.
+template <typename Emit>
+void hold_axis(const Pose& frame1, const Pose& frame2, Emit&& emit) {
+  const Vector3 axis = frame2.orientation * Vector3::UnitX();
+  emit(swing_row(frame1.orientation * Vector3::UnitY(), axis, kQuarterTurn));
+  emit(swing_row(frame1.orientation * Vector3::UnitZ(), axis, kQuarterTurn));
+}
+template <typename Emit>
+void hold_orientation(const Pose& frame1, const Pose& frame2, Emit&& emit) {
+  hold_axis(frame1, frame2, emit);
+  emit(swing_row(frame1.orientation * Vector3::UnitZ(), frame2.orientation * Vector3::UnitY(), kQuarterTurn));
+}
 
 // Twist of frame 2 about its first axis after the shortest turn that takes the first axis of frame 1 to it, -pi ... pi.
 // Its rate is w.(a1 + a2)/(1 + a1.a2), w the turning of frame 2 relative to frame 1, a1 and a2 the first axes.

@@ -139,10 +139,14 @@ class Balance {
     }
   }
 
-  // Linear ones turn with body 1, a radial axis with its points.
+  // Linear ones turn with body 1, a radial axis with its points, a swing's with its directions.
   Matrix3 axes_of(std::size_t i, const Discrepancy& d, Directions directions) const {
     const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
     Matrix3 axes = d.axes.toRotationMatrix();
+    if (directions == Directions::kOfEnd && d.is_swing()) {
+      const auto [first, second] = swing_directions(d);
+      axes.col(0) = swing_between(exp_rotation(turn_of(one)) * first, exp_rotation(turn_of(two)) * second).axis;
+    }
     if (directions == Directions::kOfTrial || d.is_angular()) return axes;
     axes = exp_rotation(turn_of(one)).toRotationMatrix() * axes;
     const Vector3 between = carried(two, d.point2) - carried(one, d.point1);
@@ -330,6 +334,7 @@ class Balance {
       const Matrix3 axes = d.axes.toRotationMatrix();
       const auto turned_axis = [&](int axis, const Pose& pose, const Vector3& error) -> Vector3 {
         if (d.is_radial() && axis == 0) return error.normalized();
+        if (d.is_swing()) return axes.col(axis);
         return pose.orientation * (trial1.orientation.conjugate() * axes.col(axis));
       };
       const Pose end1 = end_pose(one, trial1), end2 = end_pose(two, trial2);

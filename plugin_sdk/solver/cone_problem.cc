@@ -292,7 +292,24 @@ void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, doubl
     if (missing <= rounding) break;
   }
   summary->residual = std::max(summary->residual, missing);
-  summary->has_converged = summary->has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * summed());
+  summary->has_converged =
+      summary->has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * largest_held_sum());
+}
+
+// A row's value is summed from what all rows of its bodies push: a hinge's turn about a thin rod is, too, from what holds the
+// rod's end, whatever its own torque.
+double ConeProblem::largest_held_sum() const {
+  const auto pushed = [&](const std::vector<std::uint32_t>& list) {
+    double most = 0.0;
+    for (const std::uint32_t i : list) most = std::max(most, scale_[held_[i]] * std::fabs(rows[held_[i]].multiplier));
+    return most;
+  };
+  std::vector<double> of_body(held_of_body_.size());
+  std::ranges::transform(held_of_body_, of_body.begin(), pushed);
+  double most = 0.0;
+  for (const std::uint32_t r : held_)
+    most = std::max(most, scale_[r] * rows[r].length * std::max(of_body[rows[r].body1], of_body[rows[r].body2]));
+  return most;
 }
 
 double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {

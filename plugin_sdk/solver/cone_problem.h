@@ -174,6 +174,8 @@ class ConeProblem {
                    ConeSummary* summary);
   // Mends the held rows; returns by how much they were off (m/s, m).
   double refine_held(const SolverBodies& bodies, const BodyMotion& x0);
+  // Largest of what the value of a held row is summed from, m/s, m.
+  double largest_held_sum() const;
 
   std::vector<double> scale_;                // by row, root of W_ii; 0: pushes nothing
   std::vector<std::uint32_t> held_, other_;  // rows

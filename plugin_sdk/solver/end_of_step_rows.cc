@@ -29,6 +29,14 @@ bool holds_pose(const Discrepancy& d) {
 void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end1, const EndBody& end2,
                 const Vector3& turn, EndJoint* joint) {
   const Discrepancy& d = joint->discrepancy;
+  if (d.is_swing()) {
+    const auto [first, second] = swing_directions(d);
+    const Vector3 turned = end1.turn * first;
+    const Swing swing = swing_between(turned, end2.turn * second);
+    joint->errors = {swing.angle - joint->axes.col(0).dot(d.point1), 0.0, 0.0};
+    joint->directions = {turning_about(swing.axis), turning_about(turned), turning_about(swing.axis.cross(turned))};
+    return;
+  }
   if (d.is_angular()) {
     const Vector3 error = d.point2 - d.point1 + turn;
     for (int k = 0; k < 3; ++k) {

@@ -240,12 +240,20 @@ class ReactionSolver {
     return axis_mode(d.modes, axis) == AxisMode::kLimited ? d.lower[axis] : 0.0;
   }
 
-  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error, which is to first order.
+  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's, which is
+  // to first order.
   const Discrepancy& at_pose(const Joint& joint) {
     if (!has_moved_) return joint.discrepancy;
     const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
     Discrepancy& d = carried_;
     d = joint.discrepancy;
+    if (d.is_swing()) {
+      const auto [first, second] = swing_directions(d);
+      set_swing({one.pose.orientation * (one.asked.orientation.conjugate() * first),
+                 two.pose.orientation * (two.asked.orientation.conjugate() * second)},
+                held_angle(d), &d);
+      return d;
+    }
     const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
     if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
     d.point2 = d.point1 + error;

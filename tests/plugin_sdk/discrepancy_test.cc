@@ -151,6 +151,25 @@ TEST(DiscrepancyError, OfTheAngularTwinCountsTheTurnsOfBothBodies) {
   EXPECT_NEAR(error_at(d, still, still, still, other_name).z(), 0.6, 1e-15);
 }
 
+// Of any turn, of either body: the angle is that of the directions themselves.
+TEST(DiscrepancyError, OfASwingIsTheAngleThatItsDirectionsHave) {
+  Draw random(11);
+  for (int i = 0; i < 50; ++i) {
+    const Vector3 first = random.direction(), second = random.direction();
+    Discrepancy d;
+    set_swing({first, second}, 0.7, &d);
+    d.modes = pack_modes(AxisMode::kLocked, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kSwingDiscrepancy;
+    EXPECT_LT((swing_directions(d).second - second).norm(), 1e-14);
+    EXPECT_NEAR(held_angle(d), 0.7, 1e-15);
+    const Pose now1 = random.pose(3.0), now2 = random.pose(3.0), then1 = random.pose(3.0), then2 = random.pose(3.0);
+    const Vector3 turned1 = then1.orientation * (now1.orientation.conjugate() * first);
+    const Vector3 turned2 = then2.orientation * (now2.orientation.conjugate() * second);
+    // of directions that are nearly parallel an arc cosine knows half of the digits
+    EXPECT_NEAR(joint_error(d, error_at(d, now1, now2, then1, then2)), std::fabs(std::acos(turned1.dot(turned2)) - 0.7),
+                1e-12);
+  }
+}
+
 TEST(CarriedPoint, StaysWithItsBody) {
   Draw random(7);
   for (int i = 0; i < 200; ++i) {

@@ -28,7 +28,9 @@ TEST(JointLoad, HeldBackIsTheWayThatTheImpulseKeptFrom) {
   // either end of a pair
   EXPECT_NEAR(held_back(d, -Vector3::UnitY(), rod, rod, h), h * 8 * 0.5, 1e-16);
   d.modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked, true);
-  EXPECT_EQ(held_back(d, Vector3::UnitY(), world, rod, h), 0.0);
+  // about an axis it is an angle
+  EXPECT_NEAR(held_back(d, Vector3::UnitY(), world, rod, h), h * 6, 1e-16);
+  EXPECT_EQ(held_back(d, Vector3::UnitX(), world, rod, h), 0.0);
 }
 
 // The principal axes turn with the body: the same rod along y.

@@ -1,11 +1,12 @@
-// Constraint `Revolute` (§ 2.7.5.3, 2.84): a hinge. Two points of an axis, fixed in both bodies, stay the same two points.
+// Constraint `Revolute` (§ 2.7.5.3, 2.84): a hinge. A point and the direction of an axis, fixed in both bodies, stay the same.
 //
-//      body 1  ----x--a-->--x----  body 2      x: anchors half a metre to either side of the middle of
-//                 p1   m    p2                    BindAxisPoint1 and BindAxisPoint2
+//      body 1  --------o--a-->-----  body 2      o: the point of the axis that lies nearest to the centre of body 2 (of
+//                                                   body 1 where body 2 is the world) at the start
 //
-// Freedoms. Each anchor locks three axes: six rows. Anchored at m, body 2 may turn only (three freedoms left of six); the
-// second anchor holds the two turns across the axis and, once more, the translation along it: rank 5, one row redundant,
-// one freedom left, the turn about a. (2.84 puts the arm of body 1 on both bodies; each has its own.)
+// Freedoms. The point takes the translations; a across two directions of body 1 that are across it takes the two turns
+// across the axis: five rows of rank 5, none redundant, one freedom left, the turn about a. (The seed holds two points, six
+// rows; 2.84 puts the arm of body 1 on both bodies; each has its own.) Where the scene's points lie on the axis is nothing
+// to the rows: with a point far out, ways and turns could not be told apart.
 // With limits one row more about a, active only at a limit: rank 6 there. The angle is that of body 2 relative to body 1,
 // right-handed about point 1 -> point 2, zero at the start, known within one turn: two limits may span less than that.
 #include "plugin_sdk/joint_rows.h"
@@ -51,8 +52,8 @@ class Revolute final : public ConstraintPlugin {
               limits.upper < kUnlimited)
             throw Refusal("Revolute: UpperLimit lies a full turn or more above LowerLimit, which limits nothing");
           if (point1 == point2) throw Refusal("Revolute: BindAxisPoint1 and BindAxisPoint2 are the same point");
-          const Pose frame = frame_along(0.5 * (point1 + point2),
-                                         unit_axis(point2 - point1, "Revolute: BindAxisPoint1, BindAxisPoint2"));
+          const Vector3 axis = unit_axis(point2 - point1, "Revolute: BindAxisPoint1, BindAxisPoint2");
+          const Pose frame = frame_along(point1 + axis.dot(bodies.centre() - point1) * axis, axis);
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           out.number(limits.lower);
@@ -64,12 +65,11 @@ class Revolute final : public ConstraintPlugin {
                      const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-      for (const double way : {-0.5, 0.5}) {
-        Discrepancy anchor;
-        anchor.point1 = transform_point(one, way * Vector3::UnitX());
-        anchor.point2 = transform_point(two, way * Vector3::UnitX());
-        emit(anchor);
-      }
+      Discrepancy anchor;
+      anchor.point1 = one.position;
+      anchor.point2 = two.position;
+      emit(anchor);
+      hold_axis(one, two, emit);
       JointLimits limits;
       limits.lower = bound.number();
       limits.upper = bound.number();

@@ -1,13 +1,12 @@
 // Constraint `Rigid` (§ 2.7.5.4): two bodies as one.
 //
-//      z  y          three points of body 2's frame in body 1's: the origin in x, y, z; the one
-//      | /           a metre out along x in y and z; the one a metre out along y in z
+//      z  y          of body 2's frame in body 1's: the origin in x, y, z; x across y and z of body 1's,
+//      | /           y across its z
 //      |/___ x
 //
-// Freedoms. The origin's three rows take the translations. With it held, y and z of the first point are the turns about z
-// and y, and z of the second is the turn about x: six rows of rank 6, none redundant. (The seed locks three points fully:
-// nine rows of rank 6, of rank 5 where it puts them on a line.) Turned by half a turn about an axis of the frame the rows
-// would hold too; nothing gets there but by a jump.
+// Freedoms. The origin's three rows take the translations, the angles the turns about z, y and x: six rows of rank 6, none
+// redundant. (The seed locks three points fully: nine rows of rank 6, of rank 5 where it puts them on a line.) Turned by
+// half a turn about an axis of the frame the rows would hold too; nothing gets there but by a jump.
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -23,8 +22,8 @@ class Rigid final : public ConstraintPlugin {
             .types = {{"Rigid",
                        "Two bodies keep their relative pose.",
                        {Property::vector("BindPoint", "m", "world")
-                            .means("The point that the joint error is measured at; the centre of mass of body 2 if "
-                                   "absent.")}}}};
+                            .means("The point that the joint error is measured at; the centre of mass of body 2, or of "
+                                   "body 1 where that is the world, if absent.")}}}};
   }
   explicit Rigid(PropertyCursor) {}
 
@@ -33,7 +32,7 @@ class Rigid final : public ConstraintPlugin {
               [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
                 demand_type(type, "Rigid");
                 Vector3 point = properties.vector();
-                if (point.array().isNaN().all()) point = bodies.pose2.position;
+                if (point.array().isNaN().all()) point = bodies.centre();
                 const Pose frame{point, Quaternion::Identity()};
                 write_frame(bodies.pose1, frame, &out);
                 write_frame(bodies.pose2, frame, &out);
@@ -45,8 +44,7 @@ class Rigid final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       emit(held_point(one, two.position, {true, true, true}));
-      emit(held_point(one, transform_point(two, Vector3::UnitX()), {false, true, true}));
-      emit(held_point(one, transform_point(two, Vector3::UnitY()), {false, false, true}));
+      hold_orientation(one, two, emit);
     });
   }
 };

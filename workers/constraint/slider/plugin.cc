@@ -1,11 +1,10 @@
 // Constraint `Slider`: body 2 slides along an axis of body 1 and does not turn.
 //
-//      body 1 |====o====>====|  x = Axis      points of body 2's frame in body 1's: the origin and the one a
-//                 body 2                      metre out along x in y and z; the one out along y in z
+//      body 1 |====o====>====|  x = Axis      of body 2's frame in body 1's: the origin in y and z; x across y and
+//                 body 2                      z of body 1's, y across its z
 //
-// Freedoms. The origin's two rows take the translations across the axis; with it held, y and z of the point out along x
-// are the turns about z and y, z of the one out along y the turn about x: five rows of rank 5, none redundant, one freedom
-// left. The rows are taken where body 2 is, so that a long way along the axis is no lever.
+// Freedoms. The origin's two rows take the translations across the axis, the angles the turns about z, y and x: five rows
+// of rank 5, none redundant, one freedom left. The rows are taken where body 2 is, so that a long way along the axis is no lever.
 // The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit) and a
 // drive to a speed with a largest force (one row on the velocity, rank 6).
 #include <cmath>
@@ -64,8 +63,7 @@ class Slider final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       emit(held_point(one, two.position, {false, true, true}));
-      emit(held_point(one, transform_point(two, Vector3::UnitX()), {false, true, true}));
-      emit(held_point(one, transform_point(two, Vector3::UnitY()), {false, false, true}));
+      hold_orientation(one, two, emit);
 
       const Vector3 axis = one.orientation * Vector3::UnitX();
       JointLimits limits;

@@ -2,9 +2,8 @@
 //
 //      Axis1 (body 1)  --+--  Axis2 (body 2)      the points coincide, and the bars keep their angle
 //
-// Freedoms. The shared point takes the translations. With it held, the point a metre out along Axis2 keeps its height over
-// the plane of body 1 across Axis1: a1.(w x a2) = w.(a2 x a1), one turn, about the normal of both bars. Four rows of rank
-// 4 while the bars are not parallel, none redundant; left are the turns about either bar.
+// Freedoms. The shared point takes the translations. The angle of the bars changes at the rate w.n, n = a1 x a2/|a1 x a2|:
+// one turn, about the normal of both bars. Four rows of rank 4 while the bars are not parallel, none redundant; left are the turns about either bar.
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <string>
 
@@ -42,7 +41,7 @@ class Universal final : public ConstraintPlugin {
                 if (axis1.cross(axis2).norm() < 1e-6) throw Refusal("Universal: Axis2 is parallel to Axis1");
                 write_frame(bodies.pose1, frame_along(point, axis1), &out);
                 write_frame(bodies.pose2, frame_along(point, axis2), &out);
-                out.number(axis1.dot(axis2));
+                out.number(swing_between(axis1, axis2).angle);
               });
   }
 
@@ -50,9 +49,8 @@ class Universal final : public ConstraintPlugin {
                      const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-      const double height = bound.number();
       emit(held_point(one, two.position, {true, true, true}));
-      emit(held_point(one, transform_point(two, Vector3::UnitX()), {true, false, false}, {height, 0.0, 0.0}));
+      emit(swing_row(one.orientation * Vector3::UnitX(), two.orientation * Vector3::UnitX(), bound.number()));
     });
   }
 };
