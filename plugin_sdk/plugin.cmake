@@ -32,7 +32,7 @@ function(gravitas_plugin name folder output)
       target_link_libraries(${plugin} PRIVATE ${objects})
     endif()
     target_link_options(${plugin} PRIVATE
-      -Wl,--exclude-libs,ALL -Wl,--version-script=${GRAVITAS_PLUGIN_MAP}
+      -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--version-script=${GRAVITAS_PLUGIN_MAP}
       # Clang's sanitizers live in the program, so with them a library may leave symbols open
       $<$<CXX_COMPILER_ID:GNU>:-Wl,--no-undefined,-z,defs>)
     gravitas_share_precompiled(${plugin} gravitas_sdk)
