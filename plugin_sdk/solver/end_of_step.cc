@@ -38,15 +38,15 @@ class IslandSolver {
     const double share = request_.theta() * request_.time_step();
     guess_offset(share);
     int failures = 0;
-    for (int round = 0; round < kRounds; ++round) {
+    for (; round_ < kRounds; ++round_) {
       const BodyMotion before = displacement_;
       // impulses that wander from round to round are held more
-      if (round == kFreeRounds) settings_.proximal *= 10.0;
+      if (round_ == kFreeRounds) settings_.proximal *= 10.0;
       solve_pose();
       const bool closes = find_closed();
       // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
       has_settled_ =
-          round > 0 && has_velocity_ && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
+          round_ > 0 && has_velocity_ && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
       if (has_settled_) break;
       solve_velocity();
       host.mark_progress();
@@ -226,14 +226,16 @@ class IslandSolver {
     move_joint(bodies_[joint->body1], bodies_[joint->body2], end_[joint->body1], end_[joint->body2], turn, joint);
   }
 
+  // What moves is found to rounding, as errors would add up over steps; but in the end positions and velocities must agree.
+  bool may_rest() const { return summary_.iterations == 0 || round_ >= kFreeRounds; }
+
   // ---- pose change
 
   void solve_pose() {
     settings_.is_rough = true;
     ShrinkingSteps steps;
     for (bool is_last = false; !is_last;) {
-      // what moves, if only by rounding, is found to rounding: errors would add up from step to step
-      settings_.may_rest = summary_.iterations == 0;
+      settings_.may_rest = may_rest();
       move_to_end();
       stiffen();
       build_pose();
@@ -360,7 +362,7 @@ class IslandSolver {
 
   void solve_velocity() {
     const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
-    settings_.may_rest = summary_.iterations == 0;
+    settings_.may_rest = may_rest();
     // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
     if (may_turn()) {
       build_velocity(false);
@@ -569,6 +571,7 @@ class IslandSolver {
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   ConeSummary summary_;
+  int round_ = 0;
   StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
 };
