@@ -151,7 +151,7 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
       for (std::uint32_t k = 0; k < block.count; ++k) put(i + k, 0.0);
       continue;
     }
-    hold(i, missing);
+    hold(i, pressed > 0.0 ? pressed - lambda[i] : missing);
     const Bounds bounds = bounds_of(block);
     if (bounds.turning != 1 && block.count > 1) disc(i + 1, i, bounds.friction, pressed);
     if (bounds.turning == 0) continue;
