@@ -130,16 +130,14 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     project(block, &lambda[i], &y[i], projected);
     if (block.contact < 0) {
       const JointLaw& law = block.law;
-      const double slack = -corner / scale_[other_[block.first]];
       const double to_lower = law.lower_target - y[i], to_upper = law.upper_target - y[i];
-      const bool is_within = std::fabs(projected[0]) < law.bound;
+      const double slack = corner / scale_[other_[block.first]];
+      const bool is_within = std::fabs(projected[0]) < law.bound, is_at_corner = !may_slide && is_within;
       if (is_within && (projected[0] != 0.0 || law.is_equality())) {
         hold(i, projected[0] - lambda[i]);
-      } else if (may_slide || !is_within) {
-        put(i, projected[0]);
-      } else if (law.has_lower && lambda[i] + to_lower > slack) {
+      } else if (is_at_corner && law.has_lower && lambda[i] + to_lower > -slack) {
         hold(i, to_lower);
-      } else if (law.has_upper && lambda[i] + to_upper < -slack) {
+      } else if (is_at_corner && law.has_upper && lambda[i] + to_upper < slack) {
         hold(i, to_upper);
       } else {
         put(i, projected[0]);
