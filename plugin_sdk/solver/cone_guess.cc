@@ -12,9 +12,6 @@ namespace {
 // stack at rest keeps its impulses then, in place of finding them anew for what rounding moves its contacts.
 constexpr double kGuessRounding = 1024.0 * kEpsilon;
 
-// And what steps away from it may leave.
-constexpr double kStepRounding = 16.0 * kEpsilon;
-
 constexpr std::uint32_t kSteps = 6;
 
 }  // namespace
@@ -42,7 +39,7 @@ bool ConeProblem::is_solved_near_guess(const SolverBodies& bodies, const BodyMot
     enough = std::max(tolerance, rounding * sum);
     return residual_of(lambda_, y);
   };
-  double least = look(settings.may_rest ? kGuessRounding : kStepRounding);
+  double least = look(settings.may_rest ? kGuessRounding : kSumRounding);
   Eigen::VectorXd best = lambda_, best_y = y;
   if (least > enough && tolerance > 0.0 && settings.method == ConeMethod::kNewton) {
     // an earlier round's factors will mostly do
@@ -50,7 +47,7 @@ bool ConeProblem::is_solved_near_guess(const SolverBodies& bodies, const BodyMot
     bool is_old = !factors.rows.empty();
     for (bool is_last = false; done < kSteps && take_held_step(bodies, settings.proximal, tolerance, y, &factors);) {
       ++done;
-      const double residual = look(kStepRounding);
+      const double residual = look(kSumRounding);
       const bool is_nearing = residual < 0.5 * least;
       if (residual < least) least = residual, best = lambda_, best_y = y;
       if (is_last || least <= kEpsilon * sum || (!is_nearing && !is_old)) break;

@@ -10,9 +10,6 @@
 namespace gravitas {
 namespace {
 
-// Of the largest terms of a row's sum, what may be left by rounding.
-constexpr double kSumRounding = 16.0 * kEpsilon;
-
 // What is left of held rows is rounding where it is this many units of what their multipliers do.
 constexpr double kRefined = 4.0;
 

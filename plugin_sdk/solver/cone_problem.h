@@ -15,7 +15,8 @@
 //  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt, dependent rows
 //     left out, contradicting ones at their least-squares compromise. What the other rows then feel of each other is
 //     W' = W_OO - W_OE W_EE^-1 W_EO: a joint with its whole chain behind it is as good as a body.
-//  2. The others, dense:
+//  2. Without such rows, and while nothing slides: steps among the motions of the bodies, near the first guess (held_step.h).
+//  3. The others, dense:
 //     kNewton       semi-smooth Newton on the equation above. A row is held, free, or slides; with the states known the
 //                   equations are linear but for the direction of a slide, so that steps end at the solution itself once
 //                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-7 to 1e-10
@@ -24,7 +25,7 @@
 //                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
 //                   anew, from the guesses of cone_path.h, and every third time from sweeps.
 //     kGaussSeidel  projected block Gauss-Seidel, each contact solved exactly (coulomb_contact.h).
-//  3. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
+//  4. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
 //     with mu_d.
 //
 // Measured: heaps of two to five bodies with four contacts a face that slide and turn, at ratios of mass of 1e-3, 1, 1e2 and
@@ -115,6 +116,8 @@ class ConeProblem {
  private:
   // A contact slips if it does so this much faster than what counts as converged.
   static constexpr double kSlip = 1e3;
+  // Of the largest terms of a row's sum, what may be left by rounding.
+  static constexpr double kSumRounding = 16.0 * kEpsilon;
 
   // Rows that one law rules.
   struct Block {
