@@ -12,7 +12,7 @@ namespace {
 // stack at rest keeps its impulses then, in place of finding them anew for what rounding moves its contacts.
 constexpr double kGuessRounding = 1024.0 * kEpsilon;
 
-constexpr std::uint32_t kSteps = 6;
+constexpr std::uint32_t kTries = 6;
 
 }  // namespace
 
@@ -45,7 +45,7 @@ bool ConeProblem::is_solved_near_guess(const SolverBodies& bodies, const BodyMot
     // an earlier round's factors will mostly do
     HeldFactors& factors = held_factors_[contacts.empty() ? 0 : 1];
     bool is_old = !factors.rows.empty();
-    for (bool is_last = false; done < kSteps && take_held_step(bodies, settings.proximal, tolerance, y, &factors);) {
+    for (bool is_last = false; done < kTries && take_held_step(bodies, settings.proximal, tolerance, y, &factors);) {
       ++done;
       const double residual = look(kSumRounding);
       const bool is_nearing = residual < 0.5 * least;

@@ -1,6 +1,8 @@
 // No step allocates after warm-up: every allocation of this program, the plugins' included, is counted. The sanitizers
 // count allocations of their own, so this is a test of ordinary builds.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#include "tests/sanitized.h"
+
+#if !GRAVITAS_IS_SANITIZED
 
 #include <gtest/gtest.h>
 

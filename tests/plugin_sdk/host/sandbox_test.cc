@@ -33,12 +33,14 @@
 
 #include "plugin_sdk/library.h"
 #include "tests/paths.h"
+#include "tests/sanitized.h"
 
 extern char** environ;
 
 namespace gravitas::host {
 namespace {
 
+using harness::kSanitized;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
@@ -46,12 +48,6 @@ using ::testing::StartsWith;
 const std::string kPlugin = in_build("/lib/gravitas/solver_sequential.so");
 constexpr std::uint64_t kTerabyte = std::uint64_t{1} << 40;
 constexpr int kAnything = -1;
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 
 // The exit code of a process of its own that runs `body`, or 1000 and the signal that ended it.
 int in_child(const std::function<int()>& body) {

@@ -80,10 +80,10 @@ class Shapes {
     SceneShape whole;
     whole.kind = SceneShape::Kind::kCompound;
     whole.size.setOnes();
-    for (const auto& [shape, pose] : children) {
+    for (const auto& child : children) {
       const auto found =
-          std::find_if(kept_.begin(), kept_.end(), [&](const auto& kept) { return &kept.shape == shape; });
-      whole.children.push_back({found->scene_shape, pose, 0.0});
+          std::find_if(kept_.begin(), kept_.end(), [&](const auto& kept) { return &kept.shape == child.first; });
+      whole.children.push_back({found->scene_shape, child.second, 0.0});
     }
     return of(std::move(whole));
   }
