@@ -41,7 +41,7 @@ bool ConeProblem::is_solved_near_guess(const SolverBodies& bodies, const BodyMot
   };
   double least = look(settings.may_rest ? kGuessRounding : kSumRounding);
   Eigen::VectorXd best = lambda_, best_y = y;
-  if (least > enough && tolerance > 0.0 && settings.method == ConeMethod::kNewton) {
+  if (least > enough && tolerance > 0.0) {
     // an earlier round's factors will mostly do
     HeldFactors& factors = held_factors_[contacts.empty() ? 0 : 1];
     bool is_old = !factors.rows.empty();

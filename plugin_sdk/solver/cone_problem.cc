@@ -309,7 +309,7 @@ double ConeProblem::largest_held_sum() const {
   return most;
 }
 
-double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
+std::vector<double> ConeProblem::missing_of_held(const SolverBodies& bodies, const BodyMotion& x0) const {
   BodyMotion x = x0;
   push(bodies, &x);
   std::vector<double> missing(held_.size());
@@ -317,13 +317,29 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
     const ConeRow& row = rows[held_[i]];
     missing[i] = (row.law.lower_target - value(x, held_[i]) - row.law.gamma * row.multiplier) / scale_[held_[i]];
   }
+  return missing;
+}
+
+void ConeProblem::add_to_held(std::vector<double>* missing) {
+  factor_.solve(missing);
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier += (*missing)[i] / scale_[held_[i]];
+}
+
+double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
+  std::vector<double> missing = missing_of_held(bodies, x0);
   if (factor_.dropped() > 0) factor_.make_consistent(&missing);
   double largest = 0.0;
   for (std::size_t i = 0; i < held_.size(); ++i)
     largest = std::max(largest, std::fabs(missing[i]) * scale_[held_[i]] * rows[held_[i]].length);
-  factor_.solve(&missing);
-  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier += missing[i] / scale_[held_[i]];
+  add_to_held(&missing);
   return largest;
+}
+
+double ConeProblem::correct(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
+  side_ = missing_of_held(bodies, x0);
+  const double contradiction = make_consistent(smallest);
+  add_to_held(&side_);
+  return contradiction;
 }
 
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {

@@ -106,6 +106,13 @@ class ConeProblem {
   void refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest, const ConeSettings& settings,
               ConeSummary* summary);
 
+  // True if all rows that push anything hold always, in the problem that was solved last.
+  bool holds_all() const { return other_.empty(); }
+
+  // One step towards what rows ask for that differ little from those which were solved last, with their factors. Returns
+  // by how much they contradict each other, as reconcile(). Precondition: holds_all().
+  double correct(const SolverBodies& bodies, const BodyMotion& x0, double smallest);
+
   // Gives rows that hold always and contradict each other the nearest targets that some motion meets (least squares of the
   // scaled rows). Returns by how much they were off (m/s, m), 0 if by no more than `smallest` or rounding.
   double reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest);
@@ -175,8 +182,11 @@ class ConeProblem {
   void solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary);
   void solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings, double tolerance,
                    ConeSummary* summary);
+  // (target - value)/scale of the held rows with their multipliers.
+  std::vector<double> missing_of_held(const SolverBodies& bodies, const BodyMotion& x0) const;
   // Mends the held rows; returns by how much they were off (m/s, m).
   double refine_held(const SolverBodies& bodies, const BodyMotion& x0);
+  void add_to_held(std::vector<double>* missing);
   // Largest of what the value of a held row is summed from, m/s, m.
   double largest_held_sum() const;
 

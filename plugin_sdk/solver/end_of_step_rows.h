@@ -20,6 +20,7 @@ struct EndBody {
   Matrix3 inverse_inertia;
   Matrix3 stiffened;                   // inverse of inertia and geometric stiffness, for a step of the pose change
   Matrix3 turn = Matrix3::Identity();  // from S*
+  bool is_stiffened = false;
 };
 
 // A joint's discrepancy and its laws.

@@ -116,8 +116,7 @@ TEST_P(Accurate, AHangingChainCarriesAnyLoad) {
 
 // ---- stacks
 
-void expect_stands(const std::vector<double>& masses, double duration,
-                   const std::vector<std::string>& overrides = solver("Newton")) {
+void expect_stands(const std::vector<double>& masses, double duration, const std::vector<std::string>& overrides) {
   std::string bodies = kFloor;
   for (std::size_t i = 0; i < masses.size(); ++i) bodies += cube(static_cast<int>(i), masses[i]);
   SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, duration), ""), overrides);
@@ -130,10 +129,14 @@ void expect_stands(const std::vector<double>& masses, double duration,
   }
 }
 
-TEST(AccurateStack, TwoUnderAThousandTimesTheirMassStand) { expect_stands({1, 1000}, 5); }
-TEST(AccurateStack, TenUnderAThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1000}, 1); }
-TEST(AccurateStack, TwentyStand) { expect_stands(std::vector<double>(20, 1.0), 3); }
-TEST(AccurateStack, TenUnderTenThousandTimesTheirMassStand) { expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1e4}, 0.5); }
+TEST_P(Accurate, TwoUnderAThousandTimesTheirMassStand) { expect_stands({1, 1000}, 5, solver(GetParam())); }
+TEST_P(Accurate, TenUnderAThousandTimesTheirMassStand) {
+  expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1000}, 1, solver(GetParam()));
+}
+TEST_P(Accurate, TwentyStand) { expect_stands(std::vector<double>(20, 1.0), 3, solver(GetParam())); }
+TEST_P(Accurate, TenUnderTenThousandTimesTheirMassStand) {
+  expect_stands({1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1e4}, 0.5, solver(GetParam()));
+}
 
 // Sequential, too, by layers; by sweeps alone it does not.
 TEST(SequentialStack, TenUnderAThousandTimesTheirMassStand) {
@@ -148,7 +151,7 @@ TEST(SequentialStack, TenUnderAThousandTimesTheirMassStand) {
 }
 
 // Each turned against the one below, and put or dropped upon it one after another.
-TEST(SequentialStack, TurnedAndDroppedCubesComeToRestWhereTheyAre) {
+void expect_turned_and_dropped_rest(const std::string& name) {
   for (const auto& [count, turn, gap] :
        {std::tuple{10, 0.4, 0.0}, std::tuple{11, 0.05, 0.0}, std::tuple{10, 0.1, 0.1}, std::tuple{20, 0.1, 0.1}}) {
     std::string bodies = kFloor;
@@ -157,7 +160,7 @@ TEST(SequentialStack, TurnedAndDroppedCubesComeToRestWhereTheyAre) {
                 "\" GeometryId = \"Cube\" Material = \"Wood\" KineticProperties { Position = " +
                 literal(Vector3(0, 0.5 + (1.0 + gap) * i, 0)) +
                 " Orientation = " + literal(turned({0, 1, 0}, turn * i)) + " } Forces = { \"Down\" } }\n";
-    SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, 5), ""), solver("Sequential"));
+    SceneRun run(with_pushes(scene(kCubes, bodies, "", 1.0 / 60, 5), ""), solver(name));
     run.to_end();
     for (int i = 0; i < count; ++i) {
       const auto body = run.body("C" + std::to_string(i));
@@ -167,6 +170,9 @@ TEST(SequentialStack, TurnedAndDroppedCubesComeToRestWhereTheyAre) {
     }
   }
 }
+
+TEST(SequentialStack, TurnedAndDroppedCubesComeToRestWhereTheyAre) { expect_turned_and_dropped_rest("Sequential"); }
+TEST_P(Accurate, TurnedAndDroppedCubesComeToRestWhereTheyAre) { expect_turned_and_dropped_rest(GetParam()); }
 
 // ---- friction
 

@@ -3,12 +3,12 @@
 // Where the rows are taken: plugin_sdk/solver/end_of_step.h. Joints are eliminated by a sparse L D L^T that bears
 // dependent rows (plugin_sdk/solver/profile_ldlt.h); contacts, limits and drives feel each other through what is left
 // and are solved by projected Gauss-Seidel sweeps, each contact exactly (plugin_sdk/solver/cone_problem.h,
-// kGaussSeidel), or, with ContactSolver = "Newton", as Newton does.
+// kGaussSeidel), or, with ContactSolver = "Newton", as Newton does. What no joint holds and nothing slides on is found
+// among the bodies' motions, as Newton finds it: stacks stand at any ratio of mass.
 //
 // Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); joints are closed to
-// rounding at every mass ratio. Sweeps converge linearly, the slower the more contacts carry one another: stacks of ten
-// under a thousand times their mass are for Newton. `stop_reason` and `residual` say when they ran out. Other limits:
-// those of Newton.
+// rounding at every mass ratio. Sweeps converge linearly, the slower the more contacts carry one another: piles that
+// slide are for Newton. `stop_reason` and `residual` say when they ran out. Other limits: those of Newton.
 #include "plugin_sdk/solver/end_of_step.h"
 #include "plugin_sdk/solver/reactions.h"
 

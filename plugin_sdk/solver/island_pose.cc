@@ -1,0 +1,169 @@
+// The pose change: Newton's method on what rows miss at the end of the step.
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/solver/island_solver.h"
+
+namespace gravitas {
+
+void IslandSolver::solve_pose() {
+  settings_.is_rough = true;
+  ShrinkingSteps steps;
+  for (bool is_last = false; !is_last;) {
+    settings_.may_rest = may_rest();
+    stiffen();
+    build_pose();
+    const BodyMotion x0 = start_of_step();
+    ConeSummary solved = cone_.solve(bodies_, x0, representable(), settings_);
+    // where the steps end: before, redundant rows are off by the square of a turn
+    pose_contradiction_ = solved.contradiction;
+    BodyMotion next = x0;
+    cone_.push(bodies_, &next);
+    const double change = largest_change(next, displacement_), size = largest(next);
+    double turned = 0.0;
+    for (const std::uint32_t i : pushed_)
+      turned = std::max(turned, (next[i].angular - displacement_[i].angular).norm());
+    is_last = steps.end_with(change, size, 4.0 * representable()) || joints_.empty() || steps.count() == kPoseSteps;
+    if (is_last && solved.iterations > 0 && !joints_.empty()) {
+      cone_.refine(bodies_, x0, representable(), settings_, &solved);
+      next = x0;
+      cone_.push(bodies_, &next);
+    }
+    summary_.iterations += solved.iterations;
+    has_pose_ = solved.has_converged;
+    move_to_end(std::move(next));
+    keep_corrections();
+    if (!is_last && solved.iterations > 0 && cone_.holds_all() && turned <= kTurnOfChords)
+      is_last = follow_chords(change);
+  }
+  settings_.is_rough = false;
+  const double share = shorten(offset_, &displacement_);
+  if (share == 1.0) return;
+  for (ConeRow& row : cone_.rows) row.multiplier *= share;
+  keep_corrections();
+  move_to_end();
+}
+
+bool IslandSolver::follow_chords(double before) {
+  for (;;) {
+    place_unstiffened();
+    build_pose();
+    const BodyMotion x0 = start_of_step();
+    pose_contradiction_ = cone_.correct(bodies_, x0, representable());
+    ++summary_.iterations;
+    BodyMotion next = x0;
+    cone_.push(bodies_, &next);
+    const double change = largest_change(next, displacement_), size = largest(next);
+    move_to_end(std::move(next));
+    keep_corrections();
+    if (!(change <= kRateOfChords * before) || pose_contradiction_ > 0.0) return false;
+    if (largest_missing() <= kLeftByChords * kEpsilon * coordinates_ &&
+        change * (change / before) <= std::max(4.0 * representable(), 1e-14 * size))
+      return true;
+    before = change;
+  }
+}
+
+double IslandSolver::largest_missing() const {
+  double most = 0.0;
+  for (const EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const JointLaw& law = joint.pose_laws[k];
+      if (!law.is_equality()) continue;
+      const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
+      most = std::max(most, joint.length * std::fabs(law.lower_target - change));
+    }
+  }
+  return most;
+}
+
+double IslandSolver::shorten(const BodyMotion& from, BodyMotion* motion) const {
+  if (contacts_.empty()) return 1.0;
+  const double moved = largest_change(*motion, from);
+  double most = kOfOverlap * sum_of_overlaps(joints_, contacts_);
+  if (moved > most) most += kOfWay * sum_of_ways();
+  if (!(moved > most)) return 1.0;
+  const double share = most / moved;
+  for (const std::uint32_t i : pushed_) {
+    (*motion)[i].linear = from[i].linear + share * ((*motion)[i].linear - from[i].linear);
+    (*motion)[i].angular = from[i].angular + share * ((*motion)[i].angular - from[i].angular);
+  }
+  return share;
+}
+
+double IslandSolver::sum_of_ways() const {
+  double sum = 0.0;
+  for (const std::uint32_t i : pushed_) sum += way_of(bodies_[i], gyration_[i], request_.time_step());
+  for (const EndContact& c : contacts_)
+    sum += way_of(vector_at(request_.contact_point(), c.row), bodies_[c.body1], bodies_[c.body2]);
+  return sum;
+}
+
+void IslandSolver::build_pose() {
+  cone_.rows.clear();
+  cone_.contacts.clear();
+  for (const EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!joint.pose_laws[k].is_active()) continue;
+      ConeRow& row = cone_.rows.emplace_back();
+      row.body1 = joint.body1, row.body2 = joint.body2;
+      row.direction = with_turns(joint.directions[k], end_[joint.body1].stiffened, end_[joint.body2].stiffened);
+      row.length = joint.length;
+      row.law = joint.pose_laws[k];
+      row.multiplier = answer_.joint_correction[3 * joint.row + k];
+      // e(delta_k) - e* + J (x - delta_k)
+      row.start = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial -
+                  row.direction.along(displacement_[joint.body1], displacement_[joint.body2]);
+    }
+  }
+  for (const EndContact& contact : contacts_) {
+    ConeRow& row = cone_.rows.emplace_back();
+    row.body1 = contact.body1, row.body2 = contact.body2;
+    row.direction = with_turns(contact.gap_row, end_[contact.body1].stiffened, end_[contact.body2].stiffened);
+    row.law.has_lower = true;
+    row.law.lower_target = contact.gap_target;
+    row.multiplier = answer_.contact_correction[contact.row];
+  }
+}
+
+void IslandSolver::keep_corrections() {
+  std::size_t next = 0;
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      answer_.joint_correction[3 * joint.row + k] =
+          joint.pose_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
+  for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = cone_.rows[next++].multiplier;
+}
+
+bool IslandSolver::find_closed() {
+  bool any = false;
+  for (EndContact& contact : contacts_) {
+    const double gap = contact.gap + contact.gap_row.along(displacement_[contact.body1], displacement_[contact.body2]);
+    if (contact.is_closed || gap > contact.slop) continue;
+    contact.is_closed = any = true;
+  }
+  for (EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const JointLaw known = joint.velocity_laws[k];
+      JointLaw& law = joint.velocity_laws[k] = velocity_law_of(joint, k);
+      law.has_lower = law.has_lower || known.has_lower;
+      law.has_upper = law.has_upper || known.has_upper;
+      const bool changes = law.has_lower != known.has_lower || law.has_upper != known.has_upper;
+      any = any || (changes && !law.is_equality());
+    }
+  }
+  stalled_.stall([&](auto&& visit) {
+    for (EndJoint& j : joints_)
+      for (std::size_t k = 0; k < 3; ++k) visit(j.body1, j.body2, j.directions[k], &j.velocity_laws[k]);
+  });
+  // with others closed, what slid may stick
+  if (any)
+    for (EndContact& contact : contacts_) contact.slides = false;
+  return any;
+}
+
+JointLaw IslandSolver::velocity_law_of(const EndJoint& joint, std::size_t k) const {
+  return velocity_law(joint.states[k], joint.errors[static_cast<Eigen::Index>(k)], joint.slop, request_.time_step());
+}
+
+}  // namespace gravitas

@@ -1,0 +1,250 @@
+// What an island is made of, and the order in which its end is found.
+#include "plugin_sdk/solver/island_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/math/rotation.h"
+
+namespace gravitas {
+
+IslandSolver::IslandSolver(const stage::SolverSolveRequest& request, const SolverBodies& all, const Island& island,
+                           const ConeSettings& settings, ConeProblem* cone, SolverSolution* answer)
+    : request_(request), island_(island), settings_(settings), answer_(*answer), cone_(*cone) {
+  // its own bodies, and those that it is held by
+  rows_ = island.bodies;
+  for (const std::uint32_t row : island.discrepancies)
+    for (const std::size_t end : {0U, 1U}) rows_.push_back(all.row(request.discrepancy_body()[2 * row + end]));
+  for (const std::uint32_t row : island.contacts)
+    for (const std::size_t end : {0U, 1U}) rows_.push_back(request.contact_body()[2 * row + end]);
+  rows_.push_back(all.row(kNone));
+  std::sort(rows_.begin(), rows_.end());
+  rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
+  bodies_ = all.subset(rows_);
+}
+
+ConeSummary IslandSolver::solve(Host& host) {
+  load();
+  cone_.start();
+  const double share = request_.theta() * request_.time_step();
+  guess_offset(share);
+  int failures = 0;
+  for (; round_ < kRounds; ++round_) {
+    const BodyMotion before = displacement_;
+    // impulses that wander from round to round are held more
+    if (round_ == kFreeRounds) settings_.proximal *= 10.0;
+    solve_pose();
+    const bool closes = find_closed();
+    // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
+    has_settled_ =
+        round_ > 0 && has_velocity_ && !closes && !is_change(before, displacement_, 4.0 * share * summary_.residual);
+    if (has_settled_) break;
+    solve_velocity();
+    host.mark_progress();
+    has_settled_ = !set_offset(share);
+    if (has_settled_) break;
+    // what two rounds cannot solve the others could not either; sweeps go on from round to round
+    failures = has_velocity_ || settings_.method == ConeMethod::kGaussSeidel ? 0 : failures + 1;
+    if (failures == 2) break;
+  }
+  // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
+  summary_.contradiction = std::max(summary_.contradiction, pose_contradiction_);
+  summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
+  store();
+  return summary_;
+}
+
+// ---- what does not change within the step
+
+void IslandSolver::load() {
+  velocity_ = start_motion(&SolverBody::trial_velocity);
+  displacement_ = offset_ = start_motion(nullptr);
+  end_.resize(bodies_.count() + 1);
+  for (std::uint32_t i = 0; i <= bodies_.count(); ++i) {
+    end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
+    gyration_.push_back(bodies_[i].gyration());
+  }
+  for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
+  const DiscrepancyColumns columns = columns_of(request_);
+  joints_.reserve(island_.discrepancies.size());
+  contacts_.reserve(island_.contacts.size());
+  for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
+  for (const std::uint32_t row : island_.contacts) load_contact(row);
+}
+
+std::uint32_t IslandSolver::place_of(std::uint32_t row) const {
+  if (row == kNone) return static_cast<std::uint32_t>(bodies_.count());
+  return static_cast<std::uint32_t>(std::lower_bound(rows_.begin(), rows_.end(), row) - rows_.begin());
+}
+
+BodyMotion IslandSolver::start_motion(Twist SolverBody::*of) const {
+  BodyMotion motion(bodies_.count() + 1);
+  if (of != nullptr)
+    for (std::uint32_t i = 0; i < bodies_.count(); ++i) motion[i] = bodies_[i].*of;
+  return motion;
+}
+
+void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t row) {
+  EndJoint& joint = joints_.emplace_back();
+  joint.row = row;
+  joint.body1 = place_of(request_.discrepancy_body()[2 * row]);
+  joint.body2 = place_of(request_.discrepancy_body()[2 * row + 1]);
+  joint.discrepancy = columns.at(row);
+  const Discrepancy& d = joint.discrepancy;
+  joint.axes = to_rotation_matrix(d.axes);
+  const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+  const Vector3 middle = 0.5 * (d.point1 + d.point2);
+  const Vector3 start_error = error_at(d, one.trial, two.trial, one.start, two.start);
+  joint.slop = d.is_angular() ? 1e-9 : closing_slop(middle, one, two);
+  joint.length = d.is_angular() ? std::max(one.gyration(), two.gyration()) : 1.0;
+  if (!d.is_angular()) coordinates_ = std::max(coordinates_, d.point2.cwiseAbs().maxCoeff());
+  for (int k = 0; k < 3; ++k) {
+    const auto place = static_cast<std::size_t>(k);
+    joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
+    joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
+    const auto at = 3 * row + static_cast<std::uint32_t>(k);
+    answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at];
+    answer_.joint_impulse[at] = request_.discrepancy_warm_impulse()[at];
+  }
+}
+
+void IslandSolver::load_contact(std::uint32_t row) {
+  EndContact& contact = contacts_.emplace_back();
+  contact.row = row;
+  contact.body1 = place_of(request_.contact_body()[2 * row]);
+  contact.body2 = place_of(request_.contact_body()[2 * row + 1]);
+  const SolverBody &one = bodies_[contact.body1], &two = bodies_[contact.body2];
+  const Vector3 normal = vector_at(request_.contact_normal(), row);
+  const Vector3 point = vector_at(request_.contact_point(), row);
+  contact.gap_row = ConstraintDirection::through(point, normal, one, two);
+  contact.gap = -request_.contact_depth()[row];
+  const Vector3 to_surface = (-0.5 * contact.gap) * normal;
+  contact.gap_target = 0.0 - contact.gap;
+  contact.slop = closing_slop(point, one, two);
+  contact.law = contact_law(request_, row, one, two);
+  contact.arm1 = point + to_surface - one.trial.position;
+  contact.arm2 = point - to_surface - two.trial.position;
+  coordinates_ = std::max(coordinates_, point.cwiseAbs().maxCoeff());
+  answer_.contact_correction[row] = std::max(0.0, request_.contact_warm_correction()[row]);
+  set_vector(answer_.contact_impulse, row, vector_at(request_.contact_warm_impulse(), row));
+  set_vector(answer_.contact_direction, row, normal);
+}
+
+// ---- the first guess
+
+void IslandSolver::guess_offset(double share) {
+  for (EndJoint& joint : joints_) {
+    move_to_end(&joint);
+    for (std::size_t k = 0; k < 3; ++k)
+      if (velocity_law_of(joint, k).is_velocity_only)
+        push_at_trial(joint, joint.directions[k], share * answer_.joint_impulse[3 * joint.row + k], &offset_);
+  }
+  for (const EndContact& contact : contacts_) {
+    const Vector3 impulse = vector_at(answer_.contact_impulse, contact.row);
+    const Vector3 normal = contact.law.frame.col(0);
+    const Vector3 friction = impulse - normal.dot(impulse) * normal;
+    push_at_trial(contact, direction_at(friction, contact.arm1, contact.arm2), share, &offset_);
+  }
+}
+
+template <class Row>
+void IslandSolver::push_at_trial(const Row& row, const ConstraintDirection& direction, double amount,
+                                 BodyMotion* x) const {
+  if (amount == 0.0) return;
+  const SolverBody &one = bodies_[row.body1], &two = bodies_[row.body2];
+  with_turns(direction, one.inverse_inertia, two.inverse_inertia)
+      .push(amount, one.inverse_mass, two.inverse_mass, (*x)[row.body1], (*x)[row.body2]);
+}
+
+// ---- the end of the step
+
+void IslandSolver::move_to_end(BodyMotion displacement) {
+  displacement_ = std::move(displacement);
+  move_to_end();
+}
+
+void IslandSolver::move_to_end() {
+  for (const std::uint32_t i : pushed_) {
+    const Twist& d = displacement_[i];
+    end_[i].pose = displaced(bodies_[i].trial, d.linear, d.angular);
+    end_[i].turn = to_rotation_matrix(exp_rotation(d.angular));
+    end_[i].inverse_inertia =
+        d.angular.isZero(0.0)
+            ? bodies_[i].inverse_inertia
+            : world_inverse_inertia(end_[i].pose.orientation, vector_at(request_.inverse_inertia(), rows_[i]));
+  }
+  for (EndJoint& joint : joints_) move_to_end(&joint);
+}
+
+void IslandSolver::stiffen() {
+  std::vector<Matrix3> stiffness(bodies_.count() + 1, Matrix3::Zero());
+  for (const EndJoint& joint : joints_) {
+    if (joint.discrepancy.is_angular()) continue;
+    Vector3 push = Vector3::Zero();
+    for (std::size_t k = 0; k < 3; ++k)
+      push += answer_.joint_correction[3 * joint.row + k] * joint.directions[k].linear;
+    stiffness[joint.body1] += geometric_stiffness(joint.arm1, -push);
+    stiffness[joint.body2] += geometric_stiffness(joint.arm2, push);
+  }
+  for (const std::uint32_t i : pushed_) {
+    EndBody& end = end_[i];
+    end.is_stiffened = !stiffness[i].isZero(0.0);
+    if (end.is_stiffened)
+      end.stiffened =
+          stiffened_inverse(end.pose.orientation, vector_at(request_.inverse_inertia(), rows_[i]), stiffness[i]);
+  }
+  place_unstiffened();
+}
+
+void IslandSolver::place_unstiffened() {
+  for (const std::uint32_t i : pushed_)
+    if (!end_[i].is_stiffened) end_[i].stiffened = end_[i].inverse_inertia;
+}
+
+BodyMotion IslandSolver::start_of_step() const {
+  BodyMotion x0 = offset_;
+  for (const std::uint32_t i : pushed_) {
+    const Vector3 missing = offset_[i].angular - displacement_[i].angular;
+    if (missing.isZero(0.0) || !end_[i].is_stiffened) continue;
+    const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
+    x0[i].angular =
+        displacement_[i].angular + end_[i].stiffened * (world_inertia(end_[i].pose.orientation, moments) * missing);
+  }
+  return x0;
+}
+
+void IslandSolver::move_to_end(EndJoint* joint) const {
+  const Vector3 turn = displacement_[joint->body2].angular - displacement_[joint->body1].angular;
+  move_joint(bodies_[joint->body1], bodies_[joint->body2], end_[joint->body1], end_[joint->body2], turn, joint);
+}
+
+// ---- sizes, m
+
+double IslandSolver::largest_change(const BodyMotion& a, const BodyMotion& b) const {
+  double most = 0.0;
+  for (const std::uint32_t i : pushed_)
+    most = std::max(most, (a[i].linear - b[i].linear).norm() + gyration_[i] * (a[i].angular - b[i].angular).norm());
+  return most;
+}
+
+double IslandSolver::largest(const BodyMotion& a) const {
+  double most = 0.0;
+  for (const std::uint32_t i : pushed_) most = std::max(most, a[i].linear.norm() + gyration_[i] * a[i].angular.norm());
+  return most;
+}
+
+bool IslandSolver::is_change(const BodyMotion& a, const BodyMotion& b, double known) const {
+  const double size = std::max({largest(a), largest(b), largest(displacement_)});
+  return largest_change(a, b) > std::max({known, kEpsilon * coordinates_, 1e-14 * size});
+}
+
+void IslandSolver::store() {
+  for (const std::uint32_t i : pushed_) {
+    answer_.velocity[rows_[i]] = velocity_[i];
+    answer_.displacement[rows_[i]] = displacement_[i];
+  }
+  for (const EndContact& contact : contacts_)
+    set_vector(answer_.contact_turning, contact.row, contact.law.frame * contact.turning);
+}
+
+}  // namespace gravitas

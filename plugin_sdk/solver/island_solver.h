@@ -1,0 +1,162 @@
+// An island's rows at the end of the step, and the loop that finds where that is (end_of_step.h).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "plugin_sdk/plugin.h"
+#include "plugin_sdk/solver/end_of_step_rows.h"
+#include "plugin_sdk/solver/islands.h"
+#include "plugin_sdk/solver/reply.h"
+#include "plugin_sdk/solver/stalled_drives.h"
+
+namespace gravitas {
+
+class IslandSolver {
+ public:
+  IslandSolver(const stage::SolverSolveRequest& request, const SolverBodies& all, const Island& island,
+               const ConeSettings& settings, ConeProblem* cone, SolverSolution* answer);
+
+  ConeSummary solve(Host& host);
+
+ private:
+  static constexpr int kRounds = 12, kFreeRounds = 4, kRoundsOfLowering = 4, kPoseSteps = 30;
+  // Corrections move a body by no more than so many times the ways to S* and what is overlapped or missed there, summed.
+  static constexpr double kOfWay = 16.0, kOfOverlap = 2.0;
+  // Largest turn from which chords start, rad; what one may be of the step before it; units of rounding of the coordinates
+  // that may be left of what joints hold.
+  static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;
+
+  // ---- what does not change within the step
+
+  void load();
+
+  // Place of a row of the request (kNone: the world) among the island's bodies.
+  std::uint32_t place_of(std::uint32_t row) const;
+
+  BodyMotion start_motion(Twist SolverBody::*of) const;
+
+  void load_joint(const DiscrepancyColumns& columns, std::uint32_t row);
+
+  void load_contact(std::uint32_t row);
+
+  // ---- the first guess
+
+  // offset_ as the impulses of the step before make it: what rests or moves steadily is found in one round.
+  void guess_offset(double share);
+
+  template <class Row>
+  void push_at_trial(const Row& row, const ConstraintDirection& direction, double amount, BodyMotion* x) const;
+
+  // ---- the end of the step
+
+  void move_to_end(BodyMotion displacement);
+
+  // Bodies, rows and errors at S* (+) displacement_.
+  void move_to_end();
+
+  // What a turn of a body adds to the moments that the corrections mu exert on it: the arm r of a push p turns along, so
+  // K = (p.r) 1 - (p r^T + r p^T)/2. Under tension this holds a light link between heavy ones more than its inertia does,
+  // and without it steps that take the directions anew each time run away (T h^2/(m l) > 1).
+  void stiffen();
+
+  // As the bodies turn, with what stiffens the others left as it is.
+  void place_unstiffened();
+
+  // Newton's step for delta = offset + M^-1 J^T mu with the stiffness: x0 = delta_k + (M + K)^-1 M (offset - delta_k).
+  BodyMotion start_of_step() const;
+
+  void move_to_end(EndJoint* joint) const;
+
+  // What moves is found to rounding, as errors would add up over steps; but in the end positions and velocities must agree.
+  bool may_rest() const { return summary_.iterations == 0 || round_ >= kFreeRounds; }
+
+  // ---- pose change
+
+  // Precondition: bodies and joints are where displacement_ ends.
+  void solve_pose();
+
+  // After a step that changed ways by `before`: steps with the rows of where displacement_ ends but the factors of that step.
+  // True if they end at rounding, false where they do not shrink fast.
+  bool follow_chords(double before);
+
+  // Of what joints hold where displacement_ ends, m.
+  double largest_missing() const;
+
+  // Contacts that leave a body no room ask for ways without end along what is nearly flat between them. The share of the way
+  // from `from` that is left.
+  double shorten(const BodyMotion& from, BodyMotion* motion) const;
+
+  double sum_of_ways() const;
+
+  void build_pose();
+
+  void keep_corrections();
+
+  // Contacts and limits that the end of the step closes, beside those that were.
+  bool find_closed();
+
+  JointLaw velocity_law_of(const EndJoint& joint, std::size_t k) const;
+
+  // ---- velocity
+
+  void solve_velocity();
+
+  bool arrives() const;
+  // What the joints alone make of v*, where something arrives: what an impact gains is counted from there.
+  BodyMotion velocity_of_joints(BodyMotion velocity);
+  bool may_turn() const;
+
+  void build_velocity(bool with_turning);
+
+  void build_velocity_of_joints();
+
+  void build_velocity(const EndContact& contact, bool with_turning);
+
+  void keep_impulses();
+
+  // ---- energy
+
+  // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy, from what the joints allow to what
+  // joints and contacts do. Lowers e s where it is positive; true if anything was, and the velocities are to be found anew.
+  bool lower_restitution(const BodyMotion& before, int round);
+
+  // ---- rows on velocity alone
+
+  // offset_ from the present impulses. False if that changes nothing.
+  bool set_offset(double share);
+
+  // ---- sizes, m
+
+  // Half of what the largest coordinate's rounding moves a point by.
+  double representable() const { return 0.25 * kEpsilon * coordinates_; }
+  double largest_change(const BodyMotion& a, const BodyMotion& b) const;
+  double largest(const BodyMotion& a) const;
+
+  // By more than rounding, and than `known`.
+  bool is_change(const BodyMotion& a, const BodyMotion& b, double known) const;
+
+  void store();
+
+  const stage::SolverSolveRequest& request_;
+  const Island& island_;
+  ConeSettings settings_;
+  SolverSolution& answer_;
+  ConeProblem& cone_;
+
+  SolverBodies bodies_;                // the island's
+  std::vector<std::uint32_t> rows_;    // of the request, of each; rising, the world last
+  std::vector<std::uint32_t> pushed_;  // places of those that can be pushed
+  std::vector<EndJoint> joints_;
+  std::vector<EndContact> contacts_;
+  std::vector<EndBody> end_;
+  std::vector<double> gyration_;  // radii, m
+  double coordinates_ = 0.0, pose_contradiction_ = 0.0;
+  BodyMotion velocity_, displacement_, offset_;
+  ConeSummary summary_;
+  int round_ = 0;
+  StalledDrives stalled_;
+  bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
+};
+
+}  // namespace gravitas

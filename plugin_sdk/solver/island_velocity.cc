@@ -1,0 +1,172 @@
+// Velocities at the end of the step, and what acts on them alone.
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/solver/island_solver.h"
+
+namespace gravitas {
+
+void IslandSolver::solve_velocity() {
+  const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
+  settings_.may_rest = may_rest();
+  // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
+  if (may_turn()) {
+    build_velocity(false);
+    const ConeSummary without = cone_.solve(bodies_, trial, 0.0, settings_);
+    summary_.iterations += without.iterations;
+    if (without.has_converged) keep_impulses();
+  }
+  const BodyMotion before = velocity_of_joints(trial);
+  for (int round = 0;; ++round) {
+    build_velocity(true);
+    const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings_);
+    summary_.iterations += solved.iterations;
+    has_velocity_ = solved.has_converged;
+    summary_.contradiction = solved.contradiction;
+    summary_.residual = solved.residual;
+    velocity_ = trial;
+    cone_.push(bodies_, &velocity_);
+    keep_impulses();
+    if (!lower_restitution(before, round)) break;
+  }
+  std::size_t cone = 0;
+  for (EndContact& contact : contacts_)
+    if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
+}
+
+bool IslandSolver::arrives() const {
+  return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; });
+}
+
+BodyMotion IslandSolver::velocity_of_joints(BodyMotion velocity) {
+  if (joints_.empty() || !arrives()) return velocity;
+  build_velocity_of_joints();
+  summary_.iterations += cone_.solve(bodies_, velocity, 0.0, settings_).iterations;
+  cone_.push(bodies_, &velocity);
+  return velocity;
+}
+
+bool IslandSolver::may_turn() const {
+  return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.has_turning(); }) &&
+         std::ranges::all_of(contacts_, [](const EndContact& c) { return c.turning.isZero(0.0); });
+}
+
+void IslandSolver::build_velocity(bool with_turning) {
+  build_velocity_of_joints();
+  for (const EndContact& contact : contacts_)
+    if (contact.is_closed) build_velocity(contact, with_turning);
+}
+
+void IslandSolver::build_velocity_of_joints() {
+  cone_.rows.clear();
+  cone_.contacts.clear();
+  for (const EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!joint.velocity_laws[k].is_active()) continue;
+      ConeRow& row = cone_.rows.emplace_back();
+      row.body1 = joint.body1, row.body2 = joint.body2;
+      row.direction =
+          with_turns(joint.directions[k], end_[joint.body1].inverse_inertia, end_[joint.body2].inverse_inertia);
+      row.length = joint.length;
+      row.law = joint.velocity_laws[k];
+      row.multiplier = answer_.joint_impulse[3 * joint.row + k];
+    }
+  }
+}
+
+void IslandSolver::build_velocity(const EndContact& contact, bool with_turning) {
+  const Matrix3 &inverse1 = end_[contact.body1].inverse_inertia, &inverse2 = end_[contact.body2].inverse_inertia;
+  const ContactLaw& law = contact.law;
+  const bool has_turning = with_turning && law.has_turning() && !(inverse1 + inverse2).isZero(0.0);
+  const auto first = static_cast<std::uint32_t>(cone_.rows.size());
+  const ConeContact& cone = cone_.contacts.emplace_back(cone_contact(contact, first, has_turning));
+  const Vector3 impulse = law.frame.transpose() * vector_at(answer_.contact_impulse, contact.row);
+  const auto add = [&](const ConstraintDirection& direction, double length, double multiplier) {
+    ConeRow& row = cone_.rows.emplace_back();
+    row.body1 = contact.body1, row.body2 = contact.body2;
+    row.direction = direction;
+    row.length = length;
+    row.multiplier = multiplier;
+  };
+  for (int k = 0; k < (cone.has_friction ? 3 : 1); ++k)
+    add(with_turns(direction_at(law.frame.col(k), contact.arm1, contact.arm2), inverse1, inverse2), 1.0, impulse[k]);
+  const double length = std::max(bodies_[contact.body1].gyration(), bodies_[contact.body2].gyration());
+  for (int k = 0; k < (cone.has_turning ? 3 : 0); ++k)
+    add(with_turns(turning_about(law.frame.col(k)), inverse1, inverse2), length, contact.turning[k]);
+}
+
+void IslandSolver::keep_impulses() {
+  std::size_t next = 0;
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      answer_.joint_impulse[3 * joint.row + k] =
+          joint.velocity_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
+  std::size_t cone = 0;
+  for (EndContact& contact : contacts_) {
+    Vector3 impulse = Vector3::Zero();
+    contact.turning.setZero();
+    if (contact.is_closed) {
+      const ConeContact& rows = cone_.contacts[cone++];
+      for (std::uint32_t k = 0; k < (rows.has_friction ? 3U : 1U); ++k)
+        impulse += cone_.rows[rows.first + k].multiplier * contact.law.frame.col(static_cast<int>(k));
+      for (std::uint32_t k = 0; k < (rows.has_turning ? 3U : 0U); ++k)
+        contact.turning[k] = cone_.rows[rows.first + rows.count() - 3 + k].multiplier;
+      set_vector(answer_.contact_direction, contact.row, contact.law.frame.col(0));
+    }
+    set_vector(answer_.contact_impulse, contact.row, impulse);
+  }
+}
+
+// ---- energy
+
+bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
+  if (!arrives() || round >= kRoundsOfLowering) return false;
+  Gain all;
+  for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
+    // a drive's or spring's work is real
+    if (r < cone_.contacts.front().first &&
+        (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0))
+      continue;
+    add_work(cone_.rows[r], before, velocity_, &all);
+  }
+  // multipliers of joints do work on what the solution leaves of their rows
+  if (!(joints_.empty() ? all.is_real() : all.is_to_blame())) return false;
+  bool any = false;
+  std::size_t cone = 0;
+  for (EndContact& contact : contacts_) {
+    if (!contact.is_closed) continue;
+    const ConeContact& rows = cone_.contacts[cone++];
+    Gain own;
+    for (std::uint32_t k = 0; k < rows.count(); ++k) add_work(cone_.rows[rows.first + k], before, velocity_, &own);
+    const ConeRow& normal = cone_.rows[rows.first];
+    const double arrival = -normal.direction.along(before[normal.body1], before[normal.body2]);
+    if (contact.law.target > 0.0) any = lower_target(own, arrival, &contact.law.target, &contact.lowered) || any;
+  }
+  // no one contact is to blame, or lowering was not enough
+  if (!any || round + 1 == kRoundsOfLowering)
+    for (EndContact& contact : contacts_) contact.law.target = 0.0;
+  return true;
+}
+
+// ---- rows on velocity alone
+
+bool IslandSolver::set_offset(double share) {
+  BodyMotion next = start_motion(nullptr);
+  const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
+  const auto push = [&](const ConeRow& row) {
+    if (row.multiplier == 0.0) return;
+    row.direction.push(share * row.multiplier, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
+                       next[row.body1], next[row.body2]);
+  };
+  for (std::size_t r = 0; r < scalars; ++r)
+    if (cone_.rows[r].law.is_velocity_only) push(cone_.rows[r]);
+  const BodyMotion driven = next;
+  for (const ConeContact& contact : cone_.contacts)
+    for (std::uint32_t k = 1; k < contact.count(); ++k) push(cone_.rows[contact.first + k]);
+  shorten(driven, &next);
+  const bool changes = is_change(next, offset_, 0.0);
+  offset_ = std::move(next);
+  return changes;
+}
+
+}  // namespace gravitas
