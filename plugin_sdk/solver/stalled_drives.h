@@ -5,7 +5,7 @@
 // with lambda >= 0, and no more. It leaves as soon as its own target points away.
 //
 // A drive has reached a limit of the same two bodies if its row is a multiple of the limit's and what else holds between
-// them (the driving points of an AngularMotor on a hinge with limits: J_d = s J_l + sum c_k J_k, with J_k v = 0), to 1e-3. A
+// them (driving points about the axis of a hinge with limits: J_d = s J_l + sum c_k J_k, with J_k v = 0), to 1e-3. A
 // drive that is held up through other bodies is a contradiction still.
 #pragma once
 

@@ -303,7 +303,7 @@ TEST_P(JointsInMotion, RedundantRowsMoveLikeThoseWithout) {
   };
   const std::string ends = "BindAxisPoint1 = " + a + " BindAxisPoint2 = " + b;
   const std::vector<Pair> pairs = {
-      // 5 rows, and the motor's 10 of rank 5 while it has no torque
+      // 5 rows, and the motor's, whose drive has no torque
       {"hinge and motor without torque", joint("Revolute", "J", "A", "B", ends),
        joint("AngularMotor", "J", "A", "B", ends + " AngularSpeed = 2 MaximumTorque = 0")},
       {"hinge and two ball joints", joint("Revolute", "J", "A", "B", ends), ball("J", a) + ball("K", b)},

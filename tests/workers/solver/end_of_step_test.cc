@@ -172,7 +172,8 @@ TEST(EndOfStep, SweepsGoOnFromRoundToRound) {
     const SolverAnswer answer = heap.problem.solve(direct(kSweeps));
     if (answer.converged()) continue;
     ++unfinished;
-    EXPECT_GE(answer.iterations[0], 12 * kSweeps) << seed;
+    // twelve rounds, of which those that are solved near a guess take no sweeps; two that failed would be all otherwise
+    EXPECT_GE(answer.iterations[0], 6 * kSweeps) << seed;
   }
   EXPECT_GT(unfinished, 0);
 }

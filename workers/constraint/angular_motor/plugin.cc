@@ -1,24 +1,19 @@
 // Constraint `AngularMotor` (§ 2.7.5.5, 2.86): a hinge whose second body turns about the axis at a given speed
 // relative to the first.
 //
-//            p3                two anchors on the axis, as for a hinge (d_s1, d_s2),
-//             |                four driving points p_i = m + l_i about their midpoint m,
-//      p2 ----m---- p1   (a^)  l_2 = -l_1, l_3 = l_1 x a^, l_4 = -l_3,
-//             |                each driven to v_r = omega a^ x l_i (2.85)
-//            p4
+//      body 1  --------m--a-->-----  body 2      m, a: the hinge of a `Revolute`, with its five rows
+//                                                a (w_2 - w_1) = omega: the drive
 //
-// Corrected: the drive acts along the tangent a^ x l_i alone (as printed it holds all three axes of each point
-// and fights the anchors: 18 rows); rows are 6 + 4 = 10, of rank 6: five of the hinge (one of the two anchors'
-// six is redundant, along the axis) and the drive. |l| is free; half the distance of the anchors keeps the rows
-// of the anchors and of the drive of one size. MaximumTorque is shared by the four points, each with lever |l|.
+// The seed drives four points p_i = m + l_i about the axis to v_r = omega a x l_i (2.85) in all directions: 18 rows, and
+// those along l_i and a fight the anchors. What is left of them, along the tangents a x l_i, is one row four times,
+//   (a x l).(v_2 + w_2 x (m + l - x_2) - v_1 - w_1 x (m + l - x_1)) = |l|^2 a.(w_2 - w_1) + (a x l).(slip at m),
+// and m does not slip. So it is one row about a: six rows of rank 6, whatever |l|, its multiplier the torque itself,
+// bounded by MaximumTorque. Where on the axis the scene's points lie is nothing to the rows, as for a `Revolute`.
 #include "plugin_sdk/constraint.h"
 #include "plugin_sdk/joint_rows.h"
-#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
-
-constexpr int kDrivingPoints = 4;
 
 class AngularMotor final : public ConstraintPlugin {
  public:
@@ -50,15 +45,12 @@ class AngularMotor final : public ConstraintPlugin {
                 const Vector3 point2 = properties.vector();
                 const double speed = properties.number();
                 const double torque = properties.number();
-                const double length = (point2 - point1).norm();
-                if (!(length > 0.0))
+                if (point1 == point2)
                   throw Refusal("AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
-                for (const Vector3& point : {point1, point2}) {
-                  out.vector(inverse_transform_point(bodies.pose1, point));
-                  out.vector(inverse_transform_point(bodies.pose2, point));
-                }
-                out.vector(bodies.pose1.orientation.conjugate() * orthonormal_basis((point2 - point1) / length).first);
-                out.number(0.5 * length);
+                const Vector3 axis = unit_axis(point2 - point1, "AngularMotor: BindAxisPoint1, BindAxisPoint2");
+                const Pose frame = frame_along(point1 + axis.dot(bodies.centre() - point1) * axis, axis);
+                write_frame(bodies.pose1, frame, &out);
+                write_frame(bodies.pose2, frame, &out);
                 out.number(speed);
                 out.number(torque == torque ? torque : kUnlimited);
               });
@@ -74,38 +66,20 @@ class AngularMotor final : public ConstraintPlugin {
  private:
   template <typename Emit>
   static void describe(PropertyCursor bound, const JointBodies& bodies, Emit&& emit) {
-    Discrepancy anchor[2];
-    for (Discrepancy& d : anchor) {
-      const Vector3 on_body1 = bound.vector();
-      const Vector3 on_body2 = bound.vector();
-      d = point_discrepancy(on_body1, on_body2, bodies);
-      emit(d);
-    }
-    const Vector3 lever_in_body1 = bound.vector();
-    const double lever = bound.number();
+    const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+    Discrepancy anchor;
+    anchor.point1 = one.position;
+    anchor.point2 = two.position;
+    emit(anchor);
+    hold_axis(one, two, emit);
     const double speed = bound.number();
     const double torque = bound.number();
-
-    // axis and midpoint from the averages of the anchors, so that drift moves both bodies' share alike
-    const Vector3 a1 = 0.5 * (anchor[0].point1 + anchor[0].point2);
-    const Vector3 a2 = 0.5 * (anchor[1].point1 + anchor[1].point2);
-    const Vector3 axis = (a2 - a1).normalized();
-    const Vector3 middle = 0.5 * (a1 + a2);
-    const Vector3 turned = bodies.pose1.orientation * lever_in_body1;
-    const Vector3 first = (turned - turned.dot(axis) * axis).normalized();
-    const Vector3 second = first.cross(axis);
-    for (const Vector3& direction : {first, Vector3(-first), second, Vector3(-second)}) {
-      const Vector3 tangent = axis.cross(direction);
-      Matrix3 axes;
-      axes << tangent, direction, tangent.cross(direction);
-      Discrepancy drive;
-      drive.point1 = drive.point2 = middle + lever * direction;
-      drive.velocity = speed * lever * tangent;
-      drive.axes = to_quaternion(axes);
-      drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree);
-      if (torque < kUnlimited) drive.maximum_force = Vector3::Constant(torque / (kDrivingPoints * lever));
-      emit(drive);
-    }
+    // midway between both bodies', so that drift moves both alike
+    const Vector3 axis = (one.orientation * Vector3::UnitX() + two.orientation * Vector3::UnitX()).normalized();
+    Discrepancy drive = row_about(axis, 0.0, AxisMode::kDriven);
+    drive.velocity = speed * axis;
+    drive.maximum_force.x() = torque;
+    emit(drive);
   }
 };
 
