@@ -63,6 +63,12 @@ Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& n
   return error + turn2 - turn1;
 }
 
+Vector3 error_in_axes_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
+                         const Pose& then2) {
+  const Vector3 error = error_at(discrepancy, now1, now2, then1, then2);
+  return discrepancy.is_angular() ? error : now1.orientation * (then1.orientation.conjugate() * error);
+}
+
 double joint_error(const Discrepancy& discrepancy, const Vector3& error) {
   const Matrix3 axes = discrepancy.axes.toRotationMatrix();
   double sum = 0.0;

@@ -125,7 +125,11 @@ double held_angle(const Discrepancy& swing);
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2);
 
-// Joint error of a discrepancy with error vector `error` (world): its norm over the axes that are locked, and
+// The same as the discrepancy's axes see it, which turn with body 1 from `now` to `then` (an angular discrepancy's stay).
+Vector3 error_in_axes_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
+                         const Pose& then2);
+
+// Joint error of a discrepancy with error vector `error`, as its axes see it: its norm over the axes that are locked, and
 // over the limits where they are exceeded; what gives way (compliance) is no error. m, or rad for the angular twin.
 double joint_error(const Discrepancy& discrepancy, const Vector3& error);
 

@@ -28,8 +28,8 @@ JointLoad joint_load(const JointRows& joint, const JointBody& body1, const Joint
   Vector3 sum = Vector3::Zero();
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
-    load.error = std::max(
-        load.error, joint_error(discrepancy, error_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next)));
+    const Vector3 error = error_in_axes_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next);
+    load.error = std::max(load.error, joint_error(discrepancy, error));
     if (!discrepancy.is_angular()) sum += impulse_of(joint, discrepancy, row, time_step);
   }
   load.force = sum.norm() / time_step;

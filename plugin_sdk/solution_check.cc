@@ -332,14 +332,12 @@ class Balance {
       const Pose start1 = pose_of(one, request_.position(), request_.orientation());
       const Pose start2 = pose_of(two, request_.position(), request_.orientation());
       const Matrix3 axes = d.axes.toRotationMatrix();
-      const auto turned_axis = [&](int axis, const Pose& pose, const Vector3& error) -> Vector3 {
-        if (d.is_radial() && axis == 0) return error.normalized();
-        if (d.is_swing()) return axes.col(axis);
-        return pose.orientation * (trial1.orientation.conjugate() * axes.col(axis));
+      const auto along = [&](int axis, const Vector3& error) {
+        return d.is_radial() && axis == 0 ? error.norm() : axes.col(axis).dot(error);
       };
       const Pose end1 = end_pose(one, trial1), end2 = end_pose(two, trial2);
-      const Vector3 at_end = error_at(d, trial1, trial2, end1, end2);
-      const Vector3 at_start = error_at(d, trial1, trial2, start1, start2);
+      const Vector3 at_end = error_in_axes_at(d, trial1, trial2, end1, end2);
+      const Vector3 at_start = error_in_axes_at(d, trial1, trial2, start1, start2);
       // rows that are linear leave what is of second order in the turn
       const double turned = turn_of(one).norm() + turn_of(two).norm();
       const double left = kNearly + std::min(turned, kMostLeft);
@@ -352,8 +350,7 @@ class Balance {
         const bool is_held = axis_mode(d.modes, axis) == AxisMode::kLocked && !(d.compliance[axis] > 0.0) &&
                              d.maximum_force[axis] == kUnlimited;
         if (!is_held) continue;
-        const double end = turned_axis(axis, end1, at_end).dot(at_end);
-        const double start = turned_axis(axis, start1, at_start).dot(at_start);
+        const double end = along(axis, at_end), start = along(axis, at_start);
         const double beyond = std::max(end - std::max(start, 0.0), std::min(start, 0.0) - end);
         const double allowed = left * sizes + kOfSolvedCoordinates * (1.0 + coordinates);
         if (beyond <= allowed) continue;

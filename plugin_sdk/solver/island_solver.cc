@@ -94,7 +94,7 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   joint.axes = to_rotation_matrix(d.axes);
   const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
   const Vector3 middle = 0.5 * (d.point1 + d.point2);
-  const Vector3 start_error = error_at(d, one.trial, two.trial, one.start, two.start);
+  const Vector3 start_error = error_in_axes_at(d, one.trial, two.trial, one.start, two.start);
   joint.slop = d.is_angular() ? 1e-9 : closing_slop(middle, one, two);
   joint.length = d.is_angular() ? std::max(one.gyration(), two.gyration()) : 1.0;
   if (!d.is_angular()) coordinates_ = std::max(coordinates_, d.point2.cwiseAbs().maxCoeff());

@@ -136,6 +136,18 @@ TEST(DiscrepancyError, TurnsWithBothBodies) {
   }
 }
 
+// Bodies that move as one leave what a joint misses along any of its axes as it is.
+TEST(DiscrepancyError, InItsAxesDoesNotTurnWithBothBodies) {
+  Draw random(12);
+  for (int i = 0; i < 200; ++i) {
+    const Pair pair(&random, 1.0);
+    const Pose moved = random.pose(5.0);
+    const Vector3 error =
+        error_in_axes_at(pair.d, pair.pose1, pair.pose2, compose(moved, pair.pose1), compose(moved, pair.pose2));
+    EXPECT_LT((error - (pair.d.point2 - pair.d.point1)).norm(), 1e-13);
+  }
+}
+
 TEST(DiscrepancyError, OfTheAngularTwinCountsTheTurnsOfBothBodies) {
   Discrepancy d;
   d.modes |= kAngularDiscrepancy;

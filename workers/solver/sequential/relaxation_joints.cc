@@ -26,7 +26,7 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
   r.beta = correction_factor * discrepancy.correction;
   const SolverBody& one = bodies[body1];
   const SolverBody& two = bodies[body2];
-  const Vector3 start_error = error_at(discrepancy, one.trial, two.trial, one.start, two.start);
+  const Vector3 start_error = error_in_axes_at(discrepancy, one.trial, two.trial, one.start, two.start);
   const Vector3 middle = 0.5 * (discrepancy.point1 + discrepancy.point2);
   const Matrix3 axes = to_rotation_matrix(discrepancy.axes);
   const bool angular = discrepancy.is_angular();
