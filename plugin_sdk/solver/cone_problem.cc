@@ -354,6 +354,9 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
     double best = residual_of(lambda, y);
+    // a guess that is worse than none, as the impulses of a step a million times as long are
+    if (residual_of(Eigen::VectorXd::Zero(lambda.size()), start_others_) < 0.1 * best)
+      lambda.setZero(), y = start_others_, best = residual_of(lambda, y);
     Eigen::VectorXd best_lambda = lambda, best_y = y;
     const auto keep_better = [&] {
       const double residual = residual_of(lambda, y);
@@ -363,13 +366,19 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     ConePath guesses = path();
     Eigen::VectorXd swept = lambda, start = lambda;
     int without = 0;
+    bool holds = true;  // of kGaussSeidel: nothing has slid yet
     double attempt = best;
     std::uint32_t done = 0, guess = 0;
     // what rounding leaves of sums of large terms is no violation
     double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
     while (best > enough && done < settings.iterations && (!is_newton || without < kPatience || guesses.has_next())) {
       const double before = best;
-      if (!is_newton) {
+      // what touches without a push is held, too, at first: a stack that is let go is found in a step, not in one for each body
+      const bool may_hold = is_newton ? done == 0 : holds && without < kPatience;
+      if (may_hold && newton_step(proximal_after(without), &lambda, &y, tolerance)) {
+        ++done, ++without;
+      } else if (!is_newton) {
+        if (holds) lambda = best_lambda, y = best_y, holds = false;
         ++done;
         sweep(&lambda, &y);
       } else if (without < kPatience && newton_step(proximal_after(without), &lambda, &y)) {

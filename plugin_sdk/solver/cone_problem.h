@@ -24,7 +24,8 @@
 //                   right. Where seven steps do not halve the residual, some follow from the best place that are kept only
 //                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
 //                   anew, from the guesses of cone_path.h, and every third time from sweeps.
-//     kGaussSeidel  projected block Gauss-Seidel, each contact solved exactly (coulomb_contact.h).
+//     kGaussSeidel  as long as nothing slides, the same steps; then projected block Gauss-Seidel, each contact solved exactly
+//                   (coulomb_contact.h).
 //  4. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
 //     with mu_d.
 //
@@ -170,7 +171,7 @@ class ConeProblem {
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
   bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner = 0.0);
-  bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
+  bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner = 0.0);
   std::uint32_t descend(double enough, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void solve_sliding();
   void solve_sticking();

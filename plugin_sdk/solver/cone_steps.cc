@@ -171,10 +171,11 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
 }
 
 // False, with nothing done, if the step is not finite. `proximal` is added to the diagonal of its matrix, which is 1.
-bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
+bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner) {
   proximal_ = proximal;
   const Eigen::Index count = lambda->size();
-  const bool any_slides = linearise(*lambda, *y);
+  const bool any_slides = linearise(*lambda, *y, corner);
+  if (any_slides && corner > 0.0) return false;
   // what is put somewhere goes to the right
   coupled_.clear();
   step_.setZero(count);

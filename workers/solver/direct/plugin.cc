@@ -3,8 +3,8 @@
 // Where the rows are taken: plugin_sdk/solver/end_of_step.h. Joints are eliminated by a sparse L D L^T that bears
 // dependent rows (plugin_sdk/solver/profile_ldlt.h); contacts, limits and drives feel each other through what is left
 // and are solved by projected Gauss-Seidel sweeps, each contact exactly (plugin_sdk/solver/cone_problem.h,
-// kGaussSeidel), or, with ContactSolver = "Newton", as Newton does. What no joint holds and nothing slides on is found
-// among the bodies' motions, as Newton finds it: stacks stand at any ratio of mass.
+// kGaussSeidel), or, with ContactSolver = "Newton", as Newton does. As long as nothing slides it takes Newton's steps in
+// any case: stacks stand at any ratio of mass.
 //
 // Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); joints are closed to
 // rounding at every mass ratio. Sweeps converge linearly, the slower the more contacts carry one another: piles that
