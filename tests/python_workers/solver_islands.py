@@ -20,7 +20,7 @@ from surface import perturbed_normal
 
 NOTHING_TO_DO, CONVERGED, ITERATIONS = 0, 1, 2
 FREE, LOCKED, LIMITED, UNILATERAL, FRICTION, DRIVEN = range(6)
-ANGULAR = 1 << 12
+ANGULAR, SWING = 1 << 12, 1 << 14
 UNLIMITED = numpy.finfo(float).max
 
 
@@ -89,6 +89,16 @@ class Bodies:
         local = apply(inward, point - self.trial_position[body])
         return apply(rotation(self.orientation[body]), local) + self.position[body]
 
+    def turned_back(self, direction, body):
+        """A direction that a body has at S*, as it was at S_n."""
+        inward = rotation(self.trial_orientation[body]).swapaxes(-1, -2)
+        return apply(rotation(self.orientation[body]), apply(inward, direction))
+
+    def turned(self, direction, body):
+        """A direction that a body has at S_n, as it is at S*."""
+        inward = rotation(self.orientation[body]).swapaxes(-1, -2)
+        return apply(rotation(self.trial_orientation[body]), apply(inward, direction))
+
     def turn(self, body):
         """Rotation vector from S_n to S*."""
         return rotation_vector(product(self.trial_orientation[body], conjugate(self.orientation[body])))
@@ -130,8 +140,11 @@ class Scene:
         angular = (r.mode & ANGULAR) != 0
         error = r.point2 - r.point1
         turned = error + bodies.turn(body1) - bodies.turn(body2)
-        carried = bodies.carried(r.point2, body2) - bodies.carried(r.point1, body1)
+        # axes turn with body 1
+        carried = bodies.turned(bodies.carried(r.point2, body2) - bodies.carried(r.point1, body1), body1)
         start = numpy.where(angular[:, None], turned, carried)
+        is_swing = ((r.mode & SWING) != 0)[:, None]
+        start = numpy.where(is_swing, self._swing_at_start(r, axes, body1, body2), start)
 
         def along(vectors):
             return numpy.stack([dot(axes[:, i], vectors) for i in range(3)], axis=-1).reshape(-1)
@@ -153,6 +166,15 @@ class Scene:
             Rows(bodies, one[linear], two[linear], flat[linear], numpy.repeat(middle, 3, axis=0)[linear]),
             Rows(bodies, one[turning], two[turning], flat[turning]))
         self.joint_rows = rows.part(numpy.argsort(numpy.concatenate([linear, turning])))
+
+    def _swing_at_start(self, r, axes, body1, body2):
+        """Of the angle between a direction of body 1, the second axis, and one of body 2, that turned by point2."""
+        angle = dot(axes[:, 0], r.point2)[:, None]
+        first = self.bodies.turned_back(axes[:, 1], body1)
+        second = self.bodies.turned_back(numpy.cos(angle) * axes[:, 1] + numpy.sin(angle) * axes[:, 2], body2)
+        across = cross(first, second)
+        at_start = numpy.arctan2(numpy.sqrt(dot(across, across)), dot(first, second))
+        return (at_start - dot(axes[:, 0], r.point1))[:, None] * axes[:, 0]
 
     def joint_law(self, laws, row, i, after):
         """Sets the law of joint row i as row `row`: of the pose change, or of the velocity where the pose change
@@ -464,7 +486,7 @@ def check_request(r):
         if (pairs[:, 0] == pairs[:, 1]).any():
             raise Refusal(f"column {name}: a body is paired with itself")
     modes = numpy.stack([r.mode >> 4 * i & 0xF for i in range(3)], axis=-1)
-    if (modes > DRIVEN).any() or (r.mode >= 2 * ANGULAR).any():
+    if (modes > DRIVEN).any() or not numpy.isin(r.mode & ~0xFFF, (0, ANGULAR, ANGULAR | SWING)).all():
         raise Refusal("column mode: a mode that does not exist")
     if ((modes == LIMITED) & (r.lower > r.upper)).any():
         raise Refusal("column lower: above upper")
