@@ -369,20 +369,22 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     bool holds = true;  // of kGaussSeidel: nothing has slid yet
     double attempt = best;
     std::uint32_t done = 0, guess = 0;
+    // what touches without a push is held, too, at first: a stack that is let go is found in a step, not in one for each body
+    const auto takes_step = [&] {
+      const bool may_hold = is_newton ? done == 0 : holds && without < kPatience;
+      if (may_hold && newton_step(proximal_after(without), &lambda, &y, tolerance)) return true;
+      return is_newton && without < kPatience && newton_step(proximal_after(without), &lambda, &y);
+    };
     // what rounding leaves of sums of large terms is no violation
     double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
     while (best > enough && done < settings.iterations && (!is_newton || without < kPatience || guesses.has_next())) {
       const double before = best;
-      // what touches without a push is held, too, at first: a stack that is let go is found in a step, not in one for each body
-      const bool may_hold = is_newton ? done == 0 : holds && without < kPatience;
-      if (may_hold && newton_step(proximal_after(without), &lambda, &y, tolerance)) {
+      if (takes_step()) {
         ++done, ++without;
       } else if (!is_newton) {
         if (holds) lambda = best_lambda, y = best_y, holds = false;
         ++done;
         sweep(&lambda, &y);
-      } else if (without < kPatience && newton_step(proximal_after(without), &lambda, &y)) {
-        ++done, ++without;
       } else {
         lambda = start, y = start_others_ + response_ * lambda;
         done += descend(enough, &lambda, &y);

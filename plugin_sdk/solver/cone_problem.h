@@ -171,6 +171,7 @@ class ConeProblem {
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
   bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner = 0.0);
+  // With a corner, see linearise(): false, with nothing done, where a row slides.
   bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner = 0.0);
   std::uint32_t descend(double enough, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void solve_sliding();
