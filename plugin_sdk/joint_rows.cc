@@ -97,6 +97,17 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode) {
   return d;
 }
 
+Pose hinge_frame(const Vector3& point1, const Vector3& point2, const JointBodies& bodies, std::string_view type) {
+  const std::string joint(type);
+  if (point1 == point2) throw Refusal(joint + ": BindAxisPoint1 and BindAxisPoint2 are the same point");
+  const Vector3 axis = unit_axis(point2 - point1, joint + ": BindAxisPoint1, BindAxisPoint2");
+  return frame_along(point1 + axis.dot(bodies.centre() - point1) * axis, axis);
+}
+
+Vector3 axis_between(const Pose& frame1, const Pose& frame2) {
+  return (frame1.orientation * Vector3::UnitX() + frame2.orientation * Vector3::UnitX()).normalized();
+}
+
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle) {
   Discrepancy d;
   set_swing({first, second}, angle, &d);

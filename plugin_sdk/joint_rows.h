@@ -54,6 +54,13 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 // The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi).
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle);
 
+// The frame of a hinge about the axis from one point to another (world): the first axis along it, the origin at its point next
+// to bodies.centre(), since with one far out ways and turns could not be told apart. Refuses points that name no axis.
+Pose hinge_frame(const Vector3& point1, const Vector3& point2, const JointBodies& bodies, std::string_view type);
+
+// The unit axis midway between the first ones of two frames, so that drift moves both alike.
+Vector3 axis_between(const Pose& frame1, const Pose& frame2);
+
 // Calls emit with the rows that keep axes of two frames across each other: the first of frame 2 across the second and
 // third of frame 1, so that frame 2 turns about it only; and its second across the third of frame 1, which leaves no turn.
 template <typename Emit>
@@ -61,6 +68,15 @@ void hold_axis(const Pose& frame1, const Pose& frame2, Emit&& emit) {
   const Vector3 axis = frame2.orientation * Vector3::UnitX();
   emit(swing_row(frame1.orientation * Vector3::UnitY(), axis, kQuarterTurn));
   emit(swing_row(frame1.orientation * Vector3::UnitZ(), axis, kQuarterTurn));
+}
+// These two, and that the origins coincide.
+template <typename Emit>
+void hold_hinge(const Pose& frame1, const Pose& frame2, Emit&& emit) {
+  Discrepancy anchor;
+  anchor.point1 = frame1.position;
+  anchor.point2 = frame2.position;
+  emit(anchor);
+  hold_axis(frame1, frame2, emit);
 }
 template <typename Emit>
 void hold_orientation(const Pose& frame1, const Pose& frame2, Emit&& emit) {

@@ -20,9 +20,7 @@ void IslandSolver::solve_pose() {
     BodyMotion next = x0;
     cone_.push(bodies_, &next);
     const double change = largest_change(next, displacement_), size = largest(next);
-    double turned = 0.0;
-    for (const std::uint32_t i : pushed_)
-      turned = std::max(turned, (next[i].angular - displacement_[i].angular).norm());
+    const bool may_chord = solved.iterations > 0 && cone_.holds_all() && turns_little(next);
     is_last = steps.end_with(change, size, 4.0 * representable()) || joints_.empty() || steps.count() == kPoseSteps;
     if (is_last && solved.iterations > 0 && !joints_.empty()) {
       cone_.refine(bodies_, x0, representable(), settings_, &solved);
@@ -33,8 +31,7 @@ void IslandSolver::solve_pose() {
     has_pose_ = solved.has_converged;
     move_to_end(std::move(next));
     keep_corrections();
-    if (!is_last && solved.iterations > 0 && cone_.holds_all() && turned <= kTurnOfChords)
-      is_last = follow_chords(change);
+    if (!is_last && may_chord) is_last = follow_chords(change);
   }
   settings_.is_rough = false;
   const double share = shorten(offset_, &displacement_);
@@ -57,24 +54,26 @@ bool IslandSolver::follow_chords(double before) {
     move_to_end(std::move(next));
     keep_corrections();
     if (!(change <= kRateOfChords * before) || pose_contradiction_ > 0.0) return false;
-    if (largest_missing() <= kLeftByChords * kEpsilon * coordinates_ &&
-        change * (change / before) <= std::max(4.0 * representable(), 1e-14 * size))
-      return true;
+    if (are_closed() && change * (change / before) <= std::max(4.0 * representable(), 1e-14 * size)) return true;
     before = change;
   }
 }
 
-double IslandSolver::largest_missing() const {
-  double most = 0.0;
-  for (const EndJoint& joint : joints_) {
+bool IslandSolver::turns_little(const BodyMotion& next) const {
+  return std::ranges::all_of(
+      pushed_, [&](std::uint32_t i) { return (next[i].angular - displacement_[i].angular).norm() <= kTurnOfChords; });
+}
+
+bool IslandSolver::are_closed() const {
+  return std::ranges::all_of(joints_, [&](const EndJoint& joint) {
+    const double rounding = kEpsilon * (joint.discrepancy.is_angular() ? 1.0 : coordinates_);
     for (std::size_t k = 0; k < 3; ++k) {
       const JointLaw& law = joint.pose_laws[k];
-      if (!law.is_equality()) continue;
       const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
-      most = std::max(most, joint.length * std::fabs(law.lower_target - change));
+      if (law.is_equality() && !(std::fabs(law.lower_target - change) <= kLeftByChords * rounding)) return false;
     }
-  }
-  return most;
+    return true;
+  });
 }
 
 double IslandSolver::shorten(const BodyMotion& from, BodyMotion* motion) const {

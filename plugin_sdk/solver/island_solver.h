@@ -23,8 +23,8 @@ class IslandSolver {
   static constexpr int kRounds = 12, kFreeRounds = 4, kRoundsOfLowering = 4, kPoseSteps = 30;
   // Corrections move a body by no more than so many times the ways to S* and what is overlapped or missed there, summed.
   static constexpr double kOfWay = 16.0, kOfOverlap = 2.0;
-  // Largest turn from which chords start, rad; what one may be of the step before it; units of rounding of the coordinates
-  // that may be left of what joints hold.
+  // Largest turn from which chords start, rad; what one may be of the step before it; units of rounding, of the coordinates
+  // or of an angle of 1, that may be left of what joints hold.
   static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;
 
   // ---- what does not change within the step
@@ -80,8 +80,11 @@ class IslandSolver {
   // True if they end at rounding, false where they do not shrink fast.
   bool follow_chords(double before);
 
-  // Of what joints hold where displacement_ ends, m.
-  double largest_missing() const;
+  // From displacement_, so that its rows are nearly those of `next`.
+  bool turns_little(const BodyMotion& next) const;
+
+  // What joints hold, where displacement_ ends, to rounding.
+  bool are_closed() const;
 
   // Contacts that leave a body no room ask for ways without end along what is nearly flat between them. The share of the way
   // from `from` that is left.

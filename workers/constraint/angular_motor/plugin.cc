@@ -9,7 +9,6 @@
 //   (a x l).(v_2 + w_2 x (m + l - x_2) - v_1 - w_1 x (m + l - x_1)) = |l|^2 a.(w_2 - w_1) + (a x l).(slip at m),
 // and m does not slip. So it is one row about a: six rows of rank 6, whatever |l|, its multiplier the torque itself,
 // bounded by MaximumTorque. Where on the axis the scene's points lie is nothing to the rows, as for a `Revolute`.
-#include "plugin_sdk/constraint.h"
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -45,10 +44,7 @@ class AngularMotor final : public ConstraintPlugin {
                 const Vector3 point2 = properties.vector();
                 const double speed = properties.number();
                 const double torque = properties.number();
-                if (point1 == point2)
-                  throw Refusal("AngularMotor: BindAxisPoint1 and BindAxisPoint2 are the same point");
-                const Vector3 axis = unit_axis(point2 - point1, "AngularMotor: BindAxisPoint1, BindAxisPoint2");
-                const Pose frame = frame_along(point1 + axis.dot(bodies.centre() - point1) * axis, axis);
+                const Pose frame = hinge_frame(point1, point2, bodies, "AngularMotor");
                 write_frame(bodies.pose1, frame, &out);
                 write_frame(bodies.pose2, frame, &out);
                 out.number(speed);
@@ -59,27 +55,14 @@ class AngularMotor final : public ConstraintPlugin {
   void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
                      const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
-      describe(bound, bodies, emit);
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      hold_hinge(one, two, emit);
+      const Vector3 axis = axis_between(one, two);
+      Discrepancy drive = row_about(axis, 0.0, AxisMode::kDriven);
+      drive.velocity = bound.number() * axis;
+      drive.maximum_force.x() = bound.number();
+      emit(drive);
     });
-  }
-
- private:
-  template <typename Emit>
-  static void describe(PropertyCursor bound, const JointBodies& bodies, Emit&& emit) {
-    const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-    Discrepancy anchor;
-    anchor.point1 = one.position;
-    anchor.point2 = two.position;
-    emit(anchor);
-    hold_axis(one, two, emit);
-    const double speed = bound.number();
-    const double torque = bound.number();
-    // midway between both bodies', so that drift moves both alike
-    const Vector3 axis = (one.orientation * Vector3::UnitX() + two.orientation * Vector3::UnitX()).normalized();
-    Discrepancy drive = row_about(axis, 0.0, AxisMode::kDriven);
-    drive.velocity = speed * axis;
-    drive.maximum_force.x() = torque;
-    emit(drive);
   }
 };
 

@@ -10,7 +10,6 @@
 // With limits one row more about a, active only at a limit: rank 6 there. The angle is that of body 2 relative to body 1,
 // right-handed about point 1 -> point 2, zero at the start, known within one turn: two limits may span less than that.
 #include "plugin_sdk/joint_rows.h"
-#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
@@ -51,9 +50,7 @@ class Revolute final : public ConstraintPlugin {
           if (!limits.is_none() && limits.upper - limits.lower >= kTwoPi && limits.lower > -kUnlimited &&
               limits.upper < kUnlimited)
             throw Refusal("Revolute: UpperLimit lies a full turn or more above LowerLimit, which limits nothing");
-          if (point1 == point2) throw Refusal("Revolute: BindAxisPoint1 and BindAxisPoint2 are the same point");
-          const Vector3 axis = unit_axis(point2 - point1, "Revolute: BindAxisPoint1, BindAxisPoint2");
-          const Pose frame = frame_along(point1 + axis.dot(bodies.centre() - point1) * axis, axis);
+          const Pose frame = hinge_frame(point1, point2, bodies, "Revolute");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           out.number(limits.lower);
@@ -65,18 +62,13 @@ class Revolute final : public ConstraintPlugin {
                      const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-      Discrepancy anchor;
-      anchor.point1 = one.position;
-      anchor.point2 = two.position;
-      emit(anchor);
-      hold_axis(one, two, emit);
+      hold_hinge(one, two, emit);
       JointLimits limits;
       limits.lower = bound.number();
       limits.upper = bound.number();
       if (limits.is_none()) return;
-      const Vector3 axis = (one.orientation * Vector3::UnitX() + two.orientation * Vector3::UnitX()).normalized();
-      Discrepancy limit =
-          row_about(axis, limits.turn(twist_between(one.orientation, two.orientation)), AxisMode::kLimited);
+      Discrepancy limit = row_about(axis_between(one, two),
+                                    limits.turn(twist_between(one.orientation, two.orientation)), AxisMode::kLimited);
       limit.lower.x() = limits.lower;
       limit.upper.x() = limits.upper;
       emit(limit);

@@ -4,7 +4,8 @@
 //                 body 2                      z of body 1's, y across its z
 //
 // Freedoms. The origin's two rows take the translations across the axis, the angles the turns about z, y and x: five rows
-// of rank 5, none redundant, one freedom left. The rows are taken where body 2 is, so that a long way along the axis is no lever.
+// of rank 5, none redundant, one freedom left. The rows are taken where body 2 is, so that a long way along the axis is no
+// lever.
 // The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit) and a
 // drive to a speed with a largest force (one row on the velocity, rank 6).
 #include <cmath>

@@ -3,7 +3,8 @@
 //      Axis1 (body 1)  --+--  Axis2 (body 2)      the points coincide, and the bars keep their angle
 //
 // Freedoms. The shared point takes the translations. The angle of the bars changes at the rate w.n, n = a1 x a2/|a1 x a2|:
-// one turn, about the normal of both bars. Four rows of rank 4 while the bars are not parallel, none redundant; left are the turns about either bar.
+// one turn, about the normal of both bars. Four rows of rank 4 while the bars are not parallel, none redundant; left are the
+// turns about either bar.
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <string>
 
