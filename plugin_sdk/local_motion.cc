@@ -11,8 +11,8 @@
 namespace gravitas {
 namespace {
 
-constexpr double kLargestTurn = 2.0;  // rad in an inner step: the chart ends at 2 pi
-constexpr double kNearly = 0.9;
+constexpr double kLargestInnerTurn = 2.0;  // rad in an inner step: the chart ends at 2 pi
+constexpr double kShareOfTurn = 0.9;
 constexpr double kDifference = 1e-7;
 
 Eigen::Index first_number(std::size_t body) { return static_cast<Eigen::Index>(body) * LocalMotion::kNumbers; }
@@ -219,12 +219,12 @@ double LocalMotion::rounding(double h, double rate) const {
 double LocalMotion::longest() const {
   double fastest = 0.0;
   for (const Body& body : bodies_) fastest = std::max(fastest, body.start.twist.angular.norm());
-  return kNearly * kLargestTurn / fastest;
+  return kShareOfTurn * kLargestInnerTurn / fastest;
 }
 
 bool LocalMotion::is_in_chart(const Eigen::VectorXd& y) const {
   for (std::size_t b = 0; b < bodies_.size(); ++b)
-    if (!(y.segment<3>(first_number(b) + 3).norm() <= kLargestTurn)) return false;
+    if (!(y.segment<3>(first_number(b) + 3).norm() <= kLargestInnerTurn)) return false;
   return true;
 }
 

@@ -32,9 +32,11 @@ function(gravitas_plugin name folder output)
       target_link_libraries(${plugin} PRIVATE ${objects})
     endif()
     target_link_options(${plugin} PRIVATE
-      -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--version-script=${GRAVITAS_PLUGIN_MAP}
-      # Clang's sanitizers live in the program, so with them a library may leave symbols open
-      $<$<CXX_COMPILER_ID:GNU>:-Wl,--no-undefined,-z,defs>)
+      -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--version-script=${GRAVITAS_PLUGIN_MAP})
+    # the sanitizers live in the program, so with them a library leaves symbols open
+    if(NOT GRAVITAS_SANITIZERS)
+      target_link_options(${plugin} PRIVATE -Wl,--no-undefined,-z,defs)
+    endif()
     gravitas_share_precompiled(${plugin} gravitas_sdk)
     set_property(GLOBAL APPEND PROPERTY GRAVITAS_PLUGIN_TARGETS ${plugin})
   endif()

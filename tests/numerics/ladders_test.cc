@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <ranges>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -110,17 +109,20 @@ TEST(Ladders, AreClimbedWhereATableIsAskedFor) {
   if (harness::table_folder() == nullptr) GTEST_SKIP() << "GRAVITAS_TABLES is not set";
   Table table(std::string(harness::table_folder()) + "/motion.csv");
   const char *only = std::getenv("GRAVITAS_LADDER"), *climber = std::getenv("GRAVITAS_LADDER_METHOD");
-  const auto climbs = [&](const MotionMethod& method) { return climber == nullptr || method.name == climber; };
+  const auto climbing = [&](std::vector<MotionMethod> methods) {
+    std::erase_if(methods, [&](const MotionMethod& method) { return climber != nullptr && method.name != climber; });
+    return methods;
+  };
   for (const Ladder& ladder : ladders()) {
     if (only != nullptr && std::string(only) != ladder.number) continue;
-    for (const MotionMethod& method : harness::fixed_step_methods() | std::views::filter(climbs))
+    for (const MotionMethod& method : climbing(harness::fixed_step_methods()))
       for (int rung = 0; rung < ladder.rungs; ++rung) {
         const std::uint32_t steps = ladder.coarsest << rung;
         table.write(ladder, method, "time_step_s", ladder.problem.duration / steps, steps);
       }
     for (int half_digits = 4; half_digits <= 26; ++half_digits) {
       const double accuracy = std::pow(10.0, -0.5 * half_digits);
-      for (const MotionMethod& method : harness::adaptive_methods(accuracy) | std::views::filter(climbs))
+      for (const MotionMethod& method : climbing(harness::adaptive_methods(accuracy)))
         table.write(ladder, method, "accuracy", accuracy, ladder.adaptive_steps);
     }
   }

@@ -138,7 +138,7 @@ TEST(SequentialEnergy, NeverRisesSimultaneously) {
   expect_lawful_impacts({.order = RelaxationOrder::kSimultaneous}, 700, 920);
 }
 TEST(SequentialEnergy, NeverRisesOverRelaxed) { expect_lawful_impacts({.relaxation_factor = 1.5}, 700, 900); }
-TEST(SequentialEnergy, NeverRisesUnderRelaxed) { expect_lawful_impacts({.relaxation_factor = 0.5}, 800, 940); }
+TEST(SequentialEnergy, NeverRisesUnderRelaxed) { expect_lawful_impacts({.relaxation_factor = 0.5}, 800, 930); }
 TEST(SequentialEnergy, NeverRisesWithShockPropagation) {
   expect_lawful_impacts({.shock_propagation = ShockPropagation::kAlways}, 900, 940);
 }
