@@ -9,22 +9,22 @@
 namespace gravitas {
 namespace {
 
-constexpr std::uint64_t kUnknown = ~0ULL;
+constexpr std::uint64_t kUnknownRows = ~0ULL;
 constexpr std::size_t kMaxRowWords = 64;
 
 // Rows of each word of a method, as the columns looked at so far have them.
 using RowCounts = std::array<std::uint64_t, kMaxRowWords>;
 
-// The rows of a column that are its word's, or kUnknown if there is no whole number of them.
+// The rows of a column that are its word's, or kUnknownRows if there is no whole number of them.
 std::uint64_t rows_found(const stage::ColumnInfo& column, std::uint64_t count) {
   const std::uint64_t rows = count / column.components;
-  return rows * column.components == count && rows >= column.extra ? rows - column.extra : kUnknown;
+  return rows * column.components == count && rows >= column.extra ? rows - column.extra : kUnknownRows;
 }
 
 bool fits(const stage::ColumnInfo& column, std::uint64_t count, RowCounts* rows) {
   if (column.rows_index == stage::kScalar) return count == 1;
   std::uint64_t& expected = (*rows)[column.rows_index];
-  if (expected == kUnknown) return (expected = rows_found(column, count)) != kUnknown;
+  if (expected == kUnknownRows) return (expected = rows_found(column, count)) != kUnknownRows;
   std::uint64_t wanted = 0;
   return !__builtin_mul_overflow(expected + column.extra, std::uint64_t{column.components}, &wanted) && count == wanted;
 }
@@ -34,7 +34,7 @@ std::string misfit(const stage::ColumnInfo& column, std::uint64_t count, const R
   const std::string name = std::string("column ") + column.name;
   if (column.rows_index == stage::kScalar) return name + " must be one value, has " + std::to_string(count);
   const std::uint64_t found = rows_found(column, count);
-  if (found == kUnknown) return name + " has " + std::to_string(count) + " elements, not a whole number of rows";
+  if (found == kUnknownRows) return name + " has " + std::to_string(count) + " elements, not a whole number of rows";
   return name + " has " + std::to_string(found + column.extra) + " rows, expected " +
          std::to_string(rows[column.rows_index] + column.extra) + " (one per " + column.rows + ")";
 }
@@ -61,7 +61,7 @@ std::size_t first_not_unit(std::span<const double> numbers, std::size_t componen
 
 std::string check_rows(const stage::MethodInfo& method, ColumnCounts request, ColumnCounts reply) {
   RowCounts rows;
-  std::fill_n(rows.begin(), method.row_words, kUnknown);
+  std::fill_n(rows.begin(), method.row_words, kUnknownRows);
   for (std::size_t i = 0; i < request.size(); ++i)
     if (!fits(method.request[i], request[i], &rows)) return misfit(method.request[i], request[i], rows);
   for (std::size_t i = 0; i < reply.size(); ++i)
@@ -70,7 +70,7 @@ std::string check_rows(const stage::MethodInfo& method, ColumnCounts request, Co
 }
 
 RowCheck::RowCheck() {
-  for (Counts& passed : passed_) passed.request.fill(kUnknown), passed.reply.fill(kUnknown);
+  for (Counts& passed : passed_) passed.request.fill(kUnknownRows), passed.reply.fill(kUnknownRows);
 }
 
 std::string RowCheck::check(stage::Method method, ColumnCounts request, ColumnCounts reply) {

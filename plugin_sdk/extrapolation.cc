@@ -6,7 +6,7 @@
 
 namespace gravitas {
 
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
+constexpr double kUnknownError = std::numeric_limits<double>::infinity();
 
 void Extrapolation::begin() {
   row_.clear();
@@ -23,7 +23,7 @@ double Extrapolation::add() {
   const auto pieces = static_cast<double>(++pieces_);
   if (table_.size() < pieces_) table_.emplace_back();
   table_[pieces_ - 1].resize(row_.size());
-  double error = pieces_ == 1 ? kUnknown : 0.0;
+  double error = pieces_ == 1 ? kUnknownError : 0.0;
   for (std::size_t i = 0; i < row_.size(); ++i) {
     double next = row_[i];
     for (std::size_t k = 1; k < pieces_; ++k) {
@@ -33,7 +33,7 @@ double Extrapolation::add() {
     }
     table_[pieces_ - 1][i] = next;
     if (pieces_ > 1) error = std::max(error, std::fabs(next - table_[pieces_ - 2][i]) / scale_[i]);
-    if (!std::isfinite(next)) error = kUnknown;
+    if (!std::isfinite(next)) error = kUnknownError;
   }
   row_.clear();
   scale_.clear();

@@ -23,8 +23,6 @@ constexpr double kPreference = 0.03;       // of the depth
 constexpr double kDeepest = 0.01;          // of the depth: a manifold may miss the very deepest point of a round edge
 constexpr std::uint32_t kForeignBody = 1000000;
 
-Pose at(const Vector3& position) { return {position, Quaternion::Identity()}; }
-
 std::string shown_pair(const Solids& world) { return world.solids[0].type + " and " + world.solids[1].type; }
 
 std::vector<TypeDeclaration> shape_types_of(Subject& subject) {

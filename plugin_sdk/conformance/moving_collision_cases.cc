@@ -18,8 +18,6 @@ constexpr stage::Method kShapeRays = stage::Method::kCollisionRays;
 constexpr double kTarget = 1e-6;  // m
 constexpr const char* kConvex[] = {"Sphere", "Box", "Cylinder", "Capsule", "Cone", "ConvexPolyhedron"};
 
-Pose at(const Vector3& position) { return {position, Quaternion::Identity()}; }
-
 // ---- questions
 
 MessageColumns with_shapes(stage::Method method, const Solids& world) {

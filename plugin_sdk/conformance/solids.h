@@ -35,6 +35,8 @@ Solid make_cone(const PluginDeclaration& declaration, double radius, double heig
 // A solid of a declared type, with sizes about a metre.
 Solid random_solid(const PluginDeclaration& declaration, const TypeDeclaration& type, Draw* draw);
 
+inline Pose at(const Vector3& position) { return {position, Quaternion::Identity()}; }
+
 struct SolidBody {
   std::uint32_t solid = 0;
   Pose pose = {};
