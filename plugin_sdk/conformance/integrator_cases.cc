@@ -36,7 +36,7 @@ FreeBodies random_bodies(std::size_t count, Draw* draw) {
   FreeBodies free;
   for (std::size_t i = 0; i < count; ++i) {
     FreeBody body{.mass = draw->uniform(0.5, 5.0), .damping = i % 3 == 0 ? draw->uniform(0.0, 2.0) : 0.0};
-    body.moments = Vector3(draw->uniform(1, 2), draw->uniform(1, 2), draw->uniform(1, 2));
+    body.moments = Vector3{draw->uniform(1, 2), draw->uniform(1, 2), draw->uniform(1, 2)};
     body.state = {draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}};
     body.wrench = {draw->vector(3.0), draw->vector(3.0)};
     body.flags = i % 7 == 5 ? kKinematic : kMovable;

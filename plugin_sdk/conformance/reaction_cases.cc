@@ -81,7 +81,7 @@ Mechanism swinging_chain(Draw* draw, std::uint32_t links, bool is_carried) {
     const double mass = draw->uniform(0.5, 2.0);
     const std::uint32_t link = made.world.add(
         {.mass = mass,
-         .moments = mass * Vector3(draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2)),
+         .moments = mass * Vector3{draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2)},
          .pose = {joint + half, draw->rotation()},
          .twist = {joint_velocity + turning.cross(half), turning}});
     made.world.wrench[link] = {draw->vector(20.0), draw->vector(2.0)};

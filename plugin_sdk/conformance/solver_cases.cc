@@ -69,7 +69,7 @@ ConstrainedBodies random_impact(Draw* draw, std::uint32_t contacts, double frict
   for (std::uint32_t i = 0; i < count; ++i) {
     const double mass = draw->uniform(0.5, 2.0);
     world.add({.mass = mass,
-               .moments = mass * Vector3(draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2)),
+               .moments = mass * Vector3{draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2), draw->uniform(0.1, 0.2)},
                .pose = draw->pose(1.0),
                .twist = {draw->vector(3.0), draw->vector(3.0)}});
   }
@@ -158,7 +158,7 @@ void judge_complementarity(Subject& subject) {
     for (std::uint32_t i = 0; i < 5; ++i) {
       world.add({.mass = draw.uniform(0.5, 2.0),
                  .pose = {Vector3(i, 0, 0), draw.rotation()},
-                 .twist = {.linear = Vector3(draw.uniform(-2, 2), draw.uniform(-2, 2), 0)}});
+                 .twist = {.linear = Vector3{draw.uniform(-2, 2), draw.uniform(-2, 2), 0}}});
       if (i == 0) continue;
       world.contacts.push_back(
           {.body1 = i - 1, .body2 = i, .normal = Vector3::UnitX(), .point = Vector3(i - 0.5, 0, 0), .key = i});

@@ -29,7 +29,7 @@ TEST(WrenchJacobian, OfAnAccelerationIsItsSlope) {
   for (int trial = 0; trial < 200; ++trial) {
     const Body body = {draw.pose(2.0), {draw.vector(3.0), draw.vector(3.0)}};
     const double mass = draw.uniform(0.5, 4.0);
-    const Vector3 moments(draw.uniform(0.1, 3.0), draw.uniform(0.1, 3.0), draw.uniform(0.1, 3.0));
+    const Vector3 moments{draw.uniform(0.1, 3.0), draw.uniform(0.1, 3.0), draw.uniform(0.1, 3.0)};
     const Vector3 inverse = moments.cwiseInverse();
     // a wrench that is linear in the state near here
     const Accelerations wrench = Accelerations::NullaryExpr([&](Eigen::Index) { return draw.uniform(-5.0, 5.0); });

@@ -46,7 +46,7 @@ void choose_shape(Random* random, Shapes shapes, RandomBody* body) {
   if (kind == 1) {
     body->geometry = "Box";
     const Vector3 half =
-        is_isotropic ? Vector3::Constant(size) : Vector3(size, random->between(0.1, 0.6), random->between(0.1, 0.6));
+        is_isotropic ? Vector3::Constant(size) : Vector3{size, random->between(0.1, 0.6), random->between(0.1, 0.6)};
     body->properties = "HalfExtents = " + literal(half);
     return;
   }

@@ -55,9 +55,10 @@ TEST(TimeOfImpact, OfBallsIsTheRootOfAQuadratic) {
   int hits = 0, misses = 0;
   for (int i = 0; i < 2000; ++i) {
     const double r = random.uniform(0.1, 1.0), s = random.uniform(0.1, 1.0);
-    const Body a(ball(r), {random.vector(-1, 1), random.rotation()}, {random.vector(-1, 1), random.vector(-9, 9)});
-    const Body b(ball(s), {random.vector(-1, 1) + Vector3(4, 0, 0), random.rotation()},
-                 {random.vector(-2, 2) - Vector3(8, 0, 0), random.vector(-9, 9)});
+    const Body a{ball(r), {random.vector(-1, 1), random.rotation()}, {random.vector(-1, 1), random.vector(-9, 9)}};
+    const Body b{ball(s),
+                 {random.vector(-1, 1) + Vector3(4, 0, 0), random.rotation()},
+                 {random.vector(-2, 2) - Vector3(8, 0, 0), random.vector(-9, 9)}};
     const Vector3 p = b.solid.start.position - a.solid.start.position;
     const Vector3 v = b.solid.motion.displacement - a.solid.motion.displacement;
     // when the centres are first r + s + gap apart
@@ -257,10 +258,14 @@ struct RandomFlight {
 RandomFlight random_flight(test::RandomShapes* random, SceneShape::Kind kind_a, SceneShape::Kind kind_b, double spin) {
   const Vector3 way = random->direction();
   const auto geometry = [&] { return Pose{0.4 * random->direction(), random->rotation()}; };
-  return {Body(random->convex(kind_a), {random->vector(-1, 1), random->rotation()},
-               {random->vector(-1, 1), spin * random->vector(-1, 1)}, geometry()),
-          Body(random->convex(kind_b), {5.0 * way + random->vector(-1, 1), random->rotation()},
-               {-10.0 * way + random->vector(-2, 2), spin * random->vector(-1, 1)}, geometry())};
+  return {Body{random->convex(kind_a),
+               {random->vector(-1, 1), random->rotation()},
+               {random->vector(-1, 1), spin * random->vector(-1, 1)},
+               geometry()},
+          Body{random->convex(kind_b),
+               {5.0 * way + random->vector(-1, 1), random->rotation()},
+               {-10.0 * way + random->vector(-2, 2), spin * random->vector(-1, 1)},
+               geometry()}};
 }
 
 TEST(TimeOfImpact, NothingOverlapsBeforeItAndNothingIsMissed) {
@@ -298,10 +303,12 @@ TEST(TimeOfImpact, OfAGroundThatTilts) {
   int found_count = 0;
   for (const SceneShape::Kind kind : test::kConvexKinds) {
     for (int i = 0; i < 20; ++i) {
-      const Body plane(ground(), {Vector3::Zero(), Quaternion::Identity()}, {Vector3::Zero(), random.vector(-0.5, 0.5)},
-                       at(random.uniform(-1, 1), -0.2, 0));
-      const Body b(random.convex(kind), {random.vector(2, 3), random.rotation()},
-                   {random.vector(-3, 0), random.vector(-2, 2)});
+      const Body plane{ground(),
+                       {Vector3::Zero(), Quaternion::Identity()},
+                       {Vector3::Zero(), random.vector(-0.5, 0.5)},
+                       at(random.uniform(-1, 1), -0.2, 0)};
+      const Body b{
+          random.convex(kind), {random.vector(2, 3), random.rotation()}, {random.vector(-3, 0), random.vector(-2, 2)}};
       const auto gap = [&](double t) {
         const Pose X_PB = relative(compose(moved(plane.solid.start, plane.solid.motion, t), plane.solid.geometry),
                                    moved(b.solid.start, b.solid.motion, t));

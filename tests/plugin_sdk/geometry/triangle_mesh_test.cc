@@ -170,7 +170,7 @@ TEST(TriangleMesh, TellsInsideFromOutsideEverywhereRoundASolid) {
   test::RandomShapes random(9);
   int inside = 0;
   for (int i = 0; i < 3000; ++i) {
-    const Vector3 p(random.uniform(-1, 5), random.uniform(-0.2, 0.2), random.uniform(-0.5, 1.5));
+    const Vector3 p{random.uniform(-1, 5), random.uniform(-0.2, 0.2), random.uniform(-0.5, 1.5)};
     const bool is_inside = p.x() < 4 && std::fabs(p.y()) < 0.025 * p.x() && p.z() > 0 && p.z() < 1;
     inside += is_inside ? 1 : 0;
     EXPECT_EQ(mesh.nearest(p).signed_distance < 0.0, is_inside) << p.transpose();

@@ -27,7 +27,7 @@ TEST(Motion, BetweenTwoPosesEndsAtTheSecondWhateverTheTurns) {
   std::mt19937_64 generator(5);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   const auto vector = [&](double reach) {
-    return Vector3(reach * uniform(generator), reach * uniform(generator), reach * uniform(generator));
+    return Vector3{reach * uniform(generator), reach * uniform(generator), reach * uniform(generator)};
   };
   for (int i = 0; i < 1000; ++i) {
     const Pose start{vector(5.0), exp_rotation(vector(4.0))};

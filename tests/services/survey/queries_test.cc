@@ -163,7 +163,7 @@ TEST(Queries, DistanceOfABallFromABoxAnywhere) {
   query::v1::Batch batch;
   std::vector<double> right;
   for (int i = 0; i < 300; ++i) {
-    const Vector3 centre = Vector3(15, 2, 0) + Vector3(draw(4), draw(4), draw(4));
+    const Vector3 centre = Vector3(15, 2, 0) + Vector3{draw(4), draw(4), draw(4)};
     const Vector3 nearest = (centre - Vector3(15, 2, 0)).cwiseMax(-1.0).cwiseMin(1.0) + Vector3(15, 2, 0);
     const double distance = (centre - nearest).norm() - 0.25;
     if (!(distance > 0.0)) continue;
@@ -206,7 +206,7 @@ std::string crowd(int count, std::uint64_t seed, bool has_ground) {
     Geometry { Type = "Capsule" Id = "C" CustomProperties { Radius = 0.2 Height = 0.8 } } }
     Environment { Space { Bodies { )";
   for (int i = 0; i < count; ++i) {
-    const Quaternion q = Quaternion(draw(-1, 1), draw(-1, 1), draw(-1, 1), draw(-1, 1)).normalized();
+    const Quaternion q = Quaternion{draw(-1, 1), draw(-1, 1), draw(-1, 1), draw(-1, 1)}.normalized();
     const auto number = [](double value) { return fmt::format("{:.17g}", value); };
     text += "Body { Id = \"N" + std::to_string(i) + "\" GeometryId = \"" + "SBC"[i % 3] +
             "\" Mass = 1 KineticProperties { Position = {" + number(draw(-4, 4)) + "," + number(draw(0, 6)) + "," +
@@ -262,7 +262,7 @@ TEST(Queries, CastsOverlapAndDistanceAgree) {
   const auto draw = [&] { return std::uniform_real_distribution<double>(-4, 4)(random); };
   query::v1::Batch batch;
   for (int i = 0; i < 60; ++i) {
-    const Vector3 from(draw(), 3.5 + 0.8 * draw(), draw()), way(draw(), draw(), draw());
+    const Vector3 from{draw(), 3.5 + 0.8 * draw(), draw()}, way(draw(), draw(), draw());
     set_ball(0.3, from, batch.add_overlaps()->mutable_shape());
     query::v1::ClosestPoints* closest = batch.add_closest();
     set_ball(0.3, from, closest->mutable_shape());

@@ -114,7 +114,7 @@ TEST(FreeRotor, OfASymmetricBodyIsTwoRotations) {
 TEST(FreeRotor, IsAFlow) {
   conformance::Draw random(1);
   for (int i = 0; i < 3000; ++i) {
-    Vector3 moments(random.uniform(0.2, 1.2), random.uniform(0.2, 1.2), random.uniform(0.2, 1.2));
+    Vector3 moments{random.uniform(0.2, 1.2), random.uniform(0.2, 1.2), random.uniform(0.2, 1.2)};
     if (i % 4 == 0) moments[i % 3] = moments[(i + 1) % 3];
     if (i % 9 == 0) moments[0] = moments[1] * (1.0 + 1e-14);
     Vector3 momentum = random.vector(1.0);

@@ -45,7 +45,7 @@ Heap random_heap(std::uint64_t seed, double heaviest = 1.0, const HeapMaterial& 
     const double mass = i + 1 == count ? heaviest : draw.uniform(0.5, 2.0);
     const std::uint32_t body =
         p.add_body({.mass = mass,
-                    .moments = mass * Vector3(draw.uniform(0.1, 0.2), draw.uniform(0.1, 0.2), draw.uniform(0.1, 0.2)),
+                    .moments = mass * Vector3{draw.uniform(0.1, 0.2), draw.uniform(0.1, 0.2), draw.uniform(0.1, 0.2)},
                     .pose = {Vector3(0, 0.5 + i, 0), draw.rotation()},
                     .linear = draw.vector(1.0) + Vector3(0, -2, 0),
                     .angular = draw.vector(2.0)});

@@ -44,9 +44,8 @@ SolverProblem random_impact(std::uint64_t seed, double friction, double restitut
   const std::uint32_t count = 2 + draw.below(4);
   for (std::uint32_t i = 0; i < count; ++i) {
     const double mass = draw.between(0.2, 5.0);
-    const Vector3 squares(draw.between(0.01, 0.3), draw.between(0.01, 0.3), draw.between(0.01, 0.3));
-    const Vector3 moments =
-        mass / 3.0 * Vector3(squares.y() + squares.z(), squares.x() + squares.z(), squares.x() + squares.y());
+    const double zz = draw.between(0.01, 0.3), yy = draw.between(0.01, 0.3), xx = draw.between(0.01, 0.3);
+    const Vector3 moments = mass / 3.0 * Vector3(yy + zz, xx + zz, xx + yy);
     const Vector3 at = draw.vector(2.0);
     const Quaternion turned = exp_rotation(draw.vector(3.0));
     const Vector3 linear = draw.vector(4.0);
@@ -138,7 +137,7 @@ TEST(SequentialEnergy, NeverRisesSimultaneously) {
   expect_lawful_impacts({.order = RelaxationOrder::kSimultaneous}, 700, 920);
 }
 TEST(SequentialEnergy, NeverRisesOverRelaxed) { expect_lawful_impacts({.relaxation_factor = 1.5}, 700, 900); }
-TEST(SequentialEnergy, NeverRisesUnderRelaxed) { expect_lawful_impacts({.relaxation_factor = 0.5}, 800, 930); }
+TEST(SequentialEnergy, NeverRisesUnderRelaxed) { expect_lawful_impacts({.relaxation_factor = 0.5}, 800, 940); }
 TEST(SequentialEnergy, NeverRisesWithShockPropagation) {
   expect_lawful_impacts({.shock_propagation = ShockPropagation::kAlways}, 900, 940);
 }

@@ -213,10 +213,10 @@ TEST(CoulombContact, EverySolutionObeysTheLaw) {
     Matrix3 factor;
     for (int i = 0; i < 9; ++i) factor(i / 3, i % 3) = draw();
     const Matrix3 w = factor * factor.transpose() + 0.05 * Matrix3::Identity();
-    const Vector3 q(draw(), draw(), draw());
+    const Vector3 q{draw(), draw(), draw()};
     const double target = 0.5 * (1.0 + draw());
     const double mu = 1.0 + draw();
-    Vector3 impulse(0.0, draw(), draw());
+    Vector3 impulse{0.0, draw(), draw()};
     ASSERT_TRUE(solve_coulomb_contact(w, w.inverse(), q, target, mu, &impulse)) << trial;
     const Vector3 u = q + w * impulse;
     const double slip = u.tail<2>().norm();

@@ -13,7 +13,7 @@ using Scatter = BoundedBody (*)(conformance::Draw* random);
 
 inline BoundedBody spread(conformance::Draw* random) { return cube(random->vector(10.0), random->uniform(0.2, 1.5)); }
 inline BoundedBody clustered(conformance::Draw* random) {
-  const Vector3 centre(random->below(3) * 50.0, random->below(2) * -50.0, 0.0);
+  const Vector3 centre{random->below(3) * 50.0, random->below(2) * -50.0, 0.0};
   return cube(centre + random->vector(1.0), random->uniform(0.1, 0.6));
 }
 inline BoundedBody huge_and_small(conformance::Draw* random) {
@@ -28,13 +28,13 @@ inline BoundedBody flat_and_long(conformance::Draw* random) {
 }
 inline BoundedBody in_one_place(conformance::Draw*) { return cube({3.25, -1.5, 7.0}, 0.5); }
 inline BoundedBody points(conformance::Draw* random) {
-  const Vector3 p(random->below(4) * 1.0, random->below(4) * 1.0, random->below(2) * 1.0);
+  const Vector3 p{random->below(4) * 1.0, random->below(4) * 1.0, random->below(2) * 1.0};
   return {p, p};
 }
 // Bounds on the borders of cells and on planes, where bodies touch exactly.
 inline BoundedBody on_a_lattice(conformance::Draw* random) {
-  const Vector3 lower(random->below(8) - 4.0, random->below(8) - 4.0, random->below(4) - 2.0);
-  return {lower, lower + Vector3(random->below(3), random->below(3), random->below(3))};
+  const Vector3 lower{random->below(8) - 4.0, random->below(8) - 4.0, random->below(4) - 2.0};
+  return {lower, lower + Vector3{random->below(3), random->below(3), random->below(3)}};
 }
 inline BoundedBody far_away(conformance::Draw* random) {
   const double scale = std::ldexp(1.0, static_cast<int>(random->below(4)) * 20);

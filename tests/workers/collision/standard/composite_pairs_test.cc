@@ -115,7 +115,7 @@ TEST(Mesh, MeshStandsOnMesh) {
   const Shape &field = shapes.field(6), &cube = shapes.box_mesh({0.5, 0.5, 0.5}), &slab = shapes.box_mesh({3, 0.2, 3});
   RandomShapes random(52);
   for (int i = 0; i < 100; ++i) {
-    const Vector3 place(random.uniform(-1.5, 1.5), 0.499, random.uniform(-1.5, 1.5));
+    const Vector3 place{random.uniform(-1.5, 1.5), 0.499, random.uniform(-1.5, 1.5)};
     const Pose X{place, Quaternion(Eigen::AngleAxisd(random.uniform(0, 3), Vector3::UnitY()))};
     for (const auto& [ground, pose] : {std::pair(&field, at(0, 0, 0)), std::pair(&slab, at(0, -0.2, 0))}) {
       const ContactList contacts = all_contacts(*ground, pose, cube, X, 0.01);

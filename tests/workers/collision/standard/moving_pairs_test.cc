@@ -89,7 +89,7 @@ TEST(MovingPairs, ABulletDoesNotPassASheetOfTriangles) {
   for (int i = 0; i < 50; ++i) {
     // 900 m/s for 1/60 s: 3000 times its radius
     const Vector3 way = (random.vector(-0.4, 0.4) - Vector3::UnitY()).normalized();
-    const Vector3 start(random.uniform(-2, 2), 7.0, random.uniform(-2, 2));
+    const Vector3 start{random.uniform(-2, 2), 7.0, random.uniform(-2, 2)};
     const std::optional<Impact> found =
         first_impact(field, still(at(0, 0, 0)), bullet, moving({start, Quaternion::Identity()}, 15.0 * way), kTarget);
     ASSERT_TRUE(found) << i;
