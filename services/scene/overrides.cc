@@ -24,7 +24,7 @@ struct Refused {
 const std::vector<std::string> kRoots = {"Integrator", "Solver",     "Space", "Collision", "Simulator", "Body",
                                          "Geometry",   "Constraint", "Force", "Material",  "Plugin",    "Environment"};
 
-bool is_blank(char c) { return c == ' ' || c == '\t'; }
+bool is_space_or_tab(char c) { return c == ' ' || c == '\t'; }
 
 // A part of the override and where it begins.
 struct Part {
@@ -36,8 +36,8 @@ struct Part {
 };
 
 Part trimmed(Part part) {
-  while (!part.text.empty() && is_blank(part.text.front())) part = part.from(1);
-  while (!part.text.empty() && is_blank(part.text.back())) part = part.until(part.text.size() - 1);
+  while (!part.text.empty() && is_space_or_tab(part.text.front())) part = part.from(1);
+  while (!part.text.empty() && is_space_or_tab(part.text.back())) part = part.until(part.text.size() - 1);
   return part;
 }
 

@@ -418,7 +418,7 @@ TEST_P(Located, ACradleHandsOnWhatItGets) {
   for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(world.state().linear_velocity[3 * i], i == 4 ? 1.0 : 0.0, 1e-10) << i;
 }
 
-std::string name_of(const ::testing::TestParamInfo<Way>& info) {
+std::string name_of_way(const ::testing::TestParamInfo<Way>& info) {
   if (info.param.accuracy > 0.0) return "ContinuousWithAccuracy";
   return info.param.simulator == Simulator::kBisection ? "Bisection" : "Continuous";
 }
@@ -426,7 +426,7 @@ std::string name_of(const ::testing::TestParamInfo<Way>& info) {
 INSTANTIATE_TEST_SUITE_P(By, Located,
                          ::testing::Values(Way{Simulator::kBisection, 0.0}, Way{Simulator::kContinuous, 0.0},
                                            Way{Simulator::kContinuous, 1e-9}),
-                         name_of);
+                         name_of_way);
 
 // 10 m a step, through a plate of 3 cm.
 TEST(Continuous, NothingPassesThroughAPlate) {

@@ -23,7 +23,7 @@ using kernel::StepOutcome;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-const Vector3 kDown(0, -9.81, 0);
+const Vector3 kWeight(0, -9.81, 0);
 constexpr double kTimeStep = 0.01;
 constexpr std::uint32_t kAsleepBy = 60;  // the default is half a second
 
@@ -50,8 +50,8 @@ void run(Environment* world, std::uint32_t steps) {
     ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
 }
 
-Vector3 position(const Environment& world, std::uint32_t body) { return vector_at(world.state().position, body); }
-Vector3 velocity(const Environment& world, std::uint32_t body) {
+Vector3 place_of(const Environment& world, std::uint32_t body) { return vector_at(world.state().position, body); }
+Vector3 velocity_of(const Environment& world, std::uint32_t body) {
   return vector_at(world.state().linear_velocity, body);
 }
 
@@ -62,7 +62,7 @@ WorldBuilder boxes_and_ball(Hosting hosting = Hosting::kDirect) {
   builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0)).box(Vector3(0.4, 0.2, 0.4), 1.0, Vector3(0, 0.7, 0));
   builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(50, 0.25, 0));
   builder.sphere(0.2, 1.0, Vector3(0, 6.0, 0));
-  return may_sleep(&builder).gravity(kDown);
+  return may_sleep(&builder).gravity(kWeight);
 }
 
 TEST(Sleep, WhatRestsFallsAsleepAndStaysBitForBit) {
@@ -79,7 +79,7 @@ TEST(Sleep, WhatRestsFallsAsleepAndStaysBitForBit) {
   EXPECT_EQ(std::vector<double>(world.state().position.begin(), world.state().position.begin() + 12), before);
   for (const std::uint32_t body : {1U, 2U, 3U}) {
     EXPECT_TRUE(world.is_asleep(body));
-    EXPECT_EQ(velocity(world, body), Vector3::Zero());
+    EXPECT_EQ(velocity_of(world, body), Vector3::Zero());
   }
   // what touched goes on touching
   for (const Event& event : listener.events) EXPECT_NE(event.kind, EventKind::kCollisionEnd);
@@ -108,7 +108,7 @@ void expect_an_impact_upon_a_sleeper(Simulator simulator, const std::string& int
   builder.steps(150, kTimeStep).material({0.5, 0.0, 0.0, 0.0}).ground();
   builder.plugin(Slot::kIntegrator, plugin_path(integrator), settings);
   builder.sphere(0.5, 1.0, Vector3(0, 0.5, 0)).sphere(0.5, 1.0, Vector3(-3, 0.5, 0), Vector3(2, 0, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   builder.description().simulator = simulator;
   builder.description().substeps = 2;
   Environment world(builder.description());
@@ -117,9 +117,9 @@ void expect_an_impact_upon_a_sleeper(Simulator simulator, const std::string& int
   EXPECT_FALSE(world.is_asleep(2));
   run(&world, 90);
   EXPECT_FALSE(world.is_asleep(1));
-  EXPECT_NEAR(velocity(world, 1).x(), 1.5, 1e-9);
-  EXPECT_NEAR(velocity(world, 2).x(), 0.5, 1e-9);
-  EXPECT_NEAR(position(world, 1).y(), 0.5, 1e-6);
+  EXPECT_NEAR(velocity_of(world, 1).x(), 1.5, 1e-9);
+  EXPECT_NEAR(velocity_of(world, 2).x(), 0.5, 1e-9);
+  EXPECT_NEAR(place_of(world, 1).y(), 0.5, 1e-6);
 }
 
 TEST(Sleep, ASleeperTakesAnImpactAsOneThatIsAwake) {
@@ -152,14 +152,14 @@ TEST(Sleep, AChainWakesOneAfterTheOther) {
   builder.steps(400, kTimeStep).material({1.0, 0.0, 0.0, 0.0}).ground();
   for (int i = 0; i < 5; ++i) builder.sphere(0.5, 1.0, Vector3(1.5 * i, 0.5, 0));
   builder.sphere(0.5, 1.0, Vector3(-4, 0.5, 0), Vector3(3, 0, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   Environment world(builder.description());
   SleepListener listener;
   EventSource listener_source(&listener);
   world.set_commit_listener(&listener_source);
   run(&world, 400);
   EXPECT_THAT(listener.bodies(EventKind::kWake), ElementsAre(1, 2, 3, 4, 5));
-  EXPECT_NEAR(velocity(world, 5).x(), 3.0, 1e-9);
+  EXPECT_NEAR(velocity_of(world, 5).x(), 3.0, 1e-9);
   for (std::uint32_t i = 1; i <= 4; ++i) EXPECT_TRUE(world.is_asleep(i)) << i;
 }
 
@@ -170,7 +170,7 @@ TEST(Sleep, AJointMakesAnIsland) {
       .box(Vector3(0.5, 0.25, 0.5), 1.0, Vector3(1.2, 0.25, 0));
   builder.sphere(0.2, 1.0, Vector3(1.2, 6.0, 0));
   builder.joint("Spherical", "constraint_spherical", 1, 2, {0.6, 0.25, 0});
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   Environment world(builder.description());
   SleepListener listener;
   EventSource listener_source(&listener);
@@ -190,20 +190,20 @@ TEST(Sleep, AHangingBodyFallsAsleepAndOneThatMayNotKeepsItsIslandAwake) {
         .point(1.0, Vector3::Ones(), Vector3(0, -2, 0));
     builder.joint("Spherical", "constraint_spherical", 0, kNone, {0, 0, 0});
     builder.joint("Spherical", "constraint_spherical", 1, 0, {0, -1, 0});
-    may_sleep(&builder).gravity(kDown);
+    may_sleep(&builder).gravity(kWeight);
     if (!may) builder.body().flags &= ~std::uint32_t{kCanSleep};
     Environment world(builder.description());
     run(&world, 100);
     EXPECT_EQ(world.is_asleep(0), may);
     EXPECT_EQ(world.is_asleep(1), may);
-    EXPECT_LT((position(world, 1) - Vector3(0, -2, 0)).norm(), 1e-9);
+    EXPECT_LT((place_of(world, 1) - Vector3(0, -2, 0)).norm(), 1e-9);
   }
 }
 
 TEST(Sleep, WhereAllSleepNothingIsAskedAndTimeGoesOn) {
   WorldBuilder builder;
   builder.steps(300, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   Environment world(builder.description());
   run(&world, kAsleepBy);
   ASSERT_TRUE(world.is_asleep(1));
@@ -243,7 +243,7 @@ TEST(Sleep, AUserWakes) {
 TEST(Sleep, WhoHasSleptForLongWakesAsWell) {
   WorldBuilder builder;
   builder.steps(300, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   Environment world(builder.description());
   run(&world, kAsleepBy + 50);
   ASSERT_TRUE(world.is_asleep(1));
@@ -293,15 +293,15 @@ TEST(Sleep, AKinematicBodyThatBeginsToMoveWakesWhatStandsOnIt) {
     for (const double number : {t, 0.0, -0.25 + (t > 1.0 ? 2.0 * (t - 1.0) : 0.0), 0.0, 1.0, 0.0, 0.0, 0.0})
       table.motion.push_back(number);
   builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0)).box(Vector3(0.4, 0.2, 0.4), 1.0, Vector3(0, 0.7, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   Environment world(builder.description());
   run(&world, 100);
   EXPECT_TRUE(world.is_asleep(1));
   EXPECT_TRUE(world.is_asleep(2));
   run(&world, 50);
   EXPECT_FALSE(world.is_asleep(1));
-  EXPECT_NEAR(position(world, 1).y() - position(world, 0).y(), 0.5, 1e-3);
-  EXPECT_NEAR(position(world, 2).y() - position(world, 1).y(), 0.45, 1e-3);
+  EXPECT_NEAR(place_of(world, 1).y() - place_of(world, 0).y(), 0.5, 1e-3);
+  EXPECT_NEAR(place_of(world, 2).y() - place_of(world, 1).y(), 0.45, 1e-3);
 }
 
 // The box hangs on nothing: the ball, and what it rests on, are the same without the sleepers.
@@ -314,7 +314,7 @@ TEST(Sleep, ChangesNoBitOfThoseAwake) {
     if (has_pile)
       for (int i = 0; i < 6; ++i) builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(100, 0.25 + 0.5 * i, 0));
     if (may) may_sleep(&builder);
-    builder.gravity(kDown);
+    builder.gravity(kWeight);
     Environment world(builder.description());
     std::vector<double> motion;
     for (int i = 0; i < 250; ++i) {
@@ -386,7 +386,7 @@ TEST(Sleep, AForceThatChangesWakes) {
   for (const double push : {5.0, 30.0}) {
     WorldBuilder builder;
     builder.steps(200, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
-    may_sleep(&builder).gravity(kDown);
+    may_sleep(&builder).gravity(kWeight);
     builder.force("Basic", "force_basic", {0,   0,    0, 0, 0,   0, 0, 0, 0,    0,    4,     //
                                            0.0, 0,    0, 0, 1.0, 0, 0, 0, 1.01, push, 0, 0,  //
                                            9.0, push, 0, 0, 0});
@@ -400,9 +400,9 @@ TEST(Sleep, AForceThatChangesWakes) {
     EXPECT_THAT(listener.bodies(EventKind::kWake), ElementsAre(1));
     if (push < 0.5 * 2.0 * 9.81) {
       EXPECT_TRUE(world.is_asleep(1));
-      EXPECT_LT(position(world, 1).norm() - 0.25, 1e-12);
+      EXPECT_LT(place_of(world, 1).norm() - 0.25, 1e-12);
     } else {
-      EXPECT_NEAR(velocity(world, 1).x(), push / 2.0 - 0.5 * 9.81,
+      EXPECT_NEAR(velocity_of(world, 1).x(), push / 2.0 - 0.5 * 9.81,
                   0.15);  // after a second; the push takes a step to grow
     }
   }
@@ -416,7 +416,7 @@ TEST(Sleep, AForceThatJumpsWakesAtItsTime) {
       .material({0.0, 0.0, 0.0, 0.0})
       .ground()
       .box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   builder.force("Basic", "force_basic", {0,   0,     0, 0, 0,     0, 0, 0, 0,     0,     4,     //
                                          0.0, 0,     0, 0, kJump, 0, 0, 0, kJump, kPush, 0, 0,  //
                                          9.0, kPush, 0, 0, 0});
@@ -425,14 +425,14 @@ TEST(Sleep, AForceThatJumpsWakesAtItsTime) {
   run(&world, 100);
   EXPECT_TRUE(world.is_asleep(1));
   run(&world, 100);
-  EXPECT_NEAR(velocity(world, 1).x(), (2.0 - kJump) * kPush / 2.0, 1e-12);
+  EXPECT_NEAR(velocity_of(world, 1).x(), (2.0 - kJump) * kPush / 2.0, 1e-12);
 }
 
 // The stages are asked there for its sake, which changes no bit.
 TEST(Sleep, AFaultOrderedIntoAStepInWhichAllSleepIsInjectedThere) {
   WorldBuilder builder(Hosting::kSharedMemory);
   builder.steps(100, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   Environment quiet(builder.description()), world(builder.description());
   world.inject({Slot::kSolver, "kill", 90});
   run(&quiet, 100);
@@ -448,7 +448,7 @@ TEST(Sleep, AFaultOrderedIntoAStepInWhichAllSleepIsInjectedThere) {
 TEST(Sleep, NothingSleepsUnderAForceThatKeepsChanging) {
   WorldBuilder builder;
   builder.steps(300, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
-  may_sleep(&builder).gravity(kDown);
+  may_sleep(&builder).gravity(kWeight);
   builder.force("Basic", "force_basic", {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0.0, 0, 0, 0, 100.0, 0.1, 0, 0, 0});
   Environment world(builder.description());
   SleepListener listener;
@@ -456,7 +456,7 @@ TEST(Sleep, NothingSleepsUnderAForceThatKeepsChanging) {
   world.set_commit_listener(&listener_source);
   run(&world, 300);
   EXPECT_THAT(listener.bodies(EventKind::kSleep), IsEmpty());
-  EXPECT_LT(position(world, 1).norm() - 0.25, 1e-9);
+  EXPECT_LT(place_of(world, 1).norm() - 0.25, 1e-9);
 }
 
 // What is slow and goes somewhere: a drift without hold, a pendulum at its turning points, a slide.
@@ -466,15 +466,15 @@ TEST(Sleep, StopsNoMotion) {
   builder.sphere(0.5, 1.0, Vector3(0, 5, 0), Vector3(1e-9, 0, 0));
   builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0), Vector3(1e-4, 0, 0));
   builder.description().forces.push_back({"gravity", "Gravity", {0, -9.81, 0}, 0});
-  builder.description().force.plugins = WorldBuilder().sphere(1, 1, kDown).gravity(kDown).description().force.plugins;
+  builder.description().force.plugins = WorldBuilder().sphere(1, 1, kWeight).gravity(kWeight).description().force.plugins;
   builder.body().forces.push_back(0);
   builder.point(1.0, Vector3::Constant(1e-3), Vector3(10.01, 4, 0)).body().forces.push_back(0);
   builder.joint("Spherical", "constraint_spherical", 3, kNone, {10, 5, 0});
   may_sleep(&builder);
   Environment world(builder.description());
   run(&world, 1000);
-  EXPECT_NEAR(position(world, 1).x(), 1e-8, 1e-20);
-  EXPECT_NEAR(position(world, 2).x(), 1e-3, 1e-9);
+  EXPECT_NEAR(place_of(world, 1).x(), 1e-8, 1e-20);
+  EXPECT_NEAR(place_of(world, 2).x(), 1e-3, 1e-9);
   for (const std::uint32_t body : {1U, 2U, 3U}) EXPECT_FALSE(world.is_asleep(body)) << body;
 }
 

@@ -28,7 +28,7 @@ Catalog catalog() {
 }
 
 // A scene with these geometries, the first being that of a movable body.
-BuiltScene built(const std::string& geometries, const std::string& id = "A") {
+BuiltScene built_of(const std::string& geometries, const std::string& id = "A") {
   return build("Geometries {\n" + geometries +
                    "\n}\nSimulator { }\nEnvironment { Space { Bodies { Body { Id = \"Thing\" GeometryId = \"" + id +
                    "\" MassDensity = 100 } } } }",
@@ -45,7 +45,7 @@ std::string geometry(const std::string& type, const std::string& properties, con
 
 TEST(ShapeValues, PolygonsBecomeTrianglesAndMassIsThatOfTheSolid) {
   for (const char* type : {"ConvexPolyhedron", "TriangleMesh"}) {
-    const BuiltScene scene = built(geometry(type, kCube));
+    const BuiltScene scene = built_of(geometry(type, kCube));
     EXPECT_THAT(scene.errors(), IsEmpty());
     ASSERT_TRUE(scene.description.has_value());
     const kernel::BodyDescription& body = scene.description->bodies[0];
@@ -57,7 +57,7 @@ TEST(ShapeValues, PolygonsBecomeTrianglesAndMassIsThatOfTheSolid) {
 
 TEST(ShapeValues, WithoutFacesAPolyhedronIsTheHull) {
   const BuiltScene scene =
-      built(geometry("ConvexPolyhedron", "Vertices = {{0,0,0},{1,0,0},{0,1,0},{0,0,1},{0.1,0.1,0.1}}"));
+      built_of(geometry("ConvexPolyhedron", "Vertices = {{0,0,0},{1,0,0},{0,1,0},{0,0,1},{0.1,0.1,0.1}}"));
   EXPECT_THAT(scene.errors(), IsEmpty());
   ASSERT_TRUE(scene.description.has_value());
   EXPECT_NEAR(scene.description->bodies[0].mass, 100.0 / 6.0, 1e-12);
@@ -69,7 +69,7 @@ TEST(ShapeValues, WithoutFacesAPolyhedronIsTheHull) {
 
 TEST(ShapeValues, CompoundsNameTheirChildrenInAnyOrder) {
   const BuiltScene scene =
-      built(geometry("Compound", "Children = {{\"Block\",{-2,0,0},{1,0,0,0}},{\"Block\",{2,0,0},{1,0,0,0},300}}") +
+      built_of(geometry("Compound", "Children = {{\"Block\",{-2,0,0},{1,0,0,0}},{\"Block\",{2,0,0},{1,0,0,0},300}}") +
             geometry("Box", "HalfExtents = {1,1,1}", "Block"));
   EXPECT_THAT(scene.errors(), IsEmpty());
   ASSERT_TRUE(scene.description.has_value());
@@ -82,7 +82,7 @@ TEST(ShapeValues, CompoundsNameTheirChildrenInAnyOrder) {
 
 TEST(ShapeValues, RefusalsNameThePlaceAndTheFace) {
   const auto error = [](const std::string& geometries) {
-    const BuiltScene scene = built(geometries);
+    const BuiltScene scene = built_of(geometries);
     const std::vector<std::string> errors = scene.errors();
     return errors.empty() ? std::string("no error") : errors[0];
   };
@@ -129,7 +129,7 @@ class ObjFile : public testing::Test {
 
   BuiltScene with(const std::string& text, const std::string& more = "") const {
     std::ofstream(folder_ / "x.obj") << text;
-    return built(geometry("TriangleMesh", "File = \"" + (folder_ / "x.obj").string() + "\" " + more));
+    return built_of(geometry("TriangleMesh", "File = \"" + (folder_ / "x.obj").string() + "\" " + more));
   }
 
   std::filesystem::path folder_ =

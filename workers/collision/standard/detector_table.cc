@@ -9,9 +9,9 @@ namespace {
 constexpr auto kFirst = static_cast<std::size_t>(ShapeType::kRegistered);
 
 // initialised before any registration runs
-constinit std::array<RegisteredShape, kMostShapeTypes> shapes{};
+constinit std::array<RegisteredShape, kMostShapeTypes> shape_types{};
 constinit std::size_t shape_count = 0;
-constinit std::array<std::array<PairFunction, kMostShapeTypes>, kMostShapeTypes> registered{};
+constinit std::array<std::array<PairFunction, kMostShapeTypes>, kMostShapeTypes> detectors{};
 
 void collide_nothing(const Shape&, const Shape&, const Placement&, double, Manifold* out) { out->count = 0; }
 
@@ -29,19 +29,19 @@ constexpr PairFunction kPairFunctions[kOwn][kOwn] = {
 ShapeRegistration::ShapeRegistration(ShapeDeclaration declaration, ShapeReader read) noexcept
     : type_(static_cast<ShapeType>(kFirst + shape_count)) {
   if (kFirst + shape_count >= kMostShapeTypes) std::terminate();
-  shapes[shape_count++] = {declaration, read};
+  shape_types[shape_count++] = {declaration, read};
 }
 
 DetectorRegistration::DetectorRegistration(ShapeType a, ShapeType b, PairFunction function) noexcept {
-  registered[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)] = function;
+  detectors[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)] = function;
 }
 
-std::span<const RegisteredShape> registered_shapes() { return {shapes.data(), shape_count}; }
+std::span<const RegisteredShape> registered_shapes() { return {shape_types.data(), shape_count}; }
 
 PairFunction detector(ShapeType a, ShapeType b) {
   const auto row = static_cast<std::size_t>(a), column = static_cast<std::size_t>(b);
   if (row < kOwn && column < kOwn) return kPairFunctions[row][column];
-  if (registered[row][column] != nullptr) return registered[row][column];
+  if (detectors[row][column] != nullptr) return detectors[row][column];
   return a == ShapeType::kHalfspace ? collide_halfspace_general : collide_general;
 }
 
