@@ -466,7 +466,8 @@ TEST(Sleep, StopsNoMotion) {
   builder.sphere(0.5, 1.0, Vector3(0, 5, 0), Vector3(1e-9, 0, 0));
   builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0), Vector3(1e-4, 0, 0));
   builder.description().forces.push_back({"gravity", "Gravity", {0, -9.81, 0}, 0});
-  builder.description().force.plugins = WorldBuilder().sphere(1, 1, kWeight).gravity(kWeight).description().force.plugins;
+  builder.description().force.plugins =
+      WorldBuilder().sphere(1, 1, kWeight).gravity(kWeight).description().force.plugins;
   builder.body().forces.push_back(0);
   builder.point(1.0, Vector3::Constant(1e-3), Vector3(10.01, 4, 0)).body().forces.push_back(0);
   builder.joint("Spherical", "constraint_spherical", 3, kNone, {10, 5, 0});

@@ -70,7 +70,7 @@ TEST(ShapeValues, WithoutFacesAPolyhedronIsTheHull) {
 TEST(ShapeValues, CompoundsNameTheirChildrenInAnyOrder) {
   const BuiltScene scene =
       built_of(geometry("Compound", "Children = {{\"Block\",{-2,0,0},{1,0,0,0}},{\"Block\",{2,0,0},{1,0,0,0},300}}") +
-            geometry("Box", "HalfExtents = {1,1,1}", "Block"));
+               geometry("Box", "HalfExtents = {1,1,1}", "Block"));
   EXPECT_THAT(scene.errors(), IsEmpty());
   ASSERT_TRUE(scene.description.has_value());
   const kernel::BodyDescription& body = scene.description->bodies[0];
