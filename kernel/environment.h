@@ -326,6 +326,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
+  bool ends_at_switch_ = false;                   // does the part that is being made end where a force jumps?
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::optional<Trusted<Pairs>> pairs_;           // the last
   Extrapolation extrapolation_, jumps_;

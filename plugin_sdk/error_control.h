@@ -17,6 +17,14 @@ inline Property accuracy_property(double without) {
       .means("Largest estimated error of an inner step, in m, rad, and relative to speeds above 1 m/s, 1 rad/s.");
 }
 
+inline Property dense_output_property() {
+  return Property::flag("DenseOutput")
+      .defaults_to({1})
+      .means(
+          "Inner steps as long as Accuracy allows, beyond the step where nothing touches the bodies; else they end "
+          "with it.");
+}
+
 // Of inner steps, as a share of the step.
 inline constexpr double kShortestInnerStep = 1e-12;
 
@@ -27,10 +35,10 @@ inline void require_inner_step(double inner, double whole) {
         "Accuracy cannot be met by any step: forces are not smooth, bodies turn too fast, or the state overflows");
 }
 
-// The inner step that the step before left in plugin_state for this one; 0 where there is none.
+// The inner step that the step before left in plugin_state, its first number, for this one; 0 where there is none.
 inline double remembered_inner_step(std::span<const double> plugin_state, double whole) {
   const bool is_one =
-      plugin_state.size() == 1 && plugin_state[0] > kShortestInnerStep * whole && std::isfinite(plugin_state[0]);
+      !plugin_state.empty() && plugin_state[0] > kShortestInnerStep * whole && std::isfinite(plugin_state[0]);
   return is_one ? plugin_state[0] : 0.0;
 }
 

@@ -29,6 +29,7 @@ struct GroupChart {
   using Coordinates = Vector3;
   static Coordinates zero() { return Vector3::Zero(); }
   static Quaternion at(const Quaternion& q0, const Coordinates& r) { return rotate_by(q0, r); }
+  static Coordinates coordinates(const Quaternion& q0, const Quaternion& q) { return log_rotation(q * q0.conjugate()); }
   static Coordinates rate(const Quaternion&, const Coordinates& r, const Vector3& w) {
     return rotation_vector_rate(r, w);
   }
@@ -68,22 +69,17 @@ class MotionStages {
   // Evaluates stage `stage` at node c[stage] with the row a of weights of the earlier ones. False, having asked nothing,
   // where its state is not finite.
   bool evaluate(std::size_t stage, std::span<const double> a, std::span<const double> c, double h) {
-    bool finite = true;
-    for (std::size_t i = 0; i < start_.size(); ++i) {
-      const BodyState state = is_movable(i) ? combined(i, a.first(stage), c, c[stage], h) : carried(i, c[stage] * h);
-      finite = finite && is_finite(state);
-      trial_.set(i, state);
-    }
-    if (!finite) return false;
-    const std::span<const double> wrenches = derivatives_->wrenches(time_ + c[stage] * h, trial_);
-    for (std::size_t i = 0; i < start_.size(); ++i) {
-      if (!is_movable(i)) continue;
-      const BodyState state = trial_.at(i);
-      const Acceleration acceleration = derivatives_->acceleration(i, state, wrenches);
-      rate(stage, i) = {state.twist.linear, acceleration.linear, acceleration.angular,
-                        Chart::rate(start_[i].pose.orientation, turned(i, a.first(stage), h), state.twist.angular)};
-    }
-    return true;
+    return evaluate_at(
+        stage, c[stage] * h, [&](std::size_t i) { return combined(i, a.first(stage), c, c[stage], h); },
+        [&](std::size_t i, const BodyState&) { return turned(i, a.first(stage), h); });
+  }
+
+  // Evaluates stage `stage` at states that come from elsewhere, `elapsed` after the start.
+  template <typename StateOf>
+  bool evaluate_at(std::size_t stage, double elapsed, StateOf&& state_of) {
+    return evaluate_at(stage, elapsed, state_of, [&](std::size_t i, const BodyState& state) {
+      return Chart::coordinates(start_[i].pose.orientation, state.pose.orientation);
+    });
   }
 
   // State of a movable body at node `end` with the weights of the first stages.
@@ -125,12 +121,13 @@ class MotionStages {
     for (std::size_t i = 0; i < start_.size(); ++i) {
       start_[i] = trial_.at(i);
       if (!is_movable(i)) continue;
-      rate(0, i) = rate(last, i);
-      rate(0, i).turn = Chart::rate(start_[i].pose.orientation, Chart::zero(), start_[i].twist.angular);
+      rate_at(0, i) = rate(last, i);
+      rate_at(0, i).turn = Chart::rate(start_[i].pose.orientation, Chart::zero(), start_[i].twist.angular);
     }
   }
 
   const BodyState& start(std::size_t body) const { return start_[body]; }
+  const Rate& rate(std::size_t stage, std::size_t body) const { return rates_[stage * start_.size() + body]; }
   bool is_movable(std::size_t body) const { return (request_->flags()[body] & kMovable) != 0; }
   std::size_t size() const { return start_.size(); }
 
@@ -143,14 +140,32 @@ class MotionStages {
     const bool moves = (request_->flags()[body] & kKinematic) != 0;
     return moves ? detail::keep_moving(start_[body], elapsed) : start_[body];
   }
+  template <typename StateOf, typename TurnOf>
+  bool evaluate_at(std::size_t stage, double elapsed, StateOf&& state_of, TurnOf&& turn_of) {
+    bool finite = true;
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      const BodyState state = is_movable(i) ? state_of(i) : carried(i, elapsed);
+      finite = finite && is_finite(state);
+      trial_.set(i, state);
+    }
+    if (!finite) return false;
+    const std::span<const double> wrenches = derivatives_->wrenches(time_ + elapsed, trial_);
+    for (std::size_t i = 0; i < start_.size(); ++i) {
+      if (!is_movable(i)) continue;
+      const BodyState state = trial_.at(i);
+      const Acceleration acceleration = derivatives_->acceleration(i, state, wrenches);
+      rate_at(stage, i) = {state.twist.linear, acceleration.linear, acceleration.angular,
+                           Chart::rate(start_[i].pose.orientation, turn_of(i, state), state.twist.angular)};
+    }
+    return true;
+  }
   typename Chart::Coordinates turned(std::size_t body, std::span<const double> weights, double h) const {
     typename Chart::Coordinates sum = Chart::zero();
     for (std::size_t j = 0; j < weights.size(); ++j)
       if (weights[j] != 0.0) sum += h * weights[j] * rate(j, body).turn;
     return sum;
   }
-  Rate& rate(std::size_t stage, std::size_t body) { return rates_[stage * start_.size() + body]; }
-  const Rate& rate(std::size_t stage, std::size_t body) const { return rates_[stage * start_.size() + body]; }
+  Rate& rate_at(std::size_t stage, std::size_t body) { return rates_[stage * start_.size() + body]; }
 
   const stage::IntegratorIntegrateRequest* request_ = nullptr;
   Derivatives* derivatives_ = nullptr;

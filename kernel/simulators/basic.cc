@@ -5,7 +5,7 @@
 //       -> constrain -> solve -> commit S_{n+1} -> events
 //
 // A committed step is made of one or more inner steps: `Substeps` equal ones, cut where a force jumps, and whatever a
-// simulator makes of each. A force is asked before the jump that ends an inner step, and after the one that began it.
+// simulator makes of each. A force is asked as it is between the jump before and the next, whatever the time.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,22 +31,23 @@ void Environment::make_inner_steps() {
       make_part(i * length + done, part);
       done = part == left ? length : done + part;
       // a history from before the jump says nothing about what comes
-      if (asked_until_ < kInfinity && !must_restart_) std::ranges::fill(front().state_changed.span(), 1U);
+      if (ends_at_switch_ && !must_restart_) std::ranges::fill(front().state_changed.span(), 1U);
     }
   }
 }
 
 double Environment::length_to_switch(double begin, double length) {
-  asked_from_ = -kInfinity;
-  asked_until_ = kInfinity;
+  asked_from_ = -kInfinity, asked_until_ = kInfinity;
+  ends_at_switch_ = false;
   const std::vector<double>& switches = description_.switches;
   if (switches.empty() || wrench_is_constant_) return length;
   const double from = time() + begin;
   const double slack = std::max(kSameTime * length_of_step(step_count_ + 1), 4.0 * kEpsilon * from);
   const auto next = std::ranges::upper_bound(switches, from + slack);
   if (next != switches.begin()) asked_from_ = *std::prev(next);
-  if (next == switches.end() || *next > from + length + slack) return length;
+  if (next == switches.end()) return length;
   asked_until_ = std::nextafter(*next, -kInfinity);
+  ends_at_switch_ = *next <= from + length + slack;
   return *next < from + length - slack ? *next - from : length;
 }
 

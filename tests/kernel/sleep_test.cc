@@ -136,7 +136,7 @@ TEST(Sleep, EveryIntegratorLeavesSleepersAloneAndTakesThemUpAgain) {
                                                                                 {"rkmk4", {}},
                                                                                 {"implicit_midpoint", {}},
                                                                                 {"symplectic_splitting", {4}},
-                                                                                {"dormand_prince54", {1e-8}},
+                                                                                {"dormand_prince54", {1e-8, 1}},
                                                                                 {"dormand_prince853", {1e-8}},
                                                                                 {"rosenbrock", {1e-6}},
                                                                                 {"radau", {1e-6}}};

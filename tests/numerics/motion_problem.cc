@@ -48,8 +48,9 @@ std::vector<MotionMethod> fixed_step_methods() {
           {"SymplecticSplitting 6", "integrator_symplectic_splitting", {6}, 6, 0}};
 }
 
+// At an accuracy of 1, which any step meets, inner steps are those asked for.
 std::vector<MotionMethod> adaptive_methods(double accuracy) {
-  return {{"DormandPrince54", "integrator_dormand_prince54", {accuracy}, 5, 5},
+  return {{"DormandPrince54", "integrator_dormand_prince54", {accuracy, accuracy < 1.0 ? 1.0 : 0.0}, 5, 5},
           {"DormandPrince853", "integrator_dormand_prince853", {accuracy}, 8, 8},
           {"Rosenbrock", "integrator_rosenbrock", {accuracy}, 4, 0},
           {"Radau", "integrator_radau", {accuracy}, 5, 0}};

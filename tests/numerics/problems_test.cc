@@ -27,7 +27,9 @@ MotionMethod at_accuracy(const char* name, const char* library, double accuracy)
 }
 
 MotionMethod dormand_prince(double accuracy) {
-  return at_accuracy("DormandPrince54", "integrator_dormand_prince54", accuracy);
+  MotionMethod method = at_accuracy("DormandPrince54", "integrator_dormand_prince54", accuracy);
+  method.settings.push_back(1);
+  return method;
 }
 MotionMethod dormand_prince8(double accuracy) {
   return at_accuracy("DormandPrince853", "integrator_dormand_prince853", accuracy);

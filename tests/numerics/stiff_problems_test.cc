@@ -145,7 +145,7 @@ void add_lattice(WorldBuilder* world, double stiffness, double damping) {
 
 std::vector<Vector3> corners_of_lattice(double stiffness, double* momentum_error) {
   WorldBuilder builder;
-  builder.steps(60, 1.0 / 60).plugin(Slot::kIntegrator, plugin_path("integrator_dormand_prince54"), {1e-11});
+  builder.steps(60, 1.0 / 60).plugin(Slot::kIntegrator, plugin_path("integrator_dormand_prince54"), {1e-11, 1});
   add_lattice(&builder, stiffness, 0.0);
   Environment world(builder.description());
   const Vector3 momentum = harness::angular_momentum_of(world);
