@@ -17,8 +17,7 @@ namespace gravitas::kernel {
 namespace {
 
 constexpr double kSameTime = 1e-9;  // of the step
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon(), kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
