@@ -158,9 +158,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   double length_to_switch(double begin, double length);
   // Inner steps begin some time after S_n, in front() what the one before has made of it.
   void begin_inner_step(double begin, double length);
-  // Basic's, in back(); false where somebody asleep is woken: the step starts again.
+  // Basic's, in back(); false, and nothing, where somebody asleep is woken: the step starts again.
   bool make_next_state();
-  // Nothing then.
   std::optional<Trusted<Solution>> react(const Trusted<TrialState>& trial, bool has_found_contacts = false);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
   bool locates_events() const { return has_contacts() && description_.simulator >= Simulator::kBisection; }
@@ -326,8 +325,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
-  bool ends_at_switch_ = false;                   // does the part that is being made end where a force jumps?
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
+  bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last
   Extrapolation extrapolation_, jumps_;
   double margin_ = 0.0;
