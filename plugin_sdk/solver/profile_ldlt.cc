@@ -31,7 +31,7 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
   values_.assign(begin_.back(), 0.0);
   pivot_.assign(first.size(), 0.0);
   dropped_.clear();
-  null_.clear();
+  null_.clear(), part_.clear();
 }
 
 void ProfileLdlt::factorise(double least) {
@@ -182,23 +182,29 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
 
 // By row, the largest number of a side among rows that are connected with it.
 std::vector<double> ProfileLdlt::largest_of_parts(const std::vector<double>& b) const {
-  std::vector<std::size_t> next(size());  // of the same part; the last one's is itself
+  if (part_.empty()) find_parts();
+  std::vector<double> largest(size(), 0.0);
+  for (std::size_t i = 0; i < size(); ++i) {
+    double& number = largest[part_[i]];
+    number = std::max(number, std::fabs(b[i]));
+  }
+  for (std::size_t i = 0; i < size(); ++i) largest[i] = largest[part_[i]];
+  return largest;
+}
+
+// Each row's part goes by the name of its last row.
+void ProfileLdlt::find_parts() const {
+  part_.resize(size());
   const auto last_of = [&](std::size_t row) {
-    while (next[row] != row) row = next[row] = next[next[row]];
+    while (part_[row] != row) row = part_[row] = part_[part_[row]];
     return row;
   };
   for (std::size_t i = 0; i < size(); ++i) {
-    next[i] = i;
+    part_[i] = i;
     for (std::size_t j = first_[i]; j < i; ++j)
-      if (values_[begin_[i] + j - first_[i]] != 0.0) next[last_of(j)] = i;
+      if (values_[begin_[i] + j - first_[i]] != 0.0) part_[last_of(j)] = i;
   }
-  std::vector<double> largest(size(), 0.0);
-  for (std::size_t i = 0; i < size(); ++i) {
-    double& number = largest[last_of(i)];
-    number = std::max(number, std::fabs(b[i]));
-  }
-  for (std::size_t i = 0; i < size(); ++i) largest[i] = largest[last_of(i)];
-  return largest;
+  for (std::size_t i = 0; i < size(); ++i) part_[i] = last_of(i);
 }
 
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {

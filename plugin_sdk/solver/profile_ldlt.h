@@ -52,6 +52,7 @@ class ProfileLdlt {
   bool is_rounding(std::size_t row, double pivot);
   bool is_consistent(const std::vector<double>& b) const;
   std::vector<double> largest_of_parts(const std::vector<double>& b) const;
+  void find_parts() const;
   void find_null_space() const;
   // L^-T applied in place.
   void solve_transposed(std::vector<double>* x) const;
@@ -62,7 +63,9 @@ class ProfileLdlt {
   double least_pivot_ = 1.0;
   std::size_t weakest_ = 0;
   std::vector<std::size_t> dropped_;
-  mutable std::vector<NullVector> null_;  // orthonormal: what is missing of the range; found when asked for
+  // found when asked for
+  mutable std::vector<NullVector> null_;   // orthonormal: what is missing of the range
+  mutable std::vector<std::size_t> part_;  // by row, the last of those that are connected with it
 };
 
 }  // namespace gravitas
