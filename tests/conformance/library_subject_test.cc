@@ -43,7 +43,7 @@ TEST(LibrarySubject, SaysWhyNothingCanBeHad) {
   EXPECT_THROW(LibrarySubject(shipped("no_such_library")), std::runtime_error);
   EXPECT_THROW(LibrarySubject(faulty("wrong_magic")), std::runtime_error);
   // sweeps from 1 on
-  EXPECT_THROW(LibrarySubject(shipped("solver_sequential"), std::vector<double>{0.0, 1.0, 0.0, 1.0, 0.0}),
+  EXPECT_THROW(LibrarySubject(shipped("solver_sequential"), std::vector<double>{0.0, 1.0, 0.0, 1.0, 0.0, 1.0}),
                std::runtime_error);
 }
 

@@ -159,7 +159,7 @@ TEST_P(SharedProcess, FallsBackInTheSlotThatFailedAlone) {
   WorldBuilder builder = together(GetParam(), kTwo);
   builder.description().solver.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(
       WorldBuilder()
-          .plugin(Slot::kSolver, plugin_path("solver_sequential"), {100.0, 1.0, 0.0, 1.0, 0.0})
+          .plugin(Slot::kSolver, plugin_path("solver_sequential"), {100.0, 1.0, 0.0, 1.0, 0.0, 1.0})
           .description()
           .solver.plugins[0]);
   builder.description().collision.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(

@@ -170,7 +170,7 @@ TEST_P(Swapped, ALaterSwapEndsProbationAsCommitted) {
 TEST_P(Swapped, TheSolverGetsOtherSettings) {
   Environment world(builder().description());
   kernel::PluginChoice weaker = plugin_of(Slot::kSolver);
-  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0};
+  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0, 1.0};
   world.order_swap({Slot::kSolver, weaker, std::nullopt, 10});
   run_to_end(&world);
   EXPECT_NE(world.chain_hash(), chain_without_swaps());
@@ -218,7 +218,7 @@ TEST(Swap, WhatCannotTakeThePlaceIsRefusedAtOnce) {
 TEST_P(Swapped, ARerunAsksTheNewPluginToo) {
   Environment world(builder().description());
   kernel::PluginChoice weaker = plugin_of(Slot::kSolver);
-  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0};
+  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0, 1.0};
   world.order_swap({Slot::kSolver, weaker, std::nullopt, 10});
   world.set_rerun_every(Slot::kSolver, 1);
   run_to_end(&world);

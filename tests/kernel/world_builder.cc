@@ -35,7 +35,7 @@ WorldBuilder::WorldBuilder(kernel::Hosting mode) {
   space("space_basic");
   integrator("integrator_semi_implicit_euler");
   plugin(Slot::kCollision, plugin_path("collision_standard"));
-  plugin(Slot::kSolver, plugin_path("solver_sequential"), {200.0, 1.0, 0.0, 1.0, 0.0});
+  plugin(Slot::kSolver, plugin_path("solver_sequential"), {200.0, 1.0, 0.0, 1.0, 0.0, 1.0});
   material({});
 }
 

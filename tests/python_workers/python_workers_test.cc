@@ -260,10 +260,10 @@ class PythonWorker : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Both, PythonWorker, ::testing::Values("force_drag", "solver_islands"),
                          [](const auto& one) { return std::string(one.param); });
 
-// With few calls, since a solver in Python takes a hundredth of a second for each.
+// With the fewest calls, since a solver in Python takes a hundredth of a second for each.
 TEST_P(PythonWorker, ConformsSaysTheKit) {
   const std::string command = "/usr/bin/python3 " + kFolder + GetParam() + ".py";
-  const Ended check = ended(kPython + " " + in_build("/bin/gravitas check '") + command + "' --quick --calls 300");
+  const Ended check = ended(kPython + " " + in_build("/bin/gravitas check '") + command + "' --quick --calls 1000");
   EXPECT_EQ(check.code, 0) << check.words;
 }
 

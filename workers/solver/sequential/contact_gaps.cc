@@ -78,6 +78,19 @@ double ContactGaps::relax(std::size_t block, double share, const SolverBodies& b
   return change;
 }
 
+void ContactGaps::append_multipliers(std::vector<double>* to) const {
+  for (const Row& row : rows_) to->push_back(row.multiplier);
+}
+
+void ContactGaps::append_responses(std::vector<double>* to) const {
+  for (const Row& row : rows_) to->push_back(row.response);
+}
+
+const double* ContactGaps::take_multipliers(const double* from) {
+  for (Row& row : rows_) row.multiplier = *from++;
+  return from;
+}
+
 double ContactGaps::error_of(std::size_t block, const BodyMotion& x) const {
   double error = 0.0;
   for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {

@@ -166,6 +166,22 @@ double ContactImpulses::relax(std::size_t block, double share, const SolverBodie
   return change;
 }
 
+void ContactImpulses::append_multipliers(std::vector<double>* to) const {
+  for (const Row& row : rows_) to->insert(to->end(), row.impulse.begin(), row.impulse.end());
+  for (const Rolling& rolling : rolling_) to->insert(to->end(), rolling.impulse.begin(), rolling.impulse.end());
+}
+
+void ContactImpulses::append_responses(std::vector<double>* to) const {
+  for (const Row& row : rows_) to->insert(to->end(), 3, row.response.trace() / 3.0);
+  for (const Rolling& rolling : rolling_) to->insert(to->end(), 3, rolling.disc.largest);
+}
+
+const double* ContactImpulses::take_multipliers(const double* from) {
+  for (Row& row : rows_) row.impulse = Vector3::Map(from), from += 3;
+  for (Rolling& rolling : rolling_) rolling.impulse = Vector3::Map(from), from += 3;
+  return from;
+}
+
 double ContactImpulses::error_of(std::size_t block, const BodyMotion& x) const {
   double error = 0.0;
   for (std::size_t i = patches_[block].first; i < patches_[block].end; ++i) {

@@ -62,6 +62,10 @@ class ContactImpulses final : public RelaxationBlocks {
   double error_of(std::size_t block, const BodyMotion& x) const override;
   double relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) override;
 
+  void append_multipliers(std::vector<double>* to) const override;
+  void append_responses(std::vector<double>* to) const override;
+  const double* take_multipliers(const double* from) override;
+
   // ---- shock propagation (shock_propagation.h), as for ContactGaps
 
   static bool holds(std::size_t) { return true; }

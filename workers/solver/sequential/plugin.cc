@@ -19,41 +19,47 @@ class Sequential final : public SolverPlugin {
     declaration.meaning =
         "Joints and contacts by relaxation: every row is solved in turn, with accumulated, clamped "
         "multipliers, until nothing moves any more.";
-    declaration.properties = {Property::integer("Iterations")
-                                  .at_least(1.0)
-                                  .at_most(100000.0)
-                                  .defaults_to({static_cast<double>(SequentialSettings{}.iterations)})
-                                  .live()
-                                  .means("Largest number of sweeps of one relaxation; fewer where it converges."),
-                              Property::number("CorrectionFactor", "1")
-                                  .at_least(0.0)
-                                  .at_most(1.0)
-                                  .defaults_to({SequentialSettings{}.correction_factor})
-                                  .live()
-                                  .means("Share of the joint error and overlap of the step before that a step removes; "
-                                         "what one step adds is always removed whole."),
-                              Property::choice("Order", {"Given", "DeepestFirst", "Simultaneous"})
-                                  .defaults_to({static_cast<double>(SequentialSettings{}.order)})
-                                  .live()
-                                  .means("How a sweep goes: joints, then contacts, by their bodies; the largest error "
-                                         "first, kept up to date (what few sweeps leave does not go by how bodies are "
-                                         "numbered); or all from the velocities that the sweep began with "
-                                         "(what is symmetric stays so in every sweep; takes several times as many)."),
-                              Property::number("RelaxationFactor", "1")
-                                  .above(0.0)
-                                  .at_most(kLargestFactor)
-                                  .defaults_to({SequentialSettings{}.relaxation_factor})
-                                  .live()
-                                  .means("How far locks and contacts go, of the way to where they are right: below 1 "
-                                         "careful, 1.5 to 1.9 fewer sweeps for stacks and chains; sliding contacts "
-                                         "may not converge above 1."),
-                              Property::choice("ShockPropagation", {"Never", "Stacks", "Always"})
-                                  .defaults_to({static_cast<double>(SequentialSettings{}.shock_propagation)})
-                                  .live()
-                                  .means("Starts contacts layer by layer from what is immovable: of stacks (each body "
-                                         "rests on one other, no joints) that is the solution at any height and ratio "
-                                         "of mass; Always: of all that rests, where it is closer than the step "
-                                         "before.")};
+    declaration.properties = {
+        Property::integer("Iterations")
+            .at_least(1.0)
+            .at_most(100000.0)
+            .defaults_to({static_cast<double>(SequentialSettings{}.iterations)})
+            .live()
+            .means("Largest number of sweeps of one relaxation; fewer where it converges."),
+        Property::number("CorrectionFactor", "1")
+            .at_least(0.0)
+            .at_most(1.0)
+            .defaults_to({SequentialSettings{}.correction_factor})
+            .live()
+            .means("Share of the joint error and overlap of the step before that a step removes; "
+                   "what one step adds is always removed whole."),
+        Property::choice("Order", {"Given", "DeepestFirst", "Simultaneous"})
+            .defaults_to({static_cast<double>(SequentialSettings{}.order)})
+            .live()
+            .means("How a sweep goes: joints, then contacts, by their bodies; the largest error "
+                   "first, kept up to date (what few sweeps leave does not go by how bodies are "
+                   "numbered); or all from the velocities that the sweep began with "
+                   "(what is symmetric stays so in every sweep; takes several times as many)."),
+        Property::number("RelaxationFactor", "1")
+            .above(0.0)
+            .at_most(kLargestFactor)
+            .defaults_to({SequentialSettings{}.relaxation_factor})
+            .live()
+            .means("How far locks and contacts go, of the way to where they are right: below 1 "
+                   "careful, 1.5 to 1.9 fewer sweeps for stacks and chains; sliding contacts "
+                   "may not converge above 1."),
+        Property::choice("ShockPropagation", {"Never", "Stacks", "Always"})
+            .defaults_to({static_cast<double>(SequentialSettings{}.shock_propagation)})
+            .live()
+            .means("Starts contacts layer by layer from what is immovable: of stacks (each body "
+                   "rests on one other, no joints) that is the solution at any height and ratio "
+                   "of mass; Always: of all that rests, where it is closer than the step "
+                   "before."),
+        Property::flag("NesterovAcceleration")
+            .defaults_to({SequentialSettings{}.nesterov_acceleration ? 1.0 : 0.0})
+            .live()
+            .means("Sweeps go on from where they are going: of n bodies in a row some n of them in "
+                   "place of n^2. Where RelaxationFactor is 1.")};
     return declaration;
   }
 
@@ -72,12 +78,17 @@ class Sequential final : public SolverPlugin {
     const std::uint32_t order = settings.choice();
     const double relaxation_factor = settings.number();
     const std::uint32_t shock_propagation = settings.choice();
+    const bool nesterov_acceleration = settings.flag();
     if (order > 2) throw Refusal("Order is none of Given, DeepestFirst, Simultaneous");
     if (shock_propagation > 2) throw Refusal("ShockPropagation is none of Never, Stacks, Always");
     if (!(relaxation_factor > 0.0 && relaxation_factor <= kLargestFactor))
       throw Refusal("RelaxationFactor is outside 0 ... 1.95");
-    return {static_cast<std::uint32_t>(iterations), correction_factor, static_cast<RelaxationOrder>(order),
-            relaxation_factor, static_cast<ShockPropagation>(shock_propagation)};
+    return {static_cast<std::uint32_t>(iterations),
+            correction_factor,
+            static_cast<RelaxationOrder>(order),
+            relaxation_factor,
+            static_cast<ShockPropagation>(shock_propagation),
+            nesterov_acceleration};
   }
 
   SequentialIslands solver_;

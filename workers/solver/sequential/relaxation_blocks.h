@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "plugin_sdk/solver/bodies.h"
 
@@ -23,6 +24,12 @@ class RelaxationBlocks {
   // Moves multipliers and x that share (0 ... 2) of the way to where the block is right, and projects onto what is
   // allowed. Returns the largest change of J x that would make it right, m or m/s.
   virtual double relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) = 0;
+
+  // All multipliers in one order: as they are, what J x changes by with one of each, and set anew (x is left to the caller;
+  // returns what follows them).
+  virtual void append_multipliers(std::vector<double>* to) const = 0;
+  virtual void append_responses(std::vector<double>* to) const = 0;
+  virtual const double* take_multipliers(const double* from) = 0;
 
  protected:
   RelaxationBlocks() = default;

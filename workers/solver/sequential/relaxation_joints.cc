@@ -238,6 +238,19 @@ double RelaxationJoints::error_of(std::size_t number, const BodyMotion& x) const
   return error;
 }
 
+void RelaxationJoints::append_multipliers(std::vector<double>* to) const {
+  for (const Row& row : rows_) to->push_back(row.multiplier);
+}
+
+void RelaxationJoints::append_responses(std::vector<double>* to) const {
+  for (const Row& row : rows_) to->push_back(row.response);
+}
+
+const double* RelaxationJoints::take_multipliers(const double* from) {
+  for (Row& row : rows_) row.multiplier = *from++;
+  return from;
+}
+
 void RelaxationJoints::push_all(const SolverBodies& bodies, BodyMotion& x) const {
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {

@@ -84,6 +84,10 @@ class RelaxationJoints final : public RelaxationBlocks {
   double error_of(std::size_t block, const BodyMotion& x) const override;
   double relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) override;
 
+  void append_multipliers(std::vector<double>* to) const override;
+  void append_responses(std::vector<double>* to) const override;
+  const double* take_multipliers(const double* from) override;
+
   // Overwrites the multipliers of all discrepancies; those of rows that are not there with zero.
   void store(Multipliers& multipliers) const;
 

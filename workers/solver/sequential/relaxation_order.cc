@@ -11,6 +11,7 @@ constexpr std::size_t kMostNeighbours = 64;
 
 void RelaxationSweep::begin(const SolverBodies& bodies, std::array<RelaxationBlocks*, 2> parts) {
   parts_ = parts;
+  acceleration_.forget();
   if (order_ == RelaxationOrder::kGiven) return;
   places_.clear();
   at_body_.resize(bodies.count() + 1);
@@ -25,6 +26,14 @@ void RelaxationSweep::begin(const SolverBodies& bodies, std::array<RelaxationBlo
 }
 
 double RelaxationSweep::sweep(const SolverBodies& bodies, BodyMotion& x) {
+  if (!is_accelerated_ || factor_ != 1.0) return sweep_once(bodies, x);
+  acceleration_.go_ahead(parts_, x);
+  const double change = sweep_once(bodies, x);
+  acceleration_.note(parts_, x, change);
+  return change;
+}
+
+double RelaxationSweep::sweep_once(const SolverBodies& bodies, BodyMotion& x) {
   switch (order_) {
     case RelaxationOrder::kDeepestFirst:
       return sweep_deepest_first(bodies, x);

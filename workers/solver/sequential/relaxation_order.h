@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "workers/solver/sequential/nesterov_acceleration.h"
 #include "workers/solver/sequential/relaxation_blocks.h"
 
 namespace gravitas {
@@ -30,10 +31,14 @@ class RelaxationSweep {
   RelaxationSweep(RelaxationOrder order, double factor) : order_(order), factor_(factor) {}
   void set(RelaxationOrder order, double factor) { order_ = order, factor_ = factor; }
 
+  // Sweeps are accelerated (nesterov_acceleration.h) where blocks go the whole of their way; here it may be switched off.
+  void set_accelerated(bool is_accelerated) { is_accelerated_ = is_accelerated; }
   // The blocks of the sweeps that follow: joints, contacts.
   void begin(const SolverBodies& bodies, std::array<RelaxationBlocks*, 2> parts);
   // One sweep. Returns the largest change that a block asked for, m or m/s.
   double sweep(const SolverBodies& bodies, BodyMotion& x);
+  // What blocks ask for has changed.
+  void forget_acceleration() { acceleration_.forget(); }
   // Of all blocks.
   double largest_error(const BodyMotion& x) const;
 
@@ -51,12 +56,15 @@ class RelaxationSweep {
     }
   };
 
+  double sweep_once(const SolverBodies& bodies, BodyMotion& x);
   double sweep_given(const SolverBodies& bodies, BodyMotion& x) const;
   double sweep_deepest_first(const SolverBodies& bodies, BodyMotion& x);
   double sweep_simultaneously(const SolverBodies& bodies, BodyMotion& x);
 
   RelaxationOrder order_;
   double factor_;
+  bool is_accelerated_ = true;
+  NesterovAcceleration acceleration_;
   std::array<RelaxationBlocks*, 2> parts_{};
   std::vector<Place> places_;
   std::vector<std::vector<std::uint32_t>> at_body_;  // blocks at each body that can be pushed

@@ -330,7 +330,10 @@ bool SequentialSolver::sweep_velocity(double tolerance) {
     const bool converged = summary_.residual <= tolerance;
     if (converged || done == cap / 2 || done == cap / 4 * 3) {
       const double slip = kSlipToChange * std::max(summary_.residual, tolerance);
-      if (impulses_.let_slide(solution_.velocity, slip)) continue;
+      if (impulses_.let_slide(solution_.velocity, slip)) {
+        sweep_.forget_acceleration();
+        continue;
+      }
     }
     if (converged) return true;
   }

@@ -47,9 +47,11 @@
 // A stack, in which every body rests on one other and no joint acts, starts layer by layer from what nothing pushes
 // (shock_propagation.h), which is its solution at any height and ratio of mass.
 //
+// Sweeps are accelerated (nesterov_acceleration.h): each begins where the ones before were going.
+//
 // Ways of relaxing, each off unless asked for: the order of a sweep's blocks (relaxation_order.h); over-relaxation, in
-// which locks and contacts go `relaxation_factor` times the way to where they are right and are projected (of linear
-// systems it takes rows of bodies from n^2 sweeps to some n; sliding contacts may not converge with it); and a start by
+// which locks and contacts go `relaxation_factor` times the way to where they are right and are projected (without
+// acceleration it takes rows of bodies from n^2 sweeps to some n; sliding contacts may not converge with it); and a start by
 // layers of all that rests, used where it leaves smaller errors than last step's multipliers (pyramids and heaps may do
 // better without). They change the way, not what is asked for: what converges obeys the same laws.
 //
@@ -59,13 +61,12 @@
 //
 // Islands are solved each by itself (sequential_islands.h).
 //
-// Convergence is linear: one joint, one contact, or one patch of contacts that rests or sticks is
-// exact in one sweep; n bodies in a row take of the order of n^2 sweeps, times the mass ratio where
-// the heavy end hangs or lies on the light one; a box that slides or tips takes some tens.
-// Known failures: a chain of 20 links under 1000 times its mass stretches for thousands of sweeps; a pyramid of ten
-// rows rocks by 6 cm under the default 200, and a thin arch of 14 stones falls. Much friction at long arms (Painlevé; mu > 4/3 at a slender rod, less where
-// several contacts drive each other) may have no solution or several, and then the sweeps run round
-// in circles. `stop_reason` and `residual` say so; a small residual in a slow case is a small
+// One joint, one contact, or one patch of contacts that rests or sticks is exact in one sweep; n bodies in a row take of
+// the order of n sweeps, times the root of the mass ratio where the heavy end hangs or lies on the light one; a box that
+// slides or tips takes some tens. Without acceleration it is n^2, and the ratio itself.
+// Known failures: a chain of 20 links under 1000 times its mass takes thousands of sweeps. Much friction at long arms
+// (Painlevé; mu > 4/3 at a slender rod, less where several contacts drive each other) may have no solution or several, and
+// then the sweeps run round in circles. `stop_reason` and `residual` say so; a small residual in a slow case is a small
 // change, not a small error. Newton and Direct exist for these scenes.
 #pragma once
 
@@ -91,6 +92,7 @@ struct SequentialSettings {
   RelaxationOrder order = RelaxationOrder::kGiven;
   double relaxation_factor = 1.0;  // of the way of locks and contacts, 0 ... 2
   ShockPropagation shock_propagation = ShockPropagation::kStacks;
+  bool nesterov_acceleration = true;  // of the sweeps, where relaxation_factor is 1
 };
 
 // What a solution took. The reply carries the first three.
@@ -109,11 +111,14 @@ struct SequentialSummary {
 class SequentialSolver {
  public:
   explicit SequentialSolver(const SequentialSettings& settings)
-      : settings_(settings), sweep_(settings.order, settings.relaxation_factor) {}
+      : settings_(settings), sweep_(settings.order, settings.relaxation_factor) {
+    sweep_.set_accelerated(settings.nesterov_acceleration);
+  }
 
   void set(const SequentialSettings& settings) {
     settings_ = settings;
     sweep_.set(settings.order, settings.relaxation_factor);
+    sweep_.set_accelerated(settings.nesterov_acceleration);
   }
 
   // Answers the request. Throws Refusal for an impossible one (request_check.h), and where
