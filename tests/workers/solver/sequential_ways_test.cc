@@ -306,5 +306,26 @@ TEST(SequentialWays, JointsEndAtTheSamePlace) {
   }
 }
 
+// An impulse that is let go of goes by a share in each sweep: it ends as none, and not as numbers whose squares are none.
+TEST(SequentialWays, ImpulsesThatGoEndInTheirCones) {
+  SolverProblem problem;
+  const auto ground = problem.add_immovable();
+  const auto ball = problem.add_body({.pose = {{0, 1, 0}, Quaternion::Identity()}, .linear = {0.3, 1.0, 0.2}});
+  problem.add_contact(
+      {.body1 = ground, .body2 = ball, .point = {0, 0, 0}, .static_friction = 0.5, .dynamic_friction = 0.5, .key = 1});
+  problem.contact_warm_impulse = {0.2, 1.0, 0.3};
+  // so that it is relaxed at all
+  const auto other = problem.add_body({.pose = {{5, 1, 0}, Quaternion::Identity()}, .linear = {0, -1.0, 0}});
+  problem.add_contact({.body1 = ground, .body2 = other, .point = {5, 0, 0}, .key = 2});
+  for (const double share : {0.9999999, 0.99, 0.5})
+    for (const std::uint32_t sweeps : {1U, 5U, 20U, 22U, 23U, 24U, 40U, 80U, 400U, 1100U}) {
+      const SolverAnswer answer = solve(problem, {.iterations = sweeps, .relaxation_factor = share});
+      const Vector3 impulse = answer.impulse(0);
+      const double tangent = std::hypot(impulse.x(), impulse.z());
+      EXPECT_LE(tangent, 0.5 * impulse.y() * (1.0 + 1e-12)) << share << ", " << sweeps << " sweeps";
+      EXPECT_TRUE(impulse.isZero(0.0) || impulse.y() > 1e-150) << share << ", " << sweeps << " sweeps";
+    }
+}
+
 }  // namespace
 }  // namespace gravitas

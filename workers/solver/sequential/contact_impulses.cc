@@ -8,6 +8,11 @@
 #include "plugin_sdk/solver/coulomb_contact.h"
 
 namespace gravitas {
+namespace {
+
+constexpr double kNothing = 1e-140;  // N s: its squares are still exact to rounding
+
+}  // namespace
 
 // ---- rows
 
@@ -220,6 +225,8 @@ double ContactImpulses::relax_row(Row& row, double share, const SolverBodies& bo
     const double allowed = (row.slides ? row.dynamic_friction : row.static_friction) * impulse.x();
     const double tangent = impulse.tail<2>().norm();
     if (tangent > allowed) impulse.tail<2>() *= allowed / tangent;
+    // of an impulse that goes a share is left, and of that a share: numbers at whose squares no cone holds
+    if (impulse.x() < kNothing) impulse.setZero();
   }
   const Vector3 amount = impulse - row.impulse;
   row.impulse = impulse;
