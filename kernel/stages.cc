@@ -83,7 +83,7 @@ void Environment::follow_motion(double time, const Column<double>& position, con
 // World bounds at S*, widened so that pairs up to the margin apart overlap.
 Bounds Environment::trial_bounds(std::uint32_t body) const {
   return widened(bounds_of(model_.bound[body], pose_of(data_.trial_position, data_.trial_orientation, body)),
-                 0.5 * margin_);
+                 0.5 * data_.margin[0]);
 }
 
 void Environment::bound_bodies(const Trusted<TrialState>&) {

@@ -33,6 +33,8 @@ function(gravitas_plugin name folder output)
     endif()
     target_link_options(${plugin} PRIVATE
       -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--version-script=${GRAVITAS_PLUGIN_MAP})
+    # every worker makes a private copy of the whole file
+    target_link_options(${plugin} PRIVATE -Wl,--compress-debug-sections=zlib)
     # the sanitizers live in the program, so with them a library leaves symbols open
     if(NOT GRAVITAS_SANITIZERS)
       target_link_options(${plugin} PRIVATE -Wl,--no-undefined,-z,defs)

@@ -63,7 +63,7 @@ void ShiftedJacobian::factorise(const LocalMotion& motion, double real, double i
       matrix.topRightCorner(size, size).diagonal().array() -= imaginary;
       matrix.bottomLeftCorner(size, size).diagonal().array() += imaginary;
     }
-    group.factors.compute(matrix);
+    group.factors.factorise(matrix);
   }
 }
 
@@ -83,7 +83,7 @@ void ShiftedJacobian::solve(Eigen::VectorXd* real, Eigen::VectorXd* imaginary) c
       }
     }
     rates += group.carried * positions;
-    rates = group.factors.solve(rates).eval();
+    rates = group.factors.solve(rates);
     positions += rates;
     for (Eigen::Index m = 0; m < count; ++m) {
       const Eigen::Index to = first_of(m), other = kRates * (count + m);

@@ -8,10 +8,10 @@
 // real ones of twice the size: products of std::complex and Eigen's search for complex pivots call functions of the system.
 #pragma once
 
-#include <Eigen/LU>
 #include <vector>
 
 #include "plugin_sdk/local_motion.h"
+#include "plugin_sdk/math/dense_lu.h"
 
 namespace gravitas {
 
@@ -29,7 +29,7 @@ class ShiftedJacobian {
     const std::vector<std::size_t>* body = nullptr;
     std::vector<Eigen::Matrix3d> turns[2];  // of P, for attitudes: real and imaginary parts
     Eigen::MatrixXd carried;                // C P
-    Eigen::PartialPivLU<Eigen::MatrixXd> factors;
+    DenseLu factors;
   };
 
   std::vector<Group> groups_;

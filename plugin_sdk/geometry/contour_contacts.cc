@@ -9,8 +9,11 @@
 namespace gravitas::collision {
 namespace {
 
-// Faces and lines within this of lying flat on each other touch as such (sine of the angle).
-constexpr double kFlat = 0.03;
+// Faces and lines within this of lying flat on each other touch as such (sine of the angle): where an edge meets a face or
+// another edge, the rest of two faces that are nearly parallel is known to the solver, too, else bodies rock from edge to
+// edge. Of rounded cores the surface lies elsewhere.
+constexpr double kFlat = 0.2;
+constexpr double kFlatRounded = 0.03;
 // Faces whose normal may be preferred to the least (sine of the angle between).
 constexpr double kNear = 0.2;
 constexpr double kFacePreference = 0.01;
@@ -159,13 +162,13 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
   if (!(least.depth >= -margin)) return;
   const double tie = std::max(1e-9 * pair.thinnest(), 1e-14 * pair.reach());
 
-  const auto contours = [&](const Vector3& n, double sine, Contour* a, Contour* b) {
-    pair.a.contour(n, sine, a);
-    pair.b.contour(pair.R_AB.transpose() * -n, sine, b);
+  const auto contours = [&](const Vector3& n, double sine, double sine_rounded, Contour* a, Contour* b) {
+    pair.a.contour(n, pair.a.rounding() > 0.0 ? sine_rounded : sine, a);
+    pair.b.contour(pair.R_AB.transpose() * -n, pair.b.rounding() > 0.0 ? sine_rounded : sine, b);
     place_contour(pair.R_AB, pair.p_AB, b);
   };
   Contour a, b;
-  contours(least.normal, kNear, &a, &b);
+  contours(least.normal, kNear, kNear, &a, &b);
   // a face of a before one of b, and both before the least, unless the later is shallower by more than the preference
   Vector3 normal = least.normal;
   double depth = least.depth;
@@ -185,13 +188,13 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
   const double equal = std::max(1e-6 * pair.thinnest(), tie);
   const auto try_normal = [&](const Vector3& n, double wanted) {
     candidates.clear();
-    contours(n, kFlat, &a, &b);
+    contours(n, kFlat, kFlatRounded, &a, &b);
     add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
     return candidates.deepest() >= wanted - equal;
   };
   if (!try_normal(normal, depth) && (normal == least.normal || !try_normal(least.normal, least.depth))) {
     // the deepest place lies beside the features: the points that touch there
-    contours(least.normal, 0.0, &a, &b);
+    contours(least.normal, 0.0, 0.0, &a, &b);
     const Vector3& n = least.normal;
     const Vector3 middle = 0.5 * (least.point_a + least.point_b);
     const double level =

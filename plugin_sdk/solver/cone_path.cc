@@ -1,8 +1,9 @@
 #include "plugin_sdk/solver/cone_path.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "plugin_sdk/math/dense_lu.h"
 
 namespace gravitas {
 namespace {
@@ -56,7 +57,7 @@ std::uint32_t ConePath::next(double smallest, Eigen::VectorXd* lambda, Eigen::Ve
     // far, when the last step could be whole
     const double aim = std::clamp(square(1.0 - last), 0.01, 0.9) * product;
     linearise(aim, *lambda, *y);
-    const Eigen::VectorXd step = matrix_.partialPivLu().solve(side_);
+    const Eigen::VectorXd step = DenseLu(matrix_).solve(side_);
     if (!step.allFinite()) break;
     last = find_share(aim, *lambda, step);
     stuck = last < kLittle ? stuck + 1 : 0;
@@ -80,7 +81,7 @@ void ConePath::enter(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
     for (const Scalar& scalar : scalars_)
       side_[scalar.row] += std::isfinite(scalar.lower) ? scalar.lower : scalar.upper;
     speed_ = std::max(start_.cwiseAbs().maxCoeff(), side_.cwiseAbs().maxCoeff());
-    load_ = std::max(speed_, matrix_.partialPivLu().solve(side_).cwiseAbs().maxCoeff());
+    load_ = std::max(speed_, DenseLu(matrix_).solve(side_).cwiseAbs().maxCoeff());
   }
   lambda->setZero();
   for (Normal& normal : normals_) (*lambda)[normal.row] = load_, normal.slack = speed_;

@@ -37,10 +37,10 @@
 // other rows: sweeps on all rows, the held ones factorised in between; the answer says if that did not do.
 #pragma once
 
-#include <Eigen/LU>
 #include <cstdint>
 #include <vector>
 
+#include "plugin_sdk/math/dense_lu.h"
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/cone_path.h"
 #include "plugin_sdk/solver/held_step.h"
@@ -215,7 +215,7 @@ class ConeProblem {
   Eigen::MatrixXd sliding_, core_;
   Eigen::VectorXd side_of_step_, step_;
   std::vector<double> rest_;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
+  DenseLu lu_;
   double proximal_ = 0.0, factored_proximal_ = 0.0;
   std::vector<Eigen::Index> coupled_, factored_;  // rows; of sticking_
   ProfileLdlt sticking_;

@@ -1,5 +1,4 @@
 // The laws of ConeProblem: projections, the linear equations of a Newton step, and a sweep.
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -244,7 +243,9 @@ void ConeProblem::solve_sliding() {
     if (is_held) core_(a, a) += proximal_;
   }
   Eigen::Map<Eigen::VectorXd> rest(rest_.data(), size);
-  if (size > 0) rest = lu_.compute(core_).solve(rest).eval();
+  if (size == 0) return;
+  lu_.factorise(core_);
+  rest = lu_.solve(rest);
 }
 
 // Symmetric, and a contact's rows meet only those of its two bodies: a stack costs what a band costs.

@@ -10,6 +10,7 @@
 
 #include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
+#include "tests/turn_between.h"
 
 namespace gravitas {
 namespace {
@@ -53,7 +54,7 @@ std::string cube(int i, double mass) {
 
 // Links 0.5 m along a direction from the origin, and a load half a metre beyond.
 std::string chain(int links, double load, const Vector3& along, double time_step, double duration) {
-  const Quaternion turn = Quaternion::FromTwoVectors(Vector3::UnitY(), along);
+  const Quaternion turn = test::turn_between(Vector3::UnitY(), along);
   const Vector3 moments = Vector3(0.26, 0.02, 0.26) / 12.0;
   std::string bodies, joints;
   for (int i = 0; i < links; ++i)

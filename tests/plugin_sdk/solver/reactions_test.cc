@@ -14,6 +14,7 @@
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
+#include "tests/turn_between.h"
 
 namespace gravitas {
 namespace {
@@ -101,7 +102,7 @@ class Problem {
 Discrepancy rod(const Vector3& from, const Vector3& to) {
   Discrepancy d;
   d.point1 = from, d.point2 = to;
-  d.axes = Quaternion::FromTwoVectors(Vector3::UnitX(), to - from);
+  d.axes = test::turn_between(Vector3::UnitX(), to - from);
   d.modes = pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree) | kRadialDiscrepancy;
   d.lower.x() = d.upper.x() = (to - from).norm();
   return d;

@@ -25,6 +25,10 @@ namespace {
 
 constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
+// Faces within this of the plane across an axis of edges lie on each other with all that is not too shallow (cosine).
+// Without the rest of them boxes rock from edge to edge.
+constexpr double kNearlyFlat = 0.98;
+
 constexpr std::array<int, 3> kNext = {1, 2, 0};
 constexpr std::array<int, 3> kAfterNext = {2, 0, 1};
 
@@ -76,13 +80,14 @@ struct Faces {
   bool x_is_a;
 };
 
-// The patch of the reference face and the face of y that is turned most towards it. Corner i and the edge from corner i
-// to the next run round the face of y: (+,+), (-,+), (-,-), (+,-) along its axes u and v.
+// The patch of the reference face and the face of y that is turned most towards it, seen along a normal. Corner i and the
+// edge from corner i to the next run round the face of y: (+,+), (-,+), (-,-), (+,-) along its axes u and v.
 class FacePatch {
  public:
-  // `side`: +1 or -1, the end of x's axis that the face stands at
-  FacePatch(const Faces& faces, int axis, double side, double margin, double tolerance)
+  // `side`: +1 or -1, the end of x's axis that the face stands at; `normal`: unit, from x to y
+  FacePatch(const Faces& faces, int axis, double side, const Vector3& normal, double margin, double tolerance)
       : faces_(faces),
+        normal_(normal),
         axis_(axis),
         u_(kNext[static_cast<std::size_t>(axis)]),
         v_(kAfterNext[static_cast<std::size_t>(axis)]),
@@ -100,7 +105,14 @@ class FacePatch {
     const Vector3 along_u = half[y_u_] * faces.R.col(y_u_), along_v = half[y_v_] * faces.R.col(y_v_);
     const Vector3 plus = along_u + along_v, minus = along_u - along_v;
     corners_ = {Vector3(centre_ + plus), Vector3(centre_ - minus), Vector3(centre_ - plus), Vector3(centre_ + minus)};
-    for (std::size_t i = 0; i < 4; ++i) depths_[i] = faces.x.size[axis] - side * corners_[i][axis];
+    for (std::size_t i = 0; i < 4; ++i) {
+      depths_[i] = (faces.x.size[axis] - side * corners_[i][axis]) / std::fabs(normal[axis]);
+      corners_[i] += depths_[i] * normal;
+    }
+  }
+
+  bool is_nearly_flat() const {
+    return std::fabs(normal_[axis_]) >= kNearlyFlat && -y_normal_.dot(normal_) >= kNearlyFlat;
   }
 
   void add_contacts(ContactCandidates* out) const {
@@ -150,21 +162,26 @@ class FacePatch {
         code_x = box_edge_code(x_edge % 2 == 0 ? u_ : v_, x_corner(x_edge));
         code_y = box_edge_code(y_edge % 2 == 0 ? y_u_ : y_v_, y_corner(static_cast<std::size_t>(y_edge)));
       }
-      const double height =
-          centre_[axis_] -
-          (y_normal_[u_] * (vertex.x - centre_[u_]) + y_normal_[v_] * (vertex.y - centre_[v_])) / y_normal_[axis_];
-      add(vertex.x, vertex.y, faces_.x.size[axis_] - side_ * height, code_x, code_y, out);
+      const double depth = y_normal_.dot(place(vertex.x, vertex.y) - centre_) / y_normal_.dot(normal_);
+      add(vertex.x, vertex.y, depth, code_x, code_y, out);
     }
   }
 
   void add(double x, double y, double depth, FeatureCode code_x, FeatureCode code_y, ContactCandidates* out) const {
     ContactPoint contact;
-    contact.point[axis_] = side_ * (faces_.x.size[axis_] - 0.5 * depth);
-    contact.point[u_] = x, contact.point[v_] = y;
-    contact.normal = (faces_.x_is_a ? side_ : -side_) * Vector3::Unit(axis_);
+    contact.point = place(x, y) - 0.5 * depth * normal_;
+    contact.normal = faces_.x_is_a ? normal_ : Vector3(-normal_);
     contact.depth = depth;
     contact.feature = faces_.x_is_a ? contact_feature(code_x, code_y) : contact_feature(code_y, code_x);
     out->add(contact);
+  }
+
+  // On the reference face.
+  Vector3 place(double x, double y) const {
+    Vector3 point;
+    point[axis_] = side_ * faces_.x.size[axis_];
+    point[u_] = x, point[v_] = y;
+    return point;
   }
 
   static Vector3 face_corner(const Vector3& half, int axis, int u, int v, double side, std::size_t i) {
@@ -182,6 +199,7 @@ class FacePatch {
   FeatureCode code_of_x() const { return box_face_code(axis_, side_ < 0.0); }
 
   const Faces& faces_;
+  Vector3 normal_;
   int axis_, u_, v_;
   double side_;
   double margin_;
@@ -226,7 +244,7 @@ class BoxPair {
     EdgeAxis edges = axes_.shallowest_edges(face.depth - shortfall);
     if (edges.depth < -margin_) return;
     if (edges.depth < kNoBound) {
-      if (!add_edges(edges)) add_closest(edges.normal);
+      if (!add_tilted_face(prefers_b, face, edges) && !add_edges(edges)) add_closest(edges.normal);
       return;
     }
     // As long as its patch is about as deep as the preferred face, a vertex deeper still lies beside it, in touch with
@@ -265,17 +283,35 @@ class BoxPair {
     return true;
   }
 
+  Faces faces_of(bool of_b) const {
+    if (of_b) return {pair_.b, pair_.a, pair_.R_AB.transpose(), -axes_.p_AB_B(), false};
+    return {pair_.a, pair_.b, pair_.R_AB, pair_.p_AB, true};
+  }
+  // The end of the axis that faces the other box.
+  double side_of(bool of_b, int axis) const { return of_b ? -sign_b(axis) : sign_a(axis); }
+
   // False if the patch misses the depth of the face by more than `shortfall`.
   bool add_face(bool of_b, const FaceAxis& face, double shortfall) {
+    const Faces faces = faces_of(of_b);
+    const double side = side_of(of_b, face.axis);
     candidates_.clear();
-    if (of_b) {
-      const Faces faces{pair_.b, pair_.a, pair_.R_AB.transpose(), -axes_.p_AB_B(), false};
-      FacePatch(faces, face.axis, -sign_b(face.axis), margin_, rounding_).add_contacts(&candidates_);
-    } else {
-      const Faces faces{pair_.a, pair_.b, pair_.R_AB, pair_.p_AB, true};
-      FacePatch(faces, face.axis, sign_a(face.axis), margin_, rounding_).add_contacts(&candidates_);
-    }
-    if (!(candidates_.deepest() >= face.depth - shortfall)) return false;
+    FacePatch(faces, face.axis, side, side * Vector3::Unit(face.axis), margin_, rounding_).add_contacts(&candidates_);
+    return keep_patch(of_b, face.depth - shortfall);
+  }
+
+  // The face along a normal near its own.
+  bool add_tilted_face(bool of_b, const FaceAxis& face, const EdgeAxis& edges) {
+    const Faces faces = faces_of(of_b);
+    const Vector3 normal = of_b ? Vector3(-(pair_.R_AB.transpose() * edges.normal)) : edges.normal;
+    const FacePatch patch(faces, face.axis, side_of(of_b, face.axis), normal, margin_, rounding_);
+    if (!patch.is_nearly_flat()) return false;
+    candidates_.clear();
+    patch.add_contacts(&candidates_);
+    return keep_patch(of_b, edges.depth - tie_length(pair_));
+  }
+
+  bool keep_patch(bool of_b, double least) {
+    if (!(candidates_.deepest() >= least)) return false;
     candidates_.reduce_to(out_);
     if (of_b) {
       place(placement_.R_WB, placement_.p_AB_W, out_);

@@ -15,11 +15,11 @@
 // the method does not damp, so what it does not resolve keeps ringing (Rosenbrock damps). Known failure: attitudes of a
 // body that turns by more than a radian a step lag (tan of the half angle); where no solution is found (forces that
 // jump, h |w| in the tens and unequal moments) the step is refused.
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "plugin_sdk/interaction_groups.h"
+#include "plugin_sdk/math/dense_lu.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
@@ -77,7 +77,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   // Bodies that feel each other, as places in bodies_.
   struct Group {
     std::vector<std::size_t> body;
-    Eigen::PartialPivLU<Eigen::MatrixXd> factors;
+    DenseLu factors;
 
     Eigen::Index size() const { return 6 * static_cast<Eigen::Index>(body.size()); }
     Eigen::Index number(Eigen::Index k) const {
@@ -260,7 +260,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
           matrices[g](row, k) = change[groups_[g].number(row)] / (shifted[at] - unknown_[at]);
       }
     }
-    for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.compute(matrices[g]);
+    for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.factorise(matrices[g]);
   }
 
   // From the Jacobian of the forces at the middle; of what else depends on a body's own numbers, differences. False where
@@ -291,7 +291,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       block.bottomRows<3>() -=
           0.5 * h_ * torque_effect(body, at(unknown_, group.body[pushed.place])) * force.bottomRows<3>();
     }
-    for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.compute(matrices[g]);
+    for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.factorise(matrices[g]);
     return true;
   }
 
@@ -339,7 +339,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     for (const Group& group : groups_) {
       Eigen::VectorXd part(group.size());
       for (Eigen::Index k = 0; k < group.size(); ++k) part[k] = left[group.number(k)];
-      part = group.factors.solve(part).eval();
+      part = group.factors.solve(part);
       for (Eigen::Index k = 0; k < group.size(); ++k) change[group.number(k)] = part[k];
     }
     return change;

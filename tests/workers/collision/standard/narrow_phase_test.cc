@@ -11,6 +11,7 @@
 #include <set>
 #include <vector>
 
+#include "tests/turn_between.h"
 #include "tests/workers/collision/standard/narrow_phase_fixture.h"
 
 namespace gravitas::collision {
@@ -169,7 +170,7 @@ TEST(BoxHalfspace, EdgeAndVertexDown) {
   expect_patch(edge, -Vector3::UnitY(), 0.1, {Vector3(0, -0.05, 1), Vector3(0, -0.05, -1)});
 
   // the diagonal (1, 1, 1) turned upright
-  const Quaternion q = Quaternion::FromTwoVectors(Vector3(1, 1, 1), Vector3::UnitY());
+  const Quaternion q = gravitas::test::turn_between(Vector3(1, 1, 1), Vector3::UnitY());
   const Manifold vertex =
       contacts_of(box(1, 1, 1), Pose{Vector3(0, std::sqrt(3.0) - 0.1, 0), q}, halfspace(), at(0, 0, 0));
   expect_single(vertex, Vector3(0, -0.05, 0), -Vector3::UnitY(), 0.1);
@@ -403,9 +404,31 @@ TEST(BoxCylinder, EdgeAcrossTheSideTouchesInOnePoint) {
   expect_single(m, Vector3(0, r - 0.025, 0.3), Vector3::UnitY(), 0.05);
 }
 
+// Faces that are nearly parallel and cross in two edges: the vertex that would be deepest lies beside.
+TEST(BoxBox, NearlyParallelFacesThatCrossInEdgesTouchInAllOfTheirPatch) {
+  const Pose X_B{Vector3(1.5, 1.98, 1.5),
+                 Quaternion(Eigen::AngleAxisd(-0.03, Vector3::UnitZ())) * Eigen::AngleAxisd(-0.03, Vector3::UnitX())};
+  const Shape cube = box(1, 1, 1);
+  const Manifold m = contacts_of(cube, at(0, 0, 0), cube, X_B, 0.1);
+  ASSERT_EQ(m.count, 4);
+  const Vector3 n = contact(m, 0).normal;
+  // across an edge of each
+  EXPECT_NEAR(n.dot(Vector3::UnitZ()), 0.0, 1e-15);
+  EXPECT_NEAR(n.dot(X_B.orientation * Vector3::UnitX()), 0.0, 1e-15);
+  EXPECT_NEAR(deepest(m), depth_along(cube, at(0, 0, 0), cube, X_B, n), 1e-15);
+  // its corners: where the edges cross, and half a metre along both
+  double along_x = 0.0, along_z = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    along_x = std::max(along_x, 1.0 - contact(m, i).point.x());
+    along_z = std::max(along_z, contact(m, i).point.z() - 0.5);
+  }
+  EXPECT_NEAR(along_x, 0.5, 0.05);
+  EXPECT_NEAR(along_z, 0.5, 0.05);
+}
+
 TEST(BoxCylinder, VertexIntoTheSideHasTheRadialNormal) {
   // a vertex of the box pointing along +x at a cylinder standing on y, 0.05 deep
-  const Quaternion q = Quaternion::FromTwoVectors(Vector3(1, 1, 1), Vector3::UnitX());
+  const Quaternion q = gravitas::test::turn_between(Vector3(1, 1, 1), Vector3::UnitX());
   const double reach = std::sqrt(3.0);
   const Manifold m = contacts_of(box(1, 1, 1), Pose{Vector3::Zero(), q}, cylinder(2, 3), at(reach + 1.95, 0, 0));
   expect_single(m, Vector3(reach - 0.025, 0, 0), Vector3::UnitX(), 0.05);
