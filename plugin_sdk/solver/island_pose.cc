@@ -138,7 +138,8 @@ bool IslandSolver::find_closed() {
   bool any = false;
   for (EndContact& contact : contacts_) {
     const double gap = contact.gap + contact.gap_row.along(displacement_[contact.body1], displacement_[contact.body2]);
-    if (contact.is_closed || gap > contact.slop) continue;
+    // what is pushed is closed, however far the steps have come
+    if (contact.is_closed || (gap > contact.slop && !(answer_.contact_correction[contact.row] > 0.0))) continue;
     contact.is_closed = any = true;
   }
   for (EndJoint& joint : joints_) {

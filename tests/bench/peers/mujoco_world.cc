@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/bench/peers/engine.h"
+#include "tests/turn_between.h"
 
 namespace gravitas::peers {
 namespace {
@@ -35,7 +36,7 @@ class ModelText {
     for (const Plane& plane : scene.planes)
       text_ += fmt::format("<geom type=\"plane\" size=\"0 0 1\" pos=\"{}\" quat=\"{}\"/>",
                            text(Vector3(plane.offset * plane.normal)),
-                           text(Quaternion::FromTwoVectors(Vector3::UnitZ(), plane.normal)));
+                           text(test::turn_between(Vector3::UnitZ(), plane.normal)));
     for (std::uint32_t i = 0; i < scene.bodies.size(); ++i)
       if (parent(i) == kNone) add(i, Pose{});
     text_ += "</worldbody></mujoco>";

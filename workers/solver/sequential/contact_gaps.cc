@@ -211,7 +211,8 @@ void ContactGaps::find_closed(const BodyMotion& x, std::vector<std::uint8_t>& cl
   std::fill(closed.begin(), closed.end(), std::uint8_t{0});
   for (const Row& row : rows_) {
     const double gap = row.gap + row.direction.along(x[row.body1], x[row.body2]);
-    closed[row.contact] = gap <= row.slop ? 1 : 0;
+    // what is pushed is closed, however far the sweeps have come
+    closed[row.contact] = gap <= row.slop || row.multiplier > 0.0 ? 1 : 0;
   }
 }
 
