@@ -30,8 +30,6 @@ const Preset kPlain{kernel::Simulator::kBasic, "semi_implicit_euler", "newton",
 const Preset kAlone{kernel::Simulator::kBasic, "semi_implicit_euler", "newton", "`Basic`, `SemiImplicitEuler`"};
 const Preset kSecondOrder{kernel::Simulator::kBasic, "verlet", "newton", "`Basic`, `Verlet`, `Newton`"};
 const Preset kTurning{kernel::Simulator::kBasic, "symplectic_splitting", "newton", "`Basic`, `SymplecticSplitting`"};
-const Preset kRelaxed{kernel::Simulator::kBasic, "semi_implicit_euler", "sequential",
-                      "`Basic`, `SemiImplicitEuler`, `Sequential`"};
 const Preset kHeap{kernel::Simulator::kBasic,
                    "semi_implicit_euler",
                    "sequential",
@@ -52,7 +50,7 @@ const std::map<std::string, Preset> kPresets = {{"one_body", kAlone},
                                                 {"slide30", kLocated},
                                                 {"balls666", kHeap},
                                                 {"balls666_at_240", kHeap},
-                                                {"pyramid15", kRelaxed},
+                                                {"pyramid15", kHeap},
                                                 {"pile1000", kHeap}};
 
 // With the defaults of all properties that are not given, as a scene has it.
@@ -65,8 +63,7 @@ void choose(WorldBuilder* world, Slot slot, const std::string& library, const st
 
 void add_plane(WorldBuilder* world, const Plane& plane) {
   world->ground();
-  world->body().pose = {plane.offset * plane.normal,
-                        test::turn_between(Vector3::UnitY(), plane.normal)};
+  world->body().pose = {plane.offset * plane.normal, test::turn_between(Vector3::UnitY(), plane.normal)};
 }
 
 // Equal shapes are one, as in a scene that names them.
