@@ -51,7 +51,8 @@ TEST(Heaps, OfBallsDoNotOverlap) {
     std::vector<Vector3> places;
     for (const std::string& id : ids) places.push_back(run.body(id).pose.position);
     for (std::size_t i = 0; i < places.size(); ++i)
-      for (std::size_t k = 0; k < i; ++k) deepest = std::max(deepest, 2.0 * kRadiusOfBall - (places[i] - places[k]).norm());
+      for (std::size_t k = 0; k < i; ++k)
+        deepest = std::max(deepest, 2.0 * kRadiusOfBall - (places[i] - places[k]).norm());
   }
   EXPECT_LT(deepest, 0.02);
 }
