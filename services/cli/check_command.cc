@@ -76,7 +76,7 @@ void add_check(CLI::App* app, Action* action) {
   command->add_option("--case", arguments->options.only_case, "Judge this case only, as a finding names it")
       ->excludes(level);
   command->add_option("--calls", arguments->options.calls, "Calls of level C4")
-      ->check(whole_number(1000, 1'000'000'000))
+      ->check(whole_number(300, 1'000'000'000))
       ->capture_default_str();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([=] { *action = [=] { return check_plugin(*arguments); }; });

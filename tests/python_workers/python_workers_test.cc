@@ -263,7 +263,7 @@ INSTANTIATE_TEST_SUITE_P(Both, PythonWorker, ::testing::Values("force_drag", "so
 // With the fewest calls, since a solver in Python takes a hundredth of a second for each.
 TEST_P(PythonWorker, ConformsSaysTheKit) {
   const std::string command = "/usr/bin/python3 " + kFolder + GetParam() + ".py";
-  const Ended check = ended(kPython + " " + in_build("/bin/gravitas check '") + command + "' --quick --calls 1000");
+  const Ended check = ended(kPython + " " + in_build("/bin/gravitas check '") + command + "' --quick --calls 300");
   EXPECT_EQ(check.code, 0) << check.words;
 }
 
