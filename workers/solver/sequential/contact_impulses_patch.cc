@@ -50,12 +50,13 @@ ContactPatch ContactImpulses::whole_of(const Patch& patch, const SolverBodies& b
   ContactPatch::Response response = ContactPatch::Response::Zero();
   for (int i = 0; i < count; ++i) {
     const Row& at = rows_[patch.first + static_cast<std::size_t>(i)];
-    for (int j = 0; j < count; ++j) {
+    for (int j = 0; j <= i; ++j) {
       const Row& from = rows_[patch.first + static_cast<std::size_t>(j)];
       const Matrix3 world =
           point_response(bodies[at.body1], at.arm1, from.arm1) + point_response(bodies[at.body2], at.arm2, from.arm2);
       const Matrix3 part = at.frame.transpose() * world * from.frame;
       response.block(width * i, width * j, width, width) = part.topLeftCorner(width, width);
+      response.block(width * j, width * i, width, width) = part.topLeftCorner(width, width).transpose();
     }
   }
   return ContactPatch::of(response, width * count);

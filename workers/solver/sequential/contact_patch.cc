@@ -66,7 +66,6 @@ bool invert(const Square& matrix, int size, Square* inverse) {
 
 ContactPatch ContactPatch::of(const Response& response, int rows) {
   ContactPatch patch;
-  patch.rows_ = rows;
   Response used = Response::Zero();
   used.topLeftCorner(rows, rows) = response.topLeftCorner(rows, rows);
   patch.rank_ = range_of(used, rows, &patch.basis_);
@@ -75,28 +74,16 @@ ContactPatch ContactPatch::of(const Response& response, int rows) {
   return patch;
 }
 
+// Rows and columns that are not there are zero, so that all sums have the same length.
 bool ContactPatch::solve(const Rows& missing, Rows* change) const {
   if (rank_ == 0) return false;
-  Eigen::Matrix<double, kRank, 1> parts = Eigen::Matrix<double, kRank, 1>::Zero();
-  for (int k = 0; k < rank_; ++k)
-    for (int i = 0; i < rows_; ++i) parts(k) += basis_(i, k) * missing(i);
-  double size = 0.0;
-  double outside = 0.0;
-  for (int i = 0; i < rows_; ++i) {
-    double inside = 0.0;
-    for (int k = 0; k < rank_; ++k) inside += basis_(i, k) * parts(k);
-    size = std::max(size, std::fabs(missing(i)));
-    outside = std::max(outside, std::fabs(missing(i) - inside));
-  }
+  const Eigen::Matrix<double, kRank, 1> parts = basis_.transpose() * missing;
+  const Rows outside = missing - basis_ * parts;
   // noise of rounding is as large as what is missing when nothing is
-  if (outside > 1e-9 * size && outside > 0.0) return false;
-  Eigen::Matrix<double, kRank, 1> weights = Eigen::Matrix<double, kRank, 1>::Zero();
-  for (int k = 0; k < rank_; ++k)
-    for (int l = 0; l < rank_; ++l) weights(k) += inverse_(k, l) * parts(l);
-  for (int i = 0; i < rows_; ++i) {
-    (*change)(i) = 0.0;
-    for (int k = 0; k < rank_; ++k) (*change)(i) += basis_(i, k) * weights(k);
-  }
+  const double largest = outside.cwiseAbs().maxCoeff();
+  if (largest > 1e-9 * missing.cwiseAbs().maxCoeff() && largest > 0.0) return false;
+  const Eigen::Matrix<double, kRank, 1> weights = inverse_ * parts;
+  change->noalias() = basis_ * weights;
   return true;
 }
 

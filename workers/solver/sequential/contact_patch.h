@@ -26,13 +26,12 @@ class ContactPatch {
   // whose share of W is below 1e-8 of the largest are left out.
   static ContactPatch of(const Response& response, int rows);
 
-  // Sets the leading entries of `change`. False if `missing` is no motion that the bodies can make
+  // Sets `change`; entries of `missing` behind the rows are zero. False if `missing` is no motion that the bodies can make
   // (more than 1e-9 of it lies outside W's range) or W is too ill-conditioned to say: nothing is
   // set then.
   bool solve(const Rows& missing, Rows* change) const;
 
  private:
-  int rows_ = 0;
   int rank_ = 0;
   Eigen::Matrix<double, kRows, kRank> basis_ = Eigen::Matrix<double, kRows, kRank>::Zero();
   Eigen::Matrix<double, kRank, kRank> inverse_ = Eigen::Matrix<double, kRank, kRank>::Zero();
