@@ -11,11 +11,9 @@ namespace {
 
 // Faces and lines within this of lying flat on each other touch as such (sine of the angle): where an edge meets a face or
 // another edge, the rest of two faces that are nearly parallel is known to the solver, too, else bodies rock from edge to
-// edge. Of rounded cores the surface lies elsewhere.
+// edge. So near a face's normal may be preferred to the least, too. Of rounded cores the surface lies elsewhere.
 constexpr double kFlat = 0.2;
 constexpr double kFlatRounded = 0.03;
-// Faces whose normal may be preferred to the least (sine of the angle between).
-constexpr double kNear = 0.2;
 constexpr double kFacePreference = 0.01;
 constexpr double kFaceTie = 1e-7;
 
@@ -168,7 +166,7 @@ void collide_support_maps(const PlacedPair& pair, double margin, Manifold* out) 
     place_contour(pair.R_AB, pair.p_AB, b);
   };
   Contour a, b;
-  contours(least.normal, kNear, kNear, &a, &b);
+  contours(least.normal, kFlat, kFlat, &a, &b);
   // a face of a before one of b, and both before the least, unless the later is shallower by more than the preference
   Vector3 normal = least.normal;
   double depth = least.depth;

@@ -208,7 +208,7 @@ class FacePatch {
   double y_side_ = 1.0;
   Vector3 y_normal_;
   Vector3 centre_;
-  std::array<Vector3, 4> corners_;
+  std::array<Vector3, 4> corners_;  // seen along the normal, on the reference face
   std::array<double, 4> depths_;
 };
 

@@ -59,8 +59,8 @@ class ContactGaps final : public RelaxationBlocks {
 
   void store(std::vector<double>& multipliers) const;
 
-  // Sets closed[i] to 1 for contacts whose gap after the displacement x is within closing_slop(),
-  // else to 0.
+  // Sets closed[i] to 1 for contacts that are pushed, or whose gap after the displacement x is within closing_slop(), else
+  // to 0.
   void find_closed(const BodyMotion& x, std::vector<std::uint8_t>& closed) const;
 
   // Largest coordinate of a contact, m: the size that rounding of positions goes by.
