@@ -37,7 +37,7 @@ report::v1::Report read_report(const std::string& text);
 
 // Starts `gravitas` with its standard streams in files of `folder`; returns its process id.
 pid_t start_program(const std::vector<std::string>& arguments, const ScratchFolder& folder);
-// Waits for it to end; killed after a minute.
+// Waits for it to end; killed after five minutes.
 ProgramResult finish_program(pid_t process, const ScratchFolder& folder);
 
 ProgramResult run_program(const std::vector<std::string>& arguments, const ScratchFolder& folder);
