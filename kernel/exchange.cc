@@ -121,7 +121,7 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   if (now.name == before.declaration.name) return;
   wakes_all_ = true;
   find_sleepers();
-  if (slot.which() == Slot::kForce) count_jacobian_blocks();
+  if (slot.which() == Slot::kForce || slot.which() == Slot::kSolver) count_jacobian_blocks();
   if (slot.which() == Slot::kIntegrator) {
     data_.theta[0] = now.theta;
     for (const State& state : states_) {

@@ -32,39 +32,52 @@ bool Environment::is_constant(std::size_t group) const {
   return std::ranges::all_of(flags, [](std::uint32_t bits) { return (bits & kConstantWrench) != 0; });
 }
 
-// Joints that answer in derivatives have none.
+// Joints that answer in derivatives connect all bodies, at most.
 void Environment::count_jacobian_blocks() {
   std::uint64_t blocks = 0;
-  bool can_all = !knows_reactions();
+  bool can_all = true;
+  const auto demand = [&](const StageSlot& slot, std::uint32_t target, const char* capability) {
+    can_all = can_all && has_capability(slot.description().plugins[target].declaration, capability);
+  };
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     if (is_constant(g)) continue;
-    can_all = can_all && has_capability(force_.description().plugins[group.target].declaration, "jacobians");
+    demand(force_, group.target, "jacobians");
     blocks += kMostBlocksOfApplication * group.row.size();
+  }
+  if (knows_reactions()) {
+    demand(solver_, 0, "reaction_jacobians");
+    can_all = can_all && model_.body_count <= kMostJoinedBodies;
+    blocks += std::uint64_t{model_.body_count} * model_.body_count;
   }
   data_.jacobian_blocks[0] = can_all ? static_cast<std::uint32_t>(blocks) : 0;
 }
 
-// One group's blocks behind the other's; none where a plugin has taken over that gives none.
+// Asks for blocks of at most `most` pairs of bodies, and puts them behind those before; none where a plugin has taken over
+// that gives none.
+void Environment::ask_jacobians(Stage stage, StageSlot* slot, StageCall call, std::uint64_t most) {
+  data_.block_body.resize(0), data_.block.resize(0);
+  const auto reply = ids(data_.block_body, data_.block);
+  call.reply = reply;
+  ask(stage, slot, call, nullptr, [&](const auto& got) { return validator_.jacobians(got, data_.block_body, most); });
+  const std::size_t pairs = data_.jacobian_body.size(), numbers = data_.jacobian.size();
+  data_.jacobian_body.resize(pairs + data_.block_body.size()), data_.jacobian.resize(numbers + data_.block.size());
+  std::ranges::copy(data_.block_body.span(), data_.jacobian_body.data() + pairs);
+  std::ranges::copy(data_.block.span(), data_.jacobian.data() + numbers);
+}
+
 void Environment::ask_jacobians() {
-  data_.jacobian_body.resize(0), data_.jacobian.resize(0);
-  if (data_.derivative_with_jacobian[0] == 0 || data_.jacobian_blocks[0] == 0) return;
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     if (is_constant(g)) continue;
     const auto request = force_request(group, data_.derivative_position, data_.derivative_orientation,
                                        data_.derivative_linear_velocity, data_.derivative_angular_velocity);
-    data_.block_body.resize(0), data_.block.resize(0);
-    const auto reply = ids(data_.block_body, data_.block);
-    const StageCall call{stage::Method::kForceJacobians, group.target, request, reply};
-    ask(Stage::kForce, &force_, call, nullptr, [&](const auto& got) {
-      return validator_.jacobians(got, data_.block_body, kMostBlocksOfApplication * group.row.size());
-    });
-    const std::size_t pairs = data_.jacobian_body.size(), numbers = data_.jacobian.size();
-    data_.jacobian_body.resize(pairs + data_.block_body.size()), data_.jacobian.resize(numbers + data_.block.size());
-    std::ranges::copy(data_.block_body.span(), data_.jacobian_body.data() + pairs);
-    std::ranges::copy(data_.block.span(), data_.jacobian.data() + numbers);
+    ask_jacobians(Stage::kForce, &force_, {stage::Method::kForceJacobians, group.target, request, {}},
+                  kMostBlocksOfApplication * group.row.size());
   }
+  if (knows_reactions())
+    ask_jacobians(Stage::kSolve, &solver_, {stage::Method::kSolverReactionJacobians, 0, reaction_request(), {}},
+                  std::uint64_t{model_.body_count} * model_.body_count);
   if (data_.jacobian_blocks[0] == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
 }
 
@@ -86,10 +99,11 @@ void Environment::evaluate() {
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);
     sum_wrenches();
-    ask_jacobians();
     if (sleepers_ > 0 && attempt_counts_) look_for_pushes();
   }
+  data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   if (knows_reactions()) ask_reactions();
+  if (data_.derivative_with_jacobian[0] != 0 && data_.jacobian_blocks[0] != 0) ask_jacobians();
   validator_.note_wrench(told_wrench());
   if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
   std::ranges::copy(data_.wrench.span(), data_.start_wrench.data());

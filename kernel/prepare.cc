@@ -47,6 +47,7 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
   start_slots(starter);
   for (const ConstraintGroup& group : model_.constraint_groups) bind(group);
   ask_constant_forces();
+  count_jacobian_blocks();
   state_hash_ = kernel::state_hash(front());
   chain_hash_ = gravitas::chain_hash({}, state_hash_);
 }
@@ -101,11 +102,7 @@ void Environment::ask_constant_forces() {
       }
     }
   }
-  if (!wrench_is_constant_) {
-    remember_wrenches();
-    count_jacobian_blocks();
-    return;
-  }
+  if (!wrench_is_constant_) return remember_wrenches();
   force_.stop();
   std::erase_if(plan_.slots, [](const PlannedSlot& planned) { return planned.slot == Slot::kForce; });
   plan_.left_out.push_back({"force", "all forces are constant: asked once at the start"});

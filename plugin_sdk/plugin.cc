@@ -114,12 +114,21 @@ bool SolverPlugin::dispatch(stage::Method method, const gravitas_column* request
     reactions(stage::SolverReactionsRequest(request), stage::SolverReactionsReply(reply), host);
     return true;
   }
+  if (method == stage::Method::kSolverReactionJacobians) {
+    reaction_jacobians(stage::SolverReactionsRequest(request), stage::SolverReactionJacobiansReply(reply), host);
+    return true;
+  }
   if (method != stage::Method::kSolverSolve) return false;
   solve(stage::SolverSolveRequest(request), stage::SolverSolveReply(reply), host);
   return true;
 }
 
 void SolverPlugin::reactions(const stage::SolverReactionsRequest&, const stage::SolverReactionsReply&, Host&) {
+  throw UnknownMethod();
+}
+
+void SolverPlugin::reaction_jacobians(const stage::SolverReactionsRequest&, const stage::SolverReactionJacobiansReply&,
+                                      Host&) {
   throw UnknownMethod();
 }
 

@@ -195,6 +195,9 @@ class SolverPlugin {
   // For solvers with the capability `reactions` (plugin_sdk/solver/reactions.h answers it).
   virtual void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
                          Host& host);
+  // For solvers with the capability `reaction_jacobians` (the same header).
+  virtual void reaction_jacobians(const stage::SolverReactionsRequest& request,
+                                  const stage::SolverReactionJacobiansReply& reply, Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 

@@ -17,6 +17,8 @@ namespace gravitas {
 
 inline constexpr std::size_t kBlockNumbers = 72;
 inline constexpr std::size_t kMostBlocksOfApplication = 4;
+// Bodies of a scene with joints that answer in derivatives: with more, blocks for all pairs are more than one would move.
+inline constexpr std::size_t kMostJoinedBodies = 128;
 using JacobianBlock = Eigen::Matrix<double, 6, 12, Eigen::RowMajor>;
 
 // The blocks of all forces in one state (Integrator.Derivative); blocks of the same two bodies are summed by who uses them.

@@ -21,15 +21,9 @@ void Environment::ask_reactions() {
     set_vector(data_.kinematic_acceleration.span(), 2 * body, change.linear);
     set_vector(data_.kinematic_acceleration.span(), 2 * body + 1, change.angular);
   }
-  const DiscrepancyAnswer& joints = data_.discrepancies;
-  const auto request =
-      ids(model_.flags, model_.inverse_mass, model_.inertia, model_.inverse_inertia, model_.damping,
-          data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
-          data_.derivative_angular_velocity, data_.wrench, data_.kinematic_acceleration, data_.discrepancy_body,
-          joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
-          joints.upper, joints.compliance, joints.damping, joints.maximum_force);
+  const auto request = reaction_request();
   const auto reply = ids(data_.reaction, data_.discrepancy_force, data_.reaction_residual);
-  data_.discrepancy_force.resize(3 * joints.mode.size());
+  data_.discrepancy_force.resize(3 * data_.discrepancies.mode.size());
   ask(Stage::kSolve, &solver_, {stage::Method::kSolverReactions, 0, request, reply}, nullptr,
       [&](const auto& answer) { return validator_.reactions(answer); });
   std::ranges::transform(data_.wrench.span(), data_.reaction.span(), data_.wrench_with_reactions.data(), std::plus());

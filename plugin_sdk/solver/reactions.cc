@@ -9,57 +9,12 @@
 
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/math/rotation.h"
-#include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/joint_laws.h"
-#include "plugin_sdk/solver/profile_ldlt.h"
+#include "plugin_sdk/solver/reaction_solver.h"
 #include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
-namespace {
-
-struct Body {
-  double inverse_mass = 0.0;
-  Matrix3 inverse_inertia = Matrix3::Zero();
-  Pose asked, pose;  // as the question has it, and where the joints agree
-  Twist velocity, acceleration;
-
-  bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
-  Vector3 velocity_at(const Vector3& arm) const { return velocity.linear + velocity.angular.cross(arm); }
-  Vector3 centripetal(const Vector3& arm) const { return velocity.angular.cross(velocity.angular.cross(arm)); }
-};
-
-struct Joint {
-  std::size_t place;  // of its first axis among the multipliers
-  std::uint32_t body1, body2;
-  Discrepancy discrepancy;
-};
-
-struct Row {
-  std::uint32_t body1, body2;
-  std::size_t place;  // among the multipliers
-  ConstraintDirection direction;
-  double error;           // m or rad
-  double velocity_error;  // m/s or rad/s
-  double gamma;
-  double scale;  // root of the diagonal
-
-  double reach;  // m, the longer arm, or a rod's length; of an angular row 0
-};
-
-// What the rows of a discrepancy's points share.
-struct Arms {
-  Vector3 arm1, arm2;
-  Vector3 bend;  // what velocities alone do to x2 - x1, seen from axes that turn with body 1
-  double reach;
-};
-
-// What gives way, in the state as it was asked.
-struct Spring {
-  Row row;
-  double force;  // on body 2
-};
-
 bool holds_always(const Discrepancy& d, int axis) {
   if (d.maximum_force[axis] < kUnlimited) return false;
   switch (axis_mode(d.modes, axis)) {
@@ -74,401 +29,375 @@ bool holds_always(const Discrepancy& d, int axis) {
   }
 }
 
-class ReactionSolver {
- public:
-  // Multipliers by row. Returns what the rows are missed by. The request must live until write().
-  double solve(const stage::SolverReactionsRequest& request) {
-    request_ = &request;
-    has_moved_ = false;
-    load_bodies();
-    load_joints();
-    load_springs();
-    make_rows();
-    factorise(0.0);
-    if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
-    accelerate();
-    std::vector<double>& side = multipliers_;
-    side.resize(rows_.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const Row& row = rows_[i];
-      const double along = row.direction.along(bodies_[row.body1].acceleration, bodies_[row.body2].acceleration);
-      side[i] = -(row.gamma + along) / row.scale;
-    }
-    const double missed = factor_.make_consistent(&side);
-    factor_.solve(&side);
-    for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
-    return missed;
+double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
+  request_ = &request;
+  has_moved_ = false;
+  load_bodies();
+  load_joints();
+  load_springs();
+  make_rows();
+  factorise(0.0);
+  if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
+  accelerate();
+  std::vector<double>& side = multipliers_;
+  side.resize(rows_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    const double along = row.direction.along(bodies_[row.body1].acceleration, bodies_[row.body2].acceleration);
+    side[i] = -(row.gamma + along) / row.scale;
   }
+  const double missed = factor_.make_consistent(&side);
+  factor_.solve(&side);
+  for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
+  return missed;
+}
 
-  void write(double residual, const stage::SolverReactionsReply& reply) const {
-    const auto require_finite = [](double number) {
-      if (!std::isfinite(number)) throw Refusal("a reaction is not finite: masses, velocities or forces overflow");
-    };
-    require_finite(residual);
-    const std::size_t count = bodies_.size() - 1;
-    std::vector<Wrench> reactions(count + 1);
-    std::vector<double> forces(3 * request_->mode().size(), 0.0);
-    const auto push = [&](const Row& row, double force) {
-      require_finite(force);
-      forces[row.place] = force;
-      add_force(row, force, &reactions);
-    };
-    for (std::size_t i = 0; i < rows_.size(); ++i) push(rows_[i], multipliers_[i]);
-    for (const Spring& spring : springs_) push(spring.row, spring.force);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Wrench reaction = bodies_[i].is_pushed() ? reactions[i] : Wrench{};
-      reply.reaction().push(reaction.force.x(), reaction.force.y(), reaction.force.z(), reaction.torque.x(),
-                            reaction.torque.y(), reaction.torque.z());
-    }
-    for (const double force : forces) reply.discrepancy_force().push(force);
-    reply.residual().set(residual);
+void ReactionSolver::write(double residual, const stage::SolverReactionsReply& reply) const {
+  const auto require_finite = [](double number) {
+    if (!std::isfinite(number)) throw Refusal("a reaction is not finite: masses, velocities or forces overflow");
+  };
+  require_finite(residual);
+  const std::size_t count = bodies_.size() - 1;
+  std::vector<Wrench> reactions(count + 1);
+  std::vector<double> forces(3 * request_->mode().size(), 0.0);
+  const auto push = [&](const Row& row, double force) {
+    require_finite(force);
+    forces[row.place] = force;
+    add_force(row.direction, force, &reactions[row.body1], &reactions[row.body2]);
+  };
+  for (std::size_t i = 0; i < rows_.size(); ++i) push(rows_[i], multipliers_[i]);
+  for (const Spring& spring : springs_) push(spring.row, spring.force);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Wrench reaction = bodies_[i].is_pushed() ? reactions[i] : Wrench{};
+    reply.reaction().push(reaction.force.x(), reaction.force.y(), reaction.force.z(), reaction.torque.x(),
+                          reaction.torque.y(), reaction.torque.z());
   }
+  for (const double force : forces) reply.discrepancy_force().push(force);
+  reply.residual().set(residual);
+}
 
- private:
-  // Share of a diagonal: rows with such a pivot are nearly dependent.
-  static constexpr double kNearlyDependent = 0.1;
-  // Turns (rad) by which a state is off the joints: that are none, may be rounding, or small enough to go by.
-  static constexpr double kOnJoints = 1e-15, kRounding = 1e-13, kNearEnough = 1e-5;
-  // Of a diagonal: a row with a lesser pivot, at a state that agrees with the joints, says nothing but rounding.
-  static constexpr double kSingular = 1e-10;
-  // What an error leaves of the pivots of dependent rows, in its squares.
-  static constexpr double kMargin = 100.0, kMostMargin = 1e9;
-
-  void load_bodies() {
-    const std::size_t count = request_->flags().size();
-    bodies_.assign(count + 1, {});
-    for (std::size_t i = 0; i < count; ++i) {
-      Body& body = bodies_[i];
-      body.asked = body.pose = {vector_at(request_->position(), i), quaternion_at(request_->orientation(), i)};
-      body.velocity = {vector_at(request_->linear_velocity(), i), vector_at(request_->angular_velocity(), i)};
-      if (!is_free(i)) continue;
-      body.inverse_mass = request_->inverse_mass()[i];
-      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
-    }
+void ReactionSolver::load_bodies() {
+  const std::size_t count = request_->flags().size();
+  bodies_.assign(count + 1, {});
+  for (std::size_t i = 0; i < count; ++i) {
+    Body& body = bodies_[i];
+    body.asked = body.pose = {vector_at(request_->position(), i), quaternion_at(request_->orientation(), i)};
+    body.velocity = {vector_at(request_->linear_velocity(), i), vector_at(request_->angular_velocity(), i)};
+    if (!is_free(i)) continue;
+    body.inverse_mass = request_->inverse_mass()[i];
+    body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
   }
+}
 
-  bool is_free(std::size_t body) const {
-    return (request_->flags()[body] & kMovable) != 0 && (request_->flags()[body] & kKinematic) == 0;
+bool ReactionSolver::is_free(std::size_t body) const {
+  return (request_->flags()[body] & kMovable) != 0 && (request_->flags()[body] & kKinematic) == 0;
+}
+
+void ReactionSolver::accelerate() {
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+    Body& body = bodies_[i];
+    body.acceleration = {vector_at(request_->acceleration(), 2 * i), vector_at(request_->acceleration(), 2 * i + 1)};
+    if (!is_free(i)) continue;
+    const double drag = request_->drag()[i];
+    const Vector3 force = vector_at(request_->wrench(), 2 * i) + sprung_[i].force;
+    const Vector3 torque = vector_at(request_->wrench(), 2 * i + 1) + sprung_[i].torque;
+    body.acceleration.linear = body.inverse_mass * force - drag * body.velocity.linear;
+    body.acceleration.angular =
+        angular_acceleration(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), i),
+                             vector_at(request_->inverse_inertia(), i), torque) -
+        drag * body.velocity.angular;
   }
+}
 
-  // What forces, springs, the gyroscopic term and drag make of the bodies.
-  void accelerate() {
-    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-      Body& body = bodies_[i];
-      body.acceleration = {vector_at(request_->acceleration(), 2 * i), vector_at(request_->acceleration(), 2 * i + 1)};
-      if (!is_free(i)) continue;
-      const double drag = request_->drag()[i];
-      const Vector3 force = vector_at(request_->wrench(), 2 * i) + sprung_[i].force;
-      const Vector3 torque = vector_at(request_->wrench(), 2 * i + 1) + sprung_[i].torque;
-      body.acceleration.linear = body.inverse_mass * force - drag * body.velocity.linear;
-      body.acceleration.angular =
-          angular_acceleration(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), i),
-                               vector_at(request_->inverse_inertia(), i), torque) -
-          drag * body.velocity.angular;
-    }
+std::uint32_t ReactionSolver::row_of(std::uint32_t body) const {
+  return body == kNone ? static_cast<std::uint32_t>(bodies_.size() - 1) : body;
+}
+
+void ReactionSolver::load_joints() {
+  joints_.clear();
+  const DiscrepancyColumns columns{request_->point1(),     request_->point2(),       request_->velocity(),
+                                   request_->correction(), request_->axes(),         request_->mode(),
+                                   request_->lower(),      request_->upper(),        request_->compliance(),
+                                   request_->damping(),    request_->maximum_force()};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::uint32_t one = row_of(request_->discrepancy_body()[2 * i]);
+    const std::uint32_t two = row_of(request_->discrepancy_body()[2 * i + 1]);
+    if (bodies_[one].is_pushed() || bodies_[two].is_pushed()) joints_.push_back({3 * i, one, two, columns.at(i)});
   }
+}
 
-  std::uint32_t row_of(std::uint32_t body) const {
-    return body == kNone ? static_cast<std::uint32_t>(bodies_.size() - 1) : body;
-  }
-
-  void load_joints() {
-    joints_.clear();
-    const DiscrepancyColumns columns{request_->point1(),     request_->point2(),       request_->velocity(),
-                                     request_->correction(), request_->axes(),         request_->mode(),
-                                     request_->lower(),      request_->upper(),        request_->compliance(),
-                                     request_->damping(),    request_->maximum_force()};
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      const std::uint32_t one = row_of(request_->discrepancy_body()[2 * i]);
-      const std::uint32_t two = row_of(request_->discrepancy_body()[2 * i + 1]);
-      if (bodies_[one].is_pushed() || bodies_[two].is_pushed()) joints_.push_back({3 * i, one, two, columns.at(i)});
-    }
-  }
-
-  void load_springs() {
-    springs_.clear();
-    sprung_.assign(bodies_.size(), {});
-    for (const Joint& joint : joints_) {
-      const Discrepancy& d = joint.discrepancy;
-      if (!acts_as_force(d, 0) && !acts_as_force(d, 1) && !acts_as_force(d, 2)) continue;
-      const Matrix3 axes = to_rotation_matrix(d.axes);
-      const Arms arms = arms_of(d, joint);
-      for (int axis = 0; axis < 3; ++axis) {
-        if (!acts_as_force(d, axis)) continue;
-        const Row row = row_of_axis(d, axes, axis, arms, joint);
-        const Vector3 along = d.is_angular() ? Vector3(axes.col(axis)) : row.direction.linear;
-        const JointAxisState state = joint_axis_state(d, axis, along, d.point2 - d.point1);
-        const double velocity = row.direction.along(bodies_[joint.body1].velocity, bodies_[joint.body2].velocity);
-        const double force = force_of(state, velocity);
-        springs_.push_back({row, force});
-        add_force(row, force, &sprung_);
-      }
+void ReactionSolver::load_springs() {
+  springs_.clear();
+  sprung_.assign(bodies_.size(), {});
+  for (const Joint& joint : joints_) {
+    const Discrepancy& d = joint.discrepancy;
+    if (!acts_as_force(d, 0) && !acts_as_force(d, 1) && !acts_as_force(d, 2)) continue;
+    const Matrix3 axes = to_rotation_matrix(d.axes);
+    const Arms arms = arms_of(d, joint);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!acts_as_force(d, axis)) continue;
+      const Spring& spring = springs_.emplace_back(spring_of(d, axes, axis, arms, joint));
+      add_force(spring.row.direction, spring.force, &sprung_[joint.body1], &sprung_[joint.body2]);
     }
   }
+}
 
-  static void add_force(const Row& row, double force, std::vector<Wrench>* wrenches) {
-    const ConstraintDirection& d = row.direction;
-    Wrench &one = (*wrenches)[row.body1], &two = (*wrenches)[row.body2];
-    one.force -= force * d.linear, one.torque += force * d.angular1;
-    two.force += force * d.linear, two.torque += force * d.angular2;
-  }
+ReactionSolver::Spring ReactionSolver::spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms,
+                                                 const Joint& joint) const {
+  const Row row = row_of_axis(d, axes, axis, arms, joint);
+  const Vector3 along = d.is_angular() ? Vector3(axes.col(axis)) : row.direction.linear;
+  const JointAxisState state = joint_axis_state(d, axis, along, d.point2 - d.point1);
+  return {row, force_of(state, row.direction.along(bodies_[joint.body1].velocity, bodies_[joint.body2].velocity))};
+}
 
-  // Rows of all joints with the bodies where they are.
-  void make_rows() {
-    rows_.clear();
-    longest_ = 0.0;
-    for (const Joint& joint : joints_) {
-      const Discrepancy& d = at_pose(joint);
-      const Matrix3 axes = to_rotation_matrix(d.axes);
-      const Arms arms = arms_of(d, joint);
-      for (int axis = 0; axis < 3; ++axis) {
-        if (!holds_always(d, axis)) continue;
-        Row row = row_of_axis(d, axes, axis, arms, joint);
-        const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
-        row.direction = with_turns(row.direction, one.inverse_inertia, two.inverse_inertia);
-        row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
-        row.velocity_error = row.direction.along(one.velocity, two.velocity) - row.direction.linear.dot(d.velocity) -
-                             (d.is_angular() ? axes.col(axis).dot(d.velocity) : 0.0);
-        row.error = axis_mode(d.modes, axis) == AxisMode::kDriven ? 0.0 : row.error - target(d, axis);
-        longest_ = std::max(longest_, row.reach);
-        if (row.scale > 0.0) rows_.push_back(row);
-      }
+void ReactionSolver::add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two) {
+  one->force -= force * direction.linear, one->torque += force * direction.angular1;
+  two->force += force * direction.linear, two->torque += force * direction.angular2;
+}
+
+void ReactionSolver::make_rows() {
+  rows_.clear();
+  longest_ = 0.0;
+  for (Joint& joint : joints_) {
+    joint.first_row = rows_.size();
+    const Discrepancy& d = at_pose(joint);
+    const Matrix3 axes = to_rotation_matrix(d.axes);
+    const Arms arms = arms_of(d, joint);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!holds_always(d, axis)) continue;
+      Row row = row_of_axis(d, axes, axis, arms, joint);
+      const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+      row.direction = with_turns(row.direction, one.inverse_inertia, two.inverse_inertia);
+      row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
+      row.velocity_error = row.direction.along(one.velocity, two.velocity) - row.direction.linear.dot(d.velocity) -
+                           (d.is_angular() ? axes.col(axis).dot(d.velocity) : 0.0);
+      row.error = axis_mode(d.modes, axis) == AxisMode::kDriven ? 0.0 : row.error - target(d, axis);
+      longest_ = std::max(longest_, row.reach);
+      if (row.scale > 0.0) rows_.push_back(row);
     }
   }
+}
 
-  static double target(const Discrepancy& d, int axis) {
-    return axis_mode(d.modes, axis) == AxisMode::kLimited ? d.lower[axis] : 0.0;
-  }
+double ReactionSolver::target(const Discrepancy& d, int axis) {
+  return axis_mode(d.modes, axis) == AxisMode::kLimited ? d.lower[axis] : 0.0;
+}
 
-  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's, which is
-  // to first order.
-  const Discrepancy& at_pose(const Joint& joint) {
-    if (!has_moved_) return joint.discrepancy;
-    const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
-    Discrepancy& d = carried_;
-    d = joint.discrepancy;
-    if (d.is_swing()) {
-      const auto [first, second] = swing_directions(d);
-      set_swing({one.pose.orientation * (one.asked.orientation.conjugate() * first),
-                 two.pose.orientation * (two.asked.orientation.conjugate() * second)},
-                held_angle(d), &d);
-      return d;
-    }
-    const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
-    if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
-    d.point2 = d.point1 + error;
-    d.axes = one.pose.orientation * (one.asked.orientation.conjugate() * d.axes);
+const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
+  if (!has_moved_) return joint.discrepancy;
+  const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+  Discrepancy& d = carried_;
+  d = joint.discrepancy;
+  if (d.is_swing()) {
+    const auto [first, second] = swing_directions(d);
+    set_swing({one.pose.orientation * (one.asked.orientation.conjugate() * first),
+               two.pose.orientation * (two.asked.orientation.conjugate() * second)},
+              held_angle(d), &d);
     return d;
   }
+  const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
+  if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
+  d.point2 = d.point1 + error;
+  d.axes = one.pose.orientation * (one.asked.orientation.conjugate() * d.axes);
+  return d;
+}
 
-  Arms arms_of(const Discrepancy& d, const Joint& joint) const {
-    if (d.is_angular()) return {};
-    const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
-    // a drive acts where it is in body 1
-    const Vector3 at = holds_pose(d) ? d.point2 : d.point1;
-    Arms arms{at - first.pose.position, at - second.pose.position, {}, 0.0};
-    const Vector3 relative = second.velocity_at(arms.arm2) - first.velocity_at(arms.arm1);
-    arms.bend =
-        second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(relative);
-    arms.reach = longer_arm(first, arms.arm1, second, arms.arm2);
-    return arms;
-  }
+ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Joint& joint) const {
+  if (d.is_angular()) return {};
+  const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
+  // a drive acts where it is in body 1
+  const Vector3 at = holds_pose(d) ? d.point2 : d.point1;
+  Arms arms{at - first.pose.position, at - second.pose.position, {}, 0.0};
+  const Vector3 relative = second.velocity_at(arms.arm2) - first.velocity_at(arms.arm1);
+  arms.bend =
+      second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(relative);
+  arms.reach = longer_arm(first, arms.arm1, second, arms.arm2);
+  return arms;
+}
 
-  Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const {
-    Row row = d.is_radial() && axis == 0 ? radial_row(d, arms, joint) : axis_row(d, axes.col(axis), arms, joint);
-    row.place = joint.place + static_cast<std::size_t>(axis);
+ReactionSolver::Row ReactionSolver::row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms,
+                                                const Joint& joint) const {
+  Row row = d.is_radial() && axis == 0 ? radial_row(d, arms, joint) : axis_row(d, axes.col(axis), arms, joint);
+  row.place = joint.place + static_cast<std::size_t>(axis);
+  return row;
+}
+
+ReactionSolver::Row ReactionSolver::axis_row(const Discrepancy& d, const Vector3& axis, const Arms& arms,
+                                             const Joint& joint) const {
+  Row row{joint.body1, joint.body2, 0, {}, axis.dot(d.point2 - d.point1), 0.0, 0.0, 0.0, 0.0};
+  if (d.is_angular()) {
+    const Vector3 &w1 = bodies_[joint.body1].velocity.angular, &w2 = bodies_[joint.body2].velocity.angular;
+    row.direction = turning_about(axis);
+    row.gamma = turning_of(d, axis, w1, w2).dot(w2 - w1);
     return row;
   }
+  row.direction = direction_at(axis, arms.arm1, arms.arm2);
+  row.reach = arms.reach;
+  row.gamma = axis.dot(arms.bend);
+  return row;
+}
 
-  Row axis_row(const Discrepancy& d, const Vector3& axis, const Arms& arms, const Joint& joint) const {
-    Row row{joint.body1, joint.body2, 0, {}, axis.dot(d.point2 - d.point1), 0.0, 0.0, 0.0, 0.0};
-    if (d.is_angular()) {
-      const Vector3 &w1 = bodies_[joint.body1].velocity.angular, &w2 = bodies_[joint.body2].velocity.angular;
-      row.direction = turning_about(axis);
-      row.gamma = turning_of(d, axis, w1, w2).dot(w2 - w1);
-      return row;
+Vector3 ReactionSolver::turning_of(const Discrepancy& d, const Vector3& axis, const Vector3& w1, const Vector3& w2) {
+  if (!d.is_swing()) return w1.cross(axis);
+  const Vector3 s = d.axes * Vector3::UnitY(), r = exp_rotation(d.point2) * s;
+  const double sine = axis.dot(s.cross(r));
+  const Vector3 rate = w1.cross(s).cross(r) + s.cross(w2.cross(r));
+  return sine > 0.0 ? Vector3((rate - axis.dot(rate) * axis) / sine) : w1.cross(axis);
+}
+
+ReactionSolver::Row ReactionSolver::radial_row(const Discrepancy& d, const Arms& arms, const Joint& joint) const {
+  const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
+  const Vector3 error = d.point2 - d.point1;
+  const double length = error.norm();
+  if (!(length > 0.0)) return axis_row(d, to_rotation_matrix(d.axes).col(0), arms, joint);
+  const Vector3 direction = error / length;
+  const Vector3 arm1 = d.point1 - first.pose.position, arm2 = d.point2 - second.pose.position;
+  const Vector3 rate = second.velocity_at(arm2) - first.velocity_at(arm1);
+  const Vector3 across = rate - direction.dot(rate) * direction;
+  Row row{joint.body1, joint.body2, 0, direction_at(direction, arm1, arm2), length, 0.0, 0.0, 0.0, 0.0};
+  row.gamma = direction.dot(second.centripetal(arm2) - first.centripetal(arm1)) + across.squaredNorm() / length;
+  row.reach = std::max(length, longer_arm(first, arm1, second, arm2));
+  return row;
+}
+
+double ReactionSolver::longer_arm(const Body& one, const Vector3& arm1, const Body& two, const Vector3& arm2) {
+  return std::max(one.is_pushed() ? arm1.norm() : 0.0, two.is_pushed() ? arm2.norm() : 0.0);
+}
+
+double ReactionSolver::reach_of(const Row& row) const {
+  constexpr double kShortest = 1e-3;  // of the longest reach
+  if (row.direction.linear.isZero(0.0) || longest_ == 0.0) return 1.0;
+  return std::max(row.reach, kShortest * longest_);
+}
+
+double ReactionSolver::largest_turn() const {
+  double largest = 0.0;
+  for (const Row& row : rows_) largest = std::max(largest, std::abs(row.error) / reach_of(row));
+  return largest;
+}
+
+bool ReactionSolver::is_amplifying() const {
+  constexpr double kMuch = 10.0;
+  const Row& weakest = rows_[factor_.weakest()];
+  std::vector<double> unit(rows_.size(), 0.0);
+  unit[factor_.weakest()] = reach_of(weakest);
+  double largest = 0.0;
+  for (const Twist& change : taken_out(std::move(unit))) {
+    largest = std::max(largest, change.angular.norm());
+    if (longest_ > 0.0) largest = std::max(largest, change.linear.norm() / longest_);
+  }
+  return largest > kMuch;
+}
+
+void ReactionSolver::agree_with_joints() {
+  constexpr int kRounds = 12;
+  constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
+  const std::vector<Body> asked = bodies_;
+  double turn = largest_turn(), margin = kMargin;
+  bool is_factored = margin * turn * turn < factor_.least_pivot();
+  for (int round = 0; round < kRounds && turn > kOnJoints && margin < kMostMargin; ++round) {
+    const std::vector<Body> before = bodies_;
+    const bool is_new = !is_factored, had_moved = has_moved_;
+    if (is_new) factorise(margin * turn * turn);
+    move(taken_out(errors(&Row::error)));
+    const double next = largest_turn();
+    is_factored = next < kQuick * turn;
+    if (next < 0.5 * turn) {
+      turn = next;
+      margin = kMargin;
+      continue;
     }
-    row.direction = direction_at(axis, arms.arm1, arms.arm2);
-    row.reach = arms.reach;
-    row.gamma = axis.dot(arms.bend);
-    return row;
-  }
-
-  // Rate of an angular row's axis.
-  static Vector3 turning_of(const Discrepancy& d, const Vector3& axis, const Vector3& w1, const Vector3& w2) {
-    if (!d.is_swing()) return w1.cross(axis);
-    const Vector3 s = d.axes * Vector3::UnitY(), r = exp_rotation(d.point2) * s;
-    const double sine = axis.dot(s.cross(r));
-    const Vector3 rate = w1.cross(s).cross(r) + s.cross(w2.cross(r));
-    return sine > 0.0 ? Vector3((rate - axis.dot(rate) * axis) / sine) : w1.cross(axis);
-  }
-
-  // Of a rod without length there is no direction: the first axis stands in.
-  Row radial_row(const Discrepancy& d, const Arms& arms, const Joint& joint) const {
-    const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
-    const Vector3 error = d.point2 - d.point1;
-    const double length = error.norm();
-    if (!(length > 0.0)) return axis_row(d, to_rotation_matrix(d.axes).col(0), arms, joint);
-    const Vector3 direction = error / length;
-    const Vector3 arm1 = d.point1 - first.pose.position, arm2 = d.point2 - second.pose.position;
-    const Vector3 rate = second.velocity_at(arm2) - first.velocity_at(arm1);
-    const Vector3 across = rate - direction.dot(rate) * direction;
-    Row row{joint.body1, joint.body2, 0, direction_at(direction, arm1, arm2), length, 0.0, 0.0, 0.0, 0.0};
-    row.gamma = direction.dot(second.centripetal(arm2) - first.centripetal(arm1)) + across.squaredNorm() / length;
-    row.reach = std::max(length, longer_arm(first, arm1, second, arm2));
-    return row;
-  }
-
-  static double longer_arm(const Body& one, const Vector3& arm1, const Body& two, const Vector3& arm2) {
-    return std::max(one.is_pushed() ? arm1.norm() : 0.0, two.is_pushed() ? arm2.norm() : 0.0);
-  }
-
-  // m by which a turn of 1 rad takes an error out of the row; 1 if it is one of angles.
-  double reach_of(const Row& row) const {
-    constexpr double kShortest = 1e-3;  // of the longest reach
-    if (row.direction.linear.isZero(0.0) || longest_ == 0.0) return 1.0;
-    return std::max(row.reach, kShortest * longest_);
-  }
-
-  // Radians by which bodies turn where the largest error is taken out by turning.
-  double largest_turn() const {
-    double largest = 0.0;
-    for (const Row& row : rows_) largest = std::max(largest, std::abs(row.error) / reach_of(row));
-    return largest;
-  }
-
-  // True if bodies would have to move much farther than the weakest row might be off: it is nearly dependent, and not only
-  // because masses differ.
-  bool is_amplifying() const {
-    constexpr double kMuch = 10.0;
-    const Row& weakest = rows_[factor_.weakest()];
-    std::vector<double> unit(rows_.size(), 0.0);
-    unit[factor_.weakest()] = reach_of(weakest);
-    double largest = 0.0;
-    for (const Twist& change : taken_out(std::move(unit))) {
-      largest = std::max(largest, change.angular.norm());
-      if (longest_ > 0.0) largest = std::max(largest, change.linear.norm() / longest_);
-    }
-    return largest > kMuch;
-  }
-
-  // A state that an integrator tries is off the joints by an error e of its own. Where rows are nearly dependent that
-  // counts for more than its size: redundant ones are dependent no more (pivots of e^2, which no rounding explains), and
-  // near a singular configuration, at a distance x, directions are off by e/x^2. So the question is answered for the
-  // nearest state that agrees with the joints, in pose and in velocity; where there is none, for the one asked.
-  void agree_with_joints() {
-    constexpr int kRounds = 12;
-    constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
-    const std::vector<Body> asked = bodies_;
-    double turn = largest_turn(), margin = kMargin;
-    bool is_factored = margin * turn * turn < factor_.least_pivot();
-    for (int round = 0; round < kRounds && turn > kOnJoints && margin < kMostMargin; ++round) {
-      const std::vector<Body> before = bodies_;
-      const bool is_new = !is_factored, had_moved = has_moved_;
-      if (is_new) factorise(margin * turn * turn);
-      move(taken_out(errors(&Row::error)));
-      const double next = largest_turn();
-      is_factored = next < kQuick * turn;
-      if (next < 0.5 * turn) {
-        turn = next;
-        margin = kMargin;
-        continue;
-      }
-      // rounding, old factors, or a row that is dependent but for the error was taken for one that is not
-      bodies_ = before;
-      has_moved_ = had_moved;
-      make_rows();
-      if (turn < kRounding) break;
-      if (is_new) margin *= kMargin;
-    }
-    if (turn > kNearEnough) {
-      bodies_ = asked;
-      has_moved_ = false;
-      make_rows();
-      return factorise(0.0);
-    }
-    if (has_moved_ || factor_.least_pivot() < kSingular) factorise(std::max(kSingular, kMargin * turn * turn));
-    const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
-    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-      bodies_[i].velocity.linear += change[i].linear;
-      bodies_[i].velocity.angular += change[i].angular;
-    }
+    // rounding, old factors, or a row that is dependent but for the error was taken for one that is not
+    bodies_ = before;
+    has_moved_ = had_moved;
     make_rows();
+    if (turn < kRounding) break;
+    if (is_new) margin *= kMargin;
   }
-
-  void move(const std::vector<Twist>& change) {
-    for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-      Body& body = bodies_[i];
-      if (!body.is_pushed()) continue;
-      body.pose = displaced(body.pose, change[i].linear, change[i].angular);
-      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
-    }
-    has_moved_ = true;
+  if (turn > kNearEnough) {
+    bodies_ = asked;
+    has_moved_ = false;
     make_rows();
+    return factorise(0.0);
   }
-
-  std::vector<double> errors(double Row::*of) const {
-    std::vector<double> all;
-    for (const Row& row : rows_) all.push_back(row.*of);
-    return all;
+  if (has_moved_ || factor_.least_pivot() < kSingular) factorise(std::max(kSingular, kMargin * turn * turn));
+  const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+    bodies_[i].velocity.linear += change[i].linear;
+    bodies_[i].velocity.angular += change[i].angular;
   }
+  make_rows();
+}
 
-  // Change of pose or velocity, along M^-1 J^T, that takes errors of the rows away.
-  std::vector<Twist> taken_out(std::vector<double> errors) const {
-    for (std::size_t i = 0; i < rows_.size(); ++i) errors[i] /= -rows_[i].scale;
-    factor_.solve(&errors);
-    std::vector<Twist> change(bodies_.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const Row& row = rows_[i];
-      row.direction.push(errors[i] / row.scale, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
-                         change[row.body1], change[row.body2]);
+void ReactionSolver::move(const std::vector<Twist>& change) {
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+    Body& body = bodies_[i];
+    if (!body.is_pushed()) continue;
+    body.pose = displaced(body.pose, change[i].linear, change[i].angular);
+    body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
+  }
+  has_moved_ = true;
+  make_rows();
+}
+
+std::vector<double> ReactionSolver::errors(double Row::*of) const {
+  std::vector<double> all;
+  for (const Row& row : rows_) all.push_back(row.*of);
+  return all;
+}
+
+std::vector<Twist> ReactionSolver::taken_out(std::vector<double> errors) const {
+  for (std::size_t i = 0; i < rows_.size(); ++i) errors[i] /= -rows_[i].scale;
+  factor_.solve(&errors);
+  std::vector<Twist> change(bodies_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
+    row.direction.push(errors[i] / row.scale, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
+                       change[row.body1], change[row.body2]);
+  }
+  return change;
+}
+
+void ReactionSolver::factorise(double least) {
+  constexpr std::size_t kNowhere = std::numeric_limits<std::size_t>::max();
+  first_of_body_.assign(bodies_.size(), kNowhere);
+  first_.resize(rows_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    first_[i] = i;
+    for (const std::uint32_t body : {rows_[i].body1, rows_[i].body2}) {
+      if (!bodies_[body].is_pushed()) continue;
+      first_of_body_[body] = std::min(first_of_body_[body], i);
+      first_[i] = std::min(first_[i], first_of_body_[body]);
     }
-    return change;
   }
+  factor_.start(first_);
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    for (std::size_t j = first_[i]; j <= i; ++j)
+      if (const double shared = coupling(rows_[i], rows_[j], bodies_); shared != 0.0)
+        factor_.entry(i, j) = shared / (rows_[i].scale * rows_[j].scale);
+  factor_.factorise(least);
+}
 
-  // Rows whose pivot is less than `least` of their diagonal count as dependent.
-  void factorise(double least) {
-    constexpr std::size_t kNowhere = std::numeric_limits<std::size_t>::max();
-    first_of_body_.assign(bodies_.size(), kNowhere);
-    first_.resize(rows_.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      first_[i] = i;
-      for (const std::uint32_t body : {rows_[i].body1, rows_[i].body2}) {
-        if (!bodies_[body].is_pushed()) continue;
-        first_of_body_[body] = std::min(first_of_body_[body], i);
-        first_[i] = std::min(first_[i], first_of_body_[body]);
-      }
-    }
-    factor_.start(first_);
-    for (std::size_t i = 0; i < rows_.size(); ++i)
-      for (std::size_t j = first_[i]; j <= i; ++j)
-        if (const double shared = coupling(rows_[i], rows_[j], bodies_); shared != 0.0)
-          factor_.entry(i, j) = shared / (rows_[i].scale * rows_[j].scale);
-    factor_.factorise(least);
-  }
+namespace {
 
-  const stage::SolverReactionsRequest* request_ = nullptr;
-  std::vector<Body> bodies_;  // the world last
-  std::vector<Joint> joints_;
-  double longest_ = 0.0;    // reach of a row
-  bool has_moved_ = false;  // bodies, from where they were asked
-  Discrepancy carried_;     // of at_pose()
-  std::vector<Row> rows_;
-  std::vector<Spring> springs_;
-  std::vector<Wrench> sprung_;  // of the springs, by body
-  ProfileLdlt factor_;
-  std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
-  std::vector<double> multipliers_;
-};
+// Memory is all that stays of it.
+ReactionSolver& reaction_solver() {
+  thread_local ReactionSolver solver;
+  return solver;
+}
 
 }  // namespace
 
 void solve_reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply) {
   check_reactions_request(request);
-  // memory is all that stays of it
-  thread_local ReactionSolver solver;
-  const double residual = solver.solve(request);
-  solver.write(residual, reply);
+  const double residual = reaction_solver().solve(request);
+  reaction_solver().write(residual, reply);
+}
+
+void differentiate_reactions(const stage::SolverReactionsRequest& request,
+                             const stage::SolverReactionJacobiansReply& reply) {
+  check_reactions_request(request);
+  reaction_solver().solve(request);
+  reaction_solver().differentiate(reply);
 }
 
 }  // namespace gravitas

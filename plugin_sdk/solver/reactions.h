@@ -40,4 +40,15 @@ namespace gravitas {
 // Throws Refusal for an impossible request (request_check.h), and where a reaction is not finite.
 void solve_reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply);
 
+// How the reactions change with the states of bodies. With the forces' Jacobian dF, multipliers as they are, and rows and
+// springs in states that differ by 1e-7 (m, rad, m/s, rad/s) from that of each body in turn,
+//
+//   dR = d(J^T) lambda + dS + J^T dlambda,   J M^-1 J^T dlambda = -(dgamma + dJ a + J M^-1 (dF + dS + d(J^T) lambda)),
+//
+// S what springs do and a the accelerations with the reactions: one factorisation, and for each of the twelve numbers of a
+// body the rows of its own joints and one substitution. What is left out: that the nearest state that agrees with the joints
+// differs from the one asked.
+void differentiate_reactions(const stage::SolverReactionsRequest& request,
+                             const stage::SolverReactionJacobiansReply& reply);
+
 }  // namespace gravitas

@@ -11,6 +11,7 @@
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
+#include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas {
 namespace {
@@ -153,6 +154,10 @@ void check_reactions_request(const stage::SolverReactionsRequest& r) {
   check_numbers("wrench", r.wrench(), bodies, 6);
   check_numbers("acceleration", r.acceleration(), bodies, 6);
   check_discrepancies(r, bodies, 0);
+  check_length("block_body", r.block_body(), r.block().size() / kBlockNumbers, 2);
+  check_numbers("block", r.block(), r.block_body().size() / 2, kBlockNumbers);
+  for (std::size_t i = 0; i < r.block_body().size(); ++i)
+    if (r.block_body()[i] >= bodies) refuse("block_body", i / 2, "a body that does not exist");
 }
 
 }  // namespace gravitas

@@ -82,8 +82,9 @@ class Force(Plugin):
 
 
 class Solver(Plugin):
-    # the last one is asked only of plugins that declare the capability of that name
-    slot, methods = "solver", {"Solve": "solve", "Reactions": "reactions"}
+    # the last two are asked only of plugins that declare the capability of that name
+    slot = "solver"
+    methods = {"Solve": "solve", "Reactions": "reactions", "ReactionJacobians": "reaction_jacobians"}
 
 
 class Integrator(Plugin):

@@ -23,7 +23,7 @@ class Direct final : public SolverPlugin {
     declaration.version = "1.0.0";
     declaration.slot = kSlot;
     declaration.meaning = "Joints exactly, by a sparse factorisation at the end of the step; contacts by iteration.";
-    declaration.capabilities = {"reactions", "closes_joints"};
+    declaration.capabilities = {"reactions", "reaction_jacobians", "closes_joints"};
     declaration.properties = {Property::choice("ContactSolver", {"GaussSeidel", "Newton"})
                                   .defaults_to({0.0})
                                   .live()
@@ -52,6 +52,11 @@ class Direct final : public SolverPlugin {
   void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
                  Host&) override {
     solve_reactions(request, reply);
+  }
+
+  void reaction_jacobians(const stage::SolverReactionsRequest& request,
+                          const stage::SolverReactionJacobiansReply& reply, Host&) override {
+    differentiate_reactions(request, reply);
   }
 
  private:

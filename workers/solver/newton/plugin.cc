@@ -28,7 +28,7 @@ class Newton final : public SolverPlugin {
     declaration.meaning =
         "Joints and contacts at the end of the step by semi-smooth Newton on the friction cone: accurate at any mass "
         "ratio.";
-    declaration.capabilities = {"reactions", "closes_joints"};
+    declaration.capabilities = {"reactions", "reaction_jacobians", "closes_joints"};
     declaration.properties = {
         Property::number("Tolerance", "1")
             .at_least(1e-15)
@@ -63,6 +63,11 @@ class Newton final : public SolverPlugin {
   void reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply,
                  Host&) override {
     solve_reactions(request, reply);
+  }
+
+  void reaction_jacobians(const stage::SolverReactionsRequest& request,
+                          const stage::SolverReactionJacobiansReply& reply, Host&) override {
+    differentiate_reactions(request, reply);
   }
 
  private:

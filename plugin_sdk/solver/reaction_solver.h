@@ -1,0 +1,170 @@
+// What answers the second question (reactions.h): the rows of the joints in a state, their factors and multipliers.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/plugin.h"
+#include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/profile_ldlt.h"
+#include "plugin_sdk/wrench_jacobian.h"
+
+namespace gravitas {
+
+// True where an axis of a discrepancy is held at all times by whatever force it takes.
+bool holds_always(const Discrepancy& discrepancy, int axis);
+
+class ReactionSolver {
+ public:
+  // Multipliers by row. Returns what the rows are missed by. The request must live until write() or differentiate().
+  double solve(const stage::SolverReactionsRequest& request);
+  void write(double residual, const stage::SolverReactionsReply& reply) const;
+  // Once for each solve().
+  void differentiate(const stage::SolverReactionJacobiansReply& reply);
+
+ private:
+  struct Body {
+    double inverse_mass = 0.0;
+    Matrix3 inverse_inertia = Matrix3::Zero();
+    Pose asked, pose;  // as the question has it, and where the joints agree
+    Twist velocity, acceleration;
+
+    bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
+    Vector3 velocity_at(const Vector3& arm) const { return velocity.linear + velocity.angular.cross(arm); }
+    Vector3 centripetal(const Vector3& arm) const { return velocity.angular.cross(velocity.angular.cross(arm)); }
+  };
+
+  struct Joint {
+    std::size_t place;  // of its first axis among the multipliers
+    std::uint32_t body1, body2;
+    Discrepancy discrepancy;
+    std::size_t first_row = 0;  // of those that hold always
+  };
+
+  struct Row {
+    std::uint32_t body1, body2;
+    std::size_t place;  // among the multipliers
+    ConstraintDirection direction;
+    double error;           // m or rad
+    double velocity_error;  // m/s or rad/s
+    double gamma;
+    double scale;  // root of the diagonal
+    double reach;  // m, the longer arm, or a rod's length; of an angular row 0
+  };
+
+  // What the rows of a discrepancy's points share.
+  struct Arms {
+    Vector3 arm1, arm2;
+    Vector3 bend;  // what velocities alone do to x2 - x1, seen from axes that turn with body 1
+    double reach;
+  };
+
+  // What gives way, in the state as it was asked.
+  struct Spring {
+    Row row;
+    double force;  // on body 2
+  };
+
+  // What a joint is in a state of its bodies.
+  struct JointState {
+    std::array<Row, 3> rows;  // of the axes that hold always
+    Wrench one, two;          // of the springs
+  };
+
+  // Share of a diagonal: rows with such a pivot are nearly dependent.
+  static constexpr double kNearlyDependent = 0.1;
+  // Turns (rad) by which a state is off the joints: that are none, may be rounding, or small enough to go by.
+  static constexpr double kOnJoints = 1e-15, kRounding = 1e-13, kNearEnough = 1e-5;
+  // Of a diagonal: a row with a lesser pivot, at a state that agrees with the joints, says nothing but rounding.
+  static constexpr double kSingular = 1e-10;
+  // What an error leaves of the pivots of dependent rows, in its squares.
+  static constexpr double kMargin = 100.0, kMostMargin = 1e9;
+
+  void load_bodies();
+  bool is_free(std::size_t body) const;
+
+  // What forces, springs, the gyroscopic term and drag make of the bodies.
+  void accelerate();
+  std::uint32_t row_of(std::uint32_t body) const;
+  void load_joints();
+  void load_springs();
+  Spring spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
+  static void add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two);
+
+  // Adds what the reactions make of the accelerations. Returns the torques of all that acts.
+  std::vector<Vector3> accelerate_with_reactions();
+  static void accelerate(const Body& body, const Wrench& wrench, Twist* acceleration);
+
+  // By body: how its acceleration changes with the state of another if reactions stay as they are.
+  std::vector<JacobianBlock> free_blocks(std::uint32_t by, const Vector3& torque) const;
+  JointState state_of(const Joint& joint);
+
+  // How reactions (pushes_) change with a number of a body's state: blocks are those of free_blocks().
+  void differentiate(std::uint32_t by, int number, const std::vector<std::size_t>& joints,
+                     const std::vector<JacobianBlock>& blocks);
+
+  // Rows of all joints with the bodies where they are.
+  void make_rows();
+  static double target(const Discrepancy& d, int axis);
+
+  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's, which is
+  // to first order.
+  const Discrepancy& at_pose(const Joint& joint);
+  Arms arms_of(const Discrepancy& d, const Joint& joint) const;
+  Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
+  Row axis_row(const Discrepancy& d, const Vector3& axis, const Arms& arms, const Joint& joint) const;
+
+  // Rate of an angular row's axis.
+  static Vector3 turning_of(const Discrepancy& d, const Vector3& axis, const Vector3& w1, const Vector3& w2);
+
+  // Of a rod without length there is no direction: the first axis stands in.
+  Row radial_row(const Discrepancy& d, const Arms& arms, const Joint& joint) const;
+  static double longer_arm(const Body& one, const Vector3& arm1, const Body& two, const Vector3& arm2);
+
+  // m by which a turn of 1 rad takes an error out of the row; 1 if it is one of angles.
+  double reach_of(const Row& row) const;
+
+  // Radians by which bodies turn where the largest error is taken out by turning.
+  double largest_turn() const;
+
+  // True if bodies would have to move much farther than the weakest row might be off: it is nearly dependent, and not only
+  // because masses differ.
+  bool is_amplifying() const;
+
+  // A state that an integrator tries is off the joints by an error e of its own. Where rows are nearly dependent that
+  // counts for more than its size: redundant ones are dependent no more (pivots of e^2, which no rounding explains), and
+  // near a singular configuration, at a distance x, directions are off by e/x^2. So the question is answered for the
+  // nearest state that agrees with the joints, in pose and in velocity; where there is none, for the one asked.
+  void agree_with_joints();
+  void move(const std::vector<Twist>& change);
+  std::vector<double> errors(double Row::*of) const;
+
+  // Change of pose or velocity, along M^-1 J^T, that takes errors of the rows away.
+  std::vector<Twist> taken_out(std::vector<double> errors) const;
+
+  // Rows whose pivot is less than `least` of their diagonal count as dependent.
+  void factorise(double least);
+
+  const stage::SolverReactionsRequest* request_ = nullptr;
+  std::vector<Body> bodies_;  // the world last
+  std::vector<Joint> joints_;
+  double longest_ = 0.0;    // reach of a row
+  bool has_moved_ = false;  // bodies, from where they were asked
+  Discrepancy carried_;     // of at_pose()
+  std::vector<Row> rows_;
+  std::vector<Spring> springs_;
+  std::vector<Wrench> sprung_;  // of the springs, by body
+  ProfileLdlt factor_;
+  std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
+  std::vector<double> multipliers_;
+  // of the Jacobian: joints where the bodies are, and by body for one number
+  std::vector<JointState> states_;
+  std::vector<Wrench> pushes_;
+  std::vector<Twist> changes_;
+  std::vector<double> side_;
+};
+
+}  // namespace gravitas
