@@ -194,15 +194,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
-  auto reaction_request() const {
-    const DiscrepancyAnswer& joints = data_.discrepancies;
-    return ids(model_.flags, model_.inverse_mass, model_.inertia, model_.inverse_inertia, model_.damping,
-               data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
-               data_.derivative_angular_velocity, data_.wrench, data_.kinematic_acceleration, data_.discrepancy_body,
-               joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
-               joints.upper, joints.compliance, joints.damping, joints.maximum_force, data_.jacobian_body,
-               data_.jacobian);
-  }
+  std::uint64_t most_reaction_blocks() const;
 
   // stages.cc: a stage each.
   Trusted<TrialState> integrate();
@@ -267,6 +259,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // True for a group of forces whose wrenches never change.
   bool is_constant(std::size_t group) const;
   void count_jacobian_blocks();
+  bool wants_jacobian() const { return data_.derivative_with_jacobian[0] != 0 && data_.jacobian_blocks[0] != 0; }
   void ask_jacobians();
   void ask_jacobians(Stage stage, StageSlot* slot, StageCall call, std::uint64_t most);
 

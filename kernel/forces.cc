@@ -28,33 +28,23 @@ void Environment::sum_wrenches() {
 }
 
 bool Environment::is_constant(std::size_t group) const {
-  const std::span<const std::uint32_t> flags = data_.force_answers[group].flags.span();
-  return std::ranges::all_of(flags, [](std::uint32_t bits) { return (bits & kConstantWrench) != 0; });
+  return std::ranges::all_of(data_.force_answers[group].flags.span(),
+                             [](std::uint32_t bits) { return (bits & kConstantWrench) != 0; });
 }
 
-// Joints that answer in derivatives connect all bodies, at most.
 void Environment::count_jacobian_blocks() {
-  std::uint64_t blocks = 0;
-  bool can_all = true;
-  const auto demand = [&](const StageSlot& slot, std::uint32_t target, const char* capability) {
-    can_all = can_all && has_capability(slot.description().plugins[target].declaration, capability);
-  };
+  std::uint64_t blocks = knows_reactions() ? most_reaction_blocks() : 0;
+  bool can_all = !knows_reactions() || blocks > 0;
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     if (is_constant(g)) continue;
-    demand(force_, group.target, "jacobians");
+    can_all = can_all && has_capability(force_.description().plugins[group.target].declaration, "jacobians");
     blocks += kMostBlocksOfApplication * group.row.size();
-  }
-  if (knows_reactions()) {
-    demand(solver_, 0, "reaction_jacobians");
-    can_all = can_all && model_.body_count <= kMostJoinedBodies;
-    blocks += std::uint64_t{model_.body_count} * model_.body_count;
   }
   data_.jacobian_blocks[0] = can_all ? static_cast<std::uint32_t>(blocks) : 0;
 }
 
-// Asks for blocks of at most `most` pairs of bodies, and puts them behind those before; none where a plugin has taken over
-// that gives none.
+// Asks for blocks of at most `most` pairs of bodies, and puts them behind those before.
 void Environment::ask_jacobians(Stage stage, StageSlot* slot, StageCall call, std::uint64_t most) {
   data_.block_body.resize(0), data_.block.resize(0);
   const auto reply = ids(data_.block_body, data_.block);
@@ -75,10 +65,6 @@ void Environment::ask_jacobians() {
     ask_jacobians(Stage::kForce, &force_, {stage::Method::kForceJacobians, group.target, request, {}},
                   kMostBlocksOfApplication * group.row.size());
   }
-  if (knows_reactions())
-    ask_jacobians(Stage::kSolve, &solver_, {stage::Method::kSolverReactionJacobians, 0, reaction_request(), {}},
-                  std::uint64_t{model_.body_count} * model_.body_count);
-  if (data_.jacobian_blocks[0] == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
 }
 
 void Environment::begin_attempt(bool counts) {
@@ -91,6 +77,7 @@ void Environment::begin_attempt(bool counts) {
 
 void Environment::evaluate() {
   validator_.derivative_request(data_);
+  data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   follow_motion(data_.derivative_time[0], data_.derivative_position, data_.derivative_orientation,
                 data_.derivative_linear_velocity, data_.derivative_angular_velocity);
   if (!wrench_is_constant_) {
@@ -99,11 +86,12 @@ void Environment::evaluate() {
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);
     sum_wrenches();
+    if (wants_jacobian()) ask_jacobians();
     if (sleepers_ > 0 && attempt_counts_) look_for_pushes();
   }
-  data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   if (knows_reactions()) ask_reactions();
-  if (data_.derivative_with_jacobian[0] != 0 && data_.jacobian_blocks[0] != 0) ask_jacobians();
+  // a plugin may have taken over that gives none
+  if (data_.jacobian_blocks[0] == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   validator_.note_wrench(told_wrench());
   if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
   std::ranges::copy(data_.wrench.span(), data_.start_wrench.data());

@@ -126,7 +126,9 @@ void StageSlot::call_with_room(Carrier* carrier, const StageCall& call, Arena* a
     times->check += result.check_ns;
     if (result.status == GRAVITAS_OK) return;
     // who took over in the middle may know none: the question has no answer any more
-    if (result.status == GRAVITAS_UNKNOWN_METHOD && is_about_jacobians(call.method)) return;
+    if (result.status == GRAVITAS_UNKNOWN_METHOD &&
+        (call.method == stage::Method::kForceJacobians || call.method == stage::Method::kSolverReactionJacobians))
+      return;
     if (result.status == GRAVITAS_REFUSED)
       throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
     if (result.status != GRAVITAS_NEEDS_CAPACITY)

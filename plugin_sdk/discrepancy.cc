@@ -46,6 +46,50 @@ void set_swing(const SwingDirections& directions, double angle, Discrepancy* swi
   swing->axes = to_quaternion(axes);
 }
 
+double twist_between(const Quaternion& frame1, const Quaternion& frame2) {
+  constexpr double kHalfTurn = 3.14159265358979323846;
+  // relative turn q = swing * twist about x: the twist is the part of q about x
+  const Quaternion q = shorter_arc(frame1.conjugate() * frame2);
+  const double twist = 2.0 * math::atan2(q.x(), q.w());
+  if (twist > kHalfTurn) return twist - 2.0 * kHalfTurn;
+  return twist < -kHalfTurn ? twist + 2.0 * kHalfTurn : twist;
+}
+
+Vector3 Twisting::bisector() const {
+  constexpr double kAgainst = 1e-9;
+  const Vector3 sum = first + second;
+  const double length = sum.norm();
+  return length > kAgainst ? Vector3(sum / length) : orthonormal_basis(first).first;
+}
+
+Twisting Twisting::turned(const Quaternion& turn1, const Quaternion& turn2) const {
+  // how frames turn about their shafts together is no matter
+  const auto [second_axis, third_axis] = orthonormal_basis(first);
+  Matrix3 axes;
+  axes << first, second_axis, third_axis;
+  const Swing bend = swing_between(first, second);
+  const Quaternion frame1 = to_quaternion(axes);
+  const Quaternion frame2 = exp_rotation(angle * second) * (exp_rotation(bend.angle * bend.axis) * frame1);
+  return {turn1 * first, turn2 * second, twist_between(turn1 * frame1, turn2 * frame2)};
+}
+
+Twisting twisting_of(const Discrepancy& twist) {
+  const Vector3 bisector = twist.axes * Vector3::UnitX(), &half = twist.point1;
+  const double cosine = std::sqrt(std::max(0.0, 1.0 - half.squaredNorm()));
+  const double error = bisector.dot(twist.point2 - twist.point1);
+  return {cosine * bisector + half, cosine * bisector - half, cosine > 0.0 ? error / cosine : 0.0};
+}
+
+void set_twisting(const Twisting& twisting, Discrepancy* twist) {
+  const Vector3 bisector = twisting.bisector();
+  twist->point1 = 0.5 * (twisting.first - twisting.second);
+  twist->point2 = twist->point1 + twisting.cosine() * twisting.angle * bisector;
+  const auto [second, third] = orthonormal_basis(bisector);
+  Matrix3 axes;
+  axes << bisector, second, third;
+  twist->axes = to_quaternion(axes);
+}
+
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2) {
   const Vector3 error = discrepancy.point2 - discrepancy.point1;
@@ -57,6 +101,12 @@ Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& n
                                        then2.orientation * (now2.orientation.conjugate() * second))
                              .angle;
     return (angle - held_angle(discrepancy)) * (discrepancy.axes * Vector3::UnitX());
+  }
+  if (discrepancy.is_twist()) {
+    const Twisting then =
+        twisting_of(discrepancy)
+            .turned(then1.orientation * now1.orientation.conjugate(), then2.orientation * now2.orientation.conjugate());
+    return then.cosine() * then.angle * (discrepancy.axes * Vector3::UnitX());
   }
   const Vector3 turn1 = log_rotation(then1.orientation * now1.orientation.conjugate());
   const Vector3 turn2 = log_rotation(then2.orientation * now2.orientation.conjugate());

@@ -43,6 +43,10 @@ inline constexpr std::uint32_t kRadialDiscrepancy = 1U << 13;
 // body 2, the second axis turned by point2. The first axis is s x r/|s x r| and turns with both, which reactions.h must know.
 inline constexpr std::uint32_t kSwingDiscrepancy = 1U << 14;
 
+// With kAngularDiscrepancy: the twist of a shaft fixed in body 2 against one fixed in body 1, times the cosine of half the
+// bend between the two. The first axis bisects them and turns with both; point1 is half their difference, across it.
+inline constexpr std::uint32_t kTwistDiscrepancy = 1U << 16;
+
 // Beside these, in SolverSolveRequest alone: what of the discrepancy acts_as_force() (solver/joint_laws.h) acted among the
 // wrenches while S* was integrated (simulator Smooth), and is not to be applied again. No mode that a constraint may answer.
 inline constexpr std::uint32_t kForcesApplied = 1U << 15;
@@ -58,9 +62,10 @@ constexpr AxisMode axis_mode(std::uint32_t modes, int axis) {
 
 // True if the value is one that pack_modes() makes.
 constexpr bool is_valid_mode(std::uint32_t modes) {
-  constexpr std::uint32_t kSwing = kAngularDiscrepancy | kSwingDiscrepancy;
-  return (modes <= (kRadialDiscrepancy | 0xFFFU) || (modes & ~0xFFFU) == kSwing) && (modes & 0xFU) <= 5 &&
-         ((modes >> 4) & 0xFU) <= 5 && ((modes >> 8) & 0xFU) <= 5;
+  const std::uint32_t flags = modes & ~0xFFFU;
+  return (flags <= kAngularDiscrepancy || flags == kRadialDiscrepancy ||
+          flags == (kAngularDiscrepancy | kSwingDiscrepancy) || flags == (kAngularDiscrepancy | kTwistDiscrepancy)) &&
+         (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 && ((modes >> 8) & 0xFU) <= 5;
 }
 
 // Stands for "no bound" in maximum_force, lower and upper (columns hold finite numbers only).
@@ -82,6 +87,7 @@ struct Discrepancy {
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
   bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
   bool is_swing() const { return (modes & kSwingDiscrepancy) != 0; }
+  bool is_twist() const { return (modes & kTwistDiscrepancy) != 0; }
   bool has_forces_applied() const { return (modes & kForcesApplied) != 0; }
 };
 
@@ -119,8 +125,25 @@ void set_swing(const SwingDirections& directions, double angle, Discrepancy* swi
 // The angle that a swing is held at.
 double held_angle(const Discrepancy& swing);
 
+// Twist of frame 2 about its first axis after the shortest turn that takes the first axis of frame 1 to it, -pi ... pi.
+// Its rate is w.(a1 + a2)/(1 + a1.a2), w the turning of frame 2 relative to frame 1, a1 and a2 the first axes.
+double twist_between(const Quaternion& frame1, const Quaternion& frame2);
+
+// The unit shafts of a twist and its angle (rad), a twist as others make it, and as it is once either body has turned.
+// The axis, and so the row, is undefined where the shafts point against each other.
+struct Twisting {
+  Vector3 first, second;
+  double angle = 0.0;
+
+  Twisting turned(const Quaternion& turn1, const Quaternion& turn2) const;
+  double cosine() const { return 0.5 * (first + second).norm(); }  // of half the bend
+  Vector3 bisector() const;
+};
+Twisting twisting_of(const Discrepancy& twist);
+void set_twisting(const Twisting& twisting, Discrepancy* twist);
+
 // Error x2 - x1 (world) when the bodies are at `then` poses, for a discrepancy that was written at `now` poses.
-// Exact for points, and along the first axis for swings; other angular errors are carried to first order in the rotation
+// Exact for points, and along the first axis for swings and twists; other angular errors are carried to first order in the rotation
 // between the two.
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2);

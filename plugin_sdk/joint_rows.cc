@@ -115,21 +115,13 @@ Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle)
   return d;
 }
 
-double twist_between(const Quaternion& frame1, const Quaternion& frame2) {
-  // relative turn q = swing * twist about x: the twist is the part of q about x
-  const Quaternion q = shorter_arc(frame1.conjugate() * frame2);
-  const double twist = 2.0 * math::atan2(q.x(), q.w());
-  if (twist > kHalfTurn) return twist - 2.0 * kHalfTurn;
-  return twist < -kHalfTurn ? twist + 2.0 * kHalfTurn : twist;
-}
-
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {
-  const Vector3 a1 = first_axis(frame1), a2 = first_axis(frame2);
-  const Vector3 sum = a1 + a2;
-  const double length = sum.norm();  // 2 cos(swing/2)
-  *scale = 0.5 * length;
-  const Vector3 bisector = length > 1e-9 ? Vector3(sum / length) : orthonormal_basis(a1).first;
-  return row_about(bisector, *scale * twist_between(frame1, frame2), mode);
+  const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist_between(frame1, frame2)};
+  Discrepancy d;
+  set_twisting(twisting, &d);
+  *scale = twisting.cosine();
+  d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kTwistDiscrepancy;
+  return d;
 }
 
 }  // namespace gravitas

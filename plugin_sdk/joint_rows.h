@@ -84,12 +84,8 @@ void hold_orientation(const Pose& frame1, const Pose& frame2, Emit&& emit) {
   emit(swing_row(frame1.orientation * Vector3::UnitZ(), frame2.orientation * Vector3::UnitY(), kQuarterTurn));
 }
 
-// Twist of frame 2 about its first axis after the shortest turn that takes the first axis of frame 1 to it, -pi ... pi.
-// Its rate is w.(a1 + a2)/(1 + a1.a2), w the turning of frame 2 relative to frame 1, a1 and a2 the first axes.
-double twist_between(const Quaternion& frame1, const Quaternion& frame2);
-
-// The row whose error is the twist times cos(swing/2), about the unit bisector of the first axes: w.bisector is the rate
-// of just that while the twist is small. `scale` receives the cosine.
+// The row whose error is the twist times cos(swing/2), about the unit bisector of the first axes (kTwistDiscrepancy):
+// w.bisector is the rate of just that while the twist is small. `scale` receives the cosine.
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale);
 
 }  // namespace gravitas

@@ -166,7 +166,7 @@ void LocalMotion::ask_jacobian() {
   wrenches_.assign(wrenches.begin(), wrenches.end());
 }
 
-// J from the Jacobian of the forces.
+// J from the Jacobian of the wrenches.
 void LocalMotion::compose() {
   member_.assign(derivatives_->size(), {});
   for (Group& group : groups_) {
@@ -183,8 +183,7 @@ void LocalMotion::compose() {
     const std::uint32_t row = jacobian_.body(i);
     const Member &pushed = member_[row], &by = member_[jacobian_.by(i)];
     if (pushed.group == nullptr || by.group == nullptr) continue;  // what nothing pushes
-    if (pushed.group != by.group)
-      throw Refusal("the blocks of the forces' Jacobian are not those of the start of the step");
+    if (pushed.group != by.group) throw Refusal("the blocks of the Jacobian are not those of the start of the step");
     pushed.group->accelerations.block<6, kNumbers>(6 * static_cast<Eigen::Index>(pushed.place),
                                                    first_number(by.place)) +=
         accelerated_block(bodies_[pushed.group->body[pushed.place]].start.pose.orientation,

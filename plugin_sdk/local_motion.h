@@ -8,7 +8,7 @@
 //
 //   d(x, r)'/d(x, r) = A = (0, 0; 0, [w]/2),     d(x, r)'/d(v, w) = 1,
 //
-// those of velocities are made of the forces' Jacobian where it can be had (wrench_jacobian.h), else of differences:
+// those of velocities are made of the wrenches' Jacobian where it can be had (wrench_jacobian.h), else of differences:
 // twelve derivatives a body of the largest group of bodies that feel each other (interaction_groups.h).
 #pragma once
 

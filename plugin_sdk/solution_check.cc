@@ -139,7 +139,7 @@ class Balance {
     }
   }
 
-  // Linear ones turn with body 1, a radial axis with its points, a swing's with its directions.
+  // Linear ones turn with body 1, a radial axis with its points, a swing's and a twist's with their directions.
   Matrix3 axes_of(std::size_t i, const Discrepancy& d, Directions directions) const {
     const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
     Matrix3 axes = d.axes.toRotationMatrix();
@@ -147,6 +147,8 @@ class Balance {
       const auto [first, second] = swing_directions(d);
       axes.col(0) = swing_between(exp_rotation(turn_of(one)) * first, exp_rotation(turn_of(two)) * second).axis;
     }
+    if (directions == Directions::kOfEnd && d.is_twist())
+      axes.col(0) = twisting_of(d).turned(exp_rotation(turn_of(one)), exp_rotation(turn_of(two))).bisector();
     if (directions == Directions::kOfTrial || d.is_angular()) return axes;
     axes = exp_rotation(turn_of(one)).toRotationMatrix() * axes;
     const Vector3 between = carried(two, d.point2) - carried(one, d.point1);

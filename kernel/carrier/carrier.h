@@ -36,11 +36,6 @@ struct StageCall {
   const stage::MethodInfo& info() const { return stage::method_info(method); }
 };
 
-// What may go without an answer: whoever asks can do without.
-constexpr bool is_about_jacobians(stage::Method method) {
-  return method == stage::Method::kForceJacobians || method == stage::Method::kSolverReactionJacobians;
-}
-
 struct CallResult {
   std::int32_t status = GRAVITAS_OK;  // GRAVITAS_OK, _NEEDS_CAPACITY (counts say how much), _REFUSED, _FAILED …
   std::string text;                   // why it was refused or failed; what came of an ordered fault, if it was answered

@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas::kernel {
 
@@ -21,12 +22,31 @@ void Environment::ask_reactions() {
     set_vector(data_.kinematic_acceleration.span(), 2 * body, change.linear);
     set_vector(data_.kinematic_acceleration.span(), 2 * body + 1, change.angular);
   }
-  const auto request = reaction_request();
+  const DiscrepancyAnswer& joints = data_.discrepancies;
+  const auto request = [&](const Column<std::uint32_t>& block_body, const Column<double>& block) {
+    return ids(model_.flags, model_.inverse_mass, model_.inertia, model_.inverse_inertia, model_.damping,
+               data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
+               data_.derivative_angular_velocity, data_.wrench, data_.kinematic_acceleration, data_.discrepancy_body,
+               joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
+               joints.upper, joints.compliance, joints.damping, joints.maximum_force, block_body, block);
+  };
+  data_.block_body.resize(0), data_.block.resize(0);
+  data_.discrepancy_force.resize(3 * joints.mode.size());
   const auto reply = ids(data_.reaction, data_.discrepancy_force, data_.reaction_residual);
-  data_.discrepancy_force.resize(3 * data_.discrepancies.mode.size());
-  ask(Stage::kSolve, &solver_, {stage::Method::kSolverReactions, 0, request, reply}, nullptr,
+  const auto asked = request(data_.block_body, data_.block);
+  ask(Stage::kSolve, &solver_, {stage::Method::kSolverReactions, 0, asked, reply}, nullptr,
       [&](const auto& answer) { return validator_.reactions(answer); });
   std::ranges::transform(data_.wrench.span(), data_.reaction.span(), data_.wrench_with_reactions.data(), std::plus());
+  if (!wants_jacobian()) return;
+  const auto with_forces = request(data_.jacobian_body, data_.jacobian);
+  ask_jacobians(Stage::kSolve, &solver_, {stage::Method::kSolverReactionJacobians, 0, with_forces, {}},
+                most_reaction_blocks());
+}
+
+// Joints connect all bodies, at most. 0: the solver cannot say how reactions change.
+std::uint64_t Environment::most_reaction_blocks() const {
+  const bool can = has_capability(solver_.description().plugins[0].declaration, "reaction_jacobians");
+  return can && model_.body_count <= kMostJoinedBodies ? std::uint64_t{model_.body_count} * model_.body_count : 0;
 }
 
 }  // namespace gravitas::kernel

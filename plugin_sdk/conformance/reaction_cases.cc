@@ -11,11 +11,13 @@
 #include "plugin_sdk/conformance/sample_values.h"
 #include "plugin_sdk/conformance/slot_cases.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas::conformance {
 namespace {
 
-constexpr stage::Method kReactions = stage::Method::kSolverReactions;
+constexpr stage::Method kReactions = stage::Method::kSolverReactions,
+                        kReactionJacobians = stage::Method::kSolverReactionJacobians;
 constexpr double kReactionRounding = 1e-9, kWeight = 9.81;
 
 class Reactions {
@@ -211,6 +213,81 @@ void judge_twice(Subject& subject) {
   }
 }
 
+// With a number of a body's state changed: its joints' points go with it.
+Mechanism moved(Mechanism made, std::uint32_t body, int number, double by) {
+  const Vector3 change = by * Vector3::Unit(number % 3);
+  ConstrainedBody& one = made.world.bodies[body];
+  if (number >= 6) (number < 9 ? one.twist.linear : one.twist.angular) += change;
+  if (number >= 6) return made;
+  const Pose before = one.pose;
+  one.pose = displaced(one.pose, number < 3 ? change : Vector3::Zero(), number < 3 ? Vector3::Zero() : change);
+  for (BodyJoint& joint : made.world.joints) {
+    Discrepancy& d = joint.discrepancy;
+    if (joint.body1 == body) d.point1 = carried(d.point1, before, one.pose);
+    if (joint.body2 == body) d.point2 = carried(d.point2, before, one.pose);
+    if (joint.body1 == body) d.axes = one.pose.orientation * (before.orientation.conjugate() * d.axes);
+  }
+  return made;
+}
+
+// A chain under forces that answer the state of the second link with a wrench on the last one.
+void judge_reaction_jacobians(Subject& subject) {
+  constexpr double kMoved = 1e-5, kTolerance = 1e-4;
+  constexpr std::uint32_t kLinks = 3, kPushed = 2, kBy = 1;
+  Draw draw(94);
+  const Mechanism chain = swinging_chain(&draw, kLinks, false);
+  const JacobianBlock slope =
+      JacobianBlock::NullaryExpr([&](Eigen::Index, Eigen::Index) { return draw.uniform(-20.0, 20.0); });
+  MessageColumns request = chain.request();
+  request.u32("block_body") = {kPushed, kBy};
+  request.f64("block").assign(slope.data(), slope.data() + slope.size());
+  Inquiry inquiry(subject, "a chain of three that swings, under a force that answers its state");
+  const MessageColumns came = inquiry.answer(kReactionJacobians, request);
+  const std::vector<std::uint32_t>& bodies = came.u32("reaction_body");
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(6 * kLinks, 12 * kLinks);
+  for (std::size_t i = 0; i < bodies.size() / 2; ++i) {
+    inquiry.expect(bodies[2 * i] < kLinks && bodies[2 * i + 1] < kLinks,
+                   "block " + std::to_string(i) + " names a body that does not exist");
+    jacobian.block<6, 12>(6 * bodies[2 * i], 12 * bodies[2 * i + 1]) +=
+        Eigen::Map<const JacobianBlock>(&came.f64("reaction_block")[kBlockNumbers * i]);
+  }
+  const double scale = std::max(1.0, jacobian.cwiseAbs().maxCoeff());
+  const auto reactions = [&](std::uint32_t body, int number, double by) {
+    Mechanism there = moved(chain, body, number, by);
+    if (body == kBy) {
+      there.world.wrench[kPushed].force += by * slope.col(number).head<3>();
+      there.world.wrench[kPushed].torque += by * slope.col(number).tail<3>();
+    }
+    const Reactions asked = there.ask(&inquiry);
+    Eigen::VectorXd all(6 * kLinks);
+    for (std::uint32_t i = 0; i < kLinks; ++i) all.segment<6>(6 * i) << asked.force(i), asked.torque(i);
+    return all;
+  };
+  for (std::uint32_t body = 0; body < kLinks; ++body) {
+    for (int number = 0; number < 12; ++number) {
+      const Eigen::VectorXd expected =
+          (reactions(body, number, kMoved) - reactions(body, number, -kMoved)) / (2.0 * kMoved);
+      const Eigen::Index column = 12 * Eigen::Index{body} + number;
+      Eigen::Index row = 0;
+      (expected - jacobian.col(column)).cwiseAbs().maxCoeff(&row);
+      inquiry.expect_near("change of reaction number " + std::to_string(row % 6) + " on body " +
+                              std::to_string(row / 6) + " with number " + std::to_string(number) +
+                              " of the state of body " + std::to_string(body),
+                          jacobian(row, column), expected[row], kTolerance * scale);
+    }
+  }
+}
+
+// What differences are taken of may be anything but finite.
+void judge_reaction_jacobian_hostile(Subject& subject) {
+  Draw draw(95);
+  MessageColumns request = swinging_chain(&draw, 2, false).request();
+  request.u32("block_body") = {0, 1};
+  request.f64("block").assign(kBlockNumbers, 1.0);
+  expect_foreign_indices_refused(subject, "a chain that swings", kReactionJacobians, request);
+  expect_hostile_numbers_survived(subject, "a chain that swings", kReactionJacobians, request);
+}
+
 void judge_reaction_refusals(Subject& subject) {
   Draw draw(93);
   const MessageColumns request = swinging_chain(&draw, 3, true).request();
@@ -228,7 +305,7 @@ void judge_reaction_refusals(Subject& subject) {
 
 std::vector<Case> reaction_cases(const PluginDeclaration& declaration) {
   if (!has_capability(declaration, "reactions")) return {unknown_case("solver/reactions_unknown", kReactions)};
-  return {
+  std::vector<Case> cases = {
       make_case("solver/reactions_hanging", "A joint bears the weight and the centripetal force of what hangs on it.",
                 judge_hanging),
       make_case("solver/reactions", "With the reactions the points of joints accelerate as one.", judge_accelerations),
@@ -237,11 +314,28 @@ std::vector<Case> reaction_cases(const PluginDeclaration& declaration) {
       make_case("solver/reactions_twice", "Joints that hold what is held already change nothing.", judge_twice),
       make_case("solver/reactions_refusals", "Bodies that do not exist and numbers that are none are refused.",
                 judge_reaction_refusals)};
+  if (!has_capability(declaration, "reaction_jacobians")) {
+    cases.push_back(unknown_case("solver/reaction_jacobians_unknown", kReactionJacobians));
+    return cases;
+  }
+  cases.push_back(
+      make_case("solver/reaction_jacobians", "Jacobians of reactions are their slopes.", judge_reaction_jacobians));
+  cases.push_back(make_case("solver/reaction_jacobians_hostile",
+                            "Jacobians of reactions in any state are finite or refused.",
+                            judge_reaction_jacobian_hostile));
+  return cases;
 }
 
 std::vector<Question> reaction_questions(const PluginDeclaration& declaration, Draw* draw) {
   if (!has_capability(declaration, "reactions")) return {};
-  return {{"reactions of a chain of 12 links", kReactions, swinging_chain(draw, 12, true).request(), {}}};
+  const MessageColumns request = swinging_chain(draw, 12, true).request();
+  std::vector<Question> questions = {{"reactions of a chain of 12 links", kReactions, request, {}}};
+  if (has_capability(declaration, "reaction_jacobians"))
+    questions.push_back({"Jacobians of the reactions of a chain of 4 links",
+                         kReactionJacobians,
+                         swinging_chain(draw, 4, true).request(),
+                         {}});
+  return questions;
 }
 
 }  // namespace gravitas::conformance

@@ -37,6 +37,13 @@ void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end
     joint->directions = {turning_about(swing.axis), turning_about(turned), turning_about(swing.axis.cross(turned))};
     return;
   }
+  if (d.is_twist()) {
+    const Twisting twisting = twisting_of(d).turned(to_quaternion(end1.turn), to_quaternion(end2.turn));
+    const auto [second, third] = orthonormal_basis(twisting.bisector());
+    joint->errors = {twisting.cosine() * twisting.angle, 0.0, 0.0};
+    joint->directions = {turning_about(twisting.bisector()), turning_about(second), turning_about(third)};
+    return;
+  }
   if (d.is_angular()) {
     const Vector3 error = d.point2 - d.point1 + turn;
     for (int k = 0; k < 3; ++k) {

@@ -158,6 +158,8 @@ void ProfileLdlt::add(double share, const NullVector& a, NullVector* b) {
 bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
   constexpr double kAgrees = 64.0 * std::numeric_limits<double>::epsilon();
   std::vector<double> y = b, largest;
+  double most = 0.0;
+  for (const double number : b) most = std::max(most, std::fabs(number));
   for (std::size_t i = 0; i < size(); ++i) {
     const double* row = &values_[begin_[i]];
     const double* before = &y[first_[i]];
@@ -174,6 +176,7 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
     }
     const double left = std::fabs(y[i]);
     if (left <= kAgrees * terms) continue;
+    if (!(left <= kAgrees * std::max(terms, most))) return false;
     if (largest.empty()) largest = largest_of_parts(b);
     if (!(left <= kAgrees * std::max(terms, largest[i]))) return false;
   }

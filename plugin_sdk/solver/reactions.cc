@@ -194,6 +194,12 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
               held_angle(d), &d);
     return d;
   }
+  if (d.is_twist()) {
+    set_twisting(twisting_of(d).turned(one.pose.orientation * one.asked.orientation.conjugate(),
+                                       two.pose.orientation * two.asked.orientation.conjugate()),
+                 &d);
+    return d;
+  }
   const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
   if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
   d.point2 = d.point1 + error;
@@ -237,6 +243,12 @@ ReactionSolver::Row ReactionSolver::axis_row(const Discrepancy& d, const Vector3
 }
 
 Vector3 ReactionSolver::turning_of(const Discrepancy& d, const Vector3& axis, const Vector3& w1, const Vector3& w2) {
+  if (d.is_twist()) {
+    const Twisting twisting = twisting_of(d);
+    const Vector3 rate = w1.cross(twisting.first) + w2.cross(twisting.second);
+    const double cosine = twisting.cosine();
+    return cosine > 0.0 ? Vector3((rate - axis.dot(rate) * axis) / (2.0 * cosine)) : w1.cross(axis);
+  }
   if (!d.is_swing()) return w1.cross(axis);
   const Vector3 s = d.axes * Vector3::UnitY(), r = exp_rotation(d.point2) * s;
   const double sine = axis.dot(s.cross(r));

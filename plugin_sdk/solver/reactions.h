@@ -10,6 +10,7 @@
 //   radial, e = x2-x1  gamma = e.(w2 x (w2 x r2) - w1 x (w1 x r1))/|e| + (|e'|^2 - (e.e'/|e|)^2)/|e|
 //   about an axis      gamma = (w1 x a).(w2 - w1)
 //   swing, a = s x r/|s x r|  gamma = a'.(w2 - w1), s turning with body 1 and r with body 2
+//   twist, a = (s + r)/|s + r|  the same
 //
 // Held are axes that hold always: locked, or limited with one limit, without compliance; driven ones without damping;
 // all without a bound on the force.
@@ -20,8 +21,7 @@
 // gradient of e^2/2c where axes turn with body 1. `reaction` and `discrepancy_force` contain it. An integrator meets it as
 // it meets any force: at its order, and an explicit one within its stability limit, h sqrt(1/(c m)) < 2.8 for RK4.
 //
-// Limits, friction and bounded drives that do not give way are left to the end of the step, so they are of first order; so
-// is an angular row whose axis turns otherwise (of ConstantVelocity).
+// Limits, friction and bounded drives that do not give way are left to the end of the step, so they are of first order.
 //
 // Dependent rows are left out by the factorisation (profile_ldlt.h); rows that contradict each other are met as well as
 // can be (least squares), and `residual` says by how much they are missed.

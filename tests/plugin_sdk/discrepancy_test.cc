@@ -294,11 +294,11 @@ TEST(AxisModes, PackAndUnpack) {
   }
 }
 
-// Of all small codes exactly 4 * 6^3 are modes: plain, angular, radial, swing.
+// Of all small codes exactly 5 * 6^3 are modes: plain, angular, radial, swing, twist.
 TEST(AxisModes, OtherCodesAreInvalid) {
   int valid = 0;
-  for (std::uint32_t code = 0; code < (1U << 16); ++code) valid += is_valid_mode(code) ? 1 : 0;
-  EXPECT_EQ(valid, 864);
+  for (std::uint32_t code = 0; code < (1U << 17); ++code) valid += is_valid_mode(code) ? 1 : 0;
+  EXPECT_EQ(valid, 1080);
   for (int bit = 14; bit < 32; ++bit) EXPECT_FALSE(is_valid_mode(1U << bit)) << bit;
   EXPECT_FALSE(is_valid_mode(kAngularDiscrepancy | kRadialDiscrepancy));
   EXPECT_FALSE(is_valid_mode(kRadialDiscrepancy | kSwingDiscrepancy));

@@ -298,6 +298,16 @@ class ToySolver final : public SolverPlugin {
     asked += "reactions ";
   }
 };
+class SlopedSolver final : public SolverPlugin {
+  void solve(const stage::SolverSolveRequest&, const stage::SolverSolveReply&, Host&) override { asked += "solve "; }
+  void reactions(const stage::SolverReactionsRequest&, const stage::SolverReactionsReply&, Host&) override {
+    asked += "reactions ";
+  }
+  void reaction_jacobians(const stage::SolverReactionsRequest&, const stage::SolverReactionJacobiansReply&,
+                          Host&) override {
+    asked += "reaction_jacobians ";
+  }
+};
 class ToyIntegrator final : public IntegratorPlugin {
   void integrate(const stage::IntegratorIntegrateRequest&, const stage::IntegratorIntegrateReply&, Host&) override {
     asked += "integrate ";
@@ -331,7 +341,8 @@ TEST(PluginSlots, EachAnswersItsOwnQuestionsOnly) {
   EXPECT_EQ(try_every_method<MovingCollision>(), Answer("manifolds times_of_impact rays debug_geometry ", 4));
   EXPECT_EQ(try_every_method<ToyConstraint>(), Answer("bind discrepancies ", 2));
   EXPECT_EQ(try_every_method<ToyForce>(), Answer("wrenches " + none, 1));
-  EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve reactions ", 2));
+  EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve reactions " + none, 2));
+  EXPECT_EQ(try_every_method<SlopedSolver>(), Answer("solve reactions reaction_jacobians ", 3));
   EXPECT_EQ(try_every_method<ToyIntegrator>(), Answer("integrate ", 1));
 }
 

@@ -20,7 +20,7 @@ from surface import perturbed_normal
 
 NOTHING_TO_DO, CONVERGED, ITERATIONS = 0, 1, 2
 FREE, LOCKED, LIMITED, UNILATERAL, FRICTION, DRIVEN = range(6)
-ANGULAR, SWING = 1 << 12, 1 << 14
+ANGULAR, SWING, TWIST = 1 << 12, 1 << 14, 1 << 16
 UNLIMITED = numpy.finfo(float).max
 
 
@@ -486,7 +486,7 @@ def check_request(r):
         if (pairs[:, 0] == pairs[:, 1]).any():
             raise Refusal(f"column {name}: a body is paired with itself")
     modes = numpy.stack([r.mode >> 4 * i & 0xF for i in range(3)], axis=-1)
-    if (modes > DRIVEN).any() or not numpy.isin(r.mode & ~0xFFF, (0, ANGULAR, ANGULAR | SWING)).all():
+    if (modes > DRIVEN).any() or not numpy.isin(r.mode & ~0xFFF, (0, ANGULAR, ANGULAR | SWING, ANGULAR | TWIST)).all():
         raise Refusal("column mode: a mode that does not exist")
     if ((modes == LIMITED) & (r.lower > r.upper)).any():
         raise Refusal("column lower: above upper")

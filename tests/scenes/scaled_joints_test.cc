@@ -121,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Each, JointsOfAnySize,
 TEST_P(JointsOfAnySize, MoveAlike) {
   const End unit = end_of(1.0);
   if (is_end_of_step()) {
-    EXPECT_LE(unit.joint_error, std::string(joint().type) == "ConstantVelocity" ? 1e-3 : 1e-12);
+    EXPECT_LE(unit.joint_error, 1e-12);
   }
   for (const double size : {1e-6, 1e-5, 1e-3, 1e3, 1e5, 1e6})
     EXPECT_LE(apart(unit, end_of(size), size), is_end_of_step() ? 1e-11 : 1e-7) << "bodies of " << size << " m";

@@ -57,6 +57,38 @@ Environment {
   EXPECT_NEAR(run.body("Bob").pose.position.x(), 0.001 + 2.0 * angle, 1e-9);
 }
 
+// A shaft that hangs from a point, spins and drives a second one by a constant-velocity joint that bends as they fall: RK4
+// keeps its order, and the shafts turn alike to rounding.
+TEST(Smooth, KeepsTheOrderOfConstantVelocityJoints) {
+  const auto end = [](double h) {
+    SceneRun run(R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 0.4 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Driving" Mass = 1 PrincipalMoments = {0.1, 0.2, 0.3} KineticProperties { Position = {0.5, 0, 0} AngularVelocity = {6, 0, 0} } Forces = { "Down" } }
+    Body { Id = "Driven" Mass = 2 PrincipalMoments = {0.3, 0.2, 0.1} KineticProperties { Position = {1, 0, 0.5} AngularVelocity = {0, 0, 6} } Forces = { "Down" } }
+  } }
+  Constraints {
+    Constraint { Type = "Spherical" Id = "Hook" Body2 = "Driving" CustomProperties { BindPoint = {0, 0, 0} } }
+    Constraint { Type = "ConstantVelocity" Id = "Joint" Body1 = "Driving" Body2 = "Driven" CustomProperties { BindPoint = {1, 0, 0} Axis1 = {1, 0, 0} Axis2 = {0, 0, 1} } }
+  }
+  KineticIntegrator = "RK4"
+  ConstraintSolver = "Newton"
+}
+)",
+                 {set("Simulator.TimeStep", h)});
+    run.to_end();
+    EXPECT_LT(run.report().max_joint_error(), 1e-13) << h;
+    return run.body("Driven").pose;
+  };
+  const Pose one = end(0.01), half = end(0.005), quarter = end(0.0025);
+  // 2^4, less a tenth of the order
+  const double ratio = (one.position - half.position).norm() / (half.position - quarter.position).norm();
+  EXPECT_GT(ratio, std::exp2(3.9)) << ratio;
+  EXPECT_LT(ratio, std::exp2(4.6)) << ratio;
+}
+
 TEST(Smooth, RefusesWhatItCannotMove) {
   EXPECT_THAT([] { SceneRun run("double_pendulum.gravitas", smooth({"Solver=Sequential"})); },
               ThrowsMessage<std::runtime_error>(HasSubstr("needs a plugin with the capability 'reactions'")));

@@ -10,8 +10,8 @@
 // beyond 900 of them projected sweeps, ten for each of `Iterations`, whose convergence is linear), linear in a chain's joints.
 // Known failures: Coulomb friction with large coefficients at long arms (Painlevé) may have no solution or several; then
 // `stop_reason` and `residual` say so. Random heaps that slide and turn under up to 10,000 times their mass are all solved
-// (1600 of 1600; 1599 of 1600 with rolling and spinning friction), under a million times 395 of 400. The angles of axes
-// (ConstantVelocity, Axle, limits) are closed to second order in the correction's turn, points to rounding.
+// (1600 of 1600; 1599 of 1600 with rolling and spinning friction), under a million times 395 of 400. The angles of
+// limits are closed to second order in the correction's turn, all else to rounding.
 #include "plugin_sdk/solver/end_of_step.h"
 #include "plugin_sdk/solver/reactions.h"
 

@@ -1,0 +1,205 @@
+// How reactions change with the states of bodies, against differences of the reactions themselves.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/conformance/draw.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
+#include "tests/plugin_sdk/solver/reaction_problem.h"
+
+namespace gravitas {
+namespace {
+
+using conformance::Draw;
+using harness::ReactionProblem;
+
+// A joint whose frames are fixed in its bodies.
+struct Joint {
+  std::uint32_t one, two;  // kNone: the world
+  Pose frame1, frame2;     // in the bodies
+  std::function<void(const Pose&, const Pose&, const std::function<void(const Discrepancy&)>&)> describe;
+};
+
+struct Mechanism {
+  std::vector<Pose> poses;
+  std::vector<Twist> twists;
+  std::vector<double> masses;  // 0: kinematic
+  std::vector<Wrench> wrenches;
+  std::vector<Joint> joints;
+  // what forces make of the state: wrench of `body` by the state of `by`
+  std::uint32_t body = 0, by = 0;
+  JacobianBlock slope = JacobianBlock::Zero();
+
+  // With a number of a body's state changed.
+  ReactionProblem problem(std::uint32_t changed = 0, int number = 0, double amount = 0.0) const {
+    std::vector<Pose> at = poses;
+    std::vector<Twist> moving = twists;
+    std::vector<Wrench> acting = wrenches;
+    const Vector3 change = amount * Vector3::Unit(number % 3);
+    if (number < 3)
+      at[changed].position += change;
+    else if (number < 6)
+      at[changed] = displaced(at[changed], Vector3::Zero(), change);
+    else if (number < 9)
+      moving[changed].linear += change;
+    else
+      moving[changed].angular += change;
+    if (changed == by) {
+      acting[body].force += amount * slope.col(number).head<3>();
+      acting[body].torque += amount * slope.col(number).tail<3>();
+    }
+    ReactionProblem request;
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      request.add_body(masses[i], at[i].position, moving[i].linear, acting[i].force);
+      set_quaternion(request.orientation, i, at[i].orientation);
+      set_vector(request.angular_velocity, i, moving[i].angular);
+      set_vector(request.wrench, 2 * i + 1, acting[i].torque);
+      request.drag[i] = 0.1 * static_cast<double>(i);
+      if (masses[i] == 0.0) set_vector(request.acceleration, 2 * i, Vector3(1, 2, 3));
+    }
+    const auto placed = [&](std::uint32_t of, const Pose& frame) {
+      if (of == kNone) return frame;
+      return Pose{at[of].position + at[of].orientation * frame.position, at[of].orientation * frame.orientation};
+    };
+    for (const Joint& joint : joints)
+      joint.describe(placed(joint.one, joint.frame1), placed(joint.two, joint.frame2),
+                     [&](const Discrepancy& d) { request.add_joint(joint.one, joint.two, d); });
+    if (!slope.isZero(0.0)) {
+      request.block_body = {body, by};
+      request.block.assign(slope.data(), slope.data() + slope.size());
+    }
+    return request;
+  }
+
+  // A joint at a frame in the world.
+  void join(std::uint32_t one, std::uint32_t two, const Pose& frame, decltype(Joint::describe) describe) {
+    const auto inside = [&](std::uint32_t of) {
+      if (of == kNone) return frame;
+      const Quaternion back = poses[of].orientation.conjugate();
+      return Pose{back * (frame.position - poses[of].position), back * frame.orientation};
+    };
+    joints.push_back({one, two, inside(one), inside(two), std::move(describe)});
+  }
+};
+
+void expect_slopes(const Mechanism& mechanism, const std::string& what) {
+  constexpr double kBy = 1e-5;
+  ReactionProblem here = mechanism.problem();
+  const Eigen::MatrixXd jacobian = here.differentiate();
+  double largest = 0.0;
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(jacobian.rows(), jacobian.cols());
+  for (std::uint32_t body = 0; body < mechanism.poses.size(); ++body) {
+    if (mechanism.masses[body] == 0.0) continue;
+    for (int number = 0; number < 12; ++number) {
+      ReactionProblem more = mechanism.problem(body, number, kBy), less = mechanism.problem(body, number, -kBy);
+      more.solve(), less.solve();
+      for (std::size_t i = 0; i < more.reactions().size(); ++i) {
+        const double slope = (more.reactions()[i] - less.reactions()[i]) / (2.0 * kBy);
+        expected(static_cast<Eigen::Index>(i), 12 * Eigen::Index{body} + number) = slope;
+        largest = std::max(largest, std::abs(slope));
+      }
+    }
+  }
+  EXPECT_GT(largest, 1.0) << what;
+  // differences by 1e-7 of numbers with 1e-15
+  EXPECT_LT((jacobian - expected).cwiseAbs().maxCoeff(), 1e-5 * largest) << what;
+}
+
+void ball(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  emit(held_point(one, two.position, {true, true, true}));
+}
+void hinge(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  hold_hinge(one, two, emit);
+}
+void even_shafts(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  double scale = 0.0;
+  ball(one, two, emit);
+  emit(twist_row(one.orientation, two.orientation, AxisMode::kLocked, &scale));
+}
+void spring(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  Discrepancy d = held_point(one, two.position, {true, true, true});
+  d.compliance = Vector3(0.01, 0.02, 0.03), d.damping = Vector3(3, 2, 1);
+  emit(d);
+}
+void rod(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  Discrepancy d;
+  d.point1 = one.position + one.orientation * Vector3(0, 2, 0), d.point2 = two.position;
+  d.modes = pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree) | kRadialDiscrepancy;
+  d.lower.x() = d.upper.x() = 2.0;
+  emit(d);
+}
+
+// Three links that turn as one about the first joint, so that all joints agree with them.
+Mechanism links(std::uint64_t seed) {
+  Draw draw(seed);
+  Mechanism made;
+  const Vector3 turning = draw.vector(2.0);
+  for (int i = 0; i < 3; ++i) {
+    made.poses.push_back({Vector3(i + 0.5, 0, 0) + draw.vector(0.2), draw.rotation()});
+    made.twists.push_back({turning.cross(made.poses.back().position), turning});
+    made.masses.push_back(draw.uniform(0.5, 2.0));
+    made.wrenches.push_back({draw.vector(20.0), draw.vector(5.0)});
+  }
+  return made;
+}
+
+TEST(ReactionJacobians, AreTheSlopesOfTheReactions) {
+  const std::vector<std::pair<std::string, decltype(Joint::describe)>> kinds = {
+      {"balls", ball}, {"hinges", hinge}, {"even shafts", even_shafts}, {"rods", rod}, {"springs", spring}};
+  for (const auto& [name, describe] : kinds) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Draw draw(100 + seed);
+      Mechanism made = links(seed);
+      made.join(kNone, 0, {Vector3::Zero(), draw.rotation()}, ball);
+      made.join(0, 1, {Vector3(1, 0, 0), draw.rotation()}, describe);
+      made.join(1, 2, {Vector3(2, 0, 0), draw.rotation()}, describe);
+      expect_slopes(made, name);
+      made.body = 2, made.by = 1;
+      made.slope = JacobianBlock::NullaryExpr([&](Eigen::Index, Eigen::Index) { return draw.uniform(-30.0, 30.0); });
+      expect_slopes(made, name + " and a force");
+      made.masses[0] = 0.0;
+      made.joints.erase(made.joints.begin());
+      expect_slopes(made, name + " carried by a kinematic body");
+      const std::vector<Joint> once = made.joints;
+      made.joints.insert(made.joints.end(), once.begin(), once.end());
+      if (name != "rods" && name != "springs") expect_slopes(made, name + " twice");
+    }
+  }
+}
+
+// Blocks for all that joints and forces connect, and for nobody else.
+TEST(ReactionJacobians, AreOfThoseWhomJointsAndForcesConnect) {
+  Mechanism made = links(3);
+  made.join(0, 1, {Vector3(1, 0, 0), Quaternion::Identity()}, ball);
+  ReactionProblem pair = made.problem();
+  pair.differentiate();
+  EXPECT_EQ(pair.blocks(), 4U);
+  made.body = 2, made.by = 0;
+  made.slope.setOnes();
+  ReactionProblem all = made.problem();
+  all.differentiate();
+  EXPECT_EQ(all.blocks(), 9U);
+  Mechanism apart = links(3);
+  ReactionProblem none = apart.problem();
+  none.differentiate();
+  EXPECT_EQ(none.blocks(), 0U);
+}
+
+TEST(ReactionJacobians, RefuseBlocksOfNobody) {
+  Mechanism made = links(4);
+  made.join(0, 1, {Vector3(1, 0, 0), Quaternion::Identity()}, ball);
+  ReactionProblem foreign = made.problem();
+  foreign.block_body = {0, 3};
+  foreign.block.assign(kBlockNumbers, 1.0);
+  EXPECT_THROW(foreign.differentiate(), Refusal);
+  foreign.block_body = {0, 2};
+  foreign.block.pop_back();
+  EXPECT_THROW(foreign.differentiate(), Refusal);
+}
+
+}  // namespace
+}  // namespace gravitas
