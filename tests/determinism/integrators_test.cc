@@ -11,13 +11,14 @@ using kernel::Hosting;
 
 class EveryIntegrator : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHosting) {
-  const auto hash_of = [](Hosting hosting, std::uint32_t threads) {
+void expect_same_bits(const std::string& scene, const std::string& integrator, std::optional<std::uint32_t> steps) {
+  const auto hash_of = [&](Hosting hosting, std::uint32_t threads) {
     RunOptions options;
-    options.scenes = {in_source("/tests/determinism/afloat.gravitas")};
+    options.scenes = {in_source("/tests/determinism/") + scene};
+    options.steps = steps;
     options.hosting = {{std::nullopt, hosting}};
     options.threads = threads;
-    options.overrides = {std::string("Integrator=") + GetParam()};
+    options.overrides = {"Integrator=" + integrator};
     const RunResult result = run(
         options, [] { return false; }, [](const Progress&) {});
     EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
@@ -28,6 +29,13 @@ TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHosting) {
   EXPECT_EQ(hash_of(Hosting::kDirect, 2), reference) << "two threads";
   EXPECT_EQ(hash_of(Hosting::kSharedMemory, 1), reference) << "in workers";
   EXPECT_EQ(hash_of(Hosting::kGrpc, 1), reference) << "by gRPC";
+}
+
+TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHosting) { expect_same_bits("afloat.gravitas", GetParam(), {}); }
+
+// Reactions of joints, and for implicit ones their Jacobian, among the derivatives.
+TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHostingWithJointsInItsDerivatives) {
+  expect_same_bits("suspension.gravitas", GetParam(), 12);
 }
 
 INSTANTIATE_TEST_SUITE_P(Integrators, EveryIntegrator,

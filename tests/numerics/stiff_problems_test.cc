@@ -222,5 +222,31 @@ TEST(StiffProblems, AJacobianOfTheForcesSavesDerivatives) {
   }
 }
 
+// With the Jacobian of the reactions, too, where forces act on a mechanism.
+TEST(StiffProblems, AJacobianOfTheReactionsSavesDerivatives) {
+  struct End {
+    std::vector<double> positions;
+    std::uint64_t asked;
+  };
+  const auto run = [](const char* integrator, const std::vector<double>& settings, bool has_jacobians) {
+    WorldBuilder builder = harness::flyball_governor().world;
+    builder.steps(10, 0.01).plugin(Slot::kIntegrator, plugin_path(integrator), settings);
+    builder.description().simulator = kernel::Simulator::kSmooth;
+    if (!has_jacobians)
+      for (kernel::PluginChoice& plugin : builder.description().solver.plugins)
+        std::erase(plugin.declaration.capabilities, "reaction_jacobians");
+    Environment world(builder.description());
+    while (world.step_count() < world.total_steps()) EXPECT_EQ(world.step(), kernel::StepOutcome::kCommitted);
+    const std::span<const double> position = world.state().position;
+    return End{{position.begin(), position.end()}, world.stage_time(kernel::Stage::kForce).count()};
+  };
+  for (const char* integrator : {"integrator_rosenbrock", "integrator_radau"}) {
+    const End with = run(integrator, {1e-6}, true), without = run(integrator, {1e-6}, false);
+    for (std::size_t i = 0; i < with.positions.size(); ++i)
+      EXPECT_NEAR(with.positions[i], without.positions[i], 1e-7) << integrator << ", number " << i;
+    EXPECT_LT(2 * with.asked, without.asked) << integrator << " asked " << with.asked << " and " << without.asked;
+  }
+}
+
 }  // namespace
 }  // namespace gravitas
