@@ -118,10 +118,10 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   for (const ConstraintGroup& group : model_.constraint_groups)
     if (slot.which() == Slot::kConstraint && group.target == target) bind(group);
   must_restart_ = true;
+  count_jacobian_blocks();
   if (now.name == before.declaration.name) return;
   wakes_all_ = true;
   find_sleepers();
-  if (slot.which() == Slot::kForce || slot.which() == Slot::kSolver) count_jacobian_blocks();
   if (slot.which() == Slot::kIntegrator) {
     data_.theta[0] = now.theta;
     for (const State& state : states_) {

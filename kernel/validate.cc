@@ -56,7 +56,7 @@ Trusted<Wrenches> Validator::wrenches(const Untrusted<StageCall>& answer, const 
 Trusted<Wrenches> Validator::jacobians(const Untrusted<StageCall>& answer, const Column<std::uint32_t>& bodies,
                                        std::uint64_t most) const {
   check_structure_and_finiteness(answer.value_);
-  require(check_block_rows(bodies.span(), model_.body_count, most));
+  require(check_block_rows(answer.value_.info().reply[0].name, bodies.span(), model_.body_count, most));
   return Trusted<Wrenches>({});
 }
 

@@ -57,13 +57,14 @@ AnswerProblem check_remembered_contacts(std::span<const std::uint32_t> body, std
   return {};
 }
 
-AnswerProblem check_block_rows(std::span<const std::uint32_t> block_body, std::uint64_t bodies, std::uint64_t most) {
+AnswerProblem check_block_rows(const char* column, std::span<const std::uint32_t> block_body, std::uint64_t bodies,
+                               std::uint64_t most) {
   if (block_body.size() > 2 * most)
-    return {true, "block_body has " + std::to_string(block_body.size() / 2) + " rows, " + std::to_string(most) +
-                      " are allowed"};
+    return {true, std::string(column) + " has " + std::to_string(block_body.size() / 2) + " rows, " +
+                      std::to_string(most) + " are allowed"};
   const auto bad = std::ranges::find_if(block_body, [&](std::uint32_t body) { return body >= bodies; });
   if (bad == block_body.end()) return {};
-  return bad_structure("block_body", static_cast<std::size_t>(bad - block_body.begin()) / 2,
+  return bad_structure(column, static_cast<std::size_t>(bad - block_body.begin()) / 2,
                        " names a body that does not exist");
 }
 

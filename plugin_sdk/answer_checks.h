@@ -35,8 +35,9 @@ AnswerProblem check_impact_rows(std::span<const std::uint32_t> pair, std::span<c
 AnswerProblem check_contact_rows(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> feature,
                                  std::span<const double> normal, std::uint64_t pairs);
 
-// Blocks of a Jacobian, by (wrench of body, state of body): at most `most`, of bodies that exist.
-AnswerProblem check_block_rows(std::span<const std::uint32_t> block_body, std::uint64_t bodies, std::uint64_t most);
+// Blocks of a Jacobian, by (wrench of body, state of body), in a column of that name: at most `most`, of bodies that exist.
+AnswerProblem check_block_rows(const char* column, std::span<const std::uint32_t> block_body, std::uint64_t bodies,
+                               std::uint64_t most);
 
 // Discrepancies of joints that are intact (1), in the order of the joints; known modes, correction in 0 … 1, lower <=
 // upper, nothing negative that cannot be, unit axes.

@@ -8,6 +8,11 @@
 #include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
+namespace {
+
+constexpr double kWholeTurn = 6.28318530717958647692;
+
+}  // namespace
 
 JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, const Vector3& com1,
                          const Vector3& com2) {
@@ -47,12 +52,11 @@ void set_swing(const SwingDirections& directions, double angle, Discrepancy* swi
 }
 
 double twist_between(const Quaternion& frame1, const Quaternion& frame2) {
-  constexpr double kHalfTurn = 3.14159265358979323846;
   // relative turn q = swing * twist about x: the twist is the part of q about x
   const Quaternion q = shorter_arc(frame1.conjugate() * frame2);
   const double twist = 2.0 * math::atan2(q.x(), q.w());
-  if (twist > kHalfTurn) return twist - 2.0 * kHalfTurn;
-  return twist < -kHalfTurn ? twist + 2.0 * kHalfTurn : twist;
+  if (twist > 0.5 * kWholeTurn) return twist - kWholeTurn;
+  return twist < -0.5 * kWholeTurn ? twist + kWholeTurn : twist;
 }
 
 Vector3 Twisting::bisector() const {
@@ -70,7 +74,8 @@ Twisting Twisting::turned(const Quaternion& turn1, const Quaternion& turn2) cons
   const Swing bend = swing_between(first, second);
   const Quaternion frame1 = to_quaternion(axes);
   const Quaternion frame2 = exp_rotation(angle * second) * (exp_rotation(bend.angle * bend.axis) * frame1);
-  return {turn1 * first, turn2 * second, twist_between(turn1 * frame1, turn2 * frame2)};
+  const double now = twist_between(turn1 * frame1, turn2 * frame2);
+  return {turn1 * first, turn2 * second, now - kWholeTurn * std::round((now - angle) / kWholeTurn)};
 }
 
 Twisting twisting_of(const Discrepancy& twist) {
@@ -103,10 +108,10 @@ Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& n
     return (angle - held_angle(discrepancy)) * (discrepancy.axes * Vector3::UnitX());
   }
   if (discrepancy.is_twist()) {
+    const Twisting now = twisting_of(discrepancy);
     const Twisting then =
-        twisting_of(discrepancy)
-            .turned(then1.orientation * now1.orientation.conjugate(), then2.orientation * now2.orientation.conjugate());
-    return then.cosine() * then.angle * (discrepancy.axes * Vector3::UnitX());
+        now.turned(then1.orientation * now1.orientation.conjugate(), then2.orientation * now2.orientation.conjugate());
+    return now.cosine() * then.angle * (discrepancy.axes * Vector3::UnitX());
   }
   const Vector3 turn1 = log_rotation(then1.orientation * now1.orientation.conjugate());
   const Vector3 turn2 = log_rotation(then2.orientation * now2.orientation.conjugate());

@@ -129,8 +129,8 @@ double held_angle(const Discrepancy& swing);
 // Its rate is w.(a1 + a2)/(1 + a1.a2), w the turning of frame 2 relative to frame 1, a1 and a2 the first axes.
 double twist_between(const Quaternion& frame1, const Quaternion& frame2);
 
-// The unit shafts of a twist and its angle (rad), a twist as others make it, and as it is once either body has turned.
-// The axis, and so the row, is undefined where the shafts point against each other.
+// The unit shafts of a twist and its angle (rad), a twist as others make it, and as it is once either body has turned: its
+// angle goes on from where it was, beyond half a turn, too. Undefined where the shafts point against each other.
 struct Twisting {
   Vector3 first, second;
   double angle = 0.0;
@@ -143,8 +143,8 @@ Twisting twisting_of(const Discrepancy& twist);
 void set_twisting(const Twisting& twisting, Discrepancy* twist);
 
 // Error x2 - x1 (world) when the bodies are at `then` poses, for a discrepancy that was written at `now` poses.
-// Exact for points, and along the first axis for swings and twists; other angular errors are carried to first order in the rotation
-// between the two.
+// Exact for points, and along the first axis for swings and twists (times the cosine that the twist was written with);
+// other angular errors are carried to first order in the rotation between the two.
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2);
 

@@ -51,9 +51,11 @@ std::span<const double> Derivatives::wrenches(double time, const TrialColumns& t
 }
 
 std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial, WrenchJacobian* jacobian) {
-  jacobian->bodies_.clear(), jacobian->numbers_.clear();
   jacobian->is_known_ = request_.wrench_is_constant() != 0;
-  if (jacobian->is_known_ || request_.jacobian_blocks() == 0) return wrenches(time, trial);
+  if (jacobian->is_known_ || request_.jacobian_blocks() == 0) {
+    jacobian->bodies_.clear(), jacobian->numbers_.clear();
+    return wrenches(time, trial);
+  }
   require_finite(trial);
   const std::span<const double> answer = ask(time, columns_of(trial), jacobian);
   jacobian->is_known_ = jacobian->size() > 0;

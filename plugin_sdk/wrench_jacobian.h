@@ -21,8 +21,8 @@ inline constexpr std::size_t kMostBlocksOfApplication = 4;
 inline constexpr std::size_t kMostJoinedBodies = 128;
 using JacobianBlock = Eigen::Matrix<double, 6, 12, Eigen::RowMajor>;
 
-// The blocks of all wrenches in one state (Integrator.Derivative), those of joints' reactions included; blocks of the same two bodies are summed by who uses them.
-// Bodies that are in no block feel nobody.
+// The blocks of all wrenches in one state (Integrator.Derivative), those of joints' reactions included; blocks of the same
+// two bodies are summed by who uses them. Bodies that are in no block feel nobody.
 class WrenchJacobian {
  public:
   // False where it cannot be had: differences of wrenches do then.

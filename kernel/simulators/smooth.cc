@@ -41,12 +41,15 @@ void Environment::ask_reactions() {
   const auto with_forces = request(data_.jacobian_body, data_.jacobian);
   ask_jacobians(Stage::kSolve, &solver_, {stage::Method::kSolverReactionJacobians, 0, with_forces, {}},
                 most_reaction_blocks());
+  if (data_.block_body.size() == 0) data_.jacobian_blocks[0] = 0;
 }
 
-// Joints connect all bodies, at most. 0: the solver cannot say how reactions change.
+// Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
 std::uint64_t Environment::most_reaction_blocks() const {
-  const bool can = has_capability(solver_.description().plugins[0].declaration, "reaction_jacobians");
-  return can && model_.body_count <= kMostJoinedBodies ? std::uint64_t{model_.body_count} * model_.body_count : 0;
+  if (!has_capability(solver_.description().plugins[0].declaration, "reaction_jacobians")) return 0;
+  const auto movable = static_cast<std::uint64_t>(
+      std::ranges::count_if(model_.flags.span(), [](std::uint32_t flags) { return (flags & kMovable) != 0; }));
+  return movable <= kMostJoinedBodies ? movable * movable : 0;
 }
 
 }  // namespace gravitas::kernel

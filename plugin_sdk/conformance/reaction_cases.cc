@@ -1,4 +1,4 @@
-// The optional second question of slot solver, reactions: that with them the points of ball-and-socket joints accelerate
+// The optional questions of slot solver, reactions and how they change with the state: that with them the points of ball-and-socket joints accelerate
 // as one, that they are the pushes of the multipliers reported, and what they do to bodies that nothing can push.
 //
 // Tolerance: kReactionRounding of the largest force, acceleration or torque of the question.

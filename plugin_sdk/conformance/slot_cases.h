@@ -20,7 +20,7 @@ std::vector<Case> force_cases(const PluginDeclaration& declaration);
 std::vector<Case> solver_cases(const PluginDeclaration& declaration);
 // Of slot solver, for those that take motion from an integrator.
 std::vector<Case> contact_cases(const PluginDeclaration& declaration);
-// Of the optional method of slot solver.
+// Of the optional methods of slot solver.
 std::vector<Case> reaction_cases(const PluginDeclaration& declaration);
 std::vector<Case> integrator_cases(const PluginDeclaration& declaration);
 

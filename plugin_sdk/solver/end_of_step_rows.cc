@@ -38,10 +38,11 @@ void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end
     return;
   }
   if (d.is_twist()) {
-    const Twisting twisting = twisting_of(d).turned(to_quaternion(end1.turn), to_quaternion(end2.turn));
-    const auto [second, third] = orthonormal_basis(twisting.bisector());
-    joint->errors = {twisting.cosine() * twisting.angle, 0.0, 0.0};
-    joint->directions = {turning_about(twisting.bisector()), turning_about(second), turning_about(third)};
+    const Twisting trial = twisting_of(d);
+    const Twisting end = trial.turned(to_quaternion(end1.turn), to_quaternion(end2.turn));
+    const auto [second, third] = orthonormal_basis(end.bisector());
+    joint->errors = {trial.cosine() * end.angle, 0.0, 0.0};
+    joint->directions = {turning_about(end.bisector()), turning_about(second), turning_about(third)};
     return;
   }
   if (d.is_angular()) {

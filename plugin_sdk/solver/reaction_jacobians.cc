@@ -10,12 +10,12 @@
 namespace gravitas {
 namespace {
 
-// Moves a number of (x, r, v, w) by as much as tells how others change with it. Returns that.
-double displace(int number, Pose* pose, Twist* velocity) {
+// Moves a number of (x, r, v, w) by as much as tells how others change with it, with arms of `length`. Returns that.
+double displace(int number, double length, Pose* pose, Twist* velocity) {
   constexpr double kBy = 1e-7;
   const double speed = (number < 9 ? velocity->linear : velocity->angular).norm();
   double by = kBy;
-  if (number < 3) by *= 1.0 + 1e-2 * pose->position.norm();
+  if (number < 3) by *= length + 1e-2 * pose->position.norm();
   if (number >= 6) by *= std::max(1.0, speed);
   const Vector3 change = by * Vector3::Unit(number % 3);
   if (number < 3) pose->position += change;
@@ -60,6 +60,7 @@ void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& re
   has_moved_ = true;  // bodies, from where they were asked
   states_.clear();
   for (const Joint& joint : joints_) states_.push_back(state_of(joint));
+  bool is_empty = true;
   for (std::uint32_t by = 0; by < count; ++by) {
     if (!bodies_[by].is_pushed() || !is_jointed[parts.root(by)]) continue;
     const std::vector<std::uint32_t>& felt = part[parts.root(by)];
@@ -72,8 +73,13 @@ void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& re
       if (!blocks[i].allFinite()) throw Refusal("the Jacobian of a reaction is not finite: masses or forces overflow");
       reply.reaction_body().push(i, by);
       for (Eigen::Index k = 0; k < blocks[i].size(); ++k) reply.reaction_block().push(blocks[i].data()[k]);
+      is_empty = false;
     }
   }
+  // no block at all would be no answer
+  if (!is_empty || count == 0) return;
+  reply.reaction_body().push(0, 0);
+  for (std::size_t k = 0; k < kBlockNumbers; ++k) reply.reaction_block().push(0.0);
 }
 
 std::vector<Vector3> ReactionSolver::accelerate_with_reactions() {
@@ -129,7 +135,7 @@ void ReactionSolver::differentiate(std::uint32_t by, int number, const std::vect
   std::vector<double>& side = side_;
   side.assign(rows_.size(), 0.0);
   const Body still = bodies_[by];
-  const double step = displace(number, &bodies_[by].pose, &bodies_[by].velocity);
+  const double step = displace(number, longest_ > 0.0 ? longest_ : 1.0, &bodies_[by].pose, &bodies_[by].velocity);
   for (const std::size_t j : joints) {
     const Joint& joint = joints_[j];
     const JointState& from = states_[j];

@@ -194,13 +194,14 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
               held_angle(d), &d);
     return d;
   }
+  const Quaternion turn1 = one.pose.orientation * one.asked.orientation.conjugate();
+  d.velocity = turn1 * d.velocity;
   if (d.is_twist()) {
-    set_twisting(twisting_of(d).turned(one.pose.orientation * one.asked.orientation.conjugate(),
-                                       two.pose.orientation * two.asked.orientation.conjugate()),
-                 &d);
+    set_twisting(twisting_of(d).turned(turn1, two.pose.orientation * two.asked.orientation.conjugate()), &d);
     return d;
   }
-  const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
+  Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
+  if (d.is_angular()) error += turn1 * (d.point2 - d.point1) - (d.point2 - d.point1);
   if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
   d.point2 = d.point1 + error;
   d.axes = one.pose.orientation * (one.asked.orientation.conjugate() * d.axes);

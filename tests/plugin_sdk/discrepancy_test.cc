@@ -10,6 +10,7 @@
 #include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/constraint.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
@@ -170,6 +171,38 @@ TEST(DiscrepancyError, OfASwingIsTheAngleThatItsDirectionsHave) {
     EXPECT_NEAR(joint_error(d, error_at(d, now1, now2, then1, then2)), std::fabs(std::acos(turned1.dot(turned2)) - 0.7),
                 1e-12);
   }
+}
+
+// Of any turn that leaves the twist within half a turn of what it was: that of the shafts' frames, with the cosine of half the
+// bend that there was.
+TEST(DiscrepancyError, OfATwistIsTheAngleThatItsShaftsHave) {
+  Draw random(12);
+  for (int i = 0; i < 50; ++i) {
+    const Quaternion frame1 = random.rotation(), bent = exp_rotation(random.vector(0.8)) * frame1;
+    const Quaternion frame2 = exp_rotation(random.uniform(-2.0, 2.0) * (bent * Vector3::UnitX())) * bent;
+    double scale = 0.0;
+    const Discrepancy d = twist_row(frame1, frame2, AxisMode::kLocked, &scale);
+    EXPECT_TRUE(is_valid_mode(d.modes));
+    const double twist = twist_between(frame1, frame2);
+    EXPECT_NEAR((d.axes * Vector3::UnitX()).dot(d.point2 - d.point1), scale * twist, 1e-14);
+    const Twisting as_written = twisting_of(d);
+    EXPECT_NEAR(as_written.angle, twist, 1e-13);
+    EXPECT_LT((as_written.first - frame1 * Vector3::UnitX()).norm(), 1e-14);
+    EXPECT_LT((as_written.second - frame2 * Vector3::UnitX()).norm(), 1e-14);
+    const Pose now1 = random.pose(3.0), now2 = random.pose(3.0);
+    const Quaternion turn1 = exp_rotation(random.vector(0.3)), turn2 = exp_rotation(random.vector(0.3));
+    const Pose then1{now1.position, turn1 * now1.orientation}, then2{now2.position, turn2 * now2.orientation};
+    EXPECT_NEAR(joint_error(d, error_at(d, now1, now2, then1, then2)),
+                scale * std::fabs(twist_between(turn1 * frame1, turn2 * frame2)), 1e-13);
+  }
+}
+
+TEST(DiscrepancyError, OfATwistGoesOnBeyondHalfATurn) {
+  double scale = 0.0;
+  const Discrepancy d = twist_row(Quaternion::Identity(), exp_rotation(Vector3(3.1, 0, 0)), AxisMode::kLocked, &scale);
+  const Pose still, turned{Vector3::Zero(), exp_rotation(Vector3(0.1, 0, 0))};
+  EXPECT_NEAR(error_at(d, still, still, still, turned).x(), 3.2, 1e-14);
+  EXPECT_NEAR(error_at(d, still, still, turned, still).x(), 3.0, 1e-14);
 }
 
 TEST(CarriedPoint, StaysWithItsBody) {

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <vector>
 
+#include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
 
@@ -264,6 +266,29 @@ TEST_P(JointsInMotion, ASocketHoldsItsReachConeAndTwist) {
     EXPECT_LE(widest, 0.5 + 1e-3) << cone;
     EXPECT_LE(run.report().max_joint_error(), 1e-3) << cone;
   }
+}
+
+// A limit that is met far bent, while the bend changes: the angle is held, whatever its row's scale.
+TEST_P(JointsInMotion, ASocketHoldsItsTwistFarBent) {
+  if (!is_end_of_step()) GTEST_SKIP() << "first order";
+  SceneRun run(scene(body("Arm", {0, -1, 0}, "", " AngularVelocity = {3, 5, 2}", {0.1, 0.3, 0.2}),
+                     joint("Spherical", "Socket", "", "Arm",
+                           "BindPoint = {0, 0, 0} Axis = {0, -1, 0} TwistLower = -1 TwistUpper = 1.5"),
+                     1.0 / 100, 3),
+               solver());
+  const Quaternion frame = exp_rotation(Vector3(0, 0, -0.5 * std::numbers::pi));  // its first axis is {0, -1, 0}
+  double largest = -4.0, smallest = 4.0, widest = 0.0;
+  while (!run.is_done()) {
+    run.step();
+    const Quaternion turned = run.body("Arm").pose.orientation * frame;
+    largest = std::max(largest, twist_between(frame, turned));
+    smallest = std::min(smallest, twist_between(frame, turned));
+    widest = std::max(widest, swing_between(frame * Vector3::UnitX(), turned * Vector3::UnitX()).angle);
+  }
+  EXPECT_GT(widest, 0.5);
+  EXPECT_TRUE(largest > 1.5 - 1e-3 || smallest < -1.0 + 1e-3) << largest << " " << smallest;
+  EXPECT_LE(largest, 1.5 + 1e-6);
+  EXPECT_GE(smallest, -1.0 - 1e-6);
 }
 
 TEST_P(JointsInMotion, AHingeStopsAtItsLimit) {

@@ -10,7 +10,7 @@
 // in x, to O(h^2) without drift elsewhere; momentum always. Damping acts in two halves around the step, e^(-c h) in all.
 // Sources: Simo, Wong, Int. J. Numer. Meth. Eng. 31 (1991) 19; Austin, Krishnaprasad, Wang, J. Comput. Phys. 107 (1993).
 // The equations in (v_bar, W) are solved to rounding: by iteration where that contracts, else by Newton's method with
-// the matrix from the forces' Jacobian where it can be had (wrench_jacobian.h), else by differences (six derivatives per
+// the matrix from the wrenches' Jacobian where it can be had (wrench_jacobian.h), else by differences (six derivatives per
 // body of the largest group that feels each other, interaction_groups.h). Stability: none is lost at any h k; but
 // the method does not damp, so what it does not resolve keeps ringing (Rosenbrock damps). Known failure: attitudes of a
 // body that turns by more than a radian a step lag (tan of the half angle); where no solution is found (forces that
@@ -282,7 +282,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     for (std::size_t i = 0; i < jacobian_.size(); ++i) {
       const Member pushed = member_[jacobian_.body(i)], by = member_[jacobian_.by(i)];
       if (pushed.group == 0 || by.group == 0) continue;  // what nothing pushes
-      if (pushed.group != by.group) throw Refusal("the blocks of the forces' Jacobian change within the step");
+      if (pushed.group != by.group) throw Refusal("the blocks of the Jacobian change within the step");
       const Group& group = groups_[pushed.group - 1];
       const Body& body = bodies_[group.body[pushed.place]];
       const Matrix6 force = jacobian_[i] * changes[group.body[by.place]];
