@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/rotation.h"
@@ -9,21 +11,6 @@
 
 namespace gravitas {
 namespace {
-
-// Moves a number of (x, r, v, w) by as much as tells how others change with it, with arms of `length`. Returns that.
-double displace(int number, double length, Pose* pose, Twist* velocity) {
-  constexpr double kBy = 1e-7;
-  const double speed = (number < 9 ? velocity->linear : velocity->angular).norm();
-  double by = kBy;
-  if (number < 3) by *= length + 1e-2 * pose->position.norm();
-  if (number >= 6) by *= std::max(1.0, speed);
-  const Vector3 change = by * Vector3::Unit(number % 3);
-  if (number < 3) pose->position += change;
-  if (number >= 3 && number < 6) *pose = displaced(*pose, Vector3::Zero(), change);
-  if (number >= 6 && number < 9) velocity->linear += change;
-  if (number >= 9) velocity->angular += change;
-  return by;
-}
 
 // What they differ by, over `by`.
 ConstraintDirection slope(const ConstraintDirection& from, const ConstraintDirection& to, double by) {
@@ -35,6 +22,12 @@ Wrench slope(const Wrench& from, const Wrench& to, double by) {
 }
 
 }  // namespace
+
+template <typename Use>
+void ReactionSolver::for_rows_of(const Joint& joint, Use&& use) const {
+  for (std::size_t r = joint.first_row; r < rows_.size() && rows_[r].place < joint.place + 3; ++r)
+    use(r, rows_[r].place - joint.place);
+}
 
 void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& reply) {
   const auto count = static_cast<std::uint32_t>(bodies_.size() - 1);
@@ -56,7 +49,7 @@ void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& re
     part[parts.root(i)].push_back(i);
     if (!joints_of[i].empty()) is_jointed[parts.root(i)] = true;
   }
-  const std::vector<Vector3> torques = accelerate_with_reactions();
+  accelerate_with_reactions();
   has_moved_ = true;  // bodies, from where they were asked
   states_.clear();
   for (const Joint& joint : joints_) states_.push_back(state_of(joint));
@@ -64,7 +57,7 @@ void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& re
   for (std::uint32_t by = 0; by < count; ++by) {
     if (!bodies_[by].is_pushed() || !is_jointed[parts.root(by)]) continue;
     const std::vector<std::uint32_t>& felt = part[parts.root(by)];
-    std::vector<JacobianBlock> blocks = free_blocks(by, torques[by]);
+    std::vector<JacobianBlock> blocks = forced_blocks(by);
     for (int number = 0; number < 12; ++number) {
       differentiate(by, number, joints_of[by], blocks);
       for (const std::uint32_t i : felt) blocks[i].col(number) << pushes_[i].force, pushes_[i].torque;
@@ -82,16 +75,20 @@ void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& re
   for (std::size_t k = 0; k < kBlockNumbers; ++k) reply.reaction_block().push(0.0);
 }
 
-std::vector<Vector3> ReactionSolver::accelerate_with_reactions() {
+void ReactionSolver::accelerate_with_reactions() {
   std::vector<Wrench> held(bodies_.size());
   for (std::size_t i = 0; i < rows_.size(); ++i)
     add_force(rows_[i].direction, multipliers_[i], &held[rows_[i].body1], &held[rows_[i].body2]);
-  std::vector<Vector3> torques;
+  own_.assign(bodies_.size(), JacobianBlock::Zero());
   for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-    torques.push_back(vector_at(request_->wrench(), 2 * i + 1) + sprung_[i].torque + held[i].torque);
-    accelerate(bodies_[i], held[i], &bodies_[i].acceleration);
+    Body& body = bodies_[i];
+    if (!body.is_pushed()) continue;
+    const Vector3 torque = vector_at(request_->wrench(), 2 * i + 1) + sprung_[i].torque + held[i].torque;
+    own_[i] = acceleration_jacobian(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), i),
+                                    vector_at(request_->inverse_inertia(), i), torque);
+    own_[i].rightCols<6>().diagonal().array() -= request_->drag()[i];
+    accelerate(body, held[i], &body.acceleration);
   }
-  return torques;
 }
 
 void ReactionSolver::accelerate(const Body& body, const Wrench& wrench, Twist* acceleration) {
@@ -99,18 +96,14 @@ void ReactionSolver::accelerate(const Body& body, const Wrench& wrench, Twist* a
   acceleration->angular += body.inverse_inertia * wrench.torque;
 }
 
-std::vector<JacobianBlock> ReactionSolver::free_blocks(std::uint32_t by, const Vector3& torque) const {
+std::vector<JacobianBlock> ReactionSolver::forced_blocks(std::uint32_t by) const {
   std::vector<JacobianBlock> blocks(bodies_.size(), JacobianBlock::Zero());
-  const auto moments = [&](std::size_t body) { return vector_at(request_->inverse_inertia(), body); };
-  const Body& own = bodies_[by];
-  blocks[by] = acceleration_jacobian(own.pose.orientation, own.velocity.angular, vector_at(request_->inertia(), by),
-                                     moments(by), torque);
-  blocks[by].rightCols<6>().diagonal().array() -= request_->drag()[by];
   for (std::size_t i = 0; i < request_->block_body().size() / 2; ++i) {
     const std::uint32_t body = request_->block_body()[2 * i];
     if (request_->block_body()[2 * i + 1] != by || !bodies_[body].is_pushed()) continue;
     const Eigen::Map<const JacobianBlock> block(&request_->block()[kBlockNumbers * i]);
-    blocks[body] += accelerated_block(bodies_[body].pose.orientation, bodies_[body].inverse_mass, moments(body), block);
+    blocks[body] += accelerated_block(bodies_[body].pose.orientation, bodies_[body].inverse_mass,
+                                      vector_at(request_->inverse_inertia(), body), block);
   }
   return blocks;
 }
@@ -129,42 +122,105 @@ ReactionSolver::JointState ReactionSolver::state_of(const Joint& joint) {
   return state;
 }
 
-void ReactionSolver::differentiate(std::uint32_t by, int number, const std::vector<std::size_t>& joints,
-                                   const std::vector<JacobianBlock>& blocks) {
-  pushes_.assign(bodies_.size(), {});
-  std::vector<double>& side = side_;
-  side.assign(rows_.size(), 0.0);
-  const Body still = bodies_[by];
-  const double step = displace(number, longest_ > 0.0 ? longest_ : 1.0, &bodies_[by].pose, &bodies_[by].velocity);
+// As agree_with_joints() does: along M^-1 J^T onto what the rows allow.
+void ReactionSolver::agree(double step) {
+  const auto errors_along = [&](Twist Change::*of) {
+    std::vector<double> errors;
+    for (const Row& row : rows_) errors.push_back(row.direction.along(moving_[row.body1].*of, moving_[row.body2].*of));
+    return errors;
+  };
+  const auto take_out = [&](std::vector<double> errors, Twist Change::*of) {
+    const std::vector<Twist> change = taken_out(std::move(errors));
+    for (std::size_t i = 0; i < moving_.size(); ++i) {
+      (moving_[i].*of).linear += change[i].linear;
+      (moving_[i].*of).angular += change[i].angular;
+    }
+  };
+  take_out(errors_along(&Change::way), &Change::way);
+  // directions change on the way, and velocities are to agree with them
+  std::vector<double> errors = errors_along(&Change::rate);
+  const std::vector<Body> still = bodies_;
+  move_along(step, true);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const JointState to = state_of(joints_[j]);
+    for_rows_of(joints_[j], [&](std::size_t r, std::size_t axis) {
+      const ConstraintDirection change = slope(states_[j].rows[axis].direction, to.rows[axis].direction, step);
+      errors[r] += change.along(still[joints_[j].body1].velocity, still[joints_[j].body2].velocity);
+    });
+  }
+  bodies_ = still;
+  take_out(std::move(errors), &Change::rate);
+}
+
+void ReactionSolver::move_along(double step, bool pose_alone) {
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+    const auto& [way, rate] = moving_[i];
+    Body& body = bodies_[i];
+    if (!way.linear.isZero(0.0) || !way.angular.isZero(0.0))
+      body.pose = displaced(body.pose, step * way.linear, step * way.angular);
+    if (pose_alone) continue;
+    body.velocity.linear += step * rate.linear;
+    body.velocity.angular += step * rate.angular;
+  }
+}
+
+void ReactionSolver::add_slopes(double step, const std::vector<std::size_t>& joints, bool of_springs, bool of_rows) {
+  const std::vector<Body> still = bodies_;
+  move_along(step);
   for (const std::size_t j : joints) {
     const Joint& joint = joints_[j];
     const JointState& from = states_[j];
     const JointState to = state_of(joint);
-    const Wrench one = slope(from.one, to.one, step), two = slope(from.two, to.two, step);
-    pushes_[joint.body1].force += one.force, pushes_[joint.body1].torque += one.torque;
-    pushes_[joint.body2].force += two.force, pushes_[joint.body2].torque += two.torque;
-    for (std::size_t r = joint.first_row; r < rows_.size() && rows_[r].place < joint.place + 3; ++r) {
-      const std::size_t axis = rows_[r].place - joint.place;
-      const ConstraintDirection change = slope(from.rows[axis].direction, to.rows[axis].direction, step);
-      side[r] = (to.rows[axis].gamma - from.rows[axis].gamma) / step +
-                change.along(bodies_[joint.body1].acceleration, bodies_[joint.body2].acceleration);
-      add_force(change, multipliers_[r], &pushes_[joint.body1], &pushes_[joint.body2]);
+    Wrench &one = pushes_[joint.body1], &two = pushes_[joint.body2];
+    if (of_springs) {
+      const Wrench change1 = slope(from.one, to.one, step), change2 = slope(from.two, to.two, step);
+      one.force += change1.force, one.torque += change1.torque;
+      two.force += change2.force, two.torque += change2.torque;
     }
+    if (!of_rows) continue;
+    for_rows_of(joint, [&](std::size_t r, std::size_t axis) {
+      const ConstraintDirection change = slope(from.rows[axis].direction, to.rows[axis].direction, step);
+      side_[r] = (to.rows[axis].gamma - from.rows[axis].gamma) / step +
+                 change.along(still[joint.body1].acceleration, still[joint.body2].acceleration);
+      add_force(change, multipliers_[r], &one, &two);
+    });
   }
-  bodies_[by] = still;
-  changes_.assign(bodies_.size(), {});
+  bodies_ = still;
+}
+
+void ReactionSolver::differentiate(std::uint32_t by, int number, const std::vector<std::size_t>& joints,
+                                   const std::vector<JacobianBlock>& forced) {
+  constexpr double kBy = 1e-7;
+  pushes_.assign(bodies_.size(), {}), changes_.assign(bodies_.size(), {}), moving_.assign(bodies_.size(), {});
+  side_.assign(rows_.size(), 0.0);
+  const Body& body = bodies_[by];
+  Twist& moved = number < 6 ? moving_[by].way : moving_[by].rate;
+  (number % 6 < 3 ? moved.linear : moved.angular) = Vector3::Unit(number % 3);
+  double step = kBy;
+  if (number < 3) step *= (longest_ > 0.0 ? longest_ : 1.0) + 1e-2 * body.pose.position.norm();
+  if (number >= 6) step *= std::max(1.0, (number < 9 ? body.velocity.linear : body.velocity.angular).norm());
+  add_slopes(step, joints, true, !agrees_);
+  if (agrees_) {
+    agree(step);
+    std::vector<std::size_t> all(joints_.size());
+    std::iota(all.begin(), all.end(), 0);
+    add_slopes(step, all, false, true);
+  }
   for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
-    changes_[i] = {blocks[i].col(number).head<3>(), blocks[i].col(number).tail<3>()};
+    Eigen::Matrix<double, 12, 1> state;
+    state << moving_[i].way.linear, moving_[i].way.angular, moving_[i].rate.linear, moving_[i].rate.angular;
+    const Eigen::Matrix<double, 6, 1> change = forced[i].col(number) + own_[i] * state;
+    changes_[i] = {change.head<3>(), change.tail<3>()};
     accelerate(bodies_[i], pushes_[i], &changes_[i]);
   }
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     const Row& row = rows_[r];
-    side[r] = -(side[r] + row.direction.along(changes_[row.body1], changes_[row.body2])) / row.scale;
+    side_[r] = -(side_[r] + row.direction.along(changes_[row.body1], changes_[row.body2])) / row.scale;
   }
-  factor_.make_consistent(&side);
-  factor_.solve(&side);
+  factor_.make_consistent(&side_);
+  factor_.solve(&side_);
   for (std::size_t r = 0; r < rows_.size(); ++r)
-    add_force(rows_[r].direction, side[r] / rows_[r].scale, &pushes_[rows_[r].body1], &pushes_[rows_[r].body2]);
+    add_force(rows_[r].direction, side_[r] / rows_[r].scale, &pushes_[rows_[r].body1], &pushes_[rows_[r].body2]);
 }
 
 }  // namespace gravitas

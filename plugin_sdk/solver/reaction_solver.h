@@ -74,6 +74,11 @@ class ReactionSolver {
     Wrench one, two;          // of the springs
   };
 
+  // How a body's state changes with a number.
+  struct Change {
+    Twist way, rate;  // of its pose, of its velocities
+  };
+
   // Share of a diagonal: rows with such a pivot are nearly dependent.
   static constexpr double kNearlyDependent = 0.1;
   // Turns (rad) by which a state is off the joints: that are none, may be rounding, or small enough to go by.
@@ -94,18 +99,23 @@ class ReactionSolver {
   Spring spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
   static void add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two);
 
-  // Adds what the reactions make of the accelerations. Returns the torques of all that acts.
-  std::vector<Vector3> accelerate_with_reactions();
+  // Adds what the reactions make of the accelerations, and finds how those change with each body's own state (own_).
+  void accelerate_with_reactions();
   static void accelerate(const Body& body, const Wrench& wrench, Twist* acceleration);
-
-  // By body: how its acceleration changes with the state of another if reactions stay as they are.
-  std::vector<JacobianBlock> free_blocks(std::uint32_t by, const Vector3& torque) const;
+  // By body: how forces make its acceleration change with the state of another.
+  std::vector<JacobianBlock> forced_blocks(std::uint32_t by) const;
   JointState state_of(const Joint& joint);
 
-  // How reactions (pushes_) change with a number of a body's state: blocks are those of free_blocks().
+  // How reactions (pushes_) change with a number of a body's state.
   void differentiate(std::uint32_t by, int number, const std::vector<std::size_t>& joints,
-                     const std::vector<JacobianBlock>& blocks);
-
+                     const std::vector<JacobianBlock>& forced);
+  // Of joints as bodies move by a step along moving_: what springs push (pushes_), what rows do and ask (side_).
+  void add_slopes(double step, const std::vector<std::size_t>& joints, bool of_springs, bool of_rows);
+  void move_along(double step, bool pose_alone = false);
+  void agree(double step);
+  // Calls use(row, axis).
+  template <typename Use>
+  void for_rows_of(const Joint& joint, Use&& use) const;
   // Rows of all joints with the bodies where they are.
   void make_rows();
   static double target(const Discrepancy& d, int axis);
@@ -160,8 +170,11 @@ class ReactionSolver {
   ProfileLdlt factor_;
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;
-  // of the Jacobian: joints where the bodies are, and by body for one number
+  // of the Jacobian: whether states are made to agree with the joints, and joints where the bodies are; for one number by body
+  bool agrees_ = false;
   std::vector<JointState> states_;
+  std::vector<JacobianBlock> own_;
+  std::vector<Change> moving_;
   std::vector<Wrench> pushes_;
   std::vector<Twist> changes_;
   std::vector<double> side_;

@@ -31,7 +31,7 @@ bool holds_always(const Discrepancy& d, int axis) {
 
 double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   request_ = &request;
-  has_moved_ = false;
+  has_moved_ = agrees_ = false;
   load_bodies();
   load_joints();
   load_springs();
@@ -338,6 +338,7 @@ void ReactionSolver::agree_with_joints() {
     bodies_[i].velocity.linear += change[i].linear;
     bodies_[i].velocity.angular += change[i].angular;
   }
+  agrees_ = true;
   make_rows();
 }
 

@@ -46,8 +46,8 @@ void solve_reactions(const stage::SolverReactionsRequest& request, const stage::
 //   dR = d(J^T) lambda + dS + J^T dlambda,   J M^-1 J^T dlambda = -(dgamma + dJ a + J M^-1 (dF + dS + d(J^T) lambda)),
 //
 // S what springs do and a the accelerations with the reactions: one factorisation, and for each of the twelve numbers of a
-// body the rows of its own joints and one substitution. What is left out: that the nearest state that agrees with the joints
-// differs from the one asked.
+// body the rows of its own joints and one substitution. Where the answer is that of the nearest state that agrees with the
+// joints, states are moved along what these allow.
 void differentiate_reactions(const stage::SolverReactionsRequest& request,
                              const stage::SolverReactionJacobiansReply& reply);
 

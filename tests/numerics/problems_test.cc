@@ -111,6 +111,8 @@ TEST(Problems, FourBarPassesItsSingularities) {
   expect_run(harness::four_bar(20.0), kRk4, 1600, {.error = 1e-3, .joint_error = 1e-12});
   expect_run(harness::four_bar(10.0), kRk4, 6400, {.error = 1e-8, .joint_error = 1e-12});
   expect_run(harness::four_bar(10.0), dormand_prince(1e-8), 50, {.error = 1e-5, .joint_error = 1e-12});
+  expect_run(harness::four_bar(10.0), rosenbrock(1e-3), 400, {.error = 1e-3, .joint_error = 1e-12});
+  expect_run(harness::four_bar(10.0), radau(1e-2), 400, {.error = 1e-4, .joint_error = 1e-12});
   if (harness::runs_long_problems())
     expect_run(harness::four_bar(20.0), kRk4, 25600, {.error = 1e-8, .joint_error = 1e-12});
 }
