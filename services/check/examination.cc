@@ -196,7 +196,7 @@ report::v1::CheckReport Run::report() {
 }  // namespace
 
 Patience patience_of(bool is_quick) {
-  if (is_quick) return {.deadline = 1.0, .cap = 2.0, .start = 2.0};
+  if (is_quick) return {.deadline = 1.0, .cap = 2.0, .start = 5.0};
   return {};
 }
 
