@@ -4,6 +4,13 @@
 
 namespace gravitas {
 
+void move_state(int number, double by, Pose* pose, Twist* twist) {
+  const Vector3 change = by * Vector3::Unit(number % 3);
+  if (number < 3) *pose = displaced(*pose, change, Vector3::Zero());
+  if (number >= 3 && number < 6) *pose = displaced(*pose, Vector3::Zero(), change);
+  if (number >= 6) (number < 9 ? twist->linear : twist->angular) += change;
+}
+
 JacobianBlock acceleration_jacobian(const Quaternion& orientation, const Vector3& angular_velocity,
                                     const Vector3& inertia, const Vector3& inverse_inertia, const Vector3& torque) {
   const Matrix3 moments = world_inertia(orientation, inertia);

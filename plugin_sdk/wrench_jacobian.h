@@ -43,6 +43,9 @@ class WrenchJacobian {
   std::vector<double> numbers_;
 };
 
+// Moves number 0 ... 11 of (dx, r, dv, dw).
+void move_state(int number, double by, Pose* pose, Twist* twist);
+
 // d(linear, angular acceleration)/d(state) of a body under a wrench that stays as it is in world axes: what the moving
 // inertia and the gyroscopic term make,
 //

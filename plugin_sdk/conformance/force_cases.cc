@@ -285,15 +285,6 @@ Eigen::VectorXd wrenches_of(Inquiry* inquiry, const Forces& forces) {
   return sum;
 }
 
-void move(PushedBody* body, int number, double by) {
-  const Vector3 change = by * Vector3::Unit(number % 3);
-  if (number < 6) {
-    body->pose = displaced(body->pose, number < 3 ? change : Vector3::Zero(), number < 3 ? Vector3::Zero() : change);
-  } else {
-    (number < 9 ? body->twist.linear : body->twist.angular) += change;
-  }
-}
-
 void judge_jacobians(Subject& subject) {
   constexpr double kMoved = 1e-5, kTolerance = 1e-4;
   Draw draw(39);
@@ -304,10 +295,10 @@ void judge_jacobians(Subject& subject) {
   for (std::size_t body = 0; body < forces.bodies.size(); ++body) {
     const PushedBody before = forces.bodies[body];
     for (int number = 0; number < 12; ++number) {
-      move(&forces.bodies[body], number, kMoved);
+      move_state(number, kMoved, &forces.bodies[body].pose, &forces.bodies[body].twist);
       const Eigen::VectorXd after = wrenches_of(&inquiry, forces);
       forces.bodies[body] = before;
-      move(&forces.bodies[body], number, -kMoved);
+      move_state(number, -kMoved, &forces.bodies[body].pose, &forces.bodies[body].twist);
       const Eigen::VectorXd slope = (after - wrenches_of(&inquiry, forces)) / (2.0 * kMoved);
       forces.bodies[body] = before;
       const Eigen::Index column = 12 * static_cast<Eigen::Index>(body) + number;

@@ -215,12 +215,10 @@ void judge_twice(Subject& subject) {
 
 // With a number of a body's state changed: its joints' points go with it.
 Mechanism moved(Mechanism made, std::uint32_t body, int number, double by) {
-  const Vector3 change = by * Vector3::Unit(number % 3);
   ConstrainedBody& one = made.world.bodies[body];
-  if (number >= 6) (number < 9 ? one.twist.linear : one.twist.angular) += change;
-  if (number >= 6) return made;
   const Pose before = one.pose;
-  one.pose = displaced(one.pose, number < 3 ? change : Vector3::Zero(), number < 3 ? Vector3::Zero() : change);
+  move_state(number, by, &one.pose, &one.twist);
+  if (number >= 6) return made;
   for (BodyJoint& joint : made.world.joints) {
     Discrepancy& d = joint.discrepancy;
     if (joint.body1 == body) d.point1 = carried(d.point1, before, one.pose);

@@ -122,7 +122,6 @@ ReactionSolver::JointState ReactionSolver::state_of(const Joint& joint) {
   return state;
 }
 
-// As agree_with_joints() does: along M^-1 J^T onto what the rows allow.
 void ReactionSolver::agree(double step) {
   const auto errors_along = [&](Twist Change::*of) {
     std::vector<double> errors;

@@ -112,10 +112,12 @@ class ReactionSolver {
   // Of joints as bodies move by a step along moving_: what springs push (pushes_), what rows do and ask (side_).
   void add_slopes(double step, const std::vector<std::size_t>& joints, bool of_springs, bool of_rows);
   void move_along(double step, bool pose_alone = false);
+  // Leaves of moving_ what the rows allow, along M^-1 J^T, as agree_with_joints() does of states.
   void agree(double step);
   // Calls use(row, axis).
   template <typename Use>
   void for_rows_of(const Joint& joint, Use&& use) const;
+
   // Rows of all joints with the bodies where they are.
   void make_rows();
   static double target(const Discrepancy& d, int axis);
@@ -170,7 +172,7 @@ class ReactionSolver {
   ProfileLdlt factor_;
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;
-  // of the Jacobian: whether states are made to agree with the joints, and joints where the bodies are; for one number by body
+  // of the Jacobian: are states made to agree with the joints? joints where the bodies are; and by body for one number
   bool agrees_ = false;
   std::vector<JointState> states_;
   std::vector<JacobianBlock> own_;

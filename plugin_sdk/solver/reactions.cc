@@ -15,6 +15,7 @@
 #include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
+
 bool holds_always(const Discrepancy& d, int axis) {
   if (d.maximum_force[axis] < kUnlimited) return false;
   switch (axis_mode(d.modes, axis)) {

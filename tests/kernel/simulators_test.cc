@@ -233,16 +233,19 @@ TEST(Simulators, AFallbackMakesTheWholeStep) {
   }
 }
 
-// Answers twice what its plugin does, and knows no Jacobians.
-class Doubling final : public kernel::Carrier {
+// Its first plugin knows no Jacobians, and all answer a multiple of their first column.
+class Plain final : public kernel::Carrier {
  public:
-  explicit Doubling(std::unique_ptr<Carrier> plugins) : plugins_(std::move(plugins)) {}
+  explicit Plain(std::unique_ptr<Carrier> plugins, double factor = 1.0)
+      : plugins_(std::move(plugins)), factor_(factor) {}
   kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives) override {
-    if (call.method == stage::Method::kForceJacobians) return {.status = GRAVITAS_UNKNOWN_METHOD, .text = "no"};
+    const bool is_about_jacobians =
+        call.method == stage::Method::kForceJacobians || call.method == stage::Method::kSolverReactionJacobians;
+    if (is_about_jacobians && call.target == 0) return {.status = GRAVITAS_UNKNOWN_METHOD, .text = "no"};
     const kernel::CallResult result = plugins_->call(call, arena, derivatives);
-    auto* wrench = reinterpret_cast<double*>(arena->data(call.reply[0]));
-    for (std::uint64_t i = 0; i < arena->count(call.reply[0]); ++i) wrench[i] *= 2.0;
+    auto* first = reinterpret_cast<double*>(arena->data(call.reply[0]));
+    for (std::uint64_t i = 0; i < arena->count(call.reply[0]); ++i) first[i] *= factor_;
     return result;
   }
   int process_id() const override { return 0; }
@@ -250,6 +253,7 @@ class Doubling final : public kernel::Carrier {
 
  private:
   std::unique_ptr<Carrier> plugins_;
+  double factor_;
 };
 
 // One of the derivatives of a step is another's first: it makes them all. The other has no Jacobians, which implicit methods
@@ -272,7 +276,7 @@ TEST(Simulators, AForceThatTakesOverMakesTheWholeStep) {
                           auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
                           if (slot.plugins[0].declaration.slot != Slot::kForce) return plugins;
                           if (slot.plugins[0].declaration.name == "Other")
-                            return std::make_unique<Doubling>(std::move(plugins));
+                            return std::make_unique<Plain>(std::move(plugins), 2.0);
                           return std::make_unique<Weary>(std::move(plugins), &calls_left);
                         });
       run(&world);
@@ -286,6 +290,67 @@ TEST(Simulators, AForceThatTakesOverMakesTheWholeStep) {
     EXPECT_GE(calls, 5) << integrator;
     EXPECT_LT(calls, 100) << integrator;
   }
+}
+
+// A solver that takes over knows no Jacobians of reactions: the step is that of one who never did.
+TEST(Simulators, ASolverThatTakesOverMakesTheWholeStep) {
+  for (const char* integrator : {"integrator_rosenbrock", "integrator_radau"}) {
+    WorldBuilder builder = WorldBuilder().steps(1, 0.1);
+    builder.description().simulator = Simulator::kSmooth;
+    builder.plugin(Slot::kIntegrator, plugin_path(integrator), {1e-6});
+    builder.plugin(Slot::kSolver, plugin_path("solver_newton"), {1e-12, 100.0});
+    builder.sphere(0.1, 1.0, Vector3(1, 0, 0), Vector3(0, 3, 0)).force("Drag", "force_drag", {0.1, 0.5});
+    builder.joint("ConstantVelocity", "constraint_constant_velocity", kNone, 0, {0, 0, 0, 1, 0, 0, 1, 0, 0});
+    kernel::PluginChoice other = builder.description().solver.plugins[0];
+    std::erase(other.declaration.capabilities, "reaction_jacobians");
+    other.settings[0] = 1e-11;
+    builder.description().solver.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(other);
+    const auto chain_after = [&](int calls_left) {
+      Environment world(builder.description(),
+                        [&](const kernel::SlotDescription& slot, std::uint32_t threads,
+                            std::stop_token) -> std::unique_ptr<kernel::Carrier> {
+                          auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
+                          if (slot.plugins[0].declaration.slot != Slot::kSolver) return plugins;
+                          if (!has_capability(slot.plugins[0].declaration, "reaction_jacobians"))
+                            return std::make_unique<Plain>(std::move(plugins));
+                          return std::make_unique<Weary>(std::move(plugins), &calls_left);
+                        });
+      run(&world);
+      return world.chain_hash();
+    };
+    const auto quiet = chain_after(10000), other_alone = chain_after(0);
+    EXPECT_NE(other_alone, quiet) << integrator;
+    int calls = 1;
+    for (auto chain = chain_after(calls); calls < 10000 && chain != quiet; chain = chain_after(++calls))
+      EXPECT_EQ(chain, other_alone) << integrator << " after " << calls;
+    EXPECT_GE(calls, 3) << integrator;
+    EXPECT_LT(calls, 10000) << integrator;
+  }
+}
+
+// Whatever it is called: with the blocks of the other forces alone an implicit method would go by half a Jacobian.
+TEST(Simulators, ASwapToAForceWithoutJacobiansIsNoticed) {
+  WorldBuilder builder = WorldBuilder().steps(6, 0.1);
+  builder.plugin(Slot::kIntegrator, plugin_path("integrator_rosenbrock"), {1e-3});
+  builder.sphere(0.1, 1.0, Vector3(1, 0, 0), Vector3(3, 2, 1)).force("Drag", "force_drag", {0.1, 0.5});
+  builder.force("Spring", "force_spring", {50, 1, 0.5, 0, 0, 0, std::nan(""), 0, 0, 0});
+  const auto chain_with = [&](const std::string& name) {
+    Environment world(builder.description(),
+                      [&](const kernel::SlotDescription& slot, std::uint32_t threads,
+                          std::stop_token) -> std::unique_ptr<kernel::Carrier> {
+                        auto plugins = kernel::make_direct_carrier(slot.plugins, threads);
+                        const PluginDeclaration& first = slot.plugins[0].declaration;
+                        if (first.slot != Slot::kForce || has_capability(first, "jacobians")) return plugins;
+                        return std::make_unique<Plain>(std::move(plugins));
+                      });
+    kernel::PluginChoice other = builder.description().force.plugins[0];
+    other.declaration.name = name;
+    std::erase(other.declaration.capabilities, "jacobians");
+    world.order_swap({Slot::kForce, other, std::nullopt, 2});
+    run(&world);
+    return world.chain_hash();
+  };
+  EXPECT_EQ(chain_with(builder.description().force.plugins[0].declaration.name), chain_with("Other"));
 }
 
 // The impulses of the inner steps that listeners hear of are what changes the momentum; their lengths are the step.

@@ -193,13 +193,21 @@ TEST(StiffProblems, ALatticeOfSpringsBecomesTheRigidBox) {
   for (std::size_t i = 1; i < errors.size(); ++i) EXPECT_NEAR(std::log10(errors[i - 1] / errors[i]), 1.0, 0.2) << i;
 }
 
+struct End {
+  std::vector<double> positions;
+  std::uint64_t asked;  // how often for forces
+};
+
+End end_of(const WorldBuilder& builder) {
+  Environment world(builder.description());
+  while (world.step_count() < world.total_steps()) EXPECT_EQ(world.step(), kernel::StepOutcome::kCommitted);
+  const std::span<const double> position = world.state().position;
+  return {{position.begin(), position.end()}, world.stage_time(kernel::Stage::kForce).count()};
+}
+
 // With the springs' Jacobian an implicit method goes the same way and asks for forces ten times less: one Jacobian in place
 // of a derivative for each number of 8 bodies.
 TEST(StiffProblems, AJacobianOfTheForcesSavesDerivatives) {
-  struct End {
-    std::vector<double> positions;
-    std::uint64_t asked;
-  };
   const auto run = [](const char* integrator, const std::vector<double>& settings, bool has_jacobians) {
     WorldBuilder builder;
     builder.steps(6, 1.0 / 60).plugin(Slot::kIntegrator, plugin_path(integrator), settings);
@@ -207,10 +215,7 @@ TEST(StiffProblems, AJacobianOfTheForcesSavesDerivatives) {
     if (!has_jacobians)
       for (kernel::PluginChoice& plugin : builder.description().force.plugins)
         std::erase(plugin.declaration.capabilities, "jacobians");
-    Environment world(builder.description());
-    while (world.step_count() < world.total_steps()) EXPECT_EQ(world.step(), kernel::StepOutcome::kCommitted);
-    const std::span<const double> position = world.state().position;
-    return End{{position.begin(), position.end()}, world.stage_time(kernel::Stage::kForce).count()};
+    return end_of(builder);
   };
   for (const char* integrator : {"integrator_rosenbrock", "integrator_implicit_midpoint"}) {
     const std::vector<double> settings =
@@ -224,10 +229,6 @@ TEST(StiffProblems, AJacobianOfTheForcesSavesDerivatives) {
 
 // With the Jacobian of the reactions, too, where forces act on a mechanism.
 TEST(StiffProblems, AJacobianOfTheReactionsSavesDerivatives) {
-  struct End {
-    std::vector<double> positions;
-    std::uint64_t asked;
-  };
   const auto run = [](const char* integrator, const std::vector<double>& settings, bool has_jacobians) {
     WorldBuilder builder = harness::flyball_governor().world;
     builder.steps(10, 0.01).plugin(Slot::kIntegrator, plugin_path(integrator), settings);
@@ -235,10 +236,7 @@ TEST(StiffProblems, AJacobianOfTheReactionsSavesDerivatives) {
     if (!has_jacobians)
       for (kernel::PluginChoice& plugin : builder.description().solver.plugins)
         std::erase(plugin.declaration.capabilities, "reaction_jacobians");
-    Environment world(builder.description());
-    while (world.step_count() < world.total_steps()) EXPECT_EQ(world.step(), kernel::StepOutcome::kCommitted);
-    const std::span<const double> position = world.state().position;
-    return End{{position.begin(), position.end()}, world.stage_time(kernel::Stage::kForce).count()};
+    return end_of(builder);
   };
   for (const char* integrator : {"integrator_rosenbrock", "integrator_radau"}) {
     const End with = run(integrator, {1e-6}, true), without = run(integrator, {1e-6}, false);

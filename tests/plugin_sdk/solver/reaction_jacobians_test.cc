@@ -40,15 +40,7 @@ struct Mechanism {
     std::vector<Pose> at = poses;
     std::vector<Twist> moving = twists;
     std::vector<Wrench> acting = wrenches;
-    const Vector3 change = amount * Vector3::Unit(number % 3);
-    if (number < 3)
-      at[changed].position += change;
-    else if (number < 6)
-      at[changed] = displaced(at[changed], Vector3::Zero(), change);
-    else if (number < 9)
-      moving[changed].linear += change;
-    else
-      moving[changed].angular += change;
+    move_state(number, amount, &at[changed], &moving[changed]);
     if (changed == by) {
       acting[body].force += amount * slope.col(number).head<3>();
       acting[body].torque += amount * slope.col(number).tail<3>();
