@@ -80,9 +80,9 @@ void Environment::evaluate() {
   data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   follow_motion(data_.derivative_time[0], data_.derivative_position, data_.derivative_orientation,
                 data_.derivative_linear_velocity, data_.derivative_angular_velocity);
+  // the end of a step may be the time of a jump
+  data_.derivative_time[0] = std::clamp(data_.derivative_time[0], asked_from_, asked_until_);
   if (!wrench_is_constant_) {
-    // the end of a step may be the time of a jump
-    data_.derivative_time[0] = std::clamp(data_.derivative_time[0], asked_from_, asked_until_);
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);
     sum_wrenches();

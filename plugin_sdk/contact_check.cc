@@ -14,7 +14,9 @@ namespace {
 // Of the sizes of the shapes, and of the coordinates.
 constexpr double kOfSize = 1e-7, kOfCoordinates = 1e-12;
 // Normals of spheres and half-spaces, rad; faces that lie on each other, rad.
-constexpr double kOfNormal = 1e-6, kFlatContact = 1e-2;
+constexpr double kOfNormal = 1e-6, kFlatContact = 1e-2, kFlatFace = 0.03;
+// Of the sizes: how far apart depths are between which a choice of points may not tell; how much higher flush surfaces are.
+constexpr double kOfChoice = 1e-6, kOfFlush = 2e-6;
 // Share of the overlap that the deepest contact has at least, and of the margin within which one is demanded.
 constexpr double kShareOfDeepest = 0.9;
 constexpr std::size_t kMostCorners = 4;
@@ -240,13 +242,16 @@ class ContactCheck {
     const double least = expected->knows_gap ? slack_ - kShareOfDeepest * request_.margin() : slack_;
     if (!(expected->depth > least)) return true;
     char text[160];
+    const double shallow = std::min(expected->depth, kShareOfDeepest * expected->depth) - slack_ -
+                           kOfChoice * std::max(a.extent(), b.extent());
+    const bool is_too_shallow = expected->knows_depth && deepest_ < shallow;
+    if ((first == end || is_too_shallow) && is_over_seam(pair, a, b)) return true;
     if (first == end) {
       std::snprintf(text, sizeof text, "pair %zu overlaps by %.3g m and has no contact", pair, expected->depth);
       wrong_ = text;
       return false;
     }
-    const double shallow = std::min(expected->depth, kShareOfDeepest * expected->depth) - slack_;
-    if (expected->knows_depth && deepest_ < shallow) {
+    if (is_too_shallow) {
       std::snprintf(text, sizeof text, "pair %zu overlaps by %.3g m, its deepest contact by %.3g", pair,
                     expected->depth, deepest_);
       wrong_ = text;
@@ -257,6 +262,31 @@ class ContactCheck {
     std::snprintf(text, sizeof text, "pair %zu has %zu contacts where %zu corners lie within", pair, end - first,
                   corners);
     wrong_ = text;
+    return false;
+  }
+
+  // One of the two touches a third body, above whose surface there the other does not reach: what slides over bodies that
+  // lie flush need not touch the side of the next.
+  bool is_over_seam(std::size_t pair, const Solid& a, const Solid& b) const {
+    const std::span<const std::uint32_t> bodies = request_.pair();
+    for (std::size_t row = 0; row < answer_.pair.size(); ++row) {
+      const std::size_t touching = answer_.pair[row];
+      if (touching == pair) continue;
+      for (const std::size_t end : {0U, 1U}) {
+        // out of the third body, whose surface is where the contact's is
+        const Vector3 out = (end == 0 ? -1.0 : 1.0) * vector_at(answer_.normal, row);
+        const Vector3 surface = vector_at(answer_.point, row) + 0.5 * answer_.depth[row] * out;
+        for (const std::size_t own : {0U, 1U}) {
+          if (bodies[2 * touching + end] != bodies[2 * pair + own]) continue;
+          const Solid& other = own == 0 ? b : a;
+          const double size = std::max(a.extent(), b.extent());
+          const double tilt = kFlatFace * (surface - other.pose.position).norm();
+          if (other.is_bounded() &&
+              out.dot(other.pose.position - surface) + other.support(out) <= slack_ + kOfFlush * size + tilt)
+            return true;
+        }
+      }
+    }
     return false;
   }
 

@@ -43,9 +43,13 @@ void Slide::add(const Vector3& normal, double friction, const Vector3& start_vel
   used_ -= slip.dot(impulse);
 }
 
-double Slide::end(double length) const {
+bool Slide::has_stuck() const {
   constexpr double kStuck = 1e-9;  // of the speed at the start
-  if (std::fabs(end_) <= kStuck * start_) return length * used_ / start_;
+  return std::fabs(end_) <= kStuck * start_;
+}
+
+double Slide::end(double length) const {
+  if (has_stuck()) return length * used_ / start_;
   return end_ < start_ ? length * start_ / (start_ - end_) : std::numeric_limits<double>::infinity();
 }
 

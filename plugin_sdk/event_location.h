@@ -41,6 +41,8 @@ class Slide {
 
   // Speed of the slide at its start, m/s; 0 without friction.
   double start_speed() const { return weight_ > 0.0 ? start_ / weight_ : 0.0; }
+  // The trial ends with it stuck.
+  bool has_stuck() const;
   // When it comes to its end, s, if friction is the same throughout a trial of `length`: beyond that while the surfaces
   // slide on, before it where they slide back, or where sticking took less than the friction of all that time.
   // Infinite for a slide that does not slow down.

@@ -83,7 +83,8 @@ struct ContactColumns {
 //   no two contacts of a pair are at the same point
 //   a pair whose overlap has a closed form (a sphere or a half-space and anything, two boxes that overlap) has a
 //   contact, the deepest of about that depth, and where a face of
-//   a box lies on a half-space, as many as corners within, up to four
+//   a box lies on a half-space, as many as corners within, up to four; but need have none where one of the two touches a
+//   third body that the other does not stand out of
 std::string check_contacts(const stage::CollisionManifoldsRequest& request, const ContactColumns& answer);
 
 // ---- solver --------------------------------------------------------------------------------------------------------
@@ -95,10 +96,9 @@ struct SolutionColumns {
   std::uint32_t stop_reason = 0;
 };
 
-// With J as in discrepancy.h and contacts pushed at their points:
+// With J as in discrepancy.h and contacts that push each body at its own surface:
 //   momentum   M (v_{n+1} - v*) = sum of J^T lambda, linear and angular, all directions at S*, or all at S* (+) delta
-//              (linear axes turn with body 1). Arms at either, of a contact to its point or the body's own surface: what
-//              that moves of them is allowed for
+//              (linear axes turn with body 1). Arms at either: what that moves of them is allowed for
 //   pose       M delta = sum of J^T mu + theta h J^T lambda of the rows on velocity alone (friction, drives, soft ones),
 //              or of another lambda up to twice that large where the solver says that it stopped before it was done
 //   energy     kinetic energy does not grow where nothing drives: no desired velocity, no compliance, no kinematic body
@@ -115,7 +115,7 @@ class SolutionCheck {
     Vector3 linear = Vector3::Zero(), angular = Vector3::Zero();
     double size = 0.0;        // sum of the linear magnitudes
     double moment = 0.0;      // sum of magnitudes times arms
-    double unreported = 0.0;  // turning that depends on the surface at which a contact pushes
+    double unreported = 0.0;  // turning that depends on the point at which a joint pushes
   };
   struct Pushes {
     Push velocity, pose;

@@ -297,16 +297,40 @@ std::size_t flat_size_of(const Property& declared, std::span<const double> numbe
   return size <= numbers.size() ? size : 0;
 }
 
-std::vector<double> jumps_of(const std::vector<Property>& declared, std::span<const double> numbers) {
-  std::vector<double> jumps;
+namespace {
+
+// Does a table bend at a row, by more than its numbers are written to?
+bool bends_at(std::span<const double> rows, std::size_t columns, std::size_t row) {
+  constexpr double kWritten = 1e-9;
+  const std::size_t count = rows.size() / columns;
+  const auto slope = [&](std::size_t from, std::size_t column) {
+    const double* at = &rows[from * columns];
+    return (at[columns + column] - at[column]) / (at[columns] - at[0]);
+  };
+  for (std::size_t column = 1; column < columns; ++column) {
+    const double before = row > 0 ? slope(row - 1, column) : 0.0, after = row + 1 < count ? slope(row, column) : 0.0;
+    // where a time comes twice, a slope is not finite
+    if (!std::isfinite(before) || !std::isfinite(after)) return true;
+    if (std::fabs(after - before) > kWritten * std::max(std::fabs(before), std::fabs(after))) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<double> bends_of(const std::vector<Property>& declared, std::span<const double> numbers) {
+  std::vector<double> times;
   for (const Property& p : declared) {
     const std::size_t size = flat_size_of(p, numbers);
-    if (p.kind == PropertyKind::kTable && is_over_time(p))
-      for (std::size_t row = 1 + p.columns; row < size; row += p.columns)
-        if (numbers[row] == numbers[row - p.columns]) jumps.push_back(numbers[row]);
+    if (size > 0 && p.kind == PropertyKind::kTable && is_over_time(p)) {
+      const std::span<const double> rows = numbers.subspan(1, size - 1);
+      for (std::size_t row = 0; row * p.columns < rows.size(); ++row)
+        if (const double time = rows[row * p.columns]; bends_at(rows, p.columns, row))
+          if (times.empty() || times.back() != time) times.push_back(time);
+    }
     numbers = numbers.subspan(size);
   }
-  return jumps;
+  return times;
 }
 
 std::string check_flattened(const std::vector<Property>& declared, std::span<const double> numbers) {

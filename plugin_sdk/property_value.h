@@ -79,8 +79,8 @@ bool flatten(const std::vector<Property>& declared, const std::vector<NamedValue
 // How many of the flattened numbers that begin with this property's are its: a table says so itself. 0 if they end before.
 std::size_t flat_size_of(const Property& declared, std::span<const double> numbers);
 
-// Times at which tables over time (Property::table) jump, s, as they come.
-std::vector<double> jumps_of(const std::vector<Property>& declared, std::span<const double> numbers);
+// Times at which tables over time (Property::table) jump or bend, s, as they come; they are constant before and after.
+std::vector<double> bends_of(const std::vector<Property>& declared, std::span<const double> numbers);
 
 // Checks flattened values, which may come from anywhere: their number, and that each is one that its
 // property takes. Empty, or what is wrong; what is allowed.

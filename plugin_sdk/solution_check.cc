@@ -119,20 +119,18 @@ class Balance {
       const Vector3 friction = impulse - along * direction;
       const Vector3 normal = vector_at(request_.contact_normal(), i);
       const Vector3 turning = vector_at(answer_.contact_turning, i);
-      // from the middle to either surface
-      const double to_surface = 0.5 * std::fabs(request_.contact_depth()[i]) * normal.cross(impulse).norm();
+      const Vector3 to_surface = 0.5 * request_.contact_depth()[i] * normal;
       for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i),
-               [&](Pushes& body, const Vector3& arm, double sign) {
+               [&](Pushes& body, const Vector3& to_middle, double sign) {
+                 const Vector3 arm = to_middle - sign * to_surface;
                  push_at(arm, sign * impulse, &body.velocity);
                  push_couple(sign * turning, &body.velocity);
-                 body.velocity.unreported += to_surface;
                  push_at(arm, sign * correction * normal, &body.pose);
                  push_at(arm, sign * share * friction, &body.pose);
                  push_couple(sign * share * turning, &body.pose);
                  // of an impulse that is taken apart, rounding stays
                  body.pose.size += share * impulse.norm();
                  body.pose.moment += share * impulse.norm() * arm.norm();
-                 body.pose.unreported += share * to_surface;
                  loosen(share * friction.norm(), arm, &body);
                  body.loose_moment += share * turning.norm();
                });

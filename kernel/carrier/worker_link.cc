@@ -84,7 +84,7 @@ ListeningCommand start_listening_command(const std::string& command, std::chrono
   if (folder.path().empty()) fail_start("no folder for its socket: " + std::string(std::strerror(errno)));
   const std::string socket = folder.path() + "/worker";
   std::vector<std::string> words = worker_words();
-  words.insert(words.end(), {"--exec", "/bin/sh", "-c", "exec " + command + " --listen unix:" + socket});
+  words.insert(words.end(), {"--exec", "/bin/sh", "-c", "exec env " + command + " --listen unix:" + socket});
   ListeningCommand started{spawn(words, {}, std::move(on_end)), -1};
   const auto until = std::chrono::steady_clock::now() + limit;
   while ((started.descriptor = channel::connect_to("unix:" + socket)) < 0) {

@@ -39,7 +39,7 @@ double Environment::length_to_switch(double begin, double length) {
   asked_from_ = -kInfinity, asked_until_ = kInfinity;
   ends_at_switch_ = false;
   const std::vector<double>& switches = description_.switches;
-  if (switches.empty() || wrench_is_constant_) return length;
+  if (switches.empty() || (wrench_is_constant_ && model_.curves.empty())) return length;
   const double from = time() + begin;
   const double slack = std::max(kSameTime * length_of_step(step_count_ + 1), 4.0 * kEpsilon * from);
   const auto next = std::ranges::upper_bound(switches, from + slack);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/island_solver.h"
 
 namespace gravitas {
@@ -20,15 +21,17 @@ void IslandSolver::solve_pose() {
     BodyMotion next = x0;
     cone_.push(bodies_, &next);
     const double change = largest_change(next, displacement_), size = largest(next);
-    const bool may_chord = solved.iterations > 0 && cone_.holds_all() && turns_little(next);
-    is_last = steps.end_with(change, size, 4.0 * representable()) || joints_.empty() || steps.count() == kPoseSteps;
+    // factors without what the corrections stiffen lead away
+    const bool may_chord = solved.iterations > 0 && cone_.holds_all() && turns_little(next) && has_corrections();
+    const bool has_ended = steps.end_with(change, size, 4.0 * representable()) || joints_.empty();
+    is_last = has_ended || steps.count() == kPoseSteps;
     if (is_last && solved.iterations > 0 && !joints_.empty()) {
       cone_.refine(bodies_, x0, representable(), settings_, &solved);
       next = x0;
       cone_.push(bodies_, &next);
     }
     summary_.iterations += solved.iterations;
-    has_pose_ = solved.has_converged;
+    has_pose_ = solved.has_converged && (has_ended || !is_last);
     move_to_end(std::move(next));
     keep_corrections();
     if (!is_last && may_chord) is_last = follow_chords(change);
@@ -51,10 +54,14 @@ bool IslandSolver::follow_chords(double before) {
     BodyMotion next = x0;
     cone_.push(bodies_, &next);
     const double change = largest_change(next, displacement_), size = largest(next);
+    if (!(change <= before)) return false;
     move_to_end(std::move(next));
     keep_corrections();
     if (!(change <= kRateOfChords * before) || pose_contradiction_ > 0.0) return false;
-    if (are_closed() && change * (change / before) <= std::max(4.0 * representable(), 1e-14 * size)) return true;
+    const double enough = std::max(4.0 * representable(), 1e-14 * size);
+    if (are_closed() && (change == 0.0 || change * (change / before) <= enough)) return true;
+    // what is open still is no chord's to close
+    if (change <= enough) return false;
     before = change;
   }
 }
@@ -62,6 +69,13 @@ bool IslandSolver::follow_chords(double before) {
 bool IslandSolver::turns_little(const BodyMotion& next) const {
   return std::ranges::all_of(
       pushed_, [&](std::uint32_t i) { return (next[i].angular - displacement_[i].angular).norm() <= kTurnOfChords; });
+}
+
+bool IslandSolver::has_corrections() const {
+  return std::ranges::any_of(joints_, [&](const EndJoint& joint) {
+    const double* of = &answer_.joint_correction[3 * joint.row];
+    return of[0] != 0.0 || of[1] != 0.0 || of[2] != 0.0;
+  });
 }
 
 bool IslandSolver::are_closed() const {
@@ -101,7 +115,7 @@ double IslandSolver::sum_of_ways() const {
 void IslandSolver::build_pose() {
   cone_.rows.clear();
   cone_.contacts.clear();
-  for (const EndJoint& joint : joints_) {
+  for (EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k) {
       if (!joint.pose_laws[k].is_active()) continue;
       ConeRow& row = cone_.rows.emplace_back();
@@ -114,6 +128,7 @@ void IslandSolver::build_pose() {
       row.start = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial -
                   row.direction.along(displacement_[joint.body1], displacement_[joint.body2]);
     }
+    build_turns_of_rod(&joint);
   }
   for (const EndContact& contact : contacts_) {
     ConeRow& row = cone_.rows.emplace_back();
@@ -125,12 +140,33 @@ void IslandSolver::build_pose() {
   }
 }
 
+// A rod that pulls with mu resists to being turned: across it, with mu/length. As rows with that compliance, beside the
+// rod's, whose multipliers vanish where the steps end.
+void IslandSolver::build_turns_of_rod(EndJoint* joint) {
+  const bool is_rod = joint->discrepancy.is_radial() && joint->pose_laws[0].is_active() && joint->errors[0] > 0.0;
+  const double pull = -answer_.joint_correction[3 * joint->row];
+  joint->has_turns = is_rod && pull > 0.0;
+  if (!joint->has_turns) return;
+  const Matrix3 &inverse1 = end_[joint->body1].stiffened, &inverse2 = end_[joint->body2].stiffened;
+  const auto [first, second] = orthonormal_basis(joint->directions[0].linear);
+  for (const Vector3& across : {first, second}) {
+    ConeRow& row = cone_.rows.emplace_back();
+    row.body1 = joint->body1, row.body2 = joint->body2;
+    row.direction = with_turns(direction_at(across, joint->own_arm1(), joint->own_arm2()), inverse1, inverse2);
+    row.law.has_lower = row.law.has_upper = true;
+    row.law.gamma = joint->errors[0] / pull;
+    row.start = -row.direction.along(displacement_[joint->body1], displacement_[joint->body2]);
+  }
+}
+
 void IslandSolver::keep_corrections() {
   std::size_t next = 0;
-  for (const EndJoint& joint : joints_)
+  for (const EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k)
       answer_.joint_correction[3 * joint.row + k] =
           joint.pose_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
+    if (joint.has_turns) next += 2;
+  }
   for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = cone_.rows[next++].multiplier;
 }
 

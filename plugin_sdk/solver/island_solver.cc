@@ -64,7 +64,10 @@ void IslandSolver::load() {
     end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
     gyration_.push_back(bodies_[i].gyration());
   }
-  for (const std::uint32_t row : island_.bodies) pushed_.push_back(place_of(row));
+  for (const std::uint32_t row : island_.bodies) {
+    pushed_.push_back(place_of(row));
+    coordinates_ = std::max(coordinates_, bodies_[pushed_.back()].trial.position.cwiseAbs().maxCoeff());
+  }
   const DiscrepancyColumns columns = columns_of(request_);
   joints_.reserve(island_.discrepancies.size());
   contacts_.reserve(island_.contacts.size());
@@ -183,8 +186,9 @@ void IslandSolver::stiffen() {
     Vector3 push = Vector3::Zero();
     for (std::size_t k = 0; k < 3; ++k)
       push += answer_.joint_correction[3 * joint.row + k] * joint.directions[k].linear;
-    stiffness[joint.body1] += geometric_stiffness(joint.arm1, -push);
-    stiffness[joint.body2] += geometric_stiffness(joint.arm2, push);
+    const bool is_rod = joint.discrepancy.is_radial();
+    stiffness[joint.body1] += geometric_stiffness(is_rod ? joint.own_arm1() : joint.arm1, -push);
+    stiffness[joint.body2] += geometric_stiffness(is_rod ? joint.own_arm2() : joint.arm2, push);
   }
   for (const std::uint32_t i : pushed_) {
     EndBody& end = end_[i];

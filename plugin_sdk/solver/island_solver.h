@@ -83,6 +83,9 @@ class IslandSolver {
   // From displacement_, so that its rows are nearly those of `next`.
   bool turns_little(const BodyMotion& next) const;
 
+  // Of joints, as the step began or left them.
+  bool has_corrections() const;
+
   // What joints hold, where displacement_ ends, to rounding.
   bool are_closed() const;
 
@@ -93,6 +96,7 @@ class IslandSolver {
   double sum_of_ways() const;
 
   void build_pose();
+  void build_turns_of_rod(EndJoint* joint);
 
   void keep_corrections();
 

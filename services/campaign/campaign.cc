@@ -164,7 +164,10 @@ class TrialLog {
  public:
   explicit TrialLog(const std::string& folder) {
     if (folder.empty()) return;
-    std::filesystem::create_directories(folder);
+    std::error_code problem;
+    std::filesystem::create_directories(folder, problem);
+    if (problem)
+      throw BadInput("--out '" + folder + "': " + problem.message() + "; allowed: a folder that can be made");
     path_ = folder + "/trials.jsonl";
     file_ = std::fopen(path_.c_str(), "we");
     if (file_ == nullptr) fail("'" + path_ + "'");

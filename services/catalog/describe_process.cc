@@ -164,7 +164,7 @@ bool describe_libraries(const std::string& worker_path, const std::vector<std::s
 
 bool describe_command(const std::string& command, std::chrono::milliseconds timeout, plugin::v1::Catalog* answer,
                       std::string* problem) {
-  return describe(command, {"/bin/sh", "-c", "exec " + command + " --describe"}, 1, timeout, answer, problem);
+  return describe(command, {"/bin/sh", "-c", "exec env " + command + " --describe"}, 1, timeout, answer, problem);
 }
 
 }  // namespace gravitas

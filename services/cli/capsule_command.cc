@@ -62,6 +62,11 @@ int capture(CaptureLine* line) {
   writer->close();
   std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->out, writer->calls(), line->slot,
                            result.report.steps());
+  if (writer->calls() == 0 && tape.first_step > result.report.steps()) {
+    std::cerr << fmt::format("gravitas: --from-step {}: the run ended after step {}\n", tape.first_step,
+                             result.report.steps());
+    return kBadInput;
+  }
   if (writer->calls() == 0) {
     std::cerr << fmt::format(
         "gravitas: slot {} was not asked: `gravitas plan` says why; and hosted direct, a slot is not asked about "

@@ -25,6 +25,8 @@ void request_interrupt(int number) {
 void listen_to_interrupts() {
   std::signal(SIGINT, request_interrupt);
   std::signal(SIGTERM, request_interrupt);
+  // a terminal that is gone; ignored under nohup
+  if (std::signal(SIGHUP, request_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
 bool interrupted() { return interrupt_requested != 0; }

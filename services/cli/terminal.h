@@ -6,7 +6,7 @@
 
 namespace gravitas::cli {
 
-// From now on the first SIGINT or SIGTERM is noted, and the second ends the program.
+// From now on the first SIGINT, SIGTERM or SIGHUP is noted, and the second ends the program.
 void listen_to_interrupts();
 // The first has come.
 bool interrupted();

@@ -137,6 +137,8 @@ void Figures::write(report::v1::Report* report) const {
   write_change(initial.angular, last_.angular, report->mutable_angular_momentum());
   report->set_max_penetration(penetration_);
   report->set_max_joint_error(joint_error_);
+  if (!std::isfinite(initial.energy()) || !std::isfinite(last_.energy()))
+    report->add_warnings("energies are not finite: speeds are so large that their squares overflow");
   if (opening_step_)
     report->add_warnings(fmt::format(
         "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "

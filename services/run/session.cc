@@ -32,6 +32,7 @@
 #include "services/run/file_names.h"
 #include "services/run/interruptible_host.h"
 #include "services/run/kernel_names.h"
+#include "services/run/machine_limits.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
@@ -81,6 +82,7 @@ class Run final : private kernel::CommitListener {
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
+    require_workers(begun);
     environment_ = start(begun, starter(), &scene_);
     if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
     if (options_.listener) begin_listening();
@@ -225,6 +227,13 @@ class Run final : private kernel::CommitListener {
     for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
     note_survey();
     frames_->close();
+  }
+
+  static void require_workers(const kernel::EnvironmentDescription& description) {
+    const bool any = std::ranges::any_of(
+        kSlots, [&](Slot slot) { return description.slot(slot).hosting != kernel::Hosting::kDirect; });
+    const std::string lacking = any ? too_little_for_workers() : "";
+    if (!lacking.empty()) throw std::runtime_error(lacking + "; --hosting direct does without workers");
   }
 
   void begin_listening() {

@@ -48,7 +48,8 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
   const double steps = is_whole ? whole : std::ceil(ratio);
   if (!(steps <= static_cast<double>(std::numeric_limits<std::uint32_t>::max()))) {
     context->diagnostics->error(place_of(properties, SimulatorProperties::kTimeStepFieldNumber),
-                                "Duration/TimeStep is " + number_text(ratio) + "; allowed: up to 4294967295 steps");
+                                "Duration " + number_text(duration) + " s in steps of " + number_text(time_step) +
+                                    " s is " + number_text(ratio) + " steps; allowed: up to 4294967295");
     return;
   }
   context->description.time_step = time_step;

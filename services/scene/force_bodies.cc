@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/property_value.h"
 
 namespace gravitas::scene {
@@ -119,9 +120,13 @@ void complete_forces(BuildContext* context) {
   for (const kernel::BodyDescription& body : context->description.bodies) {
     for (const std::uint32_t row : body.forces) {
       const kernel::ForceDescription& force = context->description.forces[row];
-      const std::vector<double> jumps = jumps_of(type_of(force, *context)->properties, force.parameters);
-      switches.insert(jumps.begin(), jumps.end());
+      const std::vector<double> bends = bends_of(type_of(force, *context)->properties, force.parameters);
+      switches.insert(bends.begin(), bends.end());
     }
+    // accelerations jump at the rows of a motion, and with Smooth those of what is jointed to it
+    if (context->description.simulator == kernel::Simulator::kSmooth)
+      for (std::size_t row = 0; row < body.motion.size(); row += MotionCurve::kColumns)
+        switches.insert(body.motion[row]);
   }
   context->description.switches.assign(switches.begin(), switches.end());
 }

@@ -373,7 +373,9 @@ struct Solution {
     const Vector3 friction = theta * kH * Vector3(impulse[0], 0, impulse[2]);
     const Vector3 joint = vector_at(joint_impulse, 0), held = vector_at(joint_correction, 0);
     const Vector3 couple = vector_at(turning, 0);
-    const Vector3 arm = point - Vector3(0, 0.5, 0), joint_arm = anchor - Vector3(0, 0.5, 0);
+    // to the body's own surface
+    const Vector3 surface = point - 0.5 * request.f64(Request::kContactDepth)[0] * Vector3::UnitY();
+    const Vector3 arm = surface - Vector3(0, 0.5, 0), joint_arm = anchor - Vector3(0, 0.5, 0);
     set(&linear, before.linear + 0.5 * (lambda + joint), 1);
     set(&angular, before.angular + (arm.cross(lambda) + couple + joint_arm.cross(joint)).cwiseQuotient(inertia), 1);
     set(&change, 0.5 * (mu + friction + held), 2);
@@ -496,7 +498,8 @@ TEST(CheckSolution, AllowsWhatSeparatesByRoundingOfTheFastest) {
   s.linear = {0, 0, 0, 0, 0, 0, 10, 0, 0}, s.angular.assign(9, 0.0), s.change.assign(18, 0.0);
   const auto leaves_at = [&](double speed) {
     // the impulse that turns and lifts the corner so that it goes at this speed
-    const Vector3 arm = s.point - Vector3(0, 0.5, 0), n = Vector3::UnitY();
+    const double depth = s.request.f64(Solution::Request::kContactDepth)[0];
+    const Vector3 n = Vector3::UnitY(), arm = s.point - 0.5 * depth * n - Vector3(0, 0.5, 0);
     const double response = 0.5 + n.dot(arm.cross(n).cwiseQuotient(s.inertia).cross(arm));
     s.impulse = {0, (speed + 1e-9) / response, 0};
     s.solve(1.0);
@@ -512,7 +515,10 @@ TEST(CheckSolution, FindsAJointThatIsLeftOpen) {
   for (const double factor : {-1.0, 0.0, 0.5, 2.0, 1000.0}) {
     SCOPED_TRACE(factor);
     Solution s;
-    s.request.f64(Solution::Request::kContactDepth) = {10.0};  // no bound on what the contact corrects
+    // no bound on what the contact corrects, at the same surface
+    s.request.f64(Solution::Request::kContactDepth) = {10.0};
+    s.point.y() += 0.5 * (10.0 - 0.01);
+    for (int k = 0; k < 3; ++k) s.request.f64(Solution::Request::kContactPoint)[static_cast<std::size_t>(k)] = s.point[k];
     for (double& number : s.joint_correction) number *= factor;
     s.solve(1.0);
     EXPECT_THAT(s.check(), HasSubstr("pose_change leaves row 0 of the joints open"));

@@ -124,7 +124,7 @@ TEST(PropertyValue, FlattensTablesWithTheirRowCount) {
   EXPECT_FALSE(take(table, PropertyValue::of(Values{PropertyValue::of("x")})).good);
 }
 
-TEST(PropertyValue, ATableOverTimeJumpsWhereATimeComesTwice) {
+TEST(PropertyValue, ATableOverTimeJumpsWhereATimeComesTwiceAndBendsWhereItsSlopeChanges) {
   const std::vector<Property> declared = {Property::vector("Point", "m", "body"),
                                           Property::table("T", 2, "s,N", "world"),
                                           Property::table("Way", 2, "m,N", "world"), Property::flag("On")};
@@ -132,13 +132,17 @@ TEST(PropertyValue, ATableOverTimeJumpsWhereATimeComesTwice) {
     std::vector<double> numbers = {1, 1, 1, static_cast<double>(table.size() / 2)};
     numbers.insert(numbers.end(), table.begin(), table.end());
     numbers.insert(numbers.end(), {2, 3, 4, 3, 5, 0});  // the other table is not over time
-    return jumps_of(declared, numbers);
+    return bends_of(declared, numbers);
   };
   EXPECT_EQ(jumps({}), std::vector<double>());
   EXPECT_EQ(jumps({0, 1, 1, 1, 1.5, 1}), std::vector<double>());
   EXPECT_EQ(jumps({0, 1, 1, 1, 1, 2, 3, 2, 3, 4}), (std::vector<double>{1, 3}));
+  // before its first row and after its last a table is constant
+  EXPECT_EQ(jumps({0.5, 0, 1, 2, 2, 6, 3, 6}), (std::vector<double>{0.5, 2}));
+  EXPECT_EQ(jumps({0, 0, 0.1, 0.3, 0.2, 0.6}), (std::vector<double>{0, 0.2}));
+  EXPECT_EQ(jumps({2, 5}), std::vector<double>());
   // what is not whole says nothing
-  EXPECT_EQ(jumps_of(declared, std::vector<double>{1, 1, 1, 5, 0}), std::vector<double>());
+  EXPECT_EQ(bends_of(declared, std::vector<double>{1, 1, 1, 5, 0}), std::vector<double>());
 }
 
 TEST(Flatten, FollowsTheOrderOfDeclaration) {

@@ -115,6 +115,46 @@ TEST_P(Accurate, AHangingChainCarriesAnyLoad) {
   }
 }
 
+// Links joined by short rods or ropes, each end to end, off the plumb by a milliradian: what pulls a rod holds it from
+// turning (T h^2/(m l) is 0.3 to 500), and the chain swings as its energy allows.
+TEST_P(Accurate, AChainOfRodsOrRopesStaysClosed) {
+  struct Case {
+    int links;
+    double rod, load, time_step;
+  };
+  for (const char* bound : {"", "MaximumDistance = "}) {
+    for (const Case& c : {Case{2, 0.02, 1, 1.0 / 60}, Case{8, 0.1, 1, 1.0 / 60}, Case{8, 0.1, 5000, 1.0 / 60},
+                          Case{8, 0.1, 5000, 1e-3}}) {
+      for (const double tilt : {0.0, 1e-3}) {
+        const double link = 0.4, pitch = link + c.rod;
+        const Vector3 along(std::sin(tilt), -std::cos(tilt), 0.0);
+        std::string bodies, joints;
+        double falls = 0.0;
+        for (int i = 0; i < c.links; ++i) {
+          const double weight = i + 1 == c.links ? c.load : 1.0, top = c.rod + pitch * i;
+          bodies += "Body { Id = \"L" + std::to_string(i) + "\" Mass = " + literal(weight) +
+                    " PrincipalMoments = " + literal(Vector3(weight * Vector3(0.0136, 0.0005, 0.0136))) +
+                    " KineticProperties { Position = " + literal(Vector3((top + 0.5 * link) * along)) +
+                    " Orientation = " + literal(test::turn_between(-Vector3::UnitY(), along)) +
+                    " } Forces = { \"Down\" } }\n";
+          joints += "Constraint { Type = \"Distance\" Id = \"R" + std::to_string(i) + "\" " +
+                    (i == 0 ? "" : "Body1 = \"L" + std::to_string(i - 1) + "\" ") + "Body2 = \"L" + std::to_string(i) +
+                    "\" CustomProperties { BindPoint1 = " + literal(Vector3((top - c.rod) * along)) +
+                    " BindPoint2 = " + literal(Vector3(top * along)) + (*bound == 0 ? "" : bound + literal(c.rod)) +
+                    " } }\n";
+          falls += weight * kG * (top + 0.5 * link) * (1.0 - std::cos(tilt));
+        }
+        SceneRun run(with_pushes(scene("", bodies, joints, c.time_step, 0.5), ""), solver(GetParam()));
+        run.to_end();
+        const std::string what = std::string(bound) + " " + std::to_string(c.links) + " links under " +
+                                 std::to_string(c.load) + " kg, tilt " + std::to_string(tilt);
+        EXPECT_LE(run.report().max_joint_error(), 1e-11) << what;
+        EXPECT_LE(run.kinetic_energy(), falls + 1e-9) << what;
+      }
+    }
+  }
+}
+
 // ---- stacks
 
 void expect_stands(const std::vector<double>& masses, double duration, const std::vector<std::string>& overrides,

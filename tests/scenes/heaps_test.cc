@@ -93,7 +93,7 @@ TEST(Heaps, OfCubesComeToRest) {
     const Vector3 place = 0.75 * Vector3(i % 4 - 1.5, i / 16 + 1, i / 4 % 4 - 1.5);
     bodies += body(ids.back(), place, draw.rotation(), kPiece);
   }
-  SceneRun run(scene("Type = \"Box\" CustomProperties { HalfExtents = {0.25, 0.25, 0.25} }", 2.5, bodies));
+  SceneRun run(scene("Type = \"Box\" CustomProperties { HalfExtents = {0.25, 0.25, 0.25} }", 4.0, bodies));
   run.to_end();
   double deepest = 0.0, fastest = 0.0;
   for (const std::string& one : ids) {

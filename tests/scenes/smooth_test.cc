@@ -57,6 +57,62 @@ Environment {
   EXPECT_NEAR(run.body("Bob").pose.position.x(), 0.001 + 2.0 * angle, 1e-9);
 }
 
+// At the origin of the world a joint's points have no coordinates to be rounded; steps that closed it no further never ended.
+TEST(Smooth, AHingeAtTheOriginRestsAndSwings) {
+  const auto pendulum = [](const char* motion, double time_step, const char* integrator, const char* solver) {
+    SceneRun run(std::string(R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 0.3 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Bob" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} Forces = { "Down" }
+      KineticProperties { Position = {0, -0.5, 0} )") +
+                     motion + R"( } }
+  } }
+  Constraints { Constraint { Type = "Revolute" Id = "Hinge" Body2 = "Bob" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} } } }
+})",
+                 {set("Integrator", std::string(integrator)), set("Solver", std::string(solver)),
+                  set("Simulator.TimeStep", time_step)});
+    run.to_end();
+    EXPECT_LT(run.report().max_joint_error(), 1e-14);
+    return run.body("Bob").pose.position;
+  };
+  for (const char* solver : {"Newton", "Direct"}) {
+    for (const double time_step : {0.05, 1.0 / 60, 0.01, 0.001})
+      EXPECT_LT((pendulum("", time_step, "RK4", solver) - Vector3(0, -0.5, 0)).norm(), 1e-14) << solver;
+    const char* pushed = "LinearVelocity = {1, 0, 0} AngularVelocity = {0, 0, 2}";
+    const Vector3 fine = pendulum(pushed, 0.0003, "RK4", solver);
+    for (const char* integrator : {"RKMK4", "DormandPrince54", "DormandPrince853", "Radau"})
+      EXPECT_LT((pendulum(pushed, 0.001, integrator, solver) - fine).norm(), 1e-7) << solver << ", " << integrator;
+  }
+}
+
+// A pivot whose Motion has rows off the steps, where its acceleration jumps: the pendulum on it keeps the order of RK4.
+TEST(Smooth, KeepsTheOrderWhereAMotionsRowsLieWithinSteps) {
+  const auto end = [](double time_step) {
+    SceneRun run(R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Cart" Kinematic = true Motion = {{0, {0, 0, 0}, {1, 0, 0, 0}}, {0.0637, {0, 0, 0}, {1, 0, 0, 0}}, {0.237, {0.1, 0, 0}, {1, 0, 0, 0}}, {0.519, {-0.05, 0.1, 0}, {1, 0, 0, 0}}, {0.871, {0.05, 0, 0}, {1, 0, 0, 0}}} }
+    Body { Id = "Bob" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} KineticProperties { Position = {0, -0.5, 0} } Forces = { "Down" } }
+  } }
+  Constraints { Constraint { Type = "Spherical" Id = "Pivot" Body1 = "Cart" Body2 = "Bob" CustomProperties { BindPoint = {0, 0, 0} } } }
+  KineticIntegrator = "RK4"
+  ConstraintSolver = "Direct"
+}
+)",
+                 {set("Simulator.TimeStep", time_step)});
+    run.to_end();
+    return run.body("Bob").pose.position;
+  };
+  const Vector3 exact = end(0.0005);
+  const double coarse = (end(0.02) - exact).norm(), fine = (end(0.01) - exact).norm();
+  EXPECT_LT(fine, 1e-6);
+  EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.6);
+}
+
 // A shaft that hangs from a point, spins and drives a second one by a constant-velocity joint that bends as they fall: RK4
 // keeps its order, and the shafts turn alike to rounding.
 TEST(Smooth, KeepsTheOrderOfConstantVelocityJoints) {

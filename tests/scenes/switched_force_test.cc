@@ -1,4 +1,4 @@
-// Forces that jump at a time, within a step and at its end: what comes before the jump and what comes after do not mix.
+// Forces that jump or bend at a time, within a step and at its end: what comes before the jump and what comes after do not mix.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -66,6 +66,27 @@ TEST(SwitchedForce, IsNotSmearedOverLongSteps) {
     SceneRun run(kScene, {set("Integrator", std::string("Verlet")), set("Simulator.TimeStep", step)});
     run.to_end();
     EXPECT_NEAR(run.body("Ball").pose.position.x(), kWay, 10 * kRounding);  // up to 1500 terms
+  }
+}
+
+// A triangle of 2 N s on 2 kg, however short against the step: 1 m/s from its middle on, with methods that are exact for
+// a force that is linear in time.
+TEST(SwitchedForce, ARampIsNotSteppedOver) {
+  for (const double width : {0.1, 0.01, 0.001}) {
+    const std::string table = "{{0, {0, 0, 0}}, {1.0371, {0, 0, 0}}, {" + harness::literal(1.0371 + width) + ", {" +
+                              harness::literal(2.0 / width) + ", 0, 0}}, {" + harness::literal(1.0371 + 2.0 * width) +
+                              ", {0, 0, 0}}}";
+    for (const std::string integrator :
+         {"RK4", "RKMK4", "DormandPrince54", "DormandPrince853", "Radau", "Rosenbrock"}) {
+      for (const double step : {0.5, 0.02}) {
+        SCOPED_TRACE(integrator + ", width " + std::to_string(width) + ", step " + std::to_string(step));
+        SceneRun run(kWithoutGround, {set("Integrator", integrator), set("Simulator.TimeStep", step),
+                                      set("Simulator.Duration", 2.0), set("Force.Push.Table", table)});
+        run.to_end();
+        EXPECT_NEAR(run.body("Ball").twist.linear.x(), 1.0, 1e-9);
+        EXPECT_NEAR(run.body("Ball").pose.position.x(), 2.0 - 1.0371 - width, 1e-9);
+      }
+    }
   }
 }
 

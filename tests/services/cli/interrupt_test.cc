@@ -3,6 +3,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -62,8 +63,8 @@ Interrupted interrupt(int number) {
 
 class Signal : public ::testing::TestWithParam<int> {};
 
-INSTANTIATE_TEST_SUITE_P(Each, Signal, ::testing::Values(SIGINT, SIGTERM),
-                         [](const auto& which) { return std::string(which.param == SIGINT ? "SIGINT" : "SIGTERM"); });
+INSTANTIATE_TEST_SUITE_P(Each, Signal, ::testing::Values(SIGINT, SIGTERM, SIGHUP),
+                         [](const auto& which) { return "SIG" + std::string(sigabbrev_np(which.param)); });
 
 TEST_P(Signal, EndsTheRunAfterItsStepAndDoesNotReachTheWorkers) {
   const Interrupted seen = interrupt(GetParam());

@@ -69,10 +69,11 @@ TEST(Build, CountsSteps) {
 }
 
 TEST(Build, RefusesTooManySteps) {
-  EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { TimeStep = 1e-9 } }"),
-              ElementsAre("scene:1:59: error: Duration/TimeStep is 1e+10; allowed: up to 4294967295 steps"));
+  EXPECT_THAT(
+      errors_of("Environment { } Simulator { CustomProperties { TimeStep = 1e-9 } }"),
+      ElementsAre("scene:1:59: error: Duration 10 s in steps of 1e-09 s is 1e+10 steps; allowed: up to 4294967295"));
   EXPECT_THAT(errors_of("Environment { } Simulator { CustomProperties { TimeStep = 1e-300 Duration = 1e300 } }"),
-              ElementsAre(HasSubstr("Duration/TimeStep is inf")));
+              ElementsAre(HasSubstr("is inf steps")));
 }
 
 TEST(Build, ChecksWhereAWorkerIs) {

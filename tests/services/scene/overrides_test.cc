@@ -164,7 +164,8 @@ TEST(Overrides, MistakesThatOnlyBuildingFindsNameThemToo) {
               ElementsAre("--set Body.Ball01.GeometryId=Unti: GeometryId names no Geometry: \"Unti\"; did you mean "
                           "\"Unit\"? Allowed: \"Unit\""));
   EXPECT_THAT(override_errors_of("Simulator.TimeStep=1e-300"),
-              ElementsAre(::testing::StartsWith("--set Simulator.TimeStep=1e-300: Duration/TimeStep is 9.99")));
+              ElementsAre(::testing::StartsWith(
+                  "--set Simulator.TimeStep=1e-300: Duration 10 s in steps of 1e-300 s is 9.99")));
 }
 
 }  // namespace

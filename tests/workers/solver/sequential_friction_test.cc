@@ -174,8 +174,7 @@ SolverProblem ball_on_ground(const Vector3& linear, const Vector3& angular, doub
   const double depth = radius - at.y();
   problem.add_contact({.body1 = ground,
                        .body2 = ball,
-                       // the ground's point below the centre, so that the arm is the radius
-                       .point = {at.x(), at.y() - radius, at.z()},
+                       .point = {at.x(), -0.5 * depth, at.z()},
                        .depth = depth,
                        .static_friction = friction,
                        .dynamic_friction = friction,

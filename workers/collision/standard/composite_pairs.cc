@@ -13,9 +13,7 @@
 namespace gravitas::collision {
 namespace {
 
-// Sines of angles within which features lie flat on each other; heights over a plane, of the triangle's edges, that
-// count as none.
-constexpr double kFlat = 0.03;
+// Heights over a plane, of the triangle's edges, that count as none.
 constexpr double kLevel = 1e-7;
 constexpr double kPatchPreference = 0.01;
 
@@ -80,23 +78,6 @@ struct TriangleSide {
   Vector3 normal() const { return R * (side * mesh.normal(triangle)); }
   NormalKind kind(const Vector3& n) const { return classify(mesh, triangle, R.transpose() * n, side); }
 };
-
-double tie_of(const PlacedPair& pair) { return std::max(1e-9 * pair.thinnest(), 1e-13 * pair.reach()); }
-
-// The contacts along n, from a to b; those of the features that touch there in a point only if `least` is given.
-void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out) {
-  const double tie = tie_of(pair);
-  ContactCandidates candidates(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
-  Contour a, b;
-  pair.a.contour(n, kFlat, &a);
-  pair.b.contour(pair.R_AB.transpose() * -n, kFlat, &b);
-  place_contour(pair.R_AB, pair.p_AB, &b);
-  add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
-  if (candidates.count() == 0 && least != nullptr)
-    candidates.add(
-        {0.5 * (least->point_a + least->point_b), n, least->depth, (a.code & 0x7FFFU) << 15 | (b.code & 0x7FFFU)});
-  candidates.reduce_to(out);
-}
 
 // The normal at which a triangle `a` touches the other side of the pair: nothing if it is not for it to say. `other` is
 // the triangle on that side, if it is one.
@@ -313,19 +294,19 @@ double merge_distance(const Shape& a, const Shape& b) {
                          b.type == ShapeType::kHalfspace ? a.size.x() : b.size.x());
 }
 
-void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, std::uint64_t key, double margin,
-                   ContactList* out) {
+void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, std::uint64_t key,
+                   const PairRests& rests, double margin, ContactList* out) {
   const double reach = bounding_radius(a) + bounding_radius(b) + margin;
   if (!((X_WB.position - X_WA.position).squaredNorm() <= reach * reach * (1.0 + 1e-12))) return;
   if (a.compound != nullptr) {
     for (std::size_t i = 0; i < a.compound->children.size(); ++i) {
       const CompoundShape::Child& child = a.compound->children[i];
-      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), margin, out);
+      collide_parts(child.shape, compose(X_WA, child.pose), b, X_WB, key_of_part(key, 2 * i), rests, margin, out);
     }
   } else if (b.compound != nullptr) {
     for (std::size_t i = 0; i < b.compound->children.size(); ++i) {
       const CompoundShape::Child& child = b.compound->children[i];
-      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), margin, out);
+      collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), rests, margin, out);
     }
   } else if (a.mesh != nullptr && b.mesh != nullptr) {
     collide_mesh_mesh(*a.mesh, *b.mesh, relative(X_WA, X_WB), margin,
@@ -344,6 +325,7 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
   } else {
     Manifold manifold;
     collide(a, X_WA, b, X_WB, margin, &manifold);
+    lay_flush(a, X_WA, b, X_WB, rests, margin, &manifold);
     for (int i = 0; i < manifold.count; ++i)
       out->collect(key, manifold.contacts[static_cast<std::size_t>(i)], merge_distance(a, b));
   }
@@ -351,9 +333,9 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
 
 }  // namespace
 
-void collide_composite(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin,
-                       ContactList* out) {
-  collide_parts(a, X_WA, b, X_WB, 0, margin, out);
+void collide_composite(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, const PairRests& rests,
+                       double margin, ContactList* out) {
+  collide_parts(a, X_WA, b, X_WB, 0, rests, margin, out);
 }
 
 }  // namespace gravitas::collision

@@ -18,6 +18,7 @@
 
 #include "plugin_sdk/math/pose.h"
 #include "workers/collision/standard/contact_list.h"
+#include "workers/collision/standard/seams.h"
 #include "workers/collision/standard/shapes.h"
 
 namespace gravitas::collision {
@@ -31,7 +32,7 @@ struct CompoundShape {
 };
 
 // Collects the contacts of a pair of which one at least is composite (ContactList::finish() then answers them).
-void collide_composite(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin,
-                       ContactList* out);
+void collide_composite(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, const PairRests& rests,
+                       double margin, ContactList* out);
 
 }  // namespace gravitas::collision

@@ -1,4 +1,6 @@
 // Any two convex shapes by their support maps, and any against a half-space.
+#include <algorithm>
+
 #include "plugin_sdk/geometry/contour_contacts.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
 #include "workers/collision/standard/pair_functions.h"
@@ -22,6 +24,21 @@ SceneShape::Kind kind_of(ShapeType type) {
 
 const SupportMap& support_map_of(const Shape& shape, SupportMapBuffer* buffer) {
   return shape.map != nullptr ? *shape.map : buffer->emplace(kind_of(shape.type), shape.size);
+}
+
+void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out) {
+  constexpr double kFlat = 0.03;
+  const double tie = std::max(1e-9 * pair.thinnest(), 1e-13 * pair.reach());
+  ContactCandidates candidates(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
+  Contour a, b;
+  pair.a.contour(n, kFlat, &a);
+  pair.b.contour(pair.R_AB.transpose() * -n, kFlat, &b);
+  place_contour(pair.R_AB, pair.p_AB, &b);
+  add_contour_contacts(a, pair.a.rounding(), b, pair.b.rounding(), n, tie, &candidates);
+  if (candidates.count() == 0 && least != nullptr)
+    candidates.add(
+        {0.5 * (least->point_a + least->point_b), n, least->depth, (a.code & 0x7FFFU) << 15 | (b.code & 0x7FFFU)});
+  candidates.reduce_to(out);
 }
 
 void collide_general(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out) {

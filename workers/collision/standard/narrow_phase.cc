@@ -67,9 +67,11 @@ void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB,
   }
 }
 
-void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, ContactList* out) {
+void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, ContactList* out,
+             const PairRests* rests) {
   out->clear();
-  if (!a.is_composite() && !b.is_composite()) {
+  const bool is_composite = a.is_composite() || b.is_composite();
+  if (!is_composite && rests == nullptr) {
     Manifold manifold;
     collide(a, X_WA, b, X_WB, margin, &manifold);
     for (int i = 0; i < manifold.count; ++i) out->add(manifold.contacts[static_cast<std::size_t>(i)]);
@@ -79,9 +81,23 @@ void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB,
   const bool is_swapped = computed_swapped(a, X_WA, b, X_WB);
   const Shape &first = is_swapped ? b : a, &second = is_swapped ? a : b;
   const Pose &X_W1 = is_swapped ? X_WB : X_WA, &X_W2 = is_swapped ? X_WA : X_WB;
-  collide_composite(first, {Vector3::Zero(), X_W1.orientation}, second,
-                    {X_W2.position - X_W1.position, X_W2.orientation}, margin, out);
-  out->finish(X_W1.position, is_swapped);
+  PairRests own;
+  if (rests != nullptr) own = is_swapped ? PairRests{rests->of_b, rests->of_a, {}} : *rests;
+  if (is_composite) {
+    own.origin = X_W1.position;
+    collide_composite(first, {Vector3::Zero(), X_W1.orientation}, second,
+                      {X_W2.position - X_W1.position, X_W2.orientation}, own, margin, out);
+    out->finish(X_W1.position, is_swapped);
+    return;
+  }
+  Manifold manifold;
+  collide_in_order(first, X_W1, second, X_W2, margin, &manifold);
+  lay_flush(first, X_W1, second, X_W2, own, margin, &manifold);
+  for (int i = 0; i < manifold.count; ++i) {
+    ContactPoint& contact = manifold.contacts[static_cast<std::size_t>(i)];
+    if (is_swapped) contact.normal = -contact.normal;
+    out->add(contact);
+  }
 }
 
 bool intersects(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB) {

@@ -26,6 +26,7 @@
 #include "plugin_sdk/geometry/manifold.h"
 #include "plugin_sdk/math/pose.h"
 #include "workers/collision/standard/contact_list.h"
+#include "workers/collision/standard/seams.h"
 #include "workers/collision/standard/shapes.h"
 
 namespace gravitas::collision {
@@ -50,9 +51,10 @@ namespace gravitas::collision {
 // their normal is a fixed direction whichever comes first.)
 void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, Manifold* out);
 
-// The same for all shapes, meshes and compounds too: at most four contacts for each normal. The first form is for pairs
-// of convex shapes and half-spaces.
-void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, ContactList* out);
+// The same for all shapes, meshes and compounds too: at most four contacts for each normal; with what both
+// bodies rest on, flush with it (seams.h). The first form is for pairs of convex shapes and half-spaces.
+void collide(const Shape& a, const Pose& X_WA, const Shape& b, const Pose& X_WB, double margin, ContactList* out,
+             const PairRests* rests = nullptr);
 
 // Whether the solids have a point in common, touching included (within rounding). False for two
 // half-spaces, between which no contact is defined. Same preconditions.

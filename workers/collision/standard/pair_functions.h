@@ -3,6 +3,7 @@
 #pragma once
 
 #include "plugin_sdk/geometry/manifold.h"
+#include "plugin_sdk/geometry/penetration.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
 #include "plugin_sdk/math/types.h"
 #include "workers/collision/standard/shapes.h"
@@ -42,6 +43,10 @@ void collide_convex(const Shape& a, const Shape& b, const Placement& placement, 
 void collide_general(const Shape& a, const Shape& b, const Placement& placement, double margin, Manifold* out);
 void collide_halfspace_general(const Shape& a, const Shape& b, const Placement& placement, double margin,
                                Manifold* out);
+
+// The contacts of two convex shapes along the unit vector n, from a to b, of features that lie within an angle of sine 0.03
+// of its planes; those of features that touch there in a point only if `least` is given. All in a's frame.
+void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out);
 
 // The kind of a primitive that is bounded, and the map of a convex shape: its own, or one made in the buffer.
 SceneShape::Kind kind_of(ShapeType type);

@@ -1,7 +1,7 @@
 // Collision `Standard` (§ 4.3): every shape of the scene language; see narrow_phase.h for the methods.
 //
-// Pairs are independent of each other, so they are computed on the host's threads, each into its
-// own place, and written in order.
+// Pairs are computed on the host's threads, each into its own place, and written in order; in between contacts over seams
+// are mended (seams.h), which is all that a pair knows of others.
 #include "plugin_sdk/plugin.h"
 
 #include <optional>
@@ -10,6 +10,7 @@
 #include "plugin_sdk/collision.h"
 #include "workers/collision/standard/moving_pairs.h"
 #include "workers/collision/standard/narrow_phase.h"
+#include "workers/collision/standard/seams.h"
 #include "workers/collision/standard/shape_store.h"
 
 namespace gravitas::collision {
@@ -44,6 +45,7 @@ class Standard final : public CollisionPlugin {
                 request.margin(), &contacts_[i]);
       }
     });
+    seams_.mend(shapes, bodies, pair, request.margin(), {contacts_.data(), pairs});
     for (std::size_t i = 0; i < pairs; ++i)
       for (std::size_t k = 0; k < contacts_[i].size(); ++k) write_contact(request, reply, i, contacts_[i][k]);
   }
@@ -106,6 +108,7 @@ class Standard final : public CollisionPlugin {
   ShapeStore store_;
   // scratch, filled anew in every call
   std::vector<ContactList> contacts_;
+  Seams seams_;
   std::vector<std::optional<Impact>> impacts_;
   std::vector<std::optional<RayHit>> hits_;
 };

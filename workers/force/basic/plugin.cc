@@ -78,7 +78,7 @@ class BasicForce final : public OwnStateForce {
                   .means("Axes in which Force, Torque and Table are given: the world's or the geometry's."),
               Property::table("Table", 4, "s,N", "world")
                   .means("Rows {t, fx, fy, fz}: the force over time, linear between rows and constant before and after "
-                         "them; two rows of one time are a jump, at which steps end. Replaces Force."),
+                         "them; two rows of one time are a jump. Steps end where it jumps or bends. Replaces Force."),
               Property::flag("Instantaneous")
                   .defaults_to({0})
                   .means("The value is an impulse, applied once at the start (of a Table, its value at time 0).")}}}};

@@ -27,8 +27,9 @@ void ContactImpulses::build(const SolverBodies& bodies, const stage::SolverSolve
     row.body1 = request.contact_body()[2 * i];
     row.body2 = request.contact_body()[2 * i + 1];
     const Vector3 point = vector_at(request.contact_point(), i);
-    row.arm1 = point - bodies[row.body1].trial.position;
-    row.arm2 = point - bodies[row.body2].trial.position;
+    const Vector3 to_surface = (0.5 * request.contact_depth()[i]) * vector_at(request.contact_normal(), i);
+    row.arm1 = point + to_surface - bodies[row.body1].trial.position;
+    row.arm2 = point - to_surface - bodies[row.body2].trial.position;
     const ContactLaw law = contact_law(request, i, bodies[row.body1], bodies[row.body2]);
     row.frame = law.frame;
     row.target = law.target;

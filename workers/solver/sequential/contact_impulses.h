@@ -7,7 +7,8 @@
 //   lambda_N, about n
 //
 // s is the arrival speed (arrival.h), mu_r and mu_sp are lengths (m), n, e s and the coefficients those of contact_law.h.
-// Both bodies are pushed at the contact's own point, so momentum is conserved to rounding.
+// Each body is pushed at its own surface point, where both meet at the end of the step: a ball that sinks in the trial has its
+// whole radius for an arm.
 //
 // A visit to a pair of bodies first tries all their contacts at once, as sticking with n.v = e s
 // (contact_patch.h); that is taken if every impulse lies in its cone, of a flat patch also with its

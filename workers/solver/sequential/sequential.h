@@ -40,8 +40,8 @@
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
 // they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
 //
-// Order: S_{n+1} is of first order in h at joints and contacts (arms at S*), exact for constant
-// loads on resting, sticking and bouncing bodies. Joint error after the step is of second order in
+// Order: S_{n+1} is of first order in h at joints and contacts (axes and normals at S*), exact for constant
+// loads on resting, sticking, rolling and bouncing bodies. Joint error after the step is of second order in
 // the step's turn.
 //
 // A stack, in which every body rests on one other and no joint acts, starts layer by layer from what nothing pushes

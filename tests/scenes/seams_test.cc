@@ -1,0 +1,134 @@
+// What slides over a floor of many bodies feels no seams, and runs against what stands above it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::literal;
+using harness::SceneRun;
+using harness::turned;
+
+std::string geometry(const std::string& id, const std::string& type, const std::string& properties) {
+  return "Geometry { Id = \"" + id + "\" Type = \"" + type + "\" CustomProperties { " + properties + " } }\n";
+}
+
+std::string tile(const std::string& id, const std::string& shape, const Vector3& position,
+                 const Quaternion& orientation = Quaternion::Identity()) {
+  return "Body { Id = \"" + id + "\" Immovable = true GeometryId = \"" + shape + "\" Material = \"Smooth\"" +
+         " KineticProperties { Position = " + literal(position) + " Orientation = " + literal(orientation) + " } }\n";
+}
+
+// The tops at y = 0 but where `first_raised` and those after it are raised.
+std::string strips(int first_raised = 100, double raised = 0.0) {
+  std::string bodies;
+  for (int i = 0; i < 10; ++i)
+    bodies += tile("Strip" + std::to_string(i), "Strip", {1.0 * i, (i < first_raised ? 0.0 : raised) - 0.5, 0.0});
+  return bodies;
+}
+
+// Squares of 1 m, turned by 0.35 rad against the way of what slides.
+std::string squares() {
+  const Quaternion turn = turned(Vector3::UnitY(), 0.35);
+  std::string bodies;
+  for (int i = -3; i < 9; ++i)
+    for (int k = -2; k < 5; ++k)
+      bodies += tile("Square" + std::to_string(i + 3) + "_" + std::to_string(k + 2), "Square",
+                     turn * Vector3(i, 0, k) - 0.5 * Vector3::UnitY(), turn);
+  return bodies;
+}
+
+struct Method {
+  const char* simulator;
+  const char* solver;
+  double time_step;
+};
+
+class Seams : public ::testing::TestWithParam<Method> {
+ protected:
+  static std::string scene(const std::string& floor, const std::string& shape, double speed, double duration,
+                           const Quaternion& attitude = Quaternion::Identity()) {
+    const Method& method = GetParam();
+    std::string strip_children;
+    for (int i = 0; i < 10; ++i)
+      strip_children +=
+          std::string(i == 0 ? "" : ", ") + "{\"Strip\", {" + std::to_string(i) + ", 0, 0}, {1, 0, 0, 0}}";
+    return "Geometries {\n" + geometry("Strip", "Box", "HalfExtents = {0.5, 0.5, 3}") +
+           geometry("Square", "Box", "HalfExtents = {0.5, 0.5, 0.5}") +
+           geometry("Box", "Box", "HalfExtents = {0.1, 0.1, 0.1}") +
+           geometry("Slab", "Box", "HalfExtents = {1.3, 0.1, 0.8}") +
+           geometry("Can", "Cylinder", "Radius = 0.1 Height = 0.2") + geometry("Ball", "Sphere", "Radius = 0.1") +
+           geometry("Feet", "Compound",
+                    "Children = {{\"Box\", {-0.3, 0, 0}, {1, 0, 0, 0}}, {\"Box\", {0.3, 0, 0}, {1, 0, 0, 0}}}") +
+           geometry("Strips", "Compound", "Children = {" + strip_children + "}") +
+           "}\nMaterials { Material { Id = \"Smooth\" StaticFrictionCoefficient = 0 } }\n" +
+           "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n" +
+           "Simulator { Type = \"" + method.simulator +
+           "\" CustomProperties { TimeStep = " + literal(method.time_step) + " Duration = " + literal(duration) +
+           " } }\n" + "Environment { Id = \"Floor\" ConstraintSolver = \"" + method.solver +
+           "\" KineticIntegrator = \"Verlet\"" + " Space { Type = \"Grid\" Bodies {\n" + floor +
+           "Body { Id = \"Slider\" GeometryId = \"" + shape +
+           "\" MassDensity = 1000 Material = \"Smooth\" Forces = { \"Down\" } KineticProperties { Position = {0.03, "
+           "0.1, 0} " +
+           "Orientation = " + literal(attitude) + " LinearVelocity = {" + literal(speed) + ", 0, 0} } }\n} } }\n";
+  }
+  static void expect_passes(const std::string& scene, double way, const std::string& what) {
+    SceneRun run(scene);
+    while (!run.is_done()) {
+      run.step();
+      ASSERT_NEAR(run.body("Slider").pose.position.y(), 0.1, 1e-9) << what << " at " << run.time();
+    }
+    EXPECT_NEAR(run.body("Slider").pose.position.x(), 0.03 + way, 1e-6) << what;
+    EXPECT_NEAR(run.body("Slider").pose.position.z(), 0.0, 1e-9) << what;
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(EachSimulator, Seams,
+                         ::testing::Values(Method{"Basic", "Sequential", 1.0 / 60}, Method{"Basic", "Newton", 1.0 / 60},
+                                           Method{"Substepping", "Newton", 1.0 / 60},
+                                           Method{"Bisection", "Newton", 0.01}, Method{"Continuous", "Newton", 0.01}),
+                         [](const auto& test) { return std::string(test.param.simulator) + test.param.solver; });
+
+// Slower than 2 g h, a body has sunk deeper by the end of the trial than it has come over the next strip.
+TEST_P(Seams, AreNotFelt) {
+  for (const double speed : {0.1, 0.3, 3.0}) {
+    const double duration = speed < 1.0 ? 0.7 / speed : 1.0;
+    for (const char* shape : {"Box", "Can", "Ball", "Feet"})
+      expect_passes(scene(strips(), shape, speed, duration), speed * duration,
+                    std::string(shape) + " at " + std::to_string(speed) + " m/s");
+  }
+}
+
+TEST_P(Seams, AreNotFeltOnTheSlantOrInOneCompound) {
+  for (const double speed : {0.5, 3.0}) {
+    const double duration = speed < 1.0 ? 1.4 : 1.0;
+    for (const char* shape : {"Box", "Slab", "Feet"}) {
+      expect_passes(scene(squares(), shape, speed, duration), speed * duration, std::string(shape) + " over squares");
+      expect_passes(scene(tile("Floor", "Strips", {0, -0.5, 0}), shape, speed, duration), speed * duration,
+                    std::string(shape) + " over a compound");
+    }
+    expect_passes(scene(strips(), "Box", speed, duration, turned(Vector3::UnitY(), 0.3)), speed * duration,
+                  "a box with a corner in front");
+  }
+}
+
+TEST_P(Seams, OfStepsAreFelt) {
+  SceneRun up(scene(strips(1, 0.004), "Box", 0.5, 1.4));
+  up.to_end();
+  EXPECT_LT(up.body("Slider").pose.position.x(), 0.4 + 1e-6) << "a kerb of 4 mm";
+  SceneRun down(scene(strips(1, -0.004), "Box", 0.5, 1.4));
+  down.to_end();
+  // it may gain what it falls, once it is over the edge
+  const double way = down.body("Slider").pose.position.x() - 0.03;
+  EXPECT_GE(way, 0.7 - 1e-3) << "a step down by 4 mm";
+  EXPECT_LE(way, 0.4 + (0.7 - 0.4) * std::sqrt(1.0 + 2.0 * kG * 0.004 / (0.5 * 0.5)));
+  EXPECT_NEAR(down.body("Slider").pose.position.y(), 0.096, 1e-6);
+}
+
+}  // namespace
+}  // namespace gravitas

@@ -1,0 +1,107 @@
+// Contacts over seams, of pairs alone: what a body rests on, and what is flush with that.
+#include "workers/collision/standard/seams.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/workers/collision/standard/shape_fixture.h"
+#include "workers/collision/standard/narrow_phase.h"
+
+namespace gravitas::collision::test {
+namespace {
+
+// A box with its bottom 2 mm below y = 0, its front 0.1 mm over a tile whose side is at x = 0.5, as a trial leaves it.
+class OverASeam : public ::testing::Test {
+ protected:
+  Shapes shapes;
+  const Shape& box = shapes.primitive(SceneShape::Kind::kBox, {0.1, 0.1, 0.1});
+  const Shape& tile = shapes.primitive(SceneShape::Kind::kBox, {0.5, 0.5, 0.5});
+  const Pose where = at(0.4001, 0.098, 0.0);
+  // the floor before the seam
+  const Rest floor{Vector3::UnitY(), Vector3::Zero(), 0.002};
+
+  // With the body first or second, and the normal always away from the tile.
+  ContactList contacts(const Shape& other, const Pose& X_WB, const Rest& rest, bool is_first) {
+    const PairRests rests = is_first ? PairRests{{&rest, 1}, {}} : PairRests{{}, {&rest, 1}};
+    ContactList list;
+    if (is_first)
+      collide(box, where, other, X_WB, 0.001, &list, &rests);
+    else
+      collide(other, X_WB, box, where, 0.001, &list, &rests);
+    return list;
+  }
+};
+
+TEST_F(OverASeam, TheShortestWayOutLeadsSideways) {
+  const ContactList alone = all_contacts(box, where, tile, at(1.0, -0.5, 0.0));
+  ASSERT_GT(alone.size(), 0U);
+  EXPECT_NEAR(alone[0].normal.x(), 1.0, 1e-12);
+  EXPECT_NEAR(alone.deepest(), 1e-4, 1e-12);
+}
+
+TEST_F(OverASeam, OfWhatIsFlushTheFloorsNormalIsTaken) {
+  for (const bool is_first : {true, false}) {
+    const ContactList list = contacts(tile, at(1.0, -0.5, 0.0), floor, is_first);
+    ASSERT_EQ(list.size(), 4U);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      EXPECT_NEAR(list[i].normal.y(), is_first ? -1.0 : 1.0, 1e-12);
+      EXPECT_NEAR(list[i].depth, 0.002, 1e-12);
+      EXPECT_NEAR(list[i].point.y(), -0.001, 1e-12);
+    }
+  }
+}
+
+// Bit for bit, whichever comes first.
+TEST_F(OverASeam, TheMirrorLawHolds) {
+  const ContactList one = contacts(tile, at(1.0, -0.5, 0.0), floor, true);
+  const ContactList two = contacts(tile, at(1.0, -0.5, 0.0), floor, false);
+  ASSERT_EQ(one.size(), two.size());
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(one[i].point, two[i].point);
+    EXPECT_EQ(one[i].depth, two[i].depth);
+    EXPECT_EQ(one[i].feature, two[i].feature);
+    EXPECT_EQ(one[i].normal, Vector3(-two[i].normal));
+  }
+}
+
+TEST_F(OverASeam, WhatHasNotComeOverItMeetsNothing) {
+  EXPECT_EQ(contacts(tile, at(1.0005, -0.5, 0.0), floor, true).size(), 0U);
+}
+
+TEST_F(OverASeam, LowerTilesAreNoObstacle) {
+  const ContactList list = contacts(tile, at(1.0, -0.501, 0.0), floor, true);
+  ASSERT_EQ(list.size(), 4U);
+  EXPECT_NEAR(list[0].depth, 0.001, 1e-12);
+  EXPECT_NEAR(list[0].normal.y(), -1.0, 1e-12);
+}
+
+TEST_F(OverASeam, WhatStandsAboveTheFloorIs) {
+  const ContactList list = contacts(tile, at(1.0, -0.4999, 0.0), floor, true);
+  ASSERT_GT(list.size(), 0U);
+  EXPECT_NEAR(list[0].normal.x(), 1.0, 1e-12);
+}
+
+TEST_F(OverASeam, WhatSankDeeperThanIntoTheFloorIs) {
+  const ContactList list = contacts(tile, at(1.0, -0.5, 0.0), {Vector3::UnitY(), Vector3::Zero(), 0.0005}, true);
+  ASSERT_GT(list.size(), 0U);
+  EXPECT_NEAR(list[0].normal.x(), 1.0, 1e-12);
+}
+
+TEST_F(OverASeam, ChildrenOfACompoundAreLookedAtOneByOne) {
+  const Shape& floor_of_two = shapes.compound({{&tile, at(0.0, 0.0, 0.0)}, {&tile, at(1.0, 0.0, 0.0)}});
+  const ContactList list = contacts(floor_of_two, at(0.0, -0.5, 0.0), floor, true);
+  ASSERT_GT(list.size(), 0U);
+  for (std::size_t i = 0; i < list.size(); ++i) EXPECT_NEAR(list[i].normal.y(), -1.0, 1e-12);
+}
+
+TEST_F(OverASeam, ABallThatHasNotPassedItFeelsTheFloorAlone) {
+  const Shape& ball = shapes.primitive(SceneShape::Kind::kSphere, Vector3::Constant(0.1));
+  const PairRests rests{{&floor, 1}, {}};
+  ContactList list;
+  collide(ball, at(0.49, 0.098, 0.0), tile, at(1.0, -0.5, 0.0), 0.001, &list);
+  EXPECT_EQ(list.size(), 1U);
+  collide(ball, at(0.49, 0.098, 0.0), tile, at(1.0, -0.5, 0.0), 0.001, &list, &rests);
+  EXPECT_EQ(list.size(), 0U);
+}
+
+}  // namespace
+}  // namespace gravitas::collision::test

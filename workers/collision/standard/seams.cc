@@ -1,0 +1,136 @@
+#include "workers/collision/standard/seams.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plugin_sdk/geometry/support_map_buffer.h"
+#include "workers/collision/standard/narrow_phase.h"
+#include "workers/collision/standard/pair_functions.h"
+
+namespace gravitas::collision {
+namespace {
+
+constexpr double kFlat = 0.03;  // sine of the angle within which faces lie on each other
+
+// m; what stands out no farther is flush.
+double flush_length(const Shape& a, const Shape& b) {
+  return 1e-6 * std::min(smallest_half_extent(a), smallest_half_extent(b));
+}
+
+// A convex shape where it lies.
+struct PlacedMap {
+  const SupportMap& map;
+  Matrix3 R;
+  Vector3 p;
+
+  Vector3 farthest(const Vector3& n) const { return p + R * map.support(R.transpose() * n) + map.rounding() * n; }
+};
+
+// Of the faces of `other` that are flush with a rest of `body`, or lower, the normal of the one that leads out the shortest
+// way; zero if there is none.
+Vector3 flush_direction(std::span<const Rest> rests, const PlacedMap& body, const PlacedMap& other,
+                        const Vector3& origin, const Vector3& normal, double flush) {
+  Vector3 best = Vector3::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  gravitas::Contour face;
+  for (const Rest& rest : rests) {
+    if (rest.is_along(normal)) continue;
+    other.map.contour(other.R.transpose() * rest.normal, kFlat, &face);
+    if (!face.is_face()) continue;
+    const Rest level{other.R * face.normal, rest.point, rest.depth};
+    if (level.is_along(normal)) continue;
+    const double top = level.height(origin + other.farthest(level.normal));
+    const double bottom = level.height(origin + body.farthest(-level.normal));
+    if (top > flush || bottom < level.lowest() - flush || !(top - bottom < least)) continue;
+    best = level.normal, least = top - bottom;
+  }
+  return best;
+}
+
+// May lay_flush() find something, by the contacts of the pair alone?
+bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, double side, double flush, double margin) {
+  for (const Rest& rest : rests)
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      const ContactPoint& contact = contacts[k];
+      if (rest.is_along(side * contact.normal)) continue;
+      const double height = rest.height(contact.point);
+      const double slack = flush + margin + kFlat * (contact.point - rest.point).norm();
+      if (height <= slack && height >= rest.lowest() - slack) return true;
+    }
+  return false;
+}
+
+}  // namespace
+
+void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
+               double margin, Manifold* manifold) {
+  if (manifold->count == 0 || a.type == ShapeType::kHalfspace || b.type == ShapeType::kHalfspace) return;
+  SupportMapBuffer buffer_a, buffer_b;
+  const PlacedMap placed_a{support_map_of(a, &buffer_a), X_FA.orientation.toRotationMatrix(), X_FA.position};
+  const PlacedMap placed_b{support_map_of(b, &buffer_b), X_FB.orientation.toRotationMatrix(), X_FB.position};
+  const double flush = flush_length(a, b);
+  const Vector3& n = manifold->contacts[0].normal;
+  Vector3 along = -flush_direction(rests.of_a, placed_a, placed_b, rests.origin, -n, flush);
+  if (along.isZero(0.0)) along = flush_direction(rests.of_b, placed_b, placed_a, rests.origin, n, flush);
+  if (along.isZero(0.0)) return;
+  const Matrix3 R_AF = placed_a.R.transpose();
+  const PlacedPair pair{placed_a.map, placed_b.map, R_AF * placed_b.R, R_AF * (placed_b.p - placed_a.p)};
+  contacts_along(pair, R_AF * along, margin, nullptr, manifold);
+  for (int i = 0; i < manifold->count; ++i) {
+    ContactPoint& contact = manifold->contacts[static_cast<std::size_t>(i)];
+    contact.point = placed_a.p + placed_a.R * contact.point;
+    contact.normal = along;
+  }
+}
+
+void Seams::add_rest(std::uint32_t body, const Rest& rest, double same_height) {
+  std::uint32_t& count = count_[body];
+  Rest* const own = &rests_[begin_[body]];
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (!own[i].is_along(rest.normal) || std::fabs(own[i].height(rest.point)) > same_height) continue;
+    own[i].depth = std::max(own[i].depth, rest.depth);
+    return;
+  }
+  if (count < kMostRests) own[count++] = rest;
+}
+
+void Seams::find_rests(std::span<const std::uint32_t> pair, std::span<const ContactList> contacts, std::size_t bodies,
+                       double margin) {
+  constexpr double kSameHeight = 1e-5;  // of the margin
+  count_.assign(bodies, 0);
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    for (const std::uint32_t body : pair.subspan(2 * i, 2))
+      count_[body] += static_cast<std::uint32_t>(contacts[i].size());
+  begin_.resize(bodies);
+  std::uint32_t end = 0;
+  for (std::size_t i = 0; i < bodies; ++i) begin_[i] = end, end += std::min(std::exchange(count_[i], 0), kMostRests);
+  rests_.resize(end);
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    for (std::size_t k = 0; k < contacts[i].size(); ++k) {
+      const ContactPoint& contact = contacts[i][k];
+      const Vector3 to_surface = 0.5 * contact.depth * contact.normal;
+      add_rest(pair[2 * i], {-contact.normal, contact.point - to_surface, contact.depth}, kSameHeight * margin);
+      add_rest(pair[2 * i + 1], {contact.normal, contact.point + to_surface, contact.depth}, kSameHeight * margin);
+    }
+}
+
+void Seams::mend(std::span<const Shape> shapes, const BodyColumns& bodies, std::span<const std::uint32_t> pair,
+                 double margin, std::span<ContactList> contacts) {
+  find_rests(pair, contacts, bodies.body_shape.size(), margin);
+  mended_.clear();
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    if (contacts[i].size() == 0) continue;
+    const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
+    const Shape &shape_a = shapes[bodies.body_shape[a]], &shape_b = shapes[bodies.body_shape[b]];
+    const PairRests rests{rests_of(a), rests_of(b)};
+    const double flush = flush_length(shape_a, shape_b);
+    if (may_be_flush(rests.of_a, contacts[i], -1.0, flush, margin) ||
+        may_be_flush(rests.of_b, contacts[i], 1.0, flush, margin))
+      collide(shape_a, bodies.placed(a), shape_b, bodies.placed(b), margin,
+              &mended_.emplace_back(i, ContactList()).second, &rests);
+  }
+  for (auto& [i, list] : mended_) contacts[i] = std::move(list);
+}
+
+}  // namespace gravitas::collision

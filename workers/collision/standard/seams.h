@@ -1,0 +1,70 @@
+// Contacts over seams: where bodies lie flush, what slides from one onto the next feels no edge.
+//
+// In a trial a body that slides on a floor dips below it, as only the solver will hold it up. Where it comes over the next
+// tile of the floor, the shortest way out of that may then lead sideways, and the body would run against an edge that lies
+// no higher than what it slides on. One pair cannot know this; so after all pairs have been looked at
+//
+//   a body A touches C: the plane of that contact, with its normal from C to A, through C's surface
+//   A touches B, too, along another normal; B has a flat face with a normal m within 1.7 degrees of the plane's (of faces that
+//   lie on each other either may have given the plane its normal), and it is no higher than C's surface there, to 1e-6 of
+//   the smallest half extent; and A lies in B, along m, no deeper than twice as deep as in C
+//
+// make the contacts of A with B those along m: none where their features do not lie opposite each other there. What stands
+// above the plane is run against as before. Meshes do the same among their own triangles (composite_pairs.h), the
+// children of a compound are looked at one by one.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "plugin_sdk/collision.h"
+#include "workers/collision/standard/contact_list.h"
+#include "workers/collision/standard/shapes.h"
+
+namespace gravitas::collision {
+
+// What a body touches.
+struct Rest {
+  Vector3 normal;  // unit, from the other body to this one
+  Vector3 point;   // of the other's surface
+  double depth;    // m
+
+  double height(const Vector3& x) const { return normal.dot(x - point); }
+  double lowest() const { return depth > 0.0 ? -2.0 * depth : 0.0; }
+  bool is_along(const Vector3& n) const { return normal.dot(n) > 1.0 - 1e-9; }
+};
+
+// Of both bodies of a pair.
+struct PairRests {
+  std::span<const Rest> of_a, of_b;
+  Vector3 origin = Vector3::Zero();  // of the frame that shapes are placed in, world; as are the rests
+};
+
+// Replaces the contacts of two bounded convex shapes, in a frame F with world axes, where the above asks for it.
+void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
+               double margin, Manifold* manifold);
+
+class Seams {
+ public:
+  // Mends the contacts of all pairs (two bodies each), as collide() of narrow_phase.h found them.
+  void mend(std::span<const Shape> shapes, const BodyColumns& bodies, std::span<const std::uint32_t> pair,
+            double margin, std::span<ContactList> contacts);
+
+ private:
+  // A body's are the first so many: a floor under a thousand bodies knows one plane, and what touches more rests on none.
+  static constexpr std::uint32_t kMostRests = 16;
+
+  void find_rests(std::span<const std::uint32_t> pair, std::span<const ContactList> contacts, std::size_t bodies,
+                  double margin);
+  void add_rest(std::uint32_t body, const Rest& rest, double same_height);
+  std::span<const Rest> rests_of(std::uint32_t body) const { return {&rests_[begin_[body]], count_[body]}; }
+
+  // scratch, filled anew in every call
+  std::vector<std::uint32_t> begin_, count_;  // by body, of rests_
+  std::vector<Rest> rests_;
+  std::vector<std::pair<std::size_t, ContactList>> mended_;
+};
+
+}  // namespace gravitas::collision
