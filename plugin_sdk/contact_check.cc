@@ -14,7 +14,7 @@ namespace {
 // Of the sizes of the shapes, and of the coordinates.
 constexpr double kOfSize = 1e-7, kOfCoordinates = 1e-12;
 // Normals of spheres and half-spaces, rad; faces that lie on each other, rad.
-constexpr double kOfNormal = 1e-6, kFlatContact = 1e-2, kFlatFace = 0.03;
+constexpr double kOfNormal = 1e-6, kFlatContact = 1e-2, kFlushFace = 1e-4;
 // Of the sizes: how far apart depths are between which a choice of points may not tell; how much higher flush surfaces are.
 constexpr double kOfChoice = 1e-6, kOfFlush = 2e-6;
 // Share of the overlap that the deepest contact has at least, and of the margin within which one is demanded.
@@ -265,29 +265,37 @@ class ContactCheck {
     return false;
   }
 
-  // One of the two touches a third body, above whose surface there the other does not reach: what slides over bodies that
-  // lie flush need not touch the side of the next.
+  // One of the two touches a third body, and the other has a face along that contact's plane, no higher than it: what slides
+  // over bodies that lie flush need not touch the side of the next.
   bool is_over_seam(std::size_t pair, const Solid& a, const Solid& b) const {
     const std::span<const std::uint32_t> bodies = request_.pair();
+    const double flush = slack_ + kOfFlush * std::max(a.extent(), b.extent());
     for (std::size_t row = 0; row < answer_.pair.size(); ++row) {
       const std::size_t touching = answer_.pair[row];
       if (touching == pair) continue;
       for (const std::size_t end : {0U, 1U}) {
         // out of the third body, whose surface is where the contact's is
+        const double depth = answer_.depth[row];
         const Vector3 out = (end == 0 ? -1.0 : 1.0) * vector_at(answer_.normal, row);
-        const Vector3 surface = vector_at(answer_.point, row) + 0.5 * answer_.depth[row] * out;
+        const Vector3 surface = vector_at(answer_.point, row) + 0.5 * depth * out;
         for (const std::size_t own : {0U, 1U}) {
           if (bodies[2 * touching + end] != bodies[2 * pair + own]) continue;
-          const Solid& other = own == 0 ? b : a;
-          const double size = std::max(a.extent(), b.extent());
-          const double tilt = kFlatFace * (surface - other.pose.position).norm();
-          if (other.is_bounded() &&
-              out.dot(other.pose.position - surface) + other.support(out) <= slack_ + kOfFlush * size + tilt)
+          const Solid &body = own == 0 ? a : b, &other = own == 0 ? b : a;
+          const double tilt = kFlushFace * ((surface - other.pose.position).norm() + other.extent());
+          const double top = out.dot(other.pose.position - surface) + other.support(out);
+          const double bottom = out.dot(body.pose.position - surface) - body.support(-out);
+          if (has_face_along(other, out) && top <= flush + tilt && bottom >= -2.0 * std::max(0.0, depth) - flush - tilt)
             return true;
         }
       }
     }
     return false;
+  }
+
+  static bool has_face_along(const Solid& solid, const Vector3& direction) {
+    const Vector3 d = solid.local(direction).cwiseAbs();
+    if (solid.form == Form::kBox) return d.maxCoeff() >= 1.0 - 0.5 * kFlushFace * kFlushFace;
+    return solid.form == Form::kCylinder && d.y() >= 1.0 - 0.5 * kFlushFace * kFlushFace;
   }
 
   // Corners of a box that lie within a half-space, where a face of it does.

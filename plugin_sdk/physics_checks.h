@@ -84,7 +84,7 @@ struct ContactColumns {
 //   a pair whose overlap has a closed form (a sphere or a half-space and anything, two boxes that overlap) has a
 //   contact, the deepest of about that depth, and where a face of
 //   a box lies on a half-space, as many as corners within, up to four; but need have none where one of the two touches a
-//   third body that the other does not stand out of
+//   third body and the other has a face along that contact's plane, no higher than it
 std::string check_contacts(const stage::CollisionManifoldsRequest& request, const ContactColumns& answer);
 
 // ---- solver --------------------------------------------------------------------------------------------------------

@@ -117,6 +117,24 @@ TEST_P(Seams, AreNotFeltOnTheSlantOrInOneCompound) {
   }
 }
 
+// A ball on the two edges of a gap, however narrow, has nothing else to rest on.
+TEST_P(Seams, WithAGapHoldABall) {
+  for (const double gap : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 3e-3, 2e-2}) {
+    const double place = 0.03 + 0.5 + 0.5 * gap;
+    SceneRun run(
+        scene(tile("Left", "Strip", {0.03 - 0.5 - 0.5 * gap, -0.5, 0}) + tile("Right", "Strip", {place, -0.5, 0}),
+              "Ball", 0.0, 0.5),
+        {"Material.Smooth.StaticFrictionCoefficient=0.5"});
+    // as low as between the edges, as high as on a tile
+    while (!run.is_done()) {
+      run.step();
+      ASSERT_GE(run.body("Slider").pose.position.y(), std::sqrt(0.01 - 0.25 * gap * gap) - 2e-7) << "gap " << gap;
+      ASSERT_LE(run.body("Slider").pose.position.y(), 0.1 + 2e-7) << "gap " << gap;
+    }
+    EXPECT_NEAR(run.body("Slider").pose.position.x(), 0.03, 1e-3) << "gap " << gap;
+  }
+}
+
 TEST_P(Seams, OfStepsAreFelt) {
   SceneRun up(scene(strips(1, 0.004), "Box", 0.5, 1.4));
   up.to_end();

@@ -11,7 +11,7 @@
 namespace gravitas::collision {
 namespace {
 
-constexpr double kFlat = 0.03;  // sine of the angle within which faces lie on each other
+constexpr double kFlat = 1e-4;  // sine of an angle wider than that of Rest::is_along()
 
 // m; what stands out no farther is flush.
 double flush_length(const Shape& a, const Shape& b) {
@@ -39,6 +39,8 @@ Vector3 flush_direction(std::span<const Rest> rests, const PlacedMap& body, cons
     other.map.contour(other.R.transpose() * rest.normal, kFlat, &face);
     if (!face.is_face()) continue;
     const Rest level{other.R * face.normal, rest.point, rest.depth};
+    // what rests on edges, as a ball over a gap does, has nothing else to rest on
+    if (!rest.is_along(level.normal)) continue;
     if (level.is_along(normal)) continue;
     const double top = level.height(origin + other.farthest(level.normal));
     const double bottom = level.height(origin + body.farthest(-level.normal));

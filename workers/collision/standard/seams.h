@@ -4,10 +4,9 @@
 // tile of the floor, the shortest way out of that may then lead sideways, and the body would run against an edge that lies
 // no higher than what it slides on. One pair cannot know this; so after all pairs have been looked at
 //
-//   a body A touches C: the plane of that contact, with its normal from C to A, through C's surface
-//   A touches B, too, along another normal; B has a flat face with a normal m within 1.7 degrees of the plane's (of faces that
-//   lie on each other either may have given the plane its normal), and it is no higher than C's surface there, to 1e-6 of
-//   the smallest half extent; and A lies in B, along m, no deeper than twice as deep as in C
+//   a body A touches C: the plane of that contact, with the normal m from C to A, through C's surface
+//   A touches B, too, along another normal; B has a flat face with the normal m, no higher than the plane, to 1e-6 of the
+//   smallest half extent; and A lies in B, along m, no deeper than twice as deep as in C
 //
 // make the contacts of A with B those along m: none where their features do not lie opposite each other there. What stands
 // above the plane is run against as before. Meshes do the same among their own triangles (composite_pairs.h), the
@@ -33,6 +32,7 @@ struct Rest {
 
   double height(const Vector3& x) const { return normal.dot(x - point); }
   double lowest() const { return depth > 0.0 ? -2.0 * depth : 0.0; }
+  // To 4.5e-5 rad.
   bool is_along(const Vector3& n) const { return normal.dot(n) > 1.0 - 1e-9; }
 };
 
