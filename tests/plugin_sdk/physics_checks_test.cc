@@ -518,7 +518,8 @@ TEST(CheckSolution, FindsAJointThatIsLeftOpen) {
     // no bound on what the contact corrects, at the same surface
     s.request.f64(Solution::Request::kContactDepth) = {10.0};
     s.point.y() += 0.5 * (10.0 - 0.01);
-    for (int k = 0; k < 3; ++k) s.request.f64(Solution::Request::kContactPoint)[static_cast<std::size_t>(k)] = s.point[k];
+    for (int k = 0; k < 3; ++k)
+      s.request.f64(Solution::Request::kContactPoint)[static_cast<std::size_t>(k)] = s.point[k];
     for (double& number : s.joint_correction) number *= factor;
     s.solve(1.0);
     EXPECT_THAT(s.check(), HasSubstr("pose_change leaves row 0 of the joints open"));
