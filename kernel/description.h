@@ -126,7 +126,7 @@ struct EnvironmentDescription {
   std::vector<double> material_pairs = std::vector<double>(6, 0.0);
   std::vector<BodyDescription> bodies;
   std::vector<ForceDescription> forces;
-  // Times at which forces or prescribed motions jump or bend, s, rising: inner steps end there, and ask for forces on their own side.
+  // Times at which forces or motions jump or bend, s, rising: inner steps end there, and ask forces on their own side.
   std::vector<double> switches;
   std::vector<ConstraintDescription> constraints;
 

@@ -40,8 +40,7 @@ Vector3 flush_direction(std::span<const Rest> rests, const PlacedMap& body, cons
     if (!face.is_face()) continue;
     const Rest level{other.R * face.normal, rest.point, rest.depth};
     // what rests on edges, as a ball over a gap does, has nothing else to rest on
-    if (!rest.is_along(level.normal)) continue;
-    if (level.is_along(normal)) continue;
+    if (!rest.is_along(level.normal) || level.is_along(normal)) continue;
     const double top = level.height(origin + other.farthest(level.normal));
     const double bottom = level.height(origin + body.farthest(-level.normal));
     if (top > flush || bottom < level.lowest() - flush || !(top - bottom < least)) continue;
@@ -120,19 +119,23 @@ void Seams::find_rests(std::span<const std::uint32_t> pair, std::span<const Cont
 void Seams::mend(std::span<const Shape> shapes, const BodyColumns& bodies, std::span<const std::uint32_t> pair,
                  double margin, std::span<ContactList> contacts) {
   find_rests(pair, contacts, bodies.body_shape.size(), margin);
-  mended_.clear();
+  // lists keep their room from call to call
+  std::size_t mended = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     if (contacts[i].size() == 0) continue;
     const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];
     const Shape &shape_a = shapes[bodies.body_shape[a]], &shape_b = shapes[bodies.body_shape[b]];
     const PairRests rests{rests_of(a), rests_of(b)};
     const double flush = flush_length(shape_a, shape_b);
-    if (may_be_flush(rests.of_a, contacts[i], -1.0, flush, margin) ||
-        may_be_flush(rests.of_b, contacts[i], 1.0, flush, margin))
-      collide(shape_a, bodies.placed(a), shape_b, bodies.placed(b), margin,
-              &mended_.emplace_back(i, ContactList()).second, &rests);
+    if (!may_be_flush(rests.of_a, contacts[i], -1.0, flush, margin) &&
+        !may_be_flush(rests.of_b, contacts[i], 1.0, flush, margin))
+      continue;
+    if (mended == mended_.size()) mended_.emplace_back();
+    auto& [place, list] = mended_[mended++];
+    place = i;
+    collide(shape_a, bodies.placed(a), shape_b, bodies.placed(b), margin, &list, &rests);
   }
-  for (auto& [i, list] : mended_) contacts[i] = std::move(list);
+  for (std::size_t k = 0; k < mended; ++k) std::swap(contacts[mended_[k].first], mended_[k].second);
 }
 
 }  // namespace gravitas::collision
