@@ -15,8 +15,8 @@ namespace {
 constexpr double kOfSize = 1e-7, kOfCoordinates = 1e-12;
 // Normals of spheres and half-spaces, rad; faces that lie on each other, rad.
 constexpr double kOfNormal = 1e-6, kFlatContact = 1e-2, kFlushFace = 1e-4;
-// Of the sizes: how far apart depths are between which a choice of points may not tell; how much higher flush surfaces are.
-constexpr double kOfChoice = 1e-6, kOfFlush = 2e-6;
+// Of the sizes: by how much flush surfaces may differ.
+constexpr double kOfFlush = 2e-6;
 // Share of the overlap that the deepest contact has at least, and of the margin within which one is demanded.
 constexpr double kShareOfDeepest = 0.9;
 constexpr std::size_t kMostCorners = 4;
@@ -242,8 +242,7 @@ class ContactCheck {
     const double least = expected->knows_gap ? slack_ - kShareOfDeepest * request_.margin() : slack_;
     if (!(expected->depth > least)) return true;
     char text[160];
-    const double shallow = std::min(expected->depth, kShareOfDeepest * expected->depth) - slack_ -
-                           kOfChoice * std::max(a.extent(), b.extent());
+    const double shallow = std::min(expected->depth, kShareOfDeepest * expected->depth) - slack_;
     const bool is_too_shallow = expected->knows_depth && deepest_ < shallow;
     if ((first == end || is_too_shallow) && is_over_seam(pair, a, b)) return true;
     if (first == end) {
@@ -274,19 +273,18 @@ class ContactCheck {
       const std::size_t touching = answer_.pair[row];
       if (touching == pair) continue;
       for (const std::size_t end : {0U, 1U}) {
+        const std::uint32_t shared = bodies[2 * touching + end];
+        if (shared != bodies[2 * pair] && shared != bodies[2 * pair + 1]) continue;
+        const Solid &body = shared == bodies[2 * pair] ? a : b, &other = shared == bodies[2 * pair] ? b : a;
         // out of the third body, whose surface is where the contact's is
         const double depth = answer_.depth[row];
         const Vector3 out = (end == 0 ? -1.0 : 1.0) * vector_at(answer_.normal, row);
         const Vector3 surface = vector_at(answer_.point, row) + 0.5 * depth * out;
-        for (const std::size_t own : {0U, 1U}) {
-          if (bodies[2 * touching + end] != bodies[2 * pair + own]) continue;
-          const Solid &body = own == 0 ? a : b, &other = own == 0 ? b : a;
-          const double tilt = kFlushFace * ((surface - other.pose.position).norm() + other.extent());
-          const double top = out.dot(other.pose.position - surface) + other.support(out);
-          const double bottom = out.dot(body.pose.position - surface) - body.support(-out);
-          if (has_face_along(other, out) && top <= flush + tilt && bottom >= -2.0 * std::max(0.0, depth) - flush - tilt)
-            return true;
-        }
+        const double tilt = kFlushFace * ((surface - other.pose.position).norm() + other.extent());
+        const double top = out.dot(other.pose.position - surface) + other.support(out);
+        const double bottom = out.dot(body.pose.position - surface) - body.support(-out);
+        if (has_face_along(other, out) && top <= flush + tilt && bottom >= -2.0 * std::max(0.0, depth) - flush - tilt)
+          return true;
       }
     }
     return false;

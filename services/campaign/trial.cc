@@ -85,9 +85,9 @@ bool is_finite(const Environment& world) {
          finite(state.angular_velocity);
 }
 
-// Do these differ by what rounding may? Of metres, m/s, rad/s and quaternions of a few ones each: a speed of 1e-17 m/s that has
-// the other sign is above no tolerance.
-bool differs_by_rounding(const kernel::StateView& a, const kernel::StateView& b) {
+// To rounding, of metres, m/s, rad/s and quaternions of a few ones each: a speed of 1e-17 m/s that has the other sign is above
+// no tolerance.
+bool are_alike(const kernel::StateView& a, const kernel::StateView& b) {
   constexpr double kRounding = 1e-13;
   const auto alike = [](std::span<const double> one, std::span<const double> two) {
     return std::ranges::equal(one, two, [](double x, double y) {
@@ -327,7 +327,7 @@ bool Run::is_quiet_to_rounding(std::uint32_t step) const {
   const std::unique_ptr<Environment> quiet = gravitas::start(alone_description());
   while (quiet->step_count() < step && quiet->step() == StepOutcome::kCommitted) {
   }
-  return quiet->step_count() == step && differs_by_rounding(quiet->state(), world_->state());
+  return quiet->step_count() == step && are_alike(quiet->state(), world_->state());
 }
 
 // A pause is right after poison that no fallback takes over; what it leaves must go on as the quiet run does.

@@ -66,7 +66,9 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
 
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
                double margin, Manifold* manifold) {
-  if (manifold->count == 0 || a.type == ShapeType::kHalfspace || b.type == ShapeType::kHalfspace) return;
+  const bool rests_nowhere = rests.of_a.empty() && rests.of_b.empty();
+  if (rests_nowhere || manifold->count == 0 || a.type == ShapeType::kHalfspace || b.type == ShapeType::kHalfspace)
+    return;
   SupportMapBuffer buffer_a, buffer_b;
   const PlacedMap placed_a{support_map_of(a, &buffer_a), X_FA.orientation.toRotationMatrix(), X_FA.position};
   const PlacedMap placed_b{support_map_of(b, &buffer_b), X_FB.orientation.toRotationMatrix(), X_FB.position};
