@@ -124,6 +124,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void inject(FaultInjection fault);
   // See StageSlot::set_rerun_every().
   void set_rerun_every(Slot slot, std::uint32_t steps) { slot_of(slot).set_rerun_every(steps); }
+  std::string why_left_out(Slot slot) const;  // by the plan
   // What is worth a line in the report and no fault: complaints of workers, direct calls beyond their deadline.
   std::vector<std::string> warnings();
   const DurationHistogram& stage_time(Stage stage) const { return profile_[static_cast<std::size_t>(stage)]; }
@@ -266,7 +267,6 @@ class Environment : private DerivativeSource, private SlotObserver {
   // exchange.cc: others in a slot.
   StageSlot& slot_of(Slot slot);
   std::uint32_t place_of(const SwapOrder& order);
-  std::string why_left_out(Slot slot) const;
   void check_fallbacks() const;
   std::string why_unfit(const PluginDeclaration& plugin) const;
   void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) override;

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "plugin_sdk/host/description_message.h"
+#include "plugin_sdk/near_miss.h"
 #include "services/catalog/catalog.h"
 #include "services/cli/commands.h"
 #include "services/recorder/json.h"
@@ -117,8 +118,12 @@ int describe(const std::string& name, bool json) {
     for (const InstalledPlugin& plugin : catalog.plugins())
       if (plugin.declaration.name == name || find_type(plugin.declaration, name) != nullptr) found.push_back(plugin);
     if (found.empty()) {
-      problem = "there is no plugin '" + name + "'; installed:";
-      for (const InstalledPlugin& plugin : catalog.plugins()) problem += " " + plugin.declaration.name;
+      std::vector<std::string> names;
+      for (const InstalledPlugin& plugin : catalog.plugins()) names.push_back(plugin.declaration.name);
+      const std::string nearest = nearest_name(name, names);
+      problem =
+          fmt::format("there is no plugin '{}'{} installed: {}", name,
+                      nearest.empty() ? ";" : fmt::format(": did you mean '{}'?", nearest), fmt::join(names, " "));
     }
   }
   if (found.empty()) throw BadInput(problem);

@@ -102,6 +102,12 @@ RerunSpec parse_rerun(const std::string& text) {
           parse_count("--rerun", text, text.substr(equals + 1), "number of steps")};
 }
 
+void require_rerun(const RerunSpec& spec, const kernel::Environment& environment) {
+  const kernel::Plan plan = environment.plan();
+  if (std::ranges::find(plan.slots, spec.slot, &kernel::PlannedSlot::slot) == plan.slots.end())
+    refuse("--rerun", fmt::format("{}={}", slot_name(spec.slot), spec.every), environment.why_left_out(spec.slot));
+}
+
 kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDescription& scene, Catalog* catalog) {
   std::string problem;
   const bool is_path = spec.plugin.find('/') != std::string::npos || spec.plugin.ends_with(".so");

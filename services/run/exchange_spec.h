@@ -32,6 +32,8 @@ struct RerunSpec {
 };
 // `SLOT=N`.
 RerunSpec parse_rerun(const std::string& text);
+// Throws BadInput if the plan leaves the slot out.
+void require_rerun(const RerunSpec& spec, const kernel::Environment& environment);
 
 // The plugin with the settings that the scene gives it, if it is the scene's own, else with their defaults. Throws
 // BadInput if there is none of that name.

@@ -90,6 +90,7 @@ class Run final : private kernel::CommitListener {
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed);
+    for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
     give_orders();
     warn_of_orders_beyond_the_end();
     if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });

@@ -186,6 +186,8 @@ TEST(Exchange, WhatCannotBeIsRefusedWithWhatIsAllowed) {
   EXPECT_THAT(refusal({"--fault", "solver:kil@step=5"}), HasSubstr("kill"));
   EXPECT_THAT(refusal({"--compare", "solver=Euler"}), HasSubstr("no solver plugin 'Euler' is installed"));
   EXPECT_THAT(refusal({"--rerun", "solver"}), HasSubstr("SLOT=N"));
+  EXPECT_THAT(refusal({"--rerun", "force=10"}),
+              HasSubstr("--rerun force=10: the plan leaves the slot out: all forces"));
   EXPECT_THAT(refusal({"--attach", "solver=10.0.0.1:1"}), HasSubstr("a worker of this machine"));
 }
 

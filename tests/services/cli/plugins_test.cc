@@ -69,6 +69,7 @@ TEST(Describe, WhatIsNotInstalledIsAnErrorThatListsWhatIs) {
   const ProgramResult result = run_program({"describe", "Nope"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("installed: "));
+  EXPECT_THAT(run_program({"describe", "Sequentail"}, folder).err, HasSubstr("did you mean 'Sequential'? installed: "));
   const ProgramResult file = run_program({"describe", "nope.so"}, folder);
   EXPECT_EQ(file.exit_code, 2);
   EXPECT_THAT(file.err, HasSubstr("'nope.so': it cannot be read: No such file or directory; allowed: the path of"));
