@@ -126,6 +126,7 @@ void Environment::finish_step() {
   is_idle_ = inner_ == 0;
   if (!is_idle_) state_hash_ = kernel::state_hash(front());
   inner_ = 0;
+  is_anew_ = false;
   chain_hash_ = gravitas::chain_hash(chain_hash_, state_hash_);
   lap_ns_ = lap_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_between(start, lap_ns_));

@@ -195,6 +195,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
+  void join_start_velocities();
   std::uint64_t most_reaction_blocks() const;
 
   // stages.cc: a stage each.
@@ -313,7 +314,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   Pose pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const;
   bool has_contacts() const { return collision_.is_running(); }
   bool has_reactions() const { return solver_.is_running(); }
-  // Velocities at the start of the step, with instantaneous impulses where there are any.
+  // By instantaneous impulses, or where joints do not allow what the scene or an edit gave bodies.
+  bool may_jump_at_start() const;
+  // Velocities at the start of the step, after that.
   const Column<double>& start_linear_velocity() const;
   const Column<double>& start_angular_velocity() const;
 
@@ -353,6 +356,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Known once the forces have been asked at the start.
   bool wrench_is_constant_ = true;
   bool has_impulses_ = false;
+  bool is_anew_ = true;  // no step yet, or none since an edit
   bool start_wrench_known_ = false;
   bool attempt_counts_ = true;
   std::vector<std::size_t> next_in_group_;  // scratch of merge_discrepancies()

@@ -117,7 +117,7 @@ double Environment::length_of_step(std::uint32_t step) const {
 }
 
 SavedState Environment::saved_state() const {
-  SavedState saved{step_count_, length_of_step(step_count_), state_hash_, chain_hash_, figures_, {}};
+  SavedState saved{step_count_, length_of_step(step_count_), is_anew_, state_hash_, chain_hash_, figures_, {}};
   front().visit_columns([&](const char* name, StateRows, std::uint32_t, const auto& column) {
     saved.columns.push_back({name, std::span(column.data(), column.size())});
   });
@@ -156,6 +156,7 @@ std::string Environment::restore(const SavedState& saved) {
   std::swap(front_, back_);
   wakes_all_ = is_idle_ = false;
   step_count_ = saved.step;
+  is_anew_ = saved.is_anew;
   figures_ = saved.figures;
   state_hash_ = saved.state_hash;
   chain_hash_ = saved.chain_hash;

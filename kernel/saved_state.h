@@ -26,6 +26,7 @@ struct SavedColumn {
 struct SavedState {
   std::uint32_t step = 0;    // number of the state, counted from t = 0
   double step_length = 0.0;  // s, of the step that led to it; 0 for the initial state
+  bool is_anew = false;      // of the scene, or made by an edit: no step
   Hash state_hash, chain_hash;
   CommitFigures figures;
   std::vector<SavedColumn> columns;  // all of State::visit_columns(), in its order

@@ -45,14 +45,6 @@ Pose Environment::pose_of(const Column<double>& position, const Column<double>& 
   return {vector_at(position.span(), body), quaternion_at(orientation.span(), body)};
 }
 
-const Column<double>& Environment::start_linear_velocity() const {
-  return has_impulses_ && data_.time[0] == 0.0 ? data_.start_linear_velocity : front().linear_velocity;
-}
-
-const Column<double>& Environment::start_angular_velocity() const {
-  return has_impulses_ && data_.time[0] == 0.0 ? data_.start_angular_velocity : front().angular_velocity;
-}
-
 Trusted<TrialState> Environment::integrate() {
   const auto request = ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, data_.inverse_mass,
                            model_.inertia, data_.inverse_inertia, model_.damping, data_.wrench, front().position,
@@ -189,11 +181,6 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
                known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());
   }
   if (arbiter_ != nullptr) arbiter_->mix_materials(data_.contact_body.span(), data_.contact_material.span());
-}
-
-void Environment::constrain(const Trusted<TrialState>&) {
-  ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
-                    data_.trial_angular_velocity);
 }
 
 void Environment::ask_discrepancies(const Column<double>& time, const Column<double>& position,

@@ -77,7 +77,7 @@ void Environment::begin_inner_step(double begin, double length) {
     std::ranges::fill(data_.wrench.span(), 0.0);
     std::ranges::fill(data_.start_wrench.span(), 0.0);
   }
-  if (!has_impulses_ || data_.time[0] > 0.0) return;
+  if (!may_jump_at_start()) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* impulse = &data_.impulse[6 * i];
     const Twist twist =
@@ -88,15 +88,33 @@ void Environment::begin_inner_step(double begin, double length) {
     set_vector(data_.start_linear_velocity.span(), i, twist.linear);
     set_vector(data_.start_angular_velocity.span(), i, twist.angular);
   }
+  if (knows_reactions()) join_start_velocities();
+}
+
+bool Environment::may_jump_at_start() const {
+  return (has_impulses_ && data_.time[0] == 0.0) || (knows_reactions() && is_anew_ && inner_ == 0);
+}
+
+const Column<double>& Environment::start_linear_velocity() const {
+  return may_jump_at_start() ? data_.start_linear_velocity : front().linear_velocity;
+}
+
+const Column<double>& Environment::start_angular_velocity() const {
+  return may_jump_at_start() ? data_.start_angular_velocity : front().angular_velocity;
+}
+
+void Environment::constrain(const Trusted<TrialState>&) {
+  ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+                    data_.trial_angular_velocity);
+  // what springs of joints do came with the derivatives
+  if (knows_reactions())
+    for (std::uint32_t& mode : data_.discrepancies.mode.span()) mode |= kForcesApplied;
 }
 
 std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& trial, bool has_found_contacts) {
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (sleepers_ > 0 && wakes_sleepers()) return std::nullopt;
   if (constraint_.is_running()) constrain(trial);
-  // what springs of joints do came with the derivatives
-  if (knows_reactions())
-    for (std::uint32_t& mode : data_.discrepancies.mode.span()) mode |= kForcesApplied;
   return solve();
 }
 

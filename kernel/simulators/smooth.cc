@@ -3,6 +3,8 @@
 //   S_n -> integrate: S*, asking for wrenches: forces -> discrepancies of the trial state -> reactions (solver)
 //       -> constrain -> solve -> commit S_{n+1}
 //
+// and before the first step constrain -> solve, for velocities that joints do not allow.
+//
 // The integrator gets the reactions among the wrenches and need not know of joints: it integrates the index-1 form of
 // the equations and keeps its order. What that leaves of joint errors, in position and velocity, is of the size of the
 // method's own error; the solve at the end projects it away along M^-1 J^T. Springs of joints are among the reactions, so
@@ -42,6 +44,25 @@ void Environment::ask_reactions() {
   ask_jacobians(Stage::kSolve, &solver_, {stage::Method::kSolverReactionJacobians, 0, with_forces, {}},
                 most_reaction_blocks());
   if (data_.block_body.size() == 0) data_.jacobian_blocks[0] = 0;
+}
+
+// What bodies do at the start, or an impulse gives them, joints may not allow: it jumps there and then, as by a solve at the
+// end of a step without length. Left to the end of the first step it would cost the method its order.
+void Environment::join_start_velocities() {
+  constexpr double kNoLength = 1e-12;  // of the step
+  const double length = data_.time_step[0];
+  data_.time_step[0] = kNoLength * length;
+  data_.trial_position.assign(front().position);
+  data_.trial_orientation.assign(front().orientation);
+  data_.trial_linear_velocity.assign(data_.start_linear_velocity);
+  data_.trial_angular_velocity.assign(data_.start_angular_velocity);
+  follow_motion(data_.time[0], data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+                data_.trial_angular_velocity);
+  constrain(Validator::unchecked<Trusted<TrialState>>());
+  solve();
+  data_.start_linear_velocity.assign(data_.solved_linear_velocity);
+  data_.start_angular_velocity.assign(data_.solved_angular_velocity);
+  data_.time_step[0] = length;
 }
 
 // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.

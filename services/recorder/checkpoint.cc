@@ -174,8 +174,12 @@ std::string find_obstacle(const Checkpoint& checkpoint, const recorder::v1::Iden
 }
 
 kernel::SavedState saved_state_of(Checkpoint* checkpoint) {
-  kernel::SavedState saved{checkpoint->step(),
+  const std::uint32_t step = checkpoint->step();
+  const bool was_edited =
+      std::ranges::any_of(checkpoint->edits(), [&](const edit::v1::Edit& edit) { return edit.step() == step + 1; });
+  kernel::SavedState saved{step,
                            checkpoint->step_length(),
+                           step == 0 || was_edited,
                            hash_of(checkpoint->state_hash()),
                            hash_of(checkpoint->chain_hash()),
                            {checkpoint->penetration(), checkpoint->joint_error()},

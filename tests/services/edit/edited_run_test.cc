@@ -173,6 +173,34 @@ TEST(EditedRun, AJointIsBoundWhereTheBodiesAre) {
   EXPECT_NEAR((end.position - then.position - t * then.velocity - 0.5 * t * t * Vector3(0, -10, 0)).norm(), 0.0, 1e-12);
 }
 
+// What the joint does not allow is gone where the ball is caught, not at the end of the step: the rest is a steady turn. A
+// run that stopped right there ends alike.
+TEST(EditedRun, WithSmoothAJointCatchesAtOnce) {
+  EditedRun run(scene(ball("A", "Position = {1, 0, 0} LinearVelocity = {3, 2, 0}")), {},
+                {"Simulator=Smooth", "Solver=Direct", "Integrator=RK4"});
+  const std::string hold = run.folder.write(
+      "hold.gravitas",
+      "Constraints { Constraint { Type = \"Spherical\" Id = \"Hold\" Body2 = \"A\" CustomProperties { BindPoint = "
+      "{1.2, 0.8, 0} } } }");
+  run.options.edits = {"add " + hold + "@step=41"};
+  run.options.checkpoint = run.folder.path("checkpoint");
+  const Row end = run.end()["A"];
+  const double inertia = 0.4 * 2.0 * 0.1 * 0.1, rate = 2.0 * 2.0 / (2.0 + inertia), angle = 0.6 * rate;
+  EXPECT_NEAR((end.position - Vector3(1.2 + std::cos(angle), 0.8 + std::sin(angle), 0)).norm(), 0.0, 1e-9);
+  const std::string chain = run.run().report.chain_hash();
+  const std::vector<std::string> edits = run.options.edits;
+  for (const std::uint32_t stop : {40U, 41U}) {
+    run.options.steps = stop;
+    if (stop < 41) run.options.edits.clear();
+    run.run();
+    run.options.steps.reset();
+    run.options.edits = edits;
+    run.options.resume = run.options.checkpoint;
+    EXPECT_EQ(run.run().report.chain_hash(), chain) << stop;
+    run.options.resume.clear();
+  }
+}
+
 TEST(EditedRun, AMaterialIsThatOfTheImpact) {
   const std::string ground = "Body { Id = \"Ground\" GeometryId = \"Flat\" Material = \"Rubber\" }\n";
   for (const double restitution : {0.0, 0.5, 1.0}) {

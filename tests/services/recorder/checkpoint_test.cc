@@ -80,6 +80,16 @@ TEST(Checkpoint, ComesBackBitForBit) {
   EXPECT_EQ(environment->step_count(), 150U);
 }
 
+// A run that is left between an edit and the step after it.
+TEST(Checkpoint, TellsWhetherItsStateIsThatOfAnEdit) {
+  Checkpoint checkpoint = sample();
+  EXPECT_FALSE(saved_state_of(&checkpoint).is_anew);
+  checkpoint.add_edits()->set_step(checkpoint.step());
+  EXPECT_FALSE(saved_state_of(&checkpoint).is_anew);
+  checkpoint.add_edits()->set_step(checkpoint.step() + 1);
+  EXPECT_TRUE(saved_state_of(&checkpoint).is_anew);
+}
+
 TEST(Checkpoint, NoFlippedBitPasses) {
   std::vector<std::byte> bytes = serialize_checkpoint(sample());
   for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
