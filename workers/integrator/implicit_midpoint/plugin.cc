@@ -32,8 +32,9 @@ constexpr double kContraction = 0.4;
 constexpr double kConverged = 4e-16;
 // Below this the change is rounding, if it does not shrink any more.
 constexpr double kStagnant = 1e-9;
-// Share of |x| / h, and of 1 rad / h, that is no less than velocities count: kStagnant of it is what places and attitudes
-// of a double resolve, so that stiff systems at rest settle.
+// Share of x / h, of 1 rad / h and of the largest velocities that is no less than a body's velocities count, with x the
+// largest distance of a body's parts from the origin: kStagnant of it is what doubles resolve of places, attitudes and
+// velocities whose differences make the forces, so that stiff systems settle, and bodies that others hold at rest.
 constexpr double kResolved = 2e-6;
 constexpr double kDifference = 1e-7;
 
@@ -94,6 +95,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
 
   void begin() {
     bodies_.clear();
+    farthest_ = 0.0;
     trial_.resize(derivatives_->size());
     for (std::size_t i = 0; i < derivatives_->size(); ++i) {
       BodyState s = derivatives_->start(i);
@@ -106,6 +108,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       const Vector3 moments = vector_at(request_->inertia(), i);
       bodies_.push_back({i, s, moments.cwiseProduct(s.pose.orientation.conjugate() * s.twist.angular), moments,
                          vector_at(request_->inverse_inertia(), i), request_->inverse_mass()[i], kept});
+      // parts of a body are about as far from its centre as its radius of gyration
+      farthest_ =
+          std::max(farthest_, s.pose.position.norm() + std::sqrt(moments.maxCoeff() * request_->inverse_mass()[i]));
     }
     unknown_.resize(static_cast<Eigen::Index>(6 * bodies_.size()));
     for (std::size_t b = 0; b < bodies_.size(); ++b) start_from(b);
@@ -154,16 +159,25 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return w - 0.5 * body.inverse_moments.cwiseProduct(body.momentum + end);
   }
 
+  // Speeds of a body, at the start and in the middle.
+  double linear_speed(std::size_t b) const {
+    return unknown_.segment<3>(static_cast<Eigen::Index>(6 * b)).norm() + bodies_[b].start.twist.linear.norm();
+  }
+  double angular_speed(std::size_t b) const {
+    return unknown_.segment<3>(static_cast<Eigen::Index>(6 * b + 3)).norm() + bodies_[b].start.twist.angular.norm();
+  }
+
   // The largest change of a body's velocity, relative to its size at the start and in the middle, or to what can be
   // resolved.
   double size_of(const Eigen::VectorXd& change) const {
-    double largest = 0.0;
+    double largest = 0.0, fastest = farthest_ / h_, fastest_turn = 1.0 / h_;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      fastest = std::max(fastest, linear_speed(b));
+      fastest_turn = std::max(fastest_turn, angular_speed(b));
+    }
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const auto i = static_cast<Eigen::Index>(6 * b);
-      const Twist& start = bodies_[b].start.twist;
-      const double place = bodies_[b].start.pose.position.norm();
-      const double v = unknown_.segment<3>(i).norm() + start.linear.norm() + kResolved * place / h_;
-      const double w = unknown_.segment<3>(i + 3).norm() + start.angular.norm() + kResolved / h_;
+      const double v = linear_speed(b) + kResolved * fastest, w = angular_speed(b) + kResolved * fastest_turn;
       const double dv = change.segment<3>(i).norm(), dw = change.segment<3>(i + 3).norm();
       for (const double share : {dv == 0.0 ? 0.0 : dv / v, dw == 0.0 ? 0.0 : dw / w})
         largest = share <= largest ? largest : share;
@@ -366,6 +380,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   Derivatives* derivatives_ = nullptr;
   Host* host_ = nullptr;
   double h_ = 0.0;
+  double farthest_ = 0.0;  // m: of the bodies' parts from the origin
   std::vector<Group> groups_;
   std::vector<Body> bodies_;  // scratch, as all that follows
   Eigen::VectorXd unknown_;   // v_bar (m/s, world) and W (rad/s, body) of each
