@@ -8,6 +8,33 @@
 namespace gravitas::test {
 namespace {
 
+// u = v_0 - h c/(2 m) u^2 is the speed in the middle of a step under quadratic drag: from it or from rest, Newton's method
+// would leap, and a step with the matrix of one far away gains little.
+TEST(ImplicitMidpoint, SolvesForStrongQuadraticDrag) {
+  for (double c = 1e-2; c < 2e10; c *= 10.0) {
+    IntegratorProblem problem("integrator_implicit_midpoint");
+    problem.wrench_is_constant = false;
+    problem.time_step = 1.0 / 60.0;
+    problem.bodies = {FreeBody{.mass = 1.0}};
+    const Vector3 along = Vector3(3, -2, 1);
+    problem.bodies[0].state.twist.linear = along;
+    problem.plugin.derivative = [=](const stage::IntegratorDerivativeRequest& q) {
+      const Vector3 v = vector_at(q.linear_velocity(), 0), force = -c * v.norm() * v;
+      return std::vector<double>{force.x(), force.y(), force.z(), 0, 0, 0};
+    };
+    for (int step = 0; step < 30; ++step) {
+      const BodyState before = problem.bodies[0].state;
+      problem.step();
+      const double a = 0.5 * problem.time_step * c, v = before.twist.linear.norm();
+      const double middle = 2.0 * v / (1.0 + std::sqrt(1.0 + 4.0 * a * v));
+      const Vector3 moved = problem.bodies[0].state.pose.position - before.pose.position;
+      EXPECT_LT((moved - problem.time_step * middle * before.twist.linear.normalized()).norm(),
+                1e-12 * problem.time_step * v)
+          << c << ' ' << step;
+    }
+  }
+}
+
 // A bearing at rest at the origin, between weights that balance; an arm that turns about it on a stiff rod. What the weights
 // leave is rounding of the arm's direction, and no less than the bearing's speed.
 TEST(ImplicitMidpoint, TakesRoundingOfANeighboursStateForRounding) {

@@ -36,6 +36,9 @@ constexpr double kStagnant = 1e-9;
 // largest distance of a body's parts from the origin: kStagnant of it is what doubles resolve of places, attitudes and
 // velocities whose differences make the forces, so that stiff systems settle, and bodies that others hold at rest.
 constexpr double kResolved = 2e-6;
+// A Newton step that leaves less than this of the last one goes on with its matrix.
+constexpr double kGained = 1e-2;
+constexpr int kMostHalvings = 12;
 constexpr double kDifference = 1e-7;
 
 // Turn of the Cayley map in body axes.
@@ -234,21 +237,42 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       at(unknown_, b).head<3>() *= linear;
       at(unknown_, b).tail<3>() *= angular;
     }
+    Eigen::VectorXd left = residual(unknown_);
     double last = HUGE_VAL;
+    bool has_matrix = false;
     for (int step = 0; step < kMostNewtonSteps; ++step) {
       host_->mark_progress();
-      if (!unknown_.allFinite()) return false;
-      const Eigen::VectorXd left = residual(unknown_);
-      if (!left.allFinite()) return false;
+      if (left.size() == 0 || !left.allFinite()) return false;
       // the matrix of a step that gained two digits serves the next
-      if (!(last < 1e-2)) factor(left);
+      if (!has_matrix) factor(left);
       const Eigen::VectorXd change = solved(left);
-      unknown_ -= change;
       const double size = size_of(change);
-      if (size <= kConverged || (size <= kStagnant && size >= 0.5 * last)) return true;
+      if (size <= kConverged || (size <= kStagnant && size >= 0.5 * last)) {
+        unknown_ -= change;
+        return true;
+      }
+      has_matrix = size < kGained * last;
       last = size;
+      left = take(change, size);
     }
     return false;
+  }
+
+  // Takes the largest of 1, 1/2, 1/4 … of a Newton step after which the same matrix wants a shorter one (Deuflhard, Newton
+  // Methods for Nonlinear Problems, 3.3); the whole one where none is such. The residual there, with no numbers where it has
+  // none.
+  Eigen::VectorXd take(const Eigen::VectorXd& change, double size) {
+    const Eigen::VectorXd from = unknown_;
+    double share = 1.0;
+    for (int halvings = 0; halvings <= kMostHalvings; ++halvings, share *= 0.5) {
+      unknown_ = from - share * change;
+      if (!unknown_.allFinite()) continue;
+      Eigen::VectorXd left = residual(unknown_);
+      if (!left.allFinite()) continue;
+      if (size <= kStagnant || size_of(solved(left)) <= (1.0 - 0.25 * share) * size) return left;
+    }
+    unknown_ = from - change;
+    return unknown_.allFinite() ? residual(unknown_) : Eigen::VectorXd();
   }
 
   // The matrix of the residual at the unknown, group by group.
