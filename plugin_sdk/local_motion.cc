@@ -37,12 +37,8 @@ void LocalMotion::begin(const stage::IntegratorIntegrateRequest& request, Deriva
     trial_.set(i, derivatives->start(i));
     if ((request.flags()[i] & kMovable) == 0) continue;
     place[i] = bodies_.size();
-    const double damping = request.damping()[i];
-    const bool in_halves = damping * request.time_step() > 1.0;
-    BodyState start = derivatives->start(i);
-    const double kept = in_halves ? damping_factor(damping, 0.5 * request.time_step()) : 1.0;
-    start.twist = {kept * start.twist.linear, kept * start.twist.angular};
-    bodies_.push_back({i, start, start.pose.position, Vector3::Zero(), in_halves ? 0.0 : damping, kept});
+    const BodyState start = derivatives->start(i);
+    bodies_.push_back({i, start, start.pose.position, Vector3::Zero(), request.damping()[i]});
   }
   if (bodies_.empty()) return;
   ask_jacobian();
@@ -61,23 +57,53 @@ void LocalMotion::begin(const stage::IntegratorIntegrateRequest& request, Deriva
 }
 
 void LocalMotion::start_inner_step() {
+  start_.setZero();
   for (std::size_t b = 0; b < bodies_.size(); ++b)
-    start_.segment<kNumbers>(first_number(b)) << Vector3::Zero(), Vector3::Zero(), bodies_[b].start.twist.linear,
-        bodies_[b].start.twist.angular;
+    if (bodies_[b].damping == 0.0)
+      start_.segment<6>(first_number(b) + 6) << bodies_[b].start.twist.linear, bodies_[b].start.twist.angular;
+  find_known();
+}
+
+void LocalMotion::find_known() {
+  if (std::ranges::all_of(bodies_, [](const Body& body) { return body.damping == 0.0; })) return;
+  carry_kinematic(0.0);
+  for (const Body& body : bodies_) trial_.set(body.row, body.start);
+  const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + done_, trial_);
+  const auto kept_up = [](const Vector3& acceleration, double damping, const Vector3& velocity) {
+    const Vector3 kept = acceleration / damping;
+    const double length = kept.norm(), most = velocity.norm();
+    if (!std::isfinite(length)) return Vector3(Vector3::Zero());
+    return length <= most ? kept : Vector3(most / length * kept);
+  };
+  for (Body& body : bodies_) {
+    if (body.damping == 0.0) continue;
+    const Acceleration a = derivatives_->acceleration(body.row, body.start, wrenches);
+    const Twist& start = body.start.twist;
+    body.known.lasting = {kept_up(a.linear, body.damping, start.linear),
+                          kept_up(a.angular, body.damping, start.angular)};
+    body.known.fading = {start.linear - body.known.lasting.linear, start.angular - body.known.lasting.angular};
+  }
+}
+
+LocalMotion::Passed LocalMotion::passed(const Known& known, double damping, double elapsed) {
+  if (damping == 0.0) return {};
+  const double kept = damping_factor(damping, elapsed), slowed = damped_time(damping, elapsed);
+  return {elapsed * known.lasting.linear + slowed * known.fading.linear,
+          elapsed * known.lasting.angular + slowed * known.fading.angular,
+          {known.lasting.linear + kept * known.fading.linear, known.lasting.angular + kept * known.fading.angular}};
 }
 
 void LocalMotion::write(const stage::IntegratorIntegrateReply& reply) const {
   std::size_t next = 0;
-  for_each_body(*request_, reply, [&](std::size_t, const BodyState&) {
-    const Body& body = bodies_[next++];
-    return BodyState{body.start.pose, {body.kept * body.start.twist.linear, body.kept * body.start.twist.angular}};
-  });
+  for_each_body(*request_, reply, [&](std::size_t, const BodyState&) { return bodies_[next++].start; });
 }
 
-BodyState LocalMotion::state_of(const Body& body, const Numbers& y, double elapsed) const {
-  const double slowed = damping_factor(body.damping, elapsed);
-  return {displaced(body.start.pose, y.segment<3>(0), y.segment<3>(3)),
-          {slowed * y.segment<3>(6), slowed * y.segment<3>(9)}};
+BodyState LocalMotion::state_of(const Body& body, const Numbers& y, double elapsed) {
+  if (body.damping == 0.0)
+    return {displaced(body.start.pose, y.segment<3>(0), y.segment<3>(3)), {y.segment<3>(6), y.segment<3>(9)}};
+  const Passed known = passed(body.known, body.damping, elapsed);
+  return {displaced(body.start.pose, known.moved + y.segment<3>(0), known.turned + y.segment<3>(3)),
+          {known.twist.linear + y.segment<3>(6), known.twist.angular + y.segment<3>(9)}};
 }
 
 void LocalMotion::carry_kinematic(double elapsed) {
@@ -96,18 +122,27 @@ bool LocalMotion::evaluate(double elapsed, const Eigen::VectorXd& y, Eigen::Vect
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const BodyState state = trial_.at(bodies_[b].row);
     const Acceleration a = derivatives_->acceleration(bodies_[b].row, state, wrenches);
-    const double grown = damping_factor(bodies_[b].damping, -elapsed);
-    const Vector3 turned = y.segment<3>(first_number(b) + 3);
-    f->segment<kNumbers>(first_number(b)) << state.twist.linear, rotation_vector_rate(turned, state.twist.angular),
-        grown * a.linear, grown * a.angular;
+    const Numbers at = y.segment<kNumbers>(first_number(b));
+    const double damping = bodies_[b].damping;
+    auto rate = f->segment<kNumbers>(first_number(b));
+    if (damping == 0.0) {
+      rate << state.twist.linear, rotation_vector_rate(at.segment<3>(3), state.twist.angular), a.linear, a.angular;
+      continue;
+    }
+    const Passed known = passed(bodies_[b].known, damping, elapsed);
+    const Twist& lasting = bodies_[b].known.lasting;
+    rate << at.segment<3>(6),
+        rotation_vector_rate(known.turned + at.segment<3>(3), state.twist.angular) - known.twist.angular,
+        a.linear - damping * lasting.linear - damping * at.segment<3>(6),
+        a.angular - damping * lasting.angular - damping * at.segment<3>(9);
   }
   return true;
 }
 
-void LocalMotion::turn_jacobian(const Eigen::VectorXd& y) {
+void LocalMotion::turn_jacobian() {
   for (Group& group : groups_) {
     for (std::size_t m = 0; m < group.body.size(); ++m) {
-      const Matrix3 turned = to_rotation_matrix(exp_rotation(y.segment<3>(first_number(group.body[m]) + 3)));
+      const Matrix3 turned = to_rotation_matrix(exp_rotation(bodies_[group.body[m]].last_turned));
       const auto place = static_cast<Eigen::Index>(m);
       for (Eigen::Index k = 0; k < 2; ++k) {
         auto rows = group.accelerations.middleRows<3>(6 * place + 3 * k);
@@ -176,6 +211,8 @@ void LocalMotion::compose() {
       group.accelerations.block<6, kNumbers>(6 * static_cast<Eigen::Index>(m), first_number(m)) = acceleration_jacobian(
           body.start.pose.orientation, body.start.twist.angular, vector_at(request_->inertia(), body.row),
           vector_at(request_->inverse_inertia(), body.row), vector_at(wrenches_, 2 * body.row + 1));
+      group.accelerations.block<6, 6>(6 * static_cast<Eigen::Index>(m), first_number(m) + 6).diagonal().array() -=
+          body.damping;
       member_[body.row] = {&group, m};
     }
   }
@@ -221,37 +258,50 @@ double LocalMotion::longest() const {
   return kShareOfTurn * kLargestInnerTurn / fastest;
 }
 
-bool LocalMotion::is_in_chart(const Eigen::VectorXd& y) const {
-  for (std::size_t b = 0; b < bodies_.size(); ++b)
-    if (!(y.segment<3>(first_number(b) + 3).norm() <= kLargestInnerTurn)) return false;
+bool LocalMotion::is_in_chart(double elapsed, const Eigen::VectorXd& y) const {
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const Vector3 known = passed(bodies_[b].known, bodies_[b].damping, elapsed).turned;
+    if (!((known + y.segment<3>(first_number(b) + 3)).norm() <= kLargestInnerTurn)) return false;
+  }
   return true;
 }
 
-Eigen::VectorXd LocalMotion::around_end(double h, const Eigen::VectorXd& end, const Eigen::VectorXd& y) const {
+Eigen::VectorXd LocalMotion::around_end(double later, const Eigen::VectorXd& y) const {
   Eigen::VectorXd around(y.size());
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
-    const Numbers e = end.segment<kNumbers>(first_number(b)), at = y.segment<kNumbers>(first_number(b));
-    const Vector3 turn =
-        log_rotation(shorter_arc(exp_rotation(at.segment<3>(3)) * exp_rotation(e.segment<3>(3)).conjugate()));
-    around.segment<kNumbers>(first_number(b)) << at.segment<3>(0) - e.segment<3>(0), turn,
-        damping_factor(bodies_[b].damping, h) * at.segment<6>(6);
+    const Body& body = bodies_[b];
+    const Numbers at = y.segment<kNumbers>(first_number(b));
+    const Passed before = passed(body.last_known, body.damping, body.last_step + later);
+    const Passed now = passed(body.known, body.damping, later);
+    const Vector3 turn = log_rotation(
+        shorter_arc(exp_rotation(before.turned + at.segment<3>(3)) * exp_rotation(body.last_turned).conjugate()));
+    around.segment<kNumbers>(first_number(b)) << before.moved + at.segment<3>(0) - body.last_moved - now.moved,
+        turn - now.turned, before.twist.linear + at.segment<3>(6) - now.twist.linear,
+        before.twist.angular + at.segment<3>(9) - now.twist.angular;
   }
   return around;
 }
 
 void LocalMotion::accept(double h, const Eigen::VectorXd& y) {
+  // what underflows changes no sign
+  const auto flush = [](auto&& numbers) {
+    for (double& number : numbers)
+      if (std::fabs(number) < std::numeric_limits<double>::min()) number = 0.0;
+  };
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     Body& body = bodies_[b];
     Numbers end = y.segment<kNumbers>(first_number(b));
-    // what underflows changes no sign
-    for (double& number : end)
-      if (std::fabs(number) < std::numeric_limits<double>::min()) number = 0.0;
+    flush(end);
+    const Passed known = passed(body.known, body.damping, h);
+    body.last_step = h, body.last_known = body.known;
+    body.last_moved = known.moved + end.segment<3>(0), body.last_turned = known.turned + end.segment<3>(3);
     body.start = state_of(body, end, h);
-    body.moved += end.segment<3>(0);
+    flush(body.start.twist.linear), flush(body.start.twist.angular);
+    body.moved += body.last_moved;
     if (!body.moved.isZero(0.0)) body.start.pose.position = body.origin + body.moved;
   }
   done_ = h == request_->time_step() - done_ ? request_->time_step() : done_ + h;
-  start_inner_step();
+  if (done_ < request_->time_step()) start_inner_step();
 }
 
 }  // namespace gravitas

@@ -1,8 +1,15 @@
 // For authors of implicit integrators with inner steps: free motion around the start of an inner step, and its Jacobian.
 //
-// Around the start (x0, q0) of an inner step the state is y = (x - x0, r, e^(c s) v, e^(c s) w), twelve numbers a movable
-// body, with q = exp(r) q0 and s the time since then, so that damping c is an integrating factor and the attitude stays on
-// the group; y' = f(s, y). Damping with c times the time step above 1 acts in two halves around the step instead.
+// Around the start (x0, q0, v0, w0) of an inner step the state is y = (x - x0, r, v, w), twelve numbers a movable body, with
+// q = exp(r) q0, so that the attitude stays on the group; y' = f(s, y) with s the time since then. Of a body with damping c
+// it is what deviates from a motion that is known,
+//
+//   v_c = v_b + e^(-c s) (v0 - v_b),   x_c = s v_b + (1 - e^(-c s))/c (v0 - v_b)     (w_c, r_c likewise)
+//   y = (x - x0 - x_c, r - r_c, v - v_c, w - w_c),     v' = a - c v
+//
+// with v_b = a0/c, the speed that the acceleration a0 at the start keeps up against damping, cut to the length of v0. So
+// damping belongs to the equations, however strong it is, and y' = 0 where a body is free and where it falls at its last
+// speed: both are exact, and y is never far greater than v0 asks for, however stiff the forces are.
 //
 // J = df/dy at s = 0. The rates of positions and attitudes are known in closed form,
 //
@@ -28,7 +35,7 @@ class LocalMotion {
   struct Group {
     std::vector<std::size_t> body;
     std::vector<Vector3> spin;      // w
-    Eigen::MatrixXd accelerations;  // d(v, w)'/dy: six rows and twelve columns a body
+    Eigen::MatrixXd accelerations;  // d(v, w)'/dy, with damping: six rows and twelve columns a body
   };
 
   // Starts at the request's state. Both must live as long as the step.
@@ -59,24 +66,37 @@ class LocalMotion {
   // bodies of about 1 m) with velocities at `rate` (1/s).
   double rounding(double h, double rate) const;
   // True while no body has turned by more than 2 rad; the chart ends at 2 pi.
-  bool is_in_chart(const Eigen::VectorXd& y) const;
+  bool is_in_chart(double elapsed, const Eigen::VectorXd& y) const;
   // Ends an inner step of h at y; the next one starts there.
   void accept(double h, const Eigen::VectorXd& y);
   // After accept(h, y): J is turned with the bodies, which leaves it that of a mechanism that turns as a whole.
-  void turn_jacobian(const Eigen::VectorXd& y);
-  // What y would be around the end of an inner step of h.
-  Eigen::VectorXd around_end(double h, const Eigen::VectorXd& end, const Eigen::VectorXd& y) const;
+  void turn_jacobian();
+  // After accept(h, end): what y, `later` than the end and told around the start of that inner step, is around its end.
+  Eigen::VectorXd around_end(double later, const Eigen::VectorXd& y) const;
 
  private:
   using Numbers = Eigen::Matrix<double, kNumbers, 1>;
 
+  // The motion that y deviates from: v_b, w_b, and what damping takes of the velocities at the start. Zero without damping.
+  struct Known {
+    Twist lasting, fading;
+  };
   struct Body {
     std::size_t row;
     BodyState start;  // of the inner step
     Vector3 origin;   // position at the start of the step
     Vector3 moved;    // since then: summed by itself, far from the world's origin it has more digits
-    double damping;   // within the step
-    double kept;      // of the velocities, before and after the step
+    double damping;
+    Known known = {};
+    // of the inner step before: its length (s), its motion, and what it moved and turned by
+    double last_step = 0.0;
+    Known last_known = {};
+    Vector3 last_moved = Vector3::Zero(), last_turned = Vector3::Zero();
+  };
+  // What a body of a known motion has moved and turned by (x_c, r_c), and its velocities.
+  struct Passed {
+    Vector3 moved = Vector3::Zero(), turned = Vector3::Zero();
+    Twist twist;
   };
   // Of a movable body: its group, and its place there.
   struct Member {
@@ -84,7 +104,9 @@ class LocalMotion {
     std::size_t place = 0;
   };
 
-  BodyState state_of(const Body& body, const Numbers& y, double elapsed) const;
+  static Passed passed(const Known& known, double damping, double elapsed);
+  static BodyState state_of(const Body& body, const Numbers& y, double elapsed);
+  void find_known();
   void start_inner_step();
   void carry_kinematic(double elapsed);
   void ask_jacobian();

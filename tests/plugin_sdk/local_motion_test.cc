@@ -155,8 +155,8 @@ class Mechanism {
 double largest(const Eigen::MatrixXd& matrix) { return matrix.cwiseAbs().maxCoeff(); }
 
 TEST(LocalMotion, HasTheSlopesOfItsRates) {
-  for (const bool has_jacobian : {false, true}) {
-    Mechanism mechanism(has_jacobian);
+  for (const auto& [has_jacobian, damping] : {std::pair{false, 0.0}, {true, 0.0}, {false, 20.0}, {true, 20.0}}) {
+    Mechanism mechanism(has_jacobian, damping);
     // the third body feels nobody, which differences do not tell
     ASSERT_EQ(mechanism.motion.groups().size(), has_jacobian ? 2U : 1U);
     mechanism.differentiate();
@@ -193,7 +193,7 @@ TEST(LocalMotion, TurnsItsJacobianWithTheBodies) {
   }
   const Eigen::MatrixXd before = mechanism.jacobian();
   mechanism.motion.accept(0.02, y);
-  mechanism.motion.turn_jacobian(y);
+  mechanism.motion.turn_jacobian();
   const Eigen::MatrixXd turned = mechanism.jacobian();
   mechanism.differentiate();
   EXPECT_LT(largest(turned - mechanism.jacobian()), 1e-7);
@@ -213,9 +213,8 @@ TEST(LocalMotion, TellsAStateAroundTheEnd) {
   mechanism.rates(y, h + later);
   const TrialColumns from_start = mechanism.asked;
   const double time = mechanism.time;
-  const Eigen::VectorXd around = mechanism.motion.around_end(h, end, y);
   mechanism.motion.accept(h, end);
-  mechanism.rates(around, later);
+  mechanism.rates(mechanism.motion.around_end(later, y), later);
   EXPECT_NEAR(mechanism.time, time, 1e-15);
   for (std::size_t i = 0; i < 3; ++i) {
     const BodyState a = from_start.at(i), b = mechanism.asked.at(i);
@@ -223,6 +222,24 @@ TEST(LocalMotion, TellsAStateAroundTheEnd) {
     EXPECT_LT(log_rotation(shorter_arc(a.pose.orientation * b.pose.orientation.conjugate())).norm(), 1e-14);
     EXPECT_LT((a.twist.linear - b.twist.linear).norm(), 1e-14);
     EXPECT_LT((a.twist.angular - b.twist.angular).norm(), 1e-14);
+  }
+}
+
+// Told around the start, damping takes of a state what it takes of velocities, whatever else acts.
+TEST(LocalMotion, KnowsWhatDampingTakes) {
+  constexpr double kDamping = 50.0, kLater = 0.07;
+  Mechanism mechanism(false, kDamping);
+  const Eigen::VectorXd start = mechanism.motion.start();
+  EXPECT_EQ(start.norm(), 0.0);
+  constexpr double kMoment = 1e-6;
+  Eigen::VectorXd f = mechanism.rates(start, kLater);
+  const TrialColumns now = mechanism.asked;
+  mechanism.rates(start, kLater + kMoment);
+  for (std::size_t i = 0; i < 3; ++i) {
+    // of the motion y is told around: x' = v where y' = 0
+    const Vector3 speed = (mechanism.asked.at(i).pose.position - now.at(i).pose.position) / kMoment;
+    EXPECT_LT((speed - now.at(i).twist.linear).norm(), 1e-3);
+    EXPECT_EQ(f.segment<3>(kNumbers * static_cast<Eigen::Index>(i)).norm(), 0.0);
   }
 }
 
@@ -244,9 +261,9 @@ TEST(LocalMotion, MeasuresChanges) {
   EXPECT_LE(motion.rounding(1e-3, 1e3), 2.3e-7);
   Eigen::VectorXd y = motion.start();
   y.segment<3>(3) = motion.longest() * motion.twist_at_start(0).angular;
-  EXPECT_TRUE(motion.is_in_chart(y));
+  EXPECT_TRUE(motion.is_in_chart(0.0, y));
   y.segment<3>(kNumbers + 3) = Vector3(0, 2.1, 0);
-  EXPECT_FALSE(motion.is_in_chart(y));
+  EXPECT_FALSE(motion.is_in_chart(0.0, y));
 }
 
 TEST(ShiftedJacobian, SolvesWhatADenseMatrixSolves) {

@@ -161,7 +161,7 @@ class Radau final : public IntegratorPlugin {
       if (size <= kNothing || (std::max(size, last) <= rounding && rate_ > kGainsLittle)) {
         rate_ = 0.0;  // it says nothing of J
         if (error_ > accuracy_) estimate_again(h);
-        return has_end();
+        return has_end(h);
       }
       last = size;
       // the first round straightens what bends: it says nothing of the next ones
@@ -175,18 +175,20 @@ class Radau final : public IntegratorPlugin {
       const double allowed =
           error_ <= accuracy_ ? error_ * std::min(kOfEstimate, std::sqrt(error_)) : kOfRejected * error_;
       const double enough = std::max(allowed, kOfEstimate * accuracy_);
-      if (remains <= (rate_ > kGainsLittle || rounds_ == kMostRounds ? enough : allowed)) return has_end();
+      if (remains <= (rate_ > kGainsLittle || rounds_ == kMostRounds ? enough : allowed)) return has_end(h);
       if (remains * math::pow(rate_, kMostRounds - rounds_) > enough) return false;
     }
     return false;
   }
 
-  bool has_end() const { return std::isfinite(error_) && motion_.is_in_chart(motion_.start() + z_[kStages - 1]); }
+  bool has_end(double h) const {
+    return std::isfinite(error_) && motion_.is_in_chart(h, motion_.start() + z_[kStages - 1]);
+  }
 
   // An error that is too large may be that of a stiff transient: its own start is taken for the estimate.
   void estimate_again(double h) {
     shifted_ = motion_.start() + error_vector_;
-    if (!motion_.is_in_chart(shifted_) || !motion_.evaluate(0.0, shifted_, &shifted_rate_)) return;
+    if (!motion_.is_in_chart(0.0, shifted_) || !motion_.evaluate(0.0, shifted_, &shifted_rate_)) return;
     error_ = std::min(error_, estimate(h, shifted_rate_));
   }
 
@@ -194,7 +196,8 @@ class Radau final : public IntegratorPlugin {
   double improve(double h) {
     for (std::size_t i = 0; i < kStages; ++i) {
       shifted_ = motion_.start() + z_[i];
-      if (!motion_.is_in_chart(shifted_) || !motion_.evaluate(kNodes[i] * h, shifted_, &rates_[i])) return HUGE_VAL;
+      const double elapsed = kNodes[i] * h;
+      if (!motion_.is_in_chart(elapsed, shifted_) || !motion_.evaluate(elapsed, shifted_, &rates_[i])) return HUGE_VAL;
     }
     for (std::size_t i = 0; i < kStages; ++i) {
       for (std::size_t j = 0; j < kStages; ++j) rates_[i] -= kInverse[i][j] / h * z_[j];
@@ -280,9 +283,9 @@ class Radau final : public IntegratorPlugin {
             if (k != j) share *= (at - kNodes[k]) / (kNodes[j] - kNodes[k]);
           y += share * last_z_[j];
         }
-        z_[i] = motion_.around_end(last_step_, last_end_, y) - start;
+        z_[i] = motion_.around_end(s, y) - start;
       }
-      is_wild = is_wild || !z_[i].allFinite() || !motion_.is_in_chart(start + z_[i]);
+      is_wild = is_wild || !z_[i].allFinite() || !motion_.is_in_chart(s, start + z_[i]);
     }
     for (std::size_t i = 0; i < kStages && is_wild; ++i) z_[i].setZero();
   }
@@ -291,11 +294,10 @@ class Radau final : public IntegratorPlugin {
     last_step_ = h;
     last_start_ = motion_.start();
     last_z_ = z_;
-    last_end_ = motion_.start() + z_[kStages - 1];
-    motion_.accept(h, last_end_);
+    motion_.accept(h, motion_.start() + z_[kStages - 1]);
     has_rate_ = is_fresh_ = false;
     has_matrix_ = rate_ <= kKeeps;
-    if (has_matrix_) motion_.turn_jacobian(last_end_);
+    if (has_matrix_) motion_.turn_jacobian();
     guess_ = Guess::kGoesOn;
     factored_step_ = 0.0;
   }
@@ -321,7 +323,7 @@ class Radau final : public IntegratorPlugin {
   Guess guess_ = Guess::kNone;
   double last_step_ = 0.0;  // of the inner step before
   Stages last_z_;
-  Eigen::VectorXd last_start_, last_end_;
+  Eigen::VectorXd last_start_;
   Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_, shifted_, mean_rate_, bent_;
   std::vector<double> room_;
 };

@@ -114,7 +114,7 @@ class Rosenbrock final : public IntegratorPlugin {
       factors_.solve(&u_[i]);
     }
     sum_ += u_[kStages - 1];
-    return sum_.allFinite() && motion_.is_in_chart(sum_) ? motion_.size_of(u_[kStages - 1]) : HUGE_VAL;
+    return sum_.allFinite() && motion_.is_in_chart(h, sum_) ? motion_.size_of(u_[kStages - 1]) : HUGE_VAL;
   }
 
   double accuracy_;
