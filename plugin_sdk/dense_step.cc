@@ -9,7 +9,8 @@ namespace {
 enum Part : std::size_t { kPosition, kTurn, kLinear, kAngular };
 
 // Where they stand among the numbers of a body's start.
-constexpr std::size_t kPositionAt = 0, kOrientationAt = 3, kLinearAt = 7, kAngularAt = 10;
+constexpr std::size_t kPositionAt = 0, kOrientationAt = 3, kLinearAt = 7, kAngularAt = 10, kAccelerationAt = 13,
+                      kTurningAt = 16;
 
 // Is it one time, to rounding?
 bool is_same(double time, double other, double length) {
@@ -43,11 +44,12 @@ void DenseStep::assign(const stage::IntegratorIntegrateRequest& request, const M
     const Quaternion& q = start.pose.orientation;
     put(start.pose.position), put(Eigen::Vector4d(q.w(), q.x(), q.y(), q.z()));
     put(start.twist.linear), put(start.twist.angular);
+    put(stages.rate(0, i).linear), put(stages.rate(0, i).angular);
     // H k_j of the stages, freed of damping
     std::array<Eigen::Matrix<double, kCoefficient, 1>, 4> c;
     for (auto& coefficient : c) coefficient.setZero();
     for (std::size_t j = 0; j <= last; ++j) {
-      const auto& rate = stages.rate(j, i);
+      const auto& rate = stages.deviation(j, i);
       const double freed = length / damping_factor(request.damping()[i], nodes[j] * length);
       Eigen::Matrix<double, kCoefficient, 1> k;
       k << length * rate.velocity, length * rate.turn, freed * rate.linear, freed * rate.angular;
@@ -86,22 +88,32 @@ Vector3 DenseStep::sum(std::size_t body, std::size_t part, const std::array<doub
   return total;
 }
 
+// Where there is no damping all of it is in the coefficients.
+DampedMotion DenseStep::known_motion(std::size_t body, double damping, double passed) const {
+  const Twist twist = {start(body, kLinearAt), start(body, kAngularAt)};
+  if (damping == 0.0) return {.twist = twist};
+  return damped_motion(twist, {start(body, kAccelerationAt), start(body, kTurningAt)}, damping, passed);
+}
+
 BodyState DenseStep::at(std::size_t body, double damping, double ahead) const {
   const double passed = elapsed_ + ahead, kept = damping_factor(damping, passed);
   const std::array<double, 4> weights = basis(passed / length_);
   const double* q = &numbers_[kNumbers * body + kOrientationAt];
+  const DampedMotion known = known_motion(body, damping, passed);
   BodyState state;
-  state.pose = {start(body, kPositionAt) + sum(body, kPosition, weights),
-                GroupChart::at(Quaternion(q[0], q[1], q[2], q[3]), sum(body, kTurn, weights))};
-  state.twist = {kept * (start(body, kLinearAt) + sum(body, kLinear, weights)),
-                 kept * (start(body, kAngularAt) + sum(body, kAngular, weights))};
+  state.pose = {start(body, kPositionAt) + (known.moved + sum(body, kPosition, weights)),
+                GroupChart::at(Quaternion(q[0], q[1], q[2], q[3]), known.turned + sum(body, kTurn, weights))};
+  state.twist = {known.twist.linear + kept * sum(body, kLinear, weights),
+                 known.twist.angular + kept * sum(body, kAngular, weights)};
   return state;
 }
 
 Acceleration DenseStep::acceleration(std::size_t body, double damping, double ahead) const {
   const double passed = elapsed_ + ahead, kept = damping_factor(damping, passed) / length_;
   const std::array<double, 4> weights = slope(passed / length_);
-  return {kept * sum(body, kLinear, weights), kept * sum(body, kAngular, weights)};
+  Acceleration rates = {kept * sum(body, kLinear, weights), kept * sum(body, kAngular, weights)};
+  if (damping != 0.0) rates.linear += start(body, kAccelerationAt), rates.angular += start(body, kTurningAt);
+  return rates;
 }
 
 }  // namespace gravitas

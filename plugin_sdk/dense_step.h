@@ -6,8 +6,9 @@
 //   y(theta) = y0 + theta c_1 + theta (1-theta) c_2 + theta^2 (1-theta) c_3 + theta^2 (1-theta)^2 c_4
 //   c_1 = H sum b_j k_j,   c_2 = H k_1 - c_1,   c_3 = c_1 - H k_last - c_2,   c_4 = H sum d_j k_j
 //
-// where y is the position, the rotation vector from q0, and the velocities freed of damping, e^(d (t-t0)) v. It goes through
-// both ends with the slopes there; d_j are of the method. Source: Hairer, Norsett, Wanner, Solving ODEs I (1993), II.6.
+// where y is the position, the rotation vector from q0, and the velocities; of a body with damping d what they deviate from the
+// motion under the accelerations of the start by (motion_stages.h), velocities freed of damping, e^(d (t-t0)) v. It goes
+// through both ends with the slopes there; d_j are of the method. Source: Hairer, Norsett, Wanner, Solving ODEs I (1993), II.6.
 #pragma once
 
 #include <array>
@@ -43,12 +44,13 @@ class DenseStep {
   Acceleration acceleration(std::size_t body, double damping, double ahead) const;
 
  private:
-  // elapsed, length, time; of a body: position, orientation, velocities at its start, then c_1 to c_4
-  static constexpr std::size_t kHead = 3, kStart = 13, kCoefficient = 12, kNumbers = kStart + 4 * kCoefficient;
+  // elapsed, length, time; of a body: position, orientation, velocities and accelerations at its start, then c_1 to c_4
+  static constexpr std::size_t kHead = 3, kStart = 19, kCoefficient = 12, kNumbers = kStart + 4 * kCoefficient;
 
   // sum of weights times one of position, rotation vector, linear or angular velocity's coefficients
   Vector3 sum(std::size_t body, std::size_t part, const std::array<double, 4>& weights) const;
   Vector3 start(std::size_t body, std::size_t place) const;
+  DampedMotion known_motion(std::size_t body, double damping, double passed) const;
 
   double elapsed_ = 0.0, length_ = 0.0;
   std::vector<double> numbers_;

@@ -40,22 +40,34 @@
 
 namespace gravitas {
 
-// Of e = h sum_i d_i k_i, d the weights:
+// Of e, a change of a body's state:
 //   max over bodies of |e_x| / (1 m), |e_r| / (1 rad), |e_v| / max(1 m/s, |v|), |e_w| / max(1 rad/s, |w|),
 // infinite where one is not finite.
-inline double largest_error(const MotionStages<GroupChart>& stages, std::span<const double> weights, double h) {
+template <typename ChangeOf>
+double largest_change(const MotionStages<GroupChart>& stages, ChangeOf&& change_of) {
   double largest = 0.0;
   for (std::size_t i = 0; i < stages.size(); ++i) {
     if (!stages.is_movable(i)) continue;
-    const auto error = stages.weighted(i, weights, h);
+    const auto change = change_of(i);
     const Twist& twist = stages.start(i).twist;
     for (const double e :
-         {error.velocity.norm(), error.turn.norm(), error.linear.norm() / std::max(1.0, twist.linear.norm()),
-          error.angular.norm() / std::max(1.0, twist.angular.norm())})
+         {change.velocity.norm(), change.turn.norm(), change.linear.norm() / std::max(1.0, twist.linear.norm()),
+          change.angular.norm() / std::max(1.0, twist.angular.norm())})
       largest = e <= largest ? largest : e;
     if (!std::isfinite(largest)) return HUGE_VAL;
   }
   return largest;
+}
+
+// Of e = h sum_i d_i k_i, d the weights.
+inline double largest_rate(const MotionStages<GroupChart>& stages, std::span<const double> weights, double h) {
+  return largest_change(stages, [&](std::size_t i) { return stages.weighted(i, weights, h); });
+}
+
+// Of what the end changes by with the weights: with damping, e^(-d (1 - c_i) h) of what accelerations differ by.
+inline double largest_error(const MotionStages<GroupChart>& stages, std::span<const double> weights,
+                            std::span<const double> nodes, double h) {
+  return largest_change(stages, [&](std::size_t i) { return stages.difference(i, weights, nodes, h); });
 }
 
 template <typename Pair>
@@ -180,11 +192,11 @@ class EmbeddedPair : public IntegratorPlugin {
   double first_inner_step(double whole) {
     constexpr double kSmall = 0.01, kLonger = 100.0;
     constexpr double kFirst[] = {1.0}, kChange[] = {-1.0, 1.0}, kEuler[] = {0.0, 1.0};
-    const double rate = largest_error(stages_, kFirst, 1.0);
+    const double rate = largest_rate(stages_, kFirst, 1.0);
     if (rate == 0.0) return whole;
     const double trial = std::min(whole, kSmall / rate);
     if (!stages_.evaluate(1, kFirst, kEuler, trial)) return trial;
-    const double fastest = std::max(rate, largest_error(stages_, kChange, 1.0) / trial);
+    const double fastest = std::max(rate, largest_rate(stages_, kChange, 1.0) / trial);
     const double exact = math::pow(kSmall * accuracy_ / fastest, 1.0 / (Pair::kOrder + 1));
     return std::min({whole, kLonger * trial, exact});
   }

@@ -129,6 +129,23 @@ double damped_time(double damping, double time_step) {
   return damping == 0.0 ? time_step : -math::expm1(-damping * time_step) / damping;
 }
 
+double damped_distance(double damping, double time_step) {
+  const double share = damping * time_step;
+  // below, the difference loses digits, and its series ends within 2^-53
+  if (share > 0.5) return (time_step - damped_time(damping, time_step)) / damping;
+  double sum = 1.0;
+  for (int n = 16; n > 2; --n) sum = 1.0 - share / n * sum;
+  return 0.5 * time_step * time_step * sum;
+}
+
+DampedMotion damped_motion(const Twist& start, const Acceleration& acceleration, double damping, double time_step) {
+  const double kept = damping_factor(damping, time_step), slowed = damped_time(damping, time_step);
+  const double distance = damped_distance(damping, time_step);
+  return {slowed * start.linear + distance * acceleration.linear,
+          slowed * start.angular + distance * acceleration.angular,
+          {kept * start.linear + slowed * acceleration.linear, kept * start.angular + slowed * acceleration.angular}};
+}
+
 namespace detail {
 
 bool StateColumns::resize(const stage::IntegratorIntegrateReply& reply, std::size_t bodies) {

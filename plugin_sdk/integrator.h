@@ -79,6 +79,18 @@ double damping_factor(double damping, double time_step);
 // The time (s) in which an undamped body goes as far as a damped one in h: (1 - exp(-c h)) / c.
 double damped_time(double damping, double time_step);
 
+// The distance (s^2) per acceleration that a damped body goes from rest in h: (h - (1 - exp(-c h)) / c) / c, h^2/2 without
+// damping.
+double damped_distance(double damping, double time_step);
+
+// What a body moves and turns by, and its velocities, after h of constant accelerations a, alpha and damping, exactly.
+struct DampedMotion {
+  Vector3 moved = Vector3::Zero();   // m
+  Vector3 turned = Vector3::Zero();  // rad, where it keeps its axis
+  Twist twist;
+};
+DampedMotion damped_motion(const Twist& start, const Acceleration& acceleration, double damping, double time_step);
+
 namespace detail {
 inline BodyState state_at(const stage::IntegratorIntegrateRequest& request, std::size_t body) {
   return {{vector_at(request.position(), body), quaternion_at(request.orientation(), body)},

@@ -2,12 +2,20 @@
 //
 // In a step from (x0, q0, v0, w0) at t0 over h, with nodes 0 = c_1 <= c_2 <= ... <= 1 and weights a_ij, stage i is at
 //
-//   x_i = x0 + h sum_j a_ij v_j                q_i = chart(q0, h sum_j a_ij r_j)
-//   v_i = e^(-d c_i h) v0 + h sum_j a_ij e^(-d (c_i - c_j) h) a_j      (w_i likewise, with alpha_j)
+//   x_i = x0 + h sum_j a_ij v_j    v_i = v0 + h sum_j a_ij a_j      (w_i likewise, with alpha_j)
+//   q_i = chart(q0, h sum_j a_ij r_j)
 //
 // r is the rate of the attitude's coordinates in a chart (below), a and alpha are the accelerations of the stage's
-// state, without damping. Damping d is an integrating factor (Lawson 1967): it slows free bodies by e^(-d h) exactly at
-// any step and leaves the method its order; with d h >> 1 the balance of damping against a force is not met.
+// state, without damping. With damping d the method is applied to what deviates from the motion under the accelerations of
+// the start, which is known (damped_motion: x_c, v_c, r_c, w_c at times after the start), with d as an integrating factor
+// (Lawson 1967):
+//
+//   x_i = x0 + x_c(c_i h) + h sum_j a_ij (v_j - v_c(c_j h))        (attitudes likewise, with r_j and the rate of w_c)
+//   v_i = v_c(c_i h) + h sum_j a_ij e^(-d (c_i - c_j) h) (a_j - a_1)
+//
+// So free bodies slow by e^(-d h) and come as far as that takes them, and bodies under constant accelerations come to the
+// speed where damping balances them, exactly at any step; the method keeps its order. What changes within a step with
+// d h >> 1 is met as without damping, by the order.
 #pragma once
 
 #include <span>
@@ -62,7 +70,7 @@ class MotionStages {
     derivatives_ = derivatives;
     time_ = request.time();
     const std::size_t bodies = derivatives->size();
-    start_.resize(bodies), rates_.resize(stages * bodies), trial_.resize(bodies);
+    start_.resize(bodies), rates_.resize(stages * bodies), deviations_.resize(stages * bodies), trial_.resize(bodies);
     for (std::size_t i = 0; i < bodies; ++i) start_[i] = derivatives->start(i);
   }
 
@@ -71,7 +79,7 @@ class MotionStages {
   bool evaluate(std::size_t stage, std::span<const double> a, std::span<const double> c, double h) {
     return evaluate_at(
         stage, c[stage] * h, [&](std::size_t i) { return combined(i, a.first(stage), c, c[stage], h); },
-        [&](std::size_t i, const BodyState&) { return turned(i, a.first(stage), h); });
+        [&](std::size_t i, const BodyState&) { return turned(i, a.first(stage), c[stage], h); });
   }
 
   // Evaluates stage `stage` at states that come from elsewhere, `elapsed` after the start.
@@ -86,31 +94,43 @@ class MotionStages {
   BodyState combined(std::size_t body, std::span<const double> weights, std::span<const double> c, double end,
                      double h) const {
     const BodyState& s = start_[body];
-    const double damping = request_->damping()[body];
-    Vector3 moved = Vector3::Zero(), linear = Vector3::Zero(), angular = Vector3::Zero();
+    if (weights.empty()) return s;
+    const double damping = damping_of(body);
+    Vector3 moved = Vector3::Zero();
+    Twist twist = s.twist;
+    if (damping != 0.0) {
+      const DampedMotion known = known_motion(body, end * h);
+      moved = known.moved, twist = known.twist;
+    }
+    Vector3 linear = Vector3::Zero(), angular = Vector3::Zero();
     for (std::size_t j = 0; j < weights.size(); ++j) {
       if (weights[j] == 0.0) continue;
-      const Rate& r = rate(j, body);
+      const Rate& r = deviation(j, body);
       const double slowed = h * weights[j] * damping_factor(damping, (end - c[j]) * h);
       moved += h * weights[j] * r.velocity;
       linear += slowed * r.linear;
       angular += slowed * r.angular;
     }
-    const double kept = damping_factor(damping, end * h);
     BodyState state;
     state.pose.position = moved.isZero(0.0) ? s.pose.position : Vector3(s.pose.position + moved);
-    state.pose.orientation = Chart::at(s.pose.orientation, turned(body, weights, h));
-    state.twist = {kept * s.twist.linear + linear, kept * s.twist.angular + angular};
+    state.pose.orientation = Chart::at(s.pose.orientation, turned(body, weights, end, h));
+    state.twist = {twist.linear + linear, twist.angular + angular};
     return state;
   }
 
-  // The sum of a body's rates with weights, for error estimates.
+  // The sum of a body's rates with weights.
   Rate weighted(std::size_t body, std::span<const double> weights, double h) const {
-    Rate sum{Vector3::Zero(), Vector3::Zero(), Vector3::Zero(), turned(body, weights, h)};
+    Rate sum{Vector3::Zero(), Vector3::Zero(), Vector3::Zero(), Chart::zero()};
+    for (std::size_t j = 0; j < weights.size(); ++j) add(h * weights[j], h * weights[j], rate(j, body), &sum);
+    return sum;
+  }
+
+  // By how much a body's state at the end, node 1, would change with its weights, for error estimates.
+  Rate difference(std::size_t body, std::span<const double> weights, std::span<const double> c, double h) const {
+    Rate sum{Vector3::Zero(), Vector3::Zero(), Vector3::Zero(), Chart::zero()};
     for (std::size_t j = 0; j < weights.size(); ++j) {
-      sum.velocity += h * weights[j] * rate(j, body).velocity;
-      sum.linear += h * weights[j] * rate(j, body).linear;
-      sum.angular += h * weights[j] * rate(j, body).angular;
+      const double slowed = h * weights[j] * damping_factor(damping_of(body), (1.0 - c[j]) * h);
+      add(h * weights[j], slowed, deviation(j, body), &sum);
     }
     return sum;
   }
@@ -121,13 +141,17 @@ class MotionStages {
     for (std::size_t i = 0; i < start_.size(); ++i) {
       start_[i] = trial_.at(i);
       if (!is_movable(i)) continue;
-      rate_at(0, i) = rate(last, i);
-      rate_at(0, i).turn = Chart::rate(start_[i].pose.orientation, Chart::zero(), start_[i].twist.angular);
+      Rate& first = rates_[i];
+      first = rate(last, i);
+      first.turn = Chart::rate(start_[i].pose.orientation, Chart::zero(), start_[i].twist.angular);
+      deviations_[i] = deviation_of(0, i, 0.0);
     }
   }
 
   const BodyState& start(std::size_t body) const { return start_[body]; }
   const Rate& rate(std::size_t stage, std::size_t body) const { return rates_[stage * start_.size() + body]; }
+  // The same, without damping, and with it what the rates deviate from those of the known motion by.
+  const Rate& deviation(std::size_t stage, std::size_t body) const { return deviations_[stage * start_.size() + body]; }
   bool is_movable(std::size_t body) const { return (request_->flags()[body] & kMovable) != 0; }
   std::size_t size() const { return start_.size(); }
 
@@ -154,24 +178,47 @@ class MotionStages {
       if (!is_movable(i)) continue;
       const BodyState state = trial_.at(i);
       const Acceleration acceleration = derivatives_->acceleration(i, state, wrenches);
-      rate_at(stage, i) = {state.twist.linear, acceleration.linear, acceleration.angular,
-                           Chart::rate(start_[i].pose.orientation, turn_of(i, state), state.twist.angular)};
+      rates_[stage * start_.size() + i] = {
+          state.twist.linear, acceleration.linear, acceleration.angular,
+          Chart::rate(start_[i].pose.orientation, turn_of(i, state), state.twist.angular)};
+      deviations_[stage * start_.size() + i] = deviation_of(stage, i, elapsed);
     }
     return true;
   }
-  typename Chart::Coordinates turned(std::size_t body, std::span<const double> weights, double h) const {
+  typename Chart::Coordinates turned(std::size_t body, std::span<const double> weights, double end, double h) const {
     typename Chart::Coordinates sum = Chart::zero();
+    if (damping_of(body) != 0.0 && !weights.empty()) sum = rate_of(body, known_motion(body, end * h).turned);
     for (std::size_t j = 0; j < weights.size(); ++j)
-      if (weights[j] != 0.0) sum += h * weights[j] * rate(j, body).turn;
+      if (weights[j] != 0.0) sum += h * weights[j] * deviation(j, body).turn;
     return sum;
   }
-  Rate& rate_at(std::size_t stage, std::size_t body) { return rates_[stage * start_.size() + body]; }
+  Rate deviation_of(std::size_t stage, std::size_t body, double elapsed) const {
+    Rate off = rate(stage, body);
+    if (damping_of(body) == 0.0) return off;
+    if (stage == 0) return {Vector3::Zero(), Vector3::Zero(), Vector3::Zero(), Chart::zero()};
+    const Twist known = known_motion(body, elapsed).twist;
+    off.velocity -= known.linear, off.turn -= rate_of(body, known.angular);
+    off.linear -= rate(0, body).linear, off.angular -= rate(0, body).angular;
+    return off;
+  }
+  DampedMotion known_motion(std::size_t body, double elapsed) const {
+    const Rate& first = rate(0, body);
+    return damped_motion(start_[body].twist, {first.linear, first.angular}, damping_of(body), elapsed);
+  }
+  typename Chart::Coordinates rate_of(std::size_t body, const Vector3& angular_velocity) const {
+    return Chart::rate(start_[body].pose.orientation, Chart::zero(), angular_velocity);
+  }
+  static void add(double poses, double velocities, const Rate& rate, Rate* sum) {
+    sum->velocity += poses * rate.velocity, sum->turn += poses * rate.turn;
+    sum->linear += velocities * rate.linear, sum->angular += velocities * rate.angular;
+  }
+  double damping_of(std::size_t body) const { return request_->damping()[body]; }
 
   const stage::IntegratorIntegrateRequest* request_ = nullptr;
   Derivatives* derivatives_ = nullptr;
   double time_ = 0.0;
   std::vector<BodyState> start_;
-  std::vector<Rate> rates_;
+  std::vector<Rate> rates_, deviations_;
   TrialColumns trial_;
 };
 

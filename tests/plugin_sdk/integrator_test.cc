@@ -134,6 +134,35 @@ TEST(DampingFactor, NeverChangesSign) {
   EXPECT_EQ(damping_factor(1e6, 1.0), 0.0);
 }
 
+// Far from rounding, whether a series or a difference gives it; the reference has 11 bits more, and the series' first terms.
+TEST(DampedDistance, IsTheSecondIntegral) {
+  EXPECT_EQ(damped_distance(0.0, 0.5), 0.125);
+  for (double share = 1e-12; share < 1e9; share *= 1.7) {
+    const long double z = share;
+    const long double exact = share < 1e-3 ? 0.5L - z / 6 + z * z / 24 - z * z * z / 120 + z * z * z * z / 720
+                                           : (z + std::expm1(-z)) / (z * z);
+    EXPECT_NEAR(damped_distance(4.0 * share, 0.25) * 16.0 / static_cast<double>(exact), 1.0, 2e-15) << share;
+  }
+}
+
+// v' = a - c v, x' = v.
+TEST(DampedMotion, SolvesItsEquations) {
+  const Twist start = {Vector3(1, 2, 3), Vector3(-1, 0, 2)};
+  const Acceleration a = {Vector3(0, -10, 1), Vector3(3, 0.5, 0)};
+  for (const double c : {0.0, 0.3, 8.0}) {
+    constexpr double kTime = 0.7, kMoment = 1e-5;
+    const DampedMotion now = damped_motion(start, a, c, kTime);
+    const DampedMotion before = damped_motion(start, a, c, kTime - kMoment);
+    const DampedMotion after = damped_motion(start, a, c, kTime + kMoment);
+    const auto rate = [](const Vector3& from, const Vector3& to) { return Vector3((to - from) / (2.0 * kMoment)); };
+    EXPECT_LT((rate(before.moved, after.moved) - now.twist.linear).norm(), 1e-8) << c;
+    EXPECT_LT((rate(before.turned, after.turned) - now.twist.angular).norm(), 1e-8) << c;
+    EXPECT_LT((rate(before.twist.linear, after.twist.linear) - (a.linear - c * now.twist.linear)).norm(), 1e-7) << c;
+    EXPECT_LT((rate(before.twist.angular, after.twist.angular) - (a.angular - c * now.twist.angular)).norm(), 1e-7)
+        << c;
+  }
+}
+
 // ---- derivatives --------------------------------------------------------------------------------
 
 std::int32_t never(const gravitas_column*, gravitas_reply_column*) {

@@ -28,7 +28,9 @@ double coasted(double c, double t) { return -std::expm1(-c * t) / c; }
 double fallen(double c, double t) { return (t - coasted(c, t)) / c; }
 
 class StrongDamping : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Integrators, StrongDamping, testing::Values("integrator_rosenbrock", "integrator_radau"),
+INSTANTIATE_TEST_SUITE_P(Integrators, StrongDamping,
+                         testing::Values("integrator_rk4", "integrator_rkmk4", "integrator_dormand_prince54",
+                                         "integrator_dormand_prince853", "integrator_rosenbrock", "integrator_radau"),
                          [](const auto& library) { return std::string(library.param); });
 
 TEST_P(StrongDamping, SlowsFreeBodiesExactly) {
@@ -83,7 +85,9 @@ double spring_distance(double k, double c, double t) {
 
 // Forces that change within the step.
 class ControlledDamping : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Integrators, ControlledDamping, testing::Values("integrator_rosenbrock", "integrator_radau"),
+INSTANTIATE_TEST_SUITE_P(Integrators, ControlledDamping,
+                         testing::Values("integrator_dormand_prince54", "integrator_dormand_prince853",
+                                         "integrator_rosenbrock", "integrator_radau"),
                          [](const auto& library) { return std::string(library.param); });
 
 TEST_P(ControlledDamping, LeavesTheErrorToAccuracy) {

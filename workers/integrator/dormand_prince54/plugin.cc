@@ -33,7 +33,7 @@ struct Pair54 {
   static double error(const MotionStages<GroupChart>& stages, double h) {
     static constexpr double kError[kStages] = {71.0 / 57600.0,      0.0,          -71.0 / 16695.0, 71.0 / 1920.0,
                                                -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
-    return largest_error(stages, kError, h);
+    return largest_error(stages, kError, kNodes, h);
   }
 };
 

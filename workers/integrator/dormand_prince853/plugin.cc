@@ -83,7 +83,7 @@ struct Pair853 {
                                                     kEighth[9],
                                                     kEighth[10],
                                                     kEighth[11] - 0.220588235294117647058823529412e-1};
-    const double fifth = largest_error(stages, kFifth, h), third = largest_error(stages, kThird, h);
+    const double fifth = largest_error(stages, kFifth, kNodes, h), third = largest_error(stages, kThird, kNodes, h);
     if (!std::isfinite(fifth) || !std::isfinite(third)) return HUGE_VAL;
     const double share = fifth > 0.0 ? third / fifth : 0.0;
     return fifth / std::sqrt(1.0 + 0.01 * share * share);

@@ -4,7 +4,7 @@
 //   y' = y + h/6 (k_1 + 2 k_2 + 2 k_3 + k_4),     q^. = (0, w) q / 2,  alpha = I_w^-1 (tau - w x I_w w)
 //
 // The seed's 2.46, which takes the forces of time alone, is of first order as soon as one depends on the state. The
-// attitude is renormalised once a step, an error of order 5, and damping is an integrating factor (motion_stages.h).
+// attitude is renormalised once a step, an error of order 5, and damping is exact for free bodies (motion_stages.h).
 // Four derivatives a step. Stability: an undamped oscillator loses energy, (h w)^6 / 72 of it a step, up to
 // h w = 2.83; a decay at rate c is stable up to h c = 2.79. Known failure: rotations of more than some 0.5 rad a step
 // are far off, since quaternions do not add (see RKMK4); stiff springs blow up.
