@@ -29,7 +29,8 @@ double fallen(double c, double t) { return (t - coasted(c, t)) / c; }
 
 class StrongDamping : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Integrators, StrongDamping,
-                         testing::Values("integrator_rk4", "integrator_rkmk4", "integrator_dormand_prince54",
+                         testing::Values("integrator_rk4", "integrator_rkmk4", "integrator_implicit_midpoint",
+                                         "integrator_symplectic_splitting", "integrator_dormand_prince54",
                                          "integrator_dormand_prince853", "integrator_rosenbrock", "integrator_radau"),
                          [](const auto& library) { return std::string(library.param); });
 

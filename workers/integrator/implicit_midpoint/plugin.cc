@@ -7,7 +7,11 @@
 //
 // A free rotor keeps its angular momentum (the last line) and its energy (W.(Pi' - Pi) = 0, since the Cayley map makes
 // Pi' - Pi = h Pi_bar x W) to rounding at any step. With forces: energy is kept exactly where the potential is quadratic
-// in x, to O(h^2) without drift elsewhere; momentum always. Damping acts in two halves around the step, e^(-c h) in all.
+// in x, to O(h^2) without drift elsewhere; momentum always. With damping c, a = f/m, and D = (1 - e^(-c h))/c for h,
+//
+//   x' = x + h v_bar          h v_bar = D v + (h - D)/c a          v' = e^(-c h) v + D a
+//
+// (angular momentum likewise): exact under constant forces and of a free rotor, which turns in slowed time.
 // Sources: Simo, Wong, Int. J. Numer. Meth. Eng. 31 (1991) 19; Austin, Krishnaprasad, Wang, J. Comput. Phys. 107 (1993).
 // The equations in (v_bar, W) are solved to rounding: by iteration where that contracts, else by Newton's method with
 // the matrix from the wrenches' Jacobian where it can be had (wrench_jacobian.h), else by differences (six derivatives per
@@ -73,10 +77,14 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   // A movable body and what the equations need of it.
   struct Body {
     std::size_t row;   // of the request
-    BodyState start;   // slowed by half the damping
-    Vector3 momentum;  // body axes, at the start
+    BodyState start;   // with the velocities that would take a free body as far in h without damping, v D/h
+    Vector3 momentum;  // body axes, of these
     Vector3 moments, inverse_moments;
-    double inverse_mass, kept;  // exp(-c h/2)
+    double inverse_mass;
+    double reach;    // of a constant acceleration, in the mean velocity: h/2, or (h - D)/(c h)
+    double damping;  // 1/s
+    Twist undamped;  // at the start
+    Vector3 torque;  // as asked last, in body axes at the start
   };
   // Bodies that feel each other, as places in bodies_.
   struct Group {
@@ -106,11 +114,17 @@ class ImplicitMidpoint final : public IntegratorPlugin {
         trial_.set(i, (request_->flags()[i] & kKinematic) != 0 ? detail::keep_moving(s, 0.5 * h_) : s);
         continue;
       }
-      const double kept = damping_factor(request_->damping()[i], 0.5 * h_);
-      s.twist = {kept * s.twist.linear, kept * s.twist.angular};
+      const double damping = request_->damping()[i];
+      const Twist undamped = s.twist;
+      if (damping != 0.0) {
+        const double share = damped_time(damping, h_) / h_;
+        s.twist = {share * s.twist.linear, share * s.twist.angular};
+      }
       const Vector3 moments = vector_at(request_->inertia(), i);
       bodies_.push_back({i, s, moments.cwiseProduct(s.pose.orientation.conjugate() * s.twist.angular), moments,
-                         vector_at(request_->inverse_inertia(), i), request_->inverse_mass()[i], kept});
+                         vector_at(request_->inverse_inertia(), i), request_->inverse_mass()[i],
+                         damping != 0.0 ? damped_distance(damping, h_) / h_ : 0.5 * h_, damping, undamped,
+                         Vector3::Zero()});
       // parts of a body are about as far from its centre as its radius of gyration
       farthest_ =
           std::max(farthest_, s.pose.position.norm() + std::sqrt(moments.maxCoeff() * request_->inverse_mass()[i]));
@@ -145,19 +159,20 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + 0.5 * h_, trial_);
     Eigen::VectorXd left(guess.size());
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
-      const Body& body = bodies_[b];
+      Body& body = bodies_[b];
       const Vector6 z = at(guess, b);
       const Vector3 force = vector_at(wrenches, 2 * body.row), torque = vector_at(wrenches, 2 * body.row + 1);
-      const Vector3 v = body.start.twist.linear + 0.5 * h_ * body.inverse_mass * force;
-      at(left, b) << z.head<3>() - v, turning_residual(body, z.tail<3>(), torque);
+      const Vector3 v = body.start.twist.linear + body.reach * body.inverse_mass * force;
+      body.torque = body.start.pose.orientation.conjugate() * torque;
+      at(left, b) << z.head<3>() - v, turning_residual(body, z.tail<3>());
     }
     return left;
   }
 
-  // W - I^-1 (Pi + Pi')/2 with Pi' = cay(h W)^T (Pi + h q^T tau).
-  Vector3 turning_residual(const Body& body, const Vector3& w, const Vector3& torque) const {
+  // W - I^-1 (Pi + Pi')/2 with Pi' = cay(h W)^T (Pi + h q^T tau), Pi the momentum in slowed time.
+  Vector3 turning_residual(const Body& body, const Vector3& w) const {
     if (body.inverse_moments.isZero(0.0)) return w - body.start.pose.orientation.conjugate() * body.start.twist.angular;
-    const Vector3 pushed = body.momentum + h_ * (body.start.pose.orientation.conjugate() * torque);
+    const Vector3 pushed = body.momentum + 2.0 * body.reach * body.torque;
     const Vector3 end = cayley(h_ * w).conjugate() * pushed;
     return w - 0.5 * body.inverse_moments.cwiseProduct(body.momentum + end);
   }
@@ -305,7 +320,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   // it cannot be had any more.
   bool compose() {
     for (std::size_t b = 0; b < bodies_.size(); ++b) trial_.set(bodies_[b].row, middle_of(bodies_[b], at(unknown_, b)));
-    const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + 0.5 * h_, trial_, &jacobian_);
+    derivatives_->wrenches(request_->time() + 0.5 * h_, trial_, &jacobian_);
     if (!jacobian_.is_known()) return false;
     std::vector<Eigen::MatrixXd> matrices;
     std::vector<MiddleChange> changes;
@@ -313,8 +328,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       matrices.emplace_back(Eigen::MatrixXd::Zero(group.size(), group.size()));
       for (std::size_t m = 0; m < group.body.size(); ++m)
         matrices.back().block<6, 6>(first_of(m), first_of(m)) =
-            own_change(bodies_[group.body[m]], at(unknown_, group.body[m]),
-                       vector_at(wrenches, 2 * bodies_[group.body[m]].row + 1));
+            own_change(bodies_[group.body[m]], at(unknown_, group.body[m]));
     }
     for (std::size_t b = 0; b < bodies_.size(); ++b) changes.push_back(middle_change(bodies_[b], at(unknown_, b)));
     for (std::size_t i = 0; i < jacobian_.size(); ++i) {
@@ -325,9 +339,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       const Body& body = bodies_[group.body[pushed.place]];
       const Matrix6 force = jacobian_[i] * changes[group.body[by.place]];
       auto block = matrices[pushed.group - 1].block<6, 6>(first_of(pushed.place), first_of(by.place));
-      block.topRows<3>() -= 0.5 * h_ * body.inverse_mass * force.topRows<3>();
+      block.topRows<3>() -= body.reach * body.inverse_mass * force.topRows<3>();
       block.bottomRows<3>() -=
-          0.5 * h_ * torque_effect(body, at(unknown_, group.body[pushed.place])) * force.bottomRows<3>();
+          body.reach * torque_effect(body, at(unknown_, group.body[pushed.place])) * force.bottomRows<3>();
     }
     for (std::size_t g = 0; g < groups_.size(); ++g) groups_[g].factors.factorise(matrices[g]);
     return true;
@@ -349,14 +363,14 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return change;
   }
 
-  // Of the residual with the wrench as it is.
-  Matrix6 own_change(const Body& body, const Vector6& z, const Vector3& torque) const {
+  // Of the residual with the wrench as it was asked last.
+  Matrix6 own_change(const Body& body, const Vector6& z) const {
     Matrix6 change = Matrix6::Identity();
-    const Vector3 w = z.tail<3>(), here = turning_residual(body, w, torque);
+    const Vector3 w = z.tail<3>(), here = turning_residual(body, w);
     for (Eigen::Index k = 0; k < 3; ++k) {
       Vector3 shifted = w;
       shifted[k] += shift(z, k + 3);
-      change.block<3, 1>(3, 3 + k) = (turning_residual(body, shifted, torque) - here) / (shifted[k] - w[k]);
+      change.block<3, 1>(3, 3 + k) = (turning_residual(body, shifted) - here) / (shifted[k] - w[k]);
     }
     return change;
   }
@@ -386,17 +400,28 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   BodyState end_of(std::size_t b) {
     const Body& body = bodies_[b];
     const Vector6 z = at(unknown_, b);
-    const Vector3 v = 2.0 * z.head<3>() - body.start.twist.linear;
     const Vector3 w = z.tail<3>();
     BodyState end = body.start;
     end.pose.position = displaced(body.start.pose, h_ * z.head<3>(), Vector3::Zero()).position;
-    if (!w.isZero(0.0)) end.pose.orientation = normalized(body.start.pose.orientation * cayley(h_ * w));
+    const Quaternion turn = cayley(h_ * w);
+    if (!w.isZero(0.0)) end.pose.orientation = normalized(body.start.pose.orientation * turn);
     // 2 I W = Pi + Pi'
-    const Vector3 momentum = 2.0 * body.moments.cwiseProduct(w) - body.momentum;
+    Vector3 v = 2.0 * z.head<3>() - body.start.twist.linear;
+    Vector3 momentum = 2.0 * body.moments.cwiseProduct(w) - body.momentum;
+    Vector3 steady = body.start.twist.angular;  // of a body that nothing turns
+    if (body.damping != 0.0) {
+      const double kept = damping_factor(body.damping, h_), slowed = damped_time(body.damping, h_);
+      v = kept * body.undamped.linear + slowed / body.reach * (z.head<3>() - body.start.twist.linear);
+      // out of slowed time, in axes of the end; 2 reach tau of torques
+      const Vector3 free = turn.conjugate() * body.momentum, pushed = momentum - free;
+      momentum = kept * h_ / slowed * free;
+      if (!body.torque.isZero(0.0)) momentum += 0.5 * slowed / body.reach * pushed;
+      steady = kept * body.undamped.angular;
+    }
     const Vector3 turning = body.inverse_moments.isZero(0.0)
-                                ? body.start.twist.angular
+                                ? steady
                                 : Vector3(end.pose.orientation * body.inverse_moments.cwiseProduct(momentum));
-    end.twist = {body.kept * v, body.kept * turning};
+    end.twist = {v, turning};
     return end;
   }
 
