@@ -85,7 +85,7 @@ void LocalMotion::find_known() {
   }
 }
 
-LocalMotion::Passed LocalMotion::passed(const Known& known, double damping, double elapsed) {
+DampedMotion LocalMotion::passed(const Known& known, double damping, double elapsed) {
   if (damping == 0.0) return {};
   const double kept = damping_factor(damping, elapsed), slowed = damped_time(damping, elapsed);
   return {elapsed * known.lasting.linear + slowed * known.fading.linear,
@@ -101,7 +101,7 @@ void LocalMotion::write(const stage::IntegratorIntegrateReply& reply) const {
 BodyState LocalMotion::state_of(const Body& body, const Numbers& y, double elapsed) {
   if (body.damping == 0.0)
     return {displaced(body.start.pose, y.segment<3>(0), y.segment<3>(3)), {y.segment<3>(6), y.segment<3>(9)}};
-  const Passed known = passed(body.known, body.damping, elapsed);
+  const DampedMotion known = passed(body.known, body.damping, elapsed);
   return {displaced(body.start.pose, known.moved + y.segment<3>(0), known.turned + y.segment<3>(3)),
           {known.twist.linear + y.segment<3>(6), known.twist.angular + y.segment<3>(9)}};
 }
@@ -129,7 +129,7 @@ bool LocalMotion::evaluate(double elapsed, const Eigen::VectorXd& y, Eigen::Vect
       rate << state.twist.linear, rotation_vector_rate(at.segment<3>(3), state.twist.angular), a.linear, a.angular;
       continue;
     }
-    const Passed known = passed(bodies_[b].known, damping, elapsed);
+    const DampedMotion known = passed(bodies_[b].known, damping, elapsed);
     const Twist& lasting = bodies_[b].known.lasting;
     rate << at.segment<3>(6),
         rotation_vector_rate(known.turned + at.segment<3>(3), state.twist.angular) - known.twist.angular,
@@ -271,8 +271,8 @@ Eigen::VectorXd LocalMotion::around_end(double later, const Eigen::VectorXd& y) 
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     const Body& body = bodies_[b];
     const Numbers at = y.segment<kNumbers>(first_number(b));
-    const Passed before = passed(body.last_known, body.damping, body.last_step + later);
-    const Passed now = passed(body.known, body.damping, later);
+    const DampedMotion before = passed(body.last_known, body.damping, body.last_step + later);
+    const DampedMotion now = passed(body.known, body.damping, later);
     const Vector3 turn = log_rotation(
         shorter_arc(exp_rotation(before.turned + at.segment<3>(3)) * exp_rotation(body.last_turned).conjugate()));
     around.segment<kNumbers>(first_number(b)) << before.moved + at.segment<3>(0) - body.last_moved - now.moved,
@@ -292,7 +292,7 @@ void LocalMotion::accept(double h, const Eigen::VectorXd& y) {
     Body& body = bodies_[b];
     Numbers end = y.segment<kNumbers>(first_number(b));
     flush(end);
-    const Passed known = passed(body.known, body.damping, h);
+    const DampedMotion known = passed(body.known, body.damping, h);
     body.last_step = h, body.last_known = body.known;
     body.last_moved = known.moved + end.segment<3>(0), body.last_turned = known.turned + end.segment<3>(3);
     body.start = state_of(body, end, h);

@@ -93,18 +93,14 @@ class LocalMotion {
     Known last_known = {};
     Vector3 last_moved = Vector3::Zero(), last_turned = Vector3::Zero();
   };
-  // What a body of a known motion has moved and turned by (x_c, r_c), and its velocities.
-  struct Passed {
-    Vector3 moved = Vector3::Zero(), turned = Vector3::Zero();
-    Twist twist;
-  };
   // Of a movable body: its group, and its place there.
   struct Member {
     Group* group = nullptr;
     std::size_t place = 0;
   };
 
-  static Passed passed(const Known& known, double damping, double elapsed);
+  // x_c, r_c, v_c, w_c.
+  static DampedMotion passed(const Known& known, double damping, double elapsed);
   static BodyState state_of(const Body& body, const Numbers& y, double elapsed);
   void find_known();
   void start_inner_step();
