@@ -111,7 +111,7 @@ std::vector<JacobianBlock> ReactionSolver::forced_blocks(std::uint32_t by) const
 ReactionSolver::JointState ReactionSolver::state_of(const Joint& joint) {
   const Discrepancy& d = at_pose(joint);
   const Matrix3 axes = to_rotation_matrix(d.axes);
-  const Arms arms = arms_of(d, joint);
+  const Arms arms = arms_of(d, axes, joint);
   JointState state;
   for (int axis = 0; axis < 3; ++axis) {
     if (holds_always(d, axis)) state.rows[static_cast<std::size_t>(axis)] = row_of_axis(d, axes, axis, arms, joint);

@@ -57,8 +57,8 @@ class ReactionSolver {
 
   // What the rows of a discrepancy's points share.
   struct Arms {
-    Vector3 arm1, arm2;
-    Vector3 bend;  // what velocities alone do to x2 - x1, seen from axes that turn with body 1
+    Vector3 arm1, arm2;  // of body 1 to where x2 is but for what the held axes are off by
+    Vector3 bend;        // what velocities alone do to the distance of those two, seen from axes that turn with body 1
     double reach;
   };
 
@@ -125,7 +125,7 @@ class ReactionSolver {
   // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's or
   // twist's, which is to first order.
   const Discrepancy& at_pose(const Joint& joint);
-  Arms arms_of(const Discrepancy& d, const Joint& joint) const;
+  Arms arms_of(const Discrepancy& d, const Matrix3& axes, const Joint& joint) const;
   Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
   Row axis_row(const Discrepancy& d, const Vector3& axis, const Arms& arms, const Joint& joint) const;
 

@@ -30,6 +30,15 @@ bool holds_always(const Discrepancy& d, int axis) {
   }
 }
 
+namespace {
+
+// True where the error along an axis of points is the target, but for the error of the state.
+bool holds_place(const Discrepancy& d, int axis) {
+  return holds_always(d, axis) && axis_mode(d.modes, axis) != AxisMode::kDriven && !(d.is_radial() && axis == 0);
+}
+
+}  // namespace
+
 double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   request_ = &request;
   has_moved_ = agrees_ = false;
@@ -134,7 +143,7 @@ void ReactionSolver::load_springs() {
     const Discrepancy& d = joint.discrepancy;
     if (!acts_as_force(d, 0) && !acts_as_force(d, 1) && !acts_as_force(d, 2)) continue;
     const Matrix3 axes = to_rotation_matrix(d.axes);
-    const Arms arms = arms_of(d, joint);
+    const Arms arms = arms_of(d, axes, joint);
     for (int axis = 0; axis < 3; ++axis) {
       if (!acts_as_force(d, axis)) continue;
       const Spring& spring = springs_.emplace_back(spring_of(d, axes, axis, arms, joint));
@@ -163,7 +172,7 @@ void ReactionSolver::make_rows() {
     joint.first_row = rows_.size();
     const Discrepancy& d = at_pose(joint);
     const Matrix3 axes = to_rotation_matrix(d.axes);
-    const Arms arms = arms_of(d, joint);
+    const Arms arms = arms_of(d, axes, joint);
     for (int axis = 0; axis < 3; ++axis) {
       if (!holds_always(d, axis)) continue;
       Row row = row_of_axis(d, axes, axis, arms, joint);
@@ -209,15 +218,21 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
   return d;
 }
 
-ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Joint& joint) const {
+ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Matrix3& axes, const Joint& joint) const {
   if (d.is_angular()) return {};
   const Body &first = bodies_[joint.body1], &second = bodies_[joint.body2];
   // a drive acts where it is in body 1
   const Vector3 at = holds_pose(d) ? d.point2 : d.point1;
   Arms arms{at - first.pose.position, at - second.pose.position, {}, 0.0};
-  const Vector3 relative = second.velocity_at(arms.arm2) - first.velocity_at(arms.arm1);
-  arms.bend =
-      second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(relative);
+  Vector3 along = second.velocity_at(arms.arm2) - first.velocity_at(arms.arm1);
+  // body 1 is pushed at its own point: what an error of the state adds to its arm would turn light bodies
+  for (int k = 0; k < 3; ++k) {
+    if (!holds_place(d, k)) continue;
+    const Vector3 axis = axes.col(k);
+    arms.arm1 -= (axis.dot(d.point2 - d.point1) - target(d, k)) * axis;
+    along -= (axis.dot(along) - axis.dot(d.velocity)) * axis;
+  }
+  arms.bend = second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(along);
   arms.reach = longer_arm(first, arms.arm1, second, arms.arm2);
   return arms;
 }

@@ -6,11 +6,16 @@
 // the velocities alone do to the second derivative of each row's error. Points of a discrepancy are carried by their
 // bodies, its axes by body 1, a radial axis by its points; with w the relative velocity of the points seen from body 1,
 //
-//   along an axis      gamma = a.(w2 x (w2 x r2) - w1 x (w1 x r1) - 2 w1 x w),   r1, r2 the arms to body 2's point
+//   along an axis      gamma = a.(w2 x (w2 x r2) - w1 x (w1 x r1) - 2 w1 x w),   r2 the arm to body 2's point, r1 to where
+//                      that is once the held axes are at their targets, w along the other axes
 //   radial, e = x2-x1  gamma = e.(w2 x (w2 x r2) - w1 x (w1 x r1))/|e| + (|e'|^2 - (e.e'/|e|)^2)/|e|
 //   about an axis      gamma = (w1 x a).(w2 - w1)
 //   swing, a = s x r/|s x r|  gamma = a'.(w2 - w1), s turning with body 1 and r with body 2
 //   twist, a = (s + r)/|s + r|  the same
+//
+// States that an integrator tries are off by an error e of its own. Each body is pushed at its own point, so that a joint of
+// points is exactly e'' = 0 in them, too: at one point for both, a body with a small I would feel e x force / I, and turn
+// away from step to step.
 //
 // Held are axes that hold always: locked, or limited with one limit, without compliance; driven ones without damping;
 // all without a bound on the force.

@@ -108,6 +108,41 @@ TEST(Reactions, NearASingularConfigurationAreThoseOfTheNearestStateThatAgrees) {
   }
 }
 
+// A ball that holds a load by its centre, in a state where the two are off by e: it is pushed at its centre still, as a torque
+// e x force would turn a small ball ever faster.
+TEST(Reactions, OfAStateThatIsOffTheJointTurnNoBallHeldByItsCentre) {
+  const double e = 1e-3;
+  for (const bool is_first : {true, false}) {
+    Problem problem;
+    const std::uint32_t ball = problem.add_body(1.0, {0, 0, 0}, {0, 0, 0}, {3, 0, 0});
+    const std::uint32_t load = problem.add_body(2.0, {0, e, 0}, {0, 0, 0}, {0, 0, 0});
+    Discrepancy d;
+    (is_first ? d.point2 : d.point1) = Vector3(0, e, 0);
+    problem.add_joint(is_first ? ball : load, is_first ? load : ball, d);
+    problem.solve();
+    // 3 N move 3 kg
+    EXPECT_LT((problem.reaction(load) - Vector3(2, 0, 0)).norm(), 1e-15);
+    EXPECT_EQ(problem.torque(ball), Vector3::Zero());
+    EXPECT_EQ(problem.torque(load), Vector3::Zero());
+  }
+}
+
+// What is not held is no error: a load that has slid 2 m along a guide presses on it there.
+TEST(Reactions, OfAGuideActWhereItsLoadIs) {
+  Problem problem;
+  const std::uint32_t guide = problem.add_body(2.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+  const std::uint32_t load = problem.add_body(1.0, {2, 0, 0}, {0, 0, 0}, {0, 5, 0});
+  Discrepancy d;
+  d.point2 = Vector3(2, 0, 0);
+  d.modes = pack_modes(AxisMode::kFree, AxisMode::kLocked, AxisMode::kLocked);
+  problem.add_joint(guide, load, d);
+  problem.solve();
+  // R (1/2 + 2^2/3 + 1) = 5 N, I_z = 3
+  const double force = 5.0 / (0.5 + 4.0 / 3.0 + 1.0);
+  EXPECT_NEAR(problem.reaction(guide).y(), force, 1e-14);
+  EXPECT_NEAR(problem.torque(guide).z(), 2.0 * force, 1e-14);
+}
+
 TEST(Reactions, CarryTheAccelerationOfAKinematicBody) {
   Problem problem;
   const std::uint32_t driven = problem.add_body(0.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
