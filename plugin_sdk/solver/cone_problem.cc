@@ -342,13 +342,29 @@ double ConeProblem::correct(const SolverBodies& bodies, const BodyMotion& x0, do
   return contradiction;
 }
 
+namespace {
+
+// True if a residual that shrinks at a rate is enough after so many times more.
+bool will_do(double residual, double rate, double enough, std::uint32_t times) {
+  if (!(rate < 1.0)) return false;
+  for (; times > 0 && residual > enough; --times) residual *= rate;
+  return residual <= enough;
+}
+
+}  // namespace
+
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
   // Newton steps without a residual half as large before the next guess
   constexpr int kPatience = 7;
   // much holds the multipliers of rows that depend on each other where they are (1e-6: directions of friction, too, which a
   // slip that ends needs to 1e-9), little lets those that nearly do settle
   const auto proximal_after = [&](int without) { return without < 2 ? settings.proximal : without < 5 ? 1e-8 : 1e-10; };
-  const bool is_newton = settings.method == ConeMethod::kNewton;
+  // sweeps of kGaussSeidel before it is asked if they will do: what some steps of Newton's cost
+  constexpr std::uint32_t kLeastTrial = 64;
+  const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
+  // where sweeps will not, steps take over
+  bool is_newton = settings.method == ConeMethod::kNewton;
+  std::uint32_t most_steps = settings.iterations;
   double most = 0.0;
   for (const std::uint32_t r : other_) most = std::max(most, scale_[r] * rows[r].length);
   for (;;) {
@@ -368,7 +384,16 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     int without = 0;
     bool holds = true;  // of kGaussSeidel: nothing has slid yet
     double attempt = best;
-    std::uint32_t done = 0, guess = 0;
+    std::uint32_t done = 0, guess = 0, sweeps = 0;
+    double swept_to = best;
+    const auto start_newton = [&] {
+      is_newton = true;
+      lambda = swept = start = best_lambda, y = best_y;
+      attempt = best;
+      summary->iterations += done;
+      most_steps = ConeSettings{}.iterations;
+      done = 0, without = 0;
+    };
     // what touches without a push is held, too, at first: a stack that is let go is found in a step, not in one for each body
     const auto takes_step = [&] {
       const bool may_hold = is_newton ? done == 0 : holds && without < kPatience;
@@ -377,13 +402,14 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     };
     // what rounding leaves of sums of large terms is no violation
     double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
-    while (best > enough && done < settings.iterations && (!is_newton || without < kPatience || guesses.has_next())) {
+    while (best > enough && (!is_newton || (done < most_steps && (without < kPatience || guesses.has_next())))) {
       const double before = best;
+      if (!is_newton && done >= most_steps) start_newton();
       if (takes_step()) {
         ++done, ++without;
       } else if (!is_newton) {
-        if (holds) lambda = best_lambda, y = best_y, holds = false;
-        ++done;
+        if (holds) lambda = best_lambda, y = best_y, holds = false, swept_to = best;
+        ++done, ++sweeps;
         sweep(&lambda, &y);
       } else {
         lambda = start, y = start_others_ + response_ * lambda;
@@ -405,6 +431,10 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       const double residual = keep_better();
       if (residual < 0.5 * attempt) without = 0;
       if (residual < attempt) attempt = residual, start = lambda;
+      if (!is_newton && !holds && sweeps % trial == 0) {
+        if (!will_do(best, best / swept_to, enough, (most_steps - done) / trial)) start_newton();
+        swept_to = best;
+      }
       if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
     // one step more costs little and ends at rounding

@@ -25,7 +25,8 @@
 //                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
 //                   anew, from the guesses of cone_path.h, and every third time from sweeps.
 //     kGaussSeidel  as long as nothing slides, the same steps; then projected block Gauss-Seidel, each contact solved exactly
-//                   (coulomb_contact.h).
+//                   (coulomb_contact.h). Where the residual shrinks too slowly for the sweeps that are left, or they ran
+//                   out, kNewton goes on from the best of them.
 //  4. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
 //     with mu_d.
 //
@@ -75,11 +76,11 @@ enum class ConeMethod : std::uint8_t { kNewton, kGaussSeidel };
 
 struct ConeSettings {
   ConeMethod method = ConeMethod::kNewton;
-  double tolerance = 1e-12;  // of the largest velocity (length) that meets in a row
-  std::uint32_t iterations = 500;
-  double proximal = 1e-7;  // added to the diagonal of the first steps
-  bool may_rest = false;   // the first guess is kept where it is wrong by what rounding moves a body at rest
-  bool is_rough = false;   // rows that hold always are left as a first solution leaves them; refine() is to come
+  double tolerance = 1e-12;        // of the largest velocity (length) that meets in a row
+  std::uint32_t iterations = 500;  // steps, or sweeps: steps that go on where these do not do are the 500 in any case
+  double proximal = 1e-7;          // added to the diagonal of the first steps
+  bool may_rest = false;           // the first guess is kept where it is wrong by what rounding moves a body at rest
+  bool is_rough = false;  // rows that hold always are left as a first solution leaves them; refine() is to come
 };
 
 struct ConeSummary {
@@ -109,6 +110,9 @@ class ConeProblem {
 
   // True if all rows that push anything hold always, in the problem that was solved last.
   bool holds_all() const { return other_.empty(); }
+
+  // True if the problem that was solved last had too many rows for steps of Newton's.
+  bool is_large() const { return other_.size() > kDenseRows; }
 
   // One step towards what rows ask for that differ little from those which were solved last, with their factors. Returns
   // by how much they contradict each other, as reconcile(). Precondition: holds_all().

@@ -43,8 +43,9 @@ ConeSummary IslandSolver::solve(Host& host) {
     host.mark_progress();
     has_settled_ = !set_offset(share);
     if (has_settled_) break;
-    // what two rounds cannot solve the others could not either; sweeps go on from round to round
-    failures = has_velocity_ || settings_.method == ConeMethod::kGaussSeidel ? 0 : failures + 1;
+    // what two rounds cannot solve the others could not either; sweeps that no steps followed go on from round to round
+    const bool goes_on = settings_.method == ConeMethod::kGaussSeidel && cone_.is_large();
+    failures = has_velocity_ || goes_on ? 0 : failures + 1;
     if (failures == 2) break;
   }
   // where they do not settle, the pose change stays that of the impulses before: it must not move rows away

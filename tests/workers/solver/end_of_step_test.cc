@@ -151,35 +151,28 @@ TEST(EndOfStep, HeapsThatRollSettle) {
 
 // Coulomb's law may have several solutions: sweeps need not find the one that steps find, but one.
 TEST(EndOfStep, SweepsEndAtASolutionToo) {
-  int converged = 0;
-  const int seeds = harness::unless_sanitized(40);
-  for (int seed = 1; seed <= seeds; ++seed) {
-    const Heap heap = random_heap(seed);
-    const SolverAnswer sweeps = heap.problem.solve(direct(20000));
-    if (!sweeps.converged()) continue;  // linear convergence may be slow
-    EXPECT_LE(contact_residual(heap, sweeps), 1e-10) << seed;
-    ++converged;
+  for (const double heaviest : {1.0, 1e5}) {
+    for (int seed = 1; seed <= harness::unless_sanitized(40); ++seed) {
+      const Heap heap = random_heap(seed, heaviest);
+      const SolverAnswer answer = heap.problem.solve(direct());
+      EXPECT_TRUE(answer.converged()) << heaviest << ", " << seed;
+      EXPECT_LE(contact_residual(heap, answer), 1e-10) << heaviest << ", " << seed;
+    }
   }
-  EXPECT_GE(converged, seeds / 4 * 3);
 }
 
-// Where friction moves the pose, sweeps that ran out go on in the next round: all rounds are used before Direct gives up. Bodies
-// that slide past each other with little friction, since what sticks is found without sweeps.
-TEST(EndOfStep, SweepsGoOnFromRoundToRound) {
-  constexpr std::uint32_t kSweeps = 20;
-  int unfinished = 0;
+// Bodies that slide past each other with little friction, since what sticks is found without sweeps: what Newton solves is
+// solved, however few the sweeps.
+TEST(EndOfStep, WhereSweepsRunOutStepsTakeOver) {
   for (int seed = 1; seed <= 20; ++seed) {
     Heap heap = random_heap(seed, 1.0, {.friction_share = 0.1});
     SolverProblem& p = heap.problem;
     p.theta = 0.5;
     for (std::size_t body = 1; body < p.flags.size(); ++body)
       p.trial_linear_velocity[3 * body] += body % 2 == 0 ? 10.0 : -10.0;
-    const SolverAnswer answer = p.solve(direct(kSweeps));
-    if (answer.converged()) continue;
-    ++unfinished;
-    EXPECT_GE(answer.iterations[0], 12 * kSweeps) << seed;
+    for (const std::uint32_t sweeps : {1U, 20U, 1000U})
+      EXPECT_TRUE(p.solve(direct(sweeps)).converged()) << sweeps << ", " << seed;
   }
-  EXPECT_GT(unfinished, 0);
 }
 
 TEST(EndOfStep, EnergyNeverRises) {

@@ -4,11 +4,11 @@
 // dependent rows (plugin_sdk/solver/profile_ldlt.h); contacts, limits and drives feel each other through what is left
 // and are solved by projected Gauss-Seidel sweeps, each contact exactly (plugin_sdk/solver/cone_problem.h,
 // kGaussSeidel), or, with ContactSolver = "Newton", as Newton does. As long as nothing slides it takes Newton's steps in
-// any case: stacks stand at any ratio of mass.
+// any case, and where sweeps do not converge: stacks stand at any ratio of mass, and what Newton solves is solved.
 //
 // Order: S_{n+1} is of first order in h (with the simulator Smooth, that of the integrator); joints are closed to
-// rounding at every mass ratio. Sweeps converge linearly, the slower the more contacts carry one another: piles that
-// slide are for Newton. `stop_reason` and `residual` say when they ran out. Other limits: those of Newton.
+// rounding at every mass ratio. Sweeps converge linearly, the slower the more contacts carry one another: in piles that
+// slide most are for nothing. `stop_reason` and `residual` say when steps, too, ran out. Other limits: those of Newton.
 #include "plugin_sdk/solver/end_of_step.h"
 #include "plugin_sdk/solver/reactions.h"
 
@@ -34,7 +34,8 @@ class Direct final : public SolverPlugin {
                                   .defaults_to({1000.0})
                                   .live()
                                   .means("Largest number of sweeps (Newton: steps) of one solution; fewer where it "
-                                         "converges. Above 900 rows of contacts ten times as many.")};
+                                         "converges. Where sweeps do not, up to 500 steps follow. Above 900 rows of "
+                                         "contacts ten times as many sweeps alone.")};
     return declaration;
   }
 
