@@ -20,6 +20,12 @@
 // velocity row's arms end at each body's own surface point, which is where the two meet when the gap is closed (a ball that
 // sank by d rolls on its radius, not on a radius less d/2).
 //
+// Contacts may contradict each other: bodies that lie in one place are pushed off each other in a circle. Where no pose change
+// meets them (it goes beyond the bound below, or does not converge and misses a tenth of the deepest overlap, which is more
+// than the step's longest way and a tenth of the smallest radius of gyration), contacts of two bodies that can be pushed get a
+// compliance, 0.1 to 1 of their own response and rising in their order, so that some part and the next step sees in which
+// direction; the others 1e-6 of it.
+//
 // Recovery is bounded: contacts that leave a body no room (walls that crush it, shapes one in another) ask for a pose change
 // without end. Where it goes beyond 16 times the ways of the step (S_n to S*, and h v*) and twice what is overlapped at S*,
 // summed over the island, all of it is shortened, and what overlaps stays for the steps to come.

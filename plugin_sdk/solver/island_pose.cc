@@ -1,6 +1,7 @@
 // The pose change: Newton's method on what rows miss at the end of the step.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/island_solver.h"
@@ -8,6 +9,20 @@
 namespace gravitas {
 
 void IslandSolver::solve_pose() {
+  find_pose();
+  if (!yields_ && contradicts()) {
+    yields_ = true;
+    forget_corrections();
+    find_pose();
+  }
+  const double share = shorten(offset_, &displacement_);
+  if (share == 1.0) return;
+  for (ConeRow& row : cone_.rows) row.multiplier *= share;
+  keep_corrections();
+  move_to_end();
+}
+
+void IslandSolver::find_pose() {
   settings_.is_rough = true;
   ShrinkingSteps steps;
   for (bool is_last = false; !is_last;) {
@@ -32,16 +47,57 @@ void IslandSolver::solve_pose() {
     }
     summary_.iterations += solved.iterations;
     has_pose_ = solved.has_converged && (has_ended || !is_last);
+    missed_ = solved.residual;
     move_to_end(std::move(next));
     keep_corrections();
     if (!is_last && may_chord) is_last = follow_chords(change);
   }
   settings_.is_rough = false;
-  const double share = shorten(offset_, &displacement_);
-  if (share == 1.0) return;
-  for (ConeRow& row : cone_.rows) row.multiplier *= share;
-  keep_corrections();
-  move_to_end();
+}
+
+bool IslandSolver::contradicts() const {
+  double deepest = 0.0;
+  for (const EndContact& contact : contacts_) deepest = std::max(deepest, contact.gap_target);
+  const double moved = largest_change(displacement_, offset_);
+  const bool is_missed = !has_pose_ && missed_ > kOfDepth * deepest;
+  if (!is_missed && !(moved > kOfOverlap * deepest)) return false;
+  // what the step alone made overlap had room before it, and only deep in each other bodies are pushed in circles
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const std::uint32_t i : pushed_) smallest = std::min(smallest, kOfSize * gyration_[i]);
+  return deepest > smallest && deepest > largest_way() && (is_missed || moved > most_of(moved));
+}
+
+void IslandSolver::forget_corrections() {
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k) answer_.joint_correction[3 * joint.row + k] = 0.0;
+  for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = 0.0;
+  move_to_end(start_motion(nullptr));
+}
+
+// A contact's compliance, of its response: pairs of movable bodies give way, each more than those before it, so that of a
+// circle of equals one is left open; what does not move hardly gives way.
+std::vector<double> IslandSolver::yielding() const {
+  constexpr double kLeast = 0.1, kMost = 1.0, kOfImmovable = 1e-6;
+  const auto is_of_two = [&](const EndContact& c) {
+    return bodies_[c.body1].is_pushed() && bodies_[c.body2].is_pushed();
+  };
+  std::vector<double> share;
+  double pairs = -1.0;
+  std::uint32_t one = kNone, two = kNone;
+  for (const EndContact& contact : contacts_) {
+    if (!is_of_two(contact)) {
+      share.push_back(-1.0);
+      continue;
+    }
+    if (contact.body1 != one || contact.body2 != two) pairs += 1.0;
+    one = contact.body1, two = contact.body2;
+    share.push_back(pairs);
+  }
+  for (double& of : share) {
+    const double place = pairs > 0.0 ? of / pairs : 0.0;
+    of = of < 0.0 ? kOfImmovable : kLeast + (kMost - kLeast) * place * place;
+  }
+  return share;
 }
 
 bool IslandSolver::follow_chords(double before) {
@@ -92,9 +148,7 @@ bool IslandSolver::are_closed() const {
 
 double IslandSolver::shorten(const BodyMotion& from, BodyMotion* motion) const {
   if (contacts_.empty()) return 1.0;
-  const double moved = largest_change(*motion, from);
-  double most = kOfOverlap * sum_of_overlaps(joints_, contacts_);
-  if (moved > most) most += kOfWay * sum_of_ways();
+  const double moved = largest_change(*motion, from), most = most_of(moved);
   if (!(moved > most)) return 1.0;
   const double share = most / moved;
   for (const std::uint32_t i : pushed_) {
@@ -104,12 +158,28 @@ double IslandSolver::shorten(const BodyMotion& from, BodyMotion* motion) const {
   return share;
 }
 
+double IslandSolver::most_of(double moved) const {
+  const double of_overlap = kOfOverlap * sum_of_overlaps(joints_, contacts_);
+  return moved > of_overlap ? of_overlap + kOfWay * sum_of_ways() : of_overlap;
+}
+
+template <class Use>
+void IslandSolver::for_ways(Use&& use) const {
+  for (const std::uint32_t i : pushed_) use(way_of(bodies_[i], gyration_[i], request_.time_step()));
+  for (const EndContact& c : contacts_)
+    use(way_of(vector_at(request_.contact_point(), c.row), bodies_[c.body1], bodies_[c.body2]));
+}
+
 double IslandSolver::sum_of_ways() const {
   double sum = 0.0;
-  for (const std::uint32_t i : pushed_) sum += way_of(bodies_[i], gyration_[i], request_.time_step());
-  for (const EndContact& c : contacts_)
-    sum += way_of(vector_at(request_.contact_point(), c.row), bodies_[c.body1], bodies_[c.body2]);
+  for_ways([&](double way) { sum += way; });
   return sum;
+}
+
+double IslandSolver::largest_way() const {
+  double largest = 0.0;
+  for_ways([&](double way) { largest = std::max(largest, way); });
+  return largest;
 }
 
 void IslandSolver::build_pose() {
@@ -137,6 +207,13 @@ void IslandSolver::build_pose() {
     row.law.has_lower = true;
     row.law.lower_target = contact.gap_target;
     row.multiplier = answer_.contact_correction[contact.row];
+  }
+  if (!yields_) return;
+  ConeRow* row = cone_.rows.data() + cone_.rows.size() - contacts_.size();
+  for (const double share : yielding()) {
+    const double masses = bodies_[row->body1].inverse_mass + bodies_[row->body2].inverse_mass;
+    row->law.gamma = share * row->direction.product(row->direction, masses);
+    ++row;
   }
 }
 

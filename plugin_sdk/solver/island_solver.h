@@ -23,6 +23,9 @@ class IslandSolver {
   static constexpr int kRounds = 12, kFreeRounds = 4, kRoundsOfLowering = 4, kPoseSteps = 30;
   // Corrections move a body by no more than so many times the ways to S* and what is overlapped or missed there, summed.
   static constexpr double kOfWay = 16.0, kOfOverlap = 2.0;
+  // Contacts contradict each other where a solution that does not converge misses so much of the deepest, and that is so much
+  // of the smallest radius of gyration.
+  static constexpr double kOfDepth = 0.1, kOfSize = 0.1;
   // Largest turn from which chords start, rad; what one may be of the step before it; units of rounding, of the coordinates
   // or of an angle of 1, that may be left of what joints hold.
   static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;
@@ -75,6 +78,13 @@ class IslandSolver {
 
   // Precondition: bodies and joints are where displacement_ ends.
   void solve_pose();
+  void find_pose();
+
+  // True where no motion meets all contacts, as of bodies that lie in one place and each push the next away. They give way
+  // then (least squares), so that the others are met: next step's contacts are those of where that left the bodies.
+  bool contradicts() const;
+  void forget_corrections();
+  std::vector<double> yielding() const;
 
   // After a step that changed ways by `before`: steps with the rows of where displacement_ ends but the factors of that step.
   // True if they end at rounding, false where they do not shrink fast.
@@ -93,7 +103,13 @@ class IslandSolver {
   // from `from` that is left.
   double shorten(const BodyMotion& from, BodyMotion* motion) const;
 
+  // The most that corrections may move a body by, if one has moved so far.
+  double most_of(double moved) const;
+  // Of bodies and of where they touch, m.
+  template <class Use>
+  void for_ways(Use&& use) const;
   double sum_of_ways() const;
+  double largest_way() const;
 
   void build_pose();
   void build_turns_of_rod(EndJoint* joint);
@@ -164,6 +180,8 @@ class IslandSolver {
   int round_ = 0;
   StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
+  bool yields_ = false;  // contacts, in the pose change
+  double missed_ = 0.0;  // by the pose change, m
 };
 
 }  // namespace gravitas

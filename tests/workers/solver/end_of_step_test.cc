@@ -175,6 +175,34 @@ TEST(EndOfStep, WhereSweepsRunOutStepsTakeOver) {
   }
 }
 
+// Three bodies of one place, each to be pushed off the next in a circle, which no motion does: they part as far as they can, none
+// sinks into the ground that they overlap by a millimetre, and nobody gains speed.
+TEST(EndOfStep, BodiesOfOnePlacePartAndDoNotSink) {
+  for (const EndOfStepSolver& solver : {newton(), direct()}) {
+    for (const double heaviest : {1.0, 100.0}) {
+      SolverProblem p;
+      const std::uint32_t ground = p.add_immovable();
+      for (const double mass : {1.0, heaviest, 1.0}) p.add_body({.mass = mass});
+      p.make_trial(Vector3::Zero());
+      std::uint64_t key = 1;
+      for (std::uint32_t body = 1; body <= 3; ++body) {
+        p.add_contact({.body1 = ground, .body2 = body, .depth = 1e-3, .key = key++});
+        p.add_contact({.body1 = body, .body2 = body % 3 + 1, .normal = Vector3::UnitX(), .depth = 1.0, .key = key++});
+      }
+      const SolverAnswer answer = p.solve(solver);
+      std::vector<double> places;
+      for (std::uint32_t body = 1; body <= 3; ++body) {
+        EXPECT_NEAR(answer.translation(body).y(), 1e-3, 1e-8) << heaviest;
+        EXPECT_LE(answer.velocity(body).norm(), 1e-12) << heaviest;
+        places.push_back(answer.translation(body).x());
+        EXPECT_LE(std::fabs(places.back()), 1.0) << heaviest;
+      }
+      std::ranges::sort(places);
+      EXPECT_GE(std::min(places[1] - places[0], places[2] - places[1]), 0.05) << heaviest;
+    }
+  }
+}
+
 TEST(EndOfStep, EnergyNeverRises) {
   for (const double restitution : {0.0, 0.5, 1.0}) {
     for (int seed = 1; seed <= harness::unless_sanitized(100); ++seed) {
