@@ -29,7 +29,7 @@ class DurationHistogram {
     double seen = 0.0;
     for (std::uint32_t i = 0; i < kBuckets; ++i) {
       seen += buckets_[i];
-      if (seen >= wanted && seen > 0.0) return middle_ns(i) * 1e-3;
+      if (seen >= wanted && seen > 0.0) return std::min(middle_ns(i) * 1e-3, max_us());
     }
     return 0.0;
   }

@@ -83,6 +83,11 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
   if (options.duration) overrides.push_back(fmt::format("Simulator.Duration={:.17g}", *options.duration));
   for (const std::string& one : overrides) scene::apply_override(&document.scene(), one, &problems);
   require(problems);
+  // whatever the scene's Duration
+  if (options.steps && document.scene().has_simulator()) {
+    scene::v1::SimulatorProperties* simulator = document.scene().mutable_simulator()->mutable_custom_properties();
+    simulator->set_duration(*options.steps * simulator->time_step());
+  }
   for (const scene::SceneError& warning : problems.warnings) warnings->push_back(scene::to_string(warning));
 
   Catalog own;

@@ -269,6 +269,13 @@ class Run final : private kernel::CommitListener {
   // them. Swaps of the command line up to the checkpoint are done, or were refused.
   void apply_decisions(const Resumption& resumed, kernel::EnvironmentDescription* begun) {
     const std::uint32_t step = resumed.checkpoint.step();
+    for (const kernel::SwapOrder& one : swaps_)
+      if (one.step <= step && std::ranges::find(resumed.checkpoint.decisions(), slot_name(one.slot),
+                                                &recorder::v1::Decision::slot) == resumed.checkpoint.decisions().end())
+        warnings_.push_back(
+            fmt::format("--swap {} at step {}: the checkpoint of step {} knows of none there: it was refused "
+                        "then, or not ordered",
+                        slot_name(one.slot), one.step, step));
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
     try {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());

@@ -45,8 +45,13 @@ std::string hosts(const report::v1::Plan& plan) {
 std::string exchanges(const report::v1::Report& report) {
   std::string text;
   int survived = 0;
+  const auto is_lost = [](const report::v1::FaultRecord& fault) { return fault.recovered_by().starts_with("none"); };
   for (const report::v1::FaultRecord& fault : report.faults()) {
-    if (fault.recovered_by().starts_with("none")) continue;
+    // nor what came before another in a step that ended the run
+    if (std::ranges::any_of(report.faults(), [&](const report::v1::FaultRecord& other) {
+          return is_lost(other) && other.step() == fault.step() && other.slot() == fault.slot();
+        }))
+      continue;
     if (++survived <= static_cast<int>(kMostNamed))
       text += fmt::format("  survived: step {}, {} {}: {}; {} took over in {:.3g} ms\n", fault.step(), fault.slot(),
                           fault.plugin(), fault.kind(), fault.recovered_by(), 1e-3 * fault.recovery_us());

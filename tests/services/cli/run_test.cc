@@ -153,6 +153,16 @@ TEST(Run, TheTrajectoryHasARowPerMovingBodyAndSampleAndReadsBackExactly) {
   EXPECT_NEAR(std::stod(rows[21][10]), v, 1e-14);
 }
 
+// Without a Duration, which is 10 s then: more steps than can be counted.
+TEST(Run, StepsAreCountedWhateverTheDuration) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "short.gravitas", "Simulator { CustomProperties { TimeStep = 1e-9 } } Environment { Space { Bodies { } } }");
+  const ProgramResult result = run_program({"run", scene, "--steps", "10", "--hosting", "direct"}, folder);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("1e-08 s in 10 steps"));
+}
+
 TEST(Run, SamplesAreTheFirstBoundariesAtOrAfterTheIntervalAndTheLast) {
   const ScratchFolder folder;
   const std::string file = folder.path("motion.csv");

@@ -444,6 +444,19 @@ TEST(EditedRun, TheJournalKnowsTheEdits) {
   EXPECT_THAT(other.fault, HasSubstr("step 31 came out differently"));
 }
 
+TEST(EditedRun, WhatTheCheckpointWasNotEditedByIsNotPassedOver) {
+  BusyRun run;
+  run.options.steps = 40;
+  run.options.edits.resize(1);
+  const std::string made = run.options.edits[0];
+  run.options.checkpoint = run.folder.path("checkpoint");
+  run.run();
+  run.options.resume = std::exchange(run.options.checkpoint, "");
+  run.options.edits = {made, "set Body.A.Mass=3@step=35"};
+  EXPECT_THAT(run.refusal(),
+              HasSubstr("--edit before step 35: the run that the checkpoint of step 40 belongs to was not"));
+}
+
 // With a right checksum and wrong content.
 TEST(EditedRun, AnImpossibleEditOfACheckpointIsRefused) {
   const auto refusal_of = [](const std::function<void(recorder::v1::Checkpoint*)>& change) {
@@ -459,6 +472,7 @@ TEST(EditedRun, AnImpossibleEditOfACheckpointIsRefused) {
     change(&*checkpoint);
     replace_file(run.options.checkpoint, serialize_checkpoint(*checkpoint));
     run.options.resume = std::exchange(run.options.checkpoint, "");
+    run.options.edits.clear();
     return run.refusal();
   };
   EXPECT_THAT(refusal_of([](recorder::v1::Checkpoint* checkpoint) {
