@@ -106,25 +106,29 @@ void flatten_force(const TypeDeclaration& type, const v1::Force& force, const Id
 
 void complete_forces(BuildContext* context) {
   const auto written = static_cast<std::uint32_t>(context->description.forces.size());
+  std::set<std::uint32_t> named;
   for (std::uint32_t force = 0; force < written; ++force) {
     const TypeDeclaration& type = *type_of(context->description.forces[force], *context);
     for_each_property(type, &context->description.forces[force].parameters,
                       [&](const Property& property, const double* numbers) {
-                        if (property.kind == PropertyKind::kBody && !std::isnan(numbers[0]))
-                          add_reaction(force, static_cast<std::uint32_t>(numbers[0]), context);
+                        if (property.kind != PropertyKind::kBody || std::isnan(numbers[0])) return;
+                        named.insert(static_cast<std::uint32_t>(numbers[0]));
+                        add_reaction(force, static_cast<std::uint32_t>(numbers[0]), context);
                       });
     if (absent_gravity(type, &context->description.forces[force].parameters) != nullptr)
       float_bodies(force, type, context);
   }
   std::set<double> switches;
-  for (const kernel::BodyDescription& body : context->description.bodies) {
+  for (std::uint32_t i = 0; i < context->description.bodies.size(); ++i) {
+    const kernel::BodyDescription& body = context->description.bodies[i];
     for (const std::uint32_t row : body.forces) {
       const kernel::ForceDescription& force = context->description.forces[row];
       const std::vector<double> bends = bends_of(type_of(force, *context)->properties, force.parameters);
       switches.insert(bends.begin(), bends.end());
     }
-    // accelerations jump at the rows of a motion, and with Smooth those of what is jointed to it
-    if (context->description.simulator == kernel::Simulator::kSmooth)
+    // accelerations jump at the rows of a motion, with them what forces between the body and others do and, with Smooth, the
+    // accelerations of what is jointed to it
+    if (context->description.simulator == kernel::Simulator::kSmooth || named.contains(i))
       for (std::size_t row = 0; row < body.motion.size(); row += MotionCurve::kColumns)
         switches.insert(body.motion[row]);
   }

@@ -1,6 +1,7 @@
 // Forces that jump or bend at a time, within a step and at its end: what comes before the jump and what comes after do not mix.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "tests/scenes/scene_run.h"
@@ -88,6 +89,25 @@ TEST(SwitchedForce, ARampIsNotSteppedOver) {
       }
     }
   }
+}
+
+// A body on a spring whose other end follows a Motion with rows within steps, where its acceleration jumps.
+TEST(SwitchedForce, ASpringToAMotionKeepsTheOrder) {
+  const auto end = [](double time_step, const char* integrator) {
+    SceneRun run(R"(
+Forces { Force { Type = "Spring" Id = "Bound" CustomProperties { Stiffness = 30 Damping = 2 AnchorBody = "Hand" } } }
+Simulator { CustomProperties { Duration = 1 } }
+Environment { Space { Bodies {
+  Body { Id = "Hand" Kinematic = true Motion = {{0, {0, 0, 0}, {1, 0, 0, 0}}, {0.1337, {1, 0, 0}, {1, 0, 0, 0}}, {0.4113, {0, 0.5, 0}, {1, 0, 0, 0}}, {0.7771, {0, 0, 1}, {1, 0, 0, 0}}, {1.2, {1, 1, 1}, {1, 0, 0, 0}}} }
+  Body { Id = "Bob" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} } Forces = { "Bound" } } } } })",
+                 {set("Simulator.TimeStep", time_step), set("Integrator", std::string(integrator))});
+    run.to_end();
+    return run.body("Bob").pose.position;
+  };
+  const Vector3 exact = end(0.001, "DormandPrince853");
+  const double coarse = (end(0.02, "RK4") - exact).norm(), fine = (end(0.01, "RK4") - exact).norm();
+  EXPECT_LT(fine, 1e-6);
+  EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.6);
 }
 
 }  // namespace
