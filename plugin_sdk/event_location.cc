@@ -5,10 +5,18 @@
 #include <limits>
 
 namespace gravitas {
+namespace {
+
+// Of the gap that is not told from touching: overlap at which a pair that no contact was found for counts as pressed.
+constexpr double kMostUnseen = 1e4;
+
+}  // namespace
 
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight) {
   const double acceleration = (encounter.end_speed - encounter.start_speed) / length;
   const double time = encounter.fraction * length;
+  // what detectors and solvers do not tell from touching
+  const double near = std::max(encounter.slop, target_gap);
   const bool comes_back = encounter.start_speed > 0.0 && encounter.end_speed < 0.0;
   const double top = comes_back ? encounter.start_speed / -acceleration : 0.0;
   if (comes_back && top >= time) {
@@ -17,13 +25,15 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   }
   if (encounter.fraction <= 0.0) {
     const double closing = -encounter.start_speed;
-    if (encounter.gap <= target_gap || closing <= 0.0) return {length};
-    return {std::min(length, (encounter.gap + 2.0 * target_gap) / closing)};
+    if (encounter.is_touching || encounter.gap < -kMostUnseen * near || closing <= 0.0) return {length};
+    return {std::min(length, (std::fabs(encounter.gap) + 2.0 * target_gap) / closing)};
   }
-  if (encounter.gap > target_gap) return {time};
   const double closing = -(encounter.start_speed + acceleration * time);
   const double bend = 0.5 * std::fabs(acceleration) * time;
   if (bend * (length - time) <= 0.5 * target_gap) {
+    if (encounter.gap > target_gap) return {time};
+    const double lead = 2.0 * near / closing;
+    if (time > std::max(shortest_flight, 2.0 * lead)) return {time - lead};
     // grazing, the last part of the way is not worth a step of its own
     return {closing * (length - time) <= 2.0 * target_gap ? length : time + 2.0 * target_gap / closing};
   }

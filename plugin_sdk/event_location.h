@@ -12,6 +12,8 @@ struct Encounter {
   double gap = 0.0;          // then, m; beyond target_gap: what comes later is not known
   double start_speed = 0.0;  // at the start of the trial
   double end_speed = 0.0;    // at its end
+  double slop = 0.0;         // gap at which a solver may take the pair for closed, m
+  bool is_touching = false;  // since the step before: what closes it is the solver's
 };
 
 struct NextStop {
@@ -27,7 +29,10 @@ struct NextStop {
 // until it is. One that comes from afar is met where the trial, taken for
 // the straight motion between its ends, deviates from it by less than half the target (by |a| t (length - t) / 2 at the
 // time t). Until then trials are shortened to twice the time of the meeting, and steps end before it, each squaring the
-// distance. The step that meets ends a little after it, two target gaps deep, so that the contact is closed.
+// distance. The step that meets is short, as friction acts from its start to its end: where the way is straight, one that
+// ends before, where no solver sees it closed yet, comes first. It ends a little after the meeting, two target gaps deep, so that the
+// contact is closed; a pair that comes so near without touching goes on so far, too, and deeper each time while no contact is
+// found.
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight);
 
 // Two bodies whose surfaces slide on each other, in a trial with its solution: sums over their contacts, each weighted

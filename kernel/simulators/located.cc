@@ -3,14 +3,11 @@
 // it are cut so that the last is short against the flight (the solver takes slow arrivals for rest).
 //
 //   Continuous   asks the collision slot for times of impact on the way from S_n to S*; event_location.h says where to
-//                stop. Pairs that touch at the start are the solver's: what they run into next, while they touch, is
-//                found at S* only.
+//                stop. Pairs that touch at the start are the solver's: what they run into next is found at S* only.
 //   Bisection    (§ 1.4) halves trials until one ends just after a contact closes. It sees contacts at S* alone: what
-//                passes through within a trial is missed. Pairs that touch at the start and do not fly up are the
-//                solver's here, too.
+//                passes through within a trial is missed. Pairs that touch and do not fly up are the solver's, too.
 //
-// Both also end inner steps where surfaces stop sliding on each other (slides.cc).
-//
+// Both also end inner steps where surfaces stop sliding on each other (slides.cc), up to some number in a step.
 // A Zeno sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps: the rest
 // of the step is then made as Basic makes it.
 #include <algorithm>
@@ -22,11 +19,13 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostInnerSteps = 10'000, kMostTrials = 200, kMostSlides = 100;
-constexpr double kShortestFlight = 1e-6;  // of the step
-constexpr double kTargetShare = 1e-8;     // of the margin: gap at which a pair has met
-constexpr double kLead = 0.9;             // of the way to an impact is one step, the rest another
-constexpr double kFinest = 1e-13;         // of the step: how closely a halving ends
+constexpr int kMostInnerSteps = 10'000, kMostTrials = 200;
+constexpr std::size_t kMostSlides = 8, kMostSlidesOfPair = 4;    // whose ends are met in a step
+constexpr double kShortestFlight = 1e-6;                         // of the step
+constexpr double kTargetShare = 1e-8;                            // of the margin: gap at which a pair has met
+constexpr double kSlopOfArm = 2e-9, kSlopOfCoordinates = 4e-15;  // twice the gaps that solvers take for none
+constexpr double kLead = 0.9999;   // of the way to an impact is one step, the rest another
+constexpr double kFinest = 1e-13;  // of the step: how closely a halving ends
 
 // Is the pair the next one of these? Both ascend, so that those before it are dropped.
 bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint32_t>* touching) {
@@ -40,6 +39,7 @@ bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint3
 void Environment::locate_events(double begin, double length) {
   double done = 0.0;
   bool is_near = false;
+  std::size_t slides = 0;
   for (int inner = 0; done < length && !must_restart_; ++inner) {
     const double left = length - done;
     double stop = left;
@@ -56,10 +56,13 @@ void Environment::locate_events(double begin, double length) {
         trial = integrate();
       }
     }
+    const double before = stop;
     const std::optional<Trusted<Solution>> solution =
-        inner < kMostSlides ? react_until_a_slide_ends(trial, begin + done, &stop, has_found_contacts)
-                            : react(trial, has_found_contacts);
+        slides < kMostSlides + kMostSlidesOfPair * (front().touching.size() / 2)
+            ? react_until_a_slide_ends(trial, begin + done, &stop, has_found_contacts)
+            : react(trial, has_found_contacts);
     if (!solution) return;
+    slides += stop < before ? 1 : 0;
     write_solution(*solution);
     end_inner_step();
     done = stop == left ? length : done + stop;
@@ -79,7 +82,7 @@ double Environment::first_impact(const Trusted<TrialState>& trial, double begin,
       const auto pair = data_.pair.span().subspan(2 * data_.impact_pair[k], 2);
       Encounter met = encounter(k);
       // the solver has them, whatever gap it left
-      if (starts_with(pair, &touching)) met.fraction = met.gap = 0.0;
+      if (starts_with(pair, &touching)) met.fraction = met.gap = 0.0, met.is_touching = true;
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;
     }
@@ -91,19 +94,25 @@ double Environment::first_impact(const Trusted<TrialState>& trial, double begin,
 
 Encounter Environment::encounter(std::size_t impact) const {
   const double fraction = data_.impact_fraction[impact];
+  const auto centre_of = [&](std::uint32_t body) {
+    return Vector3(vector_at(front().position.span(), body) + fraction * vector_at(data_.displacement.span(), body));
+  };
   const auto velocity = [&](std::uint32_t body, const Column<double>& linear, const Column<double>& angular) {
-    const Vector3 centre =
-        vector_at(front().position.span(), body) + fraction * vector_at(data_.displacement.span(), body);
-    return Vector3(vector_at(linear.span(), body) +
-                   vector_at(angular.span(), body).cross(vector_at(data_.impact_point.span(), impact) - centre));
+    const Vector3 arm = vector_at(data_.impact_point.span(), impact) - centre_of(body);
+    return Vector3(vector_at(linear.span(), body) + vector_at(angular.span(), body).cross(arm));
   };
   const auto speed = [&](const Column<double>& linear, const Column<double>& angular) {
     const std::uint32_t* pair = &data_.pair[2 * data_.impact_pair[impact]];
     return vector_at(data_.impact_normal.span(), impact)
         .dot(velocity(pair[1], linear, angular) - velocity(pair[0], linear, angular));
   };
+  const Vector3 point = vector_at(data_.impact_point.span(), impact);
+  double arm = 0.0;
+  for (const std::uint32_t body : data_.pair.span().subspan(2 * data_.impact_pair[impact], 2))
+    if (model_.inverse_mass[body] > 0.0) arm = std::max(arm, (point - centre_of(body)).norm());
+  const double slop = kSlopOfArm * arm + kSlopOfCoordinates * point.cwiseAbs().maxCoeff();
   return {fraction, -data_.impact_depth[impact], speed(start_linear_velocity(), start_angular_velocity()),
-          speed(data_.trial_linear_velocity, data_.trial_angular_velocity)};
+          speed(data_.trial_linear_velocity, data_.trial_angular_velocity), slop};
 }
 
 double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {

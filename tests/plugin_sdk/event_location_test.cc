@@ -67,10 +67,29 @@ TEST(EventLocation, AFallIsMetAtItsTime) {
   }
 }
 
-TEST(EventLocation, AStraightWayIsMetInOneStep) {
-  const NextStop stop = stop_before({0.25, kTargetGap, -100.0, -100.0}, 0.01, kTargetGap, kShortestFlight);
-  EXPECT_FALSE(stop.is_trial);
-  EXPECT_DOUBLE_EQ(stop.length, 0.0025 + 2.0 * kTargetGap / 100.0);
+// All the way but where a solver would see it closed, and then the rest: what friction does in the step that meets is over in
+// no time. At the very end of a step, too.
+TEST(EventLocation, AStraightWayIsMetInTwoSteps) {
+  constexpr double kSlop = 5.0 * kTargetGap, kSpeed = 100.0;
+  for (const double length : {0.01, 0.0025 + 1e-14}) {
+    const NextStop stop =
+        stop_before({0.0025 / length, kTargetGap, -kSpeed, -kSpeed, kSlop}, length, kTargetGap, kShortestFlight);
+    EXPECT_FALSE(stop.is_trial);
+    EXPECT_DOUBLE_EQ(stop.length, 0.0025 - 2.0 * kSlop / kSpeed);
+  }
+  const double left = 0.0075;
+  const NextStop last = stop_before({2.0 * kSlop / (kSpeed * left), kTargetGap, -kSpeed, -kSpeed, kSlop}, left,
+                                    kTargetGap, kShortestFlight);
+  EXPECT_FALSE(last.is_trial);
+  EXPECT_NEAR(last.length, (2.0 * kSlop + 2.0 * kTargetGap) / kSpeed, 1e-25);
+}
+
+// Left between touching and the target, or overlapping without a contact, it is no rest.
+TEST(EventLocation, WhatHasNearlyMetFliesOnUntilItTouches) {
+  const NextStop stop = stop_before({0.0, 0.5 * kTargetGap, -100.0, -100.0}, 0.01, kTargetGap, kShortestFlight);
+  EXPECT_DOUBLE_EQ(stop.length, 2.5 * kTargetGap / 100.0);
+  const NextStop deeper = stop_before({0.0, -3.0 * kTargetGap, -100.0, -100.0}, 0.01, kTargetGap, kShortestFlight);
+  EXPECT_DOUBLE_EQ(deeper.length, 5.0 * kTargetGap / 100.0);
 }
 
 TEST(EventLocation, WhatTheDetectorDidNotFollowToTheEndIsLookedAtAgain) {
@@ -94,7 +113,7 @@ TEST(EventLocation, WhatTheDetectorCallsMetBeforeItIsFliesOnUntilItIs) {
 TEST(EventLocation, PairsThatRestPartOrPressNeedNoStop) {
   const double length = 0.01;
   const auto stop = [&](double start_speed, double end_speed) {
-    return stop_before({0.0, 0.0, start_speed, end_speed}, length, kTargetGap, kShortestFlight).length;
+    return stop_before({0.0, 0.0, start_speed, end_speed, 0.0, true}, length, kTargetGap, kShortestFlight).length;
   };
   EXPECT_EQ(stop(0.0, -kGravity * length), length);  // rests
   EXPECT_EQ(stop(-1.0, -2.0), length);               // pressed: the solver's

@@ -285,5 +285,33 @@ TEST(Rolling, OfSmallBallsAtLongStepsIsExact) {
   }
 }
 
+// A ball of 0.1 m that flies and spins without gravity onto a plane: friction stops the slip of 1.5 m/s at once, wherever in a
+// step that is. It took the whole step, and the ball was off by half of that times what friction changed.
+TEST(Impact, OfAFlyingBallWithFrictionIsOverInNoTime) {
+  for (const char* solver : {"Newton", "Sequential", "Direct"}) {
+    for (const double time_step : {1.0 / 60, 1.0 / 240, 1e-3, 0.11}) {
+      SceneRun run(R"(
+Geometries { Geometry { Type = "Halfspace" Id = "Flat" } Geometry { Type = "Sphere" Id = "Round" CustomProperties { Radius = 0.1 } } }
+Materials { Material { Id = "Rubber" RestitutionCoefficient = 0.3 StaticFrictionCoefficient = 0.4 } }
+Simulator { Type = "Continuous" CustomProperties { TimeStep = 0.01 Duration = 0.15 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Floor" GeometryId = "Flat" Material = "Rubber" Immovable = true }
+    Body { Id = "Ball" GeometryId = "Round" Material = "Rubber" Mass = 1
+      KineticProperties { Position = {0, 0.21, 0} LinearVelocity = {1, -1, 0} AngularVelocity = {0, 0, 5} } }
+  } }
+  KineticIntegrator = "Verlet"
+})",
+                   {set("Simulator.TimeStep", time_step), set("Solver", std::string(solver))});
+      run.to_end();
+      const SceneRun::Motion ball = run.body("Ball");
+      // of the slip, two sevenths go to the ball's speed
+      EXPECT_NEAR(ball.twist.linear.x(), 1.0 - 1.5 * 2.0 / 7.0, 1e-12) << solver << ", " << time_step;
+      EXPECT_NEAR(ball.pose.position.x(), 0.11 + 0.04 * 4.0 / 7.0, 1e-9) << solver << ", " << time_step;
+      EXPECT_NEAR(ball.pose.position.y(), 0.1 + 0.3 * 0.04, 1e-9) << solver << ", " << time_step;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace gravitas
