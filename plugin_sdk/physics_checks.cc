@@ -57,9 +57,13 @@ std::string check_velocities(const StepOfBody& s, std::size_t body) {
   const double turn = s.h * (w.norm() + s.h * rate);
   const double turned = unequal > 1e-9 ? turn * (1.0 + unequal) * s.h * rate : 0.0;
   const double turning = kChange * s.h * inverse * s.torque_spread;
-  return off_by("angular_velocity", body, (s.end.angular - w - s.h * alpha).norm(),
-                (s.damped + kOfArithmetic) * (w.norm() + s.h * alpha.norm() + s.h * rate) + turned + turning,
-                "w_n + h alpha");
+  // of torques that forces at points cancel each other's
+  const double gyration = std::sqrt(s.inverse_mass * s.inertia.maxCoeff());
+  const double cancelled = kOfArithmetic * s.h * inverse * gyration * s.force.norm();
+  return off_by(
+      "angular_velocity", body, (s.end.angular - w - s.h * alpha).norm(),
+      (s.damped + kOfArithmetic) * (w.norm() + s.h * alpha.norm() + s.h * rate) + turned + turning + cancelled,
+      "w_n + h alpha");
 }
 
 std::string check_pose(const StepOfBody& s, std::size_t body) {
@@ -67,7 +71,8 @@ std::string check_pose(const StepOfBody& s, std::size_t body) {
   const double reach = s.h * (s.start.linear.norm() + s.end.linear.norm()) + s.from.position.norm();
   std::string wrong =
       off_by("position", body, (s.to.position - s.from.position - s.h * mean).norm(),
-             s.h * half.norm() + kChange * s.h * s.h * s.inverse_mass * s.force_spread + kOfArithmetic * reach,
+             s.h * half.norm() + kChange * s.h * s.h * s.inverse_mass * s.force_spread + kOfArithmetic * reach +
+                 s.damped * s.h * (s.start.linear.norm() + s.h * s.inverse_mass * s.force.norm()),
              "x_n + h v, v between v_n and v*");
   if (!wrong.empty()) return wrong;
 

@@ -167,9 +167,8 @@ class Balance {
       const Discrepancy d = columns.at(i);
       const Matrix3 axes = axes_of(i, d, directions);
       const Vector3 point = 0.5 * (d.point1 + d.point2);
-      // at the end of the step, where the error is closed, it is where either point is
-      const bool is_closed = directions == Directions::kOfEnd && !d.is_angular();
-      const Vector3 to_point = is_closed ? Vector3(0.5 * (d.point2 - d.point1)) : Vector3(Vector3::Zero());
+      // or where either body's own is, which is one place where the step closes them
+      const Vector3 to_point = d.is_angular() ? Vector3(Vector3::Zero()) : Vector3(0.5 * (d.point2 - d.point1));
       is_driven_ = is_driven_ || !d.velocity.isZero(0.0);
       for (int axis = 0; axis < 3; ++axis) {
         const AxisMode mode = axis_mode(d.modes, axis);
@@ -236,9 +235,12 @@ class Balance {
       return relative * push.moment + 2.0 * (push.size * moved + (push.moment + made) * turned) +
              1.001 * push.unreported;
     };
+    // so is w*, turned with the body
     const double spin = (inertia * before.angular).norm() + (inertia * after.angular).norm();
-    wrong = off_by("angular_velocity", i, (turning - velocity.angular).norm(),
-                   arms(velocity, turning.norm()) + kOfSolution * spin, "I (w - w*) is the sum of the moments, N m s");
+    wrong = off_by(
+        "angular_velocity", i, (turning - velocity.angular).norm(),
+        arms(velocity, turning.norm()) + 2.0 * inertia.norm() * before.angular.norm() * turned + kOfSolution * spin,
+        "I (w - w*) is the sum of the moments, N m s");
     if (!wrong.empty()) return wrong;
     const Vector3 displaced = inertia * change.angular;
     // a turn settles by what it moves at the radius of gyration
@@ -251,7 +253,7 @@ class Balance {
   }
 
   std::string check_energy() const {
-    double before = 0.0, after = 0.0;
+    double before = 0.0, after = 0.0, after_there = 0.0;
     for (std::size_t i = 0; i < bodies_; ++i) {
       const bool moves = !vector_at(request_.trial_linear_velocity(), i).isZero(0.0) ||
                          !vector_at(request_.trial_angular_velocity(), i).isZero(0.0);
@@ -260,13 +262,16 @@ class Balance {
       const double inverse_mass = request_.inverse_mass()[i];
       const double mass = inverse_mass > 0.0 ? 1.0 / inverse_mass : 0.0;
       const Matrix3 inertia = inertia_of(i);
-      const auto energy = [&](std::span<const double> linear, std::span<const double> angular) {
-        const Vector3 w = vector_at(angular, i);
+      const auto energy = [&](std::span<const double> linear, const Vector3& w) {
         return 0.5 * (mass * vector_at(linear, i).squaredNorm() + w.dot(inertia * w));
       };
-      before += energy(request_.trial_linear_velocity(), request_.trial_angular_velocity());
-      after += energy(answer_.linear_velocity, answer_.angular_velocity);
+      before += energy(request_.trial_linear_velocity(), vector_at(request_.trial_angular_velocity(), i));
+      const Vector3 w = vector_at(answer_.angular_velocity, i);
+      after += energy(answer_.linear_velocity, w);
+      after_there += energy(answer_.linear_velocity, exp_rotation(-turn_of(static_cast<std::uint32_t>(i))) * w);
     }
+    // with the attitudes of S* or those of S_{n+1}
+    after = std::min(after, after_there);
     if (after <= before * (1.0 + 1e-9)) return {};
     char text[160];
     std::snprintf(text, sizeof text, "kinetic energy grows from %.6g J to %.6g J, and nothing drives", before, after);

@@ -52,10 +52,15 @@ SolverBodies SolverBodies::with_immovable_twins() const {
 
 ConstraintDirection ConstraintDirection::through(const Vector3& point, const Vector3& axis, const SolverBody& body1,
                                                  const SolverBody& body2) {
+  return through(point, point, axis, body1, body2);
+}
+
+ConstraintDirection ConstraintDirection::through(const Vector3& point1, const Vector3& point2, const Vector3& axis,
+                                                 const SolverBody& body1, const SolverBody& body2) {
   ConstraintDirection d;
   d.linear = axis;
-  d.angular1 = axis.cross(point - body1.trial.position);
-  d.angular2 = (point - body2.trial.position).cross(axis);
+  d.angular1 = axis.cross(point1 - body1.trial.position);
+  d.angular2 = (point2 - body2.trial.position).cross(axis);
   d.turn1 = body1.inverse_inertia * d.angular1;
   d.turn2 = body2.inverse_inertia * d.angular2;
   return d;

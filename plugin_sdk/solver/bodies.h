@@ -67,6 +67,9 @@ struct ConstraintDirection {
   // Along a unit axis through a point (world) that both bodies are pushed at.
   static ConstraintDirection through(const Vector3& point, const Vector3& axis, const SolverBody& body1,
                                      const SolverBody& body2);
+  // Each body is pushed at a point of its own.
+  static ConstraintDirection through(const Vector3& point1, const Vector3& point2, const Vector3& axis,
+                                     const SolverBody& body1, const SolverBody& body2);
   // About a unit axis.
   static ConstraintDirection about(const Vector3& axis, const SolverBody& body1, const SolverBody& body2);
 

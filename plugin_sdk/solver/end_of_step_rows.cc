@@ -59,17 +59,18 @@ void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end
   const double length = error.norm();
   // axes fixed in body 1 push where body 2's point is, midway along what is held; a drive where it is in body 1
   Vector3 at = holds_pose(d) ? point2 : point1;
-  std::array<Vector3, 3> axes;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vector3 axis = joint->axes.col(static_cast<Eigen::Index>(k));
+  Matrix3 axes;
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 axis = joint->axes.col(k);
     const bool is_radial = d.is_radial() && k == 0 && length > 0.0;
-    axes[k] = is_radial ? Vector3(error / length) : Vector3(end1.turn * axis);
-    joint->errors[static_cast<Eigen::Index>(k)] = is_radial ? length : axes[k].dot(error);
-    if (is_held(axis_mode(d.modes, static_cast<int>(k))))
-      at -= 0.5 * joint->errors[static_cast<Eigen::Index>(k)] * axes[k];
+    axes.col(k) = is_radial ? Vector3(error / length) : Vector3(end1.turn * axis);
+    joint->errors[k] = is_radial ? length : axes.col(k).dot(error);
+    if (is_held(axis_mode(d.modes, k))) at -= 0.5 * joint->errors[k] * axes.col(k);
   }
-  joint->arm1 = at - end1.pose.position, joint->arm2 = at - end2.pose.position;
-  for (std::size_t k = 0; k < 3; ++k) joint->directions[k] = direction_at(axes[k], joint->arm1, joint->arm2);
+  const Vector3 apart = joint->is_only_point ? half_of_locked(d, axes, joint->errors) : Vector3(Vector3::Zero());
+  joint->arm1 = at - apart - end1.pose.position, joint->arm2 = at + apart - end2.pose.position;
+  for (int k = 0; k < 3; ++k)
+    joint->directions[static_cast<std::size_t>(k)] = direction_at(axes.col(k), joint->arm1, joint->arm2);
 }
 
 ConeContact cone_contact(const EndContact& contact, std::uint32_t first, bool has_turning) {

@@ -28,6 +28,7 @@ struct EndJoint {
   std::uint32_t row = 0, body1 = 0, body2 = 0;
   Discrepancy discrepancy;
   Matrix3 axes;
+  bool is_only_point = false;  // joint_laws.h
   double slop = 0.0, length = 1.0;
   std::array<JointAxisState, 3> states;
   std::array<JointLaw, 3> pose_laws, velocity_laws;

@@ -125,6 +125,8 @@ class IslandSolver {
 
   void solve_velocity();
 
+  // v*, with turned_by_joints().
+  BodyMotion turned_trial_velocity() const;
   bool arrives() const;
   // What the joints alone make of v*, where something arrives: what an impact gains is counted from there.
   BodyMotion velocity_of_joints(BodyMotion velocity);

@@ -2,12 +2,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/island_solver.h"
 
 namespace gravitas {
 
 void IslandSolver::solve_velocity() {
-  const BodyMotion trial = start_motion(&SolverBody::trial_velocity);
+  const BodyMotion trial = turned_trial_velocity();
   settings_.may_rest = may_rest();
   // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
   if (may_turn()) {
@@ -32,6 +33,27 @@ void IslandSolver::solve_velocity() {
   std::size_t cone = 0;
   for (EndContact& contact : contacts_)
     if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
+}
+
+BodyMotion IslandSolver::turned_trial_velocity() const {
+  BodyMotion velocity = start_motion(&SolverBody::trial_velocity);
+  if (joints_.empty()) return velocity;
+  std::vector<Vector3> moment(bodies_.count() + 1, Vector3::Zero());
+  const double share = request_.theta() * request_.time_step();
+  for (const EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t at = 3 * joint.row + k;
+      double push = answer_.joint_correction[at];
+      if (joint.velocity_laws[k].is_velocity_only) push += share * answer_.joint_impulse[at];
+      if (push == 0.0) continue;
+      moment[joint.body1] += push * joint.directions[k].angular1;
+      moment[joint.body2] += push * joint.directions[k].angular2;
+    }
+  }
+  for (const std::uint32_t i : pushed_)
+    velocity[i].angular =
+        turned_by_joints(end_[i].inverse_inertia * moment[i], displacement_[i].angular, velocity[i].angular);
+  return velocity;
 }
 
 bool IslandSolver::arrives() const {

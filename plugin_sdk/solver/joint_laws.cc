@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "plugin_sdk/math/rotation.h"
+
 namespace gravitas {
 namespace {
 
@@ -99,6 +101,33 @@ JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const 
   a.error_at_start = is_radial ? start_error.norm() : direction.dot(start_error);
   a.error_at_trial = direction.dot(discrepancy.point2 - discrepancy.point1);
   return a;
+}
+
+bool is_only_point(const stage::SolverSolveRequest& request, std::size_t row) {
+  const std::span<const std::uint32_t> body = request.discrepancy_body(), mode = request.mode();
+  const auto is_another = [&](std::size_t other) { return (mode[other] & kAngularDiscrepancy) == 0; };
+  const auto has_same_bodies = [&](std::size_t other) {
+    return body[2 * other] == body[2 * row] && body[2 * other + 1] == body[2 * row + 1];
+  };
+  for (std::size_t other = row; other-- > 0 && has_same_bodies(other);)
+    if (is_another(other)) return false;
+  for (std::size_t other = row + 1; other < mode.size() && has_same_bodies(other); ++other)
+    if (is_another(other)) return false;
+  return is_another(row);
+}
+
+Vector3 half_of_locked(const Discrepancy& discrepancy, const Matrix3& axes, const Vector3& errors) {
+  Vector3 half = Vector3::Zero();
+  for (int k = discrepancy.is_radial() ? 1 : 0; k < 3; ++k)
+    if (axis_mode(discrepancy.modes, k) == AxisMode::kLocked && discrepancy.compliance[k] == 0.0)
+      half += 0.5 * errors[k] * axes.col(k);
+  return half;
+}
+
+Vector3 turned_by_joints(Vector3 turn, const Vector3& whole_turn, const Vector3& angular_velocity) {
+  const double by_joints = turn.norm(), whole = whole_turn.norm();
+  if (by_joints > whole) turn *= whole / by_joints;
+  return turn.isZero(0.0) ? angular_velocity : Vector3(exp_rotation(turn) * angular_velocity);
 }
 
 JointLaw pose_law(const JointAxisState& a, double beta, double h) {

@@ -47,6 +47,7 @@
 #include <limits>
 
 #include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 
@@ -85,6 +86,19 @@ double force_of(const JointAxisState& axis, double velocity);
 // All the axes of a discrepancy with error vector `start_error` (world) at S_n.
 JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
                                 const Vector3& start_error);
+
+// True for a discrepancy of points beside which no other, among the rows next to it, holds points of the same two bodies.
+// Each body may then be pushed at its own: two of a hinge would contradict each other by what they are open.
+bool is_only_point(const stage::SolverSolveRequest& request, std::size_t row);
+
+// From the middle between the points to body 2's, along what is rigidly locked and closes, with errors along the axes.
+// Along a radial axis pushes go through both.
+Vector3 half_of_locked(const Discrepancy& discrepancy, const Matrix3& axes, const Vector3& errors);
+
+// An angular velocity w* that goes along with the part of a pose change's turn that joints make: their moment turns with the
+// body in the step, and so does the axis about which it has none (that of a slender rod between ball joints). A contact's
+// stays where it is. What joints and contacts push against each other turns nothing: no more than the whole.
+Vector3 turned_by_joints(Vector3 turn, const Vector3& whole_turn, const Vector3& angular_velocity);
 
 JointLaw pose_law(const JointAxisState& axis, double beta, double time_step);
 

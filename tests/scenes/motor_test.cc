@@ -109,17 +109,17 @@ TEST_P(Motor, JointBreaksBeyondItsForce) {
 }
 
 TEST_P(Motor, JointBreaksBeyondItsThreshold) {
-  // at 1/60 s the pendulum's joint opens by some 1e-6 m at the lowest point
+  // at 1/60 s the pendulum's joint opens by some 7e-9 m (Euler) to 4e-6 m at the lowest point
   const std::string coarse = set("Simulator.TimeStep", 1.0 / 60);
   SceneRun holds("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-4)}));
   holds.to_end();
   EXPECT_TRUE(holds.holds("Pivot"));
 
-  SceneRun breaks("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-8)}));
+  SceneRun breaks("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-9)}));
   breaks.to_end();
   EXPECT_FALSE(breaks.holds("Pivot"));
   EXPECT_EQ(breaks.count_events(EventKind::kBreak), 1U);
-  EXPECT_LE(breaks.report().max_joint_error(), 1e-8);
+  EXPECT_LE(breaks.report().max_joint_error(), 1e-9);
   EXPECT_GT(breaks.body("Ball").pose.position.norm(), 10.0);
 }
 

@@ -8,6 +8,7 @@
 
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/scenes/scene_run.h"
 
 namespace gravitas {
 namespace {
@@ -86,6 +87,22 @@ TEST_P(HonestAnswers, PassTheChecksOfTheirPhysicsInEveryStep) {
       if (environment->step() == kernel::StepOutcome::kCommitted) continue;
       ADD_FAILURE() << "step " << environment->fault()->step << ": " << environment->fault()->fault.text();
       break;
+    }
+  }
+}
+
+// At the speed where damping balances gravity nothing of a velocity changes in a step, and of the place what damping does.
+TEST(DampedBodies, AreTakenAtTheirTerminalSpeed) {
+  const std::string scene = R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -10, 0} } } }
+Simulator { CustomProperties { Duration = 12 CheckPhysicsEvery = 1 } }
+Environment { Space { Bodies {
+  Body { Id = "Falls" Mass = 1 PrincipalMoments = {0.1, 0.2, 0.3} Forces = { "Down" } KineticProperties { AngularVelocity = {1, 2, 3} DampingCoefficient = 1 } } } } })";
+  for (const char* integrator : {"Euler", "Verlet", "RK4", "DormandPrince54", "SymplecticSplitting", "Radau"}) {
+    for (const double damping : {1.0, 5.0, 20.0, 40.0}) {
+      harness::SceneRun run(
+          scene, {std::string("Integrator=") + integrator, "Body.Falls.DampingCoefficient=" + std::to_string(damping)});
+      while (!run.is_done()) ASSERT_NO_THROW(run.step()) << integrator << ", " << damping << " at " << run.time();
     }
   }
 }

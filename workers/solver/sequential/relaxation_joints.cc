@@ -19,7 +19,7 @@ double inverse_masses_of(const SolverBodies& bodies, std::uint32_t body1, std::u
 }  // namespace
 
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
-                                             const SolverBodies& bodies, double correction_factor) {
+                                             bool is_only_point, const SolverBodies& bodies, double correction_factor) {
   RelaxationDiscrepancy r;
   r.body1 = body1;
   r.body2 = body2;
@@ -32,12 +32,15 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
   const bool angular = discrepancy.is_angular();
   r.slop = angular ? 1e-9 : closing_slop(middle, one, two);
   r.length = angular ? std::max(one.gyration(), two.gyration()) : 1.0;
+  const Vector3 apart =
+      is_only_point ? half_of_locked(discrepancy, axes, axes.transpose() * (discrepancy.point2 - discrepancy.point1))
+                    : Vector3(Vector3::Zero());
   for (int i = 0; i < 3; ++i) {
     const auto place = static_cast<std::size_t>(i);
     const Vector3 axis = axes.col(i);
     r.axes[place] = joint_axis_state(discrepancy, i, axis, start_error);
-    r.directions[place] =
-        angular ? ConstraintDirection::about(axis, one, two) : ConstraintDirection::through(middle, axis, one, two);
+    r.directions[place] = angular ? ConstraintDirection::about(axis, one, two)
+                                  : ConstraintDirection::through(middle - apart, middle + apart, axis, one, two);
   }
   return r;
 }

@@ -18,12 +18,13 @@
 // so that its multiplier changes none of them. A row whose J' M^-1 J'^T is below 1e-10 of
 // J M^-1 J^T is held by the lock already and left out.
 //
-// Arms. Both bodies are pushed at the midpoint of x1 and x2. At their own points, as the seed has
-// it, the pair of impulses is a couple (x2 - x1) x lambda: a joint with an error, or a slider away
-// from its origin, would turn its two bodies out of nothing, and the redundant rows of a hinge
-// would contradict each other by the error. With one point the total linear and angular momentum
-// are conserved to rounding; the linearised error differs by (turn x error)/2, which is of second
-// order like the linearisation itself.
+// Arms. Where a point is all that holds two bodies together, each is pushed at its own, where the step
+// leaves it: a ball joint on the axis of a rod then exerts no moment about it. At one point midway, which
+// is off the axis by half of what the free step opened, it would: e lambda/2 over the rod's small moment,
+// which makes slender rods spin and fly apart. Elsewhere both are pushed at the midpoint of x1 and x2: along
+// what is not locked (a slider away from its origin) their own points are apart for good, and the pair of
+// impulses would be a couple out of nothing; and the redundant rows of a hinge, two points, would
+// contradict each other by the error.
 #pragma once
 
 #include <array>
@@ -46,9 +47,9 @@ struct RelaxationDiscrepancy {
   std::array<JointAxisState, 3> axes;
 };
 
-// Reads row `row` of the request. `correction_factor` multiplies the discrepancy's own.
+// `is_only_point` as of joint_laws.h. `correction_factor` multiplies the discrepancy's own.
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
-                                             const SolverBodies& bodies, double correction_factor);
+                                             bool is_only_point, const SolverBodies& bodies, double correction_factor);
 
 class RelaxationJoints final : public RelaxationBlocks {
  public:

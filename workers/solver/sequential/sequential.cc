@@ -150,7 +150,8 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     const Discrepancy discrepancy = columns.at(i);
     const std::uint32_t body1 = bodies_.row(request.discrepancy_body()[2 * i]);
     const std::uint32_t body2 = bodies_.row(request.discrepancy_body()[2 * i + 1]);
-    discrepancies_.push_back(relaxation_discrepancy(discrepancy, body1, body2, bodies_, settings_.correction_factor));
+    discrepancies_.push_back(relaxation_discrepancy(discrepancy, body1, body2, is_only_point(request, i), bodies_,
+                                                    settings_.correction_factor));
     const RelaxationDiscrepancy& r = discrepancies_.back();
     for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
@@ -277,7 +278,17 @@ bool SequentialSolver::find_closed() {
 
 // ---- velocity
 
+void SequentialSolver::turn_trial_velocity() {
+  if (pose_joints_.is_empty()) return;
+  turn_.assign(bodies_.count() + 1, Twist{});
+  pose_joints_.push_all(bodies_, turn_);
+  for (std::uint32_t i = 0; i < bodies_.count(); ++i)
+    trial_velocity_[i].angular =
+        turned_by_joints(turn_[i].angular, solution_.displacement[i].angular, bodies_[i].trial_velocity.angular);
+}
+
 void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) {
+  turn_trial_velocity();
   velocity_joints_.build(bodies_, discrepancies_, velocity_laws_, solution_.joint_impulse);
   impulses_.build(bodies_, request, closed_, solution_.contact_impulse);
   copy(request.contact_normal(), solution_.contact_direction);

@@ -139,6 +139,7 @@ class SequentialSolver {
                    std::vector<double>* shift) const;
   void solve_pose();
   bool find_closed();
+  void turn_trial_velocity();
   void build_velocity(const stage::SolverSolveRequest& request);
   void solve_velocity();
   void relax_velocity();
@@ -176,7 +177,8 @@ class SequentialSolver {
   ContactImpulses impulses_;
 
   SolverSolution solution_;
-  BodyMotion trial_velocity_;  // v*
+  BodyMotion trial_velocity_;  // v*, as joints turn it
+  BodyMotion turn_;            // by joints
   BodyMotion offset_;          // theta h M^-1 J^T lambda of rows on velocity alone
   std::vector<std::uint8_t> closed_, closed_now_;
 
