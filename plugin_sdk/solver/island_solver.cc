@@ -96,7 +96,7 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   joint.discrepancy = columns.at(row);
   const Discrepancy& d = joint.discrepancy;
   joint.axes = to_rotation_matrix(d.axes);
-  joint.is_only_point = is_only_point(request_, row);
+  joint.is_only_point = is_only_point(request_.discrepancy_body(), request_.mode(), row);
   const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
   const Vector3 middle = 0.5 * (d.point1 + d.point2);
   const Vector3 start_error = error_in_axes_at(d, one.trial, two.trial, one.start, two.start);

@@ -37,7 +37,8 @@ void IslandSolver::solve_velocity() {
 
 BodyMotion IslandSolver::turned_trial_velocity() const {
   BodyMotion velocity = start_motion(&SolverBody::trial_velocity);
-  if (joints_.empty()) return velocity;
+  // what reactions have turned, has turned its velocity
+  if (joints_.empty() || joints_.front().discrepancy.has_forces_applied()) return velocity;
   std::vector<Vector3> moment(bodies_.count() + 1, Vector3::Zero());
   const double share = request_.theta() * request_.time_step();
   for (const EndJoint& joint : joints_) {

@@ -103,17 +103,13 @@ JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const 
   return a;
 }
 
-bool is_only_point(const stage::SolverSolveRequest& request, std::size_t row) {
-  const std::span<const std::uint32_t> body = request.discrepancy_body(), mode = request.mode();
-  const auto is_another = [&](std::size_t other) { return (mode[other] & kAngularDiscrepancy) == 0; };
+bool is_only_point(std::span<const std::uint32_t> bodies, std::span<const std::uint32_t> modes, std::size_t row) {
   const auto has_same_bodies = [&](std::size_t other) {
-    return body[2 * other] == body[2 * row] && body[2 * other + 1] == body[2 * row + 1];
+    return bodies[2 * other] == bodies[2 * row] && bodies[2 * other + 1] == bodies[2 * row + 1];
   };
-  for (std::size_t other = row; other-- > 0 && has_same_bodies(other);)
-    if (is_another(other)) return false;
-  for (std::size_t other = row + 1; other < mode.size() && has_same_bodies(other); ++other)
-    if (is_another(other)) return false;
-  return is_another(row);
+  const bool is_alone =
+      (row == 0 || !has_same_bodies(row - 1)) && (row + 1 == modes.size() || !has_same_bodies(row + 1));
+  return is_alone && (modes[row] & kAngularDiscrepancy) == 0;
 }
 
 Vector3 half_of_locked(const Discrepancy& discrepancy, const Matrix3& axes, const Vector3& errors) {

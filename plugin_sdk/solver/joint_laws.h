@@ -44,10 +44,12 @@
 // friction axes has no meaning and is not read.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <span>
 
 #include "plugin_sdk/discrepancy.h"
-#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 
@@ -87,9 +89,9 @@ double force_of(const JointAxisState& axis, double velocity);
 JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
                                 const Vector3& start_error);
 
-// True for a discrepancy of points beside which no other, among the rows next to it, holds points of the same two bodies.
-// Each body may then be pushed at its own: two of a hinge would contradict each other by what they are open.
-bool is_only_point(const stage::SolverSolveRequest& request, std::size_t row);
+// True for a discrepancy of points that is all which holds its two bodies, among the rows next to it. Each may then be pushed
+// at its own: two points of a hinge would contradict each other by what they are open.
+bool is_only_point(std::span<const std::uint32_t> bodies, std::span<const std::uint32_t> modes, std::size_t row);
 
 // From the middle between the points to body 2's, along what is rigidly locked and closes, with errors along the axes.
 // Along a radial axis pushes go through both.

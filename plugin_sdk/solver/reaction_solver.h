@@ -41,6 +41,7 @@ class ReactionSolver {
     std::size_t place;  // of its first axis among the multipliers
     std::uint32_t body1, body2;
     Discrepancy discrepancy;
+    bool is_only_point;         // joint_laws.h
     std::size_t first_row = 0;  // of those that hold always
   };
 

@@ -132,7 +132,9 @@ void ReactionSolver::load_joints() {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::uint32_t one = row_of(request_->discrepancy_body()[2 * i]);
     const std::uint32_t two = row_of(request_->discrepancy_body()[2 * i + 1]);
-    if (bodies_[one].is_pushed() || bodies_[two].is_pushed()) joints_.push_back({3 * i, one, two, columns.at(i)});
+    if (bodies_[one].is_pushed() || bodies_[two].is_pushed())
+      joints_.push_back(
+          {3 * i, one, two, columns.at(i), is_only_point(request_->discrepancy_body(), request_->mode(), i)});
   }
 }
 
@@ -227,7 +229,7 @@ ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Matrix3
   Vector3 along = second.velocity_at(arms.arm2) - first.velocity_at(arms.arm1);
   // body 1 is pushed at its own point: what an error of the state adds to its arm would turn light bodies
   for (int k = 0; k < 3; ++k) {
-    if (!holds_place(d, k)) continue;
+    if (!joint.is_only_point || !holds_place(d, k)) continue;
     const Vector3 axis = axes.col(k);
     arms.arm1 -= (axis.dot(d.point2 - d.point1) - target(d, k)) * axis;
     along -= (axis.dot(along) - axis.dot(d.velocity)) * axis;

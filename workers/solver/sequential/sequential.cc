@@ -150,8 +150,9 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     const Discrepancy discrepancy = columns.at(i);
     const std::uint32_t body1 = bodies_.row(request.discrepancy_body()[2 * i]);
     const std::uint32_t body2 = bodies_.row(request.discrepancy_body()[2 * i + 1]);
-    discrepancies_.push_back(relaxation_discrepancy(discrepancy, body1, body2, is_only_point(request, i), bodies_,
-                                                    settings_.correction_factor));
+    discrepancies_.push_back(relaxation_discrepancy(discrepancy, body1, body2,
+                                                    is_only_point(request.discrepancy_body(), request.mode(), i),
+                                                    bodies_, settings_.correction_factor));
     const RelaxationDiscrepancy& r = discrepancies_.back();
     for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
