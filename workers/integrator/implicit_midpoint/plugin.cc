@@ -37,8 +37,9 @@ constexpr double kConverged = 4e-16;
 // Below this the change is rounding, if it does not shrink any more.
 constexpr double kStagnant = 1e-9;
 // Share of x / h, of 1 rad / h and of the largest velocities that is no less than a body's velocities count, with x the
-// largest distance of a body's parts from the origin: kStagnant of it is what doubles resolve of places, attitudes and
-// velocities whose differences make the forces, so that stiff systems settle, and bodies that others hold at rest.
+// largest distance from the origin of bodies that feel each other: kStagnant of it is what doubles resolve of
+// places, attitudes and velocities whose differences make the forces, so that stiff systems settle, and bodies that others
+// hold at rest.
 constexpr double kResolved = 2e-6;
 // A Newton step that leaves less than this of the last one goes on with its matrix.
 constexpr double kGained = 1e-2;
@@ -106,7 +107,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
 
   void begin() {
     bodies_.clear();
-    farthest_ = 0.0;
+    groups_.clear();
     trial_.resize(derivatives_->size());
     for (std::size_t i = 0; i < derivatives_->size(); ++i) {
       BodyState s = derivatives_->start(i);
@@ -125,9 +126,6 @@ class ImplicitMidpoint final : public IntegratorPlugin {
                          vector_at(request_->inverse_inertia(), i), request_->inverse_mass()[i],
                          damping != 0.0 ? damped_distance(damping, h_) / h_ : 0.5 * h_, damping, undamped,
                          Vector3::Zero()});
-      // parts of a body are about as far from its centre as its radius of gyration
-      farthest_ =
-          std::max(farthest_, s.pose.position.norm() + std::sqrt(moments.maxCoeff() * request_->inverse_mass()[i]));
     }
     unknown_.resize(static_cast<Eigen::Index>(6 * bodies_.size()));
     for (std::size_t b = 0; b < bodies_.size(); ++b) start_from(b);
@@ -188,18 +186,23 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   // The largest change of a body's velocity, relative to its size at the start and in the middle, or to what can be
   // resolved.
   double size_of(const Eigen::VectorXd& change) const {
-    double largest = 0.0, fastest = farthest_ / h_, fastest_turn = 1.0 / h_;
-    for (std::size_t b = 0; b < bodies_.size(); ++b) {
-      fastest = std::max(fastest, linear_speed(b));
-      fastest_turn = std::max(fastest_turn, angular_speed(b));
-    }
-    for (std::size_t b = 0; b < bodies_.size(); ++b) {
-      const auto i = static_cast<Eigen::Index>(6 * b);
-      const double v = linear_speed(b) + kResolved * fastest, w = angular_speed(b) + kResolved * fastest_turn;
-      const double dv = change.segment<3>(i).norm(), dw = change.segment<3>(i + 3).norm();
-      for (const double share : {dv == 0.0 ? 0.0 : dv / v, dw == 0.0 ? 0.0 : dw / w})
-        largest = share <= largest ? largest : share;
-    }
+    double largest = 0.0;
+    const auto add = [&](std::span<const std::size_t> together) {
+      double fastest = 0.0, fastest_turn = 1.0 / h_;
+      for (const std::size_t b : together) {
+        fastest = std::max({fastest, linear_speed(b), bodies_[b].start.pose.position.norm() / h_});
+        fastest_turn = std::max(fastest_turn, angular_speed(b));
+      }
+      for (const std::size_t b : together) {
+        const auto i = static_cast<Eigen::Index>(6 * b);
+        const double v = linear_speed(b) + kResolved * fastest, w = angular_speed(b) + kResolved * fastest_turn;
+        const double dv = change.segment<3>(i).norm(), dw = change.segment<3>(i + 3).norm();
+        for (const double share : {dv == 0.0 ? 0.0 : dv / v, dw == 0.0 ? 0.0 : dw / w})
+          largest = share <= largest ? largest : share;
+      }
+    };
+    for (const Group& group : groups_) add(group.body);
+    for (std::size_t b = 0; groups_.empty() && b < bodies_.size(); ++b) add(std::span(&b, 1));
     return largest;
   }
 
@@ -429,7 +432,6 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   Derivatives* derivatives_ = nullptr;
   Host* host_ = nullptr;
   double h_ = 0.0;
-  double farthest_ = 0.0;  // m: of the bodies' parts from the origin
   std::vector<Group> groups_;
   std::vector<Body> bodies_;  // scratch, as all that follows
   Eigen::VectorXd unknown_;   // v_bar (m/s, world) and W (rad/s, body) of each
