@@ -27,15 +27,17 @@ MOST_EQUATIONS = 300
 class Rows:
     """J, row by row: what it has for each of its two bodies, and M^-1 J^T."""
 
-    def __init__(self, bodies, body1, body2, axis, point=None):
-        """Along a unit axis at a point that both bodies are pushed at, or about the axis where there is no point."""
+    def __init__(self, bodies, body1, body2, axis, point=None, point2=None):
+        """Along a unit axis at a point that both bodies are pushed at, or each at its own, or about the axis where there
+        is no point."""
+        point2 = point if point2 is None else point2
         self.body1, self.body2 = body1, body2
         if point is None:
             linear, turn1, turn2 = numpy.zeros_like(axis), -axis, axis
         else:
             linear = axis
             turn1 = -cross(point - bodies.trial_position[body1], axis)
-            turn2 = cross(point - bodies.trial_position[body2], axis)
+            turn2 = cross(point2 - bodies.trial_position[body2], axis)
         self.j1 = numpy.hstack([-linear, turn1])
         self.j2 = numpy.hstack([linear, turn2])
         self.push1 = numpy.hstack([-bodies.inverse_mass[body1, None] * linear, apply(bodies.inertia[body1], turn1)])

@@ -160,10 +160,18 @@ class Scene:
         self.joint_warm = r.discrepancy_warm_impulse.reshape(-1), r.discrepancy_warm_correction.reshape(-1)
         self.joint_impulse, self.joint_correction = numpy.zeros_like(self.lower), numpy.zeros_like(self.lower)
 
+        # where a point is all that holds two bodies, each is pushed at its own
+        same = (self.joint_body[1:] == self.joint_body[:-1]).all(axis=1)
+        is_alone = ~angular & ~numpy.append(same, False) & ~numpy.insert(same, 0, False)
+        is_locked = is_alone[:, None] & (self.mode.reshape(-1, 3) == LOCKED) & (r.compliance == 0)
+        half = 0.5 * numpy.where(is_locked, self.error_trial.reshape(-1, 3), 0.0)
+        apart = (half[:, 0, None] * axes[:, 0] + half[:, 1, None] * axes[:, 1]) + half[:, 2, None] * axes[:, 2]
+
         flat, one, two = axes.reshape(-1, 3), numpy.repeat(body1, 3), numpy.repeat(body2, 3)
         linear, turning = numpy.flatnonzero(~numpy.repeat(angular, 3)), numpy.flatnonzero(numpy.repeat(angular, 3))
         rows = Rows.joined(
-            Rows(bodies, one[linear], two[linear], flat[linear], numpy.repeat(middle, 3, axis=0)[linear]),
+            Rows(bodies, one[linear], two[linear], flat[linear], numpy.repeat(middle - apart, 3, axis=0)[linear],
+                 numpy.repeat(middle + apart, 3, axis=0)[linear]),
             Rows(bodies, one[turning], two[turning], flat[turning]))
         self.joint_rows = rows.part(numpy.argsort(numpy.concatenate([linear, turning])))
 
@@ -354,6 +362,7 @@ class Island:
                 self._velocity_rows.push(factor * self._velocity_only * self._multipliers, offset)
                 self._solve_pose(offset)
         scene.displacement += self._displacement
+        scene.velocity += self._start - scene.bodies.trial_velocity
         self._velocity_rows.push(self._multipliers, scene.velocity)
         self._store()
 
@@ -407,11 +416,26 @@ class Island:
         for contact in contacts:
             self._velocity_only[contact.first + 1 : contact.first + (6 if contact.turns() else 3)] = True
         self._warm = numpy.concatenate([scene.joint_warm[0][self._joints], scene.contact_warm[0][numbers]])
+        self._start = self._turned_by_joints()
         self._relax()
         self._bound_energy()
 
+    def _turned_by_joints(self):
+        """v*, of which spins go along with what joints turn the bodies by, no further than they turn."""
+        velocity = self._scene.bodies.trial_velocity.copy()
+        by_joints = numpy.zeros_like(velocity)
+        multipliers = self._corrections.copy()
+        multipliers[len(self._joints) :] = 0.0
+        self._pose_rows.push(multipliers, by_joints)
+        turn, whole = by_joints[:, 3:], self._displacement[:, 3:]
+        angle, most = numpy.sqrt(dot(turn, turn)), numpy.sqrt(dot(whole, whole))
+        turn = turn * numpy.where(angle > most, most / numpy.where(angle > 0, angle, 1.0), 1.0)[:, None]
+        acting = numpy.flatnonzero(turn.any(axis=1))
+        velocity[acting, 3:] = turned_by(velocity[acting, 3:], turn[acting])
+        return velocity
+
     def _relax(self):
-        rows, laws, velocity = self._velocity_rows, self._velocity_laws, self._scene.bodies.trial_velocity
+        rows, laws, velocity = self._velocity_rows, self._velocity_laws, self._start
         value = rows.along(velocity)
         missing = [contact.target - value[contact.first] for contact in self._velocity_contacts]
         violation = max(float((laws.violation(value) * rows.length).max(initial=0.0)), max(missing, default=0.0))
@@ -435,7 +459,7 @@ class Island:
 
     def _gain(self):
         """Work of the impulses, zero where it is rounding, and what it would be at the velocities before."""
-        velocity = self._scene.bodies.trial_velocity.copy()
+        velocity = self._start.copy()
         before = self._velocity_rows.along(velocity)
         self._velocity_rows.push(self._multipliers, velocity)
         after = self._velocity_rows.along(velocity)
@@ -527,6 +551,14 @@ def rotation_vector(q):
     sine = numpy.sqrt(dot(q[..., 1:], q[..., 1:]))
     angle = 2 * numpy.arctan2(sine, q[..., 0])
     return q[..., 1:] * numpy.where(sine > 0, angle / numpy.where(sine > 0, sine, 1.0), 2.0)[..., None]
+
+
+def turned_by(vector, rotation_vector):
+    """Rodrigues."""
+    angle = numpy.sqrt(dot(rotation_vector, rotation_vector))[:, None]
+    axis = rotation_vector / angle
+    return (numpy.cos(angle) * vector + numpy.sin(angle) * cross(axis, vector)
+            + (1 - numpy.cos(angle)) * dot(axis, vector)[:, None] * axis)
 
 
 def tangent_of(normal):
