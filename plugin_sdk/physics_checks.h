@@ -119,7 +119,8 @@ class SolutionCheck {
   };
   struct Pushes {
     Push velocity, pose;
-    double coordinates = 0.0;                // m, of what acts on it
+    double coordinates = 0.0;  // m, of what acts on it
+    bool is_joined = false;
     double loose = 0.0, loose_moment = 0.0;  // kg m, kg m^2: sizes of what rows on velocity alone displace
   };
 

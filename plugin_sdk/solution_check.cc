@@ -9,6 +9,7 @@
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/physics_checks.h"
 #include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/joint_laws.h"
 
 namespace gravitas {
 namespace {
@@ -49,8 +50,9 @@ void push_couple(const Vector3& impulse, Push* push) {
   push->moment += impulse.norm();
 }
 
-// Where a method takes the directions of its rows.
-enum class Directions : std::uint8_t { kOfTrial, kOfEnd };
+// Where a method takes the directions of its rows, and pushes two bodies that a point alone holds together: midway, or each
+// at its own place.
+enum class Directions : std::uint8_t { kOfTrial, kOfTrialAtOwn, kOfEnd };
 
 class Balance {
  public:
@@ -59,7 +61,8 @@ class Balance {
 
   std::string check() {
     std::string wrong = check_bodies(Directions::kOfTrial);
-    if (!wrong.empty() && !check_bodies(Directions::kOfEnd).empty()) return wrong;
+    if (!wrong.empty() && !check_bodies(Directions::kOfTrialAtOwn).empty() && !check_bodies(Directions::kOfEnd).empty())
+      return wrong;
     if (wrong = check_energy(); !wrong.empty()) return wrong;
     if (is_unfinished()) return {};
     if (wrong = check_touching(); !wrong.empty()) return wrong;
@@ -72,7 +75,7 @@ class Balance {
     pushes_.assign(bodies_, Pushes{});
     add_contacts();
     add_discrepancies(directions);
-    const double relative = directions == Directions::kOfTrial ? kRelative : kRelativeAtEnd;
+    const double relative = directions == Directions::kOfEnd ? kRelativeAtEnd : kRelative;
     for (std::size_t i = 0; i < bodies_; ++i) {
       if ((request_.flags()[i] & kMovable) == 0 || (request_.flags()[i] & kKinematic) != 0) continue;
       if (std::string wrong = check_body(i, relative); !wrong.empty()) return wrong;
@@ -93,14 +96,17 @@ class Balance {
   }
 
   // Calls push(pushes of the body, arm, sign) for both bodies of a row that acts at a point.
+  // `apart`: from there to where body 2 is pushed, and back to where body 1 is.
   template <typename Apply>
-  void for_both(std::span<const std::uint32_t> pair, std::size_t row, const Vector3& point, Apply&& apply) {
+  void for_both(std::span<const std::uint32_t> pair, std::size_t row, const Vector3& point, const Vector3& apart,
+                Apply&& apply) {
     for (const std::size_t end : {0U, 1U}) {
       const std::uint32_t body = pair[2 * row + end];
       if (body == kNone) continue;
+      const double sign = end == 0 ? -1.0 : 1.0;
       const Vector3 position = vector_at(request_.trial_position(), body);
       pushes_[body].coordinates = std::max(pushes_[body].coordinates, point.norm() + position.norm());
-      apply(pushes_[body], point - position, end == 0 ? -1.0 : 1.0);
+      apply(pushes_[body], point + sign * apart - position, sign);
     }
   }
 
@@ -120,9 +126,8 @@ class Balance {
       const Vector3 normal = vector_at(request_.contact_normal(), i);
       const Vector3 turning = vector_at(answer_.contact_turning, i);
       const Vector3 to_surface = 0.5 * request_.contact_depth()[i] * normal;
-      for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i),
-               [&](Pushes& body, const Vector3& to_middle, double sign) {
-                 const Vector3 arm = to_middle - sign * to_surface;
+      for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i), -to_surface,
+               [&](Pushes& body, const Vector3& arm, double sign) {
                  push_at(arm, sign * impulse, &body.velocity);
                  push_couple(sign * turning, &body.velocity);
                  push_at(arm, sign * correction * normal, &body.pose);
@@ -147,7 +152,7 @@ class Balance {
     }
     if (directions == Directions::kOfEnd && d.is_twist())
       axes.col(0) = twisting_of(d).turned(exp_rotation(turn_of(one)), exp_rotation(turn_of(two))).bisector();
-    if (directions == Directions::kOfTrial || d.is_angular()) return axes;
+    if (directions != Directions::kOfEnd || d.is_angular()) return axes;
     axes = exp_rotation(turn_of(one)).toRotationMatrix() * axes;
     const Vector3 between = carried(two, d.point2) - carried(one, d.point1);
     if (d.is_radial() && between.norm() > 0.0) axes.col(0) = between.normalized();
@@ -167,8 +172,13 @@ class Balance {
       const Discrepancy d = columns.at(i);
       const Matrix3 axes = axes_of(i, d, directions);
       const Vector3 point = 0.5 * (d.point1 + d.point2);
-      // or where either body's own is, which is one place where the step closes them
-      const Vector3 to_point = d.is_angular() ? Vector3(Vector3::Zero()) : Vector3(0.5 * (d.point2 - d.point1));
+      // at the end of the step, where the error is closed, it is where either point is
+      const bool is_closed = directions == Directions::kOfEnd && !d.is_angular();
+      const Vector3 to_point = is_closed ? Vector3(0.5 * (d.point2 - d.point1)) : Vector3(Vector3::Zero());
+      const bool is_at_own =
+          directions == Directions::kOfTrialAtOwn && is_only_point(request_.discrepancy_body(), request_.mode(), i);
+      const Vector3 apart =
+          is_at_own ? half_of_locked(d, axes, axes.transpose() * (d.point2 - d.point1)) : Vector3(Vector3::Zero());
       is_driven_ = is_driven_ || !d.velocity.isZero(0.0);
       for (int axis = 0; axis < 3; ++axis) {
         const AxisMode mode = axis_mode(d.modes, axis);
@@ -180,7 +190,8 @@ class Balance {
         const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
         const Vector3 impulse = answer_.discrepancy_impulse[k] * axes.col(axis);
         const Vector3 correction = answer_.discrepancy_correction[k] * axes.col(axis);
-        for_both(request_.discrepancy_body(), i, point, [&](Pushes& body, const Vector3& arm, double sign) {
+        for_both(request_.discrepancy_body(), i, point, apart, [&](Pushes& body, const Vector3& arm, double sign) {
+          body.is_joined = true;
           add(d, arm, sign * impulse, &body.velocity);
           add(d, arm, sign * correction, &body.pose);
           body.velocity.unreported += to_point.cross(impulse).norm();
@@ -235,12 +246,12 @@ class Balance {
       return relative * push.moment + 2.0 * (push.size * moved + (push.moment + made) * turned) +
              1.001 * push.unreported;
     };
-    // so is w*, turned with the body
+    // so is w*, which may turn with a body that joints turn
+    const double along = pushes_[i].is_joined ? 2.0 * inertia.norm() * before.angular.norm() * turned : 0.0;
     const double spin = (inertia * before.angular).norm() + (inertia * after.angular).norm();
-    wrong = off_by(
-        "angular_velocity", i, (turning - velocity.angular).norm(),
-        arms(velocity, turning.norm()) + 2.0 * inertia.norm() * before.angular.norm() * turned + kOfSolution * spin,
-        "I (w - w*) is the sum of the moments, N m s");
+    wrong = off_by("angular_velocity", i, (turning - velocity.angular).norm(),
+                   arms(velocity, turning.norm()) + along + kOfSolution * spin,
+                   "I (w - w*) is the sum of the moments, N m s");
     if (!wrong.empty()) return wrong;
     const Vector3 displaced = inertia * change.angular;
     // a turn settles by what it moves at the radius of gyration
@@ -270,8 +281,8 @@ class Balance {
       after += energy(answer_.linear_velocity, w);
       after_there += energy(answer_.linear_velocity, exp_rotation(-turn_of(static_cast<std::uint32_t>(i))) * w);
     }
-    // with the attitudes of S* or those of S_{n+1}
-    after = std::min(after, after_there);
+    // with joints the attitudes of S_{n+1} are as good as those of S*
+    if (request_.mode().size() > 0) after = std::min(after, after_there);
     if (after <= before * (1.0 + 1e-9)) return {};
     char text[160];
     std::snprintf(text, sizeof text, "kinetic energy grows from %.6g J to %.6g J, and nothing drives", before, after);

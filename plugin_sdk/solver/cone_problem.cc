@@ -20,6 +20,13 @@ void clear_lists(std::size_t count, std::vector<List>* lists) {
   for (List& list : *lists) list.clear();
 }
 
+// True if a residual that shrinks at a rate is enough after so many times more.
+bool will_do(double residual, double rate, double enough, std::uint32_t times) {
+  if (!(rate < 1.0)) return false;
+  for (; times > 0 && residual > enough; --times) residual *= rate;
+  return residual <= enough;
+}
+
 }  // namespace
 
 void ConeProblem::start() {
@@ -341,17 +348,6 @@ double ConeProblem::correct(const SolverBodies& bodies, const BodyMotion& x0, do
   add_to_held(&side_);
   return contradiction;
 }
-
-namespace {
-
-// True if a residual that shrinks at a rate is enough after so many times more.
-bool will_do(double residual, double rate, double enough, std::uint32_t times) {
-  if (!(rate < 1.0)) return false;
-  for (; times > 0 && residual > enough; --times) residual *= rate;
-  return residual <= enough;
-}
-
-}  // namespace
 
 void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary) {
   // Newton steps without a residual half as large before the next guess

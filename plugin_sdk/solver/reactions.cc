@@ -15,6 +15,14 @@
 #include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
+namespace {
+
+// True where the error along an axis of points is the target, but for the error of the state.
+bool holds_place(const Discrepancy& d, int axis) {
+  return holds_always(d, axis) && axis_mode(d.modes, axis) != AxisMode::kDriven && !(d.is_radial() && axis == 0);
+}
+
+}  // namespace
 
 bool holds_always(const Discrepancy& d, int axis) {
   if (d.maximum_force[axis] < kUnlimited) return false;
@@ -29,15 +37,6 @@ bool holds_always(const Discrepancy& d, int axis) {
       return false;
   }
 }
-
-namespace {
-
-// True where the error along an axis of points is the target, but for the error of the state.
-bool holds_place(const Discrepancy& d, int axis) {
-  return holds_always(d, axis) && axis_mode(d.modes, axis) != AxisMode::kDriven && !(d.is_radial() && axis == 0);
-}
-
-}  // namespace
 
 double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   request_ = &request;
