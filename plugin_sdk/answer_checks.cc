@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -14,6 +15,7 @@ namespace {
 
 // Share of an impulse that rounding may put on the wrong side of a bound.
 constexpr double kRounding = 1e-9;
+constexpr double kSmallest = std::numeric_limits<double>::min();  // below it rounding is no share
 
 std::string at_row(const char* what, std::size_t row) { return std::string(what) + " of row " + std::to_string(row); }
 
@@ -114,7 +116,7 @@ AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const d
   for (std::size_t i = 0; i < answer.contact_correction.size(); ++i) {
     const Vector3 impulse = vector_at(answer.contact_impulse, i), normal = vector_at(answer.contact_direction, i);
     const double* row = &material[kMaterialColumns * i];
-    const double along = normal.dot(impulse), tolerance = kRounding * impulse.norm();
+    const double along = normal.dot(impulse), tolerance = kRounding * impulse.stableNorm() + kSmallest;
     if (along < -tolerance) return bad_number("contact_impulse", i, " pulls the bodies together");
     const double friction = std::max(row[kStaticFriction], row[kDynamicFriction]);
     if ((impulse - along * normal).norm() > friction * along + tolerance)

@@ -206,6 +206,21 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
   return worst <= std::max(smallest, kEpsilon * motion_);
 }
 
+// Is a row missed that moves with none of the others, since what holds always determines it?
+bool ConeProblem::is_out_of_reach(double tolerance) const {
+  constexpr double kNothing = 1e-10;  // of a response of 1
+  return std::ranges::any_of(blocks_, [&](const Block& block) {
+    const auto i = static_cast<Eigen::Index>(block.first);
+    if (response_(i, i) > kNothing) return false;
+    const std::uint32_t r = other_[block.first];
+    const double lower = block.contact < 0 ? block.law.lower_target : block.target;
+    const bool has_lower = block.contact >= 0 || block.law.has_lower;
+    const double below = has_lower ? lower - start_others_[i] : 0.0;
+    const double above = block.contact < 0 && block.law.has_upper ? start_others_[i] - block.law.upper_target : 0.0;
+    return std::max(below, above) * scale_[r] * rows[r].length > tolerance;
+  });
+}
+
 // y of the other rows.
 void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
   for (std::size_t o = 0; o < other_.size(); ++o) {
@@ -261,6 +276,10 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
     reduce(bodies);
+    if (settings.gives_up && is_out_of_reach(tolerance)) {
+      summary.has_converged = false;
+      return summary;
+    }
     solve_dense(settings, tolerance, &summary);
   }
   set_multipliers();

@@ -173,6 +173,7 @@ void IslandSolver::for_ways(Use&& use) const {
 double IslandSolver::sum_of_ways() const {
   double sum = 0.0;
   for_ways([&](double way) { sum += way; });
+  for (const std::uint32_t i : pushed_) sum += driven_[i].linear.norm() + gyration_[i] * driven_[i].angular.norm();
   return sum;
 }
 

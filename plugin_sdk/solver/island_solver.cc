@@ -59,7 +59,7 @@ ConeSummary IslandSolver::solve(Host& host) {
 
 void IslandSolver::load() {
   velocity_ = start_motion(&SolverBody::trial_velocity);
-  displacement_ = offset_ = start_motion(nullptr);
+  displacement_ = offset_ = driven_ = start_motion(nullptr);
   end_.resize(bodies_.count() + 1);
   for (std::uint32_t i = 0; i <= bodies_.count(); ++i) {
     end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
@@ -140,9 +140,16 @@ void IslandSolver::load_contact(std::uint32_t row) {
 void IslandSolver::guess_offset(double share) {
   for (EndJoint& joint : joints_) {
     move_to_end(&joint);
-    for (std::size_t k = 0; k < 3; ++k)
-      if (velocity_law_of(joint, k).is_velocity_only)
-        push_at_trial(joint, joint.directions[k], share * answer_.joint_impulse[3 * joint.row + k], &offset_);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const JointLaw law = velocity_law_of(joint, k);
+      if (law.is_velocity_only)
+        push_at_trial(joint, joint.directions[k], share * answer_.joint_impulse[3 * joint.row + k],
+                      law.is_unbounded_drive() ? &driven_ : &offset_);
+    }
+  }
+  for (const std::uint32_t i : pushed_) {
+    offset_[i].linear += driven_[i].linear;
+    offset_[i].angular += driven_[i].angular;
   }
   for (const EndContact& contact : contacts_) {
     const Vector3 impulse = vector_at(answer_.contact_impulse, contact.row);

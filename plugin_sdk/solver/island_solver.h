@@ -105,7 +105,7 @@ class IslandSolver {
 
   // The most that corrections may move a body by, if one has moved so far.
   double most_of(double moved) const;
-  // Of bodies and of where they touch, m.
+  // Of bodies and of where they touch, m; what drives add counts to the sum.
   template <class Use>
   void for_ways(Use&& use) const;
   double sum_of_ways() const;
@@ -124,6 +124,16 @@ class IslandSolver {
   // ---- velocity
 
   void solve_velocity();
+  void find_velocity(const BodyMotion& trial);
+  bool has_unbounded_drive() const;
+  // Where joints, limits or contacts are in the way of drives without bound, these ask for what they can reach and give way
+  // a little; what they press does not bounce. False where what they reach is not known.
+  bool let_drives_yield(const BodyMotion& trial);
+  // What drives that yield bear moves them no more.
+  void hold_loads_of_drives();
+  // Of joints, with the law and the impulse of each.
+  template <class Use>
+  void for_velocity_rows(Use&& use);
 
   // v*, with turned_by_joints().
   BodyMotion turned_trial_velocity() const;
@@ -178,11 +188,13 @@ class IslandSolver {
   std::vector<double> gyration_;  // radii, m
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
+  BodyMotion driven_;  // part of offset_ by drives without bound
   ConeSummary summary_;
   int round_ = 0;
   StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
   bool yields_ = false;  // contacts, in the pose change
+  bool drives_yield_ = false;
   double missed_ = 0.0;  // by the pose change, m
 };
 

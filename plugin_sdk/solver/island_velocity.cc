@@ -6,10 +6,26 @@
 #include "plugin_sdk/solver/island_solver.h"
 
 namespace gravitas {
-
 void IslandSolver::solve_velocity() {
   const BodyMotion trial = turned_trial_velocity();
   settings_.may_rest = may_rest();
+  if (!drives_yield_) {
+    settings_.gives_up = has_unbounded_drive();
+    find_velocity(trial);
+    drives_yield_ = settings_.gives_up && (!has_velocity_ || summary_.contradiction > 0.0);
+    settings_.gives_up = false;
+  }
+  if (drives_yield_ && let_drives_yield(trial)) {
+    find_velocity(trial);
+    hold_loads_of_drives();
+  }
+  if (drives_yield_) find_velocity(trial);
+  std::size_t cone = 0;
+  for (EndContact& contact : contacts_)
+    if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
+}
+
+void IslandSolver::find_velocity(const BodyMotion& trial) {
   // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
   if (may_turn()) {
     build_velocity(false);
@@ -30,9 +46,60 @@ void IslandSolver::solve_velocity() {
     keep_impulses();
     if (!lower_restitution(before, round)) break;
   }
-  std::size_t cone = 0;
-  for (EndContact& contact : contacts_)
-    if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
+}
+
+bool IslandSolver::has_unbounded_drive() const {
+  return std::ranges::any_of(joints_, [](const EndJoint& joint) {
+    return std::ranges::any_of(joint.velocity_laws, &JointLaw::is_unbounded_drive);
+  });
+}
+
+bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
+  constexpr double kGives = 1e-3;       // of what a row gives way to by itself
+  constexpr double kTolerance = 1e-10;  // pushes are 1/kGives of what holds
+  build_velocity(true);
+  for (ConeRow& row : cone_.rows) {
+    row.multiplier = 0.0;
+    if (!row.law.is_unbounded_drive()) continue;
+    const double masses = bodies_[row.body1].inverse_mass + bodies_[row.body2].inverse_mass;
+    row.law.gamma = kGives * row.direction.product(row.direction, masses);
+    row.law.yields = true;
+  }
+  for (ConeContact& contact : cone_.contacts) contact.target = 0.0;
+  ConeSettings settings = settings_;
+  settings.tolerance = std::max(settings.tolerance, kTolerance);
+  const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings);
+  summary_.iterations += solved.iterations;
+  if (!solved.has_converged) return false;
+  BodyMotion reached = trial;
+  cone_.push(bodies_, &reached);
+  for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse) {
+    *impulse = 0.0;
+    if (!row.law.yields) return;
+    *law = row.law;
+    law->lower_target = law->upper_target = row.direction.along(reached[row.body1], reached[row.body2]);
+  });
+  for (EndContact& contact : contacts_) {
+    contact.law.target = 0.0;
+    contact.turning.setZero();
+    set_vector(answer_.contact_impulse, contact.row, Vector3::Zero());
+  }
+  return true;
+}
+
+void IslandSolver::hold_loads_of_drives() {
+  for_velocity_rows([](const ConeRow&, JointLaw* law, const double* impulse) {
+    if (law->yields) law->shift(law->gamma * *impulse);
+  });
+}
+
+template <class Use>
+void IslandSolver::for_velocity_rows(Use&& use) {
+  std::size_t next = 0;
+  for (EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (joint.velocity_laws[k].is_active())
+        use(cone_.rows[next++], &joint.velocity_laws[k], &answer_.joint_impulse[3 * joint.row + k]);
 }
 
 BodyMotion IslandSolver::turned_trial_velocity() const {
@@ -182,7 +249,15 @@ bool IslandSolver::set_offset(double share) {
                        next[row.body1], next[row.body2]);
   };
   for (std::size_t r = 0; r < scalars; ++r)
-    if (cone_.rows[r].law.is_velocity_only) push(cone_.rows[r]);
+    if (cone_.rows[r].law.is_unbounded_drive()) push(cone_.rows[r]);
+  // drives that yield have moved their bodies as far as these go
+  if (!drives_yield_) driven_ = next;
+  next = driven_;
+  const auto acts_on_velocity = [](const JointLaw& law) {
+    return law.is_velocity_only && !law.is_unbounded_drive() && !law.yields;
+  };
+  for (std::size_t r = 0; r < scalars; ++r)
+    if (acts_on_velocity(cone_.rows[r].law)) push(cone_.rows[r]);
   const BodyMotion driven = next;
   for (const ConeContact& contact : cone_.contacts)
     for (std::uint32_t k = 1; k < contact.count(); ++k) push(cone_.rows[contact.first + k]);

@@ -62,11 +62,14 @@ struct JointLaw {
   double bound = std::numeric_limits<double>::infinity();  // of |lambda|
   // The impulse acts on the velocity alone: theta h of it moves the pose.
   bool is_velocity_only = false;
+  bool yields = false;  // of a drive without bound: something is in its way
 
   bool is_active() const { return has_lower || has_upper; }
   bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }
   // An equality that nothing softens or bounds.
   bool is_rigid() const { return is_equality() && gamma == 0.0 && bound == std::numeric_limits<double>::infinity(); }
+  // A drive that asks for its velocity whatever stands against it.
+  bool is_unbounded_drive() const { return is_velocity_only && is_rigid(); }
   void shift(double amount) { lower_target += amount, upper_target += amount; }
 };
 

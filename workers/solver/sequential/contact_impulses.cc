@@ -387,6 +387,26 @@ std::uint32_t ContactImpulses::drop_restitution(const SolverBodies& bodies, cons
   return count;
 }
 
+void ContactImpulses::drop_restitution() {
+  for (Row& row : rows_) row.target = 0.0;
+}
+
+void ContactImpulses::append_cones(const SolverBodies& bodies, ConeProblem* problem) const {
+  for (const Row& row : rows_) {
+    ConeContact& cone = problem->contacts.emplace_back();
+    cone.first = static_cast<std::uint32_t>(problem->rows.size());
+    cone.has_friction = row.has_friction;
+    cone.static_friction = row.static_friction, cone.dynamic_friction = row.dynamic_friction;
+    const SolverBody &one = bodies[row.body1], &two = bodies[row.body2];
+    const Vector3 point1 = one.trial.position + row.arm1, point2 = two.trial.position + row.arm2;
+    for (std::uint32_t k = 0; k < cone.count(); ++k) {
+      ConeRow& own = problem->rows.emplace_back();
+      own.body1 = row.body1, own.body2 = row.body2;
+      own.direction = ConstraintDirection::through(point1, point2, row.frame.col(k), one, two);
+    }
+  }
+}
+
 void ContactImpulses::scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                             const std::vector<double>& factor) {
   for (Row& row : rows_) {

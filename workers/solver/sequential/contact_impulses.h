@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/cone_problem.h"
 #include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/reply.h"
 #include "workers/solver/sequential/contact_patch.h"
@@ -76,6 +77,9 @@ class ContactImpulses final : public RelaxationBlocks {
   void replace_body(std::size_t block, int side, std::uint32_t offset);
   void set_responses(const SolverBodies& bodies);
 
+  // As rows of a problem, after those that it has, without rolling, spinning and restitution.
+  void append_cones(const SolverBodies& bodies, ConeProblem* problem) const;
+
   // Makes contacts that slip faster than `slip` (m/s) slide with mu_d in the following sweeps;
   // returns whether any changed.
   bool let_slide(const BodyMotion& x, double slip);
@@ -99,6 +103,8 @@ class ContactImpulses final : public RelaxationBlocks {
   // gained. Returns how many changed.
   std::uint32_t drop_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                  const std::vector<Gain>& gains);
+  // Of all.
+  void drop_restitution();
   // Multiplies all impulses by the factor of their bodies' group.
   void scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, const std::vector<double>& factor);
   bool has_restitution() const;

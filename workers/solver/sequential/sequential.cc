@@ -70,6 +70,7 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
   find_closed();
   build_velocity(request);
   solve_velocity();
+  let_drives_yield(request);
 
   const double factor = request.theta() * time_step_;
   if (factor > 0.0 && acts_on_velocity_alone()) {
@@ -78,6 +79,8 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
     if (find_closed()) {
       build_velocity(request);
       solve_velocity();
+      // what has moved its bodies until something was in the way, moves them no further
+      if (let_drives_yield(request)) return;
       set_offset(factor);
       solve_pose();
     }
@@ -139,7 +142,7 @@ double SequentialSolver::reconcile(const RelaxationJoints::Laws& laws, const Bod
 
 void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   summary_ = {};
-  used_up_ = false;
+  used_up_ = drives_yield_ = false;
   time_step_ = request.time_step();
   coordinates_ = 0.0;
   bodies_.load(request);
@@ -292,11 +295,13 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
   turn_trial_velocity();
   velocity_joints_.build(bodies_, discrepancies_, velocity_laws_, solution_.joint_impulse);
   impulses_.build(bodies_, request, closed_, solution_.contact_impulse);
+  if (drives_yield_) impulses_.drop_restitution();
   copy(request.contact_normal(), solution_.contact_direction);
 }
 
 // Velocities and impulses, with the bound on energy.
 void SequentialSolver::solve_velocity() {
+  used_up_before_velocity_ = used_up_;
   relax_velocity();
   bound_energy();
   velocity_joints_.store(solution_.joint_impulse);
@@ -360,6 +365,65 @@ void SequentialSolver::set_offset(double factor) {
   std::fill(offset_.begin(), offset_.end(), Twist{});
   velocity_joints_.push_velocity_only(bodies_, factor, offset_);
   impulses_.push_friction(bodies_, factor, offset_);
+}
+
+// ---- drives that something is in the way of
+
+// Where a drive without bound, or what is in its way, misses by much of what it asks for: velocities anew, in which drives ask
+// for what joints, limits and contacts let them reach, and what they press does not bounce. Returns whether there was any.
+bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request) {
+  constexpr double kMissed = 0.1;
+  double asked = 0.0;
+  for (std::size_t i = 0; i < velocity_laws_.size(); ++i)
+    if (velocity_laws_[i].is_unbounded_drive())
+      asked = std::max(asked, discrepancies_[i / 3].length * std::fabs(velocity_laws_[i].lower_target));
+  const double missed = std::max(
+      {velocity_joints_.largest_violation(solution_.velocity), velocity_joints_.largest_left_out(solution_.velocity),
+       impulses_.largest_violation(solution_.velocity)});
+  if (asked == 0.0 || !(missed > kMissed * asked) || !find_reach()) return false;
+  used_up_ = used_up_before_velocity_;
+  drives_yield_ = true;
+  copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
+  copy(request.contact_warm_impulse(), solution_.contact_impulse);
+  build_velocity(request);
+  solve_velocity();
+  return true;
+}
+
+// The shifts of drives without bound: to what they reach where they give way a little and nothing else does.
+bool SequentialSolver::find_reach() {
+  constexpr double kGives = 1e-3;
+  ConeProblem problem;
+  std::vector<std::size_t> place;
+  for (std::size_t i = 0; i < velocity_laws_.size(); ++i) {
+    if (!velocity_laws_[i].is_active()) continue;
+    const RelaxationDiscrepancy& d = discrepancies_[i / 3];
+    ConeRow& row = problem.rows.emplace_back();
+    row.body1 = d.body1, row.body2 = d.body2;
+    row.direction = d.directions[i % 3];
+    row.length = d.length;
+    row.law = velocity_laws_[i];
+    place.push_back(i);
+    if (!row.law.is_unbounded_drive()) continue;
+    row.law.shift(-velocity_shift_[i]);
+    const double masses = bodies_[row.body1].inverse_mass + bodies_[row.body2].inverse_mass;
+    row.law.gamma = kGives * row.direction.product(row.direction, masses);
+    row.law.yields = true;
+  }
+  impulses_.append_cones(bodies_, &problem);
+  ConeSettings settings;
+  settings.tolerance = 1e-10;
+  if (!problem.solve(bodies_, trial_velocity_, 0.0, settings).has_converged) return false;
+  BodyMotion reached = trial_velocity_;
+  problem.push(bodies_, &reached);
+  for (std::size_t k = 0; k < place.size(); ++k) {
+    const ConeRow& row = problem.rows[k];
+    if (!row.law.yields) continue;
+    const std::size_t i = place[k];
+    velocity_shift_[i] = row.direction.along(reached[row.body1], reached[row.body2]) - row.law.lower_target;
+    velocity_laws_[i].shift(row.law.lower_target + velocity_shift_[i] - velocity_laws_[i].lower_target);
+  }
+  return true;
 }
 
 // ---- energy

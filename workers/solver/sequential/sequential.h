@@ -143,6 +143,8 @@ class SequentialSolver {
   void build_velocity(const stage::SolverSolveRequest& request);
   void solve_velocity();
   void relax_velocity();
+  bool let_drives_yield(const stage::SolverSolveRequest& request);
+  bool find_reach();
   template <typename Contacts>
   bool begins_by_layers(const RelaxationJoints& joints, const Contacts& contacts) const;
   template <typename Contacts>
@@ -162,6 +164,8 @@ class SequentialSolver {
   SequentialSummary summary_;
   bool velocity_converged_ = true;
   bool used_up_ = false;  // some relaxation ran out of sweeps
+  bool used_up_before_velocity_ = false;
+  bool drives_yield_ = false;  // something is in the way of drives without bound
   double time_step_ = 0.0;
   double coordinates_ = 0.0;
 
@@ -169,7 +173,8 @@ class SequentialSolver {
   std::vector<RelaxationDiscrepancy> discrepancies_;
   RelaxationJoints::Laws pose_laws_, velocity_laws_;
   StalledDrives stalled_;
-  // of rows that contradict each other: by how much their targets are moved, and the most, m and m/s
+  // of rows that contradict each other and of drives that yield: by how much their targets are moved; and the most of
+  // the former, m and m/s
   std::vector<double> velocity_shift_;
   double shifted_pose_ = 0.0, shifted_velocity_ = 0.0;
   RelaxationJoints pose_joints_, velocity_joints_;
