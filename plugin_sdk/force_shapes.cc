@@ -19,12 +19,41 @@ void require_sizes(const BodyShape& shape, std::size_t count) {
   if (!good) throw Refusal("a shape's sizes are not " + std::to_string(count) + " numbers above 0");
 }
 
-Surface capsule_surface(double radius, double height) {
+// A half circle's meridian of radius 1, from its pole to its rim, with all but the rim moved out by `share`.
+std::vector<MeridianPoint> cap_meridian(double share) {
   std::vector<MeridianPoint> meridian;
   for (int i = 0; i <= kCapRings; ++i) {
     const math::SinCos angle = math::sincos(0.5 * std::numbers::pi * i / kCapRings);
-    meridian.push_back({i == 0 ? 0.0 : radius * angle.sin, -0.5 * height - radius * angle.cos});
+    const double size = i == kCapRings ? 1.0 : 1.0 + share;
+    meridian.push_back({i == 0 ? 0.0 : size * angle.sin, i == kCapRings ? 0.0 : -size * angle.cos});
   }
+  return meridian;
+}
+
+double volume_of(const std::vector<MeridianPoint>& meridian) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < meridian.size(); ++i) {
+    const double a = meridian[i - 1].radius, b = meridian[i].radius;
+    sum += std::numbers::pi / 3.0 * (a * a + a * b + b * b) * (meridian[i].height - meridian[i - 1].height);
+  }
+  return sum;
+}
+
+// By how much a cap's points lie out of the sphere, so that its volume is that of the half ball.
+double cap_outset() {
+  double low = 0.0, high = 0.1;
+  for (int halving = 0; halving < 60; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (volume_of(cap_meridian(middle)) < 2.0 / 3.0 * std::numbers::pi ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+Surface capsule_surface(double radius, double height) {
+  static const std::vector<MeridianPoint> cap = cap_meridian(cap_outset());
+  std::vector<MeridianPoint> meridian;
+  for (const MeridianPoint& point : cap)
+    meridian.push_back({radius * point.radius, radius * point.height - 0.5 * height});
   for (int i = kCapRings; i >= 0; --i) {
     const MeridianPoint below = meridian[static_cast<std::size_t>(i)];
     meridian.push_back({below.radius, -below.height});

@@ -23,8 +23,8 @@ BodyShape shape_of(const stage::ForceWrenchesRequest& request, std::uint32_t bod
 // Sides of the polyhedron that stands for a round shape.
 inline constexpr std::uint32_t kRoundSides = 48;
 
-// Surface of a Box or ConvexPolyhedron, exactly, and of a Cylinder, Cone or Capsule, as a polyhedron of kRoundSides sides, in the frame of
-// the geometry; nothing for other types. Throws Refusal for sizes that are not above 0, and for a polyhedron that is none.
+// Surface of a Box or ConvexPolyhedron, exactly, and of a Cylinder, Cone or Capsule, as a polyhedron of kRoundSides sides with
+// the volume of the shape, in the frame of the geometry; nothing for other types. Throws Refusal for sizes that are not above 0, and for a polyhedron that is none.
 std::optional<Surface> surface_of(const BodyShape& shape);
 
 // Pose of a body's geometry in the world.

@@ -221,6 +221,28 @@ bool ConeProblem::is_out_of_reach(double tolerance) const {
   });
 }
 
+// A contact that moves with nothing but what joints hold (a wheel that touches its own chassis) depends on their rows, but
+// not quite, as these are taken where the step ends: it would ask for motions without end. It gets the compliance that keeps
+// its response at a share of what moving all bodies together would give it.
+void ConeProblem::give_way(const SolverBodies& bodies) {
+  constexpr double kOfWhole = 1e-3;
+  double mass = 0.0;
+  for (std::uint32_t i = 0; i < bodies.count(); ++i)
+    if (bodies[i].inverse_mass > 0.0) mass += 1.0 / bodies[i].inverse_mass;
+  if (!(mass > 0.0)) return;
+  for (const Block& block : blocks_) {
+    const bool is_contact = block.contact >= 0 || (block.law.has_lower != block.law.has_upper);
+    if (!is_contact) continue;
+    const auto i = static_cast<Eigen::Index>(block.first);
+    const std::uint32_t r = other_[block.first];
+    const double least = kOfWhole / (mass * scale_[r] * scale_[r]);
+    const double missing = least - response_(i, i);
+    if (!(missing > 0.0)) continue;
+    response_(i, i) += missing;
+    rows[r].law.gamma += missing * scale_[r] * scale_[r];
+  }
+}
+
 // y of the other rows.
 void ConeProblem::find_values(const BodyMotion& x, Eigen::VectorXd* y) const {
   for (std::size_t o = 0; o < other_.size(); ++o) {
@@ -280,6 +302,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
       summary.has_converged = false;
       return summary;
     }
+    if (!held_.empty()) give_way(bodies);
     solve_dense(settings, tolerance, &summary);
   }
   set_multipliers();

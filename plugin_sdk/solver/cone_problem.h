@@ -80,7 +80,7 @@ struct ConeSettings {
   std::uint32_t iterations = 500;  // steps, or sweeps: steps that go on where these do not do are the 500 in any case
   double proximal = 1e-7;          // added to the diagonal of the first steps
   bool may_rest = false;           // the first guess is kept where it is wrong by what rounding moves a body at rest
-  bool gives_up = false;         // at once where what holds always leaves a row no motion, and it is missed
+  bool gives_up = false;           // at once where what holds always leaves a row no motion, and it is missed
   bool is_rough = false;  // rows that hold always are left as a first solution leaves them; refine() is to come
 };
 
@@ -161,6 +161,7 @@ class ConeProblem {
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
   bool is_out_of_reach(double tolerance) const;
+  void give_way(const SolverBodies& bodies);
   bool is_solved_near_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance,
                             const ConeSettings& settings, ConeSummary* summary);
   void set_multipliers();

@@ -195,7 +195,9 @@ class IslandSolver {
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
   bool yields_ = false;  // contacts, in the pose change
   bool drives_yield_ = false;
-  double missed_ = 0.0;  // by the pose change, m
+  double drives_contradict_ = 0.0;  // joints or each other, m/s
+  std::vector<double> reach_;       // of drives that yield
+  double missed_ = 0.0;             // by the pose change, m
 };
 
 }  // namespace gravitas

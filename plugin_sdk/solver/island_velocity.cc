@@ -13,13 +13,19 @@ void IslandSolver::solve_velocity() {
     settings_.gives_up = has_unbounded_drive();
     find_velocity(trial);
     drives_yield_ = settings_.gives_up && (!has_velocity_ || summary_.contradiction > 0.0);
+    drives_contradict_ = drives_yield_ ? summary_.contradiction : 0.0;
     settings_.gives_up = false;
   }
-  if (drives_yield_ && let_drives_yield(trial)) {
+  if (drives_yield_) {
+    constexpr int kRoundsOfLoads = 2;  // each leaves what drives give way to a load of the round before
+    const bool is_known = let_drives_yield(trial);
+    for (int round = 0; is_known && round < kRoundsOfLoads; ++round) {
+      find_velocity(trial);
+      hold_loads_of_drives();
+    }
     find_velocity(trial);
-    hold_loads_of_drives();
+    summary_.contradiction = std::max(summary_.contradiction, drives_contradict_);
   }
-  if (drives_yield_) find_velocity(trial);
   std::size_t cone = 0;
   for (EndContact& contact : contacts_)
     if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
@@ -57,6 +63,7 @@ bool IslandSolver::has_unbounded_drive() const {
 bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
   constexpr double kGives = 1e-3;       // of what a row gives way to by itself
   constexpr double kTolerance = 1e-10;  // pushes are 1/kGives of what holds
+  constexpr int kSteps = 3;             // each leaves kGives of the way
   build_velocity(true);
   for (ConeRow& row : cone_.rows) {
     row.multiplier = 0.0;
@@ -68,16 +75,20 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
   for (ConeContact& contact : cone_.contacts) contact.target = 0.0;
   ConeSettings settings = settings_;
   settings.tolerance = std::max(settings.tolerance, kTolerance);
-  const ConeSummary solved = cone_.solve(bodies_, trial, 0.0, settings);
-  summary_.iterations += solved.iterations;
-  if (!solved.has_converged) return false;
   BodyMotion reached = trial;
-  cone_.push(bodies_, &reached);
+  for (int step = 0; step < kSteps; ++step) {
+    const ConeSummary solved = cone_.solve(bodies_, reached, 0.0, settings);
+    summary_.iterations += solved.iterations;
+    if (!solved.has_converged) return false;
+    cone_.push(bodies_, &reached);
+  }
+  reach_.clear();
   for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse) {
     *impulse = 0.0;
     if (!row.law.yields) return;
     *law = row.law;
-    law->lower_target = law->upper_target = row.direction.along(reached[row.body1], reached[row.body2]);
+    reach_.push_back(row.direction.along(reached[row.body1], reached[row.body2]));
+    law->lower_target = law->upper_target = reach_.back();
   });
   for (EndContact& contact : contacts_) {
     contact.law.target = 0.0;
@@ -88,8 +99,8 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
 }
 
 void IslandSolver::hold_loads_of_drives() {
-  for_velocity_rows([](const ConeRow&, JointLaw* law, const double* impulse) {
-    if (law->yields) law->shift(law->gamma * *impulse);
+  for_velocity_rows([&, next = std::size_t{0}](const ConeRow&, JointLaw* law, const double* impulse) mutable {
+    if (law->yields) law->lower_target = law->upper_target = reach_[next++] + law->gamma * *impulse;
   });
 }
 

@@ -5,8 +5,8 @@
 //   torque also -s c_A w
 //   U = rho |g| V (level - up.b)             so that f = -dU/dx, torque = -dU/dturn without drag
 //
-// Exact for Sphere, Box and ConvexPolyhedron cut by the surface (submerged.h); Cylinder, Cone and Capsule are polyhedra of 48 sides of the
-// same sections. Other shapes are refused. A floating body finds its depth and rocks back upright by itself, since b
+// Exact for Sphere, Box and ConvexPolyhedron cut by the surface (submerged.h); Cylinder, Cone and Capsule are polyhedra of 48
+// sides of the same volume, and but for the Capsule's caps of the same sections. Other shapes are refused. A floating body finds its depth and rocks back upright by itself, since b
 // moves. Region bounds the fluid: a body whose geometry's origin is outside feels nothing, which is a jump at its sides.
 // Level is along up through the world's origin. The seed leaves buoyancy to future work (§ 6.2.3).
 #include "plugin_sdk/plugin.h"

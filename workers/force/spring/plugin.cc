@@ -11,6 +11,7 @@
 #include "plugin_sdk/plugin.h"
 
 #include <cmath>
+#include <vector>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
@@ -156,6 +157,7 @@ class Spring final : public ForcePlugin {
   explicit Spring(PropertyCursor) {}
 
   void wrenches(const stage::ForceWrenchesRequest& request, const stage::ForceWrenchesReply& reply, Host&) override {
+    list_applications(request);
     std::size_t row = 0;
     for_each_application(request, reply, [&](std::uint64_t, PropertyCursor cursor, std::uint32_t body) {
       const Parameters p = read(cursor);
@@ -204,21 +206,35 @@ class Spring final : public ForcePlugin {
       throw Refusal("AnchorBody is no row of the bodies");
   }
 
-  // What all bodies on the spring do to its anchor. The energy is counted with them.
-  static ApplicationAnswer reaction(const Parameters& p, const stage::ForceWrenchesRequest& request,
-                                    std::uint32_t force) {
-    ApplicationAnswer sum;
+  // Each force's applications, in their order.
+  void list_applications(const stage::ForceWrenchesRequest& request) {
     const std::span<const std::uint32_t> applications = request.application();
-    for (std::size_t i = 0; i + 1 < applications.size(); i += 2) {
-      if (applications[i] != force || applications[i + 1] == p.anchor_body) continue;
-      if (applications[i + 1] >= request.mass().size())
-        throw Refusal("an application names a body that does not exist");
-      const Pull pull = pull_of(p, request, applications[i + 1]);
+    first_of_force_.assign(request.force_type().size(), kNone);
+    next_.resize(applications.size() / 2);
+    for (std::uint32_t row = static_cast<std::uint32_t>(next_.size()); row-- > 0;) {
+      std::uint32_t& first = first_of_force_.at(applications[2 * row]);
+      next_[row] = first;
+      first = row;
+    }
+  }
+
+  // What all bodies on the spring do to its anchor. The energy is counted with them.
+  ApplicationAnswer reaction(const Parameters& p, const stage::ForceWrenchesRequest& request,
+                             std::uint32_t force) const {
+    ApplicationAnswer sum;
+    for (std::uint32_t row = first_of_force_[force]; row != kNone; row = next_[row]) {
+      const std::uint32_t body = request.application()[2 * row + 1];
+      if (body == p.anchor_body) continue;
+      if (body >= request.mass().size()) throw Refusal("an application names a body that does not exist");
+      const Pull pull = pull_of(p, request, body);
       sum.wrench.force -= pull.force;
       sum.wrench.torque -= pull.anchor_arm.cross(pull.force);
     }
     return sum;
   }
+
+  // of a call
+  std::vector<std::uint32_t> first_of_force_, next_;
 };
 
 }  // namespace

@@ -57,7 +57,7 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   const bool has_rows =
       !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
   summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
-  if (contradicts) summary_.stop_reason = StopReason::kContradiction;
+  if (contradicts || drives_contradict_) summary_.stop_reason = StopReason::kContradiction;
   if (used_up_) summary_.stop_reason = StopReason::kIterations;
   pose_joints_.store(solution_.joint_correction);
   gaps_.store(solution_.contact_correction);
@@ -142,7 +142,7 @@ double SequentialSolver::reconcile(const RelaxationJoints::Laws& laws, const Bod
 
 void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   summary_ = {};
-  used_up_ = drives_yield_ = false;
+  used_up_ = drives_yield_ = drives_contradict_ = false;
   time_step_ = request.time_step();
   coordinates_ = 0.0;
   bodies_.load(request);
@@ -377,10 +377,15 @@ bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request
   for (std::size_t i = 0; i < velocity_laws_.size(); ++i)
     if (velocity_laws_[i].is_unbounded_drive())
       asked = std::max(asked, discrepancies_[i / 3].length * std::fabs(velocity_laws_[i].lower_target));
-  const double missed = std::max(
-      {velocity_joints_.largest_violation(solution_.velocity), velocity_joints_.largest_left_out(solution_.velocity),
-       impulses_.largest_violation(solution_.velocity)});
-  if (asked == 0.0 || !(missed > kMissed * asked) || !find_reach()) return false;
+  const double missed = std::max({velocity_joints_.largest_violation(solution_.velocity),
+                                  velocity_joints_.largest_left_out(solution_.velocity),
+                                  impulses_.largest_violation(solution_.velocity)});
+  if (asked == 0.0 || !(missed > kMissed * asked)) return false;
+  std::vector<double> unused(velocity_laws_.size());
+  const bool contradict =
+      reconcile(velocity_laws_, trial_velocity_, kLeastContradiction * (asked + missed), &unused) > 0.0;
+  if (!find_reach()) return false;
+  drives_contradict_ = drives_contradict_ || contradict;
   used_up_ = used_up_before_velocity_;
   drives_yield_ = true;
   copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
@@ -392,7 +397,8 @@ bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request
 
 // The shifts of drives without bound: to what they reach where they give way a little and nothing else does.
 bool SequentialSolver::find_reach() {
-  constexpr double kGives = 1e-3;
+  constexpr double kGives = 1e-3;  // of what a row gives way to by itself
+  constexpr int kSteps = 3;        // each leaves kGives of the way
   ConeProblem problem;
   std::vector<std::size_t> place;
   for (std::size_t i = 0; i < velocity_laws_.size(); ++i) {
@@ -413,9 +419,11 @@ bool SequentialSolver::find_reach() {
   impulses_.append_cones(bodies_, &problem);
   ConeSettings settings;
   settings.tolerance = 1e-10;
-  if (!problem.solve(bodies_, trial_velocity_, 0.0, settings).has_converged) return false;
   BodyMotion reached = trial_velocity_;
-  problem.push(bodies_, &reached);
+  for (int step = 0; step < kSteps; ++step) {
+    if (!problem.solve(bodies_, reached, 0.0, settings).has_converged) return false;
+    problem.push(bodies_, &reached);
+  }
   for (std::size_t k = 0; k < place.size(); ++k) {
     const ConeRow& row = problem.rows[k];
     if (!row.law.yields) continue;

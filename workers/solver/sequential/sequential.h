@@ -165,7 +165,8 @@ class SequentialSolver {
   bool velocity_converged_ = true;
   bool used_up_ = false;  // some relaxation ran out of sweeps
   bool used_up_before_velocity_ = false;
-  bool drives_yield_ = false;  // something is in the way of drives without bound
+  bool drives_yield_ = false;       // something is in the way of drives without bound
+  bool drives_contradict_ = false;  // joints, or each other
   double time_step_ = 0.0;
   double coordinates_ = 0.0;
 
