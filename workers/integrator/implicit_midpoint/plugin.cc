@@ -36,6 +36,10 @@ constexpr double kContraction = 0.4;
 constexpr double kConverged = 4e-16;
 // Below this the change is rounding, if it does not shrink any more.
 constexpr double kStagnant = 1e-9;
+// As far as this it is, after so many steps of Newton's that made it no less: a light link between heavy bodies feels the
+// rounding of what it carries.
+constexpr double kNoise = 1e-7;
+constexpr int kStepsOfNoise = 4;
 // Share of x / h, of 1 rad / h and of the largest velocities that is no less than a body's velocities count, with x the
 // largest distance from the origin of bodies that feel each other: kStagnant of it is what doubles resolve of
 // places, attitudes and velocities whose differences make the forces, so that stiff systems settle, and bodies that others
@@ -256,7 +260,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       at(unknown_, b).tail<3>() *= angular;
     }
     Eigen::VectorXd left = residual(unknown_);
-    double last = HUGE_VAL;
+    double last = HUGE_VAL, least = HUGE_VAL;
+    int idle = 0;
+    Eigen::VectorXd best;
     bool has_matrix = false;
     for (int step = 0; step < kMostNewtonSteps; ++step) {
       host_->mark_progress();
@@ -267,6 +273,12 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       const double size = size_of(change);
       if (size <= kConverged || (size <= kStagnant && size >= 0.5 * last)) {
         unknown_ -= change;
+        return true;
+      }
+      if (size < least) {
+        least = size, best = unknown_ - change, idle = 0;
+      } else if (++idle >= kStepsOfNoise && least <= kNoise) {
+        unknown_ = best;
         return true;
       }
       has_matrix = size < kGained * last;

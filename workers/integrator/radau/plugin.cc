@@ -163,12 +163,14 @@ class Radau final : public IntegratorPlugin {
         if (error_ > accuracy_) estimate_again(h);
         return has_end(h);
       }
+      const double last_size = last;
       last = size;
       // the first round straightens what bends: it says nothing of the next ones
       if (rounds_ == 1 || (rounds_ == 2 && rate_ < kFar)) continue;
       if (rate_ >= 1.0) {
         if (size <= rounding) continue;
-        return false;
+        // the rounding of accelerations, which may be far more (a light link between heavy bodies): what it leaves is nothing
+        return std::max(size, last_size) <= kOfEstimate * accuracy_ && error_ <= accuracy_ && has_end(h);
       }
       const double remains = size * rate_ / (1.0 - rate_);
       if (error_ > accuracy_ && remains <= kOfRejected * error_) estimate_again(h);
