@@ -24,6 +24,8 @@ constexpr double kRoundBefore = 2.0;
 constexpr double kOfSolution = 1e-13;
 // A displacement that changes by less from one look at it to the next has settled, of the coordinates.
 constexpr double kSettled = 4e-16;
+// Where drives yield to what is in their way, that is found with pushes which are much larger.
+constexpr double kSettledByDrives = 1e-13;
 // Rounding of a gap, of the coordinates that it is the difference of.
 constexpr double kOfSolvedCoordinates = 1e-12;
 // Share of a displacement that a method may leave undone, where it says that it is done.
@@ -226,7 +228,7 @@ class Balance {
     const Twist change{vector_at(answer_.pose_change, 2 * i), vector_at(answer_.pose_change, 2 * i + 1)};
     const double moved = change.linear.norm(), turned = change.angular.norm();
     const Push &velocity = pushes_[i].velocity, &pose = pushes_[i].pose;
-    const double settled = kSettled * pushes_[i].coordinates;
+    const double settled = (is_driven_ ? kSettledByDrives : kSettled) * pushes_[i].coordinates;
     // before a method is done, what friction and drives displace may be that of the round before
     const double before_last = is_unfinished() ? kRoundBefore : 0.0;
 
@@ -406,8 +408,10 @@ class Balance {
       const double after = speed(answer_.linear_velocity, answer_.angular_velocity, request_.trial_position());
       // s^2 <= u^2 + 2 |a| gap, and the gap was crossed within the step
       const double arrival = 2.0 * (std::fabs(start) + std::fabs(trial));
+      // a speed that moves nothing but by rounding is none
+      const double rounding = kSettled * point.norm() / request_.time_step();
       const double allowed = request_.contact_material()[kMaterialColumns * i + kRestitution] * arrival + 1e-3 * sizes +
-                             kOfFastest * fastest;
+                             kOfFastest * fastest + rounding;
       if (after <= allowed) continue;
       char text[160];
       std::snprintf(text, sizeof text, "contact_impulse of row %zu pushes what separates at %.3g m/s, allowed %.3g", i,

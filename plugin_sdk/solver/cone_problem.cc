@@ -397,6 +397,10 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   // much holds the multipliers of rows that depend on each other where they are (1e-6: directions of friction, too, which a
   // slip that ends needs to 1e-9), little lets those that nearly do settle
   const auto proximal_after = [&](int without) { return without < 2 ? settings.proximal : without < 5 ? 1e-8 : 1e-10; };
+  // Guesses that find nothing better show how far rounding lets it come: this many are enough where so many times what
+  // counts as rounding are left, and so many are rounding.
+  constexpr int kIdleGuesses = 3;
+  constexpr double kNearly = 1e4, kRounded = 8.0;
   // sweeps of kGaussSeidel before it is asked if they will do: what some steps of Newton's cost
   constexpr std::uint32_t kLeastTrial = 64;
   const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
@@ -423,6 +427,8 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     bool holds = true;  // of kGaussSeidel: nothing has slid yet
     double attempt = best;
     std::uint32_t done = 0, guess = 0, sweeps = 0;
+    double found = std::numeric_limits<double>::infinity();  // since when guesses have not halved it
+    int idle = 0;
     double swept_to = best;
     const auto start_newton = [&] {
       is_newton = true;
@@ -450,6 +456,11 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
         ++done, ++sweeps;
         sweep(&lambda, &y);
       } else {
+        if (best < 0.5 * found) {
+          found = best, idle = 0;
+        } else if (++idle >= kIdleGuesses && best <= kNearly * enough) {
+          break;
+        }
         lambda = start, y = start_others_ + response_ * lambda;
         done += descend(enough, &lambda, &y);
         if (keep_better() <= enough) break;
@@ -479,7 +490,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     if (is_newton && best <= enough && done > 0 && newton_step(proximal_after(without), &lambda, &y)) keep_better();
     summary->iterations += done;
     summary->residual = best;
-    summary->has_converged = best <= enough;
+    summary->has_converged = best <= (idle >= kIdleGuesses ? kRounded : 1.0) * enough;
     lambda_ = best_lambda;
     if (let_slide(best_lambda, best_y, kSlip * std::max(best, tolerance))) continue;
     into_cones(&lambda_);

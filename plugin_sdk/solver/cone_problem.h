@@ -15,6 +15,8 @@
 //  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt, dependent rows
 //     left out, contradicting ones at their least-squares compromise. What the other rows then feel of each other is
 //     W' = W_OO - W_OE W_EE^-1 W_EO: a joint with its whole chain behind it is as good as a body.
+//     Where that leaves a contact or a limit less than 1e-3 of what moving all bodies together would, it gets the difference
+//     as a compliance: what joints hold by themselves, but for rounding and turns, would be pushed without end.
 //  2. Without such rows, and while nothing slides: steps among the motions of the bodies, near the first guess (held_step.h).
 //  3. The others, dense:
 //     kNewton       semi-smooth Newton on the equation above. A row is held, free, or slides; with the states known the
@@ -23,7 +25,8 @@
 //                   added to the diagonal of the step's matrix, not of the equation: the answer is one of those that are
 //                   right. Where seven steps do not halve the residual, some follow from the best place that are kept only
 //                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
-//                   anew, from the guesses of cone_path.h, and every third time from sweeps.
+//                   anew, from the guesses of cone_path.h, and every third time from sweeps, until three guesses near the
+//                   tolerance have not halved the residual: up to 8 times of it then counts as rounding.
 //     kGaussSeidel  as long as nothing slides, the same steps; then projected block Gauss-Seidel, each contact solved exactly
 //                   (coulomb_contact.h). Where the residual shrinks too slowly for the sweeps that are left, or they ran
 //                   out, kNewton goes on from the best of them.

@@ -30,6 +30,12 @@
 // without end. Where it goes beyond 16 times the ways of the step (S_n to S*, and h v*) and twice what is overlapped at S*,
 // summed over the island, all of it is shortened, and what overlaps stays for the steps to come.
 //
+// Drives without a bound ask for their velocity whatever is in the way. Where that has no solution, they are given a compliance of
+// 1e-3 of their own response, which finds the velocities that joints, limits and contacts let them reach (steps of the proximal
+// point method: nearest to what they ask for, least squares), and then ask for those: they hold loads there, but press no more,
+// and what they press does not bounce. What they had moved their bodies by before stays in delta, so that an arm comes to rest
+// at the wall and not a step before it. Drives that contradict joints or each other are reported as contradictions.
+//
 // Laws: joint_laws.h, contact_law.h; solution of the rows: cone_problem.h. Energy. Restitution with friction in coupled
 // impacts can create energy (Kane's paradox): where an island gains, e s of the contacts that arrive and do positive work
 // is lowered, to a half, a quarter, zero, and if it gains still, all of them to zero.

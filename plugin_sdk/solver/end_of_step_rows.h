@@ -35,8 +35,9 @@ struct EndJoint {
   // at the end of the step
   std::array<ConstraintDirection, 3> directions;
   Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
-  Vector3 errors;          // along the axes
-  bool has_turns = false;  // two rows follow its own, for a rod that pulls
+  Vector3 errors;                  // along the axes
+  bool has_turns = false;          // two rows follow its own, for a rod that pulls
+  std::array<double, 3> driven{};  // impulses of drives without bound by which these move the pose, N s, N m s
 
   // Of a rod, to its ends: the arms above are to its middle.
   Vector3 own_arm1() const { return arm1 - 0.5 * errors[0] * directions[0].linear; }

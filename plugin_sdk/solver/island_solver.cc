@@ -108,7 +108,8 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
     joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
     joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
     const auto at = 3 * row + static_cast<std::uint32_t>(k);
-    answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at];
+    answer_.joint_correction[at] =
+        joint.pose_laws[place].is_active() ? request_.discrepancy_warm_correction()[at] : 0.0;
     answer_.joint_impulse[at] = request_.discrepancy_warm_impulse()[at];
   }
 }
@@ -142,14 +143,12 @@ void IslandSolver::guess_offset(double share) {
     move_to_end(&joint);
     for (std::size_t k = 0; k < 3; ++k) {
       const JointLaw law = velocity_law_of(joint, k);
-      if (law.is_velocity_only)
-        push_at_trial(joint, joint.directions[k], share * answer_.joint_impulse[3 * joint.row + k],
-                      law.is_unbounded_drive() ? &driven_ : &offset_);
+      const double impulse = answer_.joint_impulse[3 * joint.row + k];
+      if (law.is_velocity_only) push_at_trial(joint, joint.directions[k], share * impulse, &offset_);
+      if (!law.is_unbounded_drive()) continue;
+      joint.driven[k] = impulse;
+      push_at_trial(joint, joint.directions[k], share * impulse, &driven_);
     }
-  }
-  for (const std::uint32_t i : pushed_) {
-    offset_[i].linear += driven_[i].linear;
-    offset_[i].angular += driven_[i].angular;
   }
   for (const EndContact& contact : contacts_) {
     const Vector3 impulse = vector_at(answer_.contact_impulse, contact.row);
@@ -258,6 +257,12 @@ void IslandSolver::store() {
   }
   for (const EndContact& contact : contacts_)
     set_vector(answer_.contact_turning, contact.row, contact.law.frame * contact.turning);
+  // by what drives moved their bodies before something was in the way
+  const double share = request_.theta() * request_.time_step();
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (const std::size_t at = 3 * joint.row + k; has_yielded(joint.velocity_laws[k]))
+        answer_.joint_correction[at] = share * (joint.driven[k] - answer_.joint_impulse[at]);
 }
 
 }  // namespace gravitas

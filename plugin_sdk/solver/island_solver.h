@@ -129,9 +129,10 @@ class IslandSolver {
   // Where joints, limits or contacts are in the way of drives without bound, these ask for what they can reach and give way
   // a little; what they press does not bounce. False where what they reach is not known.
   bool let_drives_yield(const BodyMotion& trial);
+  bool has_yielded(const JointLaw& law) const { return drives_yield_ && (law.is_unbounded_drive() || law.yields); }
   // What drives that yield bear moves them no more.
   void hold_loads_of_drives();
-  // Of joints, with the law and the impulse of each.
+  // Of joints, with the law of each, its impulse and EndJoint::driven.
   template <class Use>
   void for_velocity_rows(Use&& use);
 

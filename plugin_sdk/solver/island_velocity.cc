@@ -83,7 +83,7 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
     cone_.push(bodies_, &reached);
   }
   reach_.clear();
-  for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse) {
+  for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse, double*) {
     *impulse = 0.0;
     if (!row.law.yields) return;
     *law = row.law;
@@ -99,7 +99,7 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
 }
 
 void IslandSolver::hold_loads_of_drives() {
-  for_velocity_rows([&, next = std::size_t{0}](const ConeRow&, JointLaw* law, const double* impulse) mutable {
+  for_velocity_rows([&, next = std::size_t{0}](const ConeRow&, JointLaw* law, const double* impulse, double*) mutable {
     if (law->yields) law->lower_target = law->upper_target = reach_[next++] + law->gamma * *impulse;
   });
 }
@@ -110,7 +110,7 @@ void IslandSolver::for_velocity_rows(Use&& use) {
   for (EndJoint& joint : joints_)
     for (std::size_t k = 0; k < 3; ++k)
       if (joint.velocity_laws[k].is_active())
-        use(cone_.rows[next++], &joint.velocity_laws[k], &answer_.joint_impulse[3 * joint.row + k]);
+        use(cone_.rows[next++], &joint.velocity_laws[k], &answer_.joint_impulse[3 * joint.row + k], &joint.driven[k]);
 }
 
 BodyMotion IslandSolver::turned_trial_velocity() const {
@@ -123,7 +123,8 @@ BodyMotion IslandSolver::turned_trial_velocity() const {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t at = 3 * joint.row + k;
       double push = answer_.joint_correction[at];
-      if (joint.velocity_laws[k].is_velocity_only) push += share * answer_.joint_impulse[at];
+      const JointLaw& law = joint.velocity_laws[k];
+      if (law.is_velocity_only) push += share * (has_yielded(law) ? joint.driven[k] : answer_.joint_impulse[at]);
       if (push == 0.0) continue;
       moment[joint.body1] += push * joint.directions[k].angular1;
       moment[joint.body2] += push * joint.directions[k].angular2;
@@ -253,25 +254,24 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
 
 bool IslandSolver::set_offset(double share) {
   BodyMotion next = start_motion(nullptr);
-  const std::size_t scalars = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
-  const auto push = [&](const ConeRow& row) {
-    if (row.multiplier == 0.0) return;
-    row.direction.push(share * row.multiplier, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
-                       next[row.body1], next[row.body2]);
+  const auto push = [&](const ConeRow& row, double impulse, BodyMotion* x) {
+    if (impulse == 0.0) return;
+    row.direction.push(share * impulse, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
+                       (*x)[row.body1], (*x)[row.body2]);
   };
-  for (std::size_t r = 0; r < scalars; ++r)
-    if (cone_.rows[r].law.is_unbounded_drive()) push(cone_.rows[r]);
-  // drives that yield have moved their bodies as far as these go
-  if (!drives_yield_) driven_ = next;
-  next = driven_;
-  const auto acts_on_velocity = [](const JointLaw& law) {
-    return law.is_velocity_only && !law.is_unbounded_drive() && !law.yields;
-  };
-  for (std::size_t r = 0; r < scalars; ++r)
-    if (acts_on_velocity(cone_.rows[r].law)) push(cone_.rows[r]);
+  driven_ = next;
+  for_velocity_rows([&](const ConeRow& row, JointLaw* law, double*, double* driven) {
+    if (!law->is_velocity_only) return;
+    const bool is_drive = law->is_unbounded_drive() || law->yields;
+    // drives that yield have moved their bodies as far as these go
+    if (is_drive && !drives_yield_) *driven = row.multiplier;
+    push(row, is_drive ? *driven : row.multiplier, &next);
+    if (is_drive) push(row, *driven, &driven_);
+  });
   const BodyMotion driven = next;
   for (const ConeContact& contact : cone_.contacts)
-    for (std::uint32_t k = 1; k < contact.count(); ++k) push(cone_.rows[contact.first + k]);
+    for (std::uint32_t k = 1; k < contact.count(); ++k)
+      push(cone_.rows[contact.first + k], cone_.rows[contact.first + k].multiplier, &next);
   shorten(driven, &next);
   const bool changes = is_change(next, offset_, 0.0);
   offset_ = std::move(next);

@@ -62,7 +62,7 @@ struct JointLaw {
   double bound = std::numeric_limits<double>::infinity();  // of |lambda|
   // The impulse acts on the velocity alone: theta h of it moves the pose.
   bool is_velocity_only = false;
-  bool yields = false;  // of a drive without bound: something is in its way
+  bool yields = false;  // of a drive without bound: something is in its way (end_of_step.h)
 
   bool is_active() const { return has_lower || has_upper; }
   bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }

@@ -321,6 +321,11 @@ void RelaxationJoints::clear_multipliers() {
   for (Row& row : rows_) row.multiplier = 0.0;
 }
 
+void RelaxationJoints::take_drives(const Multipliers& multipliers) {
+  for (Row& row : rows_)
+    if (row.law.is_unbounded_drive()) row.multiplier = multipliers[row.place];
+}
+
 void RelaxationJoints::store(Multipliers& multipliers) const {
   std::fill(multipliers.begin(), multipliers.end(), 0.0);
   for (const Row& row : rows_) multipliers[row.place] = row.multiplier;

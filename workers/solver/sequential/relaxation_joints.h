@@ -92,6 +92,9 @@ class RelaxationJoints final : public RelaxationBlocks {
   // Overwrites the multipliers of all discrepancies; those of rows that are not there with zero.
   void store(Multipliers& multipliers) const;
 
+  // Multipliers of drives without bound.
+  void take_drives(const Multipliers& multipliers);
+
   // ---- the bound on energy (sequential.h) ----
 
   // Work of the rows that neither drive nor soften, lambda (J before + J after)/2, J, added to that

@@ -60,6 +60,9 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   if (contradicts || drives_contradict_) summary_.stop_reason = StopReason::kContradiction;
   if (used_up_) summary_.stop_reason = StopReason::kIterations;
   pose_joints_.store(solution_.joint_correction);
+  for (std::size_t i = 0; i < moved_.size(); ++i)
+    if (velocity_laws_[i].is_unbounded_drive())
+      solution_.joint_correction[i] = request.theta() * time_step_ * (moved_[i] - solution_.joint_impulse[i]);
   gaps_.store(solution_.contact_correction);
   return summary_;
 }
@@ -77,10 +80,16 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
     set_offset(factor);
     solve_pose();
     if (find_closed()) {
+      moved_.assign(velocity_laws_.size(), 0.0);
+      velocity_joints_.store(moved_);
       build_velocity(request);
       solve_velocity();
-      // what has moved its bodies until something was in the way, moves them no further
-      if (let_drives_yield(request)) return;
+      // drives that now yield have moved their bodies as far as these go
+      if (let_drives_yield(request)) {
+        velocity_joints_.take_drives(moved_);
+      } else {
+        moved_.clear();
+      }
       set_offset(factor);
       solve_pose();
     }
@@ -161,6 +170,7 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
   velocity_shift_.assign(pose_laws_.size(), 0.0);
+  moved_.clear();
   shifted_pose_ = shifted_velocity_ = 0.0;
   trial_velocity_.clear();
   for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);

@@ -59,6 +59,9 @@
 // other (cone_problem.h); those that no motion can meet together get the nearest targets that it can (least squares), and
 // the sweeps begin anew. `stop_reason` says so.
 //
+// Drives without a bound whose velocity is missed by a tenth, or what is in their way, ask for what joints, limits and contacts let
+// them reach (end_of_step.h, found by cone_problem.h), and velocities are solved anew.
+//
 // Islands are solved each by itself (sequential_islands.h).
 //
 // One joint, one contact, or one patch of contacts that rests or sticks is exact in one sweep; n bodies in a row take of
@@ -178,6 +181,7 @@ class SequentialSolver {
   // the former, m and m/s
   std::vector<double> velocity_shift_;
   double shifted_pose_ = 0.0, shifted_velocity_ = 0.0;
+  RelaxationJoints::Multipliers moved_;  // by what drives moved the pose before they yielded; empty: none has
   RelaxationJoints pose_joints_, velocity_joints_;
   ContactGaps gaps_;
   ContactImpulses impulses_;
