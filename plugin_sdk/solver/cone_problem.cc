@@ -300,6 +300,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     reduce(bodies);
     if (settings.gives_up && is_out_of_reach(tolerance)) {
       summary.has_converged = false;
+      summary.residual = std::numeric_limits<double>::infinity();
       return summary;
     }
     if (!held_.empty()) give_way(bodies);

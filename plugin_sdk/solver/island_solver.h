@@ -126,6 +126,8 @@ class IslandSolver {
   void solve_velocity();
   void find_velocity(const BodyMotion& trial);
   bool has_unbounded_drive() const;
+  // Not by what rounding leaves of contacts that hardly settle.
+  bool misses_what_drives_ask(const BodyMotion& trial) const;
   // Where joints, limits or contacts are in the way of drives without bound, these ask for what they can reach and give way
   // a little; what they press does not bounce. False where what they reach is not known.
   bool let_drives_yield(const BodyMotion& trial);

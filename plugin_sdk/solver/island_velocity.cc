@@ -12,7 +12,7 @@ void IslandSolver::solve_velocity() {
   if (!drives_yield_) {
     settings_.gives_up = has_unbounded_drive();
     find_velocity(trial);
-    drives_yield_ = settings_.gives_up && (!has_velocity_ || summary_.contradiction > 0.0);
+    drives_yield_ = settings_.gives_up && misses_what_drives_ask(trial);
     drives_contradict_ = drives_yield_ ? summary_.contradiction : 0.0;
     settings_.gives_up = false;
   }
@@ -58,6 +58,17 @@ bool IslandSolver::has_unbounded_drive() const {
   return std::ranges::any_of(joints_, [](const EndJoint& joint) {
     return std::ranges::any_of(joint.velocity_laws, &JointLaw::is_unbounded_drive);
   });
+}
+
+bool IslandSolver::misses_what_drives_ask(const BodyMotion& trial) const {
+  constexpr double kMuch = 1e-3;
+  if (summary_.contradiction > 0.0) return true;
+  if (has_velocity_) return false;
+  double asked = largest(trial);
+  for (const EndJoint& joint : joints_)
+    for (const JointLaw& law : joint.velocity_laws)
+      if (law.is_unbounded_drive()) asked = std::max(asked, joint.length * std::fabs(law.lower_target));
+  return summary_.residual > kMuch * asked;
 }
 
 bool IslandSolver::let_drives_yield(const BodyMotion& trial) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -113,6 +114,34 @@ Environment {
       // RK4 at 1/60 s
       EXPECT_NEAR(run.energy(), 0.0, 1e-3) << integrator << ", " << moment;
     }
+  }
+}
+
+// A link of 0.1 g that holds 10 t feels the rounding of what it carries, 1e5 N: methods that look for rounding's end in what a round
+// changes must not look for ever, nor refuse. The reference is of the equations of a double pendulum in its two angles.
+TEST(Smooth, ALightLinkHoldsAHeavyBody) {
+  const std::string scene = R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 0.5 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Link" Mass = 1e-4 PrincipalMoments = {1e-5, 1e-5, 1e-5} KineticProperties { Position = {0.5, 0, 0} } Forces = { "Down" } }
+    Body { Id = "Load" Mass = 1e4 PrincipalMoments = {1e3, 1e3, 1e3} KineticProperties { Position = {1.25, -0.4, 0} } Forces = { "Down" } }
+  } }
+  Constraints {
+    Constraint { Type = "Revolute" Id = "Pivot" Body2 = "Link" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} } }
+    Constraint { Type = "Revolute" Id = "Hook" Body1 = "Link" Body2 = "Load" CustomProperties { BindAxisPoint1 = {1, 0, 0} BindAxisPoint2 = {1, 0, 1} } }
+  }
+  ConstraintSolver = "Direct"
+}
+)";
+  const Vector3 end(0.6434869411116291, -1.2078867456907545, 0);
+  for (const auto& [integrator, time_step, tolerance] :
+       {std::tuple{"Radau", 0.01, 1e-8}, std::tuple{"ImplicitMidpoint", 0.002, 1e-5},
+        std::tuple{"ImplicitMidpoint", 0.0005, 1e-6}, std::tuple{"DormandPrince54", 0.01, 1e-8}}) {
+    SceneRun run(scene, {set("Integrator", std::string(integrator)), set("Simulator.TimeStep", time_step)});
+    run.to_end();
+    EXPECT_LE((run.body("Load").pose.position - end).norm(), tolerance) << integrator << " " << time_step;
   }
 }
 

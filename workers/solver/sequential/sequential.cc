@@ -383,14 +383,15 @@ void SequentialSolver::set_offset(double factor) {
 // for what joints, limits and contacts let them reach, and what they press does not bounce. Returns whether there was any.
 bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request) {
   constexpr double kMissed = 0.1;
-  double asked = 0.0;
+  if (std::ranges::none_of(velocity_laws_, &JointLaw::is_unbounded_drive)) return false;
+  double asked = std::max(velocity_joints_.largest_motion(trial_velocity_), impulses_.largest_motion(trial_velocity_));
   for (std::size_t i = 0; i < velocity_laws_.size(); ++i)
     if (velocity_laws_[i].is_unbounded_drive())
       asked = std::max(asked, discrepancies_[i / 3].length * std::fabs(velocity_laws_[i].lower_target));
   const double missed = std::max({velocity_joints_.largest_violation(solution_.velocity),
                                   velocity_joints_.largest_left_out(solution_.velocity),
                                   impulses_.largest_violation(solution_.velocity)});
-  if (asked == 0.0 || !(missed > kMissed * asked)) return false;
+  if (!(missed > kMissed * asked)) return false;
   std::vector<double> unused(velocity_laws_.size());
   const bool contradict =
       reconcile(velocity_laws_, trial_velocity_, kLeastContradiction * (asked + missed), &unused) > 0.0;
