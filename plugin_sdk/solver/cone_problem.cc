@@ -206,13 +206,21 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
   return worst <= std::max(smallest, kEpsilon * motion_);
 }
 
-// Is a row missed that moves with none of the others, since what holds always determines it?
-bool ConeProblem::is_out_of_reach(double tolerance) const {
-  constexpr double kNothing = 1e-10;  // of a response of 1
+// The response that a contact or a limit keeps at least: a share of what moving all bodies together would give it.
+double ConeProblem::least_response(const SolverBodies& bodies) const {
+  constexpr double kOfWhole = 1e-5;
+  double mass = 0.0;
+  for (std::uint32_t i = 0; i < bodies.count(); ++i)
+    if (bodies[i].inverse_mass > 0.0) mass += 1.0 / bodies[i].inverse_mass;
+  return mass > 0.0 ? kOfWhole / mass : 0.0;
+}
+
+// Is a row missed that what holds always leaves next to no motion?
+bool ConeProblem::is_out_of_reach(double least, double tolerance) const {
   return std::ranges::any_of(blocks_, [&](const Block& block) {
     const auto i = static_cast<Eigen::Index>(block.first);
-    if (response_(i, i) > kNothing) return false;
     const std::uint32_t r = other_[block.first];
+    if (response_(i, i) * scale_[r] * scale_[r] > least) return false;
     const double lower = block.contact < 0 ? block.law.lower_target : block.target;
     const bool has_lower = block.contact >= 0 || block.law.has_lower;
     const double below = has_lower ? lower - start_others_[i] : 0.0;
@@ -223,20 +231,14 @@ bool ConeProblem::is_out_of_reach(double tolerance) const {
 
 // A contact that moves with nothing but what joints hold (a wheel that touches its own chassis) depends on their rows, but
 // not quite, as these are taken where the step ends: it would ask for motions without end. It gets the compliance that keeps
-// its response at a share of what moving all bodies together would give it.
-void ConeProblem::give_way(const SolverBodies& bodies) {
-  constexpr double kOfWhole = 1e-3;
-  double mass = 0.0;
-  for (std::uint32_t i = 0; i < bodies.count(); ++i)
-    if (bodies[i].inverse_mass > 0.0) mass += 1.0 / bodies[i].inverse_mass;
-  if (!(mass > 0.0)) return;
+// its response.
+void ConeProblem::give_way(double least) {
   for (const Block& block : blocks_) {
-    const bool is_contact = block.contact >= 0 || (block.law.has_lower != block.law.has_upper);
-    if (!is_contact) continue;
+    const bool is_one_sided = block.contact >= 0 || block.law.has_lower != block.law.has_upper;
+    if (!is_one_sided) continue;
     const auto i = static_cast<Eigen::Index>(block.first);
     const std::uint32_t r = other_[block.first];
-    const double least = kOfWhole / (mass * scale_[r] * scale_[r]);
-    const double missing = least - response_(i, i);
+    const double missing = least / (scale_[r] * scale_[r]) - response_(i, i);
     if (!(missing > 0.0)) continue;
     response_(i, i) += missing;
     rows[r].law.gamma += missing * scale_[r] * scale_[r];
@@ -298,12 +300,13 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     solve_large(bodies, x0, settings, tolerance, &summary);
   } else if (!other_.empty()) {
     reduce(bodies);
-    if (settings.gives_up && is_out_of_reach(tolerance)) {
+    const double least = held_.empty() ? 0.0 : least_response(bodies);
+    if (settings.gives_up && is_out_of_reach(least, tolerance)) {
       summary.has_converged = false;
       summary.residual = std::numeric_limits<double>::infinity();
       return summary;
     }
-    if (!held_.empty()) give_way(bodies);
+    give_way(least);
     solve_dense(settings, tolerance, &summary);
   }
   set_multipliers();

@@ -163,8 +163,9 @@ class ConeProblem {
   double make_consistent(double smallest);
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
-  bool is_out_of_reach(double tolerance) const;
-  void give_way(const SolverBodies& bodies);
+  double least_response(const SolverBodies& bodies) const;
+  bool is_out_of_reach(double least, double tolerance) const;
+  void give_way(double least);
   bool is_solved_near_guess(const SolverBodies& bodies, const BodyMotion& x0, double tolerance,
                             const ConeSettings& settings, ConeSummary* summary);
   void set_multipliers();

@@ -145,11 +145,10 @@ void IslandSolver::guess_offset(double share) {
       const JointLaw law = velocity_law_of(joint, k);
       const double impulse = answer_.joint_impulse[3 * joint.row + k];
       if (law.is_velocity_only) push_at_trial(joint, joint.directions[k], share * impulse, &offset_);
-      if (!law.is_unbounded_drive()) continue;
-      joint.driven[k] = impulse;
-      push_at_trial(joint, joint.directions[k], share * impulse, &driven_);
+      if (law.is_unbounded_drive()) joint.driven[k] = impulse;
     }
   }
+  driven_ = offset_;
   for (const EndContact& contact : contacts_) {
     const Vector3 impulse = vector_at(answer_.contact_impulse, contact.row);
     const Vector3 normal = contact.law.frame.col(0);

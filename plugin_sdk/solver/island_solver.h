@@ -105,7 +105,7 @@ class IslandSolver {
 
   // The most that corrections may move a body by, if one has moved so far.
   double most_of(double moved) const;
-  // Of bodies and of where they touch, m; what drives add counts to the sum.
+  // Of bodies and of where they touch, m; what drives and springs add counts to the sum.
   template <class Use>
   void for_ways(Use&& use) const;
   double sum_of_ways() const;
@@ -191,7 +191,7 @@ class IslandSolver {
   std::vector<double> gyration_;  // radii, m
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
-  BodyMotion driven_;  // part of offset_ by drives without bound
+  BodyMotion driven_;  // part of offset_ by drives and springs
   ConeSummary summary_;
   int round_ = 0;
   StalledDrives stalled_;

@@ -265,25 +265,23 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
 
 bool IslandSolver::set_offset(double share) {
   BodyMotion next = start_motion(nullptr);
-  const auto push = [&](const ConeRow& row, double impulse, BodyMotion* x) {
+  const auto push = [&](const ConeRow& row, double impulse) {
     if (impulse == 0.0) return;
     row.direction.push(share * impulse, bodies_[row.body1].inverse_mass, bodies_[row.body2].inverse_mass,
-                       (*x)[row.body1], (*x)[row.body2]);
+                       next[row.body1], next[row.body2]);
   };
-  driven_ = next;
   for_velocity_rows([&](const ConeRow& row, JointLaw* law, double*, double* driven) {
     if (!law->is_velocity_only) return;
     const bool is_drive = law->is_unbounded_drive() || law->yields;
     // drives that yield have moved their bodies as far as these go
     if (is_drive && !drives_yield_) *driven = row.multiplier;
-    push(row, is_drive ? *driven : row.multiplier, &next);
-    if (is_drive) push(row, *driven, &driven_);
+    push(row, is_drive ? *driven : row.multiplier);
   });
-  const BodyMotion driven = next;
+  driven_ = next;
   for (const ConeContact& contact : cone_.contacts)
     for (std::uint32_t k = 1; k < contact.count(); ++k)
-      push(cone_.rows[contact.first + k], cone_.rows[contact.first + k].multiplier, &next);
-  shorten(driven, &next);
+      push(cone_.rows[contact.first + k], cone_.rows[contact.first + k].multiplier);
+  shorten(driven_, &next);
   const bool changes = is_change(next, offset_, 0.0);
   offset_ = std::move(next);
   return changes;
