@@ -238,7 +238,7 @@ void ConeProblem::give_way(double least) {
     if (!is_one_sided) continue;
     const auto i = static_cast<Eigen::Index>(block.first);
     const std::uint32_t r = other_[block.first];
-    const double missing = least / (scale_[r] * scale_[r]) - response_(i, i);
+    const double missing = std::max(least / (scale_[r] * scale_[r]) - response_(i, i), rows[r].softness);
     if (!(missing > 0.0)) continue;
     response_(i, i) += missing;
     rows[r].law.gamma += missing * scale_[r] * scale_[r];

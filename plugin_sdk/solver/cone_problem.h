@@ -15,7 +15,7 @@
 //  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt, dependent rows
 //     left out, contradicting ones at their least-squares compromise. What the other rows then feel of each other is
 //     W' = W_OO - W_OE W_EE^-1 W_EO: a joint with its whole chain behind it is as good as a body.
-//     Where that leaves a contact or a limit less than 1e-3 of what moving all bodies together would, it gets the difference
+//     Where that leaves a contact or a limit less than 1e-5 of what moving all bodies together would, it gets the difference
 //     as a compliance: what joints hold by themselves, but for rounding and turns, would be pushed without end.
 //  2. Without such rows, and while nothing slides: steps among the motions of the bodies, near the first guess (held_step.h).
 //  3. The others, dense:
@@ -60,6 +60,7 @@ struct ConeRow {
   double length = 1.0;      // m per unit of y: an arm for rows about an axis
   JointLaw law = {};        // scalar rows
   double multiplier = 0.0;  // first guess, then the answer
+  double softness = 0.0;    // of a contact's normal: compliance as a share of the row's response
 };
 
 // Rows first ... of a contact: normal, two tangents if it has friction, then normal and two tangents of turning if it rolls

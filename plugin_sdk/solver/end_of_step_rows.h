@@ -52,6 +52,7 @@ struct EndContact {
   Vector3 arm1, arm2;                 // to the surface points
   Vector3 turning = Vector3::Zero();  // impulses of rolling and spinning friction in the law's frame, N m s
   bool is_closed = false, slides = false;
+  double softness = 0.0;  // ConeRow's
   std::uint32_t lowered = 0;
 };
 

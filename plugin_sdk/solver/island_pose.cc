@@ -207,6 +207,7 @@ void IslandSolver::build_pose() {
     row.direction = with_turns(contact.gap_row, end_[contact.body1].stiffened, end_[contact.body2].stiffened);
     row.law.has_lower = true;
     row.law.lower_target = contact.gap_target;
+    row.softness = contact.softness;
     row.multiplier = answer_.contact_correction[contact.row];
   }
   if (!yields_) return;

@@ -122,6 +122,16 @@ void IslandSolver::load_contact(std::uint32_t row) {
   const SolverBody &one = bodies_[contact.body1], &two = bodies_[contact.body2];
   const Vector3 normal = vector_at(request_.contact_normal(), row);
   const Vector3 point = vector_at(request_.contact_point(), row);
+  const auto joins = [&](const EndJoint& joint) {
+    return std::minmax(joint.body1, joint.body2) == std::minmax(contact.body1, contact.body2);
+  };
+  const auto drives = [&](const EndJoint& joint) {
+    return std::ranges::any_of(joint.states, [&](const JointAxisState& state) {
+      return velocity_law(state, state.error_at_trial, joint.slop, request_.time_step()).is_unbounded_drive();
+    });
+  };
+  // drives that yield are less than that in the way
+  if (std::ranges::any_of(joints_, joins) && std::ranges::none_of(joints_, drives)) contact.softness = kOfJoined;
   contact.gap_row = ConstraintDirection::through(point, normal, one, two);
   contact.gap = -request_.contact_depth()[row];
   const Vector3 to_surface = (-0.5 * contact.gap) * normal;

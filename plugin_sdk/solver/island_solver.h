@@ -26,6 +26,9 @@ class IslandSolver {
   // Contacts contradict each other where a solution that does not converge misses so much of the deepest, and that is so much
   // of the smallest radius of gyration.
   static constexpr double kOfDepth = 0.1, kOfSize = 0.1;
+  // Contacts of bodies that a joint joins give way by so much of what they would: linear rows of two faces that a hinge holds
+  // together contradict it by the square of a turn.
+  static constexpr double kOfJoined = 1e-4;
   // Largest turn from which chords start, rad; what one may be of the step before it; units of rounding, of the coordinates
   // or of an angle of 1, that may be left of what joints hold.
   static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;

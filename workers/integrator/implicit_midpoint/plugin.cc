@@ -218,7 +218,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       unknown_ -= change;
       const double size = size_of(change);
       if (size <= kConverged || (size <= kStagnant && size >= last)) return;
-      if (i > 1 && size > kContraction * last) break;
+      if (i > 1 && size > kContraction * last && size > kStagnant) break;
       last = size;
     }
     newton();
