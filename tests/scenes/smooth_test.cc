@@ -145,6 +145,29 @@ Environment {
   }
 }
 
+// A mass on a spring of 1e13 N/m is a pendulum to the midpoint rule at 10 ms: the middle of each step lies on the circle, in the
+// direction that free flight gives it. What is beyond is the rounding of the length, 1e-16 m, times the spring.
+TEST(ImplicitMidpoint, SwingsOnAStiffSpringAsOnARod) {
+  SceneRun run(R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } }
+         Force { Type = "Spring" Id = "Rod" CustomProperties { Stiffness = 1e13 RestLength = 1 } } }
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment {
+  Space { Bodies { Body { Id = "Bob" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} Forces = { "Down", "Rod" } KineticProperties { Position = {1, 0, 0} } } } }
+  KineticIntegrator = "ImplicitMidpoint"
+}
+)");
+  const double h = 0.01;
+  Vector3 x(1, 0, 0), v = Vector3::Zero();
+  while (!run.is_done()) {
+    run.step();
+    const Vector3 middle = (x + 0.5 * h * v + 0.25 * h * h * Vector3(0, -9.81, 0)).normalized();
+    v = 4.0 / h * (middle - x) - v;
+    x = 2.0 * middle - x;
+    ASSERT_LE((run.body("Bob").pose.position - x).norm(), 2e-3) << run.time();
+  }
+}
+
 // At the origin of the world a joint's points have no coordinates to be rounded; steps that closed it no further never ended.
 TEST(Smooth, AHingeAtTheOriginRestsAndSwings) {
   const auto pendulum = [](const char* motion, double time_step, const char* integrator, const char* solver) {

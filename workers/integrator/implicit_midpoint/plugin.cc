@@ -36,10 +36,10 @@ constexpr double kContraction = 0.4;
 constexpr double kConverged = 4e-16;
 // Below this the change is rounding, if it does not shrink any more.
 constexpr double kStagnant = 1e-9;
-// As far as this it is, after so many steps of Newton's that made it no less: a light link between heavy bodies feels the
-// rounding of what it carries.
+// As far as this it is where so many steps of Newton's in a row stay below: a light link between heavy bodies feels the rounding
+// of what it carries.
 constexpr double kNoise = 1e-7;
-constexpr int kStepsOfNoise = 4;
+constexpr int kStepsOfNoise = 8;
 // Share of x / h, of 1 rad / h and of the largest velocities that is no less than a body's velocities count, with x the
 // largest distance from the origin of bodies that feel each other: kStagnant of it is what doubles resolve of
 // places, attitudes and velocities whose differences make the forces, so that stiff systems settle, and bodies that others
@@ -261,7 +261,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     }
     Eigen::VectorXd left = residual(unknown_);
     double last = HUGE_VAL, least = HUGE_VAL;
-    int idle = 0;
+    int resting = 0;
     Eigen::VectorXd best;
     bool has_matrix = false;
     for (int step = 0; step < kMostNewtonSteps; ++step) {
@@ -275,9 +275,11 @@ class ImplicitMidpoint final : public IntegratorPlugin {
         unknown_ -= change;
         return true;
       }
-      if (size < least) {
-        least = size, best = unknown_ - change, idle = 0;
-      } else if (++idle >= kStepsOfNoise && least <= kNoise) {
+      // one that leaps away again was no place to rest
+      resting = size <= kNoise ? resting + 1 : 0;
+      if (resting <= 1) least = HUGE_VAL;
+      if (resting > 0 && size < least) least = size, best = unknown_ - change;
+      if (resting >= kStepsOfNoise) {
         unknown_ = best;
         return true;
       }
