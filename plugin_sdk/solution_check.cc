@@ -24,7 +24,7 @@ constexpr double kRoundBefore = 2.0;
 constexpr double kOfSolution = 1e-13;
 // A displacement that changes by less from one look at it to the next has settled, of the coordinates.
 constexpr double kSettled = 4e-16;
-// Where drives yield to what is in their way, that is found with pushes which are much larger.
+// Where drives yield to what is in their way (their corrections say so), that is found with pushes which are much larger.
 constexpr double kSettledByDrives = 1e-13;
 // Rounding of a gap, of the coordinates that it is the difference of.
 constexpr double kOfSolvedCoordinates = 1e-12;
@@ -190,6 +190,7 @@ class Balance {
         is_driven_ = is_driven_ || is_soft;
         const bool on_velocity = is_soft || mode == AxisMode::kDriven || mode == AxisMode::kFriction;
         const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
+        has_yielded_ = has_yielded_ || (on_velocity && answer_.discrepancy_correction[k] != 0.0);
         const Vector3 impulse = answer_.discrepancy_impulse[k] * axes.col(axis);
         const Vector3 correction = answer_.discrepancy_correction[k] * axes.col(axis);
         for_both(request_.discrepancy_body(), i, point, apart, [&](Pushes& body, const Vector3& arm, double sign) {
@@ -228,7 +229,7 @@ class Balance {
     const Twist change{vector_at(answer_.pose_change, 2 * i), vector_at(answer_.pose_change, 2 * i + 1)};
     const double moved = change.linear.norm(), turned = change.angular.norm();
     const Push &velocity = pushes_[i].velocity, &pose = pushes_[i].pose;
-    const double settled = (is_driven_ ? kSettledByDrives : kSettled) * pushes_[i].coordinates;
+    const double settled = (has_yielded_ ? kSettledByDrives : kSettled) * pushes_[i].coordinates;
     // before a method is done, what friction and drives displace may be that of the round before
     const double before_last = is_unfinished() ? kRoundBefore : 0.0;
 
@@ -434,6 +435,7 @@ class Balance {
   std::size_t bodies_;
   std::vector<Pushes>& pushes_;
   bool is_driven_ = false;
+  bool has_yielded_ = false;  // a drive, to what is in its way
 };
 
 }  // namespace

@@ -73,6 +73,7 @@ void IslandSolver::load() {
   joints_.reserve(island_.discrepancies.size());
   contacts_.reserve(island_.contacts.size());
   for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
+  find_joined();
   for (const std::uint32_t row : island_.contacts) load_contact(row);
 }
 
@@ -114,6 +115,18 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   }
 }
 
+void IslandSolver::find_joined() {
+  for (const EndJoint& joint : joints_) {
+    for (const JointAxisState& axis : joint.states) {
+      if (!velocity_law(axis, axis.error_at_trial, joint.slop, request_.time_step()).is_unbounded_drive()) continue;
+      joined_.clear();
+      return;
+    }
+    joined_.emplace_back(std::minmax({joint.body1, joint.body2}));
+  }
+  std::ranges::sort(joined_);
+}
+
 void IslandSolver::load_contact(std::uint32_t row) {
   EndContact& contact = contacts_.emplace_back();
   contact.row = row;
@@ -122,16 +135,8 @@ void IslandSolver::load_contact(std::uint32_t row) {
   const SolverBody &one = bodies_[contact.body1], &two = bodies_[contact.body2];
   const Vector3 normal = vector_at(request_.contact_normal(), row);
   const Vector3 point = vector_at(request_.contact_point(), row);
-  const auto joins = [&](const EndJoint& joint) {
-    return std::minmax(joint.body1, joint.body2) == std::minmax(contact.body1, contact.body2);
-  };
-  const auto drives = [&](const EndJoint& joint) {
-    return std::ranges::any_of(joint.states, [&](const JointAxisState& state) {
-      return velocity_law(state, state.error_at_trial, joint.slop, request_.time_step()).is_unbounded_drive();
-    });
-  };
-  // drives that yield are less than that in the way
-  if (std::ranges::any_of(joints_, joins) && std::ranges::none_of(joints_, drives)) contact.softness = kOfJoined;
+  if (std::ranges::binary_search(joined_, std::pair(std::minmax({contact.body1, contact.body2}))))
+    contact.softness = kOfJoined;
   contact.gap_row = ConstraintDirection::through(point, normal, one, two);
   contact.gap = -request_.contact_depth()[row];
   const Vector3 to_surface = (-0.5 * contact.gap) * normal;

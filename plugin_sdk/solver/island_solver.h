@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "plugin_sdk/plugin.h"
@@ -43,6 +44,9 @@ class IslandSolver {
   BodyMotion start_motion(Twist SolverBody::*of) const;
 
   void load_joint(const DiscrepancyColumns& columns, std::uint32_t row);
+
+  // Pairs whose contacts give way; none beside drives without bound, which yield less than that.
+  void find_joined();
 
   void load_contact(std::uint32_t row);
 
@@ -190,6 +194,7 @@ class IslandSolver {
   std::vector<std::uint32_t> pushed_;  // places of those that can be pushed
   std::vector<EndJoint> joints_;
   std::vector<EndContact> contacts_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> joined_;  // rising
   std::vector<EndBody> end_;
   std::vector<double> gyration_;  // radii, m
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;

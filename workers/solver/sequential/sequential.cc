@@ -126,18 +126,23 @@ bool SequentialSolver::reconcile() {
   return shifted_velocity_ > 0.0 || shifted_pose_ > 0.0;
 }
 
+ConeRow SequentialSolver::row_of(std::size_t place, const JointLaw& law) const {
+  const RelaxationDiscrepancy& d = discrepancies_[place / 3];
+  ConeRow row;
+  row.body1 = d.body1, row.body2 = d.body2;
+  row.direction = d.directions[place % 3];
+  row.length = d.length;
+  row.law = law;
+  return row;
+}
+
 double SequentialSolver::reconcile(const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
                                    std::vector<double>* shift) const {
   ConeProblem problem;
   std::vector<std::size_t> place;
   for (std::size_t i = 0; i < laws.size(); ++i) {
     if (!laws[i].is_rigid()) continue;
-    const RelaxationDiscrepancy& d = discrepancies_[i / 3];
-    ConeRow& row = problem.rows.emplace_back();
-    row.body1 = d.body1, row.body2 = d.body2;
-    row.direction = d.directions[i % 3];
-    row.length = d.length;
-    row.law = laws[i];
+    problem.rows.push_back(row_of(i, laws[i]));
     place.push_back(i);
   }
   if (place.empty() || problem.reconcile(bodies_, start, smallest) == 0.0) return 0.0;
@@ -414,12 +419,7 @@ bool SequentialSolver::find_reach() {
   std::vector<std::size_t> place;
   for (std::size_t i = 0; i < velocity_laws_.size(); ++i) {
     if (!velocity_laws_[i].is_active()) continue;
-    const RelaxationDiscrepancy& d = discrepancies_[i / 3];
-    ConeRow& row = problem.rows.emplace_back();
-    row.body1 = d.body1, row.body2 = d.body2;
-    row.direction = d.directions[i % 3];
-    row.length = d.length;
-    row.law = velocity_laws_[i];
+    ConeRow& row = problem.rows.emplace_back(row_of(i, velocity_laws_[i]));
     place.push_back(i);
     if (!row.law.is_unbounded_drive()) continue;
     row.law.shift(-velocity_shift_[i]);

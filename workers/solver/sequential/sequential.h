@@ -140,6 +140,7 @@ class SequentialSolver {
   bool reconcile();
   double reconcile(const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
                    std::vector<double>* shift) const;
+  ConeRow row_of(std::size_t place, const JointLaw& law) const;
   void solve_pose();
   bool find_closed();
   void turn_trial_velocity();
