@@ -6,7 +6,7 @@
 //
 // A drive has reached a limit of the same two bodies if its row is a multiple of the limit's and what else holds between
 // them (driving points about the axis of a hinge with limits: J_d = s J_l + sum c_k J_k, with J_k v = 0), to 1e-3. A
-// drive that is held up through other bodies is a contradiction still.
+// drive that is held up in any other way yields (end_of_step.h), which has to be found; what is told here is exact.
 #pragma once
 
 #include <cstdint>
