@@ -113,6 +113,32 @@ Acceleration Derivatives::acceleration(std::size_t body, const BodyState& state,
                                vector_at(request_.inverse_inertia(), body), torque)};
 }
 
+Acceleration Derivatives::kick(std::size_t body, const Quaternion& orientation,
+                               std::span<const double> wrenches) const {
+  return acceleration(body, {{Vector3::Zero(), orientation}, {}}, wrenches);
+}
+
+bool Derivatives::has_gyroscopic_term(std::size_t body) const {
+  const Vector3 moments = vector_at(request_.inertia(), body);
+  return moments.minCoeff() < moments.maxCoeff() && vector_at(request_.inverse_inertia(), body).minCoeff() > 0.0;
+}
+
+Turning Derivatives::turned_freely(std::size_t body, const Turning& start, double time) const {
+  if (has_gyroscopic_term(body))
+    return gravitas::turned_freely(start, vector_at(request_.inertia(), body),
+                                   vector_at(request_.inverse_inertia(), body), time);
+  const Pose turned = displaced({Vector3::Zero(), start.orientation}, Vector3::Zero(), time * start.angular_velocity);
+  return {turned.orientation, start.angular_velocity};
+}
+
+Vector3 Derivatives::carried(std::size_t body, const Vector3& angular_velocity, const Quaternion& from,
+                             const Quaternion& to) const {
+  if (!has_gyroscopic_term(body)) return angular_velocity;
+  const Vector3 moments = vector_at(request_.inertia(), body);
+  const Vector3 momentum = from * moments.cwiseProduct(from.conjugate() * angular_velocity);
+  return to * (to.conjugate() * momentum).cwiseQuotient(moments);
+}
+
 BodyState Derivatives::start(std::size_t body) const { return detail::state_at(request_, body); }
 
 Twist accelerated(const Twist& twist, const Acceleration& acceleration, double damping, double time_step) {

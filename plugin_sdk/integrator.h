@@ -6,6 +6,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/free_rotor.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
@@ -49,10 +50,20 @@ class Derivatives {
   // Acceleration of one body in a state, under its part of `wrenches`.
   Acceleration acceleration(std::size_t body, const BodyState& state, std::span<const double> wrenches) const;
 
+  // That without the gyroscopic term, f/m and I_w^-1 tau, for methods that leave that term to the two below.
+  Acceleration kick(std::size_t body, const Quaternion& orientation, std::span<const double> wrenches) const;
+  // Attitude and angular velocity of one body after `time` (s) in which nothing turns it: exp(t w) q where its moments are
+  // equal or some are infinite, else the exact free rotor (free_rotor.h).
+  Turning turned_freely(std::size_t body, const Turning& start, double time) const;
+  // The angular velocity at another attitude that has the same angular momentum.
+  Vector3 carried(std::size_t body, const Vector3& angular_velocity, const Quaternion& from,
+                  const Quaternion& to) const;
+
   BodyState start(std::size_t body) const;
   std::size_t size() const { return request_.flags().size(); }
 
  private:
+  bool has_gyroscopic_term(std::size_t body) const;
   void require_finite(std::span<const double> column, std::size_t components, const char* what) const;
   void require_finite(const TrialColumns& trial) const;
   std::span<const double> ask(double time, const std::array<std::span<const double>, 4>& state,

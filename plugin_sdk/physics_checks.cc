@@ -38,6 +38,14 @@ struct StepOfBody {
   Vector3 force, torque;  // at the first question
   double force_spread = 0.0, torque_spread = 0.0;
   Vector3 inertia, inverse_inertia;
+
+  // By how much moments differ, of the smallest.
+  double unequal() const {
+    const double inverse = inverse_inertia.maxCoeff();
+    return inverse > 0.0 ? (inertia.maxCoeff() - inertia.minCoeff()) * inverse : 0.0;
+  }
+  // rad/s^2, at most, by the torque and the gyroscopic term.
+  double rate() const { return torque.norm() * inverse_inertia.maxCoeff() + unequal() * start.angular.squaredNorm(); }
 };
 
 std::string check_velocities(const StepOfBody& s, std::size_t body) {
@@ -51,9 +59,8 @@ std::string check_velocities(const StepOfBody& s, std::size_t body) {
   const Vector3& w = s.start.angular;
   const Vector3 alpha = angular_acceleration(s.from.orientation, w, s.inertia, s.inverse_inertia, s.torque);
   const double inverse = s.inverse_inertia.maxCoeff();
-  const double unequal = inverse > 0.0 ? (s.inertia.maxCoeff() - s.inertia.minCoeff()) * inverse : 0.0;
   // what changes while the body turns: a torque that is fixed in it, and the gyroscopic term
-  const double rate = s.torque.norm() * inverse + unequal * w.squaredNorm();
+  const double unequal = s.unequal(), rate = s.rate();
   const double turn = s.h * (w.norm() + s.h * rate);
   const double turned = unequal > 1e-9 ? turn * (1.0 + unequal) * s.h * rate : 0.0;
   const double turning = kChange * s.h * inverse * s.torque_spread;
@@ -84,8 +91,10 @@ std::string check_pose(const StepOfBody& s, std::size_t body) {
   if (change.w() < 0.0) return off_by("orientation", body, 2.0, 0.0, "it changed its sign");
   const Vector3 between = 0.5 * s.h * (s.start.angular + s.end.angular);
   const double apart = s.h * (s.end.angular - s.start.angular).norm();
+  // on the way a torque and the gyroscopic term may change what they leave at the end
+  const double on_the_way = 0.5 * s.h * s.h * s.rate() * (1.0 + turn * (1.0 + s.unequal()));
   return off_by("orientation", body, (log_rotation(change) - between).norm(),
-                (0.5 + turn) * apart + spread + turn * turn * turn / 12.0 + kOfArithmetic * (1.0 + turn),
+                (0.5 + turn) * apart + on_the_way + spread + turn * turn * turn / 12.0 + kOfArithmetic * (1.0 + turn),
                 "the turn by h w, w between w_n and w*");
 }
 

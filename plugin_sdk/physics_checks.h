@@ -116,6 +116,7 @@ class SolutionCheck {
     double size = 0.0;        // sum of the linear magnitudes
     double moment = 0.0;      // sum of magnitudes times arms
     double unreported = 0.0;  // turning that depends on the point at which a joint pushes
+    double turned = 0.0;      // linear part that depends on how far along its direction has turned
   };
   struct Pushes {
     Push velocity, pose;

@@ -51,14 +51,18 @@ BoxErrors errors_of(const std::string& integrator, double time_step) {
           (spin() - before).norm() / before.norm(), (end.pose.position - right).norm() / right.norm()};
 }
 
+// Kicks and exact free turning in turn.
 TEST(TumblingBox, IsExactBySplitting) {
-  for (const double h : {1e-3, 1e-2, 0.5, 10.0}) {
-    const BoxErrors e = errors_of("= \"SymplecticSplitting\"", h);
-    EXPECT_LT(e.angle, 1e-8) << h;
-    // E has a part m g z with z of 400 m summed from all steps
-    EXPECT_LT(e.energy, h < 0.1 ? 1e-10 : 1e-12) << h;
-    EXPECT_LT(e.spin, 1e-12) << h;
-    EXPECT_LT(e.position, 1e-11) << h;
+  for (const std::string integrator : {"SymplecticSplitting", "Verlet", "SemiImplicitEuler"}) {
+    for (const double h : {1e-3, 1e-2, 0.5, 10.0}) {
+      const BoxErrors e = errors_of("= \"" + integrator + "\"", h);
+      EXPECT_LT(e.angle, 1e-8) << integrator << h;
+      EXPECT_LT(e.spin, 1e-12) << integrator << h;
+      if (integrator == "SemiImplicitEuler") continue;  // falls to first order
+      // E has a part m g z with z of 400 m summed from all steps
+      EXPECT_LT(e.energy, h < 0.1 ? 1e-10 : 1e-12) << integrator << h;
+      EXPECT_LT(e.position, 1e-11) << integrator << h;
+    }
   }
 }
 
@@ -74,9 +78,8 @@ TEST(TumblingBox, IsFollowedByTheOthersToTheirOrder) {
     const char* integrator;
     double order, angle;
   };
-  for (const Bound& b :
-       {Bound{"= \"RKMK4\"", 4.0, 1e-7}, Bound{"= \"RK4\"", 4.0, 1e-7}, Bound{"= \"ImplicitMidpoint\"", 2.0, 1e-2},
-        Bound{"= \"Verlet\"", 2.0, 1e-2}, Bound{"= \"BasicVerlet\"", 2.0, 1e-2}}) {
+  for (const Bound& b : {Bound{"= \"RKMK4\"", 4.0, 1e-7}, Bound{"= \"RK4\"", 4.0, 1e-7},
+                         Bound{"= \"ImplicitMidpoint\"", 2.0, 1e-2}, Bound{"= \"BasicVerlet\"", 2.0, 1e-2}}) {
     const double fine = errors_of(b.integrator, 1e-3).angle, coarse = errors_of(b.integrator, 2e-3).angle;
     EXPECT_LT(fine, b.angle) << b.integrator;
     EXPECT_GT(std::log2(coarse / fine), b.order - 0.2) << b.integrator;

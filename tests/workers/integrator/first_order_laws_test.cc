@@ -29,8 +29,9 @@ TEST_P(FirstOrderLaws, AFreeBodyTurnsExactlyAboutAPrincipalAxis) {
       problem_.bodies[0].state = {{Vector3::Zero(), start}, {Vector3::Zero(), w}};
       problem_.step();
       const BodyState& state = problem_.bodies[0].state;
-      // the gyroscopic term of a turned principal axis is rounding: 1e-16 w^2 h
-      EXPECT_LT((state.twist.angular - w).norm(), 1e-15 * speed * (1.0 + speed));
+      // the gyroscopic term of a turned principal axis is rounding: 1e-16 w^2 h; about the middle axis, exactly, it grows by a
+      // factor of e^3 in the longest step
+      EXPECT_LT((state.twist.angular - w).norm(), 3e-15 * speed * (1.0 + speed));
       const Quaternion expected = rotate_by(start, problem_.time_step * w);
       EXPECT_LT((state.pose.orientation.coeffs() - expected.coeffs()).norm(), 1e-14 * (1 + speed));
       EXPECT_NEAR(state.pose.orientation.norm(), 1.0, 1e-15);

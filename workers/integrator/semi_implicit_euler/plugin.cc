@@ -1,12 +1,13 @@
 // Integrator `SemiImplicitEuler` (symplectic Euler): first order, position with the new velocity. With h the time
 // step and forces at t_n:
 //
-//   v' = e^(-c h) (v + h f/m)          w' = e^(-c h) (w + h alpha),   alpha = I_w^-1 (tau - w x I_w w)
-//   x' = x + h v'         q' = exp(h w') q
+//   v' = e^(-c h) (v + h f/m)          w* = e^(-c h) (w + h I_w^-1 tau)
+//   x' = x + h v'                      q', w' = (q, w*) after h of exact free turning (free_rotor.h)
 //
-// Symplectic for forces that depend on position alone: the energy of an oscillator stays within about h w / 2 of
-// its value for h w < 2 and grows without bound beyond. Known failure: the gyroscopic term is taken explicitly,
-// so a fast free rotor with unequal moments gains energy, of order (h w)^2 per turn.
+// A kick, then a drift: symplectic for forces that depend on position and attitude alone. The energy of an oscillator stays
+// within about h w / 2 of its value for h w < 2 and grows without bound beyond; a body that nothing turns keeps its energy and
+// momentum to rounding, and has its true attitude, at any spin and step. (The gyroscopic term taken explicitly multiplies the
+// energy of a disc by 15 in 5 s at 10 rad/s and 1/60 s.) Without torque it is exp(h w) q where the moments are equal.
 // theta = 1: an impulse of this step moves the pose by h times the velocity it gives.
 #include "plugin_sdk/integrator.h"
 
@@ -30,8 +31,11 @@ class SemiImplicitEuler final : public IntegratorPlugin {
     Derivatives derivatives(request, host, &room_);
     const std::span<const double> wrenches = derivatives.wrenches_at_start();
     for_each_body(request, reply, [&](std::size_t body, const BodyState& s) {
-      const Twist next = accelerated(s.twist, derivatives.acceleration(body, s, wrenches), request.damping()[body], h);
-      return BodyState{displaced(s.pose, h * next.linear, h * next.angular), next};
+      const Quaternion& q = s.pose.orientation;
+      const Twist next = accelerated(s.twist, derivatives.kick(body, q, wrenches), request.damping()[body], h);
+      const Turning turned = derivatives.turned_freely(body, {q, next.angular}, h);
+      const Pose moved = displaced(s.pose, h * next.linear, Vector3::Zero());
+      return BodyState{{moved.position, turned.orientation}, {next.linear, turned.angular_velocity}};
     });
   }
 

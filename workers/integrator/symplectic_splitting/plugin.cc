@@ -24,10 +24,9 @@
 #include <cstring>
 
 #include "plugin_sdk/integrator.h"
+#include "plugin_sdk/math/free_rotor.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
-#include "workers/integrator/symplectic_splitting/exact_rotation.h"
-#include "workers/integrator/symplectic_splitting/free_rotor.h"
 
 namespace gravitas {
 namespace {
@@ -183,19 +182,15 @@ class SymplecticSplitting final : public IntegratorPlugin {
     Vector3& w = state.twist.angular;
     drift_linearly(body, from, to, s, &state);
     const Vector3 inverse_moments = vector_at(request_->inverse_inertia(), body);
-    if (w.isZero(0.0)) {
-      // keeps its attitude bit for bit
-    } else if (inverse_moments.isZero(0.0)) {
+    if (inverse_moments.isZero(0.0)) {
       state.pose = displaced(state.pose, Vector3::Zero(), slowed * w);
-    } else if (!(inverse_moments.minCoeff() > 0.0)) {
+    } else if (!w.isZero(0.0) && !(inverse_moments.minCoeff() > 0.0)) {
       throw Refusal("body " + std::to_string(body) + " can be turned about some of its axes alone");
     } else {
-      const Vector3 moments = vector_at(request_->inertia(), body);
-      const Vector3 momentum = moments.cwiseProduct(exactly_rotated(state.pose.orientation.conjugate(), w));
-      const RotorMotion moved = free_rotor(inverse_moments, momentum, slowed);
-      state.pose.orientation = normalized(state.pose.orientation * moved.turn);
-      // divided, for moments times rounded inverses would gather the same error in each step
-      w = exactly_rotated(state.pose.orientation, moved.momentum.cwiseQuotient(moments));
+      const Turning turned =
+          turned_freely({state.pose.orientation, w}, vector_at(request_->inertia(), body), inverse_moments, slowed);
+      state.pose.orientation = turned.orientation;
+      w = turned.angular_velocity;
     }
     w *= kept;
     trial_.set(body, state);

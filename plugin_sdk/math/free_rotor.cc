@@ -1,12 +1,13 @@
-#include "workers/integrator/symplectic_splitting/free_rotor.h"
+#include "plugin_sdk/math/free_rotor.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "plugin_sdk/math/elliptic.h"
+#include "plugin_sdk/math/exact_rotation.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
-#include "workers/integrator/symplectic_splitting/elliptic.h"
 
 namespace gravitas {
 namespace {
@@ -227,6 +228,16 @@ RotorMotion free_rotor(const Vector3& inverse_moments, const Vector3& momentum, 
   const Quaternion turn = exp_rotation(angle * n) * to_quaternion(frame_of(n, k) * frame_of(next, k).transpose());
   const Vector3 axis = axes.restored(turn.vec());
   return {momentum + size * axes.restored(change), Quaternion(turn.w(), axis.x(), axis.y(), axis.z())};
+}
+
+Turning turned_freely(const Turning& start, const Vector3& moments, const Vector3& inverse_moments, double time) {
+  const auto& [q, w] = start;
+  if (w.isZero(0.0)) return start;
+  const Vector3 momentum = moments.cwiseProduct(exactly_rotated(q.conjugate(), w));
+  const RotorMotion moved = free_rotor(inverse_moments, momentum, time);
+  const Quaternion end = normalized(q * moved.turn);
+  // divided, for moments times rounded inverses would gather the same error in each step
+  return {end, exactly_rotated(end, moved.momentum.cwiseQuotient(moments))};
 }
 
 }  // namespace gravitas

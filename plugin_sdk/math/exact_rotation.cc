@@ -1,4 +1,4 @@
-#include "workers/integrator/symplectic_splitting/exact_rotation.h"
+#include "plugin_sdk/math/exact_rotation.h"
 
 #include <array>
 

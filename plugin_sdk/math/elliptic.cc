@@ -1,4 +1,4 @@
-#include "workers/integrator/symplectic_splitting/elliptic.h"
+#include "plugin_sdk/math/elliptic.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The exact free rotor and what it is made of: closed forms, published values, and the flow's own laws.
-#include "workers/integrator/symplectic_splitting/free_rotor.h"
+#include "plugin_sdk/math/free_rotor.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "workers/integrator/symplectic_splitting/elliptic.h"
+#include "plugin_sdk/math/elliptic.h"
 
 namespace gravitas::test {
 namespace {

@@ -40,4 +40,13 @@ struct RotorMotion {
 // grows as 1e-16 times the angle turned. NaN in gives NaN out.
 RotorMotion free_rotor(const Vector3& inverse_moments, const Vector3& momentum, double time);
 
+// The same of a body in the world: attitude (body to world) and angular velocity (world, rad/s) after `time`. At rest it keeps
+// both bit for bit. Its energy and momentum do not drift: velocities are turned to and fro with one rounding, and divided by
+// the moments (kg m^2, all > 0) themselves.
+struct Turning {
+  Quaternion orientation;
+  Vector3 angular_velocity;
+};
+Turning turned_freely(const Turning& start, const Vector3& moments, const Vector3& inverse_moments, double time);
+
 }  // namespace gravitas
