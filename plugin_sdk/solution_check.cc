@@ -53,7 +53,7 @@ void push_couple(const Vector3& impulse, Push* push) {
 }
 
 // Where a method takes the directions of its rows, and pushes two bodies that a point alone holds together: midway, or each
-// at its own place.
+// at its own place; impulses then may be along directions on the way from S* to the end.
 enum class Directions : std::uint8_t { kOfTrial, kOfTrialAtOwn, kOfEnd };
 
 class Balance {
@@ -90,6 +90,33 @@ class Balance {
   // What the pose change turns a body by, rad, and where it carries a point of the trial state.
   Vector3 turn_of(std::uint32_t body) const {
     return body == kNone ? Vector3(Vector3::Zero()) : vector_at(answer_.pose_change, 2 * body + 1);
+  }
+  // By how much the axes of a discrepancy of points turn, rad, at most, with the pose change or the part of it that a method
+  // knows before what acts on the velocity alone has moved the bodies.
+  double turned_on_the_way(std::size_t row, const Discrepancy& d) const {
+    const std::uint32_t one = request_.discrepancy_body()[2 * row], two = request_.discrepancy_body()[2 * row + 1];
+    const double share = request_.theta() * request_.time_step();
+    const auto gained = [&](std::uint32_t body, std::span<const double> after, std::span<const double> before) {
+      return body == kNone ? 0.0 : share * (vector_at(after, body) - vector_at(before, body)).norm();
+    };
+    const auto turned = [&](std::uint32_t body) {
+      if (body == kNone) return 0.0;
+      // sweeps that ran out may have come anywhere on the way of the free step
+      const Quaternion way =
+          quaternion_at(request_.trial_orientation(), body) * quaternion_at(request_.orientation(), body).conjugate();
+      const double unfinished = is_unfinished() ? log_rotation(shorter_arc(way)).norm() : 0.0;
+      return unfinished + turn_of(body).norm() +
+             gained(body, answer_.angular_velocity, request_.trial_angular_velocity());
+    };
+    const auto moved = [&](std::uint32_t body, const Vector3& point) {
+      if (body == kNone) return 0.0;
+      const double arm = (point - vector_at(request_.trial_position(), body)).norm();
+      return vector_at(answer_.pose_change, 2 * body).norm() + arm * turned(body) +
+             gained(body, answer_.linear_velocity, request_.trial_linear_velocity());
+    };
+    const double length = (d.point2 - d.point1).norm();
+    if (!d.is_radial() || length == 0.0) return turned(one);
+    return turned(one) + (moved(one, d.point1) + moved(two, d.point2)) / length;
   }
   Vector3 carried(std::uint32_t body, const Vector3& point) const {
     if (body == kNone) return point;
@@ -181,6 +208,8 @@ class Balance {
           directions == Directions::kOfTrialAtOwn && is_only_point(request_.discrepancy_body(), request_.mode(), i);
       const Vector3 apart =
           is_at_own ? half_of_locked(d, axes, axes.transpose() * (d.point2 - d.point1)) : Vector3(Vector3::Zero());
+      const bool turns = directions == Directions::kOfTrialAtOwn && !d.is_angular();
+      const double turned = turns ? 1.001 * turned_on_the_way(i, d) : 0.0;
       is_driven_ = is_driven_ || !d.velocity.isZero(0.0);
       for (int axis = 0; axis < 3; ++axis) {
         const AxisMode mode = axis_mode(d.modes, axis);
@@ -199,6 +228,9 @@ class Balance {
           add(d, arm, sign * correction, &body.pose);
           body.velocity.unreported += to_point.cross(impulse).norm();
           body.pose.unreported += to_point.cross(correction).norm();
+          body.velocity.turned += turned * impulse.norm();
+          body.velocity.unreported += turned * impulse.norm() * arm.norm();
+          if (on_velocity) body.pose.turned += turned * share * impulse.norm();
           if (on_velocity) add(d, arm, sign * share * impulse, &body.pose);
           if (on_velocity) loosen(share * impulse.norm(), arm, &body);
         });
@@ -233,14 +265,15 @@ class Balance {
     // before a method is done, what friction and drives displace may be that of the round before
     const double before_last = is_unfinished() ? kRoundBefore : 0.0;
 
-    std::string wrong =
-        off_by("linear_velocity", i, (mass * (after.linear - before.linear) - velocity.linear).norm(),
-               relative * velocity.size + kOfSolution * mass * (before.linear.norm() + after.linear.norm()),
-               "m (v - v*) is the sum of the impulses, N s");
+    std::string wrong = off_by(
+        "linear_velocity", i, (mass * (after.linear - before.linear) - velocity.linear).norm(),
+        relative * velocity.size + velocity.turned + kOfSolution * mass * (before.linear.norm() + after.linear.norm()),
+        "m (v - v*) is the sum of the impulses, N s");
     if (!wrong.empty()) return wrong;
-    wrong = off_by("pose_change", i, (mass * change.linear - pose.linear).norm(),
-                   relative * pose.size + before_last * pushes_[i].loose + mass * (kOfSolution * moved + settled),
-                   "m delta is the sum of the corrections, kg m");
+    wrong = off_by(
+        "pose_change", i, (mass * change.linear - pose.linear).norm(),
+        relative * pose.size + pose.turned + before_last * pushes_[i].loose + mass * (kOfSolution * moved + settled),
+        "m delta is the sum of the corrections, kg m");
     if (!wrong.empty()) return wrong;
 
     // arms and inertia at the end of the step are as good
@@ -249,8 +282,9 @@ class Balance {
       return relative * push.moment + 2.0 * (push.size * moved + (push.moment + made) * turned) +
              1.001 * push.unreported;
     };
-    // so is w*, which may turn with a body that joints turn
-    const double along = pushes_[i].is_joined ? 2.0 * inertia.norm() * before.angular.norm() * turned : 0.0;
+    // so is w*, which may turn with a body that joints turn, and the inertia that impulses meet
+    const double spins = before.angular.norm() + (after.angular - before.angular).norm();
+    const double along = pushes_[i].is_joined ? 2.0 * inertia.norm() * spins * turned : 0.0;
     const double spin = (inertia * before.angular).norm() + (inertia * after.angular).norm();
     wrong = off_by("angular_velocity", i, (turning - velocity.angular).norm(),
                    arms(velocity, turning.norm()) + along + kOfSolution * spin,

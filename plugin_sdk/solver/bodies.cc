@@ -40,6 +40,15 @@ SolverBodies SolverBodies::subset(const std::vector<std::uint32_t>& rows) const 
   return some;
 }
 
+void SolverBodies::turn(const BodyMotion& displacement) {
+  for (std::size_t i = 0; i < count(); ++i) {
+    if (displacement[i].angular.isZero(0.0)) continue;
+    const Matrix3 turn = to_rotation_matrix(exp_rotation(displacement[i].angular));
+    Matrix3& inverse = bodies_[i].inverse_inertia;
+    inverse = turn * inverse * turn.transpose();
+  }
+}
+
 SolverBodies SolverBodies::with_immovable_twins() const {
   SolverBodies all = *this;
   all.bodies_.insert(all.bodies_.end(), bodies_.begin(), bodies_.end());

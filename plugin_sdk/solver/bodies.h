@@ -46,6 +46,9 @@ class SolverBodies {
   // These, and after them (the world included) each again as a body that nothing pushes, in the same order.
   SolverBodies with_immovable_twins() const;
 
+  // Turns the world inertia to where a displacement from the trial pose leaves the bodies.
+  void turn(const BodyMotion& displacement);
+
   // Without the world.
   std::size_t count() const { return bodies_.size() - 1; }
   // The row itself, or that of the world for kNone.

@@ -4,7 +4,7 @@
     S_n, S*, discrepancies, contacts
       -> pose change       delta = M^-1 J^T mu      no joint open, no gap negative
       -> closed contacts   gaps and limits that S* (+) delta leaves at zero
-      -> velocity          v_{n+1} = v* + M^-1 J^T lambda
+      -> velocity          v_{n+1} = v* + M^-1 J^T lambda, joints where the pose change leaves the bodies
       -> pose change again, with theta h M^-1 J^T lambda of friction, drives and springs
 
 The laws are those of schemas/gravitas/stage/v1/solver.proto. Bodies that no joint or contact joins are solved apart,
@@ -16,6 +16,7 @@ import numpy
 
 from complementarity import EPSILON, STILLNESS, Contact, Laws, Rows, apply, cross, dot, solve
 from gravitas_worker import KINEMATIC, MOVABLE, NONE, Property, Refusal, Solver, check_finite, check_indices, main
+from rotations import (conjugate, product, rotation, rotation_vector, sum_along, tangent_of, turn_by, turned_by, unit)
 from surface import perturbed_normal
 
 NOTHING_TO_DO, CONVERGED, ITERATIONS = 0, 1, 2
@@ -137,14 +138,15 @@ class Scene:
         body1, body2 = self.joint_body[:, 0], self.joint_body[:, 1]
         middle = 0.5 * (r.point1 + r.point2)
         axes = rotation(r.axes).swapaxes(-1, -2)  # [row, axis]
+        self.joint_axes, self.joint_point = axes, (r.point1, r.point2)
+        self.is_swing, self.is_twist = (r.mode & SWING) != 0, (r.mode & TWIST) != 0
         angular = (r.mode & ANGULAR) != 0
         error = r.point2 - r.point1
         turned = error + bodies.turn(body1) - bodies.turn(body2)
         # axes turn with body 1
         carried = bodies.turned(bodies.carried(r.point2, body2) - bodies.carried(r.point1, body1), body1)
         start = numpy.where(angular[:, None], turned, carried)
-        is_swing = ((r.mode & SWING) != 0)[:, None]
-        start = numpy.where(is_swing, self._swing_at_start(r, axes, body1, body2), start)
+        start = numpy.where(self.is_swing[:, None], self._swing_at_start(r, axes, body1, body2), start)
 
         def along(vectors):
             return numpy.stack([dot(axes[:, i], vectors) for i in range(3)], axis=-1).reshape(-1)
@@ -163,17 +165,64 @@ class Scene:
         # where a point is all that holds two bodies, each is pushed at its own
         same = (self.joint_body[1:] == self.joint_body[:-1]).all(axis=1)
         is_alone = ~angular & ~numpy.append(same, False) & ~numpy.insert(same, 0, False)
-        is_locked = is_alone[:, None] & (self.mode.reshape(-1, 3) == LOCKED) & (r.compliance == 0)
-        half = 0.5 * numpy.where(is_locked, self.error_trial.reshape(-1, 3), 0.0)
-        apart = (half[:, 0, None] * axes[:, 0] + half[:, 1, None] * axes[:, 1]) + half[:, 2, None] * axes[:, 2]
+        self.is_own = is_alone[:, None] & (self.mode.reshape(-1, 3) == LOCKED) & (r.compliance == 0)
+        self.is_angular = angular
+        apart = sum_along(axes, 0.5 * numpy.where(self.is_own, self.error_trial.reshape(-1, 3), 0.0))
+        self.joint_rows = self._rows_of_joints(axes, middle - apart, middle + apart)
 
-        flat, one, two = axes.reshape(-1, 3), numpy.repeat(body1, 3), numpy.repeat(body2, 3)
-        linear, turning = numpy.flatnonzero(~numpy.repeat(angular, 3)), numpy.flatnonzero(numpy.repeat(angular, 3))
+    def _rows_of_joints(self, axes, point1, point2):
+        """Three a discrepancy, along axes at a point of each body, or about them."""
+        bodies, flat = self.bodies, axes.reshape(-1, 3)
+        one, two = (numpy.repeat(self.joint_body[:, i], 3) for i in range(2))
+        angular = numpy.repeat(self.is_angular, 3)
+        linear, turning = numpy.flatnonzero(~angular), numpy.flatnonzero(angular)
         rows = Rows.joined(
-            Rows(bodies, one[linear], two[linear], flat[linear], numpy.repeat(middle - apart, 3, axis=0)[linear],
-                 numpy.repeat(middle + apart, 3, axis=0)[linear]),
+            Rows(bodies, one[linear], two[linear], flat[linear], numpy.repeat(point1, 3, axis=0)[linear],
+                 numpy.repeat(point2, 3, axis=0)[linear]),
             Rows(bodies, one[turning], two[turning], flat[turning]))
-        self.joint_rows = rows.part(numpy.argsort(numpy.concatenate([linear, turning])))
+        return rows.part(numpy.argsort(numpy.concatenate([linear, turning])))
+
+    def joint_rows_at(self, displacement):
+        """The rows where a displacement leaves the bodies; of two that do not turn, or touch each other, those of S*. Linear
+        axes turn with body 1, a swing's with its two directions, a twist's with its two shafts."""
+        axes, (point1, point2) = self.joint_axes, self.joint_point
+        body1, body2 = self.joint_body[:, 0], self.joint_body[:, 1]
+        if not displacement[:, 3:].any() or not len(axes):
+            return self.joint_rows
+        turn1, turn2 = (rotation(turn_by(displacement[body, 3:])) for body in (body1, body2))
+
+        def moved(point, body, turn):
+            centre = self.bodies.trial_position[body]
+            return centre + displacement[body, :3] + apply(turn, point - centre)
+
+        def turned(vectors):
+            return numpy.stack([apply(turn1, vectors[:, i]) for i in range(3)], axis=1)
+
+        end1, end2, at_end = moved(point1, body1, turn1), moved(point2, body2, turn2), turned(axes)
+        errors = numpy.stack([dot(at_end[:, i], end2 - end1) for i in range(3)], axis=-1)
+        modes = self.mode.reshape(-1, 3)
+        is_held = (modes == LOCKED) | (modes == LIMITED) | (modes == UNILATERAL)
+        place = numpy.where(is_held.any(axis=1)[:, None], end2, end1)
+        place = place - sum_along(at_end, 0.5 * numpy.where(is_held, errors, 0.0))
+        apart = sum_along(at_end, 0.5 * numpy.where(self.is_own, errors, 0.0))
+
+        first = apply(turn1, axes[:, 1])
+        angle = dot(axes[:, 0], point2)[:, None]
+        second = apply(turn2, numpy.cos(angle) * axes[:, 1] + numpy.sin(angle) * axes[:, 2])
+        swing = axes.copy()
+        swing[:, 0] = unit(cross(first, second), axes[:, 0])
+        swing[:, 1], swing[:, 2] = first, cross(swing[:, 0], first)
+        cosine = numpy.sqrt(numpy.maximum(0.0, 1 - dot(point1, point1)))[:, None]
+        twist = axes.copy()
+        twist[:, 0] = unit(apply(turn1, cosine * axes[:, 0] + point1) + apply(turn2, cosine * axes[:, 0] - point1),
+                           axes[:, 0])
+        about = numpy.where(self.is_twist[:, None, None], twist, axes)
+        about = numpy.where(self.is_swing[:, None, None], swing, about)
+        rows = self._rows_of_joints(numpy.where(self.is_angular[:, None, None], about, at_end),
+                                    place - apart - displacement[body1, :3], place + apart - displacement[body2, :3])
+        still = ~(displacement[body1, 3:].any(axis=1) | displacement[body2, 3:].any(axis=1)) | self.touches
+        still, count = numpy.repeat(still, 3), len(rows)
+        return Rows.joined(rows, self.joint_rows).part(numpy.where(still, count, 0) + numpy.arange(count))
 
     def _swing_at_start(self, r, axes, body1, body2):
         """Of the angle between a direction of body 1, the second axis, and one of body 2, that turned by point2."""
@@ -239,6 +288,8 @@ class Scene:
     def _set_contacts(self, r, correction_factor):
         bodies = self.bodies
         self.contact_body = r.contact_body.astype(numpy.intp)
+        touching = {tuple(sorted(pair)) for pair in self.contact_body.tolist()}
+        self.touches = numpy.array([tuple(sorted(pair)) in touching for pair in self.joint_body.tolist()], bool)
         body1, body2 = self.contact_body[:, 0], self.contact_body[:, 1]
         normal, point, self.gap = r.contact_normal, r.contact_point, -r.contact_depth
         self.gap_rows = Rows(bodies, body1, body2, normal, point)
@@ -407,7 +458,8 @@ class Island:
             static, dynamic, rolling, spinning = scene.friction[contact]
             contacts.append(Contact(count + len(numbers), scene.bounce[contact], static, dynamic, rolling, spinning))
             numbers += range(6 * contact, 6 * contact + (6 if contacts[-1].turns() else 3))
-        self._velocity_rows = Rows.joined(scene.joint_rows.part(self._joints), scene.contact_rows.part(numbers))
+        joint_rows = scene.joint_rows_at(self._displacement)
+        self._velocity_rows = Rows.joined(joint_rows.part(self._joints), scene.contact_rows.part(numbers))
         self._velocity_laws = Laws(len(self._velocity_rows))
         for name, values in self._joint_laws.__dict__.items():
             self._velocity_laws.__dict__[name][:count] = values
@@ -421,15 +473,16 @@ class Island:
         self._bound_energy()
 
     def _turned_by_joints(self):
-        """v*, of which spins go along with what joints turn the bodies by, no further than they turn."""
+        """v*, of which spins go along with what joints turn the bodies by, along what these turn by, and no further."""
         velocity = self._scene.bodies.trial_velocity.copy()
         by_joints = numpy.zeros_like(velocity)
         multipliers = self._corrections.copy()
         multipliers[len(self._joints) :] = 0.0
         self._pose_rows.push(multipliers, by_joints)
         turn, whole = by_joints[:, 3:], self._displacement[:, 3:]
-        angle, most = numpy.sqrt(dot(turn, turn)), numpy.sqrt(dot(whole, whole))
-        turn = turn * numpy.where(angle > most, most / numpy.where(angle > 0, angle, 1.0), 1.0)[:, None]
+        square = dot(whole, whole)
+        share = numpy.clip(dot(turn, whole) / numpy.where(square > 0, square, 1.0), 0.0, 1.0)
+        turn = share[:, None] * whole
         acting = numpy.flatnonzero(turn.any(axis=1))
         velocity[acting, 3:] = turned_by(velocity[acting, 3:], turn[acting])
         return velocity
@@ -521,51 +574,6 @@ def check_range(name, column, low, high):
     if bad.any():
         row = int(numpy.argwhere(bad)[0][0])
         raise Refusal(f"column {name}, row {row}: {float(column[bad][0]):g}; allowed: {low:g} to {high:g}")
-
-
-# ---- rotations, as rows (w, x, y, z)
-
-
-def rotation(q):
-    """Matrices."""
-    w, x, y, z = (q[..., i] for i in range(4))
-    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
-    return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def conjugate(q):
-    return q * numpy.array([1.0, -1.0, -1.0, -1.0])
-
-
-def product(p, q):
-    scalar = p[..., 0] * q[..., 0] - dot(p[..., 1:], q[..., 1:])
-    vector = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + cross(p[..., 1:], q[..., 1:])
-    return numpy.concatenate([scalar[..., None], vector], axis=-1)
-
-
-def rotation_vector(q):
-    """Along the shorter arc."""
-    q = numpy.where(q[..., :1] < 0, -q, q)
-    sine = numpy.sqrt(dot(q[..., 1:], q[..., 1:]))
-    angle = 2 * numpy.arctan2(sine, q[..., 0])
-    return q[..., 1:] * numpy.where(sine > 0, angle / numpy.where(sine > 0, sine, 1.0), 2.0)[..., None]
-
-
-def turned_by(vector, rotation_vector):
-    """Rodrigues."""
-    angle = numpy.sqrt(dot(rotation_vector, rotation_vector))[:, None]
-    axis = rotation_vector / angle
-    return (numpy.cos(angle) * vector + numpy.sin(angle) * cross(axis, vector)
-            + (1 - numpy.cos(angle)) * dot(axis, vector)[:, None] * axis)
-
-
-def tangent_of(normal):
-    """A unit vector across each: away from the smallest component."""
-    axis = numpy.eye(3)[numpy.abs(normal).argmin(axis=1)] if len(normal) else normal
-    across = cross(normal, axis)
-    return across / numpy.sqrt(dot(across, across))[:, None]
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver/end_of_step_rows.h"
 
 namespace gravitas {
 namespace {
@@ -23,6 +24,7 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
   RelaxationDiscrepancy r;
   r.body1 = body1;
   r.body2 = body2;
+  r.is_only_point = is_only_point;
   r.beta = correction_factor * discrepancy.correction;
   const SolverBody& one = bodies[body1];
   const SolverBody& two = bodies[body2];
@@ -43,6 +45,27 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
                                   : ConstraintDirection::through(middle - apart, middle + apart, axis, one, two);
   }
   return r;
+}
+
+void move_to_end(const Discrepancy& discrepancy, const SolverBodies& turned, const BodyMotion& displacement,
+                 RelaxationDiscrepancy* moved) {
+  const SolverBody &one = turned[moved->body1], &two = turned[moved->body2];
+  const Twist &change1 = displacement[moved->body1], &change2 = displacement[moved->body2];
+  // what does not turn keeps its rows bit for bit
+  if (change1.angular.isZero(0.0) && change2.angular.isZero(0.0)) return;
+  const auto end_of = [](const SolverBody& body, const Twist& change) {
+    EndBody end;
+    end.pose = displaced(body.trial, change.linear, change.angular);
+    end.turn = to_rotation_matrix(exp_rotation(change.angular));
+    return end;
+  };
+  EndJoint joint;
+  joint.discrepancy = discrepancy;
+  joint.axes = to_rotation_matrix(discrepancy.axes);
+  joint.is_only_point = moved->is_only_point;
+  move_joint(one, two, end_of(one, change1), end_of(two, change2), change2.angular - change1.angular, &joint);
+  for (std::size_t k = 0; k < 3; ++k)
+    moved->directions[k] = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
 }
 
 void RelaxationJoints::build(const SolverBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies,

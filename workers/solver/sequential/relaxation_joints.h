@@ -40,6 +40,7 @@ namespace gravitas {
 // A discrepancy with all that the two problems need of it. The poses are those at S*.
 struct RelaxationDiscrepancy {
   std::uint32_t body1 = 0, body2 = 0;  // rows of SolverBodies
+  bool is_only_point = false;          // joint_laws.h
   double beta = 1.0;                   // of the pose change
   double slop = 0.0;                   // of a limit, m or rad
   double length = 1.0;                 // of a unit of the error, m: 1 for points, an arm for angles
@@ -50,6 +51,11 @@ struct RelaxationDiscrepancy {
 // `is_only_point` as of joint_laws.h. `correction_factor` multiplies the discrepancy's own.
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
                                              bool is_only_point, const SolverBodies& bodies, double correction_factor);
+
+// Moves the directions to where a pose change leaves the bodies, as end_of_step_rows.h has them. `turned`: bodies with
+// the inertia there.
+void move_to_end(const Discrepancy& discrepancy, const SolverBodies& turned, const BodyMotion& displacement,
+                 RelaxationDiscrepancy* moved);
 
 class RelaxationJoints final : public RelaxationBlocks {
  public:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/plugin.h"
@@ -34,6 +35,10 @@ void copy(std::span<const double> from, std::vector<double>& to) { to.assign(fro
 void check_range(double violation, double motion) {
   if (!std::isfinite(violation) || !std::isfinite(motion))
     throw Refusal("velocities, errors or arms so large that their products are not finite");
+}
+
+std::pair<std::uint32_t, std::uint32_t> pair_of(std::uint32_t body1, std::uint32_t body2) {
+  return std::minmax(body1, body2);
 }
 
 }  // namespace
@@ -119,30 +124,30 @@ bool SequentialSolver::reconcile() {
   const double placed = std::max(kLeastContradiction, 4.0 * turn * turn) * reach + 4.0 * open * turn;
   std::vector<double> shift(pose_laws_.size(), 0.0);
   if (used_up_ || velocity_joints_.largest_left_out(solution_.velocity) > moved)
-    shifted_velocity_ = reconcile(velocity_laws_, trial_velocity_, moved, &velocity_shift_);
+    shifted_velocity_ = reconcile(directed_, velocity_laws_, trial_velocity_, moved, &velocity_shift_);
   if (used_up_ || pose_joints_.largest_left_out(solution_.displacement) > placed)
-    shifted_pose_ = reconcile(pose_laws_, BodyMotion(trial_velocity_.size()), placed, &shift);
+    shifted_pose_ = reconcile(discrepancies_, pose_laws_, BodyMotion(trial_velocity_.size()), placed, &shift);
   for (std::size_t i = 0; i < shift.size(); ++i) pose_laws_[i].shift(shift[i]);
   return shifted_velocity_ > 0.0 || shifted_pose_ > 0.0;
 }
 
-ConeRow SequentialSolver::row_of(std::size_t place, const JointLaw& law) const {
-  const RelaxationDiscrepancy& d = discrepancies_[place / 3];
+ConeRow SequentialSolver::row_of(const RelaxationDiscrepancy& d, std::size_t axis, const JointLaw& law) {
   ConeRow row;
   row.body1 = d.body1, row.body2 = d.body2;
-  row.direction = d.directions[place % 3];
+  row.direction = d.directions[axis];
   row.length = d.length;
   row.law = law;
   return row;
 }
 
-double SequentialSolver::reconcile(const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
+double SequentialSolver::reconcile(const std::vector<RelaxationDiscrepancy>& discrepancies,
+                                   const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
                                    std::vector<double>* shift) const {
   ConeProblem problem;
   std::vector<std::size_t> place;
   for (std::size_t i = 0; i < laws.size(); ++i) {
     if (!laws[i].is_rigid()) continue;
-    problem.rows.push_back(row_of(i, laws[i]));
+    problem.rows.push_back(row_of(discrepancies[i / 3], i % 3, laws[i]));
     place.push_back(i);
   }
   if (place.empty() || problem.reconcile(bodies_, start, smallest) == 0.0) return 0.0;
@@ -174,6 +179,10 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
+  touching_.clear();
+  for (std::size_t i = 0; i < request.contact_key().size() && !discrepancies_.empty(); ++i)
+    touching_.push_back(pair_of(request.contact_body()[2 * i], request.contact_body()[2 * i + 1]));
+  std::ranges::sort(touching_);
   velocity_shift_.assign(pose_laws_.size(), 0.0);
   moved_.clear();
   shifted_pose_ = shifted_velocity_ = 0.0;
@@ -308,10 +317,26 @@ void SequentialSolver::turn_trial_velocity() {
 
 void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) {
   turn_trial_velocity();
-  velocity_joints_.build(bodies_, discrepancies_, velocity_laws_, solution_.joint_impulse);
-  impulses_.build(bodies_, request, closed_, solution_.contact_impulse);
+  take_directions(request);
+  velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
+  impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
   if (drives_yield_) impulses_.drop_restitution();
   copy(request.contact_normal(), solution_.contact_direction);
+}
+
+// Of the velocities' rows: where the pose change ends; at S*, where contacts' are, of bodies that touch each other as well, whose
+// rows would contradict each other by the turn, and of all where drives yield: what jams there is told by rows that depend on
+// each other exactly.
+void SequentialSolver::take_directions(const stage::SolverSolveRequest& request) {
+  directed_ = discrepancies_;
+  if (discrepancies_.empty()) return;
+  turned_ = bodies_;
+  if (drives_yield_) return;
+  turned_.turn(solution_.displacement);
+  const DiscrepancyColumns columns = columns_of(request);
+  for (std::size_t i = 0; i < directed_.size(); ++i)
+    if (!std::ranges::binary_search(touching_, pair_of(directed_[i].body1, directed_[i].body2)))
+      move_to_end(columns.at(i), turned_, solution_.displacement, &directed_[i]);
 }
 
 // Velocities and impulses, with the bound on energy.
@@ -397,13 +422,15 @@ bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request
                                   velocity_joints_.largest_left_out(solution_.velocity),
                                   impulses_.largest_violation(solution_.velocity)});
   if (!(missed > kMissed * asked)) return false;
+  drives_yield_ = true;
+  take_directions(request);
   std::vector<double> unused(velocity_laws_.size());
   const bool contradict =
-      reconcile(velocity_laws_, trial_velocity_, kLeastContradiction * (asked + missed), &unused) > 0.0;
-  if (!find_reach()) return false;
+      reconcile(directed_, velocity_laws_, trial_velocity_, kLeastContradiction * (asked + missed), &unused) > 0.0;
+  drives_yield_ = find_reach();
+  if (!drives_yield_) return false;
   drives_contradict_ = drives_contradict_ || contradict;
   used_up_ = used_up_before_velocity_;
-  drives_yield_ = true;
   copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
   copy(request.contact_warm_impulse(), solution_.contact_impulse);
   build_velocity(request);
@@ -419,7 +446,7 @@ bool SequentialSolver::find_reach() {
   std::vector<std::size_t> place;
   for (std::size_t i = 0; i < velocity_laws_.size(); ++i) {
     if (!velocity_laws_[i].is_active()) continue;
-    ConeRow& row = problem.rows.emplace_back(row_of(i, velocity_laws_[i]));
+    ConeRow& row = problem.rows.emplace_back(row_of(directed_[i / 3], i % 3, velocity_laws_[i]));
     place.push_back(i);
     if (!row.law.is_unbounded_drive()) continue;
     row.law.shift(-velocity_shift_[i]);

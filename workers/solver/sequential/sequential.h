@@ -4,11 +4,11 @@
 //   S_n, S*, discrepancies, contacts
 //     -> pose change      delta  = M^-1 J^T mu      joint_laws.h, contact_gaps.h
 //     -> closed contacts  gaps and limits that S* (+) delta leaves at zero
-//     -> velocity         v_{n+1} = v* + M^-1 J^T lambda      joint_laws.h, contact_impulses.h
+//     -> velocity         v_{n+1} = v* + M^-1 J^T lambda      joint_laws.h, contact_impulses.h; joints' J at S* (+) delta
 //     -> pose change again, if friction, drives or springs act on the velocity alone
 //
 // Notation: h time step, * what the integrator made without joints and contacts, J Jacobian rows
-// with arms and world inertia at S*, M masses, lambda impulses (N s), mu position multipliers (kg
+// with arms and world inertia at S* (joints' velocities: at S* (+) delta), M masses, lambda impulses (N s), mu position multipliers (kg
 // m), (+) composition of a pose with a translation and a rotation vector (world). delta is not h
 // (v_{n+1} - v*): the multipliers are its own.
 //
@@ -40,7 +40,11 @@
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
 // they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
 //
-// Order: S_{n+1} is of first order in h at joints and contacts (axes and normals at S*), exact for constant
+// Joints' velocities are made right where the pose change leaves the bodies. Made right at S*, the spin of a wheel is left
+// across its hinge by what that turned, and where it turns by more than a radian in a step, this grows from step to step. Those
+// of bodies that also touch each other, and of all where drives yield, are made right at S* all the same, where contacts' are.
+//
+// Order: S_{n+1} is of first order in h at joints and contacts (pose change and normals at S*), exact for constant
 // loads on resting, sticking, rolling and bouncing bodies. Joint error after the step is of second order in
 // the step's turn.
 //
@@ -74,6 +78,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "plugin_sdk/solver/reply.h"
@@ -138,13 +143,14 @@ class SequentialSolver {
   void begin(const stage::SolverSolveRequest& request);
   void solve_rows(const stage::SolverSolveRequest& request);
   bool reconcile();
-  double reconcile(const RelaxationJoints::Laws& laws, const BodyMotion& start, double smallest,
-                   std::vector<double>* shift) const;
-  ConeRow row_of(std::size_t place, const JointLaw& law) const;
+  double reconcile(const std::vector<RelaxationDiscrepancy>& discrepancies, const RelaxationJoints::Laws& laws,
+                   const BodyMotion& start, double smallest, std::vector<double>* shift) const;
+  static ConeRow row_of(const RelaxationDiscrepancy& d, std::size_t axis, const JointLaw& law);
   void solve_pose();
   bool find_closed();
   void turn_trial_velocity();
   void build_velocity(const stage::SolverSolveRequest& request);
+  void take_directions(const stage::SolverSolveRequest& request);
   void solve_velocity();
   void relax_velocity();
   bool let_drives_yield(const stage::SolverSolveRequest& request);
@@ -174,8 +180,10 @@ class SequentialSolver {
   double time_step_ = 0.0;
   double coordinates_ = 0.0;
 
-  SolverBodies bodies_;
-  std::vector<RelaxationDiscrepancy> discrepancies_;
+  SolverBodies bodies_, turned_;                      // the latter with the inertia of the velocities' rows
+  std::vector<RelaxationDiscrepancy> discrepancies_;  // at S*
+  std::vector<RelaxationDiscrepancy> directed_;       // with the directions of the velocities' rows
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> touching_;  // bodies, where there are joints; rising
   RelaxationJoints::Laws pose_laws_, velocity_laws_;
   StalledDrives stalled_;
   // of rows that contradict each other and of drives that yield: by how much their targets are moved; and the most of
