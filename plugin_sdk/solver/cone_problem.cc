@@ -408,9 +408,13 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   // sweeps of kGaussSeidel before it is asked if they will do: what some steps of Newton's cost
   constexpr std::uint32_t kLeastTrial = 64;
   const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
-  // where sweeps will not, steps take over
+  // where sweeps will not, steps take over; of large problems down to a fifth, so that what has no end takes a second or two
+  constexpr double kRowsOfAll = 368.0, kLeastShare = 0.2;
+  const double fewer = kRowsOfAll / static_cast<double>(lambda_.size());
+  const double share = std::clamp(fewer * fewer * fewer, kLeastShare, 1.0);
+  const auto affordable = [&](std::uint32_t steps) { return static_cast<std::uint32_t>(std::ceil(share * steps)); };
   bool is_newton = settings.method == ConeMethod::kNewton;
-  std::uint32_t most_steps = settings.iterations;
+  std::uint32_t most_steps = is_newton ? affordable(settings.iterations) : settings.iterations;
   double most = 0.0;
   for (const std::uint32_t r : other_) most = std::max(most, scale_[r] * rows[r].length);
   for (;;) {
@@ -439,7 +443,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       lambda = swept = start = best_lambda, y = best_y;
       attempt = best;
       summary->iterations += done;
-      most_steps = ConeSettings{}.iterations;
+      most_steps = affordable(ConeSettings{}.iterations);
       done = 0, without = 0;
     };
     // what touches without a push is held, too, at first: a stack that is let go is found in a step, not in one for each body

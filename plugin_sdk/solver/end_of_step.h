@@ -14,7 +14,9 @@
 // turn with body 1, a radial axis with its points, swings and twists with their directions; other angular errors are
 // carried to first order in delta's turn. Rows push both bodies at body 2's point, midway to body 1's along what is held
 // (where a point is all that holds them together, each at its own), which is one place at the end. Where a step of it was
-// small (1e-7 rad), those that follow are chords: new rows and errors, the same factors.
+// small (1e-7 rad), those that follow are chords: new rows and errors, the same factors. What the turn changes of the inertia,
+// and of the offset of what acts on velocities alone, is taken anew at each step; where steps shrink slowly by that (capsules
+// that an impact turns about their axes), they are accelerated (anderson_acceleration.h).
 //
 // Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points is not known; a
 // velocity row's arms end at each body's own surface point, which is where the two meet when the gap is closed (a ball that

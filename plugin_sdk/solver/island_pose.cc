@@ -23,11 +23,16 @@ void IslandSolver::solve_pose() {
 }
 
 void IslandSolver::find_pose() {
+  constexpr double kSlow = 0.3;  // of the step before
+  constexpr std::size_t kStepsAlone = 3;
   settings_.is_rough = true;
   ShrinkingSteps steps;
+  AndersonAcceleration acceleration;
+  double last_change = 0.0;
   for (bool is_last = false; !is_last;) {
     settings_.may_rest = may_rest();
     stiffen();
+    turn_offset();
     build_pose();
     const BodyMotion x0 = start_of_step();
     ConeSummary solved = cone_.solve(bodies_, x0, representable(), settings_);
@@ -48,11 +53,36 @@ void IslandSolver::find_pose() {
     summary_.iterations += solved.iterations;
     has_pose_ = solved.has_converged && (has_ended || !is_last);
     missed_ = solved.residual;
-    move_to_end(std::move(next));
+    // the steps know how directions turn, but not inertia: bodies with a small moment end slowly, or run away
+    shrinks_slowly_ = shrinks_slowly_ || (steps.count() > kStepsAlone && change > kSlow * last_change);
+    last_change = change;
+    move_to_end(shrinks_slowly_ && !is_last ? accelerated(next, &acceleration) : std::move(next));
     keep_corrections();
     if (!is_last && may_chord) is_last = follow_chords(change);
   }
   settings_.is_rough = false;
+}
+
+BodyMotion IslandSolver::accelerated(const BodyMotion& image, AndersonAcceleration* acceleration) const {
+  // turns in the measure of ways
+  const auto packed = [&](const BodyMotion& motion) {
+    Eigen::VectorXd all(static_cast<Eigen::Index>(6 * pushed_.size()));
+    Eigen::Index at = 0;
+    for (const std::uint32_t i : pushed_) {
+      all.segment<3>(at) = motion[i].linear, all.segment<3>(at + 3) = gyration_[i] * motion[i].angular;
+      at += 6;
+    }
+    return all;
+  };
+  const Eigen::VectorXd mixed = acceleration->next(packed(displacement_), packed(image));
+  BodyMotion next = image;
+  Eigen::Index at = 0;
+  for (const std::uint32_t i : pushed_) {
+    next[i].linear = mixed.segment<3>(at);
+    if (gyration_[i] > 0.0) next[i].angular = mixed.segment<3>(at + 3) / gyration_[i];
+    at += 6;
+  }
+  return next;
 }
 
 bool IslandSolver::contradicts() const {
@@ -103,6 +133,7 @@ std::vector<double> IslandSolver::yielding() const {
 bool IslandSolver::follow_chords(double before) {
   for (;;) {
     place_unstiffened();
+    turn_offset();
     build_pose();
     const BodyMotion x0 = start_of_step();
     pose_contradiction_ = cone_.correct(bodies_, x0, representable());

@@ -170,6 +170,7 @@ void IslandSolver::guess_offset(double share) {
     const Vector3 friction = impulse - normal.dot(impulse) * normal;
     push_at_trial(contact, direction_at(friction, contact.arm1, contact.arm2), share, &offset_);
   }
+  keep_moments_of_offset();
 }
 
 template <class Row>

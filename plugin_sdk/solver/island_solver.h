@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "plugin_sdk/plugin.h"
+#include "plugin_sdk/solver/anderson_acceleration.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/reply.h"
@@ -86,6 +87,9 @@ class IslandSolver {
   // Precondition: bodies and joints are where displacement_ ends.
   void solve_pose();
   void find_pose();
+
+  // Where the next step begins after one to `image`: there, or beyond what steps that shrink slowly tell.
+  BodyMotion accelerated(const BodyMotion& image, AndersonAcceleration* acceleration) const;
 
   // True where no motion meets all contacts, as of bodies that lie in one place and each push the next away. They give way
   // then (least squares), so that the others are met: next step's contacts are those of where that left the bodies.
@@ -171,6 +175,10 @@ class IslandSolver {
   // offset_ from the present impulses. False if that changes nothing.
   bool set_offset(double share);
 
+  // Impulses keep their moment while steps turn the inertia: else a spin that a joint takes back is left across it.
+  void keep_moments_of_offset();
+  void turn_offset();
+
   // ---- sizes, m
 
   // Half of what the largest coordinate's rounding moves a point by.
@@ -199,7 +207,8 @@ class IslandSolver {
   std::vector<double> gyration_;  // radii, m
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
-  BodyMotion driven_;  // part of offset_ by drives and springs
+  std::vector<Vector3> offset_moment_;  // that turns by offset_, kg m^2; zero where that turns nothing
+  BodyMotion driven_;                   // part of offset_ by drives and springs
   ConeSummary summary_;
   int round_ = 0;
   StalledDrives stalled_;
@@ -209,6 +218,7 @@ class IslandSolver {
   double drives_contradict_ = 0.0;  // joints or each other, m/s
   std::vector<double> reach_;       // of drives that yield
   double missed_ = 0.0;             // by the pose change, m
+  bool shrinks_slowly_ = false;     // its steps
 };
 
 }  // namespace gravitas

@@ -285,7 +285,22 @@ bool IslandSolver::set_offset(double share) {
   shorten(driven_, &next);
   const bool changes = is_change(next, offset_, 0.0);
   offset_ = std::move(next);
+  keep_moments_of_offset();
   return changes;
+}
+
+void IslandSolver::keep_moments_of_offset() {
+  offset_moment_.assign(bodies_.count() + 1, Vector3::Zero());
+  for (const std::uint32_t i : pushed_) {
+    if (offset_[i].angular.isZero(0.0)) continue;
+    const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
+    offset_moment_[i] = world_inertia(end_[i].pose.orientation, moments) * offset_[i].angular;
+  }
+}
+
+void IslandSolver::turn_offset() {
+  for (const std::uint32_t i : pushed_)
+    if (!offset_moment_[i].isZero(0.0)) offset_[i].angular = end_[i].inverse_inertia * offset_moment_[i];
 }
 
 }  // namespace gravitas

@@ -120,10 +120,10 @@ Vector3 half_of_locked(const Discrepancy& discrepancy, const Matrix3& axes, cons
   return half;
 }
 
-Vector3 turned_by_joints(Vector3 turn, const Vector3& whole_turn, const Vector3& angular_velocity) {
-  const double by_joints = turn.norm(), whole = whole_turn.norm();
-  if (by_joints > whole) turn *= whole / by_joints;
-  return turn.isZero(0.0) ? angular_velocity : Vector3(exp_rotation(turn) * angular_velocity);
+Vector3 turned_by_joints(const Vector3& turn, const Vector3& whole_turn, const Vector3& angular_velocity) {
+  const double square = whole_turn.squaredNorm();
+  const double share = square > 0.0 ? std::clamp(turn.dot(whole_turn) / square, 0.0, 1.0) : 0.0;
+  return share == 0.0 ? angular_velocity : Vector3(exp_rotation(share * whole_turn) * angular_velocity);
 }
 
 JointLaw pose_law(const JointAxisState& a, double beta, double h) {

@@ -102,8 +102,9 @@ Vector3 half_of_locked(const Discrepancy& discrepancy, const Matrix3& axes, cons
 
 // An angular velocity w* that goes along with the part of a pose change's turn that joints make: their moment turns with the
 // body in the step, and so does the axis about which it has none (that of a slender rod between ball joints). A contact's
-// stays where it is. What joints and contacts push against each other turns nothing: no more than the whole.
-Vector3 turned_by_joints(Vector3 turn, const Vector3& whole_turn, const Vector3& angular_velocity);
+// stays where it is. What joints and contacts push against each other turns nothing: of the joints' turn it is what lies along
+// the whole, and no more than that.
+Vector3 turned_by_joints(const Vector3& turn, const Vector3& whole_turn, const Vector3& angular_velocity);
 
 JointLaw pose_law(const JointAxisState& axis, double beta, double time_step);
 

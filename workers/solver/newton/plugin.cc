@@ -42,7 +42,9 @@ class Newton final : public SolverPlugin {
             .at_most(100000.0)
             .defaults_to({static_cast<double>(ConeSettings{}.iterations)})
             .live()
-            .means("Largest number of steps of one solution; fewer where it converges.")};
+            .means("Largest number of steps of one solution; fewer where it converges. Of more than 368 rows of "
+                   "contacts fewer, by "
+                   "the cube of their number, down to a fifth.")};
     return declaration;
   }
 
