@@ -48,7 +48,8 @@ StepOutcome Environment::step() {
 }
 
 double Environment::time_of(std::uint32_t step) const {
-  if (step < description_.steps || step == 0) return step * description_.time_step;
+  const bool is_whole = description_.last_time_step == description_.time_step;
+  if (step < description_.steps || step == 0 || is_whole) return step * description_.time_step;
   return (description_.steps - 1) * description_.time_step + description_.last_time_step;
 }
 
