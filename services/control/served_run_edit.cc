@@ -15,9 +15,10 @@ namespace gravitas::control {
 void ServedRun::require_settled_swaps() const {
   for (const kernel::SwapRecord& record : environment_->swaps())
     if (record.state < kernel::SwapState::kCommitted)
-      throw NotNow(fmt::format("edit: the swap of slot {} to {}, ordered for step {}, is on its way ({}); edits go on when "
-                               "it has been made",
-                               slot_name(record.slot), record.to, record.step, swap_state_name(record.state)));
+      throw NotNow(
+          fmt::format("edit: the swap of slot {} to {}, ordered for step {}, is on its way ({}); edits go on when "
+                      "it has been made",
+                      slot_name(record.slot), record.to, record.step, swap_state_name(record.state)));
 }
 
 api::EditMade ServedRun::edit(const api::EditRequest& request) {

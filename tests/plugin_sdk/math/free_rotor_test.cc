@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "plugin_sdk/conformance/draw.h"
-#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/elliptic.h"
+#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas::test {
 namespace {
