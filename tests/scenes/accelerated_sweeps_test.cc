@@ -83,5 +83,43 @@ TEST(AcceleratedSweeps, HoldUpAnArch) {
   EXPECT_GT(arch.moves(false), 1e-4);
 }
 
+// A suspension bridge of ropes, twenty knots on a parabola with a deck of 40 kg under each, begins where it is in balance, and
+// hangs: what the pose change pushes is taut, also while sweeps have not come to their end.
+TEST(AcceleratedSweeps, HoldUpABridgeOfRopes) {
+  constexpr int kKnots = 20;
+  constexpr double kSag = 6.0, kWidth = 2.0;
+  const auto knot = [](int i) {
+    const double share = static_cast<double>(i) / (kKnots + 1);
+    return Vector3(kWidth * i, -4.0 * kSag * share * (1.0 - share), 0.0);
+  };
+  const auto name = [](const char* letter, int i) { return letter + std::to_string(i); };
+  std::string bodies, ropes;
+  const auto add = [&](const std::string& id, double mass, const Vector3& place) {
+    bodies += "Body { Id = \"" + id + "\" Mass = " + literal(mass) +
+              " PrincipalMoments = {1, 1, 1} Forces = { \"Down\" } KineticProperties { Position = " + literal(place) +
+              " CanSleep = false } }\n";
+  };
+  const auto tie = [&](const std::string& from, const std::string& to, const Vector3& start, const Vector3& end) {
+    ropes += "Constraint { Type = \"Distance\" Id = \"" + from + "to" + to + "\" Body1 = \"" + from + "\" Body2 = \"" +
+             to + "\" CustomProperties { BindPoint1 = " + literal(start) + " BindPoint2 = " + literal(end) +
+             " MaximumDistance = " + literal((end - start).norm()) + " } }\n";
+  };
+  for (int i = 1; i <= kKnots; ++i) {
+    const Vector3 deck(kWidth * i, -kSag - 2.0, 0.0);
+    add(name("K", i), 10.0, knot(i)), add(name("D", i), 40.0, deck);
+    tie(name("K", i), name("D", i), knot(i), deck);
+    tie(i == 1 ? "" : name("K", i - 1), name("K", i), knot(i - 1), knot(i));
+  }
+  tie("", name("K", kKnots), knot(kKnots + 1), knot(kKnots));
+  SceneRun run(
+      "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+      "Simulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = 4 } }\n"
+      "Environment { Space { Bodies {\n" +
+      bodies + "} } Constraints {\n" + ropes + "} }\n");
+  run.to_end();
+  EXPECT_LE(run.report().max_joint_error(), 1e-5);
+  for (int i = 1; i <= kKnots; ++i) EXPECT_LE((run.body(name("K", i)).pose.position - knot(i)).norm(), 1e-3) << i;
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -278,6 +278,8 @@ bool SequentialSolver::find_closed() {
     added = added || closed_now_[i] > closed_[i];
     closed_[i] = std::max(closed_[i], closed_now_[i]);
   }
+  pushed_.resize(pose_laws_.size());
+  pose_joints_.store(pushed_);
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -285,6 +287,12 @@ bool SequentialSolver::find_closed() {
       const double error = d.axes[axis].error_at_trial + moved;
       JointLaw law = velocity_law(d.axes[axis], error, d.slop, time_step_);
       if (law.is_rigid()) law.shift(velocity_shift_[3 * i + axis]);
+      // what is pushed is closed, however far the sweeps have come
+      const JointLaw& pose = pose_laws_[3 * i + axis];
+      if (pose.is_active() && !pose.is_equality()) {
+        law.has_lower = law.has_lower || pushed_[3 * i + axis] > 0.0;
+        law.has_upper = law.has_upper || pushed_[3 * i + axis] < 0.0;
+      }
       JointLaw& known = velocity_laws_[3 * i + axis];
       const bool adds = (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
       added = added || (adds && !law.is_equality());

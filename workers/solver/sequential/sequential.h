@@ -192,6 +192,7 @@ class SequentialSolver {
   double shifted_pose_ = 0.0, shifted_velocity_ = 0.0;
   RelaxationJoints::Multipliers moved_;  // by what drives moved the pose before they yielded; empty: none has
   RelaxationJoints pose_joints_, velocity_joints_;
+  RelaxationJoints::Multipliers pushed_;  // by the pose change
   ContactGaps gaps_;
   ContactImpulses impulses_;
 
