@@ -180,8 +180,9 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
   touching_.clear();
-  for (std::size_t i = 0; i < request.contact_key().size() && !discrepancies_.empty(); ++i)
-    touching_.push_back(pair_of(request.contact_body()[2 * i], request.contact_body()[2 * i + 1]));
+  if (!discrepancies_.empty())
+    for (std::size_t i = 0; i < request.contact_key().size(); ++i)
+      touching_.push_back(pair_of(request.contact_body()[2 * i], request.contact_body()[2 * i + 1]));
   std::ranges::sort(touching_);
   velocity_shift_.assign(pose_laws_.size(), 0.0);
   moved_.clear();
@@ -325,7 +326,7 @@ void SequentialSolver::turn_trial_velocity() {
 
 void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) {
   turn_trial_velocity();
-  take_directions(request);
+  take_directions(request, drives_yield_);
   velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
   impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
   if (drives_yield_) impulses_.drop_restitution();
@@ -335,11 +336,11 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
 // Of the velocities' rows: where the pose change ends; at S*, where contacts' are, of bodies that touch each other as well, whose
 // rows would contradict each other by the turn, and of all where drives yield: what jams there is told by rows that depend on
 // each other exactly.
-void SequentialSolver::take_directions(const stage::SolverSolveRequest& request) {
+void SequentialSolver::take_directions(const stage::SolverSolveRequest& request, bool drives_yield) {
   directed_ = discrepancies_;
   if (discrepancies_.empty()) return;
   turned_ = bodies_;
-  if (drives_yield_) return;
+  if (drives_yield) return;
   turned_.turn(solution_.displacement);
   const DiscrepancyColumns columns = columns_of(request);
   for (std::size_t i = 0; i < directed_.size(); ++i)
@@ -430,13 +431,16 @@ bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request
                                   velocity_joints_.largest_left_out(solution_.velocity),
                                   impulses_.largest_violation(solution_.velocity)});
   if (!(missed > kMissed * asked)) return false;
-  drives_yield_ = true;
-  take_directions(request);
+  take_directions(request, true);
   std::vector<double> unused(velocity_laws_.size());
   const bool contradict =
       reconcile(directed_, velocity_laws_, trial_velocity_, kLeastContradiction * (asked + missed), &unused) > 0.0;
-  drives_yield_ = find_reach();
-  if (!drives_yield_) return false;
+  if (!find_reach()) {
+    // the velocities that stand are those of the rows before
+    take_directions(request, drives_yield_);
+    return false;
+  }
+  drives_yield_ = true;
   drives_contradict_ = drives_contradict_ || contradict;
   used_up_ = used_up_before_velocity_;
   copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);

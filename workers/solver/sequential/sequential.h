@@ -8,9 +8,9 @@
 //     -> pose change again, if friction, drives or springs act on the velocity alone
 //
 // Notation: h time step, * what the integrator made without joints and contacts, J Jacobian rows
-// with arms and world inertia at S* (joints' velocities: at S* (+) delta), M masses, lambda impulses (N s), mu position multipliers (kg
-// m), (+) composition of a pose with a translation and a rotation vector (world). delta is not h
-// (v_{n+1} - v*): the multipliers are its own.
+// with arms and world inertia at S* (velocities of jointed islands: inertia at S* (+) delta), M masses,
+// lambda impulses (N s), mu position multipliers (kg m), (+) composition of a pose with a translation and a
+// rotation vector (world). delta is not h (v_{n+1} - v*): the multipliers are its own.
 //
 // Method (§ 2.7.6, corrected). Projected block Gauss-Seidel: joints, then contacts, each block
 // solved for what is missing of it now, with accumulated multipliers that are clamped as a whole,
@@ -150,7 +150,7 @@ class SequentialSolver {
   bool find_closed();
   void turn_trial_velocity();
   void build_velocity(const stage::SolverSolveRequest& request);
-  void take_directions(const stage::SolverSolveRequest& request);
+  void take_directions(const stage::SolverSolveRequest& request, bool drives_yield);
   void solve_velocity();
   void relax_velocity();
   bool let_drives_yield(const stage::SolverSolveRequest& request);
