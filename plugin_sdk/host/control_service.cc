@@ -99,6 +99,9 @@ grpc::Status ControlService::serve_kernel(grpc::ServerReaderWriter<WorkerMessage
     answer.mutable_refusal()->set_reason(admission.reason);
     answer.mutable_refusal()->set_text(admission.text);
     stream->Write(answer);
+    // the process may end with the session: not before the kernel, which cancels then, has read why
+    while (stream->Read(&message)) {
+    }
     on_end(false);
     return grpc::Status::OK;
   }
