@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -114,6 +115,36 @@ TEST_P(Seams, AreNotFeltOnTheSlantOrInOneCompound) {
     }
     expect_passes(scene(strips(), "Box", speed, duration, turned(Vector3::UnitY(), 0.3)), speed * duration,
                   "a box with a corner in front");
+  }
+}
+
+// A cylinder that rolls over a seam at a slant touches the next box with an end of its lowest line first: beside its top, on
+// its edge.
+TEST_P(Seams, AreNotFeltByACylinderThatRolls) {
+  const Method& method = GetParam();
+  constexpr double kRadius = 0.1, kSpeed = 2.0;
+  for (const double slant : {0.05, 0.1, 0.2, 0.35, 0.5}) {
+    for (const double time_step : {1.0 / 60, 1.0 / 240}) {
+      const Quaternion turn = turned(Vector3::UnitY(), slant);
+      const Vector3 ahead = turn * Vector3::UnitX(), axis = turn * Vector3::UnitZ();
+      SceneRun run(
+          "Geometries {\n" + geometry("Strip", "Box", "HalfExtents = {0.5, 0.5, 1}") +
+          geometry("Can", "Cylinder", "Radius = 0.1 Height = 0.3") +
+          "}\nMaterials { Material { Id = \"Smooth\" StaticFrictionCoefficient = 0.3 } }\n"
+          "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+          "Simulator { Type = \"" +
+          method.simulator + "\" CustomProperties { TimeStep = " + literal(time_step) +
+          " Duration = 0.5 } }\nEnvironment { ConstraintSolver = \"" + method.solver +
+          "\" KineticIntegrator = \"Verlet\" Space { Bodies {\n" + tile("Left", "Strip", {-0.5, -0.5, 0}) +
+          tile("Right", "Strip", {0.5, -0.5, 0}) +
+          "Body { Id = \"Slider\" GeometryId = \"Can\" Mass = 1 Material = \"Smooth\" Forces = { \"Down\" } "
+          "KineticProperties { Position = {-0.5, 0.1, 0} Orientation = " +
+          literal(turn * turned(Vector3::UnitX(), 0.5 * std::numbers::pi)) + " LinearVelocity = " +
+          literal(kSpeed * ahead) + " AngularVelocity = " + literal(-kSpeed / kRadius * axis) + " } }\n} } }\n");
+      run.to_end();
+      const Vector3 end = Vector3(-0.5, kRadius, 0.0) + kSpeed * run.time() * ahead;
+      EXPECT_LE((run.body("Slider").pose.position - end).norm(), 1e-6) << slant << ' ' << time_step;
+    }
   }
 }
 

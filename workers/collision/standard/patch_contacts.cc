@@ -8,7 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
+#include "plugin_sdk/geometry/penetration.h"
+#include "plugin_sdk/geometry/support_map_buffer.h"
+#include "workers/collision/standard/pair_functions.h"
 #include "workers/collision/standard/patch_sink.h"
 #include "workers/collision/standard/patches.h"
 #include "workers/collision/standard/polygon_clip.h"
@@ -276,13 +280,20 @@ void add_support_contact(const ConvexPair& pair, const ContactAxis& axis, Contac
   const Contour on_b = contour(b, kInPlane);
   const Vector3 support_of_a = a.support();
   const Vector3 support_of_b = b.support();
-  Vector3 place = 0.5 * (support_of_a + support_of_b);
+  Vector3 place;
   if (on_a.kind == Contour::Kind::kPoint) {
     place = support_of_a;
   } else if (on_b.kind == Contour::Kind::kPoint) {
     place = support_of_b;
   } else if (on_a.kind == Contour::Kind::kLine && on_b.kind == Contour::Kind::kLine) {
     place = crossing_of(facing_line(a), facing_line(b));
+  } else {
+    // a face whose rim the other touches: of a face the support is any corner
+    SupportMapBuffer buffer_a, buffer_b;
+    const Separation least =
+        find_separation({support_map_of(pair.a, &buffer_a), support_map_of(pair.b, &buffer_b), pair.R_AB, pair.p_AB},
+                        std::numeric_limits<double>::infinity());
+    place = 0.5 * (least.point_a + least.point_b);
   }
   const Vector3& n = axis.normal;
   const double middle = 0.5 * (n.dot(support_of_a) + n.dot(support_of_b));
