@@ -36,8 +36,7 @@ JointLoad joint_load(const JointRows& joint, const JointBody& body1, const Joint
 double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const JointBody& body1, const JointBody& body2,
                  double time_step);
 
-// The most of a joint's rows: what a breaking threshold is compared with where the solver leaves no error (capability
-// `closes_joints`).
+// The most of a joint's rows: what a breaking threshold is compared with, beside the error that the solver leaves.
 double held_back(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
 
 }  // namespace gravitas

@@ -109,21 +109,22 @@ TEST_P(Motor, JointBreaksBeyondItsForce) {
 }
 
 TEST_P(Motor, JointBreaksBeyondItsThreshold) {
-  // at 1/60 s the pendulum's joint opens by some 7e-9 m (Euler) to 4e-6 m at the lowest point
+  // at 1/60 s the joint of a pendulum let go level holds back up to 3 g h^2 = 8.2 mm, at the lowest point
   const std::string coarse = set("Simulator.TimeStep", 1.0 / 60);
-  SceneRun holds("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-4)}));
+  SceneRun holds("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-2)}));
   holds.to_end();
   EXPECT_TRUE(holds.holds("Pivot"));
 
-  SceneRun breaks("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 1e-9)}));
+  SceneRun breaks("pendulum.gravitas", with({coarse, set("Constraint.Pivot.BreakingThreshold", 5e-3)}));
   breaks.to_end();
   EXPECT_FALSE(breaks.holds("Pivot"));
   EXPECT_EQ(breaks.count_events(EventKind::kBreak), 1U);
-  EXPECT_LE(breaks.report().max_joint_error(), 1e-9);
+  EXPECT_LE(breaks.report().max_joint_error(), 1e-5);
   EXPECT_GT(breaks.body("Ball").pose.position.norm(), 10.0);
 }
 
-// Newton leaves no error: what the threshold is judged on is how far the impulse held the joint, g h^2 of a ball that hangs.
+// Solvers leave next to no error: what the threshold is judged on is how far the impulse held the joint, g h^2 of a ball that
+// hangs, with each of them alike.
 TEST_P(Motor, JointThatIsLeftNoErrorBreaksByWhatItHolds) {
   const auto holds = [&](const char* solver, double threshold) {
     SceneRun run("pendulum.gravitas",
@@ -134,11 +135,10 @@ TEST_P(Motor, JointThatIsLeftNoErrorBreaksByWhatItHolds) {
     return run.holds("Pivot");
   };
   const double held = kG * 1e-3 * 1e-3;
-  for (const char* solver : {"Newton", "Direct"}) {
+  for (const char* solver : {"Sequential", "Newton", "Direct"}) {
     EXPECT_TRUE(holds(solver, held * (1.0 + 1e-6))) << solver;
     EXPECT_FALSE(holds(solver, held * (1.0 - 1e-6))) << solver;
   }
-  EXPECT_TRUE(holds("Sequential", held * (1.0 - 1e-6)));
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ class Direct final : public SolverPlugin {
     declaration.version = "1.0.0";
     declaration.slot = kSlot;
     declaration.meaning = "Joints exactly, by a sparse factorisation at the end of the step; contacts by iteration.";
-    declaration.capabilities = {"reactions", "reaction_jacobians", "closes_joints"};
+    declaration.capabilities = {"reactions", "reaction_jacobians"};
     declaration.properties = {Property::choice("ContactSolver", {"GaussSeidel", "Newton"})
                                   .defaults_to({0.0})
                                   .live()

@@ -28,7 +28,7 @@ class Newton final : public SolverPlugin {
     declaration.meaning =
         "Joints and contacts at the end of the step by semi-smooth Newton on the friction cone: accurate at any mass "
         "ratio.";
-    declaration.capabilities = {"reactions", "reaction_jacobians", "closes_joints"};
+    declaration.capabilities = {"reactions", "reaction_jacobians"};
     declaration.properties = {
         Property::number("Tolerance", "1")
             .at_least(1e-15)
