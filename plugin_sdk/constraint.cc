@@ -25,6 +25,15 @@ JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<
           pose_of(position, orientation, constraint_body[2 * joint + 1]), constraint_body[2 * joint + 1] != kNone};
 }
 
+JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std::size_t joint) {
+  JointBodies bodies = bodies_of(request.constraint_body(), request.position(), request.orientation(), joint);
+  const std::uint32_t body1 = request.constraint_body()[2 * joint], body2 = request.constraint_body()[2 * joint + 1];
+  if (body1 != kNone) bodies.spin1 = vector_at(request.angular_velocity(), body1);
+  if (body2 != kNone) bodies.spin2 = vector_at(request.angular_velocity(), body2);
+  bodies.time_step = request.time_step();
+  return bodies;
+}
+
 std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row) {
   if (row + 1 >= begin.size() || begin[row] > begin[row + 1] || begin[row + 1] > numbers.size())
     throw Refusal("its parameters lie outside their column");

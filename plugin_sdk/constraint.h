@@ -19,6 +19,9 @@ namespace gravitas {
 struct JointBodies {
   Pose pose1, pose2;  // of the centres of mass
   bool has_body2 = true;
+  // rad/s, world, and the step that came to this state, s; zero when joints are bound
+  Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
+  double time_step = 0.0;
 
   // The centre of mass of body 2, or where that is the world of body 1: a place that is no long way from what the joint
   // holds, wherever the origin is.
@@ -39,6 +42,7 @@ class BoundWriter {
 namespace detail {
 JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
                       std::span<const double> orientation, std::size_t joint);
+JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std::size_t joint);
 void push_bound(const stage::ConstraintBindReply& reply, std::span<const double> numbers);
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d);
 std::span<const double> slice(std::span<const double> numbers, std::span<const std::uint32_t> begin, std::size_t row);
@@ -70,8 +74,7 @@ void describe_each(const stage::ConstraintDiscrepanciesRequest& request,
     if (request.intact()[i] == 0) continue;
     name_refused_row(kJointRow, i, [&] {
       describe(request.constraint_type()[i], PropertyCursor(detail::slice(request.bound(), request.bound_begin(), i)),
-               detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i),
-               [&](const Discrepancy& d) { detail::push_discrepancy(reply, i, d); });
+               detail::bodies_of(request, i), [&](const Discrepancy& d) { detail::push_discrepancy(reply, i, d); });
     });
   }
 }

@@ -14,6 +14,13 @@ constexpr double kHalfTurn = 3.14159265358979323846;
 
 Vector3 first_axis(const Quaternion& q) { return q * Vector3::UnitX(); }
 
+Discrepancy row_of(const Twisting& twisting, AxisMode mode) {
+  Discrepancy d;
+  set_twisting(twisting, &d);
+  d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kTwistDiscrepancy;
+  return d;
+}
+
 }  // namespace
 
 void demand_type(std::uint64_t type, std::string_view name) {
@@ -40,10 +47,17 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
   return limits;
 }
 
-double JointLimits::turn(double angle) const {
-  if (lower == -kUnlimited || upper == kUnlimited) return angle;
-  const double middle = 0.5 * (lower + upper);
-  return angle - 2.0 * kHalfTurn * std::round((angle - middle) / (2.0 * kHalfTurn));
+double JointLimits::turn(double angle, double way) const {
+  constexpr double kWholeTurn = 2.0 * kHalfTurn;
+  constexpr double kPast = 0.05;  // rad, that a step may begin beyond a limit by
+  if (is_none()) return angle;
+  double middle = 0.5 * (lower + upper);
+  if (lower == -kUnlimited) middle = upper + kPast - kHalfTurn;
+  if (upper == kUnlimited) middle = lower - kPast + kHalfTurn;
+  const auto nearest = [&](double any) { return any - kWholeTurn * std::round((any - middle) / kWholeTurn); };
+  const double seen = nearest(angle), begun = seen - way, known = nearest(begun);
+  const bool is_known = known >= lower - kPast && known <= upper + kPast;
+  return is_known ? seen + (known - begun) : seen;
 }
 
 Pose frame_along(const Vector3& origin, const Vector3& first) {
@@ -108,19 +122,29 @@ Vector3 axis_between(const Pose& frame1, const Pose& frame2) {
   return (frame1.orientation * Vector3::UnitX() + frame2.orientation * Vector3::UnitX()).normalized();
 }
 
-Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle) {
+Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle, AxisMode mode) {
   Discrepancy d;
   set_swing({first, second}, angle, &d);
-  d.modes = pack_modes(AxisMode::kLocked, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kSwingDiscrepancy;
+  d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kSwingDiscrepancy;
   return d;
 }
 
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {
   const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist_between(frame1, frame2)};
-  Discrepancy d;
-  set_twisting(twisting, &d);
   *scale = twisting.cosine();
-  d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kTwistDiscrepancy;
+  return row_of(twisting, mode);
+}
+
+Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
+                              const JointLimits& limits) {
+  const Vector3 one = first_axis(frame1), two = first_axis(frame2);
+  const double bend = 1.0 + one.dot(two);
+  const double way = bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
+  const Twisting twisting = {one, two, limits.turn(twist_between(frame1, frame2), way)};
+  Discrepancy d = row_of(twisting, AxisMode::kLimited);
+  const double scale = twisting.cosine();
+  d.lower.x() = limits.lower > -kUnlimited ? scale * limits.lower : -kUnlimited;
+  d.upper.x() = limits.upper < kUnlimited ? scale * limits.upper : kUnlimited;
   return d;
 }
 

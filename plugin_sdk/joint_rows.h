@@ -26,8 +26,11 @@ struct JointLimits {
 
   static JointLimits of(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
   bool is_none() const { return lower == -kUnlimited && upper == kUnlimited; }
-  // The turn among angle + k 2 pi that lies nearest to the middle of two limits; for one or none the one within pi.
-  double turn(double angle) const;
+  // The turn that is meant by an angle, among angle + k 2 pi; `way`: what the step turned by to get there. Without limits the
+  // one within pi. With two the nearest to their middle, with one the nearest to half a turn on its free side; but where the step
+  // began within the limits in another, that: what a step turns beyond a limit is beyond it, however little is between the two.
+  // A single limit is met again once a turn: what comes from behind it passes.
+  double turn(double angle, double way) const;
 };
 
 // A frame with its origin at `origin` and its first axis along a unit vector (world).
@@ -51,8 +54,9 @@ Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3&
 // One row about a unit axis, with the angle (rad) as its error.
 Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 
-// The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi).
-Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle);
+// The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi);
+// its error is counted from there.
+Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle, AxisMode mode = AxisMode::kLocked);
 
 // The frame of a hinge about the axis from one point to another (world): the first axis along it, the origin at its point next
 // to bodies.centre(), since with one far out ways and turns could not be told apart. Refuses points that name no axis.
@@ -87,5 +91,8 @@ void hold_orientation(const Pose& frame1, const Pose& frame2, Emit&& emit) {
 // The row whose error is the twist times cos(swing/2), about the unit bisector of the first axes (kTwistDiscrepancy):
 // w.bisector is the rate of just that while the twist is small. `scale` receives the cosine.
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale);
+// The same row with limits of the twist, which is the turn that JointLimits::turn() tells.
+Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
+                              const JointLimits& limits);
 
 }  // namespace gravitas

@@ -20,6 +20,8 @@ constexpr double kRelative = 1e-10;
 constexpr double kRelativeAtEnd = 1e-8;
 // Of what rows on velocity alone displace, where a method stopped between two rounds.
 constexpr double kRoundBefore = 2.0;
+// Steps towards the end may turn axes further than that.
+constexpr double kBeyondEnd = 2.0;
 // Of the momenta and energies themselves.
 constexpr double kOfSolution = 1e-13;
 // A displacement that changes by less from one look at it to the next has settled, of the coordinates.
@@ -53,7 +55,7 @@ void push_couple(const Vector3& impulse, Push* push) {
 }
 
 // Where a method takes the directions of its rows, and pushes two bodies that a point alone holds together: midway, or each
-// at its own place; impulses then may be along directions on the way from S* to the end.
+// at its own place; both impulses and corrections then may be along directions on the way from S* to the end.
 enum class Directions : std::uint8_t { kOfTrial, kOfTrialAtOwn, kOfEnd };
 
 class Balance {
@@ -230,7 +232,9 @@ class Balance {
           body.pose.unreported += to_point.cross(correction).norm();
           body.velocity.turned += turned * impulse.norm();
           body.velocity.unreported += turned * impulse.norm() * arm.norm();
-          if (on_velocity) body.pose.turned += turned * share * impulse.norm();
+          const double moved = correction.norm() + (on_velocity ? share * impulse.norm() : 0.0);
+          body.pose.turned += kBeyondEnd * turned * moved;
+          body.pose.unreported += kBeyondEnd * turned * moved * arm.norm();
           if (on_velocity) add(d, arm, sign * share * impulse, &body.pose);
           if (on_velocity) loosen(share * impulse.norm(), arm, &body);
         });

@@ -224,8 +224,8 @@ TEST_F(JointPair, ARevolutesAngleIsThatOfBody2AboutItsAxis) {
     // limits of -1 and 5 span 6 of 6.28 rad: the turn nearest to 2
     const double seen = angle < 2.0 - 3.14159 ? angle + 6.283185307179586 : angle;
     EXPECT_NEAR(axis.dot(limit.point2 - limit.point1), seen, kFreedomRounding);
-    EXPECT_EQ(limit.lower.x(), -1.0);
-    EXPECT_EQ(limit.upper.x(), 5.0);
+    EXPECT_DOUBLE_EQ(limit.lower.x(), -1.0);
+    EXPECT_DOUBLE_EQ(limit.upper.x(), 5.0);
   }
 }
 

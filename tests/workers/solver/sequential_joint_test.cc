@@ -64,8 +64,8 @@ TEST(SequentialJoint, APendulumsPointStandsStill) {
   const SolverAnswer answer = problem.solve(joint_solver_with(100));
   EXPECT_TRUE(answer.converged());
   EXPECT_LE(relative_velocity(problem, answer, 0).norm(), 1e-14);
-  // one sweep of each relaxation solves it, the second sees nothing left
-  EXPECT_LE(answer.iterations[0], 4U);
+  // one sweep of each relaxation solves it, the second sees nothing left; the pose change is relaxed twice
+  EXPECT_LE(answer.iterations[0], 6U);
 }
 
 TEST(SequentialJoint, TheErrorGoesByTheCorrection) {
@@ -88,9 +88,10 @@ TEST(SequentialJoint, TheErrorGoesByTheCorrection) {
 }
 
 TEST(SequentialJoint, TheErrorOfAStepIsOfSecondOrder) {
-  // what one step leaves falls with the square of the correction: (h^2)^2, and so by 16 per halving
+  // what one step leaves falls with the square of the correction: (h^2)^2, and so by 16 per halving; what would be more than a
+  // thousandth of the radius of gyration is closed
   double previous = 0.0;
-  for (const double h : {0.04, 0.02, 0.01}) {
+  for (const double h : {0.08, 0.04, 0.02, 0.01, 0.005}) {
     SolverProblem problem;
     problem.time_step = h;
     const auto bob = problem.add_body({.mass = 1.0,
@@ -102,6 +103,10 @@ TEST(SequentialJoint, TheErrorOfAStepIsOfSecondOrder) {
     problem.add_discrepancy(kNone, bob, problem.joint_at(kNone, bob, Vector3::Zero()));
     const SolverAnswer answer = problem.solve(joint_solver_with(100));
     const double left = committed_error(problem, answer, 0).norm();
+    if (h > 0.06) {
+      EXPECT_LE(left, 1e-6);
+      continue;
+    }
     if (previous > 0.0) {
       EXPECT_LE(left, previous / 12.0);
     }
@@ -179,7 +184,7 @@ TEST(SequentialJoint, AHingeWithSixRowsOfRankFiveConverges) {
     const SolverProblem problem = hinge(apart, {0.5, 3.0, -0.4});
     const SolverAnswer answer = problem.solve(joint_solver_with(100));
     EXPECT_TRUE(answer.converged()) << apart;
-    EXPECT_LE(answer.iterations[0], 8U);
+    EXPECT_LE(answer.iterations[0], 10U);
     // the rows of points that lie close differ by their distance: rounding grows by its inverse
     const double tolerance = 1e-14 + 1e-15 / apart;
     EXPECT_LE(relative_velocity(problem, answer, 0).norm(), tolerance);

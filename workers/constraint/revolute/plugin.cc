@@ -66,12 +66,7 @@ class Revolute final : public ConstraintPlugin {
       JointLimits limits;
       limits.lower = bound.number();
       limits.upper = bound.number();
-      if (limits.is_none()) return;
-      Discrepancy limit = row_about(axis_between(one, two),
-                                    limits.turn(twist_between(one.orientation, two.orientation)), AxisMode::kLimited);
-      limit.lower.x() = limits.lower;
-      limit.upper.x() = limits.upper;
-      emit(limit);
+      if (!limits.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, limits));
     });
   }
 };

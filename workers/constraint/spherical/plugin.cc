@@ -11,13 +11,14 @@
 // Cone. With t the direction of a2 across a1, n = a1 x t, e = dA2/dphi = cos(phi) t - sin(phi) a1 and the relative turning
 // w, phi' = w.n and sin(phi) psi' = -w.e, so phi - c(psi) has the rate w.(n + c' e/sin(phi)). The row is that direction made
 // unit, with sin(c) for sin(phi), which is the same at the cone and finite at the axis. Of an irregular cone c is linear
-// between its points, round once; azimuths count right-handed about Axis from the first tangent of
-// plugin_sdk/math/rotation.h's orthonormal_basis(Axis).
-// Twist: twist_row() of plugin_sdk/joint_rows.h, undefined at a swing of 180 degrees.
+// between its points, round once; a regular one's row is that of a swing, exact for turns of any size. Azimuths count
+// right-handed about Axis, from the world's x as seen along it (-z for an Axis within 1e-3 of x).
+// Twist: limited_twist_row() of plugin_sdk/joint_rows.h, undefined at a swing of 180 degrees.
 #include <cmath>
 #include <vector>
 
 #include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
@@ -31,8 +32,6 @@ struct ConePoint {
 };
 ConePoint cone_at(std::span<const double> cone, double azimuth) {
   const std::size_t count = cone.size() / 2;
-  // a point is enough for a regular cone
-  if (count == 1) return {cone[1], 0.0};
   std::size_t next = 0;
   while (next < count && cone[2 * next] <= azimuth) ++next;
   const std::size_t last = next == 0 ? count - 1 : next - 1;
@@ -60,8 +59,10 @@ class Spherical final : public ConstraintPlugin {
                   .at_most(kPi)
                   .means("Largest angle of Axis in body 2 against Axis in body 1; none if absent."),
               Property::table("ReachCone", 2, "rad", "world")
-                  .means("An irregular cone instead: azimuth about Axis, rising within 0 ... 2 pi, and largest angle "
-                         "there; three rows at least."),
+                  .means(
+                      "An irregular cone instead: azimuth, rising within 0 ... 2 pi, and largest angle there; three "
+                      "rows at least. Azimuths count right-handed about Axis from the world's x as seen along it; from "
+                      "-z where Axis is along x, to 1e-3."),
               Property::vector("Axis", "1", "world").means("Axis of cone and twist at the start, any length."),
               Property::number("TwistLower", "rad")
                   .at_least(-kPi)
@@ -111,7 +112,7 @@ class Spherical final : public ConstraintPlugin {
     if (!is_regular && irregular.empty() && twist.is_none()) return;
     if (axis.array().isNaN().all())
       throw Refusal("Spherical: Axis is missing, which reach cone and twist limits are measured from");
-    const Pose frame = frame_along(point, unit_axis(axis, "Spherical: Axis"));
+    const Pose frame = cone_frame(point, unit_axis(axis, "Spherical: Axis"));
     write_frame(bodies.pose1, frame, out);
     write_frame(bodies.pose2, frame, out);
     out->number(twist.lower);
@@ -119,6 +120,16 @@ class Spherical final : public ConstraintPlugin {
     out->number(is_regular ? 1.0 : static_cast<double>(irregular.size() / 2));
     if (is_regular) out->number(0.0), out->number(angle);
     for (const double number : irregular) out->number(number);
+  }
+
+  // Its second axis is at azimuth 0.
+  static Pose cone_frame(const Vector3& point, const Vector3& axis) {
+    constexpr double kAlong = 1e-3;
+    const Vector3 across = Vector3::UnitX() - axis.x() * axis;
+    const Vector3 start = across.norm() > kAlong ? across : Vector3(axis.z() * axis - Vector3::UnitZ());
+    Matrix3 axes;
+    axes.col(0) = axis, axes.col(1) = start.normalized(), axes.col(2) = axis.cross(axes.col(1));
+    return {point, to_quaternion(axes)};
   }
 
   static void demand_cone(std::span<const double> cone) {
@@ -140,16 +151,16 @@ class Spherical final : public ConstraintPlugin {
     twist.upper = bound.number();
     const std::span<const double> cone = bound.table(2);
     if (!cone.empty()) emit(cone_row(cone, one.orientation, two.orientation));
-    if (twist.is_none()) return;
-    double scale = 0.0;
-    Discrepancy row = twist_row(one.orientation, two.orientation, AxisMode::kLimited, &scale);
-    row.lower.x() = twist.lower > -kUnlimited ? scale * twist.lower : -kUnlimited;
-    row.upper.x() = twist.upper < kUnlimited ? scale * twist.upper : kUnlimited;
-    emit(row);
+    if (!twist.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, twist));
   }
 
   static Discrepancy cone_row(std::span<const double> cone, const Quaternion& one, const Quaternion& two) {
     const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
+    if (cone.size() == 2) {
+      Discrepancy row = swing_row(a1, a2, cone[1], AxisMode::kLimited);
+      row.lower.x() = -kUnlimited;
+      return row;
+    }
     const Swing swing = swing_between(a1, a2);
     const Vector3 across = swing.axis.cross(a1);
     double azimuth = math::atan2((one * Vector3::UnitZ()).dot(across), (one * Vector3::UnitY()).dot(across));

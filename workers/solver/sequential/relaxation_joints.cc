@@ -47,13 +47,11 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
   return r;
 }
 
-void move_to_end(const Discrepancy& discrepancy, const SolverBodies& turned, const BodyMotion& displacement,
-                 RelaxationDiscrepancy* moved) {
-  const SolverBody &one = turned[moved->body1], &two = turned[moved->body2];
-  const Twist &change1 = displacement[moved->body1], &change2 = displacement[moved->body2];
-  // what does not turn keeps its rows bit for bit
-  if (change1.angular.isZero(0.0) && change2.angular.isZero(0.0)) return;
-  const auto end_of = [](const SolverBody& body, const Twist& change) {
+JointEnd end_of(const Discrepancy& discrepancy, const RelaxationDiscrepancy& at_trial, const SolverBodies& turned,
+                const BodyMotion& displacement) {
+  const SolverBody &one = turned[at_trial.body1], &two = turned[at_trial.body2];
+  const Twist &change1 = displacement[at_trial.body1], &change2 = displacement[at_trial.body2];
+  const auto body_end = [](const SolverBody& body, const Twist& change) {
     EndBody end;
     end.pose = displaced(body.trial, change.linear, change.angular);
     end.turn = to_rotation_matrix(exp_rotation(change.angular));
@@ -62,10 +60,14 @@ void move_to_end(const Discrepancy& discrepancy, const SolverBodies& turned, con
   EndJoint joint;
   joint.discrepancy = discrepancy;
   joint.axes = to_rotation_matrix(discrepancy.axes);
-  joint.is_only_point = moved->is_only_point;
-  move_joint(one, two, end_of(one, change1), end_of(two, change2), change2.angular - change1.angular, &joint);
-  for (std::size_t k = 0; k < 3; ++k)
-    moved->directions[k] = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
+  joint.is_only_point = at_trial.is_only_point;
+  move_joint(one, two, body_end(one, change1), body_end(two, change2), change2.angular - change1.angular, &joint);
+  JointEnd end;
+  for (std::size_t k = 0; k < 3; ++k) {
+    end.directions[k] = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
+    end.errors[k] = joint.errors[static_cast<Eigen::Index>(k)];
+  }
+  return end;
 }
 
 void RelaxationJoints::build(const SolverBodies& bodies, const std::vector<RelaxationDiscrepancy>& discrepancies,

@@ -52,10 +52,14 @@ struct RelaxationDiscrepancy {
 RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std::uint32_t body1, std::uint32_t body2,
                                              bool is_only_point, const SolverBodies& bodies, double correction_factor);
 
-// Moves the directions to where a pose change leaves the bodies, as end_of_step_rows.h has them. `turned`: bodies with
+// Where a pose change leaves a joint (end_of_step_rows.h): its directions and its errors along the axes. `turned`: bodies with
 // the inertia there.
-void move_to_end(const Discrepancy& discrepancy, const SolverBodies& turned, const BodyMotion& displacement,
-                 RelaxationDiscrepancy* moved);
+struct JointEnd {
+  std::array<ConstraintDirection, 3> directions;
+  std::array<double, 3> errors;
+};
+JointEnd end_of(const Discrepancy& discrepancy, const RelaxationDiscrepancy& at_trial, const SolverBodies& turned,
+                const BodyMotion& displacement);
 
 class RelaxationJoints final : public RelaxationBlocks {
  public:

@@ -10,6 +10,7 @@
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
 #include "plugin_sdk/solver/cone_problem.h"
+#include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/request_check.h"
 #include "workers/solver/sequential/shock_propagation.h"
@@ -35,10 +36,6 @@ void copy(std::span<const double> from, std::vector<double>& to) { to.assign(fro
 void check_range(double violation, double motion) {
   if (!std::isfinite(violation) || !std::isfinite(motion))
     throw Refusal("velocities, errors or arms so large that their products are not finite");
-}
-
-std::pair<std::uint32_t, std::uint32_t> pair_of(std::uint32_t body1, std::uint32_t body2) {
-  return std::minmax(body1, body2);
 }
 
 }  // namespace
@@ -74,7 +71,7 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
 
 void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
   begin(request);
-  solve_pose();
+  solve_pose(request);
   find_closed();
   build_velocity(request);
   solve_velocity();
@@ -82,8 +79,8 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
 
   const double factor = request.theta() * time_step_;
   if (factor > 0.0 && acts_on_velocity_alone()) {
-    set_offset(factor);
-    solve_pose();
+    set_offset(request, factor);
+    solve_pose_with_offset(request);
     if (find_closed()) {
       moved_.assign(velocity_laws_.size(), 0.0);
       velocity_joints_.store(moved_);
@@ -95,10 +92,21 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
       } else {
         moved_.clear();
       }
-      set_offset(factor);
-      solve_pose();
+      set_offset(request, factor);
+      solve_pose_with_offset(request);
     }
   }
+}
+
+// Sweeps over what friction and drives displace a light body by, which joints are to take back, may leave much of it: the pose
+// change is that without it then.
+void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request) {
+  if (discrepancies_.empty()) return solve_pose(request);
+  keep_pose(&before_offset_);
+  solve_pose(request);
+  if (!(open_ > before_offset_.open) || (pose_converged_ && !(open_ > kFarOpen))) return;
+  take_pose(before_offset_);
+  used_up_ = true;
 }
 
 // Sweeps ran out, or rows that were left out are not met: was something asked for that no motion can do? Rows that hold
@@ -161,7 +169,7 @@ double SequentialSolver::reconcile(const std::vector<RelaxationDiscrepancy>& dis
 
 void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   summary_ = {};
-  used_up_ = drives_yield_ = drives_contradict_ = false;
+  used_up_ = drives_yield_ = drives_contradict_ = posed_at_end_ = false;
   time_step_ = request.time_step();
   coordinates_ = 0.0;
   bodies_.load(request);
@@ -202,14 +210,29 @@ void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
   gaps_.build(bodies_, request, settings_.correction_factor, solution_.contact_correction);
   coordinates_ = std::max(coordinates_, gaps_.coordinates());
   offset_.assign(bodies_.count() + 1, Twist{});
+  offset_moment_.assign(bodies_.count() + 1, Vector3::Zero());
   closed_.assign(request.contact_key().size(), 0);
   velocity_laws_.assign(pose_laws_.size(), JointLaw{});
+  pushed_.resize(pose_laws_.size());
 }
 
 // ---- pose change
 
-// solution_.displacement and the multipliers of the pose rows, on top of offset_.
-void SequentialSolver::solve_pose() {
+// solution_.displacement and the multipliers of the pose rows, on top of offset_: of rows at S*, then of rows where that ends.
+void SequentialSolver::solve_pose(const stage::SolverSolveRequest& request) {
+  if (posed_at_end_) {
+    pose_joints_.store(pushed_);
+    pose_joints_.build(bodies_, discrepancies_, pose_laws_, pushed_);
+    turn_offset(bodies_);
+    posed_at_end_ = false;
+  }
+  pose_converged_ = relax_pose();
+  used_up_ = used_up_ || !pose_converged_;
+  if (!discrepancies_.empty()) close_at_end(request);
+}
+
+// Returns whether sweeps came to their end.
+bool SequentialSolver::relax_pose() {
   solution_.displacement = offset_;
   const double violation =
       std::max(pose_joints_.largest_violation(solution_.displacement), gaps_.largest_violation(solution_.displacement));
@@ -221,7 +244,7 @@ void SequentialSolver::solve_pose() {
     // nothing is missing, so zero multipliers are the solution
     pose_joints_.clear_multipliers();
     gaps_.clear_multipliers();
-    return;
+    return true;
   }
   double tolerance = std::max(representable, kStillness * std::max(violation, motion));
   sweep_.begin(bodies_, {&pose_joints_, &gaps_});
@@ -236,10 +259,10 @@ void SequentialSolver::solve_pose() {
     converged = sweep_.sweep(bodies_, solution_.displacement) <= tolerance;
     ++summary_.sweeps;
   }
-  used_up_ = used_up_ || !converged;
   solution_.displacement = offset_;
   pose_joints_.push_all(bodies_, solution_.displacement);
   gaps_.push_all(bodies_, solution_.displacement);
+  return converged;
 }
 
 template <typename Contacts>
@@ -269,60 +292,7 @@ double SequentialSolver::choose_start(const BodyMotion& base, double tolerance, 
   return with_load();
 }
 
-// Adds the contacts and limits that the pose change leaves closed to those that were, and makes the
-// laws of the velocities. Returns whether any closed that was not.
-bool SequentialSolver::find_closed() {
-  bool added = false;
-  closed_now_.resize(closed_.size());
-  gaps_.find_closed(solution_.displacement, closed_now_);
-  for (std::size_t i = 0; i < closed_.size(); ++i) {
-    added = added || closed_now_[i] > closed_[i];
-    closed_[i] = std::max(closed_[i], closed_now_[i]);
-  }
-  pushed_.resize(pose_laws_.size());
-  pose_joints_.store(pushed_);
-  for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
-    const RelaxationDiscrepancy& d = discrepancies_[i];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double moved = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
-      const double error = d.axes[axis].error_at_trial + moved;
-      JointLaw law = velocity_law(d.axes[axis], error, d.slop, time_step_);
-      if (law.is_rigid()) law.shift(velocity_shift_[3 * i + axis]);
-      // what is pushed is closed, however far the sweeps have come
-      const JointLaw& pose = pose_laws_[3 * i + axis];
-      if (pose.is_active() && !pose.is_equality()) {
-        law.has_lower = law.has_lower || pushed_[3 * i + axis] > 0.0;
-        law.has_upper = law.has_upper || pushed_[3 * i + axis] < 0.0;
-      }
-      JointLaw& known = velocity_laws_[3 * i + axis];
-      const bool adds = (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
-      added = added || (adds && !law.is_equality());
-      const bool has_lower = law.has_lower || known.has_lower;
-      const bool has_upper = law.has_upper || known.has_upper;
-      known = law;
-      known.has_lower = has_lower;
-      known.has_upper = has_upper;
-    }
-  }
-  stalled_.stall([&](auto&& visit) {
-    for (std::size_t i = 0; i < discrepancies_.size(); ++i)
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        visit(discrepancies_[i].body1, discrepancies_[i].body2, discrepancies_[i].directions[axis],
-              &velocity_laws_[3 * i + axis]);
-  });
-  return added;
-}
-
 // ---- velocity
-
-void SequentialSolver::turn_trial_velocity() {
-  if (pose_joints_.is_empty()) return;
-  turn_.assign(bodies_.count() + 1, Twist{});
-  pose_joints_.push_all(bodies_, turn_);
-  for (std::uint32_t i = 0; i < bodies_.count(); ++i)
-    trial_velocity_[i].angular =
-        turned_by_joints(turn_[i].angular, solution_.displacement[i].angular, bodies_[i].trial_velocity.angular);
-}
 
 void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) {
   turn_trial_velocity();
@@ -331,21 +301,6 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
   impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
   if (drives_yield_) impulses_.drop_restitution();
   copy(request.contact_normal(), solution_.contact_direction);
-}
-
-// Of the velocities' rows: where the pose change ends; at S*, where contacts' are, of bodies that touch each other as well, whose
-// rows would contradict each other by the turn, and of all where drives yield: what jams there is told by rows that depend on
-// each other exactly.
-void SequentialSolver::take_directions(const stage::SolverSolveRequest& request, bool drives_yield) {
-  directed_ = discrepancies_;
-  if (discrepancies_.empty()) return;
-  turned_ = bodies_;
-  if (drives_yield) return;
-  turned_.turn(solution_.displacement);
-  const DiscrepancyColumns columns = columns_of(request);
-  for (std::size_t i = 0; i < directed_.size(); ++i)
-    if (!std::ranges::binary_search(touching_, pair_of(directed_[i].body1, directed_[i].body2)))
-      move_to_end(columns.at(i), turned_, solution_.displacement, &directed_[i]);
 }
 
 // Velocities and impulses, with the bound on energy.
@@ -410,10 +365,17 @@ bool SequentialSolver::acts_on_velocity_alone() const {
   return velocity_joints_.has_velocity_only_impulse() || impulses_.has_friction_impulse();
 }
 
-void SequentialSolver::set_offset(double factor) {
+void SequentialSolver::set_offset(const stage::SolverSolveRequest& request, double factor) {
   std::fill(offset_.begin(), offset_.end(), Twist{});
   velocity_joints_.push_velocity_only(bodies_, factor, offset_);
   impulses_.push_friction(bodies_, factor, offset_);
+  // turns by the inertia there, which is taken where the bodies end
+  const auto inertia = [&](std::size_t i) {
+    return world_inertia(bodies_[i].trial.orientation, moments_of(vector_at(request.inverse_inertia(), i)));
+  };
+  for (std::size_t i = 0; i < bodies_.count(); ++i)
+    offset_moment_[i] =
+        offset_[i].angular.isZero(0.0) ? Vector3(Vector3::Zero()) : Vector3(inertia(i) * offset_[i].angular);
 }
 
 // ---- drives that something is in the way of

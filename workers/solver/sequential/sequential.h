@@ -77,6 +77,7 @@
 // change, not a small error. Newton and Direct exist for these scenes.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -139,6 +140,19 @@ class SequentialSolver {
   const SolverSolution& solution() const { return solution_; }
 
  private:
+  // Joints that are open by a larger share of what their bodies measure are closed further; steps of that.
+  static constexpr double kOpen = 1e-3, kClosed = 1e-6, kFarOpen = 1e-2;
+  static constexpr int kPoseSteps = 6;
+
+  struct PoseChange {
+    BodyMotion displacement;
+    RelaxationJoints joints;
+    ContactGaps gaps;
+    std::vector<JointEnd> ends;
+    double open = 0.0;
+    bool is_at_end = false, has_converged = true;
+  };
+
   void load(const stage::SolverSolveRequest& request);
   void begin(const stage::SolverSolveRequest& request);
   void solve_rows(const stage::SolverSolveRequest& request);
@@ -146,7 +160,20 @@ class SequentialSolver {
   double reconcile(const std::vector<RelaxationDiscrepancy>& discrepancies, const RelaxationJoints::Laws& laws,
                    const BodyMotion& start, double smallest, std::vector<double>* shift) const;
   static ConeRow row_of(const RelaxationDiscrepancy& d, std::size_t axis, const JointLaw& law);
-  void solve_pose();
+  void solve_pose(const stage::SolverSolveRequest& request);
+  bool relax_pose();
+  void close_at_end(const stage::SolverSolveRequest& request);
+  void find_ends(const stage::SolverSolveRequest& request);
+  void build_at_end();
+  void keep_pose(PoseChange* kept) const;
+  void take_pose(const PoseChange& kept);
+  void solve_pose_with_offset(const stage::SolverSolveRequest& request);
+  static std::pair<std::uint32_t, std::uint32_t> pair_of(std::uint32_t body1, std::uint32_t body2) {
+    return std::minmax(body1, body2);
+  }
+  bool touches(const RelaxationDiscrepancy& joint) const;
+  bool stands(const RelaxationDiscrepancy& joint) const;
+  double error_at_end(std::size_t row, std::size_t axis) const;
   bool find_closed();
   void turn_trial_velocity();
   void build_velocity(const stage::SolverSolveRequest& request);
@@ -167,7 +194,8 @@ class SequentialSolver {
   void scale_back();
   void sum_velocity();
   bool acts_on_velocity_alone() const;
-  void set_offset(double factor);
+  void set_offset(const stage::SolverSolveRequest& request, double factor);
+  void turn_offset(const SolverBodies& bodies);
 
   SequentialSettings settings_;
   RelaxationSweep sweep_;
@@ -184,7 +212,9 @@ class SequentialSolver {
   std::vector<RelaxationDiscrepancy> discrepancies_;  // at S*
   std::vector<RelaxationDiscrepancy> directed_;       // with the directions of the velocities' rows
   std::vector<std::pair<std::uint32_t, std::uint32_t>> touching_;  // bodies, where there are joints; rising
-  RelaxationJoints::Laws pose_laws_, velocity_laws_;
+  std::vector<RelaxationDiscrepancy> posed_;                       // with those of the pose change's
+  std::vector<JointEnd> ends_;                                     // where that ends
+  RelaxationJoints::Laws pose_laws_, posed_laws_, velocity_laws_;
   StalledDrives stalled_;
   // of rows that contradict each other and of drives that yield: by how much their targets are moved; and the most of
   // the former, m and m/s
@@ -195,11 +225,16 @@ class SequentialSolver {
   RelaxationJoints::Multipliers pushed_;  // by the pose change
   ContactGaps gaps_;
   ContactImpulses impulses_;
+  bool pose_converged_ = true;
+  bool posed_at_end_ = false;  // pose_joints_ has rows where the pose change ended, not at S*
+  double open_ = 0.0;  // the most that pose laws are missed by where it ends, as a share of what the bodies measure
+  PoseChange before_step_, before_offset_;  // gone back to where what followed left joints more open
 
   SolverSolution solution_;
-  BodyMotion trial_velocity_;  // v*, as joints turn it
-  BodyMotion turn_;            // by joints
-  BodyMotion offset_;          // theta h M^-1 J^T lambda of rows on velocity alone
+  BodyMotion trial_velocity_;           // v*, as joints turn it
+  BodyMotion turn_;                     // by joints
+  BodyMotion offset_;                   // theta h M^-1 J^T lambda of rows on velocity alone
+  std::vector<Vector3> offset_moment_;  // that turns by it, kg m^2
   std::vector<std::uint8_t> closed_, closed_now_;
 
   std::vector<std::uint32_t> group_;

@@ -1,0 +1,174 @@
+// Where the pose change ends: rows and errors there, and what is closed.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "plugin_sdk/solver.h"
+#include "workers/solver/sequential/sequential.h"
+
+namespace gravitas {
+bool SequentialSolver::touches(const RelaxationDiscrepancy& joint) const {
+  return std::ranges::binary_search(touching_, pair_of(joint.body1, joint.body2));
+}
+
+// Newton's steps from the rows at S*, for what these leave of joints by the square of the turn: each with rows at the end of
+// the one before, as long as one halves what joints are open by.
+void SequentialSolver::close_at_end(const stage::SolverSolveRequest& request) {
+  find_ends(request);
+  for (int step = 0; open_ > (step == 0 ? kOpen : kClosed) && step < kPoseSteps; ++step) {
+    const double open = open_;
+    keep_pose(&before_step_);
+    build_at_end();
+    pose_converged_ = relax_pose();
+    posed_at_end_ = true;
+    find_ends(request);
+    if (!(open_ < open)) take_pose(before_step_);
+    if (!(open_ < 0.5 * open)) return;
+  }
+}
+
+void SequentialSolver::keep_pose(PoseChange* kept) const {
+  kept->displacement = solution_.displacement;
+  kept->joints = pose_joints_;
+  kept->gaps = gaps_;
+  kept->ends = ends_;
+  kept->open = open_;
+  kept->is_at_end = posed_at_end_;
+  kept->has_converged = pose_converged_;
+}
+
+void SequentialSolver::take_pose(const PoseChange& kept) {
+  solution_.displacement = kept.displacement;
+  pose_joints_ = kept.joints;
+  gaps_ = kept.gaps;
+  ends_ = kept.ends;
+  open_ = kept.open;
+  posed_at_end_ = kept.is_at_end;
+  pose_converged_ = kept.has_converged;
+}
+
+// The end of each joint, and open_.
+void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
+  const DiscrepancyColumns columns = columns_of(request);
+  turned_ = bodies_;
+  turned_.turn(solution_.displacement);
+  ends_.resize(discrepancies_.size());
+  open_ = 0.0;
+  for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
+    const RelaxationDiscrepancy& d = discrepancies_[i];
+    ends_[i] = end_of(columns.at(i), d, turned_, solution_.displacement);
+    if (touches(d)) continue;
+    const double size = std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const JointLaw& law = pose_laws_[3 * i + axis];
+      const double moved = ends_[i].errors[axis] - d.axes[axis].error_at_trial;
+      double missing = 0.0;
+      if (law.has_lower) missing = std::max(missing, law.lower_target - moved);
+      if (law.has_upper) missing = std::max(missing, moved - law.upper_target);
+      if (size > 0.0) open_ = std::max(open_, missing * d.length / size);
+    }
+  }
+}
+
+// Rows there, which ask for what is missing there: J x with x from S*.
+void SequentialSolver::build_at_end() {
+  posed_ = discrepancies_;
+  posed_laws_ = pose_laws_;
+  for (std::size_t i = 0; i < posed_.size(); ++i) {
+    RelaxationDiscrepancy& d = posed_[i];
+    if (touches(d)) continue;
+    d.directions = ends_[i].directions;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double along = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
+      posed_laws_[3 * i + axis].shift(along - (ends_[i].errors[axis] - d.axes[axis].error_at_trial));
+    }
+  }
+  pose_joints_.store(pushed_);
+  pose_joints_.build(turned_, posed_, posed_laws_, pushed_);
+  turn_offset(turned_);
+}
+
+// What acts on velocities alone keeps its moment while steps turn the inertia.
+void SequentialSolver::turn_offset(const SolverBodies& bodies) {
+  for (std::uint32_t i = 0; i < bodies.count(); ++i)
+    if (!offset_moment_[i].isZero(0.0)) offset_[i].angular = bodies[i].inverse_inertia * offset_moment_[i];
+}
+
+// Of a row at S*, with the directions there.
+double SequentialSolver::error_at_end(std::size_t row, std::size_t axis) const {
+  const RelaxationDiscrepancy& d = discrepancies_[row];
+  if (posed_at_end_ && !touches(d)) return ends_[row].errors[axis];
+  return d.axes[axis].error_at_trial +
+         d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
+}
+
+// Adds the contacts and limits that the pose change leaves closed to those that were, and makes the
+// laws of the velocities. Returns whether any closed that was not.
+bool SequentialSolver::find_closed() {
+  bool added = false;
+  closed_now_.resize(closed_.size());
+  gaps_.find_closed(solution_.displacement, closed_now_);
+  for (std::size_t i = 0; i < closed_.size(); ++i) {
+    added = added || closed_now_[i] > closed_[i];
+    closed_[i] = std::max(closed_[i], closed_now_[i]);
+  }
+  pose_joints_.store(pushed_);
+  for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
+    const RelaxationDiscrepancy& d = discrepancies_[i];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      JointLaw law = velocity_law(d.axes[axis], error_at_end(i, axis), d.slop, time_step_);
+      if (law.is_rigid()) law.shift(velocity_shift_[3 * i + axis]);
+      // what is pushed is closed, however far the sweeps have come
+      const JointLaw& pose = pose_laws_[3 * i + axis];
+      if (pose.is_active() && !pose.is_equality()) {
+        law.has_lower = law.has_lower || pushed_[3 * i + axis] > 0.0;
+        law.has_upper = law.has_upper || pushed_[3 * i + axis] < 0.0;
+      }
+      JointLaw& known = velocity_laws_[3 * i + axis];
+      const bool adds = (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
+      added = added || (adds && !law.is_equality());
+      const bool has_lower = law.has_lower || known.has_lower;
+      const bool has_upper = law.has_upper || known.has_upper;
+      known = law;
+      known.has_lower = has_lower;
+      known.has_upper = has_upper;
+    }
+  }
+  stalled_.stall([&](auto&& visit) {
+    for (std::size_t i = 0; i < discrepancies_.size(); ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        visit(discrepancies_[i].body1, discrepancies_[i].body2, discrepancies_[i].directions[axis],
+              &velocity_laws_[3 * i + axis]);
+  });
+  return added;
+}
+
+void SequentialSolver::turn_trial_velocity() {
+  if (pose_joints_.is_empty()) return;
+  turn_.assign(bodies_.count() + 1, Twist{});
+  pose_joints_.push_all(bodies_, turn_);
+  for (std::uint32_t i = 0; i < bodies_.count(); ++i)
+    trial_velocity_[i].angular =
+        turned_by_joints(turn_[i].angular, solution_.displacement[i].angular, bodies_[i].trial_velocity.angular);
+}
+
+// Of the velocities' rows: where the pose change ends; at S*, where contacts' are, of bodies that touch each other as well, whose
+// rows would contradict each other by the turn, and of all where drives yield: what jams there is told by rows that depend on
+// each other exactly.
+void SequentialSolver::take_directions(const stage::SolverSolveRequest& request, bool drives_yield) {
+  directed_ = discrepancies_;
+  if (discrepancies_.empty()) return;
+  turned_ = bodies_;
+  if (drives_yield) return;
+  find_ends(request);
+  for (std::size_t i = 0; i < directed_.size(); ++i)
+    if (!touches(directed_[i]) && !stands(directed_[i])) directed_[i].directions = ends_[i].directions;
+}
+
+// What does not turn keeps its rows bit for bit.
+bool SequentialSolver::stands(const RelaxationDiscrepancy& joint) const {
+  return solution_.displacement[joint.body1].angular.isZero(0.0) &&
+         solution_.displacement[joint.body2].angular.isZero(0.0);
+}
+
+}  // namespace gravitas
