@@ -40,13 +40,19 @@
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
 // they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
 //
+// What rows at S* leave of joints is of second order in the step's turn. Where that is more than a thousandth of the bodies' radius
+// of gyration, steps of Newton's method follow: rows where the bodies are by then, for what is missing there, relaxed again,
+// until a millionth is left or a step does not halve it. Friction and drives may displace a light body by many times its size, which
+// joints are to take back: where sweeps leave joints open by more than a hundredth then, or ran out, the pose change is that
+// without it.
+//
 // Joints' velocities are made right where the pose change leaves the bodies. Made right at S*, the spin of a wheel is left
 // across its hinge by what that turned, and where it turns by more than a radian in a step, this grows from step to step. Those
 // of bodies that also touch each other, and of all where drives yield, are made right at S* all the same, where contacts' are.
 //
 // Order: S_{n+1} is of first order in h at joints and contacts (pose change and normals at S*), exact for constant
 // loads on resting, sticking, rolling and bouncing bodies. Joint error after the step is of second order in
-// the step's turn.
+// the step's turn, up to what is closed.
 //
 // A stack, in which every body rests on one other and no joint acts, starts layer by layer from what nothing pushes
 // (shock_propagation.h), which is its solution at any height and ratio of mass.
