@@ -27,9 +27,12 @@ JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<
 
 JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std::size_t joint) {
   JointBodies bodies = bodies_of(request.constraint_body(), request.position(), request.orientation(), joint);
-  const std::uint32_t body1 = request.constraint_body()[2 * joint], body2 = request.constraint_body()[2 * joint + 1];
-  if (body1 != kNone) bodies.spin1 = vector_at(request.angular_velocity(), body1);
-  if (body2 != kNone) bodies.spin2 = vector_at(request.angular_velocity(), body2);
+  const std::span<const double> spin = request.angular_velocity();
+  const auto spin_of = [&](std::uint32_t body) {
+    return body != kNone && 3 * (std::size_t{body} + 1) <= spin.size() ? vector_at(spin, body) : Vector3::Zero();
+  };
+  bodies.spin1 = spin_of(request.constraint_body()[2 * joint]);
+  bodies.spin2 = spin_of(request.constraint_body()[2 * joint + 1]);
   bodies.time_step = request.time_step();
   return bodies;
 }

@@ -29,7 +29,8 @@ struct Joints {
   std::vector<std::uint32_t> intact = {1, 1, 1};
   std::vector<double> position = {1, 2, 3, 4, 5, 6};
   std::vector<double> orientation = {1, 0, 0, 0, 0, 1, 0, 0};
-  std::vector<double> time = {0.0};
+  std::vector<double> angular_velocity = {0, 0, 1, 0, 0, 2};
+  std::vector<double> time_step = {0.01};
 
   template <typename Bind>
   void bind(Bind bind) {
@@ -54,6 +55,8 @@ struct Joints {
     request[Request::kIntact] = column_of(intact);
     request[Request::kPosition] = column_of(position);
     request[Request::kOrientation] = column_of(orientation);
+    request[Request::kAngularVelocity] = column_of(angular_velocity);
+    request[Request::kTimeStep] = column_of(time_step);
     std::array<gravitas_reply_column, Reply::kColumnCount> reply{};
     std::vector<std::array<double, 64>> room(Reply::kColumnCount);
     for (std::size_t i = 0; i < room.size(); ++i) reply[i] = {room[i].data(), 64, 0};
@@ -104,6 +107,18 @@ TEST(DescribeEach, TellsWhichJointADiscrepancyIsOf) {
     for (std::uint64_t i = 0; i < type / 10; ++i) emit(Discrepancy{});
   });
   EXPECT_EQ(joints.described, (std::vector<std::uint32_t>{0, 1, 1, 2, 2, 2}));
+}
+
+TEST(DescribeEach, TellsHowBodiesTurnAndForHowLong) {
+  Joints joints;
+  std::vector<Vector3> first, second;
+  joints.describe([&](std::uint64_t, PropertyCursor, const JointBodies& bodies, auto&&) {
+    first.push_back(bodies.spin1), second.push_back(bodies.spin2);
+    EXPECT_EQ(bodies.time_step, 0.01);
+  });
+  const Vector3 a(0, 0, 1), b(0, 0, 2), world = Vector3::Zero();
+  EXPECT_EQ(first, (std::vector<Vector3>{a, world, b}));
+  EXPECT_EQ(second, (std::vector<Vector3>{b, b, world}));
 }
 
 TEST(DescribeEach, LeavesBrokenJointsOut) {

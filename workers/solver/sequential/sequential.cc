@@ -223,7 +223,6 @@ void SequentialSolver::solve_pose(const stage::SolverSolveRequest& request) {
   if (posed_at_end_) {
     pose_joints_.store(pushed_);
     pose_joints_.build(bodies_, discrepancies_, pose_laws_, pushed_);
-    turn_offset(bodies_);
     posed_at_end_ = false;
   }
   pose_converged_ = relax_pose();

@@ -7,6 +7,7 @@
 #include "workers/solver/sequential/sequential.h"
 
 namespace gravitas {
+
 bool SequentialSolver::touches(const RelaxationDiscrepancy& joint) const {
   return std::ranges::binary_search(touching_, pair_of(joint.body1, joint.body2));
 }
