@@ -49,15 +49,20 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 
 double JointLimits::turn(double angle, double way) const {
   constexpr double kWholeTurn = 2.0 * kHalfTurn;
-  constexpr double kPast = 0.05;  // rad, that a step may begin beyond a limit by
+  constexpr double kPast = 0.02;  // rad, that a step may begin beyond a limit by
   if (is_none()) return angle;
+  const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
   double middle = 0.5 * (lower + upper);
-  if (lower == -kUnlimited) middle = upper + kPast - kHalfTurn;
-  if (upper == kUnlimited) middle = lower - kPast + kHalfTurn;
+  if (!has_lower) middle = upper + kPast - kHalfTurn;
+  if (!has_upper) middle = lower - kPast + kHalfTurn;
   const auto nearest = [&](double any) { return any - kWholeTurn * std::round((any - middle) / kWholeTurn); };
   const double seen = nearest(angle), begun = seen - way, known = nearest(begun);
-  const bool is_known = known >= lower - kPast && known <= upper + kPast;
-  return is_known ? seen + (known - begun) : seen;
+  if (!(known >= lower - kPast && known <= upper + kPast)) return seen;
+  const double turned = seen + (known - begun);
+  // what moves out of a single limit, or through it from behind, needs no push
+  if (!has_lower && known > upper && way < 0.0) return turned - kWholeTurn;
+  if (!has_upper && known < lower && way > 0.0) return turned + kWholeTurn;
+  return turned;
 }
 
 Pose frame_along(const Vector3& origin, const Vector3& first) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/conformance/draw.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
@@ -172,6 +173,52 @@ TEST(SeamOfAMesh, TakesNoMoreInnerSteps) {
   const Vector3 end = Vector3(-0.4, 0.1, 0.0) + 2.0 * run.time() * ahead;
   EXPECT_LE((run.body("Slider").pose.position - end).norm(), 1e-6);
   EXPECT_LE(run.environment().stage_time(kernel::Stage::kSolve).count(), 3000U);
+}
+
+// In the bottom of a groove, and edge first in small triangles, the shortest way out of each triangle leads into another.
+TEST(SeamOfAMesh, HoldsWhatComesDeep) {
+  const auto run_with = [](const std::string& mesh, const std::string& shape, const Vector3& position,
+                           const Quaternion& orientation, double speed, double duration) {
+    SceneRun run(
+        "Geometries {\n" + geometry("Mesh", "TriangleMesh", mesh) + shape +
+        "}\nMaterials { Material { Id = \"Smooth\" StaticFrictionCoefficient = 0.3 } }\n"
+        "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+        "Simulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = " +
+        literal(duration) + " } }\nEnvironment { ConstraintSolver = \"Newton\" Space { Bodies {\n" +
+        tile("Floor", "Mesh", Vector3::Zero()) +
+        "Body { Id = \"Slider\" GeometryId = \"Body\" Mass = 1 Material = \"Smooth\" Forces = { \"Down\" } "
+        "KineticProperties { Position = " +
+        literal(position) + " Orientation = " + literal(orientation) + " LinearVelocity = {0, " + literal(-speed) +
+        ", 0} } }\n} } }\n");
+    run.to_end();
+    return run.body("Slider").pose.position.y();
+  };
+  const std::string groove =
+      "Vertices = {{-3, 2.517, -3}, {-3, 2.517, 3}, {0, 0, -3}, {0, 0, 3}, {3, 2.517, -3}, {3, 2.517, 3}} "
+      "Faces = {{0, 1, 3}, {0, 3, 2}, {2, 3, 5}, {2, 5, 4}}";
+  conformance::Draw random(7);
+  for (int i = 0; i < 40; ++i) {
+    const Quaternion turn = random.pose(1.0).orientation;
+    EXPECT_GT(run_with(groove, geometry("Body", "Box", "HalfExtents = {0.3, 0.2, 0.1}"), {0, 0.6, 0}, turn, 0.0, 1.5),
+              0.0)
+        << i;
+    EXPECT_GT(run_with(groove, geometry("Body", "Cone", "Radius = 0.25 Height = 0.5"), {0, 0.6, 0}, turn, 0.0, 1.5),
+              0.0)
+        << i;
+  }
+  std::string vertices, faces;
+  for (int i = 0; i < 7; ++i) {
+    vertices += std::string(i == 0 ? "" : ", ") + "{" + literal(0.5 * i - 1.5) + ", 0, -1.5}, {" +
+                literal(0.5 * i - 1.5) + ", 0, 1.5}";
+    const std::string a = std::to_string(2 * i), b = std::to_string(2 * i + 1), c = std::to_string(2 * i + 2),
+                      d = std::to_string(2 * i + 3);
+    if (i < 6)
+      faces += std::string(i == 0 ? "" : ", ") + "{" + a + ", " + b + ", " + d + "}, {" + a + ", " + d + ", " + c + "}";
+  }
+  EXPECT_GT(run_with("Vertices = {" + vertices + "} Faces = {" + faces + "}",
+                     geometry("Body", "Box", "HalfExtents = {0.3, 0.02, 0.3}"), {0, 0.38, 0},
+                     turned(Vector3::UnitZ(), 1.2) * turned(Vector3::UnitX(), 0.1), 6.0, 0.5),
+            -0.05);
 }
 
 // A ball on the two edges of a gap, however narrow, has nothing else to rest on.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "plugin_sdk/geometry/contour_contacts.h"
@@ -197,6 +198,11 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
                          const Collector& out) {
   const Matrix3 R = X_MC.orientation.toRotationMatrix();
   const Vector3 centre = X_MC.position + R * map.centre();
+  // In a concave edge, and deep in small triangles, the shortest way out of each leads into another, and none claims the
+  // contact: then all do that are about as shallow as any, along their faces.
+  constexpr double kOfShallowest = 2.0;
+  double shallowest = std::numeric_limits<double>::infinity();  // along the face of a triangle that claims nothing
+  bool is_claimed = false, by_faces = false;
   const auto collide_triangle = [&](std::uint32_t t, const std::optional<Separation>& known) {
     const TriangleMap triangle(mesh.corners(t), mesh.normal(t));
     const PlacedPair pair{triangle, map, R, X_MC.position};
@@ -204,18 +210,34 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
     if (!(least.depth >= -margin)) return;
     const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
     const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
+    const Vector3 up = side.normal();
+    const bool is_before = up.dot(centre - triangle.centre()) > 0.0;
     Vector3 normal;
     bool is_least = false;
-    if (!choose_normal(pair, side, nullptr, least, &normal, &is_least)) return;
     Manifold manifold;
-    contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+    if (by_faces) {
+      if (is_before && pair.depth_along(up) <= kOfShallowest * shallowest)
+        contacts_along(pair, up, margin, &least, &manifold);
+    } else if (choose_normal(pair, side, nullptr, least, &normal, &is_least)) {
+      contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+    }
+    is_claimed = is_claimed || manifold.count > 0;
+    if (manifold.count == 0 && is_before)
+      shallowest = std::min(shallowest, std::max(1e-6 * map.radius(), pair.depth_along(up)));
     out.add(t, manifold);
   };
-  if (map.rounding() == map.radius()) {
-    for_each_at_ball(mesh, centre, map.radius(), margin, collide_triangle);
-  } else {
-    mesh.for_each_in(box_of(map, R, X_MC.position).widened(margin),
-                     [&](std::uint32_t t) { collide_triangle(t, std::nullopt); });
+  const auto collide_triangles = [&] {
+    if (map.rounding() == map.radius()) {
+      for_each_at_ball(mesh, centre, map.radius(), margin, collide_triangle);
+    } else {
+      mesh.for_each_in(box_of(map, R, X_MC.position).widened(margin),
+                       [&](std::uint32_t t) { collide_triangle(t, std::nullopt); });
+    }
+  };
+  collide_triangles();
+  if (!is_claimed && std::isfinite(shallowest)) {
+    by_faces = true;
+    collide_triangles();
   }
   if (!mesh.is_closed() || !mesh.box().overlaps({centre, centre})) return;
   const TriangleMesh::Nearest nearest = mesh.nearest(centre);
