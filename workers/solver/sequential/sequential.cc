@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <utility>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/plugin.h"
@@ -295,7 +294,7 @@ double SequentialSolver::choose_start(const BodyMotion& base, double tolerance, 
 
 void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) {
   turn_trial_velocity();
-  take_directions(request, drives_yield_);
+  take_directions(drives_yield_);
   velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
   impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
   if (drives_yield_) impulses_.drop_restitution();
@@ -392,13 +391,13 @@ bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request
                                   velocity_joints_.largest_left_out(solution_.velocity),
                                   impulses_.largest_violation(solution_.velocity)});
   if (!(missed > kMissed * asked)) return false;
-  take_directions(request, true);
+  take_directions(true);
   std::vector<double> unused(velocity_laws_.size());
   const bool contradict =
       reconcile(directed_, velocity_laws_, trial_velocity_, kLeastContradiction * (asked + missed), &unused) > 0.0;
   if (!find_reach()) {
     // the velocities that stand are those of the rows before
-    take_directions(request, drives_yield_);
+    take_directions(drives_yield_);
     return false;
   }
   drives_yield_ = true;

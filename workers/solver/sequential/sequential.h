@@ -183,7 +183,7 @@ class SequentialSolver {
   bool find_closed();
   void turn_trial_velocity();
   void build_velocity(const stage::SolverSolveRequest& request);
-  void take_directions(const stage::SolverSolveRequest& request, bool drives_yield);
+  void take_directions(bool drives_yield);
   void solve_velocity();
   void relax_velocity();
   bool let_drives_yield(const stage::SolverSolveRequest& request);
@@ -219,7 +219,7 @@ class SequentialSolver {
   std::vector<RelaxationDiscrepancy> directed_;       // with the directions of the velocities' rows
   std::vector<std::pair<std::uint32_t, std::uint32_t>> touching_;  // bodies, where there are joints; rising
   std::vector<RelaxationDiscrepancy> posed_;                       // with those of the pose change's
-  std::vector<JointEnd> ends_;                                     // where that ends
+  std::vector<JointEnd> ends_;                                     // where solution_.displacement ends
   RelaxationJoints::Laws pose_laws_, posed_laws_, velocity_laws_;
   StalledDrives stalled_;
   // of rows that contradict each other and of drives that yield: by how much their targets are moved; and the most of

@@ -1,7 +1,5 @@
 // Where the pose change ends: rows and errors there, and what is closed.
 #include <algorithm>
-#include <cmath>
-#include <utility>
 
 #include "plugin_sdk/solver.h"
 #include "workers/solver/sequential/sequential.h"
@@ -156,12 +154,12 @@ void SequentialSolver::turn_trial_velocity() {
 // Of the velocities' rows: where the pose change ends; at S*, where contacts' are, of bodies that touch each other as well, whose
 // rows would contradict each other by the turn, and of all where drives yield: what jams there is told by rows that depend on
 // each other exactly.
-void SequentialSolver::take_directions(const stage::SolverSolveRequest& request, bool drives_yield) {
+void SequentialSolver::take_directions(bool drives_yield) {
   directed_ = discrepancies_;
   if (discrepancies_.empty()) return;
   turned_ = bodies_;
   if (drives_yield) return;
-  find_ends(request);
+  turned_.turn(solution_.displacement);
   for (std::size_t i = 0; i < directed_.size(); ++i)
     if (!touches(directed_[i]) && !stands(directed_[i])) directed_[i].directions = ends_[i].directions;
 }
