@@ -11,29 +11,26 @@ namespace {
 // Largest share of the way to a border that a step takes.
 constexpr double kShare = 0.99;
 
-// max(0, t) with its corner rounded, and its slope.
-struct Rounded {
-  double value, slope;
-  Rounded(double t, double width) {
-    const double root = std::sqrt(0.25 * t * t + width * width);
-    value = t > 0.0 ? 0.5 * t + root : width * width / (root - 0.5 * t);
-    slope = 0.5 + 0.25 * t / root;
-  }
-};
-
 double square(double a) { return a * a; }
 
 }  // namespace
 
-void ConePath::add_scalar(Eigen::Index row, double lower, double upper, double bound) {
-  if (std::isinf(bound) && std::isinf(upper)) {
-    add_normal(row, lower);
-  } else {
-    scalars_.push_back({row, lower, upper, bound});
-  }
+bool ConePath::Side::is_bounded() const { return std::isfinite(bound); }
+
+double ConePath::Side::stiffness() const { return slack / push + (is_bounded() ? excess / (bound - push) : 0.0); }
+
+double ConePath::Side::missing(double aim, double y) const {
+  return sign * (target - y) + aim / push - (is_bounded() ? aim / (bound - push) : 0.0);
 }
 
-void ConePath::add_normal(Eigen::Index row, double target) { normals_.push_back({.row = row, .target = target}); }
+void ConePath::add_scalar(Eigen::Index row, double lower, double upper, double bound) {
+  if (!(bound > 0.0)) {
+    none_.push_back(row);
+    return;
+  }
+  if (std::isfinite(lower)) sides_.push_back({.row = row, .sign = 1.0, .target = lower, .bound = bound});
+  if (std::isfinite(upper)) sides_.push_back({.row = row, .sign = -1.0, .target = upper, .bound = bound});
+}
 
 void ConePath::add_disc(Eigen::Index row, int count, Eigen::Index normal, double factor) {
   if (factor > 0.0) {
@@ -48,21 +45,25 @@ std::uint32_t ConePath::next(double smallest, Eigen::VectorXd* lambda, Eigen::Ve
   constexpr double kLittle = 0.02, kEnd = 1e-10;
   enter(lambda, y);
   const double near = kEnd * load_ * speed_, end = discs_.empty() ? std::min(near, square(smallest)) : near;
-  double last = 0.9, product = load_ * speed_;
+  double last = 0.9;
   std::uint32_t steps = 0, stuck = 0;
   while (steps < kSteps && stuck < kStuck) {
     ++steps;
-    product = normals_.empty() ? 0.01 * product : mean_product(*lambda);
+    const double product = mean_product(*lambda);
     if (!(product > end)) break;
     // far, when the last step could be whole
     const double aim = std::clamp(square(1.0 - last), 0.01, 0.9) * product;
     linearise(aim, *lambda, *y);
     const Eigen::VectorXd step = DenseLu(matrix_).solve(side_);
     if (!step.allFinite()) break;
-    last = find_share(aim, *lambda, step);
+    last = find_share(aim, *lambda, *y, step);
     stuck = last < kLittle ? stuck + 1 : 0;
     *lambda += last * step;
-    for (Normal& normal : normals_) normal.slack += last * normal.slack_step;
+    for (Side& side : sides_) {
+      side.push += last * side.push_step;
+      side.slack += last * side.slack_step;
+      side.excess += last * side.excess_step;
+    }
     for (Disc& disc : discs_) disc.slip += last * disc.slip_step;
     *y = start_ + response_ * *lambda;
   }
@@ -77,14 +78,17 @@ void ConePath::enter(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
     matrix_ = response_;
     matrix_.diagonal().array() += 1e-8;
     side_ = -start_;
-    for (const Normal& normal : normals_) side_[normal.row] += normal.target;
-    for (const Scalar& scalar : scalars_)
-      side_[scalar.row] += std::isfinite(scalar.lower) ? scalar.lower : scalar.upper;
+    for (std::size_t i = sides_.size(); i-- > 0;) side_[sides_[i].row] = sides_[i].target - start_[sides_[i].row];
     speed_ = std::max(start_.cwiseAbs().maxCoeff(), side_.cwiseAbs().maxCoeff());
     load_ = std::max(speed_, DenseLu(matrix_).solve(side_).cwiseAbs().maxCoeff());
   }
   lambda->setZero();
-  for (Normal& normal : normals_) (*lambda)[normal.row] = load_, normal.slack = speed_;
+  for (Side& side : sides_) {
+    side.push = side.is_bounded() ? std::min(load_, 0.5 * side.bound) : load_;
+    side.slack = speed_;
+    side.excess = side.is_bounded() ? speed_ : 0.0;
+    (*lambda)[side.row] += side.sign * side.push;
+  }
   for (Disc& disc : discs_) disc.slip = speed_ / (square(disc.factor) * load_);
   *y = start_ + response_ * *lambda;
 }
@@ -92,18 +96,31 @@ void ConePath::enter(Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
 // Mean of what is to be g.
 double ConePath::mean_product(const Eigen::VectorXd& lambda) const {
   double sum = 0.0;
-  for (const Normal& normal : normals_) sum += lambda[normal.row] * normal.slack;
+  std::size_t count = sides_.size() + discs_.size();
+  for (const Side& side : sides_) {
+    sum += side.push * side.slack;
+    if (!side.is_bounded()) continue;
+    sum += (side.bound - side.push) * side.excess;
+    ++count;
+  }
   for (const Disc& disc : discs_) sum += disc.slip * disc.room(lambda);
-  return sum / static_cast<double>(normals_.size() + discs_.size());
+  return sum / static_cast<double>(count);
 }
 
 // matrix d = side, d the change of lambda; slacks and slips are eliminated.
 void ConePath::linearise(double aim, const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) {
   matrix_ = response_;
-  for (const Normal& normal : normals_) {
-    const double l = lambda[normal.row];
-    matrix_(normal.row, normal.row) += normal.slack / l;
-    side_[normal.row] = normal.target - y[normal.row] + aim / l;
+  for (std::size_t i = 0; i < sides_.size();) {
+    const Eigen::Index row = sides_[i].row;
+    double compliance = 0.0, reach = 0.0;
+    for (; i < sides_.size() && sides_[i].row == row; ++i) {
+      const Side& side = sides_[i];
+      const double stiffness = side.stiffness();
+      compliance += 1.0 / stiffness;
+      reach += side.sign * side.missing(aim, y[row]) / stiffness;
+    }
+    matrix_(row, row) += 1.0 / compliance;
+    side_[row] = reach / compliance;
   }
   for (const Disc& disc : discs_) {
     const double room = disc.room(lambda), pull = 2.0 * disc.slip / room, l = lambda[disc.normal];
@@ -126,45 +143,35 @@ void ConePath::linearise(double aim, const Eigen::VectorXd& lambda, const Eigen:
     matrix_(i, i) = 1.0;
     side_[i] = -lambda[i];
   }
-  for (const Scalar& scalar : scalars_) linearise(scalar, std::sqrt(aim), lambda, y);
 }
 
-void ConePath::linearise(const Scalar& scalar, double width, const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) {
-  const Eigen::Index i = scalar.row;
-  const double z = lambda[i] - y[i];
-  double to = z + scalar.lower, slope = 1.0;
-  if (scalar.lower != scalar.upper) {
-    to = slope = 0.0;
-    if (std::isfinite(scalar.lower)) {
-      const Rounded up(z + scalar.lower, width);
-      to += up.value, slope += up.slope;
-    }
-    if (std::isfinite(scalar.upper)) {
-      const Rounded down(-z - scalar.upper, width);
-      to -= down.value, slope += down.slope;
-    }
-  }
-  if (std::isfinite(scalar.bound)) {
-    const Rounded above(to - scalar.bound, width), below(-to - scalar.bound, width);
-    to += below.value - above.value;
-    slope *= std::max(0.0, 1.0 - above.slope - below.slope);
-  }
-  slope = std::min(slope, 1.0);
-  matrix_.row(i) *= slope;
-  matrix_(i, i) += 1.0 - slope;
-  side_[i] = to - lambda[i];
-}
-
-double ConePath::find_share(double aim, const Eigen::VectorXd& lambda, const Eigen::VectorXd& step) {
+double ConePath::find_share(double aim, const Eigen::VectorXd& lambda, const Eigen::VectorXd& y,
+                            const Eigen::VectorXd& step) {
   double share = 1.0;
   const auto keep_positive = [&](double now, double change) {
     if (change < 0.0) share = std::min(share, -kShare * now / change);
   };
-  for (Normal& normal : normals_) {
-    const double l = lambda[normal.row], change = step[normal.row];
-    normal.slack_step = (aim - normal.slack * change) / l - normal.slack;
-    keep_positive(l, change);
-    keep_positive(normal.slack, normal.slack_step);
+  for (std::size_t i = 0; i < sides_.size(); ++i) {
+    Side& side = sides_[i];
+    side.push_step = side.sign * step[side.row];
+    if (i + 1 == sides_.size() || sides_[i + 1].row != side.row) continue;
+    // of two, what the stiffer one gives way to is known to its digits
+    Side& other = sides_[++i];
+    const double change = response_.col(side.row).dot(step);
+    Side &stiff = side.stiffness() > other.stiffness() ? side : other, &soft = &stiff == &side ? other : side;
+    stiff.push_step = (stiff.missing(aim, y[side.row]) - stiff.sign * change) / stiff.stiffness();
+    soft.push_step = stiff.push_step + soft.sign * step[side.row];
+  }
+  for (Side& side : sides_) {
+    const double push = side.push, change = side.push_step;
+    side.slack_step = (aim - side.slack * change) / push - side.slack;
+    keep_positive(push, change);
+    keep_positive(side.slack, side.slack_step);
+    if (!side.is_bounded()) continue;
+    const double left = side.bound - push;
+    side.excess_step = (aim + side.excess * change) / left - side.excess;
+    keep_positive(left, -change);
+    keep_positive(side.excess, side.excess_step);
   }
   for (Disc& disc : discs_) {
     // room + 2 half t + curve t^2 after a share t of the step

@@ -278,7 +278,7 @@ ConePath ConeProblem::path() const {
                       law.bound);
       continue;
     }
-    path.add_normal(i, block.target);
+    path.add_scalar(i, block.target, kInfinity, kInfinity);
     const Bounds bounds = bounds_of(block);
     if (bounds.turning != 1 && block.count > 1) path.add_disc(i + 1, 2, i, bounds.friction);
     if (bounds.turning == 0) continue;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -29,11 +30,13 @@ ConeSummary IslandSolver::solve(Host& host) {
   const double share = request_.theta() * request_.time_step();
   guess_offset(share);
   int failures = 0;
+  double last_change = 0.0;
   for (; round_ < kRounds; ++round_) {
     const BodyMotion before = displacement_;
     // impulses that wander from round to round are held more
     if (round_ == kFreeRounds) settings_.proximal *= 10.0;
     solve_pose();
+    last_change = largest_change(before, displacement_);
     const bool closes = find_closed();
     // velocities are known to their residual; of rows that depend on each other, all impulses that move alike are right
     has_settled_ =
@@ -48,11 +51,65 @@ ConeSummary IslandSolver::solve(Host& host) {
     failures = has_velocity_ || goes_on ? 0 : failures + 1;
     if (failures == 2) break;
   }
+  if (!has_settled_ && !contacts_.empty() && !joints_.empty()) leave_out_wandering(last_change);
   // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
   summary_.contradiction = std::max(summary_.contradiction, pose_contradiction_);
   summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
   store();
   return summary_;
+}
+
+void IslandSolver::leave_out_wandering(double last_change) {
+  constexpr double kMuch = 1e-3;  // of the smallest radius of gyration
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const std::uint32_t i : pushed_) smallest = std::min(smallest, gyration_[i]);
+  const double before = open();
+  if (!(std::max(last_change, before) > kMuch * smallest)) return;
+  const PoseChange kept = pose_change();
+  offset_ = driven_;
+  keep_moments_of_offset();
+  forget_corrections();
+  solve_pose();
+  if (open() > std::max(before, kMuch * smallest)) {
+    take(kept);
+    return;
+  }
+  find_closed();
+  solve_velocity();
+}
+
+IslandSolver::PoseChange IslandSolver::pose_change() const {
+  PoseChange change{displacement_, offset_, offset_moment_, {}, {}, has_pose_};
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k) change.of_joints.push_back(answer_.joint_correction[3 * joint.row + k]);
+  for (const EndContact& contact : contacts_) change.of_contacts.push_back(answer_.contact_correction[contact.row]);
+  return change;
+}
+
+void IslandSolver::take(const PoseChange& change) {
+  offset_ = change.offset;
+  offset_moment_ = change.offset_moment;
+  has_pose_ = change.has_converged;
+  auto of_joint = change.of_joints.begin();
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k) answer_.joint_correction[3 * joint.row + k] = *of_joint++;
+  auto of_contact = change.of_contacts.begin();
+  for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = *of_contact++;
+  move_to_end(change.displacement);
+}
+
+double IslandSolver::open() const {
+  double open = 0.0;
+  for (const EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const JointLaw& law = joint.pose_laws[k];
+      const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
+      const double below = law.has_lower ? law.lower_target - change : 0.0;
+      const double above = law.has_upper ? change - law.upper_target : 0.0;
+      open = std::max(open, std::max(below, above) * joint.length);
+    }
+  }
+  return open;
 }
 
 // ---- what does not change within the step

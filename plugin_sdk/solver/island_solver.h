@@ -35,6 +35,21 @@ class IslandSolver {
   // or of an angle of 1, that may be left of what joints hold.
   static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;
 
+  // What friction displaces may send joints and contacts to where it is another (a light link between the ground and what falls on
+  // it), round by round. Where the last change was much, or left joints open, it is left out.
+  void leave_out_wandering(double last_change);
+  // What joints miss, m.
+  double open() const;
+
+  struct PoseChange {
+    BodyMotion displacement, offset;
+    std::vector<Vector3> offset_moment;
+    std::vector<double> of_joints, of_contacts;  // corrections
+    bool has_converged;
+  };
+  PoseChange pose_change() const;
+  void take(const PoseChange& change);
+
   // ---- what does not change within the step
 
   void load();

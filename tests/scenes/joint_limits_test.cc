@@ -1,4 +1,4 @@
-// Limits of hinges, twists and cones where a step turns far, and of rag dolls, which have all of them.
+// Limits of hinges, twists and cones where a step turns far, and of rag dolls and chains, which have all of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -201,9 +201,9 @@ class RagDoll : public ::testing::Test {
   static inline std::string rules_;
 };
 
-// Once in one of four they flew apart, by up to 97 m.
-TEST_F(RagDoll, StaysTogetherWithNewton) {
-  for (std::uint64_t seed = 0; seed < 6; ++seed) EXPECT_LE(open(seed, "Newton"), 0.05) << seed;
+// Once in one of four they flew apart, by up to 97 m, and then one in four was open by a millimetre to metres.
+TEST_F(RagDoll, StaysClosedWithNewton) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) EXPECT_LE(open(seed, "Newton"), 1e-9) << seed;
 }
 
 TEST_F(RagDoll, StaysTogetherWithSequential) {
@@ -211,6 +211,77 @@ TEST_F(RagDoll, StaysTogetherWithSequential) {
   for (std::uint64_t seed = 0; seed < 12; ++seed) open_by.push_back(open(seed, "Sequential"));
   std::ranges::nth_element(open_by, open_by.begin() + 6);
   EXPECT_LE(open_by[6], 0.02);  // 0.067 with joints made right at S* alone
+}
+
+// ---- chains with limits in every joint
+
+class LimitedChain : public ::testing::Test {
+ protected:
+  // Eight boxes on hinges, sliders, cones and universal joints, thrown at the ground with 8 m/s.
+  static std::string text(std::uint64_t seed) {
+    conformance::Draw random(seed);
+    const auto direction = [&] {
+      const double x = random.uniform(-1.0, 1.0), y = random.uniform(-1.0, 1.0);
+      return Vector3(x, y, random.uniform(0.1, 1.0)).normalized();
+    };
+    const Vector3 velocity = Vector3(0, -8, 0) + 2.0 * direction(), spin = 4.0 * direction();
+    std::string bodies, joints, rules;
+    Vector3 at(0, 3, 0);
+    for (int i = 0; i < 8; ++i) {
+      const std::string id = "B" + std::to_string(i), last = "B" + std::to_string(i - 1);
+      const Vector3 before = at;
+      if (i > 0) at += 0.6 * (random.below(2) == 0 ? 1.0 : -1.0) * direction();
+      at.y() = std::max(at.y(), 0.6);
+      const double mass = std::exp(random.uniform(-1.0, 1.0));
+      bodies += "Body { Id = \"" + id + "\" GeometryId = \"Box\" Mass = " + literal(mass) +
+                " Forces = {\"G\"} KineticProperties { Position = " + literal(at) +
+                " Orientation = " + literal(harness::turned(direction(), random.uniform(0.0, 3.0))) +
+                " LinearVelocity = " + literal(Vector3(velocity + spin.cross(at))) +
+                " AngularVelocity = " + literal(spin) + " } }\n";
+      for (int j = 0; j < i; ++j)
+        rules += "Rule { Allow = false Bodies = {\"B" + std::to_string(j) + "\", \"" + id + "\"} }\n";
+      if (i == 0) continue;
+      const Vector3 middle = 0.5 * (before + at), axis = direction();
+      const double lower = -random.uniform(0.0, 1.0), upper = random.uniform(0.1, 1.0);
+      const auto range = [](const std::string& name, double a, double b) {
+        return " Lower" + name + " = " + literal(a) + " Upper" + name + " = " + literal(b);
+      };
+      const std::string point = "BindPoint = " + literal(middle);
+      const std::string kinds[] = {
+          "\"Revolute\" CustomProperties { BindAxisPoint1 = " + literal(middle) +
+              " BindAxisPoint2 = " + literal(Vector3(middle + axis)) + range("Limit", lower, upper),
+          "\"Slider\" CustomProperties { " + point + " Axis = " + literal(axis) +
+              range("Limit", lower / 8.0, upper / 8.0),
+          "\"Spherical\" CustomProperties { " + point + " Axis = " + literal(axis) +
+              " ReachConeAngle = " + literal(upper),
+          "\"Universal\" CustomProperties { " + point + " Axis1 = " + literal(axis) +
+              " Axis2 = " + literal(Vector3(axis.cross(Vector3(0.3, 0.5, 0.7)))),
+      };
+      joints += "Constraint { Id = \"J" + std::to_string(i) + "\" Body1 = \"" + last + "\" Body2 = \"" + id +
+                "\" Type = " + kinds[random.below(4)] + " } }\n";
+    }
+    return "Geometries { Geometry { Type = \"Halfspace\" Id = \"Ground\" CustomProperties { } }\n"
+           "Geometry { Type = \"Box\" Id = \"Box\" CustomProperties { HalfExtents = {0.1, 0.25, 0.1} } } }\n"
+           "Materials { Material { Id = \"M\" StaticFrictionCoefficient = 0.5 } }\n"
+           "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+           "Simulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = 1 } }\n"
+           "Environment { Space { Bodies { Body { Id = \"Floor\" GeometryId = \"Ground\" Material = \"M\" }\n" +
+           bodies + "} }\nConstraints {\n" + joints + "}\nCollisionFilter { Exceptions {\n" + rules + "} } }\n";
+  }
+};
+
+// One in ten came open by a centimetre to half a metre: limits of two sides that no step of Newton's method settled, and
+// friction that sends a light link to where it is another.
+TEST_F(LimitedChain, StaysClosedWithNewtonAndDirect) {
+  for (const std::string solver : {"Newton", "Direct"}) {
+    for (std::uint64_t seed = 0; seed < 24; ++seed) {
+      SceneRun run(text(seed), {set("Solver", solver)});
+      const double before = run.energy();
+      run.to_end();
+      EXPECT_LE(run.report().max_joint_error(), 1e-6) << solver << ' ' << seed;
+      EXPECT_LE(run.energy(), before) << solver << ' ' << seed;
+    }
+  }
 }
 
 }  // namespace
