@@ -122,7 +122,8 @@ AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const d
     if ((impulse - along * normal).norm() > friction * along + tolerance)
       return bad_number("contact_impulse", i, " leaves the friction cone");
     const Vector3 turning = vector_at(answer.contact_turning, i);
-    const double spinning = normal.dot(turning), pressed = along + tolerance, rounding = kRounding * turning.norm();
+    const double spinning = normal.dot(turning), pressed = along + tolerance;
+    const double rounding = kRounding * turning.stableNorm() + kSmallest;
     if (std::fabs(spinning) > row[kSpinningFriction] * pressed + rounding)
       return bad_number("contact_turning", i, " spins by more than spinning friction can");
     if ((turning - spinning * normal).norm() > row[kRollingFriction] * pressed + rounding)

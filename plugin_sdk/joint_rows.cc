@@ -49,7 +49,8 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 
 double JointLimits::turn(double angle, double way) const {
   constexpr double kWholeTurn = 2.0 * kHalfTurn;
-  constexpr double kPast = 0.02;  // rad, that a step may begin beyond a limit by
+  constexpr double kPast = 0.02;                  // rad, that a step may begin beyond a limit by
+  constexpr double kRests = 1e-9, kMoves = 1e-2;  // rad; of how far it is beyond
   if (is_none()) return angle;
   const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
   double middle = 0.5 * (lower + upper);
@@ -59,9 +60,10 @@ double JointLimits::turn(double angle, double way) const {
   const double seen = nearest(angle), begun = seen - way, known = nearest(begun);
   if (!(known >= lower - kPast && known <= upper + kPast)) return seen;
   const double turned = seen + (known - begun);
-  // what moves out of a single limit, or through it from behind, needs no push
-  if (!has_lower && known > upper && way < 0.0) return turned - kWholeTurn;
-  if (!has_upper && known < lower && way > 0.0) return turned + kWholeTurn;
+  // what moves out of a single limit, or through it from behind, needs no push; what rests on it is beyond it by rounding
+  const auto moves_out = [](double beyond, double out) { return beyond > kRests && out > kMoves * beyond; };
+  if (!has_lower && moves_out(known - upper, -way)) return turned - kWholeTurn;
+  if (!has_upper && moves_out(lower - known, way)) return turned + kWholeTurn;
   return turned;
 }
 

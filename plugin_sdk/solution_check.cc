@@ -93,6 +93,11 @@ class Balance {
   Vector3 turn_of(std::uint32_t body) const {
     return body == kNone ? Vector3(Vector3::Zero()) : vector_at(answer_.pose_change, 2 * body + 1);
   }
+  // What the points of a contact of jointed bodies may go along with, rad.
+  double turned_about(std::size_t contact, const Vector3& normal) const {
+    const std::uint32_t* bodies = &request_.contact_body()[2 * contact];
+    return std::max(std::fabs(normal.dot(turn_of(bodies[0]))), std::fabs(normal.dot(turn_of(bodies[1]))));
+  }
   // By how much the axes of a discrepancy of points turn, rad, at most, with the pose change or the part of it that a method
   // knows before what acts on the velocity alone has moved the bodies.
   double turned_on_the_way(std::size_t row, const Discrepancy& d) const {
@@ -157,9 +162,11 @@ class Balance {
       const Vector3 normal = vector_at(request_.contact_normal(), i);
       const Vector3 turning = vector_at(answer_.contact_turning, i);
       const Vector3 to_surface = 0.5 * request_.contact_depth()[i] * normal;
+      const double turned = turned_about(i, normal);
       for_both(request_.contact_body(), i, vector_at(request_.contact_point(), i), -to_surface,
                [&](Pushes& body, const Vector3& arm, double sign) {
                  push_at(arm, sign * impulse, &body.velocity);
+                 body.velocity.unreported += turned * arm.norm() * impulse.norm();
                  push_couple(sign * turning, &body.velocity);
                  push_at(arm, sign * correction * normal, &body.pose);
                  push_at(arm, sign * share * friction, &body.pose);
@@ -449,8 +456,8 @@ class Balance {
       const double arrival = 2.0 * (std::fabs(start) + std::fabs(trial));
       // a speed that moves nothing but by rounding is none
       const double rounding = kSettled * point.norm() / request_.time_step();
-      const double allowed = request_.contact_material()[kMaterialColumns * i + kRestitution] * arrival + 1e-3 * sizes +
-                             kOfFastest * fastest + rounding;
+      const double allowed = request_.contact_material()[kMaterialColumns * i + kRestitution] * arrival +
+                             (1e-3 + turned_about(i, direction)) * sizes + kOfFastest * fastest + rounding;
       if (after <= allowed) continue;
       char text[160];
       std::snprintf(text, sizeof text, "contact_impulse of row %zu pushes what separates at %.3g m/s, allowed %.3g", i,

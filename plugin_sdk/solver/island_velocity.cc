@@ -201,8 +201,12 @@ void IslandSolver::build_velocity(const EndContact& contact, bool with_turning) 
     row.length = length;
     row.multiplier = multiplier;
   };
+  Vector3 arm1 = contact.arm1, arm2 = contact.arm2;
+  if (!joints_.empty())
+    turn_arms(law.frame.col(0), bodies_[contact.body1], bodies_[contact.body2], displacement_[contact.body1],
+              displacement_[contact.body2], &arm1, &arm2);
   for (int k = 0; k < (cone.has_friction ? 3 : 1); ++k)
-    add(with_turns(direction_at(law.frame.col(k), contact.arm1, contact.arm2), inverse1, inverse2), 1.0, impulse[k]);
+    add(with_turns(direction_at(law.frame.col(k), arm1, arm2), inverse1, inverse2), 1.0, impulse[k]);
   cone_.rows[first].softness = contact.softness;
   const double length = std::max(bodies_[contact.body1].gyration(), bodies_[contact.body2].gyration());
   for (int k = 0; k < (cone.has_turning ? 3 : 0); ++k)

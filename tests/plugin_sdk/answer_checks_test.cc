@@ -160,6 +160,7 @@ TEST(AnswerChecks, FrictionOfTurning) {
   EXPECT_EQ(check(0, 0, {0, 0, 0}).text, "");
   EXPECT_EQ(check(0.05, 0.03, {0.06, -0.06, -0.08}).text, "");  // both at their bounds
   EXPECT_EQ(check(0.05, 0, {0.06, 1e-17, 0.08}).text, "");
+  EXPECT_EQ(check(0.05, 0, {6e-202, 1e-217, 8e-202}).text, "");  // its square is no number
   const char* const spins = "contact_turning of row 0 spins by more than spinning friction can";
   const char* const rolls = "contact_turning of row 0 rolls by more than rolling friction can";
   expect_number(check(0.05, 0.03, {0, 0.0601, 0}), spins);

@@ -87,6 +87,24 @@ TEST_P(TurningLimits, OfOneSideLetTheOtherGo) {
   }
 }
 
+// A motor that presses on a single limit rests there: by rounding it is beyond, and moves back by it.
+TEST_P(TurningLimits, OfOneSideBearAMotor) {
+  for (const double torque : {5.0, 50.0, 1e4}) {
+    for (const double time_step : {1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0, 1e-3}) {
+      const std::string motor =
+          "Type = \"AngularMotor\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} "
+          "AngularSpeed = 3 MaximumTorque = " +
+          literal(torque) + " } }\nConstraint { Id = \"Stop\" Body2 = \"A\" ";
+      for (const std::string& stop : {hinge("UpperLimit = 0.7"), ball("TwistUpper = 0.7")}) {
+        SceneRun run = turning(motor + stop, 0.0, time_step, 1.5);
+        run.to_end();
+        EXPECT_NEAR(angle_of(run), 0.7, 1e-6) << torque << ' ' << time_step << stop;
+        EXPECT_LE(run.body("A").twist.angular.norm(), 1e-6) << torque << ' ' << time_step << stop;
+      }
+    }
+  }
+}
+
 // Azimuths of an irregular cone count from the world's x as seen along Axis, from -z where that is along x, whatever the sign of
 // its last digits.
 TEST_P(TurningLimits, OfAConeCountFromTheWorldsX) {

@@ -78,8 +78,7 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
 
   const double factor = request.theta() * time_step_;
   if (factor > 0.0 && acts_on_velocity_alone()) {
-    set_offset(request, factor);
-    solve_pose_with_offset(request);
+    solve_pose_with_offset(request, factor);
     if (find_closed()) {
       moved_.assign(velocity_laws_.size(), 0.0);
       velocity_joints_.store(moved_);
@@ -91,21 +90,24 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
       } else {
         moved_.clear();
       }
-      set_offset(request, factor);
-      solve_pose_with_offset(request);
+      solve_pose_with_offset(request, factor);
     }
   }
 }
 
-// Sweeps over what friction and drives displace a light body by, which joints are to take back, may leave much of it: the pose
-// change is that without it then.
-void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request) {
-  if (discrepancies_.empty()) return solve_pose(request);
+// Sweeps over what friction, springs and drives displace a light body by, which joints are to take back, may leave much of it:
+// the pose change is that without friction's then, or that without any.
+void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor) {
   keep_pose(&before_offset_);
-  solve_pose(request);
-  if (!(open_ > before_offset_.open) || (pose_converged_ && !(open_ > kFarOpen))) return;
+  for (const bool with_friction : {true, false}) {
+    set_offset(request, factor, with_friction);
+    solve_pose(request);
+    if (discrepancies_.empty()) return;
+    if (!(open_ > std::max(before_offset_.open, pose_converged_ ? kFarOpen : kRounded))) return;
+    used_up_ = true;
+    if (!(open_ > kClosed)) return;
+  }
   take_pose(before_offset_);
-  used_up_ = true;
 }
 
 // Sweeps ran out, or rows that were left out are not met: was something asked for that no motion can do? Rows that hold
@@ -296,7 +298,9 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
   turn_trial_velocity();
   take_directions(drives_yield_);
   velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
-  impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
+  const bool is_jointed = !discrepancies_.empty();
+  impulses_.build(is_jointed ? turned_ : bodies_, request, closed_, solution_.contact_impulse,
+                  is_jointed && !drives_yield_ ? &solution_.displacement : nullptr);
   if (drives_yield_) impulses_.drop_restitution();
   copy(request.contact_normal(), solution_.contact_direction);
 }
@@ -363,10 +367,10 @@ bool SequentialSolver::acts_on_velocity_alone() const {
   return velocity_joints_.has_velocity_only_impulse() || impulses_.has_friction_impulse();
 }
 
-void SequentialSolver::set_offset(const stage::SolverSolveRequest& request, double factor) {
+void SequentialSolver::set_offset(const stage::SolverSolveRequest& request, double factor, bool with_friction) {
   std::fill(offset_.begin(), offset_.end(), Twist{});
   velocity_joints_.push_velocity_only(bodies_, factor, offset_);
-  impulses_.push_friction(bodies_, factor, offset_);
+  if (with_friction) impulses_.push_friction(bodies_, factor, offset_);
   // turns by the inertia there, which is taken where the bodies end
   const auto inertia = [&](std::size_t i) {
     return world_inertia(bodies_[i].trial.orientation, moments_of(vector_at(request.inverse_inertia(), i)));

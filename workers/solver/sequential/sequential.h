@@ -146,8 +146,8 @@ class SequentialSolver {
   const SolverSolution& solution() const { return solution_; }
 
  private:
-  // Joints that are open by a larger share of what their bodies measure are closed further; steps of that.
-  static constexpr double kOpen = 1e-3, kClosed = 1e-6, kFarOpen = 1e-2;
+  // Joints that are open by a larger share of what their bodies measure are closed further; steps of that; rounding of many.
+  static constexpr double kOpen = 1e-3, kClosed = 1e-6, kFarOpen = 1e-2, kRounded = 1e-12;
   static constexpr int kPoseSteps = 6;
 
   struct PoseChange {
@@ -173,7 +173,7 @@ class SequentialSolver {
   void build_at_end();
   void keep_pose(PoseChange* kept) const;
   void take_pose(const PoseChange& kept);
-  void solve_pose_with_offset(const stage::SolverSolveRequest& request);
+  void solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor);
   static std::pair<std::uint32_t, std::uint32_t> pair_of(std::uint32_t body1, std::uint32_t body2) {
     return std::minmax(body1, body2);
   }
@@ -200,7 +200,7 @@ class SequentialSolver {
   void scale_back();
   void sum_velocity();
   bool acts_on_velocity_alone() const;
-  void set_offset(const stage::SolverSolveRequest& request, double factor);
+  void set_offset(const stage::SolverSolveRequest& request, double factor, bool with_friction);
   void turn_offset(const SolverBodies& bodies);
 
   SequentialSettings settings_;
