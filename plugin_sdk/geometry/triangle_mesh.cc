@@ -230,7 +230,13 @@ TriangleMesh::Nearest TriangleMesh::nearest(const Vector3& p) const {
       side += math::acos(std::clamp(u.dot(w), -1.0, 1.0)) * normals_[around];
     }
   }
-  best.signed_distance = std::copysign(std::sqrt(least), side.dot(p - best.point));
+  const double distance = std::sqrt(least);
+  best.signed_distance = std::copysign(distance, -side.dot(where.point));
+  // so near the surface the difference of the two points is their rounding
+  constexpr double kTouching = 1e-9;
+  double reach = 0.0;
+  for (const Vector3& corner : corners(best.triangle)) reach = std::max(reach, std::sqrt((corner - p).squaredNorm()));
+  best.outward = distance > kTouching * reach ? Vector3(where.point / -best.signed_distance) : side.normalized();
   return best;
 }
 

@@ -90,6 +90,8 @@ class TriangleMesh {
     std::uint32_t triangle = kNone;
     Vector3 point = Vector3::Zero();
     double signed_distance = 0.0;  // m, < 0 on the side of the solid; the sign means something if the mesh is closed
+    // Unit, the way in which that grows; on the surface, where it has none, the mean normal round the nearest place.
+    Vector3 outward = Vector3::UnitY();
   };
   Nearest nearest(const Vector3& p) const;
 

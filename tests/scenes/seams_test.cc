@@ -65,6 +65,11 @@ class Seams : public ::testing::TestWithParam<Method> {
            geometry("Box", "Box", "HalfExtents = {0.1, 0.1, 0.1}") +
            geometry("Slab", "Box", "HalfExtents = {1.3, 0.1, 0.8}") +
            geometry("Can", "Cylinder", "Radius = 0.1 Height = 0.2") + geometry("Ball", "Sphere", "Radius = 0.1") +
+           geometry(
+               "Cube", "TriangleMesh",
+               "Vertices = {{-0.1, -0.1, -0.1}, {-0.1, -0.1, 0.1}, {-0.1, 0.1, -0.1}, {-0.1, 0.1, 0.1}, {0.1, -0.1, "
+               "-0.1}, {0.1, -0.1, 0.1}, {0.1, 0.1, -0.1}, {0.1, 0.1, 0.1}} Faces = {{0, 2, 6}, {6, 4, 0}, {0, 4, 5}, "
+               "{5, 1, 0}, {4, 6, 5}, {5, 6, 7}, {3, 2, 0}, {0, 1, 3}, {3, 6, 2}, {7, 6, 3}, {1, 5, 3}, {3, 5, 7}}") +
            geometry("Feet", "Compound",
                     "Children = {{\"Box\", {-0.3, 0, 0}, {1, 0, 0, 0}}, {\"Box\", {0.3, 0, 0}, {1, 0, 0, 0}}}") +
            geometry("Strips", "Compound", "Children = {" + strip_children + "}") +
@@ -109,7 +114,7 @@ TEST_P(Seams, AreNotFelt) {
 TEST_P(Seams, AreNotFeltOnTheSlantOrInOneCompound) {
   for (const double speed : {0.5, 3.0}) {
     const double duration = speed < 1.0 ? 1.4 : 1.0;
-    for (const char* shape : {"Box", "Slab", "Feet"}) {
+    for (const char* shape : {"Box", "Slab", "Cube", "Feet"}) {
       expect_passes(scene(squares(), shape, speed, duration), speed * duration, std::string(shape) + " over squares");
       expect_passes(scene(tile("Floor", "Strips", {0, -0.5, 0}), shape, speed, duration), speed * duration,
                     std::string(shape) + " over a compound");

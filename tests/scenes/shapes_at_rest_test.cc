@@ -110,6 +110,41 @@ TEST(ShapesAtRest, SettleThereWhenDropped) {
   }
 }
 
+// Sunk in askew by the landing, a mesh was held by its deepest corner alone: it stayed 12 mm deep and rocked for ever.
+TEST(ShapesAtRest, AMeshComesToRestAsItsHullDoes) {
+  const std::string vertices =
+      "Vertices = {{-0.10205825317021947, -0.1877919850027808, -0.05149120845061955}, {-0.1864801544411777, "
+      "-0.15615848832263804, 0.04782017207280559}, {0.41305541014098746, -0.2734232911297996, -0.14863060885587376}, "
+      "{0.3509882720889844, -0.021758394493202576, 0.018670825729707186}, {-0.3355258492802935, 0.3253179151284342, "
+      "0.003027138942593488}, {-0.07193480467191435, 0.20877507406104392, 0.13460888145333888}}";
+  const std::string faces =
+      " Faces = {{4, 2, 0}, {1, 5, 4}, {4, 0, 1}, {1, 0, 2}, {3, 2, 4}, {4, 5, 3}, {3, 1, 2}, {5, 1, 3}}";
+  const auto end_of = [](const std::string& type, const std::string& properties) {
+    SceneRun run(
+        "Geometries { Geometry { Type = \"Box\" Id = \"Half\" CustomProperties { HalfExtents = {0.35, 0.3, 0.7} } }\n"
+        "Geometry { Type = \"Compound\" Id = \"Block\" CustomProperties { Children = {{\"Half\", {-0.35, 0, 0}, {1, 0, "
+        "0, "
+        "0}}, {\"Half\", {0.35, 0, 0}, {1, 0, 0, 0}}} } }\n"
+        "Geometry { Type = \"" +
+        type + "\" Id = \"Stone\" CustomProperties { " + properties +
+        " } } }\nMaterials { Material { Id = \"Rough\" StaticFrictionCoefficient = 0.6 } }\n"
+        "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+        "Simulator { CustomProperties { TimeStep = 0.016666666666666666 Duration = 3 } }\n"
+        "Environment { ConstraintSolver = \"Sequential\" KineticIntegrator = \"Verlet\" Space { Bodies {\n"
+        "Body { Id = \"Ground\" Immovable = true GeometryId = \"Block\" Material = \"Rough\" "
+        "KineticProperties { Position = {0, 0.3, 0} } }\n"
+        "Body { Id = \"Thing\" GeometryId = \"Stone\" Mass = 1 Material = \"Rough\" Forces = { \"Down\" } "
+        "KineticProperties { Position = {-0.36104876066606084, 0.6529180004796175, -0.02852380537113631} "
+        "Orientation = {-0.48394681131049194, -0.31615778481896195, -0.6424732038308962, 0.5030585664513006} } }\n"
+        "} } }\n");
+    run.to_end();
+    return run.body("Thing");
+  };
+  const SceneRun::Motion mesh = end_of("TriangleMesh", vertices + faces), hull = end_of("ConvexPolyhedron", vertices);
+  EXPECT_NEAR(mesh.pose.position.y(), hull.pose.position.y(), 1e-6);
+  EXPECT_LE(mesh.twist.linear.norm() + mesh.twist.angular.norm(), 1e-6);
+}
+
 TEST(ShapesAtRest, SlideOverFlushSurfacesWithoutAHop) {
   struct Slide {
     const char* shape;

@@ -178,5 +178,27 @@ TEST(TriangleMesh, TellsInsideFromOutsideEverywhereRoundASolid) {
   EXPECT_GT(inside, 100);
 }
 
+TEST(TriangleMesh, TellsTheWayOutUpToItsSurface) {
+  const TriangleMesh mesh =
+      made({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}});
+  ASSERT_TRUE(mesh.is_closed());
+  test::RandomShapes random(10);
+  for (int i = 0; i < 2000; ++i) {
+    // anywhere, and within 1e-17 ... 1e-3 m of a face, an edge or a corner
+    Vector3 p = random.vector(-0.5, 1.5);
+    if (i % 2 == 0) {
+      const TriangleMesh::Nearest foot = mesh.nearest(p);
+      p = foot.point + std::pow(10.0, random.uniform(-17, -3)) * random.direction();
+    }
+    const TriangleMesh::Nearest nearest = mesh.nearest(p);
+    EXPECT_NEAR(nearest.outward.squaredNorm(), 1.0, 1e-14);
+    EXPECT_LE((p - nearest.signed_distance * nearest.outward - nearest.point).norm(), 1e-9 * 2.0);
+    if (std::fabs(nearest.signed_distance) > 1e-6) {
+      EXPECT_LE((p - nearest.signed_distance * nearest.outward - nearest.point).norm(), 1e-15);
+    }
+  }
+  EXPECT_LE((mesh.nearest({0.25, 0.25, 0.0}).outward + Vector3::UnitZ()).norm(), 1e-15);
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -17,6 +17,8 @@ namespace {
 // Heights over a plane, of the triangle's edges, that count as none.
 constexpr double kLevel = 1e-7;
 constexpr double kPatchPreference = 0.01;
+// A neighbour whose normal is nearer to a contact's than the triangle's own, by this in the cosines, has the contact.
+constexpr double kFacesMore = 0.5;
 
 // ---- normals of a mesh
 
@@ -42,10 +44,11 @@ NormalKind classify(const TriangleMesh& mesh, std::uint32_t t, const Vector3& n,
   for (std::size_t k = 0; k < 3; ++k) count += (touches[k] = height[k] >= top - 1e-3 * longest) ? 1 : 0;
   if (count == 3) return n.dot(own) > 0.0 ? NormalKind::kOwn : NormalKind::kForeign;
 
-  bool leads_out = n.dot(own) > 0.0, is_own = true, is_flush = true, has_border = false;
+  double facing = n.dot(own);
+  bool is_own = true, is_flush = true, has_border = false;
   const auto look = [&](std::uint32_t around) {
     if (around == t) return;
-    leads_out = leads_out || n.dot(side * mesh.normal(around)) > 0.0;
+    facing = std::max(facing, n.dot(side * mesh.normal(around)));
     const std::array<Vector3, 3> y = mesh.corners(around);
     for (const Vector3& corner : y) {
       if (n.dot(corner) <= top + kLevel * longest) continue;
@@ -63,9 +66,9 @@ NormalKind classify(const TriangleMesh& mesh, std::uint32_t t, const Vector3& n,
     for (const std::uint32_t around : mesh.ring(mesh.triangles()[t][vertex])) look(around);
     has_border = !mesh.is_closed();
   }
-  if (!leads_out && !has_border) return NormalKind::kForeign;
+  if (!(facing > 0.0) && !has_border) return NormalKind::kForeign;
   if (is_own) return NormalKind::kOwn;
-  return is_flush ? NormalKind::kFlush : NormalKind::kForeign;
+  return is_flush && n.dot(own) >= facing - kFacesMore ? NormalKind::kFlush : NormalKind::kForeign;
 }
 
 // ---- a triangle and a convex shape, in the frame of the triangle
@@ -156,6 +159,17 @@ class Collector {
   ContactList* out_;
 };
 
+// Lays the contacts of a triangle, `a` of its pair, flush with what the bodies rest on (seams.h).
+struct Flush {
+  const PairRests& rests;
+  const Pose& X_FM;  // of the mesh in the frame of the rests
+  double length;     // m
+
+  void lay(const PlacedPair& pair, double margin, Manifold* manifold) const {
+    lay_flush(pair, X_FM, rests, length, margin, manifold);
+  }
+};
+
 // Calls visit(triangle, separation) for every triangle that a ball comes within `margin` of, in a fixed order. Nothing is
 // said of the separation where the centre is in the triangle, within rounding.
 template <typename Visit>
@@ -194,8 +208,8 @@ void for_each_at_ball(const TriangleMesh& mesh, const Vector3& centre, double ra
   }
 }
 
-void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const Pose& X_MC, double margin,
-                         const Collector& out) {
+void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const Pose& X_MC, const Flush& flush,
+                         double margin, const Collector& out) {
   const Matrix3 R = X_MC.orientation.toRotationMatrix();
   const Vector3 centre = X_MC.position + R * map.centre();
   // In a concave edge, and deep in small triangles, the shortest way out of each leads into another, and none claims the
@@ -220,6 +234,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
         contacts_along(pair, up, margin, &least, &manifold);
     } else if (choose_normal(pair, side, nullptr, least, &normal, &is_least)) {
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+      flush.lay(pair, margin, &manifold);
     }
     is_claimed = is_claimed || manifold.count > 0;
     if (manifold.count == 0 && is_before)
@@ -242,8 +257,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
   if (!mesh.is_closed() || !mesh.box().overlaps({centre, centre})) return;
   const TriangleMesh::Nearest nearest = mesh.nearest(centre);
   if (!(nearest.signed_distance < 0.0)) return;
-  const Vector3 way = nearest.point - centre;
-  const Vector3 n = way / std::sqrt(way.squaredNorm());
+  const Vector3& n = nearest.outward;
   const Vector3 back = X_MC.position + R * map.support(R.transpose() * -n) - map.rounding() * n;
   const double depth = n.dot(nearest.point - back);
   out.add(TriangleMesh::kNone, ContactPoint{0.5 * (nearest.point + back), n, depth, 0});
@@ -277,8 +291,8 @@ void collide_mesh_halfspace(const TriangleMesh& mesh, const Vector3& up, const V
   }
 }
 
-void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, double margin,
-                       const Collector& out) {
+void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, const Flush& flush,
+                       double margin, const Collector& out) {
   const Matrix3 R = X_AB.orientation.toRotationMatrix();
   const Vector3 centre_a = a.box().centre(), centre_b = X_AB.position + R * b.box().centre();
   // the box of a in b
@@ -304,6 +318,7 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
       if (!choose_normal(pair, side_a, &side_b, least, &normal, &is_least)) return;
       Manifold manifold;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+      flush.lay(pair, margin, &manifold);
       out.add(std::uint64_t{ta} << 32 | tb, manifold);
     });
   });
@@ -331,18 +346,21 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
       collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), rests, margin, out);
     }
   } else if (a.mesh != nullptr && b.mesh != nullptr) {
-    collide_mesh_mesh(*a.mesh, *b.mesh, relative(X_WA, X_WB), margin,
+    collide_mesh_mesh(*a.mesh, *b.mesh, relative(X_WA, X_WB), {rests, X_WA, flush_length(a, b)}, margin,
                       Collector(X_WA, key, merge_distance(a, b), false, out));
   } else if (a.mesh != nullptr || b.mesh != nullptr) {
     const bool is_reversed = a.mesh == nullptr;
     const Shape &mesh = is_reversed ? b : a, &other = is_reversed ? a : b;
     const Pose X_MO = is_reversed ? relative(X_WB, X_WA) : relative(X_WA, X_WB);
-    const Collector collector(is_reversed ? X_WB : X_WA, key, merge_distance(a, b), is_reversed, out);
+    const Pose& X_WM = is_reversed ? X_WB : X_WA;
+    const Collector collector(X_WM, key, merge_distance(a, b), is_reversed, out);
     if (other.type == ShapeType::kHalfspace) {
       collide_mesh_halfspace(*mesh.mesh, X_MO.orientation * Vector3::UnitY(), X_MO.position, margin, collector);
     } else {
       SupportMapBuffer buffer;
-      collide_mesh_convex(*mesh.mesh, support_map_of(other, &buffer), X_MO, margin, collector);
+      const PairRests of_mesh_first = is_reversed ? PairRests{rests.of_b, rests.of_a, rests.origin} : rests;
+      collide_mesh_convex(*mesh.mesh, support_map_of(other, &buffer), X_MO,
+                          {of_mesh_first, X_WM, flush_length(mesh, other)}, margin, collector);
     }
   } else {
     Manifold manifold;

@@ -6,7 +6,7 @@
 //
 //   a normal at an edge or vertex is kept only if the triangles round it lie below its plane (it is in the mesh's own
 //   normal cone there); else, where they are flush or rise, the triangle's own normal takes its place, and where they
-//   fall away, one of them is nearer and has the contact
+//   fall away, or it points far more along the normal of one of them, that one has the contact
 //   a triangle of a closed mesh pushes outward only, one of an open mesh to the side on which the other shape's centre is
 //   a shape whose centre is inside a closed mesh is pushed to the nearest place of its surface
 //

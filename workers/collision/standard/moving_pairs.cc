@@ -102,7 +102,7 @@ void look_inside(const TriangleMesh& mesh, const MovingBody& body, const Vector3
   if (!(mesh.box().squared_distance(point) == 0.0)) return;
   const TriangleMesh::Nearest nearest = mesh.nearest(point);
   if (!(nearest.signed_distance < 0.0)) return;
-  const Vector3 out = X_WM.orientation * Vector3((nearest.point - point) / -nearest.signed_distance);
+  const Vector3 out = X_WM.orientation * nearest.outward;
   search->offer(Impact{0.0, is_reversed ? Vector3(-out) : out, transform_point(X_WM, 0.5 * (nearest.point + point)),
                        -nearest.signed_distance});
 }

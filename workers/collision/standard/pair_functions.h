@@ -44,8 +44,9 @@ void collide_general(const Shape& a, const Shape& b, const Placement& placement,
 void collide_halfspace_general(const Shape& a, const Shape& b, const Placement& placement, double margin,
                                Manifold* out);
 
-// The contacts of two convex shapes along the unit vector n, from a to b, of features that lie within an angle of sine 0.03
-// of its planes; those of features that touch there in a point only if `least` is given. All in a's frame.
+// The contacts of two convex shapes along the unit vector n, from a to b, of features that lie within an angle of sine 0.2
+// (of rounded cores 0.03) of its planes, as in collide_support_maps(): of a face askew all corners, or bodies would rock
+// from one to the next. Those of features that touch there in a point only if `least` is given. All in a's frame.
 void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out);
 
 // The kind of a primitive that is bounded, and the map of a convex shape: its own, or one made in the buffer.

@@ -13,11 +13,6 @@ namespace {
 
 constexpr double kFlat = 1e-4;  // sine of an angle wider than that of Rest::is_along()
 
-// m; what stands out no farther is flush.
-double flush_length(const Shape& a, const Shape& b) {
-  return 1e-6 * std::min(smallest_half_extent(a), smallest_half_extent(b));
-}
-
 // A convex shape where it lies.
 struct PlacedMap {
   const SupportMap& map;
@@ -62,20 +57,37 @@ bool may_be_flush(std::span<const Rest> rests, const ContactList& contacts, doub
   return false;
 }
 
+// The normal from a to b to take instead of this one, of either's rests; zero if there is none.
+Vector3 flush_normal(const PlacedMap& a, const PlacedMap& b, const PairRests& rests, const Vector3& normal,
+                     double flush) {
+  const Vector3 along = -flush_direction(rests.of_a, a, b, rests.origin, -normal, flush);
+  return along.isZero(0.0) ? flush_direction(rests.of_b, b, a, rests.origin, normal, flush) : along;
+}
+
 }  // namespace
+
+double flush_length(const Shape& a, const Shape& b) {
+  return 1e-6 * std::min(smallest_half_extent(a), smallest_half_extent(b));
+}
+
+void lay_flush(const PlacedPair& pair, const Pose& X_FA, const PairRests& rests, double flush, double margin,
+               Manifold* manifold) {
+  if (rests.are_none() || manifold->count == 0) return;
+  const Matrix3 R_FA = X_FA.orientation.toRotationMatrix();
+  const PlacedMap a{pair.a, R_FA, X_FA.position};
+  const PlacedMap b{pair.b, R_FA * pair.R_AB, X_FA.position + R_FA * pair.p_AB};
+  const Vector3 along = flush_normal(a, b, rests, R_FA * manifold->contacts[0].normal, flush);
+  if (!along.isZero(0.0)) contacts_along(pair, R_FA.transpose() * along, margin, nullptr, manifold);
+}
 
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
                double margin, Manifold* manifold) {
-  const bool rests_nowhere = rests.of_a.empty() && rests.of_b.empty();
-  if (rests_nowhere || manifold->count == 0 || a.type == ShapeType::kHalfspace || b.type == ShapeType::kHalfspace)
+  if (rests.are_none() || manifold->count == 0 || a.type == ShapeType::kHalfspace || b.type == ShapeType::kHalfspace)
     return;
   SupportMapBuffer buffer_a, buffer_b;
   const PlacedMap placed_a{support_map_of(a, &buffer_a), X_FA.orientation.toRotationMatrix(), X_FA.position};
   const PlacedMap placed_b{support_map_of(b, &buffer_b), X_FB.orientation.toRotationMatrix(), X_FB.position};
-  const double flush = flush_length(a, b);
-  const Vector3& n = manifold->contacts[0].normal;
-  Vector3 along = -flush_direction(rests.of_a, placed_a, placed_b, rests.origin, -n, flush);
-  if (along.isZero(0.0)) along = flush_direction(rests.of_b, placed_b, placed_a, rests.origin, n, flush);
+  const Vector3 along = flush_normal(placed_a, placed_b, rests, manifold->contacts[0].normal, flush_length(a, b));
   if (along.isZero(0.0)) return;
   const Matrix3 R_AF = placed_a.R.transpose();
   const PlacedPair pair{placed_a.map, placed_b.map, R_AF * placed_b.R, R_AF * (placed_b.p - placed_a.p)};

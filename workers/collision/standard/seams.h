@@ -9,8 +9,8 @@
 //   smallest half extent; and A lies in B, along m, no deeper than twice as deep as in C
 //
 // make the contacts of A with B those along m: none where their features do not lie opposite each other there. What stands
-// above the plane is run against as before. Meshes do the same among their own triangles (composite_pairs.h), the
-// children of a compound are looked at one by one.
+// above the plane is run against as before. The children of a compound and the triangles of a mesh are looked at one by
+// one; among its own triangles a mesh has no seams (composite_pairs.h).
 #pragma once
 
 #include <cstdint>
@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "plugin_sdk/collision.h"
+#include "plugin_sdk/geometry/penetration.h"
 #include "workers/collision/standard/contact_list.h"
 #include "workers/collision/standard/shapes.h"
 
@@ -40,11 +41,19 @@ struct Rest {
 struct PairRests {
   std::span<const Rest> of_a, of_b;
   Vector3 origin = Vector3::Zero();  // of the frame that shapes are placed in, world; as are the rests
+
+  bool are_none() const { return of_a.empty() && of_b.empty(); }
 };
+
+// m; of two shapes, what stands out no farther is flush.
+double flush_length(const Shape& a, const Shape& b);
 
 // Replaces the contacts of two bounded convex shapes, in a frame F with world axes, where the above asks for it.
 void lay_flush(const Shape& a, const Pose& X_FA, const Shape& b, const Pose& X_FB, const PairRests& rests,
                double margin, Manifold* manifold);
+// The same of two convex parts, the contacts in the frame of the first, which lies at X_FA.
+void lay_flush(const PlacedPair& pair, const Pose& X_FA, const PairRests& rests, double flush, double margin,
+               Manifold* manifold);
 
 class Seams {
  public:

@@ -80,6 +80,35 @@ TEST(Mesh, BoxOfTrianglesAnswersAsTheBox) {
   }
 }
 
+// Of a face that has sunk in askew all corners are told, not its deepest alone, else bodies rock from corner to corner; and
+// none is pushed sideways, out over the far end of the slab.
+TEST(Mesh, IsHeldByAllCornersOfATiltedFace) {
+  Shapes shapes;
+  RandomShapes random(55);
+  const Vector3 half(0.3, 0.2, 0.25);
+  const Shape &mesh = shapes.box_mesh(half), &hull = shapes.box_hull(half);
+  const Shape slab = box(1.0, 0.3, 1.0);
+  for (int i = 0; i < 100; ++i) {
+    const Vector3 axis = Vector3(random.uniform(-1, 1), 0.0, random.uniform(-1, 1)).normalized();
+    const Quaternion turn(Eigen::AngleAxisd(random.uniform(0.0, 0.1), axis));
+    const Pose X{Vector3(random.uniform(-0.5, 0.5), 0.45, random.uniform(-0.5, 0.5)), turn};
+    const ContactList expected = all_contacts(slab, at(0, 0, 0), hull, X, 0.01);
+    const ContactList found = all_contacts(slab, at(0, 0, 0), mesh, X, 0.01);
+    ASSERT_EQ(expected.size(), 4U) << i;
+    for (std::size_t m = 0; m < 4; ++m) {
+      double nearest = 1.0;
+      for (std::size_t k = 0; k < found.size(); ++k)
+        nearest = std::min(nearest, (found[k].point - expected[m].point).norm());
+      // along the slab's normal or along the face's: 0.1 rad apart, of a depth of 0.1 m at most
+      EXPECT_LE(nearest, 0.1 * 0.1) << i;
+    }
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      EXPECT_GE(found[k].normal.y(), 0.99) << i;
+      EXPECT_LE(found[k].depth, 0.12) << i;
+    }
+  }
+}
+
 TEST(Mesh, PushesOutwardFromWithin) {
   Shapes shapes;
   const Shape& mesh = shapes.box_mesh({2, 2, 2});

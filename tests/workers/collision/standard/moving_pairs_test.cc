@@ -132,6 +132,28 @@ TEST(MovingPairs, WhatIsInsideAClosedMeshTouchesAtTheStart) {
   }
 }
 
+// The difference of a vertex and the place of the surface next to it is rounding: a normal made of it was not of unit length.
+TEST(MovingPairs, WhatBarelyTouchesAClosedMeshHasItsFacesNormal) {
+  test::Shapes shapes;
+  gravitas::test::RandomShapes random(64);
+  const Shape& room = shapes.box_mesh(Vector3::Constant(2.0));
+  const Shape& box = shapes.box_mesh(Vector3::Constant(0.1));
+  for (int i = 0; i < 200; ++i) {
+    const Pose X_WR{random.vector(-1, 1), random.rotation()};
+    const double depth = 1e-14 * std::pow(10.0, i % 8);
+    const MovingBody outer = still(X_WR);
+    const MovingBody inner = moving(compose(X_WR, at(2.1 - depth, 0.3, -0.2)), random.vector(-0.1, 0.1));
+    for (const double side : {1.0, -1.0}) {
+      const std::optional<Impact> found =
+          side > 0.0 ? first_impact(room, outer, box, inner, kTarget) : first_impact(box, inner, room, outer, kTarget);
+      ASSERT_TRUE(found) << "depth " << depth;
+      EXPECT_EQ(found->fraction, 0.0);
+      EXPECT_NEAR(found->normal.squaredNorm(), 1.0, 1e-14) << "depth " << depth;
+      EXPECT_LE((side * found->normal - X_WR.orientation * Vector3::UnitX()).norm(), 1e-6) << "depth " << depth;
+    }
+  }
+}
+
 // A mesh that turns under a ball that stands still: the edge of a wheel's paddle.
 TEST(MovingPairs, ATurningMeshMeetsWhatStandsStill) {
   test::Shapes shapes;

@@ -50,6 +50,23 @@ TEST_F(OverASeam, OfWhatIsFlushTheFloorsNormalIsTaken) {
   }
 }
 
+// So of a body of triangles, each of which is laid on the tile by itself.
+TEST_F(OverASeam, AMeshIsLaidFlushToo) {
+  const Shape& mesh = shapes.box_mesh({0.1, 0.1, 0.1});
+  const PairRests of_first{{&floor, 1}, {}}, of_second{{}, {&floor, 1}};
+  ContactList lists[2];
+  collide(mesh, where, tile, at(1.0, -0.5, 0.0), 0.001, &lists[0], &of_first);
+  collide(tile, at(1.0, -0.5, 0.0), mesh, where, 0.001, &lists[1], &of_second);
+  for (const ContactList& list : lists) {
+    ASSERT_EQ(list.size(), 4U);
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      EXPECT_NEAR(list[i].normal.y(), &list == lists ? -1.0 : 1.0, 1e-12);
+      EXPECT_NEAR(list[i].depth, 0.002, 1e-12);
+      EXPECT_NEAR(list[i].point.y(), -0.001, 1e-12);
+    }
+  }
+}
+
 // Bit for bit, whichever comes first.
 TEST_F(OverASeam, TheMirrorLawHolds) {
   const ContactList one = contacts(tile, at(1.0, -0.5, 0.0), floor, true);
