@@ -319,8 +319,21 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     for (const std::uint32_t r : held_) rows[r].multiplier = 0.0;
     refine_held(bodies, x0);
   }
-  if (!settings.is_rough) refine(bodies, x0, smallest, settings, &summary);
+  if (settings.is_rough) return summary;
+  refine(bodies, x0, smallest, settings, &summary);
+  share_out();
   return summary;
+}
+
+// Held rows that depend on each other bear alike: of all multipliers that move alike the shortest ones, scaled. Not beside
+// drives: what these bear moves the bodies, what joints bear does not.
+void ConeProblem::share_out() {
+  const auto drives = [&](std::uint32_t r) { return rows[r].law.is_velocity_only; };
+  if (factor_.dropped() == 0 || std::ranges::any_of(held_, drives)) return;
+  std::vector<double> scaled(held_.size());
+  for (std::size_t i = 0; i < held_.size(); ++i) scaled[i] = rows[held_[i]].multiplier * scale_[held_[i]];
+  factor_.shorten(&scaled);
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier = scaled[i] / scale_[held_[i]];
 }
 
 void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest,

@@ -13,7 +13,8 @@
 //
 // Method.
 //  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt, dependent rows
-//     left out, contradicting ones at their least-squares compromise. What the other rows then feel of each other is
+//     left out, contradicting ones at their least-squares compromise; of the multipliers that move alike the shortest are told,
+//     so that four rods bear a plate alike. What the other rows then feel of each other is
 //     W' = W_OO - W_OE W_EE^-1 W_EO: a joint with its whole chain behind it is as good as a body.
 //     Where that leaves a contact or a limit less than 1e-5 of what moving all bodies together would, it gets the difference
 //     as a compliance: what joints hold by themselves, but for rounding and turns, would be pushed without end.
@@ -203,6 +204,7 @@ class ConeProblem {
   // Mends the held rows; returns by how much they were off (m/s, m).
   double refine_held(const SolverBodies& bodies, const BodyMotion& x0);
   void add_to_held(std::vector<double>* missing);
+  void share_out();
   // Largest of what the value of a held row is summed from, m/s, m.
   double largest_held_sum() const;
 

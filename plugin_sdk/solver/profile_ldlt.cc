@@ -211,7 +211,15 @@ void ProfileLdlt::find_parts() const {
 }
 
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {
-  if (dropped_.empty() || is_consistent(*b)) return 0.0;
+  return dropped_.empty() || is_consistent(*b) ? 0.0 : project(b);
+}
+
+void ProfileLdlt::shorten(std::vector<double>* x) const {
+  if (!dropped_.empty()) project(x);
+}
+
+// Takes away what lies in the null space; returns its length.
+double ProfileLdlt::project(std::vector<double>* b) const {
   if (null_.empty()) find_null_space();
   Eigen::VectorXd shares(static_cast<Eigen::Index>(null_.size()));
   for (Eigen::Index k = 0; k < shares.size(); ++k) {

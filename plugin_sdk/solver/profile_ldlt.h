@@ -33,6 +33,8 @@ class ProfileLdlt {
   std::size_t dropped() const { return dropped_.size(); }
   // x with A x = b; entries of dropped rows are 0 and not looked at.
   void solve(std::vector<double>* b) const;
+  // The shortest x of those with the same A x.
+  void shorten(std::vector<double>* x) const;
   // The side nearest to b that A x can be. Returns the distance; 0, and leaves b, where it is only of rounding.
   double make_consistent(std::vector<double>* b) const;
 
@@ -51,6 +53,7 @@ class ProfileLdlt {
   // May the pivot of a row be what rounding left there?
   bool is_rounding(std::size_t row, double pivot);
   bool is_consistent(const std::vector<double>& b) const;
+  double project(std::vector<double>* b) const;
   std::vector<double> largest_of_parts(const std::vector<double>& b) const;
   void find_parts() const;
   void find_null_space() const;

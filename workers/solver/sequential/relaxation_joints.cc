@@ -149,11 +149,6 @@ void RelaxationJoints::factorise(Block& block, double inverse_masses) {
     factor_[chosen][column] = root;
   }
 
-  for (std::size_t i = 0; i < count; ++i)
-    if (rigid_[i].response > 0.0 &&
-        std::find(kept.begin(), kept.begin() + block.rigid, i) == kept.begin() + block.rigid)
-      left_out_.push_back({block.body1, block.body2, rigid_[i].own, rigid_[i].law.lower_target, rigid_[i].length});
-
   // inverse = S L^-T L^-1 S, S the scaling of the rows
   using Matrix = Eigen::Matrix<double, kBlock, kBlock>;
   Matrix lower_inverse = Matrix::Zero();
@@ -175,6 +170,53 @@ void RelaxationJoints::factorise(Block& block, double inverse_masses) {
       block.inverse(i, j) = entry / std::sqrt(scale);
     }
   }
+  leave_out(kept, inverse_masses, &block);
+}
+
+// The rigid rows that are not kept, and what they bore to those that are.
+void RelaxationJoints::leave_out(const std::array<std::size_t, kBlock>& kept, double inverse_masses, Block* block) {
+  const auto rigid = static_cast<std::size_t>(block->rigid);
+  block->first_left_out = static_cast<std::uint32_t>(left_out_.size());
+  for (std::size_t i = 0; i < rigid_.size(); ++i) {
+    const Row& row = rigid_[i];
+    if (!(row.response > 0.0) || std::find(kept.begin(), kept.begin() + block->rigid, i) != kept.begin() + block->rigid)
+      continue;
+    LeftOut& left = left_out_.emplace_back();
+    left = {block->body1, block->body2, row.own, row.law.lower_target,
+            row.length,   row.place,    {},      std::sqrt(row.response)};
+    // what a drive bears moves the bodies, what a lock bears does not
+    const auto drives = [](const Row& any) { return any.law.is_velocity_only; };
+    if (drives(row) || std::any_of(rows_.end() - block->rigid, rows_.end(), drives)) continue;
+    for (std::size_t k = 0; k < rigid; ++k) {
+      double combination = 0.0;
+      for (std::size_t j = 0; j < rigid; ++j)
+        combination += block->inverse(static_cast<int>(k), static_cast<int>(j)) *
+                       row.own.product(rows_[block->first + j].own, inverse_masses);
+      Row& to = rows_[block->first + k];
+      to.multiplier += combination * row.multiplier;
+      left.share[k] = combination * std::sqrt(to.response) / left.scale;
+    }
+  }
+  block->end_left_out = static_cast<std::uint32_t>(left_out_.size());
+}
+
+// mu = C y, (C^T C) y = what the kept rows bear alone, C the kept rows and the shares of the others.
+void RelaxationJoints::share_out(const Block& block, Multipliers* multipliers) const {
+  using Numbers = Eigen::Matrix<double, kBlock, 1>;
+  Eigen::Matrix<double, kBlock, kBlock> square = Eigen::Matrix<double, kBlock, kBlock>::Identity();
+  for (std::uint32_t i = block.first_left_out; i < block.end_left_out; ++i) {
+    const auto share = Numbers::Map(left_out_[i].share.data());
+    square += share * share.transpose();
+  }
+  Numbers alone = Numbers::Zero();
+  const auto scale_of = [&](int k) { return std::sqrt(rows_[block.first + static_cast<std::uint32_t>(k)].response); };
+  for (int k = 0; k < block.rigid; ++k)
+    alone[k] = rows_[block.first + static_cast<std::uint32_t>(k)].multiplier * scale_of(k);
+  const Numbers y = square.llt().solve(alone);
+  for (int k = 0; k < block.rigid; ++k)
+    (*multipliers)[rows_[block.first + static_cast<std::uint32_t>(k)].place] = y[k] / scale_of(k);
+  for (std::uint32_t i = block.first_left_out; i < block.end_left_out; ++i)
+    (*multipliers)[left_out_[i].place] = y.dot(Numbers::Map(left_out_[i].share.data())) / left_out_[i].scale;
 }
 
 // Appends the other rows, made M-orthogonal to the rigid ones.
@@ -354,6 +396,8 @@ void RelaxationJoints::take_drives(const Multipliers& multipliers) {
 void RelaxationJoints::store(Multipliers& multipliers) const {
   std::fill(multipliers.begin(), multipliers.end(), 0.0);
   for (const Row& row : rows_) multipliers[row.place] = row.multiplier;
+  for (const Block& block : blocks_)
+    if (block.first_left_out < block.end_left_out) share_out(block, &multipliers);
 }
 
 void RelaxationJoints::add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,

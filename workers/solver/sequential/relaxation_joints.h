@@ -11,7 +11,8 @@
 // factorisation, until a pivot falls below 1e-10: at most six, the rest depend on them. So
 // redundancy costs nothing (a hinge of two points has 6 rows of rank 5, a rigid joint of three
 // points 9 of rank 6, the seed's motor 18 of rank 6): rows left out hold by themselves, or are
-// inconsistent, and their multipliers are zero. A sweep solves the kept ones together.
+// inconsistent. A sweep solves the kept ones together. In the end what they bear is shared out: of all
+// multipliers that move alike the shortest ones, scaled, so that four rods bear a plate alike.
 //
 // Then every other row (limits, drives, springs) is made M-orthogonal to the kept ones,
 //   J' = J - K_rB K_BB^-1 J_B,
@@ -135,11 +136,15 @@ class RelaxationJoints final : public RelaxationBlocks {
     std::uint32_t body1, body2;
     ConstraintDirection own;
     double target, length;
+    std::uint32_t place;
+    std::array<double, kBlock> share;  // of the kept rows, all scaled: it is their combination
+    double scale;                      // root of J M^-1 J^T
   };
   struct Block {
     std::uint32_t body1 = 0, body2 = 0;
     std::uint32_t first = 0, end = 0;  // rows
     int rigid = 0;                     // how many of them, from the first, are solved together
+    std::uint32_t first_left_out = 0, end_left_out = 0;
     Eigen::Matrix<double, kBlock, kBlock> inverse;
   };
 
@@ -149,7 +154,9 @@ class RelaxationJoints final : public RelaxationBlocks {
   void collect(const std::vector<RelaxationDiscrepancy>& discrepancies, const Laws& laws, std::size_t first,
                std::size_t end, const Multipliers& warm);
   void factorise(Block& block, double inverse_masses);
+  void leave_out(const std::array<std::size_t, kBlock>& kept, double inverse_masses, Block* block);
   void orthogonalise(Block& block, double inverse_masses);
+  void share_out(const Block& block, Multipliers* multipliers) const;
   double relax_rigid(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2);
   double relax_others(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2);
 
