@@ -49,19 +49,23 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 
 double JointLimits::turn(double angle, double way) const {
   constexpr double kWholeTurn = 2.0 * kHalfTurn;
-  constexpr double kPast = 0.02;                  // rad, that a step may begin beyond a limit by
-  constexpr double kRests = 1e-9, kMoves = 1e-2;  // rad; of how far it is beyond
+  constexpr double kPast = 0.02, kOfWay = 0.5, kMostPast = 1.0;  // rad, that a step may begin beyond a limit by
+  constexpr double kRests = 1e-9, kMoves = 1e-2;                 // rad; of how far it is beyond
   if (is_none()) return angle;
   const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
+  // the way is known to first order, or to half of it where a method turns by other spins than those at the end
+  const double past = has_lower && has_upper ? kPast : std::min(kPast + kOfWay * std::fabs(way), kMostPast);
   double middle = 0.5 * (lower + upper);
-  if (!has_lower) middle = upper + kPast - kHalfTurn;
-  if (!has_upper) middle = lower - kPast + kHalfTurn;
+  if (!has_lower) middle = upper + past - kHalfTurn;
+  if (!has_upper) middle = lower - past + kHalfTurn;
   const auto nearest = [&](double any) { return any - kWholeTurn * std::round((any - middle) / kWholeTurn); };
   const double seen = nearest(angle), begun = seen - way, known = nearest(begun);
-  if (!(known >= lower - kPast && known <= upper + kPast)) return seen;
+  if (!(known >= lower - past && known <= upper + past)) return seen;
   const double turned = seen + (known - begun);
   // what moves out of a single limit, or through it from behind, needs no push; what rests on it is beyond it by rounding
-  const auto moves_out = [](double beyond, double out) { return beyond > kRests && out > kMoves * beyond; };
+  const auto moves_out = [](double beyond, double out) {
+    return beyond > kRests && out > kMoves * beyond && out < beyond;
+  };
   if (!has_lower && moves_out(known - upper, -way)) return turned - kWholeTurn;
   if (!has_upper && moves_out(lower - known, way)) return turned + kWholeTurn;
   return turned;

@@ -1,10 +1,6 @@
 // What a contact's material row asks of its velocities: a frame, the speed at which it parts, and coefficients.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
-#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/bodies.h"
 
 namespace gravitas {
@@ -25,21 +21,6 @@ struct ContactLaw {
 // Of contact `i` of the request, between two bodies.
 ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
                        const SolverBody& two);
-
-// Arms of a contact of jointed bodies, from where S* has them to where the pose change ends: its points go along with what their
-// body turns about the normal (the line on which a wheel rolls steers with it, and stays under its axle while it spins), those
-// of two bodies that can be pushed with what both turn by. Where joints hold bodies in directions of the end, points left
-// behind would contradict them, and one end of such a line bear everything.
-inline void turn_arms(const Vector3& normal, const SolverBody& one, const SolverBody& two, const Twist& change1,
-                      const Twist& change2, Vector3* arm1, Vector3* arm2) {
-  const double turn1 = normal.dot(change1.angular), turn2 = normal.dot(change2.angular);
-  double turn = one.is_pushed() ? turn1 : turn2;
-  if (one.is_pushed() && two.is_pushed())
-    turn = turn1 * turn2 > 0.0 ? std::copysign(std::min(std::fabs(turn1), std::fabs(turn2)), turn1) : 0.0;
-  if (turn == 0.0) return;
-  const Quaternion q = exp_rotation(turn * normal);
-  *arm1 = q * *arm1, *arm2 = q * *arm2;
-}
 
 // Lowers e s of a contact whose impulse did work on its bodies: to the speed at which they arrive where the step ends, if that
 // is little less; else to a half, a quarter, then zero. `times` counts the latter. False if nothing is to be lowered.

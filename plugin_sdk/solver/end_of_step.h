@@ -21,7 +21,7 @@
 // Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points is not known; a
 // velocity row's arms end at each body's own surface point, which is where the two meet when the gap is closed (a ball that
 // sank by d rolls on its radius, not on a radius less d/2). Those of jointed bodies go along with what delta turns about the
-// normal (turn_arms() of contact_law.h).
+// normal, or joints and contacts would contradict each other (turn_arms() of island_velocity.cc).
 //
 // Contacts may contradict each other: bodies that lie in one place are pushed off each other in a circle. Where no pose change
 // meets them (it goes beyond the bound below, or does not converge and misses a tenth of the deepest overlap, which is more

@@ -6,6 +6,27 @@
 #include "plugin_sdk/solver/island_solver.h"
 
 namespace gravitas {
+namespace {
+
+// Arms of a contact of jointed bodies, from where S* has them to where the pose change ends: its points go along with what their
+// body turns about the normal (the line on which a wheel rolls steers with it, and stays under its axle while it spins), those
+// of two bodies that can be pushed with what both turn by. Where joints hold bodies in directions of the end, points left
+// behind would contradict them, and one end of such a line bear everything. What turns further than a tenth of a radian does
+// not rest on a line.
+void turn_arms(const Vector3& normal, const SolverBody& one, const SolverBody& two, const Twist& change1,
+               const Twist& change2, Vector3* arm1, Vector3* arm2) {
+  const double turn1 = normal.dot(change1.angular), turn2 = normal.dot(change2.angular);
+  double turn = one.is_pushed() ? turn1 : turn2;
+  if (one.is_pushed() && two.is_pushed())
+    turn = turn1 * turn2 > 0.0 ? std::copysign(std::min(std::fabs(turn1), std::fabs(turn2)), turn1) : 0.0;
+  constexpr double kMost = 0.1;
+  if (turn == 0.0 || std::fabs(turn) > kMost) return;
+  const Quaternion q = exp_rotation(turn * normal);
+  *arm1 = q * *arm1, *arm2 = q * *arm2;
+}
+
+}  // namespace
+
 void IslandSolver::solve_velocity() {
   const BodyMotion trial = turned_trial_velocity();
   settings_.may_rest = may_rest();

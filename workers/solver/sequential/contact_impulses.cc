@@ -17,8 +17,7 @@ constexpr double kNothing = 1e-140;  // N s: its squares are still exact to roun
 // ---- rows
 
 void ContactImpulses::build(const SolverBodies& bodies, const stage::SolverSolveRequest& request,
-                            const std::vector<std::uint8_t>& closed, const std::vector<double>& warm,
-                            const BodyMotion* pose_change) {
+                            const std::vector<std::uint8_t>& closed, const std::vector<double>& warm) {
   rows_.clear();
   rolling_.clear();
   for (std::size_t i = 0; i < closed.size(); ++i) {
@@ -32,9 +31,6 @@ void ContactImpulses::build(const SolverBodies& bodies, const stage::SolverSolve
     row.arm1 = point + to_surface - bodies[row.body1].trial.position;
     row.arm2 = point - to_surface - bodies[row.body2].trial.position;
     const ContactLaw law = contact_law(request, i, bodies[row.body1], bodies[row.body2]);
-    if (pose_change != nullptr)
-      turn_arms(law.frame.col(0), bodies[row.body1], bodies[row.body2], (*pose_change)[row.body1],
-                (*pose_change)[row.body2], &row.arm1, &row.arm2);
     row.frame = law.frame;
     row.target = law.target;
     row.dynamic_friction = law.dynamic_friction;

@@ -39,9 +39,9 @@ namespace gravitas {
 class ContactImpulses final : public RelaxationBlocks {
  public:
   // Rows of the contacts with closed[i] != 0, starting from the impulses `warm` (world, on the
-  // second body; three numbers per contact). With a pose change, arms go along with it (turn_arms()).
+  // second body; three numbers per contact).
   void build(const SolverBodies& bodies, const stage::SolverSolveRequest& request,
-             const std::vector<std::uint8_t>& closed, const std::vector<double>& warm, const BodyMotion* pose_change);
+             const std::vector<std::uint8_t>& closed, const std::vector<double>& warm);
 
   bool is_empty() const { return rows_.empty(); }
   void push_all(const SolverBodies& bodies, BodyMotion& x) const;

@@ -298,9 +298,7 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
   turn_trial_velocity();
   take_directions(drives_yield_);
   velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
-  const bool is_jointed = !discrepancies_.empty();
-  impulses_.build(is_jointed ? turned_ : bodies_, request, closed_, solution_.contact_impulse,
-                  is_jointed && !drives_yield_ ? &solution_.displacement : nullptr);
+  impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
   if (drives_yield_) impulses_.drop_restitution();
   copy(request.contact_normal(), solution_.contact_direction);
 }
