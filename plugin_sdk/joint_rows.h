@@ -29,7 +29,8 @@ struct JointLimits {
   // The turn that is meant by an angle, among angle + k 2 pi; `way`: what the step turned by to get there. Without limits the
   // one within pi. With two the nearest to their middle, with one the nearest to half a turn on its free side; but where the step
   // began within the limits in another, that: what a step turns beyond a limit is beyond it, however little is between the two.
-  // A single limit is met again once a turn: what comes from behind it passes.
+  // A single limit is met again once a turn: what comes from behind it passes. What began beyond it by 0.02 rad or half of the
+  // way, which is known to first order, or moves back by no more than rounding, is on it.
   double turn(double angle, double way) const;
 };
 
