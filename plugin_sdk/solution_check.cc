@@ -95,6 +95,7 @@ class Balance {
   }
   // What the points of a contact of jointed bodies may go along with, rad.
   double turned_about(std::size_t contact, const Vector3& normal) const {
+    if (request_.mode().empty()) return 0.0;
     const std::uint32_t* bodies = &request_.contact_body()[2 * contact];
     return std::max(std::fabs(normal.dot(turn_of(bodies[0]))), std::fabs(normal.dot(turn_of(bodies[1]))));
   }

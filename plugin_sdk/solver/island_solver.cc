@@ -102,11 +102,8 @@ double IslandSolver::open() const {
   double open = 0.0;
   for (const EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const JointLaw& law = joint.pose_laws[k];
       const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
-      const double below = law.has_lower ? law.lower_target - change : 0.0;
-      const double above = law.has_upper ? change - law.upper_target : 0.0;
-      open = std::max(open, std::max(below, above) * joint.length);
+      open = std::max(open, joint.pose_laws[k].missed_by(change) * joint.length);
     }
   }
   return open;

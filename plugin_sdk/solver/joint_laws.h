@@ -44,6 +44,7 @@
 // friction axes has no meaning and is not read.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -71,6 +72,10 @@ struct JointLaw {
   // A drive that asks for its velocity whatever stands against it.
   bool is_unbounded_drive() const { return is_velocity_only && is_rigid(); }
   void shift(double amount) { lower_target += amount, upper_target += amount; }
+  // By how much a change of the error misses the targets.
+  double missed_by(double change) const {
+    return std::max({0.0, has_lower ? lower_target - change : 0.0, has_upper ? change - upper_target : 0.0});
+  }
 };
 
 // What the laws of one axis are made from.

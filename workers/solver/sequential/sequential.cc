@@ -98,7 +98,7 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
 // Sweeps over what friction, springs and drives displace a light body by, which joints are to take back, may leave much of it:
 // the pose change is that without friction's then, or that without any.
 void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor) {
-  keep_pose(&before_offset_);
+  if (!discrepancies_.empty()) keep_pose(&before_offset_);
   for (const bool with_friction : {true, false}) {
     set_offset(request, factor, with_friction);
     solve_pose(request);

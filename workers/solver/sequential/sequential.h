@@ -42,9 +42,9 @@
 //
 // What rows at S* leave of joints is of second order in the step's turn. Where that is more than a thousandth of the bodies' radius
 // of gyration, steps of Newton's method follow: rows where the bodies are by then, for what is missing there, relaxed again,
-// until a millionth is left or a step does not halve it. Friction and drives may displace a light body by many times its size, which
-// joints are to take back: where sweeps leave joints open by more than a hundredth then, or ran out, the pose change is that
-// without it.
+// until a millionth is left or a step does not halve it. Friction, springs and drives may displace a light body by many times its
+// size, which joints are to take back: where that leaves joints open by more than a hundredth then (a millionth where sweeps ran
+// out), the pose change is that without friction's part, or that without any.
 //
 // Joints' velocities are made right where the pose change leaves the bodies. Made right at S*, the spin of a wheel is left
 // across its hinge by what that turned, and where it turns by more than a radian in a step, this grows from step to step. Those

@@ -59,12 +59,8 @@ void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
     if (touches(d)) continue;
     const double size = std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const JointLaw& law = pose_laws_[3 * i + axis];
-      const double moved = ends_[i].errors[axis] - d.axes[axis].error_at_trial;
-      double missing = 0.0;
-      if (law.has_lower) missing = std::max(missing, law.lower_target - moved);
-      if (law.has_upper) missing = std::max(missing, moved - law.upper_target);
-      if (size > 0.0) open_ = std::max(open_, missing * d.length / size);
+      const double missed = pose_laws_[3 * i + axis].missed_by(ends_[i].errors[axis] - d.axes[axis].error_at_trial);
+      if (size > 0.0) open_ = std::max(open_, missed * d.length / size);
     }
   }
 }
