@@ -21,6 +21,14 @@ Discrepancy row_of(const Twisting& twisting, AxisMode mode) {
   return d;
 }
 
+double limited_twist(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
+                     const JointLimits& limits) {
+  const Vector3 one = first_axis(frame1), two = first_axis(frame2);
+  const double bend = 1.0 + one.dot(two);
+  const double way = bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
+  return limits.turn(twist_between(frame1, frame2), way);
+}
+
 }  // namespace
 
 void demand_type(std::uint64_t type, std::string_view name) {
@@ -69,6 +77,29 @@ double JointLimits::turn(double angle, double way) const {
   if (!has_lower && moves_out(known - upper, -way)) return turned - kWholeTurn;
   if (!has_upper && moves_out(lower - known, way)) return turned + kWholeTurn;
   return turned;
+}
+
+JointSpring JointSpring::of(PropertyCursor* properties) {
+  if (properties->at_end()) return {};
+  const double stiffness = properties->number(), damping = properties->number();
+  return {std::isnan(stiffness) ? 0.0 : stiffness, std::isnan(damping) ? 0.0 : damping};
+}
+
+void JointSpring::yield_on(int axis, Discrepancy* d) const {
+  const AxisMode mode = stiffness > 0.0 ? AxisMode::kLocked : damping > 0.0 ? AxisMode::kDriven : AxisMode::kFree;
+  d->modes = (d->modes & ~(0xFU << (4 * axis))) | static_cast<std::uint32_t>(mode) << (4 * axis);
+  if (stiffness > 0.0) d->compliance[axis] = 1.0 / stiffness;
+  d->damping[axis] = damping;
+}
+
+void write_spring(const JointSpring& spring, BoundWriter* out) {
+  out->number(spring.stiffness);
+  out->number(spring.damping);
+}
+
+JointSpring read_spring(PropertyCursor* bound) {
+  const double stiffness = bound->number();
+  return {stiffness, bound->number()};
 }
 
 Pose frame_along(const Vector3& origin, const Vector3& first) {
@@ -140,6 +171,22 @@ Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle,
   return d;
 }
 
+Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& other) {
+  Matrix3 axes;
+  axes.col(0) = first;
+  axes.col(2) = first.cross(other).normalized();
+  axes.col(1) = axes.col(2).cross(first);
+  return {origin, to_quaternion(axes)};
+}
+
+Discrepancy turn_between(const Quaternion& frame1, const Quaternion& frame2) {
+  Discrepancy d;
+  d.axes = frame1;
+  d.point2 = log_rotation(frame2 * frame1.conjugate());
+  d.modes = pack_modes(AxisMode::kFree, AxisMode::kFree, AxisMode::kFree, true);
+  return d;
+}
+
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {
   const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist_between(frame1, frame2)};
   *scale = twisting.cosine();
@@ -148,14 +195,20 @@ Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMo
 
 Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                               const JointLimits& limits) {
-  const Vector3 one = first_axis(frame1), two = first_axis(frame2);
-  const double bend = 1.0 + one.dot(two);
-  const double way = bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
-  const Twisting twisting = {one, two, limits.turn(twist_between(frame1, frame2), way)};
+  const Twisting twisting = {first_axis(frame1), first_axis(frame2), limited_twist(frame1, frame2, bodies, limits)};
   Discrepancy d = row_of(twisting, AxisMode::kLimited);
   const double scale = twisting.cosine();
   d.lower.x() = limits.lower > -kUnlimited ? scale * limits.lower : -kUnlimited;
   d.upper.x() = limits.upper < kUnlimited ? scale * limits.upper : kUnlimited;
+  return d;
+}
+
+Discrepancy sprung_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
+                             const JointLimits& limits, double rest, const JointSpring& spring) {
+  Twisting twisting = {first_axis(frame1), first_axis(frame2), limited_twist(frame1, frame2, bodies, limits) - rest};
+  if (limits.is_none()) twisting.angle -= 2.0 * kHalfTurn * std::round(twisting.angle / (2.0 * kHalfTurn));
+  Discrepancy d = row_of(twisting, AxisMode::kFree);
+  spring.yield_on(0, &d);
   return d;
 }
 

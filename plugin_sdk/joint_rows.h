@@ -34,6 +34,20 @@ struct JointLimits {
   double turn(double angle, double way) const;
 };
 
+// A spring and a damper on an axis, which yields as they let it (compliance, joint_laws.h): of torque or force -(k e + c e'),
+// with a damper alone -c e'. As scenes give them: NaN or 0 where there is none.
+struct JointSpring {
+  double stiffness = 0.0, damping = 0.0;
+
+  // The next two properties; a request that was recorded before a joint had them may end here.
+  static JointSpring of(PropertyCursor* properties);
+  bool is_none() const { return stiffness == 0.0 && damping == 0.0; }
+  // As one of the axes (0 ... 2) of a discrepancy, whose error is counted from where the spring is at rest.
+  void yield_on(int axis, Discrepancy* d) const;
+};
+void write_spring(const JointSpring& spring, BoundWriter* out);
+JointSpring read_spring(PropertyCursor* bound);
+
 // A frame with its origin at `origin` and its first axis along a unit vector (world).
 Pose frame_along(const Vector3& origin, const Vector3& first);
 
@@ -58,6 +72,13 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 // The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi);
 // its error is counted from there.
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle, AxisMode mode = AxisMode::kLocked);
+
+// A frame of a cross of two bars (unit vectors, not parallel): its first axis along the one, the third across both.
+Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& other);
+
+// The turn of frame 2 against frame 1, a rotation vector in the axes of frame 1, as an angular discrepancy whose axes are all
+// free. Exact to first order in the step's turn.
+Discrepancy turn_between(const Quaternion& frame1, const Quaternion& frame2);
 
 // The frame of a hinge about the axis from one point to another (world): the first axis along it, the origin at its point next
 // to bodies.centre(), since with one far out ways and turns could not be told apart. Refuses points that name no axis.
@@ -92,6 +113,9 @@ void hold_orientation(const Pose& frame1, const Pose& frame2, Emit&& emit) {
 // The row whose error is the twist times cos(swing/2), about the unit bisector of the first axes (kTwistDiscrepancy):
 // w.bisector is the rate of just that while the twist is small. `scale` receives the cosine.
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale);
+// A spring against the twist's way from `rest`, known within half a turn of the middle of the limits, else of rest.
+Discrepancy sprung_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
+                             const JointLimits& limits, double rest, const JointSpring& spring);
 // The same row with limits of the twist, which is the turn that JointLimits::turn() tells.
 Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                               const JointLimits& limits);

@@ -69,9 +69,10 @@ void judge_bind(Subject& subject) {
   }
 }
 
-// True if any move along the axis is an error.
+// True if any move along the axis is an error: what gives way is none.
 bool is_held(const Discrepancy& d, int axis) {
   const AxisMode mode = axis_mode(d.modes, axis);
+  if (d.compliance[axis] > 0.0) return false;
   return mode == AxisMode::kLocked || (mode == AxisMode::kLimited && d.lower[axis] == d.upper[axis]);
 }
 

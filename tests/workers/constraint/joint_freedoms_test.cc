@@ -320,6 +320,85 @@ TEST_F(JointPair, ASuspensionIsASpringAlongTheSteeringAxisAndNoError) {
   EXPECT_EQ(all[2].damping.x(), 50.0);
 }
 
+// A spring's force and torque have a potential: the power of its rows is the rate of e^2/(2 c), in every state that the joint
+// allows, turned far; and it holds nothing.
+TEST_F(JointPair, SpringsHaveAPotentialAndTakeNoFreedom) {
+  struct Sprung {
+    const char* plugin;
+    const char* type;
+    std::vector<double> properties;
+    // of the turn of body 2, rad, at most, and of its way
+    Vector3 turn, way;
+    std::size_t springs;
+  };
+  const Vector3 none = Vector3::Zero();
+  const double no = kNoValue;
+  const std::vector<Sprung> all_joints = {
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {no, no, 50, 2, 0.4}), 2.5 * kAxis, none,
+       1},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {no, no, no, no, 50, 2, 0.4}), none, 3.0 * kAxis, 1},
+      {"constraint_spherical",
+       "Spherical",
+       numbers({kPoint}, {no, 0, no, no, no, no, no, 50, 2}),
+       {1, -1.5, 1},
+       none,
+       3},
+      {"constraint_universal", "Universal", numbers({kPoint, kAxis, kAcross}, {50, 2, 0, 0}), 1.3 * kAxis, none, 1},
+      {"constraint_universal", "Universal", numbers({kPoint, kAxis, kBent}, {0, 0, 50, 2}), 1.3 * kBent, none, 1},
+      {"constraint_constant_velocity", "ConstantVelocity", numbers({kPoint, kAxis, kAxis}, {50, 2}), 2.0 * kAcross,
+       none, 3},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kBent}, {no, no, no, no, 50, 2, 0.2}), 1.1 * kAxis, none, 1},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {2.5, 2.5, 50, 2}), none, {0.4, 2, -1}, 1},
+      {"constraint_bushing",
+       "Bushing",
+       numbers({kPoint}, {1, 0, 0, 0, 10, 20, 30, 1, 2, 3, 50, 50, 50, 1, 1, 1}),
+       {1, -1.5, 1},
+       {0.4, 2, -1},
+       6},
+      {"constraint_bushing",
+       "Bushing",
+       numbers({kPoint}, {0.6, 0, 0.8, 0, 0, 20, 0, 1, 2, 3, 0, 0, 0, 0, 0, 0}),
+       {1, -1.5, 1},
+       {0.4, 2, -1},
+       1},
+  };
+  for (const Sprung& sprung : all_joints) {
+    PluginUnderTest plugin(sprung.plugin);
+    for (int i = 0; i < 20; ++i) {
+      JointProblem pair = joint(&plugin, sprung.type, sprung.properties);
+      turn(&pair, random_.uniform(-1.0, 1.0) * sprung.turn);
+      pair.bodies[1].pose.position += random_.uniform(-1.0, 1.0) * sprung.way;
+      for (JointedBody& body : pair.bodies) body.twist = {random_.vector(1.0), random_.vector(1.0)};
+      const std::vector<JointedBody> now = pair.bodies;
+      const auto each = [&](auto&& look) {
+        for (const Discrepancy& d : pair.describe())
+          for (int k = 0; k < 3; ++k)
+            if (d.compliance[k] > 0.0) look(d, k, to_rotation_matrix(d.axes).col(k));
+      };
+      double power = 0.0;
+      std::size_t springs = 0;
+      each([&](const Discrepancy& d, int k, const Vector3& axis) {
+        const double rest = axis_mode(d.modes, k) == AxisMode::kLimited ? d.lower[k] : 0.0;
+        power += (axis.dot(d.point2 - d.point1) - rest) / d.compliance[k] * pair.row_velocity(d, axis);
+        ++springs;
+      });
+      EXPECT_EQ(springs, sprung.springs) << sprung.type;
+      const auto energy = [&](double time) {
+        for (std::size_t b = 0; b < 2; ++b)
+          pair.bodies[b].pose = displaced(now[b].pose, time * now[b].twist.linear, time * now[b].twist.angular);
+        double sum = 0.0;
+        each([&](const Discrepancy& d, int k, const Vector3& axis) {
+          const double rest = axis_mode(d.modes, k) == AxisMode::kLimited ? d.lower[k] : 0.0;
+          const double error = axis.dot(d.point2 - d.point1) - rest;
+          sum += 0.5 * error * error / d.compliance[k];
+        });
+        return sum;
+      };
+      EXPECT_NEAR((energy(1e-5) - energy(-1e-5)) / 2e-5, power, 1e-6) << sprung.type << ' ' << i;
+    }
+  }
+}
+
 // Reach cones and twist: the row's error is the way to the limit, and its rate is the row's, near the limit.
 TEST_F(JointPair, AReachConesRowPointsToTheCone) {
   PluginUnderTest plugin("constraint_spherical");
@@ -404,6 +483,9 @@ TEST_F(JointPair, ContradictionsAreRefusedWithTheField) {
       {"constraint_constant_velocity", "ConstantVelocity", numbers({kPoint, kAxis, -kAxis}), "Axis2"},
       {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAxis}, {kNoValue, kNoValue}), "RollingAxis"},
       {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAcross}, {kNoValue, 3.0}), "SuspensionDamping"},
+      {"constraint_axle", "Axle", numbers({kPoint, kAxis, kAcross}, {kNoValue, kNoValue, 0.2, 0.1}),
+       "SteeringLowerLimit"},
+      {"constraint_distance", "Distance", numbers({kPoint, kPoint + kAxis}, {1.0, 2.0, kNoValue, 3.0}), "Damping"},
       {"constraint_spherical", "Spherical",
        numbers({kPoint}, {0.5, 0, kNoValue, kNoValue, kNoValue, kNoValue, kNoValue}), "Axis"},
       {"constraint_spherical", "Spherical", numbers({kPoint}, {kNoValue, 0, 0, 0, 0, -0.1, 0.1}), "Axis"},

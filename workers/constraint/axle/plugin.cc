@@ -7,19 +7,27 @@
 // Freedoms. The wheel's centre: three rows, or with a suspension the two across s (held where the wheel is) and a soft one
 // along s, which takes no freedom. The angle between s and r changes at the rate w.n, n = s x r/|s x r|: one row about n.
 // Four rows of rank 4, left are the turns about s and r; with a suspension rank 3 and a spring.
+//
+// Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
+// start, however the wheel rolls; asin(sin(g) sin(angle)) where s and r make an angle g. Limits are one row, active at a
+// limit; a spring and a damper, torque -k (angle - SteeringAngle) - c angle', take no freedom. With a stiff spring
+// SteeringAngle is the angle that the wheel is steered to. They can tell less than a quarter turn either way.
 #include <cmath>
 
 #include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
+
+constexpr double kMostSteering = 1.5;  // rad, short of a quarter turn
 
 class Axle final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {
         .name = "Axle",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Wheel that rolls, steers and is sprung.",
         .types = {
@@ -35,7 +43,24 @@ class Axle final : public ConstraintPlugin {
               Property::number("SuspensionStiffness", "N/m")
                   .above(0.0)
                   .means("Spring along the steering axis; rigid if absent."),
-              Property::number("SuspensionDamping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")}}}};
+              Property::number("SuspensionDamping", "N*s/m").at_least(0.0).means("Its damping; none if absent."),
+              Property::number("SteeringLowerLimit", "rad")
+                  .at_least(-kMostSteering)
+                  .at_most(0.0)
+                  .means("Smallest steering angle, right-handed about SteeringAxis, 0 at the start; none if absent."),
+              Property::number("SteeringUpperLimit", "rad")
+                  .at_least(0.0)
+                  .at_most(kMostSteering)
+                  .means("Largest steering angle; none if absent."),
+              Property::number("SteeringStiffness", "N*m/rad")
+                  .at_least(0.0)
+                  .means("Spring that steers to SteeringAngle; none if absent."),
+              Property::number("SteeringDamping", "N*m*s/rad").at_least(0.0).means("Its damper; none if absent."),
+              Property::number("SteeringAngle", "rad")
+                  .at_least(-kMostSteering)
+                  .at_most(kMostSteering)
+                  .defaults_to({0.0})
+                  .means("Steering angle at which the spring is at rest.")}}}};
   }
   explicit Axle(PropertyCursor) {}
 
@@ -52,11 +77,17 @@ class Axle final : public ConstraintPlugin {
                 if (std::isnan(stiffness) && !std::isnan(damping))
                   throw Refusal("Axle: SuspensionDamping is given without SuspensionStiffness");
                 if (stiffness <= 0.0) throw Refusal("Axle: SuspensionStiffness is not positive");
-                write_frame(bodies.pose1, frame_along(point, steering), &out);
+                const JointLimits limits = properties.at_end() ? JointLimits{} : steering_limits(&properties);
+                const JointSpring spring = JointSpring::of(&properties);
+                write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
                 write_frame(bodies.pose2, frame_along(point, rolling), &out);
                 out.number(swing_between(steering, rolling).angle);
                 out.number(std::isnan(stiffness) ? 0.0 : 1.0 / stiffness);
                 out.number(std::isnan(damping) ? 0.0 : damping);
+                out.number(limits.lower);
+                out.number(limits.upper);
+                write_spring(spring, &out);
+                out.number(properties.at_end() ? 0.0 : properties.number());
               });
   }
 
@@ -69,12 +100,35 @@ class Axle final : public ConstraintPlugin {
       const bool is_sprung = compliance > 0.0;
       emit(held_point(one, two.position, {!is_sprung, true, true}));
       emit(swing_row(steering, rolling, angle));
-      if (!is_sprung) return;
-      Discrepancy spring = row_along(steering, one.position, two.position, AxisMode::kLocked);
-      spring.compliance.x() = compliance;
-      spring.damping.x() = damping;
-      emit(spring);
+      if (is_sprung) {
+        Discrepancy spring = row_along(steering, one.position, two.position, AxisMode::kLocked);
+        spring.compliance.x() = compliance;
+        spring.damping.x() = damping;
+        emit(spring);
+      }
+      const Vector3 across = -(one.orientation * Vector3::UnitZ());
+      JointLimits limits;
+      limits.lower = bound.number();
+      limits.upper = bound.number();
+      if (!limits.is_none()) {
+        Discrepancy limit = swing_row(across, rolling, kQuarterTurn, AxisMode::kLimited);
+        limit.lower.x() = limits.lower;
+        limit.upper.x() = limits.upper;
+        emit(limit);
+      }
+      const JointSpring held = read_spring(&bound);
+      if (held.is_none()) return;
+      const Vector3 rest = exp_rotation(bound.number() * steering) * across;
+      Discrepancy sprung = swing_row(rest, rolling, kQuarterTurn, AxisMode::kFree);
+      held.yield_on(0, &sprung);
+      emit(sprung);
     });
+  }
+
+ private:
+  static JointLimits steering_limits(PropertyCursor* properties) {
+    const double lower = properties->number(), upper = properties->number();
+    return JointLimits::of(lower, upper, "Axle: SteeringLowerLimit", "Axle: SteeringUpperLimit");
   }
 };
 

@@ -8,6 +8,7 @@
 // and a2 the shafts. A bend is a turn about an axis across both, and moving the bend round a1 turns by k (a1 - a2): neither
 // has a part along a1 + a2, and all that do not are such turns. Four rows of rank 4, none redundant; left are the two
 // bends. With w1 = O1 a1, w2 = O2 a2 and no bending the row says (O2 - O1)(1 + a1.a2) = 0: equal speeds.
+// A spring and a damper against the bend, torque -k bend - c bend' about the axis across both shafts, take no freedom.
 // Undefined at a bend of 180 degrees, which is refused at the start.
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
@@ -19,7 +20,7 @@ class ConstantVelocity final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "ConstantVelocity",
-            .version = "1.0",
+            .version = "1.1",
             .slot = Slot::kConstraint,
             .meaning = "Joint of shafts that turn alike.",
             .types = {{"ConstantVelocity",
@@ -28,7 +29,13 @@ class ConstantVelocity final : public ConstraintPlugin {
                         Property::vector("Axis1", "1", "world")
                             .required()
                             .means("Shaft of body 1, any length; both point the same way along the drive."),
-                        Property::vector("Axis2", "1", "world").required().means("Shaft of body 2.")}}}};
+                        Property::vector("Axis2", "1", "world").required().means("Shaft of body 2."),
+                        Property::number("BendStiffness", "N*m/rad")
+                            .at_least(0.0)
+                            .means("Spring that straightens the shafts; none if absent."),
+                        Property::number("BendDamping", "N*m*s/rad")
+                            .at_least(0.0)
+                            .means("Damper of their bending; none if absent.")}}}};
   }
   explicit ConstantVelocity(PropertyCursor) {}
 
@@ -44,6 +51,7 @@ class ConstantVelocity final : public ConstraintPlugin {
                 const Swing bend = swing_between(axis1, axis2);
                 write_frame(bodies.pose1, frame1, &out);
                 write_frame(bodies.pose2, {point, exp_rotation(bend.angle * bend.axis) * frame1.orientation}, &out);
+                write_spring(JointSpring::of(&properties), &out);
               });
   }
 
@@ -54,6 +62,11 @@ class ConstantVelocity final : public ConstraintPlugin {
       double scale = 0.0;
       emit(held_point(one, two.position, {true, true, true}));
       emit(twist_row(one.orientation, two.orientation, AxisMode::kLocked, &scale));
+      const JointSpring spring = read_spring(&bound);
+      if (spring.is_none()) return;
+      Discrepancy bend = turn_between(one.orientation, two.orientation);
+      for (int axis = 0; axis < 3; ++axis) spring.yield_on(axis, &bend);
+      emit(bend);
     });
   }
 };

@@ -5,9 +5,13 @@
 //
 // Freedoms. One row along u = (x2 - x1)/|x2 - x1|: J v = u.(v2 + w2 x r2 - v1 - w1 x r1) is the rate of the distance, and
 // not zero for any body that can be moved, so a rod takes one freedom of twelve (rank 1), a rope none while it is slack.
+// With a stiffness what is beyond the range is a stretch that a spring and a damper hold, force -k stretch - c |x2 - x1|' along
+// u, and never across the range: an elastic rope, a spring, a strut. It takes no freedom, and may start beyond the range.
 // u turns with the points (the discrepancy is radial). Where the points meet u is undefined and any direction is taken: a
 // rope is slack there, a rod of length 0 is refused.
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "plugin_sdk/joint_rows.h"
@@ -18,13 +22,14 @@ namespace {
 
 // A distance that a scene gives with few digits is put right in the first step.
 constexpr double kGivenDigits = 1e-3;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 class Distance final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {
         .name = "Distance",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Rod, rope or cable.",
         .types = {{"Distance",
@@ -37,7 +42,11 @@ class Distance final : public ConstraintPlugin {
                     Property::number("MaximumDistance", "m")
                         .at_least(0.0)
                         .means("Largest distance; absent: none, or that of the start if MinimumDistance is absent "
-                               "too.")}}}};
+                               "too."),
+                    Property::number("Stiffness", "N/m")
+                        .above(0.0)
+                        .means("Spring that holds what is beyond the range; rigid if absent."),
+                    Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")}}}};
   }
   explicit Distance(PropertyCursor) {}
 
@@ -52,11 +61,19 @@ class Distance final : public ConstraintPlugin {
                 if (is_rod) least = most = start;
                 if (std::isnan(least)) least = 0.0;
                 if (std::isnan(most)) most = kUnlimited;
-                demand_range(least, most, start);
+                const bool has_spring = !properties.at_end();
+                const double stiffness = has_spring ? properties.number() : kNone;
+                const double damping = has_spring ? properties.number() : kNone;
+                if (std::isnan(stiffness) && !std::isnan(damping))
+                  throw Refusal("Distance: Damping is given without Stiffness");
+                // with a spring it may start beyond them
+                demand_range(least, most, std::isnan(stiffness) ? start : std::max(least, std::min(start, most)));
                 out.vector(inverse_transform_point(bodies.pose1, point1));
                 out.vector(inverse_transform_point(bodies.pose2, point2));
                 out.number(least);
                 out.number(most);
+                out.number(std::isnan(stiffness) ? 0.0 : 1.0 / stiffness);
+                out.number(std::isnan(damping) ? 0.0 : damping);
               });
   }
 
@@ -72,6 +89,8 @@ class Distance final : public ConstraintPlugin {
       d.modes |= kRadialDiscrepancy;
       d.lower.x() = bound.number();
       d.upper.x() = bound.number();
+      d.compliance.x() = bound.number();
+      d.damping.x() = bound.number();
       emit(d);
     });
   }

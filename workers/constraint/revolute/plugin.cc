@@ -9,6 +9,8 @@
 // to the rows: with a point far out, ways and turns could not be told apart.
 // With limits one row more about a, active only at a limit: rank 6 there. The angle is that of body 2 relative to body 1,
 // right-handed about point 1 -> point 2, zero at the start, known within one turn: two limits may span less than that.
+// A spring and a damper about a, torque -k (angle - RestAngle) - c angle', take no freedom. Beyond half a turn from RestAngle
+// (from the middle of the limits, where there are some) the angle, and so the spring, goes on from the other side.
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -21,7 +23,7 @@ class Revolute final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Revolute",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Hinge.",
         .types = {{"Revolute",
@@ -36,7 +38,12 @@ class Revolute final : public ConstraintPlugin {
                                "0 at the start; none if absent."),
                     Property::number("UpperLimit", "rad")
                         .at_least(0.0)
-                        .means("Largest angle; none if absent. Less than a full turn above LowerLimit.")}}}};
+                        .means("Largest angle; none if absent. Less than a full turn above LowerLimit."),
+                    Property::number("Stiffness", "N*m/rad").at_least(0.0).means("Torsion spring; none if absent."),
+                    Property::number("Damping", "N*m*s/rad").at_least(0.0).means("Torsion damper; none if absent."),
+                    Property::number("RestAngle", "rad")
+                        .defaults_to({0.0})
+                        .means("Angle at which the spring pushes nothing.")}}}};
   }
   explicit Revolute(PropertyCursor) {}
 
@@ -50,11 +57,14 @@ class Revolute final : public ConstraintPlugin {
           if (!limits.is_none() && limits.upper - limits.lower >= kTwoPi && limits.lower > -kUnlimited &&
               limits.upper < kUnlimited)
             throw Refusal("Revolute: UpperLimit lies a full turn or more above LowerLimit, which limits nothing");
+          const JointSpring spring = JointSpring::of(&properties);
           const Pose frame = hinge_frame(point1, point2, bodies, "Revolute");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           out.number(limits.lower);
           out.number(limits.upper);
+          write_spring(spring, &out);
+          out.number(properties.at_end() ? 0.0 : properties.number());
         });
   }
 
@@ -67,6 +77,9 @@ class Revolute final : public ConstraintPlugin {
       limits.lower = bound.number();
       limits.upper = bound.number();
       if (!limits.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, limits));
+      const JointSpring spring = read_spring(&bound);
+      if (!spring.is_none())
+        emit(sprung_twist_row(one.orientation, two.orientation, bodies, limits, bound.number(), spring));
     });
   }
 };

@@ -7,7 +7,8 @@
 // of rank 5, none redundant, one freedom left. The rows are taken where body 2 is, so that a long way along the axis is no
 // lever.
 // The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit) and a
-// drive to a speed with a largest force (one row on the velocity, rank 6).
+// drive to a speed with a largest force (one row on the velocity, rank 6). A spring and a damper along it, force
+// -k (way - RestPosition) - c way', take no freedom.
 #include <cmath>
 
 #include "plugin_sdk/joint_rows.h"
@@ -18,23 +19,29 @@ namespace {
 class Slider final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
-    return {.name = "Slider",
-            .version = "1.0",
-            .slot = Slot::kConstraint,
-            .meaning = "Straight guide.",
-            .types = {{"Slider",
-                       "The second body slides along an axis of the first and does not turn against it.",
-                       {Property::vector("BindPoint", "m", "world").required().means("A point of the guide."),
-                        Property::vector("Axis", "1", "world").required().means("Its direction, any length."),
-                        Property::number("LowerLimit", "m")
-                            .at_most(0.0)
-                            .means("Smallest way of body 2 along the axis from the start; none if absent."),
-                        Property::number("UpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
-                        Property::number("Speed", "m/s")
-                            .means("Speed of body 2 along the axis that a drive keeps; no drive if absent."),
-                        Property::number("MaximumForce", "N")
-                            .at_least(0.0)
-                            .means("Largest force of the drive; unlimited if absent.")}}}};
+    return {
+        .name = "Slider",
+        .version = "1.1",
+        .slot = Slot::kConstraint,
+        .meaning = "Straight guide.",
+        .types = {{"Slider",
+                   "The second body slides along an axis of the first and does not turn against it.",
+                   {Property::vector("BindPoint", "m", "world").required().means("A point of the guide."),
+                    Property::vector("Axis", "1", "world").required().means("Its direction, any length."),
+                    Property::number("LowerLimit", "m")
+                        .at_most(0.0)
+                        .means("Smallest way of body 2 along the axis from the start; none if absent."),
+                    Property::number("UpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
+                    Property::number("Speed", "m/s")
+                        .means("Speed of body 2 along the axis that a drive keeps; no drive if absent."),
+                    Property::number("MaximumForce", "N")
+                        .at_least(0.0)
+                        .means("Largest force of the drive; unlimited if absent."),
+                    Property::number("Stiffness", "N/m").at_least(0.0).means("Spring along the axis; none if absent."),
+                    Property::number("Damping", "N*s/m").at_least(0.0).means("Damper along the axis; none if absent."),
+                    Property::number("RestPosition", "m")
+                        .defaults_to({0.0})
+                        .means("Way at which the spring pushes nothing.")}}}};
   }
   explicit Slider(PropertyCursor) {}
 
@@ -47,6 +54,8 @@ class Slider final : public ConstraintPlugin {
                 const double lower = properties.number(), upper = properties.number();
                 const JointLimits limits = JointLimits::of(lower, upper, "Slider: LowerLimit", "Slider: UpperLimit");
                 const double speed = properties.number(), force = properties.number();
+                const JointSpring spring = JointSpring::of(&properties);
+                const double rest = properties.at_end() ? 0.0 : properties.number();
                 const bool is_driven = !std::isnan(speed);
                 if (!is_driven && !std::isnan(force)) throw Refusal("Slider: MaximumForce is given without Speed");
                 write_frame(bodies.pose1, frame, &out);
@@ -56,6 +65,8 @@ class Slider final : public ConstraintPlugin {
                 out.number(is_driven ? 1.0 : 0.0);
                 out.number(is_driven ? speed : 0.0);
                 out.number(std::isnan(force) ? kUnlimited : force);
+                write_spring(spring, &out);
+                out.number(rest);
               });
   }
 
@@ -76,11 +87,17 @@ class Slider final : public ConstraintPlugin {
         limit.upper.x() = limits.upper;
         emit(limit);
       }
-      if (!bound.flag()) return;
+      const bool is_driven = bound.flag();
       Discrepancy drive = row_along(axis, two.position, two.position, AxisMode::kDriven);
       drive.velocity = bound.number() * axis;
       drive.maximum_force.x() = bound.number();
-      emit(drive);
+      if (is_driven) emit(drive);
+
+      const JointSpring spring = read_spring(&bound);
+      if (spring.is_none()) return;
+      Discrepancy sprung = row_along(axis, one.position + bound.number() * axis, two.position, AxisMode::kFree);
+      spring.yield_on(0, &sprung);
+      emit(sprung);
     });
   }
 };

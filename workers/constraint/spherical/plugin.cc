@@ -13,6 +13,8 @@
 // unit, with sin(c) for sin(phi), which is the same at the cone and finite at the axis. Of an irregular cone c is linear
 // between its points, round once; a regular one's row is that of a swing, exact for turns of any size. Azimuths count
 // right-handed about Axis, from the world's x as seen along it (-z for an Axis within 1e-3 of x).
+// Spring and damper: of the whole turn of body 2 against body 1 since the start, torque -k angle about its axis and -c w. They
+// take no freedom.
 // Twist: limited_twist_row() of plugin_sdk/joint_rows.h, undefined at a swing of 180 degrees.
 #include <cmath>
 #include <vector>
@@ -47,7 +49,7 @@ class Spherical final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Spherical",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Ball-and-socket joint.",
         .types = {
@@ -68,10 +70,14 @@ class Spherical final : public ConstraintPlugin {
                   .at_least(-kPi)
                   .at_most(0.0)
                   .means("Smallest twist of body 2 about its axis, 0 at the start; none if absent."),
-              Property::number("TwistUpper", "rad")
+              Property::number("TwistUpper", "rad").at_least(0.0).at_most(kPi).means("Largest twist; none if absent."),
+              Property::number("Stiffness", "N*m/rad")
                   .at_least(0.0)
-                  .at_most(kPi)
-                  .means("Largest twist; none if absent.")}}}};
+                  .means(
+                      "Spring that turns body 2 back to how it was at the start, about whatever axis; none if absent."),
+              Property::number("Damping", "N*m*s/rad")
+                  .at_least(0.0)
+                  .means("Damper of all its turning; none if absent.")}}}};
   }
   explicit Spherical(PropertyCursor) {}
 
@@ -82,8 +88,16 @@ class Spherical final : public ConstraintPlugin {
                 const Vector3 point = properties.vector();
                 out.vector(inverse_transform_point(bodies.pose1, point));
                 out.vector(inverse_transform_point(bodies.pose2, point));
-                // a request may end here: the joint without limits
-                if (!properties.at_end()) bind_limits(point, &properties, bodies, &out);
+                // a request may end here: the joint that leaves all turns free
+                if (properties.at_end()) return;
+                const Cone cone = read_cone(&properties);
+                const JointSpring spring = JointSpring::of(&properties);
+                if (cone.limits_nothing() && spring.is_none()) return;
+                const Pose frame = cone_frame(point, cone.axis);
+                write_frame(bodies.pose1, frame, &out);
+                write_frame(bodies.pose2, frame, &out);
+                write_spring(spring, &out);
+                write_cone(cone, &out);
               });
   }
 
@@ -93,33 +107,47 @@ class Spherical final : public ConstraintPlugin {
       const Vector3 anchor1 = bound.vector();
       const Vector3 anchor2 = bound.vector();
       emit(point_discrepancy(anchor1, anchor2, bodies));
-      if (!bound.at_end()) describe_limits(bound, bodies, emit);
+      if (!bound.at_end()) describe_turns(bound, bodies, emit);
     });
   }
 
  private:
-  static void bind_limits(const Vector3& point, PropertyCursor* properties, const JointBodies& bodies,
-                          BoundWriter* out) {
+  struct Cone {
+    Vector3 axis = Vector3::UnitX();
+    JointLimits twist;
+    double angle = 0.0;  // of a regular one, else 0
+    std::span<const double> irregular;
+
+    bool limits_nothing() const { return twist.is_none() && angle == 0.0 && irregular.empty(); }
+  };
+
+  static Cone read_cone(PropertyCursor* properties) {
+    Cone cone;
     const double angle = properties->number();
-    const std::span<const double> irregular = properties->table(2);
+    cone.irregular = properties->table(2);
     const Vector3 axis = properties->vector();
     const double lower = properties->number(), upper = properties->number();
-    const JointLimits twist = JointLimits::of(lower, upper, "Spherical: TwistLower", "Spherical: TwistUpper");
-    const bool is_regular = !std::isnan(angle);
-    if (is_regular && !irregular.empty()) throw Refusal("Spherical: ReachConeAngle and ReachCone are both given");
-    if (is_regular && !(angle > 0.0 && angle <= kPi)) throw Refusal("Spherical: ReachConeAngle is outside 0 ... pi");
-    demand_cone(irregular);
-    if (!is_regular && irregular.empty() && twist.is_none()) return;
+    cone.twist = JointLimits::of(lower, upper, "Spherical: TwistLower", "Spherical: TwistUpper");
+    if (!std::isnan(angle)) {
+      if (!cone.irregular.empty()) throw Refusal("Spherical: ReachConeAngle and ReachCone are both given");
+      if (!(angle > 0.0 && angle <= kPi)) throw Refusal("Spherical: ReachConeAngle is outside 0 ... pi");
+      cone.angle = angle;
+    }
+    demand_cone(cone.irregular);
+    if (cone.limits_nothing()) return cone;
     if (axis.array().isNaN().all())
       throw Refusal("Spherical: Axis is missing, which reach cone and twist limits are measured from");
-    const Pose frame = cone_frame(point, unit_axis(axis, "Spherical: Axis"));
-    write_frame(bodies.pose1, frame, out);
-    write_frame(bodies.pose2, frame, out);
-    out->number(twist.lower);
-    out->number(twist.upper);
-    out->number(is_regular ? 1.0 : static_cast<double>(irregular.size() / 2));
-    if (is_regular) out->number(0.0), out->number(angle);
-    for (const double number : irregular) out->number(number);
+    cone.axis = unit_axis(axis, "Spherical: Axis");
+    return cone;
+  }
+
+  static void write_cone(const Cone& cone, BoundWriter* out) {
+    out->number(cone.twist.lower);
+    out->number(cone.twist.upper);
+    const bool is_regular = cone.angle > 0.0;
+    out->number(is_regular ? 1.0 : static_cast<double>(cone.irregular.size() / 2));
+    if (is_regular) out->number(0.0), out->number(cone.angle);
+    for (const double number : cone.irregular) out->number(number);
   }
 
   // Its second axis is at azimuth 0.
@@ -144,8 +172,14 @@ class Spherical final : public ConstraintPlugin {
   }
 
   template <typename Emit>
-  static void describe_limits(PropertyCursor bound, const JointBodies& bodies, Emit&& emit) {
+  static void describe_turns(PropertyCursor bound, const JointBodies& bodies, Emit&& emit) {
     const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+    const JointSpring spring = read_spring(&bound);
+    if (!spring.is_none()) {
+      Discrepancy turn = turn_between(one.orientation, two.orientation);
+      for (int axis = 0; axis < 3; ++axis) spring.yield_on(axis, &turn);
+      emit(turn);
+    }
     JointLimits twist;
     twist.lower = bound.number();
     twist.upper = bound.number();

@@ -5,6 +5,8 @@
 // Freedoms. The shared point takes the translations. The angle of the bars changes at the rate w.n, n = a1 x a2/|a1 x a2|:
 // one turn, about the normal of both bars. Four rows of rank 4 while the bars are not parallel, none redundant; left are the
 // turns about either bar.
+// A spring and a damper about either bar take no freedom. Their angle is that by which one bar has turned about the other
+// since the start, asin(sin(g) sin(angle)) where the bars make an angle g: within a right angle, beyond which they pull on.
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <string>
 
@@ -16,19 +18,29 @@ namespace {
 class Universal final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
-    return {.name = "Universal",
-            .version = "1.0",
-            .slot = Slot::kConstraint,
-            .meaning = "Hooke's joint.",
-            .types = {{"Universal",
-                       "Two bodies share a point; an axis of the first and one of the second keep their angle.",
-                       {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
-                        Property::vector("Axis1", "1", "world")
-                            .required()
-                            .means("Bar of the cross that is fixed in body 1, any length."),
-                        Property::vector("Axis2", "1", "world")
-                            .required()
-                            .means("Bar that is fixed in body 2; not parallel to Axis1, as a rule across it.")}}}};
+    return {
+        .name = "Universal",
+        .version = "1.1",
+        .slot = Slot::kConstraint,
+        .meaning = "Hooke's joint.",
+        .types = {
+            {"Universal",
+             "Two bodies share a point; an axis of the first and one of the second keep their angle.",
+             {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
+              Property::vector("Axis1", "1", "world")
+                  .required()
+                  .means("Bar of the cross that is fixed in body 1, any length."),
+              Property::vector("Axis2", "1", "world")
+                  .required()
+                  .means("Bar that is fixed in body 2; not parallel to Axis1, as a rule across it."),
+              Property::number("Stiffness1", "N*m/rad")
+                  .at_least(0.0)
+                  .means("Spring about Axis1, at rest at the start; none if absent."),
+              Property::number("Damping1", "N*m*s/rad").at_least(0.0).means("Damper about Axis1; none if absent."),
+              Property::number("Stiffness2", "N*m/rad")
+                  .at_least(0.0)
+                  .means("Spring about Axis2, at rest at the start; none if absent."),
+              Property::number("Damping2", "N*m*s/rad").at_least(0.0).means("Damper about Axis2; none if absent.")}}}};
   }
   explicit Universal(PropertyCursor) {}
 
@@ -40,9 +52,12 @@ class Universal final : public ConstraintPlugin {
                 const Vector3 axis1 = unit_axis(properties.vector(), "Universal: Axis1");
                 const Vector3 axis2 = unit_axis(properties.vector(), "Universal: Axis2");
                 if (axis1.cross(axis2).norm() < 1e-6) throw Refusal("Universal: Axis2 is parallel to Axis1");
-                write_frame(bodies.pose1, frame_along(point, axis1), &out);
-                write_frame(bodies.pose2, frame_along(point, axis2), &out);
+                write_frame(bodies.pose1, cross_frame(point, axis1, axis2), &out);
+                write_frame(bodies.pose2, cross_frame(point, axis2, axis1), &out);
                 out.number(swing_between(axis1, axis2).angle);
+                for (int bar = 0; bar < 2; ++bar) {
+                  write_spring(JointSpring::of(&properties), &out);
+                }
               });
   }
 
@@ -51,8 +66,21 @@ class Universal final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       emit(held_point(one, two.position, {true, true, true}));
-      emit(swing_row(one.orientation * Vector3::UnitX(), two.orientation * Vector3::UnitX(), bound.number()));
+      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+      emit(swing_row(axis1, axis2, bound.number()));
+      const JointSpring spring1 = read_spring(&bound), spring2 = read_spring(&bound);
+      if (!spring1.is_none()) emit_sprung(one.orientation * Vector3::UnitZ(), axis2, spring1, emit);
+      if (!spring2.is_none()) emit_sprung(axis1, two.orientation * Vector3::UnitZ(), spring2, emit);
     });
+  }
+
+ private:
+  // Of a direction of either body, across each other at the start.
+  template <typename Emit>
+  static void emit_sprung(const Vector3& first, const Vector3& second, const JointSpring& spring, Emit&& emit) {
+    Discrepancy row = swing_row(first, second, kQuarterTurn, AxisMode::kFree);
+    spring.yield_on(0, &row);
+    emit(row);
   }
 };
 

@@ -1,0 +1,203 @@
+// Springs and dampers on the axes of joints: where they come to rest, how they swing, and that a wheel is steered by them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::SceneRun;
+using harness::set;
+
+class JointSprings : public ::testing::Test {
+ protected:
+  static constexpr double kStiffness = 50.0;  // N m/rad or N/m
+  static constexpr double kArm = 0.5;         // m
+
+  // A body "Arm" of 1 kg at `position`, which the joint holds to the world; CanSleep = false, so that it rests by itself.
+  static std::string scene(const std::string& joint, const Vector3& position, const std::string& more = "") {
+    return "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } }\n"
+           "Force { Type = \"Basic\" Id = \"T\" CustomProperties { Torque = {0, 10, 0} } } }\n"
+           "Simulator { CustomProperties { Duration = 10 } }\n"
+           "Environment { Space { Bodies { Body { Id = \"Arm\" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} " +
+           (more.empty() ? std::string("Forces = {\"G\"}") : more) +
+           " KineticProperties { CanSleep = false Position = " + harness::literal(position) +
+           " } } } }\nConstraints { Constraint { Id = \"J\" Body2 = \"Arm\" " + joint + " } } }\n";
+  }
+  // Root of a function that falls through zero between -1 and 1.
+  static double root(const std::function<double(double)>& f) {
+    double low = -1.0, high = 1.0;
+    for (int i = 0; i < 100; ++i) {
+      const double middle = 0.5 * (low + high);
+      (f(middle) > 0.0 ? low : high) = middle;
+    }
+    return low;
+  }
+  // Angle of an arm above the horizontal, where k (angle - rest) and its weight balance.
+  static double sunk(double rest) {
+    return root([&](double angle) { return -kStiffness * (angle - rest) - kG * kArm * std::cos(angle); });
+  }
+};
+
+TEST_F(JointSprings, RestWhereTheyBalanceTheLoad) {
+  const Vector3 out(kArm, 0, 0), aslant(0.4, 0, 0.3);
+  struct Trial {
+    std::string joint;
+    Vector3 start, rest;
+  };
+  const auto below = [](const Vector3& direction, double angle) {
+    return Vector3(std::cos(angle) * direction + kArm * std::sin(angle) * Vector3::UnitY());
+  };
+  const std::vector<Trial> trials = {
+      {"Type = \"Revolute\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} Stiffness = 50 "
+       "Damping = 5 RestAngle = 0.2 }",
+       out, below(out, sunk(0.2))},
+      {"Type = \"Revolute\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} LowerLimit = -1 "
+       "UpperLimit = 0.5 Stiffness = 50 Damping = 5 }",
+       out, below(out, sunk(0.0))},
+      {"Type = \"Slider\" CustomProperties { BindPoint = {0, 0, 0} Axis = {0, 1, 0} Stiffness = 50 Damping = 5 "
+       "RestPosition = 0.3 }",
+       out, out + (0.3 - kG / kStiffness) * Vector3::UnitY()},
+      {"Type = \"Spherical\" CustomProperties { BindPoint = {0, 0, 0} Stiffness = 50 Damping = 5 }", aslant,
+       below(aslant, sunk(0.0))},
+      {"Type = \"ConstantVelocity\" CustomProperties { BindPoint = {0, 0, 0} Axis1 = {4, 0, 3} Axis2 = {4, 0, 3} "
+       "BendStiffness = 50 BendDamping = 5 }",
+       aslant, below(aslant, sunk(0.0))},
+      {"Type = \"Universal\" CustomProperties { BindPoint = {0, 0, 0} Axis1 = {0, 0, 1} Axis2 = {0, 1, 0} Stiffness1 = "
+       "50 Damping1 = 5 Stiffness2 = 10 Damping2 = 3 }",
+       out, below(out, sunk(0.0))},
+      {"Type = \"Universal\" CustomProperties { BindPoint = {0, 0, 0} Axis1 = {0, 1, 0} Axis2 = {0, 0, 1} Stiffness1 = "
+       "10 Damping1 = 3 Stiffness2 = 50 Damping2 = 5 }",
+       out, below(out, sunk(0.0))},
+      {"Type = \"Distance\" CustomProperties { BindPoint1 = {0.5, 1, 0} BindPoint2 = {0.5, 0, 0} MaximumDistance = 1.2 "
+       "Stiffness = 50 Damping = 5 }",
+       out, out - (0.2 + kG / kStiffness) * Vector3::UnitY()},
+      {"Type = \"Bushing\" CustomProperties { BindPoint = {0.5, 0, 0} Stiffness = {20, 50, 30} Damping = {5, 5, 5} "
+       "AngularStiffness = {1, 2, 3} AngularDamping = {1, 1, 1} }",
+       out, out - kG / kStiffness * Vector3::UnitY()},
+  };
+  for (const Trial& trial : trials)
+    for (const std::string solver : {"Newton", "Direct", "Sequential"})
+      for (const double time_step : {1.0 / 60.0, 2e-3}) {
+        SceneRun run(scene(trial.joint, trial.start), {set("Solver", solver), set("Simulator.TimeStep", time_step)});
+        run.to_end();
+        // `Sequential` sweeps joint by joint in directions of the free motion
+        const double bound = solver == "Sequential" ? 40.0 * time_step * time_step : 1e-8;
+        EXPECT_LE((run.body("Arm").pose.position - trial.rest).norm(), bound)
+            << trial.joint << ' ' << solver << ' ' << time_step;
+      }
+}
+
+// A hinge's I x'' + c x' + k x = 0, struck at rest.
+TEST_F(JointSprings, SwingAtTheirFrequency) {
+  constexpr double kMoment = 0.1, kSoft = 40.0, kDamper = 0.3, kSpeed = 5.0, kEnd = 0.5;
+  const double decay = 0.5 * kDamper / kMoment, rate = std::sqrt(kSoft / kMoment - decay * decay);
+  const double exact = std::exp(-decay * kEnd) * kSpeed / rate * std::sin(rate * kEnd);
+  const std::string joint =
+      "Type = \"Revolute\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} Stiffness = 40 "
+      "Damping = 0.3 }";
+  struct Trial {
+    const char *simulator, *integrator;
+    double order;
+  };
+  for (const Trial& trial :
+       {Trial{"Basic", "SemiImplicitEuler", 1}, {"Smooth", "RK4", 4}, {"Smooth", "ImplicitMidpoint", 2}})
+    for (const std::string solver : {"Newton", "Direct"}) {
+      std::vector<double> errors;
+      for (const double time_step : {kEnd / 400.0, kEnd / 800.0}) {
+        SceneRun run(scene(joint, Vector3::Zero(), "Forces = {}"),
+                     {set("Solver", solver), set("Simulator", trial.simulator), set("Integrator", trial.integrator),
+                      set("Simulator.TimeStep", time_step), set("Simulator.Duration", kEnd),
+                      set("Body.Arm.AngularVelocity", Vector3(0, 0, kSpeed))});
+        run.to_end();
+        const Quaternion q = run.body("Arm").pose.orientation;
+        errors.push_back(std::fabs(2.0 * std::atan2(q.z(), q.w()) - exact));
+      }
+      EXPECT_NEAR(std::log2(errors[0] / errors[1]), trial.order, 0.1) << trial.simulator << ' ' << trial.integrator;
+    }
+}
+
+// The joint's torque is the gradient of k angle^2/2, for turns of any size: what swings in three dimensions keeps its energy.
+TEST_F(JointSprings, KeepEnergyInTheLarge) {
+  SceneRun run(
+      scene("Type = \"Spherical\" CustomProperties { BindPoint = {0, 0, 0} Stiffness = 20 }", Vector3(kArm, 0, 0)),
+      {set("Solver", "Newton"), set("Simulator", "Smooth"), set("Integrator", "DormandPrince853"),
+       set("Simulator.TimeStep", 0.01), set("Simulator.Duration", 1.0),
+       set("Body.Arm.LinearVelocity", Vector3(0, 0, 4)), set("Body.Arm.AngularVelocity", Vector3(6, -8, 0))});
+  const double before = run.energy();
+  double largest = 0.0;
+  while (!run.is_done()) {
+    run.step();
+    const double angle = harness::angle_between(run.body("Arm").pose.orientation, Quaternion::Identity());
+    largest = std::max(largest, angle);
+    EXPECT_NEAR(run.energy() + 0.5 * 20.0 * angle * angle, before, 1e-9);
+  }
+  EXPECT_GE(largest, 1.2);
+}
+
+// A spring so stiff that no explicit step could follow it yields by load over stiffness.
+TEST_F(JointSprings, AreStableForEveryStiffness) {
+  for (const std::string solver : {"Newton", "Direct", "Sequential"})
+    for (const double stiffness : {1e-3, 1e3, 1e8, 1e13}) {
+      SceneRun run(scene("Type = \"Bushing\" CustomProperties { BindPoint = {0, 0, 0} Stiffness = {1e5, 1e5, 1e5} "
+                         "AngularStiffness = {1e5, " +
+                             harness::literal(stiffness) + ", 1e5} AngularDamping = {0, " +
+                             harness::literal(1e-3 + 0.6 * std::sqrt(stiffness)) + ", 0} }",
+                         Vector3::Zero(), "Forces = {\"T\"}"),
+                   {set("Solver", solver), set("Simulator.TimeStep", 1.0 / 60.0)});
+      run.to_end();
+      const double turn = harness::angle_between(run.body("Arm").pose.orientation, Quaternion::Identity());
+      if (stiffness >= 1e3) EXPECT_NEAR(turn, 10.0 / stiffness, 1e-9) << solver << ' ' << stiffness;
+      EXPECT_TRUE(std::isfinite(turn));
+    }
+}
+
+// A wheel that rolls at 20 rad/s about z and may steer about y.
+class Steering : public JointSprings {
+ protected:
+  static SceneRun wheel(const std::string& properties, const std::string& force, const std::string& solver,
+                        double time_step, double spin) {
+    return SceneRun(
+        scene("Type = \"Axle\" CustomProperties { BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = "
+              "{0, 0, 1} " +
+                  properties + " }",
+              Vector3::Zero(), "Forces = {" + force + "}"),
+        {set("Solver", solver), set("Simulator.TimeStep", time_step), set("Simulator.Duration", 5.0),
+         set("Body.Arm.AngularVelocity", Vector3(0, 0, spin))});
+  }
+  static double angle(const SceneRun& run) {
+    const Vector3 axis = run.body("Arm").pose.orientation * Vector3::UnitZ();
+    return std::atan2(axis.x(), axis.z());
+  }
+};
+
+TEST_F(Steering, GoesWhereItsSpringIsAtRest) {
+  for (const std::string solver : {"Newton", "Direct", "Sequential"})
+    for (const double spin : {0.0, 20.0}) {
+      SceneRun turning =
+          wheel("SteeringStiffness = 100 SteeringDamping = 10 SteeringAngle = 0.3", "\"T\"", solver, 1e-3, spin);
+      turning.to_end();
+      // of first order in the step while it rolls
+      EXPECT_NEAR(angle(turning), 0.3 + 10.0 / 100.0, spin == 0.0 ? 1e-8 : 5e-5) << solver << ' ' << spin;
+      EXPECT_NEAR(turning.body("Arm").twist.angular.norm(), spin, 1e-3 * spin + 1e-7) << solver << ' ' << spin;
+    }
+}
+
+TEST_F(Steering, StopsAtItsLimits) {
+  for (const std::string solver : {"Newton", "Direct", "Sequential"})
+    for (const double time_step : {1.0 / 60.0, 1e-3})
+      for (const double spin : {0.0, 20.0}) {
+        SceneRun turning =
+            wheel("SteeringLowerLimit = -0.1 SteeringUpperLimit = 0.2", "\"T\"", solver, time_step, spin);
+        turning.to_end();
+        EXPECT_NEAR(angle(turning), 0.2, solver == "Sequential" ? 1e-5 : 1e-12) << solver << ' ' << spin;
+      }
+}
+
+}  // namespace
+}  // namespace gravitas
