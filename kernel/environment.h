@@ -170,6 +170,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t pieces_to_accuracy(double begin, double length, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
   void take_extrapolated();
+  // jumps.cc
+  void find_changes(std::vector<double>* changes) const;
+  bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
@@ -335,6 +338,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last
   Extrapolation extrapolation_, jumps_;
+  static constexpr std::uint32_t kMostPieces = 8;                                    // of a part that is extrapolated
+  std::vector<double> first_changes_[kMostPieces], trial_changes_, second_changes_;  // of velocities
   double margin_ = 0.0;
 
   Activity activity_;

@@ -3,9 +3,11 @@
 // below the accuracy; the finest of them then stand, and the last of these ends in the extrapolated state.
 //
 // What jumps on the way (a contact closes or opens, a slide ends) has no expansion in powers of the step: the part is
-// shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. A jump in the
-// first or the last inner step of every attempt would look smooth; it shows in that step's change of velocities, which then
-// does not tend to 0 with the step. Impacts of bodies that do not touch are found first, as without an accuracy.
+// shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. What flickers
+// would crumble the whole step: each part below kCrumb of it makes the finest a little longer. A jump in the first or the last
+// inner step of every attempt would look smooth; one of velocities shows in that step's change of them, which then does not
+// tend to 0 with the step, one of reactions in shorter steps (jumps.cc). Impacts of bodies that do not touch are found first,
+// as without an accuracy.
 #include <algorithm>
 #include <cmath>
 
@@ -14,10 +16,12 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostAttempts = 10'000;  // in a step; the rest of it is then made as Basic makes it
-constexpr std::uint32_t kMostPieces = 8;
 constexpr std::size_t kRow = 13;       // numbers of a body
 constexpr double kFinestPart = 1e-10;  // of the step
+constexpr double kCrumb = 1e-3, kCoarser = 1.02;
+// What the start misses of its laws within the accuracy is put right in the first inner step. s
+constexpr double kOfJump = 0.125;
+constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
 constexpr double kShorter = 0.25, kLonger = 4.0;
 constexpr double kConverges = 0.5;  // share of the error that a piece more leaves, at most
 
@@ -39,33 +43,29 @@ void put(const State& state, const State& start, std::uint32_t bodies, Extrapola
 }  // namespace
 
 void Environment::extrapolate_parts(double begin, double length) {
-  const double finest = kFinestPart * length_of_step(step_count_ + 1);
-  double done = 0.0, wanted = length;
+  const double step = length_of_step(step_count_ + 1);
+  double finest = kFinestPart * step, done = 0.0, wanted = length;
   bool has_failed = false;
-  for (int attempt = 0; done < length && !must_restart_; ++attempt) {
+  while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
-    double part = left;
-    std::uint32_t pieces = 1;
-    if (attempt < kMostAttempts) {
-      part = std::min(wanted, left);
-      if (has_contacts()) {
-        begin_inner_step(from, part);
-        part = first_impact(integrate(), from, part);
-      }
-      if (part > finest) pieces = pieces_to_accuracy(from, part, part < std::min(wanted, left));
-      if (pieces == 0) {
-        wanted = kShorter * part;
-        has_failed = true;
-        continue;
-      }
+    double part = std::min(wanted, left);
+    if (has_contacts()) {
+      begin_inner_step(from, part);
+      part = first_impact(integrate(), from, part);
     }
+    if (part < kCrumb * step) finest *= kCoarser;
+    const bool ends_with_impact = part < std::min(wanted, left);
+    const std::uint32_t pieces = part > finest ? pieces_to_accuracy(from, part, ends_with_impact) : 1;
+    has_failed = has_failed || pieces == 0;
+    if (pieces == 0) wanted = kShorter * part;
     for (std::uint32_t i = 0; i < pieces && !must_restart_; ++i) {
       if (!make_piece(from, part, i, pieces)) return;
       if (i > 0 && i + 1 == pieces) take_extrapolated();
       end_inner_step();
     }
+    if (pieces == 0) continue;
     done = part == left ? length : done + part;
-    wanted = has_failed ? part : kLonger * part;
+    if (!ends_with_impact) wanted = has_failed ? part : kLonger * part;
     has_failed = false;
   }
 }
@@ -81,21 +81,16 @@ bool Environment::make_piece(double begin, double length, std::uint32_t i, std::
 std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool ends_with_impact) {
   const std::size_t front = front_, back = back_;
   const CommitFigures figures = figures_;
-  const auto go_back = [&] {
-    front_ = front;
-    back_ = back;
-    figures_ = figures;
-  };
+  const auto go_back = [&] { front_ = front, back_ = back, figures_ = figures; };
   extrapolation_.begin();
   jumps_.begin();
-  const auto put_change = [&] {
-    const auto put_vectors = [&](const Column<double>& from, const Column<double>& to) {
-      for (std::size_t k = 0; k < to.size(); ++k)
-        jumps_.put(is_awake(static_cast<std::uint32_t>(k / 3)) ? to[k] - from[k] : 0.0, 1.0);
-    };
-    put_vectors(start_linear_velocity(), this->back().linear_velocity);
-    put_vectors(start_angular_velocity(), this->back().angular_velocity);
+  const auto put_changes = [&](std::vector<double>* changes) {
+    find_changes(changes);
+    for (const double change : *changes) jumps_.put(change, 1.0);
   };
+  const std::uint32_t first = ends_with_impact ? 2 : 1;  // whose first inner step does not end with the impact
+  const bool sees_jumps = description_.accuracy >= kSeesJumps;
+  const double most_of_jump = sees_jumps ? std::max(length, kOfJump) : length;
   double error = 0.0;
   std::uint32_t enough = 0;
   try {
@@ -105,8 +100,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
           go_back();
           return 0;
         }
-        if (i == 0) put_change();
-        if (i + 1 == pieces && !ends_with_impact) put_change();
+        if (i == 0) put_changes(&first_changes_[pieces - 1]);
+        if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
         const std::size_t before = front_;
         front_ = back_;
         back_ = before == front ? kSpareState : before;
@@ -116,11 +111,15 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       go_back();
       jumps_.add();
       double jump = 0.0;
-      for (const double change : jumps_.best()) jump = std::max(jump, std::fabs(change) * length);
-      if (std::max(now, jump) <= description_.accuracy) enough = pieces;
-      if (pieces > 2 && now > kConverges * error) break;
+      for (const double change : jumps_.best()) jump = std::max(jump, std::fabs(change) * most_of_jump);
+      if (std::max(now, jump) <= description_.accuracy && pieces > first) enough = pieces;
+      const bool converges = pieces <= 2 || now <= kConverges * error;
       error = now;
+      if (!converges) break;
     }
+    const bool is_refused = enough > 0 && sees_jumps && hides_jump(begin, length, first, enough, error);
+    go_back();
+    if (is_refused) enough = 0;
   } catch (...) {
     go_back();
     throw;

@@ -1,0 +1,77 @@
+// Jumps of reactions that an extrapolation does not see (extrapolated.cc): friction that turns back, a drive that reaches its
+// speed, a rope that comes taut in the first inner step of every attempt. What acts where that step ends then acts all of it,
+// in each of them alike, and the results agree on what is wrong by the jump times the time until it.
+//
+// Shorter inner steps, each an eighth of the one before, tell it: one that ends before the jump misses the change of
+// velocities that the attempts foretell, and one more as long as theirs does not make up for it. What closes a gap of
+// rounding has done so by then, and is no jump.
+#include <algorithm>
+#include <cmath>
+
+#include "kernel/environment.h"
+
+namespace gravitas::kernel {
+namespace {
+
+constexpr double kShorterTrial = 8.0;
+constexpr double kSeen = 1.0 / 64.0;      // of the accuracy; an eighth's eighth of the jump shows in the first trial
+constexpr double kOfError = 2.0;          // that the extrapolation leaves
+constexpr double kRounding = 1e-12;       // m/s or rad/s
+constexpr double kShortestTrial = 1e-10;  // of the part
+constexpr double kRemains = 0.5;          // of what is missed
+
+}  // namespace
+
+// Of what is awake, in the inner step that has been made.
+void Environment::find_changes(std::vector<double>* changes) const {
+  changes->clear();
+  const auto add = [&](const Column<double>& from, const Column<double>& to) {
+    for (std::size_t k = 0; k < to.size(); ++k)
+      changes->push_back(is_awake(static_cast<std::uint32_t>(k / 3)) ? to[k] - from[k] : 0.0);
+  };
+  add(start_linear_velocity(), states_[back_].linear_velocity);
+  add(start_angular_velocity(), states_[back_].angular_velocity);
+}
+
+// After attempts in `first` to `pieces` inner steps, two at least, which left an error of the extrapolation. The state is where
+// the trials end.
+bool Environment::hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error) {
+  const std::size_t front = front_, back = back_;
+  const double fine_step = length / pieces;
+  const auto foretold = [&](std::size_t k, double step) {
+    // Aitken and Neville's; what the start misses of its laws within the accuracy is put right in any step
+    double changes[kMostPieces];
+    for (std::uint32_t n = first; n <= pieces; ++n) {
+      changes[n - 1] = first_changes_[n - 1][k];
+      for (std::uint32_t m = n - 1; m >= first; --m)
+        changes[m - 1] = changes[m] + (changes[m] - changes[m - 1]) * (step * n - length) / (length - length * n / m);
+    }
+    return changes[first - 1];
+  };
+  const double allowed = std::max(kSeen * description_.accuracy + kOfError * error, kRounding);
+  double step = fine_step / kShorterTrial;
+  for (double largest = 2.0 * allowed; largest > allowed && step > kShortestTrial * length; step /= kShorterTrial) {
+    front_ = front, back_ = back;
+    if (!make_piece(begin, step, 0, 1) || must_restart_) return true;
+    find_changes(&trial_changes_);
+    largest = 0.0;
+    double missed = 0.0;
+    for (std::size_t k = 0; k < trial_changes_.size(); ++k) {
+      const double expected = foretold(k, step);
+      missed = std::max(missed, std::fabs(trial_changes_[k] - expected));
+      largest = std::max({largest, std::fabs(trial_changes_[k]), std::fabs(expected)});
+    }
+    if (missed <= allowed) continue;
+    front_ = back_, back_ = kSpareState;
+    if (!make_piece(begin + step, fine_step, 0, 1) || must_restart_) return true;
+    find_changes(&second_changes_);
+    for (std::size_t k = 0; k < trial_changes_.size(); ++k) {
+      const double alone = trial_changes_[k] - foretold(k, step);
+      const double both = trial_changes_[k] + second_changes_[k] - foretold(k, step + fine_step);
+      if (std::fabs(alone) > allowed && std::fabs(both) > kRemains * std::fabs(alone)) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace gravitas::kernel

@@ -1,0 +1,116 @@
+// `Continuous` with an Accuracy where reactions jump: friction that turns back, drives that reach their speed.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::SceneRun;
+using harness::set;
+
+class AccuracyAtJumps : public ::testing::Test {
+ protected:
+  static constexpr double kAccuracy = 1e-9;
+
+  static std::vector<std::string> settings(double time_step, double duration) {
+    return {set("Simulator.TimeStep", time_step),
+            set("Simulator.Duration", duration),
+            "Simulator=Continuous",
+            set("Simulator.Accuracy", kAccuracy),
+            "Integrator=Verlet",
+            "Solver=Newton"};
+  }
+  static std::string scene(const std::string& bodies, const std::string& joints) {
+    return "Geometries { Geometry { Type = \"Halfspace\" Id = \"Ground\" CustomProperties { } }\n"
+           "Geometry { Type = \"Box\" Id = \"Cube\" CustomProperties { HalfExtents = {0.5, 0.05, 0.5} } } }\n"
+           "Materials { Material { Id = \"M\" StaticFrictionCoefficient = 0.3 } }\n"
+           "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+           "Environment { Space { Bodies {\n" +
+           bodies + "} }\nConstraints {\n" + joints + "} }\n";
+  }
+};
+
+// Thrown up a slope that it slides back down on.
+TEST_F(AccuracyAtJumps, FrictionTurnsBack) {
+  constexpr double kSlope = 0.6, kFriction = 0.3, kEnd = 1.0;
+  const double up = kG * (std::sin(kSlope) + kFriction * std::cos(kSlope));
+  const double down = kG * (std::sin(kSlope) - kFriction * std::cos(kSlope));
+  const Quaternion tilt = harness::turned(Vector3::UnitZ(), kSlope);
+  const Vector3 along = tilt * Vector3::UnitX();
+  for (const double speed : {1.3, 15.0 / 7.0, 3.1})
+    for (const double time_step : {1.0 / 60.0, 1.0 / 240.0}) {
+      const std::string q = harness::literal(tilt);
+      SceneRun run(
+          scene("Body { Id = \"Slope\" GeometryId = \"Ground\" Material = \"M\" KineticProperties { Orientation = " +
+                    q + " } }\n" +
+                    "Body { Id = \"Box\" GeometryId = \"Cube\" Material = \"M\" Mass = 1 Forces = {\"G\"} "
+                    "KineticProperties { Position = " +
+                    harness::literal(Vector3(0.05 * (tilt * Vector3::UnitY()))) + " Orientation = " + q +
+                    " LinearVelocity = " + harness::literal(Vector3(speed * along)) + " } }\n",
+                ""),
+          settings(time_step, kEnd));
+      run.to_end();
+      const double rise = speed / up, fall = kEnd - rise;
+      const double way = 0.5 * speed * rise - 0.5 * down * fall * fall;
+      EXPECT_NEAR(run.body("Box").pose.position.dot(along), way, 10.0 * kAccuracy) << speed << ' ' << time_step;
+      EXPECT_NEAR(run.body("Box").twist.linear.dot(along), -down * fall, 10.0 * kAccuracy) << speed << ' ' << time_step;
+    }
+}
+
+// Two bodies in free flight bounce until they stay together: from then on a contact without friction does no work. Its gaps of
+// rounding crumbled the steps, and what was left of them lost a sixth of the energy.
+TEST_F(AccuracyAtJumps, LastingContactsDoNoWork) {
+  for (const double accuracy : {1e-4, 1e-6, 1e-8}) {
+    SceneRun run(
+        "Geometries { Geometry { Type = \"Cylinder\" Id = \"Y\" CustomProperties { Radius = 0.12 Height = 0.3 } }\n"
+        "Geometry { Type = \"Capsule\" Id = \"C\" CustomProperties { Radius = 0.08 Height = 0.25 } } }\n"
+        "Materials { Material { Id = \"M\" RestitutionCoefficient = 0.3 StaticFrictionCoefficient = 0 } }\n"
+        "Environment { Space { Bodies {\n"
+        "Body { Id = \"A\" GeometryId = \"C\" Material = \"M\" Mass = 1 KineticProperties { Position = {0, 0.5, 0} "
+        "Orientation "
+        "= {-0.05185843992237382, -0.11144044551988258, 0.08262137298655965, -0.988971909629876} LinearVelocity = "
+        "{0.5114303325363797, -2.1873862180463366, -0.3045465414104413} AngularVelocity = {-1.2441649335730771, "
+        "2.7506502454605735, 3.850330504494139} } }\n"
+        "Body { Id = \"B\" GeometryId = \"Y\" Material = \"M\" Mass = 1 KineticProperties { Position = {0.03, -0.5, "
+        "0.02} "
+        "Orientation = {-0.3008801430883417, 0.4206685901620578, -0.019226908050685342, -0.8556514493372964} "
+        "LinearVelocity = {0.06080178550706238, 2.0177402948205736, -0.4521461604490816} AngularVelocity = "
+        "{3.389375765769463, -4.62947484558819, 0.7838191415598976} } }\n"
+        "} } }\n",
+        {"Simulator=Continuous", "Integrator=Verlet", "Solver=Newton", set("Simulator.TimeStep", 1.0 / 60.0),
+         set("Simulator.Accuracy", accuracy), set("Simulator.Duration", 0.3)});
+    while (run.time() < 0.199) run.step();
+    const double together = run.energy();
+    run.to_end();
+    // what it loses within the step where the bounces end
+    EXPECT_NEAR(run.energy(), together, 2e-3 * together) << accuracy;
+  }
+}
+
+// A load that falls through the speed of a drive of half its weight: pushed down before, held after.
+TEST_F(AccuracyAtJumps, DrivesReachTheirSpeed) {
+  constexpr double kEnd = 0.5;
+  for (const double speed : {0.5, 0.775, 1.1})
+    for (const double time_step : {1.0 / 60.0, 1.0 / 240.0}) {
+      SceneRun run(
+          scene("Body { Id = \"Ground\" GeometryId = \"Ground\" Material = \"M\" KineticProperties { Position = {0, "
+                "-9, 0} } }\n"
+                "Body { Id = \"Load\" GeometryId = \"Cube\" Material = \"M\" Mass = 2 Forces = {\"G\"} }\n",
+                "Constraint { Type = \"Slider\" Id = \"J\" Body2 = \"Load\" CustomProperties { BindPoint = {0, 0, 0} "
+                "Axis = {0, 1, 0} MaximumForce = 9.81 Speed = " +
+                    harness::literal(-speed) + " } }\n"),
+          settings(time_step, kEnd));
+      run.to_end();
+      const double reached = speed / (1.5 * kG);
+      EXPECT_NEAR(run.body("Load").twist.linear.y(), -speed - 0.5 * kG * (kEnd - reached), 10.0 * kAccuracy)
+          << speed << ' ' << time_step;
+    }
+}
+
+}  // namespace
+}  // namespace gravitas
