@@ -90,7 +90,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
   };
   const std::uint32_t first = ends_with_impact ? 2 : 1;  // whose first inner step does not end with the impact
   const bool sees_jumps = description_.accuracy >= kSeesJumps;
-  const double most_of_jump = sees_jumps ? std::max(length, kOfJump) : length;
+  const double most_of_jump = sees_jumps && !ends_with_impact ? std::max(length, kOfJump) : length;
   double error = 0.0;
   std::uint32_t enough = 0;
   try {
