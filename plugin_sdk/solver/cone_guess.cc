@@ -104,7 +104,8 @@ bool ConeProblem::take_held_step(const SolverBodies& bodies, double proximal, do
     const std::uint32_t r = other_[static_cast<std::size_t>(coupled_[a])];
     rest_[a] -= rows[r].direction.along(put[rows[r].body1], put[rows[r].body2]) / scale_[r];
   }
-  held.solve(&rest_);
+  // factors of no rows may be those of others, which were dropped
+  if (!coupled_.empty()) held.solve(&rest_);
   for (const double change : rest_)
     if (!std::isfinite(change)) return false;
   for (std::size_t o = 0; o < other_.size(); ++o)
