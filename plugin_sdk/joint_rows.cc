@@ -82,6 +82,7 @@ double JointLimits::turn(double angle, double way) const {
 JointSpring JointSpring::of(PropertyCursor* properties) {
   if (properties->at_end()) return {};
   const double stiffness = properties->number(), damping = properties->number();
+  if (stiffness < 0.0 || damping < 0.0) throw Refusal("a stiffness or damping is negative");
   return {std::isnan(stiffness) ? 0.0 : stiffness, std::isnan(damping) ? 0.0 : damping};
 }
 
@@ -100,6 +101,11 @@ void write_spring(const JointSpring& spring, BoundWriter* out) {
 JointSpring read_spring(PropertyCursor* bound) {
   const double stiffness = bound->number();
   return {stiffness, bound->number()};
+}
+
+Discrepancy sprung(Discrepancy row, const JointSpring& spring) {
+  spring.yield_on(0, &row);
+  return row;
 }
 
 Pose frame_along(const Vector3& origin, const Vector3& first) {
@@ -187,6 +193,12 @@ Discrepancy turn_between(const Quaternion& frame1, const Quaternion& frame2) {
   return d;
 }
 
+Discrepancy sprung_turn(const Quaternion& frame1, const Quaternion& frame2, const JointSpring& spring) {
+  Discrepancy d = turn_between(frame1, frame2);
+  for (int axis = 0; axis < 3; ++axis) spring.yield_on(axis, &d);
+  return d;
+}
+
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {
   const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist_between(frame1, frame2)};
   *scale = twisting.cosine();
@@ -207,9 +219,7 @@ Discrepancy sprung_twist_row(const Quaternion& frame1, const Quaternion& frame2,
                              const JointLimits& limits, double rest, const JointSpring& spring) {
   Twisting twisting = {first_axis(frame1), first_axis(frame2), limited_twist(frame1, frame2, bodies, limits) - rest};
   if (limits.is_none()) twisting.angle -= 2.0 * kHalfTurn * std::round(twisting.angle / (2.0 * kHalfTurn));
-  Discrepancy d = row_of(twisting, AxisMode::kFree);
-  spring.yield_on(0, &d);
-  return d;
+  return sprung(row_of(twisting, AxisMode::kFree), spring);
 }
 
 }  // namespace gravitas

@@ -39,7 +39,7 @@ struct JointLimits {
 struct JointSpring {
   double stiffness = 0.0, damping = 0.0;
 
-  // The next two properties; a request that was recorded before a joint had them may end here.
+  // The next two properties, refused if negative; a request that was recorded before a joint had them may end here.
   static JointSpring of(PropertyCursor* properties);
   bool is_none() const { return stiffness == 0.0 && damping == 0.0; }
   // As one of the axes (0 ... 2) of a discrepancy, whose error is counted from where the spring is at rest.
@@ -47,6 +47,8 @@ struct JointSpring {
 };
 void write_spring(const JointSpring& spring, BoundWriter* out);
 JointSpring read_spring(PropertyCursor* bound);
+// A row (its first axis) that the spring holds, as far as it does.
+Discrepancy sprung(Discrepancy row, const JointSpring& spring);
 
 // A frame with its origin at `origin` and its first axis along a unit vector (world).
 Pose frame_along(const Vector3& origin, const Vector3& first);
@@ -77,8 +79,9 @@ Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle,
 Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& other);
 
 // The turn of frame 2 against frame 1, a rotation vector in the axes of frame 1, as an angular discrepancy whose axes are all
-// free. Exact to first order in the step's turn.
+// free, or which a spring turns back about whatever axis. Exact to first order in the step's turn.
 Discrepancy turn_between(const Quaternion& frame1, const Quaternion& frame2);
+Discrepancy sprung_turn(const Quaternion& frame1, const Quaternion& frame2, const JointSpring& spring);
 
 // The frame of a hinge about the axis from one point to another (world): the first axis along it, the origin at its point next
 // to bodies.centre(), since with one far out ways and turns could not be told apart. Refuses points that name no axis.

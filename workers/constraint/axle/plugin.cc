@@ -12,8 +12,6 @@
 // start, however the wheel rolls; asin(sin(g) sin(angle)) where s and r make an angle g. Limits are one row, active at a
 // limit; a spring and a damper, torque -k (angle - SteeringAngle) - c angle', take no freedom. With a stiff spring
 // SteeringAngle is the angle that the wheel is steered to. They can tell less than a quarter turn either way.
-#include <cmath>
-
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -71,19 +69,17 @@ class Axle final : public ConstraintPlugin {
                 const Vector3 point = properties.vector();
                 const Vector3 steering = unit_axis(properties.vector(), "Axle: SteeringAxis");
                 const Vector3 rolling = unit_axis(properties.vector(), "Axle: RollingAxis");
-                const double stiffness = properties.number(), damping = properties.number();
+                const JointSpring suspension = JointSpring::of(&properties);
                 if (steering.cross(rolling).norm() < 1e-6)
                   throw Refusal("Axle: RollingAxis is parallel to SteeringAxis");
-                if (std::isnan(stiffness) && !std::isnan(damping))
+                if (suspension.stiffness == 0.0 && suspension.damping > 0.0)
                   throw Refusal("Axle: SuspensionDamping is given without SuspensionStiffness");
-                if (stiffness <= 0.0) throw Refusal("Axle: SuspensionStiffness is not positive");
                 const JointLimits limits = properties.at_end() ? JointLimits{} : steering_limits(&properties);
                 const JointSpring spring = JointSpring::of(&properties);
                 write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
                 write_frame(bodies.pose2, frame_along(point, rolling), &out);
                 out.number(swing_between(steering, rolling).angle);
-                out.number(std::isnan(stiffness) ? 0.0 : 1.0 / stiffness);
-                out.number(std::isnan(damping) ? 0.0 : damping);
+                write_spring(suspension, &out);
                 out.number(limits.lower);
                 out.number(limits.upper);
                 write_spring(spring, &out);
@@ -95,17 +91,13 @@ class Axle final : public ConstraintPlugin {
                      const stage::ConstraintDiscrepanciesReply& reply, Host&) override {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-      const double angle = bound.number(), compliance = bound.number(), damping = bound.number();
+      const double angle = bound.number();
+      const JointSpring suspension = read_spring(&bound);
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
-      const bool is_sprung = compliance > 0.0;
+      const bool is_sprung = !suspension.is_none();
       emit(held_point(one, two.position, {!is_sprung, true, true}));
       emit(swing_row(steering, rolling, angle));
-      if (is_sprung) {
-        Discrepancy spring = row_along(steering, one.position, two.position, AxisMode::kLocked);
-        spring.compliance.x() = compliance;
-        spring.damping.x() = damping;
-        emit(spring);
-      }
+      if (is_sprung) emit(sprung(row_along(steering, one.position, two.position, AxisMode::kFree), suspension));
       const Vector3 across = -(one.orientation * Vector3::UnitZ());
       JointLimits limits;
       limits.lower = bound.number();
@@ -119,9 +111,7 @@ class Axle final : public ConstraintPlugin {
       const JointSpring held = read_spring(&bound);
       if (held.is_none()) return;
       const Vector3 rest = exp_rotation(bound.number() * steering) * across;
-      Discrepancy sprung = swing_row(rest, rolling, kQuarterTurn, AxisMode::kFree);
-      held.yield_on(0, &sprung);
-      emit(sprung);
+      emit(sprung(swing_row(rest, rolling, kQuarterTurn), held));
     });
   }
 

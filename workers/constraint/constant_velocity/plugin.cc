@@ -63,10 +63,7 @@ class ConstantVelocity final : public ConstraintPlugin {
       emit(held_point(one, two.position, {true, true, true}));
       emit(twist_row(one.orientation, two.orientation, AxisMode::kLocked, &scale));
       const JointSpring spring = read_spring(&bound);
-      if (spring.is_none()) return;
-      Discrepancy bend = turn_between(one.orientation, two.orientation);
-      for (int axis = 0; axis < 3; ++axis) spring.yield_on(axis, &bend);
-      emit(bend);
+      if (!spring.is_none()) emit(sprung_turn(one.orientation, two.orientation, spring));
     });
   }
 };

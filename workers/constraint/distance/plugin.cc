@@ -11,7 +11,6 @@
 // rope is slack there, a rod of length 0 is refused.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "plugin_sdk/joint_rows.h"
@@ -22,7 +21,6 @@ namespace {
 
 // A distance that a scene gives with few digits is put right in the first step.
 constexpr double kGivenDigits = 1e-3;
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 class Distance final : public ConstraintPlugin {
  public:
@@ -61,19 +59,16 @@ class Distance final : public ConstraintPlugin {
                 if (is_rod) least = most = start;
                 if (std::isnan(least)) least = 0.0;
                 if (std::isnan(most)) most = kUnlimited;
-                const bool has_spring = !properties.at_end();
-                const double stiffness = has_spring ? properties.number() : kNone;
-                const double damping = has_spring ? properties.number() : kNone;
-                if (std::isnan(stiffness) && !std::isnan(damping))
-                  throw Refusal("Distance: Damping is given without Stiffness");
+                const JointSpring spring = JointSpring::of(&properties);
+                const bool is_rigid = spring.stiffness == 0.0;
+                if (is_rigid && spring.damping > 0.0) throw Refusal("Distance: Damping is given without Stiffness");
                 // with a spring it may start beyond them
-                demand_range(least, most, std::isnan(stiffness) ? start : std::max(least, std::min(start, most)));
+                demand_range(least, most, is_rigid ? start : std::max(least, std::min(start, most)));
                 out.vector(inverse_transform_point(bodies.pose1, point1));
                 out.vector(inverse_transform_point(bodies.pose2, point2));
                 out.number(least);
                 out.number(most);
-                out.number(std::isnan(stiffness) ? 0.0 : 1.0 / stiffness);
-                out.number(std::isnan(damping) ? 0.0 : damping);
+                write_spring(spring, &out);
               });
   }
 
@@ -89,8 +84,9 @@ class Distance final : public ConstraintPlugin {
       d.modes |= kRadialDiscrepancy;
       d.lower.x() = bound.number();
       d.upper.x() = bound.number();
-      d.compliance.x() = bound.number();
-      d.damping.x() = bound.number();
+      const JointSpring spring = read_spring(&bound);
+      if (spring.stiffness > 0.0) d.compliance.x() = 1.0 / spring.stiffness;
+      d.damping.x() = spring.damping;
       emit(d);
     });
   }

@@ -95,9 +95,8 @@ class Slider final : public ConstraintPlugin {
 
       const JointSpring spring = read_spring(&bound);
       if (spring.is_none()) return;
-      Discrepancy sprung = row_along(axis, one.position + bound.number() * axis, two.position, AxisMode::kFree);
-      spring.yield_on(0, &sprung);
-      emit(sprung);
+      const Vector3 rest = one.position + bound.number() * axis;
+      emit(sprung(row_along(axis, rest, two.position, AxisMode::kFree), spring));
     });
   }
 };

@@ -175,11 +175,7 @@ class Spherical final : public ConstraintPlugin {
   static void describe_turns(PropertyCursor bound, const JointBodies& bodies, Emit&& emit) {
     const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
     const JointSpring spring = read_spring(&bound);
-    if (!spring.is_none()) {
-      Discrepancy turn = turn_between(one.orientation, two.orientation);
-      for (int axis = 0; axis < 3; ++axis) spring.yield_on(axis, &turn);
-      emit(turn);
-    }
+    if (!spring.is_none()) emit(sprung_turn(one.orientation, two.orientation, spring));
     JointLimits twist;
     twist.lower = bound.number();
     twist.upper = bound.number();

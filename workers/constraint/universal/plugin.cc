@@ -55,9 +55,7 @@ class Universal final : public ConstraintPlugin {
                 write_frame(bodies.pose1, cross_frame(point, axis1, axis2), &out);
                 write_frame(bodies.pose2, cross_frame(point, axis2, axis1), &out);
                 out.number(swing_between(axis1, axis2).angle);
-                for (int bar = 0; bar < 2; ++bar) {
-                  write_spring(JointSpring::of(&properties), &out);
-                }
+                for (int bar = 0; bar < 2; ++bar) write_spring(JointSpring::of(&properties), &out);
               });
   }
 
@@ -69,18 +67,11 @@ class Universal final : public ConstraintPlugin {
       const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
       emit(swing_row(axis1, axis2, bound.number()));
       const JointSpring spring1 = read_spring(&bound), spring2 = read_spring(&bound);
-      if (!spring1.is_none()) emit_sprung(one.orientation * Vector3::UnitZ(), axis2, spring1, emit);
-      if (!spring2.is_none()) emit_sprung(axis1, two.orientation * Vector3::UnitZ(), spring2, emit);
+      // of a direction of either body, across each other at the start
+      const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
+      if (!spring1.is_none()) emit(sprung(swing_row(across1, axis2, kQuarterTurn), spring1));
+      if (!spring2.is_none()) emit(sprung(swing_row(axis1, across2, kQuarterTurn), spring2));
     });
-  }
-
- private:
-  // Of a direction of either body, across each other at the start.
-  template <typename Emit>
-  static void emit_sprung(const Vector3& first, const Vector3& second, const JointSpring& spring, Emit&& emit) {
-    Discrepancy row = swing_row(first, second, kQuarterTurn, AxisMode::kFree);
-    spring.yield_on(0, &row);
-    emit(row);
   }
 };
 
