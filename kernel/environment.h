@@ -338,8 +338,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last
   Extrapolation extrapolation_, jumps_;
-  static constexpr std::uint32_t kMostPieces = 8;                                    // of a part that is extrapolated
-  std::vector<double> first_changes_[kMostPieces], trial_changes_, second_changes_;  // of velocities
+  static constexpr std::uint32_t kMostPieces = 8;                            // of a part that is extrapolated
+  std::vector<double> first_changes_[kMostPieces], trial_changes_, missed_;  // of velocities
   double margin_ = 0.0;
 
   Activity activity_;

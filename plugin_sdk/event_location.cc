@@ -10,6 +10,17 @@ namespace {
 // Of the gap that is not told from touching: overlap at which a pair that no contact was found for counts as pressed.
 constexpr double kMostUnseen = 1e4;
 
+// Of the slip with the arms that the trial ends with: what is slower in one of the ways a contact may have moved, sticks.
+constexpr double kSticks = 0.1;
+
+// When a pair meets that the straight motion lets meet at a time: later, if it is drawn together.
+double accelerated_time(const Encounter& encounter, double acceleration, double time) {
+  if (!(acceleration < 0.0)) return time;
+  const double way = -0.5 * (encounter.start_speed + encounter.end_speed) * time, speed = encounter.start_speed;
+  const double root = std::sqrt(speed * speed - 2.0 * acceleration * way);
+  return std::max(time, speed <= 0.0 ? 2.0 * way / (root - speed) : (speed + root) / -acceleration);
+}
+
 }  // namespace
 
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight) {
@@ -37,8 +48,33 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
     // grazing, the last part of the way is not worth a step of its own
     return {closing * (length - time) <= 2.0 * target_gap ? length : time + 2.0 * target_gap / closing};
   }
-  if (length > 2.5 * time) return {2.0 * time, true};
+  if (const double met = accelerated_time(encounter, acceleration, time); length > 2.5 * met) return {2.0 * met, true};
   return {time * (closing > bend ? std::max(0.5, 1.0 - 2.0 * bend * (length - time) / (closing * time)) : 0.5)};
+}
+
+Vector3 start_slip(const Vector3& point1, const Vector3& point2, const Vector3& normal, const TrialMotion& one,
+                   const TrialMotion& two) {
+  const Quaternion turn1 = one.end.orientation * one.start.orientation.conjugate();
+  const Quaternion turn2 = two.end.orientation * two.start.orientation.conjugate();
+  const Quaternion turn =
+      Quaternion::FromTwoVectors(two.start.position - one.start.position, two.end.position - one.end.position);
+  const Vector3 arm1 = point1 - one.end.position, arm2 = point2 - two.end.position;
+  const auto across = [&](const Vector3& relative) { return Vector3(relative - normal.dot(relative) * normal); };
+  // with the point where it was when the trial began, and how directions turn with the normal
+  const auto slip = [&](const Vector3& point, const Quaternion& directions) {
+    const Vector3 velocity1 = one.velocity.linear + one.velocity.angular.cross(point - one.start.position);
+    const Vector3 velocity2 = two.velocity.linear + two.velocity.angular.cross(point - two.start.position);
+    return across(directions * (velocity2 - velocity1));
+  };
+  const auto from_one = [&](const Quaternion& way) { return Vector3(one.start.position + way.conjugate() * arm1); };
+  const auto from_two = [&](const Quaternion& way) { return Vector3(two.start.position + way.conjugate() * arm2); };
+  Vector3 slowest = slip(from_one(turn1), turn2);
+  for (const Vector3& other : {slip(from_two(turn2), turn1), slip(from_one(turn2), turn2), slip(from_two(turn1), turn1),
+                               slip(from_one(turn), turn)})
+    if (other.squaredNorm() < slowest.squaredNorm()) slowest = other;
+  const Vector3 with_arms_of_end = across(two.velocity.linear + two.velocity.angular.cross(arm2) - one.velocity.linear -
+                                          one.velocity.angular.cross(arm1));
+  return slowest.norm() < kSticks * with_arms_of_end.norm() ? slowest : with_arms_of_end;
 }
 
 void Slide::add(const Vector3& normal, double friction, const Vector3& start_velocity, const Vector3& end_velocity,

@@ -3,6 +3,8 @@
 // m/s, positive when the bodies part; times in s.
 #pragma once
 
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/pose.h"
 #include "plugin_sdk/math/types.h"
 
 namespace gravitas {
@@ -33,6 +35,20 @@ struct NextStop {
 // little after the meeting, two target gaps deep, so that the contact is closed; a pair that comes so near without touching
 // goes on so far, too, and deeper each time while no contact is found.
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight);
+
+// A body in a trial: where it starts and ends, and how fast it starts.
+struct TrialMotion {
+  Pose start, end;
+  Twist velocity;
+};
+
+// Velocity (m/s) of body 2 relative to body 1 across the normal, where they touched when the trial began, in directions of
+// its end: `point1` and `point2`, of their surfaces, and the unit normal are those of the contact then. What slides is taken
+// with the arms it has then. What sticks or rolls does not: it would slip as fast as it turns within the trial. Where its
+// contact was before depends on the shapes: at a corner or edge of the one it moves with the material of the one and its normal
+// with the other, under something round it keeps its place, seen from the other, or from the line of the centres.
+Vector3 start_slip(const Vector3& point1, const Vector3& point2, const Vector3& normal, const TrialMotion& one,
+                   const TrialMotion& two);
 
 // Two bodies whose surfaces slide on each other, in a trial with its solution: sums over their contacts, each weighted
 // with the largest friction that it bears, mu lambda_N.

@@ -24,6 +24,7 @@ constexpr double kOfJump = 0.125;
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
 constexpr double kShorter = 0.25, kLonger = 4.0;
 constexpr double kConverges = 0.5;  // share of the error that a piece more leaves, at most
+constexpr double kSettled = 0.01;   // share of the accuracy: lesser errors need not converge while jumps are looked at
 
 // The numbers of a state; attitudes q, which are the same as -q, on the side of those at the start.
 void put(const State& state, const State& start, std::uint32_t bodies, Extrapolation* extrapolation) {
@@ -113,7 +114,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       double jump = 0.0;
       for (const double change : jumps_.best()) jump = std::max(jump, std::fabs(change) * most_of_jump);
       if (std::max(now, jump) <= description_.accuracy && pieces > first) enough = pieces;
-      const bool converges = pieces <= 2 || now <= kConverges * error;
+      const bool converges = pieces <= 2 || now <= std::max(kConverges * error, kSettled * description_.accuracy);
       error = now;
       if (!converges) break;
     }

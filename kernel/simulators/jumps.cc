@@ -2,9 +2,10 @@
 // speed, a rope that comes taut in the first inner step of every attempt. What acts where that step ends then acts all of it,
 // in each of them alike, and the results agree on what is wrong by the jump times the time until it.
 //
-// Shorter inner steps, each an eighth of the one before, tell it: one that ends before the jump misses the change of
-// velocities that the attempts foretell, and one more as long as theirs does not make up for it. What closes a gap of
-// rounding has done so by then, and is no jump.
+// Shorter inner steps, each an eighth of the one before, tell it: those that end before the jump miss of the change of
+// velocities that the attempts foretell as much as the jump makes in their time, and the shorter the less. What a smooth motion
+// misses, since its changes are no polynomial of the step, is prod(1 - s/h) of the attempts' steps h in a step s: the shorter
+// the more; and so is what closes a gap of rounding.
 #include <algorithm>
 #include <cmath>
 
@@ -18,7 +19,7 @@ constexpr double kSeen = 1.0 / 64.0;      // of the accuracy; an eighth's eighth
 constexpr double kOfError = 2.0;          // that the extrapolation leaves
 constexpr double kRounding = 1e-12;       // m/s or rad/s
 constexpr double kShortestTrial = 1e-10;  // of the part
-constexpr double kRemains = 0.5;          // of what is missed
+constexpr double kUncertain = 0.25;       // share of what a smooth motion misses
 
 }  // namespace
 
@@ -48,27 +49,30 @@ bool Environment::hides_jump(double begin, double length, std::uint32_t first, s
     }
     return changes[first - 1];
   };
+  const auto of_smooth = [&](double step) {
+    double product = 1.0;
+    for (std::uint32_t n = first; n <= pieces; ++n) product *= 1.0 - step * n / length;
+    return product;
+  };
   const double allowed = std::max(kSeen * description_.accuracy + kOfError * error, kRounding);
   double step = fine_step / kShorterTrial;
+  missed_.clear();
   for (double largest = 2.0 * allowed; largest > allowed && step > kShortestTrial * length; step /= kShorterTrial) {
     front_ = front, back_ = back;
     if (!make_piece(begin, step, 0, 1) || must_restart_) return true;
     find_changes(&trial_changes_);
+    const bool is_first = missed_.empty();
+    missed_.resize(trial_changes_.size(), 0.0);
+    const double kept = of_smooth(step * kShorterTrial) / of_smooth(step);
     largest = 0.0;
-    double missed = 0.0;
     for (std::size_t k = 0; k < trial_changes_.size(); ++k) {
-      const double expected = foretold(k, step);
-      missed = std::max(missed, std::fabs(trial_changes_[k] - expected));
+      const double expected = foretold(k, step), missed = trial_changes_[k] - expected;
       largest = std::max({largest, std::fabs(trial_changes_[k]), std::fabs(expected)});
-    }
-    if (missed <= allowed) continue;
-    front_ = back_, back_ = kSpareState;
-    if (!make_piece(begin + step, fine_step, 0, 1) || must_restart_) return true;
-    find_changes(&second_changes_);
-    for (std::size_t k = 0; k < trial_changes_.size(); ++k) {
-      const double alone = trial_changes_[k] - foretold(k, step);
-      const double both = trial_changes_[k] + second_changes_[k] - foretold(k, step + fine_step);
-      if (std::fabs(alone) > allowed && std::fabs(both) > kRemains * std::fabs(alone)) return true;
+      const double of_jump = missed_[k] - kept * missed;
+      if (!is_first && std::fabs(of_jump) > std::max(allowed, kUncertain * std::fabs(missed)) &&
+          std::fabs(missed_[k]) > std::fabs(missed))
+        return true;
+      missed_[k] = missed;
     }
   }
   return false;

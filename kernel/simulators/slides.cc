@@ -29,15 +29,28 @@ constexpr double kSlideShare = 1e-9;     // of the slide: how closely its end is
 std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<TrialState> trial, double begin,
                                                                        double* length, bool has_found_contacts) {
   const double shortest = kShortestSlide * length_of_step(step_count_ + 1);
+  const auto surface = [&](std::size_t contact, double side) {
+    return Vector3(vector_at(data_.contact_point.span(), contact) +
+                   0.5 * side * data_.contact_depth[contact] * vector_at(data_.contact_normal.span(), contact));
+  };
+  const auto motion = [&](std::uint32_t body) {
+    return TrialMotion{
+        {vector_at(front().position.span(), body), quaternion_at(front().orientation.span(), body)},
+        {vector_at(data_.trial_position.span(), body), quaternion_at(data_.trial_orientation.span(), body)},
+        {vector_at(start_linear_velocity().span(), body), vector_at(start_angular_velocity().span(), body)}};
+  };
+  const auto slip_before = [&](std::size_t contact) {
+    const std::uint32_t* pair = &data_.contact_body[2 * contact];
+    return start_slip(surface(contact, 1.0), surface(contact, -1.0), vector_at(data_.contact_normal.span(), contact),
+                      motion(pair[0]), motion(pair[1]));
+  };
   // velocity of b relative to a where body b's surface is, or a's
-  const auto slip = [&](std::size_t contact, const Column<double>& linear, const Column<double>& angular) {
+  const auto slip_after = [&](std::size_t contact) {
     const auto at = [&](std::size_t end, double side) {
       const std::uint32_t body = data_.contact_body[2 * contact + end];
-      const Vector3 surface =
-          vector_at(data_.contact_point.span(), contact) +
-          0.5 * side * data_.contact_depth[contact] * vector_at(data_.contact_normal.span(), contact);
-      const Vector3 arm = surface - vector_at(data_.trial_position.span(), body);
-      return Vector3(vector_at(linear.span(), body) + vector_at(angular.span(), body).cross(arm));
+      const Vector3 arm = surface(contact, side) - vector_at(data_.trial_position.span(), body);
+      return Vector3(vector_at(data_.solved_linear_velocity.span(), body) +
+                     vector_at(data_.solved_angular_velocity.span(), body).cross(arm));
     };
     return Vector3(at(1, -1.0) - at(0, 1.0));
   };
@@ -57,8 +70,7 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
         const Vector3 normal = vector_at(data_.contact_normal.span(), i);
         const Vector3 impulse = vector_at(data_.contact_impulse.span(), i);
         const double* material = &data_.contact_material[kMaterialColumns * i];
-        slide.add(normal, material[kDynamicFriction], slip(i, start_linear_velocity(), start_angular_velocity()),
-                  slip(i, data_.solved_linear_velocity, data_.solved_angular_velocity), impulse);
+        slide.add(normal, material[kDynamicFriction], slip_before(i), slip_after(i), impulse);
         if (!(material[kRollingFriction] > 0.0 || material[kSpinningFriction] > 0.0)) continue;
         // as slides at the distance of the nearer centre of what can move
         double arm = std::numeric_limits<double>::infinity();

@@ -56,14 +56,15 @@ void IslandSolver::find_pose() {
     // the steps know how directions turn, but not inertia: bodies with a small moment end slowly, or run away
     shrinks_slowly_ = shrinks_slowly_ || (steps.count() > kStepsAlone && change > kSlow * last_change);
     last_change = change;
-    move_to_end(shrinks_slowly_ && !is_last ? accelerated(next, &acceleration) : std::move(next));
+    move_to_end(shrinks_slowly_ && !is_last ? accelerated(displacement_, next, &acceleration) : std::move(next));
     keep_corrections();
     if (!is_last && may_chord) is_last = follow_chords(change);
   }
   settings_.is_rough = false;
 }
 
-BodyMotion IslandSolver::accelerated(const BodyMotion& image, AndersonAcceleration* acceleration) const {
+BodyMotion IslandSolver::accelerated(const BodyMotion& from, const BodyMotion& image,
+                                     AndersonAcceleration* acceleration) const {
   // turns in the measure of ways
   const auto packed = [&](const BodyMotion& motion) {
     Eigen::VectorXd all(static_cast<Eigen::Index>(6 * pushed_.size()));
@@ -74,7 +75,7 @@ BodyMotion IslandSolver::accelerated(const BodyMotion& image, AndersonAccelerati
     }
     return all;
   };
-  const Eigen::VectorXd mixed = acceleration->next(packed(displacement_), packed(image));
+  const Eigen::VectorXd mixed = acceleration->next(packed(from), packed(image));
   BodyMotion next = image;
   Eigen::Index at = 0;
   for (const std::uint32_t i : pushed_) {

@@ -51,7 +51,7 @@ ConeSummary IslandSolver::solve(Host& host) {
     failures = has_velocity_ || goes_on ? 0 : failures + 1;
     if (failures == 2) break;
   }
-  if (!has_settled_ && !contacts_.empty() && !joints_.empty()) leave_out_wandering(last_change);
+  if (!has_settled_ && !contacts_.empty() && !joints_.empty() && !has_stiff_springs()) leave_out_wandering(last_change);
   // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
   summary_.contradiction = std::max(summary_.contradiction, pose_contradiction_);
   summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
@@ -76,6 +76,19 @@ void IslandSolver::leave_out_wandering(double last_change) {
   }
   find_closed();
   solve_velocity();
+}
+
+bool IslandSolver::has_stiff_springs() const {
+  for (const EndJoint& joint : joints_) {
+    const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double gamma = velocity_law_of(joint, k).gamma;
+      if (gamma == 0.0) continue;
+      const ConstraintDirection row = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
+      if (row.product(row, one.inverse_mass + two.inverse_mass) > gamma) return true;
+    }
+  }
+  return false;
 }
 
 IslandSolver::PoseChange IslandSolver::pose_change() const {

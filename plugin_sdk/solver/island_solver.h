@@ -36,8 +36,11 @@ class IslandSolver {
   static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;
 
   // What friction displaces may send joints and contacts to where it is another (a light link between the ground and what falls on
-  // it), round by round. Where the last change was much, or left joints open, it is left out.
+  // it), round by round. Where the last change was much, or left joints open, it is left out. Not where stiff springs hold against it:
+  // they would turn their bodies alone.
   void leave_out_wandering(double last_change);
+  // Does a spring take away more of a velocity than it leaves?
+  bool has_stiff_springs() const;
   // What joints miss, m.
   double open() const;
 
@@ -104,7 +107,7 @@ class IslandSolver {
   void find_pose();
 
   // Where the next step begins after one to `image`: there, or beyond what steps that shrink slowly tell.
-  BodyMotion accelerated(const BodyMotion& image, AndersonAcceleration* acceleration) const;
+  BodyMotion accelerated(const BodyMotion& from, const BodyMotion& image, AndersonAcceleration* acceleration) const;
 
   // True where no motion meets all contacts, as of bodies that lie in one place and each push the next away. They give way
   // then (least squares), so that the others are met: next step's contacts are those of where that left the bodies.
@@ -233,6 +236,7 @@ class IslandSolver {
   double drives_contradict_ = 0.0;  // joints or each other, m/s
   std::vector<double> reach_;       // of drives that yield
   double missed_ = 0.0;             // by the pose change, m
+  AndersonAcceleration offsets_;    // from round to round
   bool shrinks_slowly_ = false;     // its steps
 };
 

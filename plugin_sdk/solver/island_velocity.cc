@@ -309,7 +309,8 @@ bool IslandSolver::set_offset(double share) {
       push(cone_.rows[contact.first + k], cone_.rows[contact.first + k].multiplier);
   shorten(driven_, &next);
   const bool changes = is_change(next, offset_, 0.0);
-  offset_ = std::move(next);
+  offset_ =
+      changes && !joints_.empty() && round_ >= kFreeRounds ? accelerated(offset_, next, &offsets_) : std::move(next);
   keep_moments_of_offset();
   return changes;
 }

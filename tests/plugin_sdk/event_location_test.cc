@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plugin_sdk/math/rotation.h"
+
 namespace gravitas {
 namespace {
 
@@ -140,13 +142,73 @@ TEST(NextStop, FollowsAFlightToItsTopThoughTheStraightMotionMeetsBefore) {
   EXPECT_NEAR(stop_before({1e-5, 2e-10, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
 }
 
+// 1e-10 m up, down at 2e-5 m/s: the straight motion to 0.5 mm below, after 10 ms, meets the floor a thousand times sooner.
+TEST(NextStop, LooksAgainWhereWhatIsDrawnTogetherMeets) {
+  constexpr double kWay = 1e-10, kSpeed = 2e-5;
+  const NextStop stop =
+      stop_before(Flight{kTargetGap + kWay, -kSpeed}.encounter(0.01), 0.01, kTargetGap, kShortestFlight);
+  EXPECT_TRUE(stop.is_trial);
+  const double met = (std::sqrt(kSpeed * kSpeed + 2.0 * kGravity * kWay) - kSpeed) / kGravity;
+  EXPECT_NEAR(stop.length, 2.0 * met, 1e-12);
+}
+
 TEST(NextStop, TakesFlightsLowerThanTheTargetForRest) {
   EXPECT_EQ(stop_before({0.0, 0.0, 1e-6, -0.04}, 0.004, 1e-10, 1e-9).length, 0.004);
 }
 
-// ---- slides -------------------------------------------------------------------------------------
-
 const Vector3 kUp(0, 1, 0);
+
+// ---- slips at the start of a trial ---------------------------------------------------------------
+
+constexpr double kTrial = 0.02;
+
+// A body that turns steadily about a point, told by where a trial starts.
+TrialMotion turning_about(const Vector3& centre, const Vector3& rate, const Vector3& at) {
+  const Quaternion turn = exp_rotation(kTrial * rate);
+  return {{at, Quaternion::Identity()}, {centre + turn * (at - centre), turn}, {rate.cross(at - centre), rate}};
+}
+
+// On a plate that turns about an edge, 0.1 m below its face, a ball of 0.2 m stays where it is on the plate, and rolls about
+// its own centre.
+TEST(StartSlip, OfABallThatRollsOnATurningPlateIsThatOfItsStart) {
+  const Vector3 rate(0, 0, 3.0), own(0, 0, 5.0);
+  const TrialMotion plate = turning_about(Vector3::Zero(), rate, Vector3(0.5, -0.1, 0));
+  TrialMotion ball = turning_about(Vector3::Zero(), rate, Vector3(0.4, 0.2, 0));
+  ball.velocity.angular = rate + own;
+  ball.end.orientation = exp_rotation(kTrial * ball.velocity.angular);
+  const Vector3 normal = exp_rotation(kTrial * rate) * kUp, point = ball.end.position - 0.2 * normal;
+  // the ball's surface goes along the plate as fast as it turns against it
+  const Vector3 slip = start_slip(point, point, normal, plate, ball);
+  EXPECT_NEAR(slip.norm(), 1.0, kTrial * (rate + own).norm());
+  EXPECT_NEAR(slip.dot(normal), 0.0, 1e-15);
+  // and at the velocity that makes up for it not at all
+  ball.velocity.linear -= Vector3(1.0, 0, 0);
+  EXPECT_NEAR(start_slip(point, point, normal, plate, ball).norm(), 0.0, 1e-15);
+  EXPECT_NEAR(start_slip(point, point, -normal, ball, plate).norm(), 0.0, 1e-15);
+}
+
+// A rod tips over its lower end, which sticks to the ground; and a plate turns on a corner of something that stands.
+TEST(StartSlip, OfACornerThatSticksIsNone) {
+  const TrialMotion still{};
+  const Vector3 corner(0.3, 0, 0.1);
+  const TrialMotion rod = turning_about(corner, {0.7, 0.2, -2.0}, Vector3(0.5, 1.0, 0));
+  EXPECT_NEAR(start_slip(corner, corner, kUp, still, rod).norm(), 0.0, 1e-15);
+  const Vector3 normal = rod.end.orientation * kUp;
+  EXPECT_NEAR(start_slip(corner, corner, normal, rod, still).norm(), 0.0, 1e-15);
+}
+
+// Wheels of 0.1 and 0.3 m that turn on each other, the one about the other's centre.
+TEST(StartSlip, OfABallThatRollsOnABallIsNone) {
+  const double about = 2.0;  // rad/s of the line of the centres
+  const TrialMotion inner{{Vector3::Zero(), Quaternion::Identity()}, {Vector3::Zero(), Quaternion::Identity()}, {}};
+  TrialMotion outer = turning_about(Vector3::Zero(), Vector3(0, 0, about), Vector3(0.4, 0, 0));
+  outer.velocity.angular = Vector3(0, 0, 4.0 * about);
+  outer.end.orientation = exp_rotation(kTrial * outer.velocity.angular);
+  const Vector3 normal = outer.end.position.normalized();
+  EXPECT_NEAR(start_slip(0.3 * normal, 0.3 * normal, normal, inner, outer).norm(), 0.0, 1e-15);
+}
+
+// ---- slides -------------------------------------------------------------------------------------
 
 // mu g = 3 m/s^2 on 2 kg, in a trial of `length` of a slide that began at 3 m/s.
 Slide slide_of(double length, double end_speed, double friction_impulse) {

@@ -92,6 +92,59 @@ TEST_F(AccuracyAtJumps, LastingContactsDoNoWork) {
   }
 }
 
+// A disc of the given energy falls nearly flat on a floor without friction and rises again: its weight is on one point of the
+// rim, which goes all around it within some milliseconds. That fast but smooth change was taken for jumps.
+TEST_F(AccuracyAtJumps, FastChangesAreNone) {
+  for (const double accuracy : {1e-6, 1e-8, 1e-10}) {
+    SceneRun run(
+        "Geometries { Geometry { Type = \"Halfspace\" Id = \"F\" }\n"
+        "Geometry { Type = \"Cylinder\" Id = \"B\" CustomProperties { Radius = 0.2 Height = 0.04 } } }\n"
+        "Materials { Material { Id = \"M\" RestitutionCoefficient = 0 StaticFrictionCoefficient = 0 } }\n"
+        "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+        "Environment { Space { Bodies {\n"
+        "Body { Id = \"Floor\" GeometryId = \"F\" Material = \"M\" }\n"
+        "Body { Id = \"Disc\" GeometryId = \"B\" Material = \"M\" Mass = 1 Forces = {\"G\"} KineticProperties {\n"
+        "Position = {0, 0.0963048883417878, 0} Orientation = {0.9800665778412416, 0.19866933079506122, 0, 0}\n"
+        "LinearVelocity = {0.2, 0, 0} AngularVelocity = {0, 7.84212198800577, 0.7788366846173009} } }\n"
+        "} } }\n",
+        {"Simulator=Continuous", "Integrator=Verlet", "Solver=Newton", set("Simulator.TimeStep", 1.0 / 60.0),
+         set("Simulator.Accuracy", accuracy), set("Simulator.Duration", 0.2)});
+    const double start = run.energy();
+    run.to_end();
+    EXPECT_NEAR(run.energy(), start, 20.0 * accuracy * start) << accuracy;
+  }
+}
+
+// Two links with springs in their hinges, which touch nothing, against `Smooth` with a method of order 8.
+TEST_F(AccuracyAtJumps, SprungLinksAreSmooth) {
+  const std::string links =
+      "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+      "Environment { Space { Bodies {\n"
+      "Body { Id = \"L0\" Mass = 2.1 PrincipalMoments = {0.0026, 0.0258, 0.0258} Forces = {\"G\"} KineticProperties { "
+      "Position = {0.124, 0.1077, 0} } }\n"
+      "Body { Id = \"L1\" Mass = 1.2 PrincipalMoments = {0.0014, 0.0137, 0.0137} Forces = {\"G\"} KineticProperties { "
+      "Position = {0.341, 0.0903, 0} } }\n"
+      "} }\nConstraints {\n"
+      "Constraint { Type = \"Revolute\" Id = \"J0\" Body2 = \"L0\" CustomProperties { BindAxisPoint1 = {0, 0, 0} "
+      "BindAxisPoint2 = {0, 0, 1} Stiffness = 38 RestAngle = 0.38 } }\n"
+      "Constraint { Type = \"Revolute\" Id = \"J1\" Body1 = \"L0\" Body2 = \"L1\" CustomProperties { BindAxisPoint1 = "
+      "{0.248, 0.2154, 0} BindAxisPoint2 = {0.248, 0.2154, 1} Stiffness = 45 RestAngle = -0.6 } }\n"
+      "} }\n";
+  const auto end = [&](const std::vector<std::string>& settings) {
+    SceneRun run(links, settings);
+    run.to_end();
+    return run.body("L1").pose.position;
+  };
+  const std::string step = set("Simulator.TimeStep", 1.0 / 60.0), duration = set("Simulator.Duration", 0.1);
+  const Vector3 exact = end({step, duration, "Simulator=Smooth", "Integrator=DormandPrince853",
+                             set("Integrator.Accuracy", 1e-12), "Solver=Direct"});
+  for (const double accuracy : {1e-6, 1e-8}) {
+    const Vector3 found = end({step, duration, "Simulator=Continuous", set("Simulator.Accuracy", accuracy),
+                               "Integrator=Verlet", "Solver=Newton"});
+    EXPECT_LT((found - exact).norm(), 20.0 * accuracy) << accuracy;
+  }
+}
+
 // A load that falls through the speed of a drive of half its weight: pushed down before, held after.
 TEST_F(AccuracyAtJumps, DrivesReachTheirSpeed) {
   constexpr double kEnd = 0.5;

@@ -1,6 +1,7 @@
 // Springs and dampers on the axes of joints: where they come to rest, how they swing, and that a wheel is steered by them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -43,6 +44,69 @@ class JointSprings : public ::testing::Test {
     return root([&](double angle) { return -kStiffness * (angle - rest) - kG * kArm * std::cos(angle); });
   }
 };
+
+// Two boxes on a joint whose spring is unloaded fall 1 m on a corner: what the spring takes up is energy that they do not have.
+TEST_F(JointSprings, StiffOnesGainNothingInImpacts) {
+  const std::string bodies =
+      "Geometries { Geometry { Type = \"Halfspace\" Id = \"F\" }\n"
+      "Geometry { Type = \"Box\" Id = \"B\" CustomProperties { HalfExtents = {0.08, 0.25, 0.1} } } }\n"
+      "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+      "Environment { CollisionFilter { DefaultAllow = true Rules { Rule { Allow = false Bodies = {\"P\", \"Q\"} } } }\n"
+      "Space { Bodies { Body { Id = \"Floor\" GeometryId = \"F\" }\n"
+      "Body { Id = \"P\" GeometryId = \"B\" Mass = 3 Forces = {\"G\"} KineticProperties { Position = {-0.109, 1.482, "
+      "0.279} "
+      "Orientation = {0.6860877458807263, 0.6773903651980065, 0, 0.265378782289043} } }\n"
+      "Body { Id = \"Q\" GeometryId = \"B\" Mass = 2 Forces = {\"G\"} KineticProperties { Position = {0.167, 1.251, "
+      "-0.001} "
+      "Orientation = {0.29066074940412484, -0.00755288058481469, 0, -0.9567963643067965} } } } }\n"
+      "Constraints { Constraint { Id = \"J\" Body1 = \"P\" Body2 = \"Q\" ";
+  const std::vector<std::string> joints = {
+      "Type = \"Spherical\" CustomProperties { BindPoint = {0, 1.5, 0} Stiffness = 1e4 }",
+      "Type = \"Spherical\" CustomProperties { BindPoint = {0, 1.5, 0} Stiffness = 1e6 }",
+      "Type = \"ConstantVelocity\" CustomProperties { BindPoint = {0, 1.5, 0} Axis1 = {-0.6, 0.7, 0.4} Axis2 = {-0.6, "
+      "0.7, "
+      "0.4} BendStiffness = 1e6 }"};
+  for (const std::string solver : {"Newton", "Direct"})
+    for (const std::string& joint : joints) {
+      SceneRun run(bodies + joint + " } } }\n",
+                   {set("Simulator.TimeStep", 1.0 / 60.0), set("Simulator.Duration", 1.0), "Solver=" + solver});
+      const double start = run.energy();
+      double highest = start;
+      while (run.time() < 1.0 - 1e-9) {
+        run.step();
+        highest = std::max(highest, run.energy());
+      }
+      // the method's own error in free fall is m g v h / 2
+      EXPECT_LT(highest, 1.05 * start) << joint << ' ' << solver;
+    }
+}
+
+// A push turns one of two free bodies on a joint that straightens itself with 1e8 N m/rad.
+TEST_F(JointSprings, StiffBendsStayClosed) {
+  const std::string scene =
+      "Forces { Force { Type = \"Basic\" Id = \"Kick\" CustomProperties { Force = {0, 0, 0.5} ApplicationPoint = {0, "
+      "0.2, 0} "
+      "Instantaneous = true } } }\n"
+      "Environment { Space { Bodies {\n"
+      "Body { Id = \"A\" Mass = 3 PrincipalMoments = {0.06, 0.006, 0.06} KineticProperties { Position = {0, -0.25, 0} "
+      "} }\n"
+      "Body { Id = \"B\" Mass = 2 PrincipalMoments = {0.004, 0.04, 0.04} Forces = {\"Kick\"} KineticProperties { "
+      "Position = "
+      "{0.25, 0, 0} } } } }\n"
+      "Constraints { Constraint { Id = \"J\" Type = \"ConstantVelocity\" Body1 = \"A\" Body2 = \"B\" CustomProperties "
+      "{ "
+      "BindPoint = {0, 0, 0} Axis1 = {0, 0.6, 0.8} Axis2 = {0, 0.6, 0.8} BendStiffness = 1e8 } } } }\n";
+  for (const std::string solver : {"Newton", "Direct"}) {
+    SceneRun run(scene, {set("Simulator.TimeStep", 1.0 / 60.0), set("Simulator.Duration", 1.0), "Solver=" + solver});
+    run.to_end();
+    const auto end = [&](const std::string& body, const Vector3& point) {
+      const Pose pose = run.body(body).pose;
+      return Vector3(pose.position + pose.orientation * point);
+    };
+    EXPECT_LT((end("A", {0, 0.25, 0}) - end("B", {-0.25, 0, 0})).norm(), 1e-12) << solver;
+    EXPECT_LT(run.energy(), 0.5 * 0.5 * 0.5 / 2.0 + 0.5 * 0.1 * 0.1 / 0.004) << solver;  // of B alone
+  }
+}
 
 TEST_F(JointSprings, RestWhereTheyBalanceTheLoad) {
   const Vector3 out(kArm, 0, 0), aslant(0.4, 0, 0.3);

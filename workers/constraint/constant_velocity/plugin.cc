@@ -63,7 +63,11 @@ class ConstantVelocity final : public ConstraintPlugin {
       emit(held_point(one, two.position, {true, true, true}));
       emit(twist_row(one.orientation, two.orientation, AxisMode::kLocked, &scale));
       const JointSpring spring = read_spring(&bound);
-      if (!spring.is_none()) emit(sprung_turn(one.orientation, two.orientation, spring));
+      if (spring.is_none()) return;
+      // across the shaft: about it, what the twist's row holds would be pushed by what the step foresees of the turn
+      Discrepancy bend = turn_between(one.orientation, two.orientation);
+      for (const int axis : {1, 2}) spring.yield_on(axis, &bend);
+      emit(bend);
     });
   }
 };
