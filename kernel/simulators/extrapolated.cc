@@ -6,8 +6,7 @@
 // shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. What flickers
 // would crumble the whole step: each part below kCrumb of it makes the finest a little longer. A jump in the first or the last
 // inner step of every attempt would look smooth; one of velocities shows in that step's change of them, which then does not
-// tend to 0 with the step, one of reactions in shorter steps (jumps.cc). Impacts of bodies that do not touch are found first,
-// as without an accuracy.
+// tend to 0 with the step, one of reactions in shorter steps (jumps.cc). Impacts are found first.
 #include <algorithm>
 #include <cmath>
 
@@ -23,8 +22,9 @@ constexpr double kCrumb = 1e-3, kCoarser = 1.02;
 constexpr double kOfJump = 0.125;
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
 constexpr double kShorter = 0.25, kLonger = 4.0;
-constexpr double kConverges = 0.5;  // share of the error that a piece more leaves, at most
-constexpr double kSettled = 0.01;   // share of the accuracy: lesser errors need not converge while jumps are looked at
+constexpr double kOfAccuracy = 1e-3, kNothing = 1e-12;  // m, m/s or rad/s: changes that count for none
+constexpr double kConverges = 0.5;                      // share of the error that a piece more leaves, at most
+constexpr double kSettled = 0.01;  // share of the accuracy: lesser errors need not converge while jumps are looked at
 
 // The numbers of a state; attitudes q, which are the same as -q, on the side of those at the start.
 void put(const State& state, const State& start, std::uint32_t bodies, Extrapolation* extrapolation) {
@@ -57,8 +57,7 @@ void Environment::extrapolate_parts(double begin, double length) {
     if (part < kCrumb * step) finest *= kCoarser;
     const bool ends_with_impact = part < std::min(wanted, left);
     const std::uint32_t pieces = part > finest ? pieces_to_accuracy(from, part, ends_with_impact) : 1;
-    has_failed = has_failed || pieces == 0;
-    if (pieces == 0) wanted = kShorter * part;
+    if (pieces == 0) wanted = kShorter * part, has_failed = true;
     for (std::uint32_t i = 0; i < pieces && !must_restart_; ++i) {
       if (!make_piece(from, part, i, pieces)) return;
       if (i > 0 && i + 1 == pieces) take_extrapolated();
@@ -118,9 +117,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       error = now;
       if (!converges) break;
     }
-    const bool is_refused = enough > 0 && sees_jumps && hides_jump(begin, length, first, enough, error);
+    if (enough > 0 && sees_jumps && hides_jump(begin, length, first, enough, error)) enough = 0;
     go_back();
-    if (is_refused) enough = 0;
   } catch (...) {
     go_back();
     throw;
@@ -128,15 +126,17 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
   return enough;
 }
 
-// Of bodies that it moves from where the last inner step has them; others keep every bit.
+// Of bodies that it moves. Other numbers stay: a difference of rounding alone would double from part to part.
 void Environment::take_extrapolated() {
   const State& end = back();
+  const double nothing = std::min(kOfAccuracy * description_.accuracy, kNothing);
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     if (!is_awake(i)) continue;
     const double* best = &extrapolation_.best()[kRow * i];
     set_quaternion(end.orientation.span(), i, Quaternion(best[0], best[1], best[2], best[3]).normalized());
     const auto set = [&](const Column<double>& column, std::size_t at) {
-      for (std::size_t k = 0; k < 3; ++k) column[3ULL * i + k] = best[at + k] + 0.0;
+      for (std::size_t k = 3ULL * i; k < 3ULL * i + 3; ++k, ++at)
+        if (std::fabs(best[at] - column[k]) > nothing) column[k] = best[at] + 0.0;
     };
     set(end.position, 4);
     set(end.linear_velocity, 7);

@@ -377,8 +377,7 @@ TEST(Simulators, ExtrapolatedPartsAreInnerStepsForListeners) {
   run(&world);
   EXPECT_NEAR(sum.length, 0.1, 1e-15);
   EXPECT_EQ(sum.numbers[0], 0U);
-  // the states that parts end in are extrapolated from up to eight attempts, with weights of some thousands
-  EXPECT_NEAR(sum.impulse.y(), 2.0 * kGravity * 0.1, 1e-11);
+  EXPECT_NEAR(sum.impulse.y(), 2.0 * kGravity * 0.1, 1e-12);
   EXPECT_NEAR(sum.impulse.x(), 2.0 * (world.state().linear_velocity[3] - 1.0), 1e-12);
   EXPECT_NEAR(world.state().linear_velocity[3], 5.0 / 7.0, 1e-12);  // it has come to roll
 }

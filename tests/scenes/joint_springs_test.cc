@@ -53,19 +53,18 @@ TEST_F(JointSprings, StiffOnesGainNothingInImpacts) {
       "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
       "Environment { CollisionFilter { DefaultAllow = true Rules { Rule { Allow = false Bodies = {\"P\", \"Q\"} } } }\n"
       "Space { Bodies { Body { Id = \"Floor\" GeometryId = \"F\" }\n"
-      "Body { Id = \"P\" GeometryId = \"B\" Mass = 3 Forces = {\"G\"} KineticProperties { Position = {-0.109, 1.482, "
-      "0.279} "
-      "Orientation = {0.6860877458807263, 0.6773903651980065, 0, 0.265378782289043} } }\n"
-      "Body { Id = \"Q\" GeometryId = \"B\" Mass = 2 Forces = {\"G\"} KineticProperties { Position = {0.167, 1.251, "
-      "-0.001} "
-      "Orientation = {0.29066074940412484, -0.00755288058481469, 0, -0.9567963643067965} } } } }\n"
+      "Body { Id = \"P\" GeometryId = \"B\" Mass = 3 Forces = {\"G\"} KineticProperties { "
+      "Position = {-0.109, 1.482, 0.279} Orientation = {0.6860877458807263, 0.6773903651980065, 0, 0.265378782289043} "
+      "} }\n"
+      "Body { Id = \"Q\" GeometryId = \"B\" Mass = 2 Forces = {\"G\"} KineticProperties { "
+      "Position = {0.167, 1.251, -0.001} Orientation = {0.29066074940412484, -0.00755288058481469, 0, "
+      "-0.9567963643067965} } } } }\n"
       "Constraints { Constraint { Id = \"J\" Body1 = \"P\" Body2 = \"Q\" ";
   const std::vector<std::string> joints = {
       "Type = \"Spherical\" CustomProperties { BindPoint = {0, 1.5, 0} Stiffness = 1e4 }",
       "Type = \"Spherical\" CustomProperties { BindPoint = {0, 1.5, 0} Stiffness = 1e6 }",
-      "Type = \"ConstantVelocity\" CustomProperties { BindPoint = {0, 1.5, 0} Axis1 = {-0.6, 0.7, 0.4} Axis2 = {-0.6, "
-      "0.7, "
-      "0.4} BendStiffness = 1e6 }"};
+      "Type = \"ConstantVelocity\" CustomProperties { BindPoint = {0, 1.5, 0} Axis1 = {-0.6, 0.7, 0.4} "
+      "Axis2 = {-0.6, 0.7, 0.4} BendStiffness = 1e6 }"};
   for (const std::string solver : {"Newton", "Direct"})
     for (const std::string& joint : joints) {
       SceneRun run(bodies + joint + " } } }\n",
@@ -84,18 +83,16 @@ TEST_F(JointSprings, StiffOnesGainNothingInImpacts) {
 // A push turns one of two free bodies on a joint that straightens itself with 1e8 N m/rad.
 TEST_F(JointSprings, StiffBendsStayClosed) {
   const std::string scene =
-      "Forces { Force { Type = \"Basic\" Id = \"Kick\" CustomProperties { Force = {0, 0, 0.5} ApplicationPoint = {0, "
-      "0.2, 0} "
-      "Instantaneous = true } } }\n"
+      "Forces { Force { Type = \"Basic\" Id = \"Kick\" CustomProperties { Force = {0, 0, 0.5} "
+      "ApplicationPoint = {0, 0.2, 0} Instantaneous = true } } }\n"
       "Environment { Space { Bodies {\n"
-      "Body { Id = \"A\" Mass = 3 PrincipalMoments = {0.06, 0.006, 0.06} KineticProperties { Position = {0, -0.25, 0} "
-      "} }\n"
+      "Body { Id = \"A\" Mass = 3 PrincipalMoments = {0.06, 0.006, 0.06} KineticProperties { "
+      "Position = {0, -0.25, 0} } }\n"
       "Body { Id = \"B\" Mass = 2 PrincipalMoments = {0.004, 0.04, 0.04} Forces = {\"Kick\"} KineticProperties { "
-      "Position = "
-      "{0.25, 0, 0} } } } }\n"
-      "Constraints { Constraint { Id = \"J\" Type = \"ConstantVelocity\" Body1 = \"A\" Body2 = \"B\" CustomProperties "
-      "{ "
-      "BindPoint = {0, 0, 0} Axis1 = {0, 0.6, 0.8} Axis2 = {0, 0.6, 0.8} BendStiffness = 1e8 } } } }\n";
+      "Position = {0.25, 0, 0} } } } }\n"
+      "Constraints { Constraint { Id = \"J\" Type = \"ConstantVelocity\" Body1 = \"A\" Body2 = \"B\" "
+      "CustomProperties { BindPoint = {0, 0, 0} Axis1 = {0, 0.6, 0.8} Axis2 = {0, 0.6, 0.8} BendStiffness = 1e8 } } } "
+      "}\n";
   for (const std::string solver : {"Newton", "Direct"}) {
     SceneRun run(scene, {set("Simulator.TimeStep", 1.0 / 60.0), set("Simulator.Duration", 1.0), "Solver=" + solver});
     run.to_end();
