@@ -7,11 +7,13 @@
 namespace gravitas {
 
 double contact_margin(std::span<const LocalBound> bounds) {
-  constexpr double kMarginShare = 0.01;
+  constexpr double kMarginShare = 0.01, kFlat = 1e-9;
   double smallest = std::numeric_limits<double>::infinity();
   for (const LocalBound& bound : bounds) {
     if (bound.kind == BoundKind::kSphere) smallest = std::min(smallest, bound.half_extents.x());
-    if (bound.kind == BoundKind::kBox) smallest = std::min(smallest, bound.half_extents.minCoeff());
+    if (bound.kind != BoundKind::kBox) continue;
+    for (const double extent : bound.half_extents)
+      if (extent > kFlat * bound.half_extents.maxCoeff()) smallest = std::min(smallest, extent);
   }
   return std::isinf(smallest) ? 0.0 : kMarginShare * smallest;
 }

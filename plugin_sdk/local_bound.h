@@ -19,7 +19,7 @@ struct LocalBound {
 };
 
 // The least gap up to which contacts are asked for: a hundredth of the smallest half extent, so that a contact which the
-// reactions of a step close is known to the solver. m; 0 where nothing has bounds. Steps in which bodies move further ask
+// reactions of a step close is known to the solver. A flat mesh has no thickness that would count. m; 0 where nothing has bounds. Steps in which bodies move further ask
 // for more (kernel/simulators/substepping.cc).
 double contact_margin(std::span<const LocalBound> bounds);
 

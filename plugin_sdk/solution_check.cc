@@ -229,7 +229,7 @@ class Balance {
         is_driven_ = is_driven_ || is_soft;
         const bool on_velocity = is_soft || mode == AxisMode::kDriven || mode == AxisMode::kFriction;
         const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
-        has_yielded_ = has_yielded_ || (on_velocity && answer_.discrepancy_correction[k] != 0.0);
+        has_yielded_ = has_yielded_ || (on_velocity && !is_soft && answer_.discrepancy_correction[k] != 0.0);
         const Vector3 impulse = answer_.discrepancy_impulse[k] * axes.col(axis);
         const Vector3 correction = answer_.discrepancy_correction[k] * axes.col(axis);
         for_both(request_.discrepancy_body(), i, point, apart, [&](Pushes& body, const Vector3& arm, double sign) {

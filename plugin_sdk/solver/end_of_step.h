@@ -5,7 +5,7 @@
 //     repeat   pose change  delta = M^-1 J^T mu + theta h M^-1 J^T lambda_v      rows at S* (+) delta
 //              contacts and limits that S* (+) delta closes
 //              velocity     v_{n+1} = v* + M^-1 J^T lambda                         rows at S* (+) delta
-//     until    delta no longer changes by what lambda_v (friction, drives, springs) adds to it
+//     until    delta no longer changes by what lambda_v (friction, drives) adds to it
 //
 // J, arms and world inertia are those at the end of the step, so that what holds is held where the body will be: a chain
 // under 1000 times its mass, linearised at S*, flies apart at 1/60 s.
@@ -17,6 +17,9 @@
 // small (1e-7 rad), those that follow are chords: new rows and errors, the same factors. What the turn changes of the inertia,
 // and of the offset of what acts on velocities alone, is taken anew at each step; where steps shrink slowly by that (capsules
 // that an impact turns about their axes), they are accelerated (anderson_acceleration.h).
+//
+// Springs of joints have a row in either, with the same compliance (joint_laws.h): the errors at the end of the step are what they
+// hold against, however far that turns, and what strikes a body moves it in the step after.
 //
 // Contacts. The gap is linear in delta with the arms of S*, for the surface beyond the contact's points is not known; a
 // velocity row's arms end at each body's own surface point, which is where the two meet when the gap is closed (a ball that

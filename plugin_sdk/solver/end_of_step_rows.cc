@@ -103,7 +103,8 @@ bool ShrinkingSteps::end_with(double change, double size, double rounding) {
 double sum_of_overlaps(const std::vector<EndJoint>& joints, const std::vector<EndContact>& contacts) {
   double sum = 0.0;
   for (const EndJoint& joint : joints)
-    for (const JointLaw& law : joint.pose_laws) sum += joint.length * missed_by(law);
+    for (const JointLaw& law : joint.pose_laws)
+      if (law.gamma == 0.0) sum += joint.length * missed_by(law);
   for (const EndContact& contact : contacts) sum += std::max(0.0, contact.gap_target);
   return sum;
 }

@@ -172,7 +172,8 @@ bool IslandSolver::are_closed() const {
     for (std::size_t k = 0; k < 3; ++k) {
       const JointLaw& law = joint.pose_laws[k];
       const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
-      if (law.is_equality() && !(std::fabs(law.lower_target - change) <= kLeftByChords * rounding)) return false;
+      if (law.is_equality() && law.gamma == 0.0 && !(std::fabs(law.lower_target - change) <= kLeftByChords * rounding))
+        return false;
     }
     return true;
   });
@@ -206,6 +207,16 @@ double IslandSolver::sum_of_ways() const {
   double sum = 0.0;
   for_ways([&](double way) { sum += way; });
   for (const std::uint32_t i : pushed_) sum += driven_[i].linear.norm() + gyration_[i] * driven_[i].angular.norm();
+  for (const EndJoint& joint : joints_) {
+    const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const JointLaw& law = joint.pose_laws[k];
+      if (law.gamma == 0.0) continue;
+      const ConstraintDirection row = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
+      const double response = row.product(row, one.inverse_mass + two.inverse_mass);
+      sum += joint.length * law.missed_by(0.0) * response / (response + law.gamma);
+    }
+  }
   return sum;
 }
 

@@ -51,7 +51,7 @@ ConeSummary IslandSolver::solve(Host& host) {
     failures = has_velocity_ || goes_on ? 0 : failures + 1;
     if (failures == 2) break;
   }
-  if (!has_settled_ && !contacts_.empty() && !joints_.empty() && !has_stiff_springs()) leave_out_wandering(last_change);
+  if (!has_settled_ && !contacts_.empty() && !joints_.empty()) leave_out_wandering(last_change);
   // where they do not settle, the pose change stays that of the impulses before: it must not move rows away
   summary_.contradiction = std::max(summary_.contradiction, pose_contradiction_);
   summary_.has_converged = has_settled_ && has_pose_ && has_velocity_;
@@ -76,19 +76,6 @@ void IslandSolver::leave_out_wandering(double last_change) {
   }
   find_closed();
   solve_velocity();
-}
-
-bool IslandSolver::has_stiff_springs() const {
-  for (const EndJoint& joint : joints_) {
-    const SolverBody &one = bodies_[joint.body1], &two = bodies_[joint.body2];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double gamma = velocity_law_of(joint, k).gamma;
-      if (gamma == 0.0) continue;
-      const ConstraintDirection row = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
-      if (row.product(row, one.inverse_mass + two.inverse_mass) > gamma) return true;
-    }
-  }
-  return false;
 }
 
 IslandSolver::PoseChange IslandSolver::pose_change() const {
@@ -116,7 +103,7 @@ double IslandSolver::open() const {
   for (const EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k) {
       const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
-      open = std::max(open, joint.pose_laws[k].missed_by(change) * joint.length);
+      if (!is_spring(joint.states[k])) open = std::max(open, joint.pose_laws[k].missed_by(change) * joint.length);
     }
   }
   return open;
@@ -224,6 +211,7 @@ void IslandSolver::guess_offset(double share) {
   for (EndJoint& joint : joints_) {
     move_to_end(&joint);
     for (std::size_t k = 0; k < 3; ++k) {
+      if (is_spring(joint.states[k])) load_spring(k, &joint);
       const JointLaw law = velocity_law_of(joint, k);
       const double impulse = answer_.joint_impulse[3 * joint.row + k];
       if (law.is_velocity_only) push_at_trial(joint, joint.directions[k], share * impulse, &offset_);
@@ -238,6 +226,16 @@ void IslandSolver::guess_offset(double share) {
     push_at_trial(contact, direction_at(friction, contact.arm1, contact.arm2), share, &offset_);
   }
   keep_moments_of_offset();
+}
+
+void IslandSolver::load_spring(std::size_t k, EndJoint* joint) {
+  const double h = request_.time_step(), theta = request_.theta();
+  const double approach =
+      joint->directions[k].along(bodies_[joint->body1].trial_velocity, bodies_[joint->body2].trial_velocity);
+  joint->pose_laws[k] = spring_pose_law(joint->states[k], approach, theta, h);
+  const std::size_t at = 3 * joint->row + k;
+  if (joint->pose_laws[k].is_active())
+    answer_.joint_correction[at] = request_.discrepancy_warm_correction()[at] + theta * h * answer_.joint_impulse[at];
 }
 
 template <class Row>
@@ -342,9 +340,13 @@ void IslandSolver::store() {
   // by what drives moved their bodies before something was in the way
   const double share = request_.theta() * request_.time_step();
   for (const EndJoint& joint : joints_)
-    for (std::size_t k = 0; k < 3; ++k)
-      if (const std::size_t at = 3 * joint.row + k; has_yielded(joint.velocity_laws[k]))
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t at = 3 * joint.row + k;
+      if (has_yielded(joint.velocity_laws[k]))
         answer_.joint_correction[at] = share * (joint.driven[k] - answer_.joint_impulse[at]);
+      else if (joint.pose_laws[k].is_active() && is_spring(joint.states[k]))
+        answer_.joint_correction[at] -= share * answer_.joint_impulse[at];
+    }
 }
 
 }  // namespace gravitas

@@ -36,11 +36,8 @@ class IslandSolver {
   static constexpr double kTurnOfChords = 1e-7, kRateOfChords = 1e-2, kLeftByChords = 4.0;
 
   // What friction displaces may send joints and contacts to where it is another (a light link between the ground and what falls on
-  // it), round by round. Where the last change was much, or left joints open, it is left out. Not where stiff springs hold against it:
-  // they would turn their bodies alone.
+  // it), round by round. Where the last change was much, or left joints open, it is left out.
   void leave_out_wandering(double last_change);
-  // Does a spring take away more of a velocity than it leaves?
-  bool has_stiff_springs() const;
   // What joints miss, m.
   double open() const;
 
@@ -73,6 +70,9 @@ class IslandSolver {
 
   // offset_ as the impulses of the step before make it: what rests or moves steadily is found in one round.
   void guess_offset(double share);
+
+  // What a spring asks of the pose change; joint_correction is all that it pushes there, until store().
+  void load_spring(std::size_t k, EndJoint* joint);
 
   template <class Row>
   void push_at_trial(const Row& row, const ConstraintDirection& direction, double amount, BodyMotion* x) const;
@@ -134,7 +134,7 @@ class IslandSolver {
 
   // The most that corrections may move a body by, if one has moved so far.
   double most_of(double moved) const;
-  // Of bodies and of where they touch, m; what drives and springs add counts to the sum.
+  // Of bodies and of where they touch, m; what drives add and springs may counts to the sum.
   template <class Use>
   void for_ways(Use&& use) const;
   double sum_of_ways() const;
@@ -226,7 +226,7 @@ class IslandSolver {
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   std::vector<Vector3> offset_moment_;  // that turns by offset_, kg m^2; zero where that turns nothing
-  BodyMotion driven_;                   // part of offset_ by drives and springs
+  BodyMotion driven_;                   // part of offset_ by drives
   ConeSummary summary_;
   int round_ = 0;
   StalledDrives stalled_;

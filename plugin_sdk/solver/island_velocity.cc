@@ -263,8 +263,7 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
   Gain all;
   for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
     // a drive's or spring's work is real
-    if (r < cone_.contacts.front().first &&
-        (cone_.rows[r].law.is_velocity_only || cone_.rows[r].law.lower_target != 0.0))
+    if (r < cone_.contacts.front().first && (cone_.rows[r].law.may_do_work() || cone_.rows[r].law.lower_target != 0.0))
       continue;
     add_work(cone_.rows[r], before, velocity_, &all);
   }

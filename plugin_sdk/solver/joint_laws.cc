@@ -47,7 +47,6 @@ JointLaw soft_law(const JointAxisState& a, double h) {
   JointLaw law;
   const double softness = a.compliance * a.damping + h;
   law.gamma = a.compliance / (h * softness);
-  law.is_velocity_only = true;
   if (is_held(a)) {
     set_equality(law, a.desired_velocity - (a.error_at_start - rest_error(a)) / softness);
     return law;
@@ -145,6 +144,18 @@ JointLaw pose_law(const JointAxisState& a, double beta, double h) {
     law.has_upper = true;
     law.upper_target = a.upper + std::max(0.0, (1.0 - beta) * (a.error_at_start - a.upper)) - a.error_at_trial;
   }
+  return law;
+}
+
+bool is_spring(const JointAxisState& a) { return is_soft(a); }
+
+JointLaw spring_pose_law(const JointAxisState& a, double approach, double theta, double h) {
+  if (theta == 0.0) return {};
+  if (theta == 1.0) approach = (a.error_at_trial - a.error_at_start) / h;
+  JointLaw law = soft_law(a, h);
+  law.lower_target = theta * h * (law.lower_target - approach);
+  law.upper_target = theta * h * (law.upper_target - approach);
+  law.bound = force_bound(a.maximum_force, theta * h * h);
   return law;
 }
 

@@ -17,7 +17,8 @@
 //     locked            e* + J delta = (1 - beta) e_n
 //     limited           e* + J delta >= lower + min(0, (1 - beta)(e_n - lower)), and so for upper
 //     unilateral        as limited, from below at 0
-//     others            none, nor for a compliance
+//     with compliance   J delta + gamma mu = theta h (the velocity's target - J v*), that gamma, bound theta F h^2
+//     others            none
 //   Velocity, bound F h:
 //     locked            J v = v_d
 //     limited           J v >= v_d where closed below, J v <= v_d where closed above
@@ -61,10 +62,12 @@ struct JointLaw {
   double upper_target = 0.0;
   double gamma = 0.0;
   double bound = std::numeric_limits<double>::infinity();  // of |lambda|
-  // The impulse acts on the velocity alone: theta h of it moves the pose.
+  // Has no part in the pose change, which theta h of its impulse moves: drives and friction.
   bool is_velocity_only = false;
   bool yields = false;  // of a drive without bound: something is in its way (end_of_step.h)
 
+  // Work that it does is real: of a drive, friction or a spring.
+  bool may_do_work() const { return is_velocity_only || gamma > 0.0; }
   bool is_active() const { return has_lower || has_upper; }
   bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }
   // An equality that nothing softens or bounds.
@@ -112,6 +115,14 @@ Vector3 half_of_locked(const Discrepancy& discrepancy, const Matrix3& axes, cons
 Vector3 turned_by_joints(const Vector3& turn, const Vector3& whole_turn, const Vector3& angular_velocity);
 
 JointLaw pose_law(const JointAxisState& axis, double beta, double time_step);
+
+// True for a spring: an axis that would be held, with compliance.
+bool is_spring(const JointAxisState& axis);
+
+// A spring's part in the pose change, J delta + gamma mu = theta h (target of its velocity law - J v*): mu is theta h lambda
+// where nothing strikes in the step. `approach` is J v*; for theta = 1, where v* has moved bodies to S*, the errors tell it,
+// however far that turned. None for theta = 0.
+JointLaw spring_pose_law(const JointAxisState& axis, double approach, double theta, double time_step);
 
 // `error_after` is e* + J delta, `slop` how far from a limit it still counts as closed.
 JointLaw velocity_law(const JointAxisState& axis, double error_after, double slop, double time_step);

@@ -145,6 +145,36 @@ TEST(ShapesAtRest, AMeshComesToRestAsItsHullDoes) {
   EXPECT_LE(mesh.twist.linear.norm() + mesh.twist.angular.norm(), 1e-6);
 }
 
+// A mesh without thickness, as the floor or far away: the boxes stay where they stand.
+TEST(ShapesAtRest, AStackStandsOnAFlatMeshAndBesideOne) {
+  const std::string mesh =
+      "Geometry { Type = \"TriangleMesh\" Id = \"Sheet\" CustomProperties { Vertices = {{-2, 0, -2}, {-2, 0, 2}, {2, "
+      "0, 2}, "
+      "{2, 0, -2}} Faces = {{0, 1, 2}, {0, 2, 3}} } }\n";
+  const std::string sheet = "Body { Id = \"S\" GeometryId = \"Sheet\" Immovable = true KineticProperties { Position = ";
+  for (const std::string& grounds :
+       {sheet + "{0, 0, 0} } }\n", sheet + "{50, 0, 0} } }\nBody { Id = \"F\" GeometryId = \"Plane\" }\n"}) {
+    std::string boxes;
+    for (int i = 0; i < 5; ++i)
+      boxes += "Body { Id = \"B" + std::to_string(i) +
+               "\" GeometryId = \"Box\" Forces = {\"Down\"} KineticProperties { CanSleep = false Position = " +
+               harness::literal(Vector3(0.02 * i, 0.15 + 0.3 * i, 0.03 * (i % 2))) +
+               " Orientation = " + harness::literal(turned(Vector3::UnitY(), 0.2 * i)) + " } }\n";
+    for (const std::string solver : {"Newton", "Sequential", "Direct"}) {
+      SceneRun run(
+          "Geometries { Geometry { Type = \"Halfspace\" Id = \"Plane\" } Geometry { Type = \"Box\" Id = \"Box\" "
+          "CustomProperties { HalfExtents = {0.1, 0.15, 0.2} } }\n" +
+              mesh +
+              "}\nForces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } "
+              "} }\nEnvironment { Space { Bodies {\n" +
+              grounds + boxes + "} } }\n",
+          {set("Simulator.TimeStep", 1.0 / 60.0), set("Simulator.Duration", 0.5), "Solver=" + solver});
+      run.to_end();
+      EXPECT_LT((run.body("B4").pose.position - Vector3(0.08, 1.35, 0)).norm(), 1e-9) << solver << ' ' << grounds;
+    }
+  }
+}
+
 TEST(ShapesAtRest, SlideOverFlushSurfacesWithoutAHop) {
   struct Slide {
     const char* shape;

@@ -406,7 +406,7 @@ void RelaxationJoints::add_work(const SolverBodies& bodies, const BodyMotion& be
     Gain& gain = gains[group[owner_of(block, bodies)]];
     for (std::size_t i = block.first; i < block.end; ++i) {
       const Row& row = rows_[i];
-      if (row.law.is_velocity_only) continue;
+      if (row.law.may_do_work()) continue;
       const double start = row.own.along(before[block.body1], before[block.body2]);
       const double end = row.own.along(after[block.body1], after[block.body2]);
       gain.add(0.5 * row.multiplier * (start + end),
@@ -419,7 +419,7 @@ void RelaxationJoints::exempt_driven(const SolverBodies& bodies, const std::vect
                                      std::vector<double>& factor) const {
   for (const Block& block : blocks_)
     for (std::size_t i = block.first; i < block.end; ++i)
-      if (rows_[i].law.is_velocity_only && rows_[i].multiplier != 0.0) factor[group[owner_of(block, bodies)]] = 1.0;
+      if (rows_[i].law.may_do_work() && rows_[i].multiplier != 0.0) factor[group[owner_of(block, bodies)]] = 1.0;
 }
 
 void RelaxationJoints::scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,

@@ -64,6 +64,9 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   for (std::size_t i = 0; i < moved_.size(); ++i)
     if (velocity_laws_[i].is_unbounded_drive())
       solution_.joint_correction[i] = request.theta() * time_step_ * (moved_[i] - solution_.joint_impulse[i]);
+  for_springs([&](std::size_t i) {
+    solution_.joint_correction[i] -= request.theta() * time_step_ * solution_.joint_impulse[i];
+  });
   gaps_.store(solution_.contact_correction);
   return summary_;
 }
@@ -95,7 +98,7 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
   }
 }
 
-// Sweeps over what friction, springs and drives displace a light body by, which joints are to take back, may leave much of it:
+// Sweeps over what friction and drives displace a light body by, which joints are to take back, may leave much of it:
 // the pose change is that without friction's then, or that without any.
 void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor) {
   if (!discrepancies_.empty()) keep_pose(&before_offset_);
@@ -185,7 +188,7 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
                                                     is_only_point(request.discrepancy_body(), request.mode(), i),
                                                     bodies_, settings_.correction_factor));
     const RelaxationDiscrepancy& r = discrepancies_.back();
-    for (const JointAxisState& axis : r.axes) pose_laws_.push_back(pose_law(axis, r.beta, time_step_));
+    for (std::size_t k = 0; k < 3; ++k) pose_laws_.push_back(pose_law_of(r, k, request.theta()));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
   touching_.clear();
@@ -200,10 +203,27 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);
 }
 
+JointLaw SequentialSolver::pose_law_of(const RelaxationDiscrepancy& d, std::size_t axis, double theta) const {
+  const JointAxisState& state = d.axes[axis];
+  if (!is_spring(state)) return pose_law(state, d.beta, time_step_);
+  const double approach = d.directions[axis].along(bodies_[d.body1].trial_velocity, bodies_[d.body2].trial_velocity);
+  return spring_pose_law(state, approach, theta, time_step_);
+}
+
+// Corrections of springs are what they push beyond theta h of their impulse, but while the pose change is solved.
+template <class Use>
+void SequentialSolver::for_springs(Use&& use) const {
+  for (std::size_t i = 0; i < pose_laws_.size(); ++i)
+    if (pose_laws_[i].is_active() && is_spring(discrepancies_[i / 3].axes[i % 3])) use(i);
+}
+
 // Rows and multipliers as before the first sweep.
 void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
   copy(request.discrepancy_warm_impulse(), solution_.joint_impulse);
   copy(request.discrepancy_warm_correction(), solution_.joint_correction);
+  for_springs([&](std::size_t i) {
+    solution_.joint_correction[i] += request.theta() * time_step_ * solution_.joint_impulse[i];
+  });
   copy(request.contact_warm_impulse(), solution_.contact_impulse);
   copy(request.contact_warm_correction(), solution_.contact_correction);
   copy(request.contact_normal(), solution_.contact_direction);

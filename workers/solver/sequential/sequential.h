@@ -5,7 +5,7 @@
 //     -> pose change      delta  = M^-1 J^T mu      joint_laws.h, contact_gaps.h
 //     -> closed contacts  gaps and limits that S* (+) delta leaves at zero
 //     -> velocity         v_{n+1} = v* + M^-1 J^T lambda      joint_laws.h, contact_impulses.h; joints' J at S* (+) delta
-//     -> pose change again, if friction, drives or springs act on the velocity alone
+//     -> pose change again, if friction or drives act on the velocity alone
 //
 // Notation: h time step, * what the integrator made without joints and contacts, J Jacobian rows
 // with arms and world inertia at S* (velocities of jointed islands: inertia at S* (+) delta), M masses,
@@ -22,7 +22,7 @@
 // zero and no sweep is done. Velocities are summed up anew from the final multipliers, so that a
 // body without an impulse keeps v* and delta = 0 bit for bit.
 //
-// Rows on velocity alone (friction, rolling, drives, springs): mu = theta h lambda. Scheme: pose
+// Rows on velocity alone (friction, rolling, drives): mu = theta h lambda. Scheme: pose
 // change without them, closed set, velocities; then pose change again on top of theta h M^-1 J^T
 // lambda. If that closes a contact or a limit more, velocities are solved for the larger set and
 // the pose change once more, and the set is not looked at again. A contact that this opens stays in
@@ -42,7 +42,7 @@
 //
 // What rows at S* leave of joints is of second order in the step's turn. Where that is more than a thousandth of the bodies' radius
 // of gyration, steps of Newton's method follow: rows where the bodies are by then, for what is missing there, relaxed again,
-// until a millionth is left or a step does not halve it. Friction, springs and drives may displace a light body by many times its
+// until a millionth is left or a step does not halve it. Friction and drives may displace a light body by many times its
 // size, which joints are to take back: where that leaves joints open by more than a hundredth then (a millionth where sweeps ran
 // out), the pose change is that without friction's part, or that without any.
 //
@@ -160,6 +160,9 @@ class SequentialSolver {
   };
 
   void load(const stage::SolverSolveRequest& request);
+  JointLaw pose_law_of(const RelaxationDiscrepancy& d, std::size_t axis, double theta) const;
+  template <class Use>
+  void for_springs(Use&& use) const;
   void begin(const stage::SolverSolveRequest& request);
   void solve_rows(const stage::SolverSolveRequest& request);
   bool reconcile();

@@ -59,6 +59,7 @@ void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
     if (touches(d)) continue;
     const double size = std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
     for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (is_spring(d.axes[axis])) continue;
       const double missed = pose_laws_[3 * i + axis].missed_by(ends_[i].errors[axis] - d.axes[axis].error_at_trial);
       if (size > 0.0) open_ = std::max(open_, missed * d.length / size);
     }
