@@ -7,13 +7,12 @@
 namespace gravitas {
 
 double contact_margin(std::span<const LocalBound> bounds) {
-  constexpr double kMarginShare = 0.01, kFlat = 1e-9;
+  constexpr double kMarginShare = 0.01, kThinnest = 1e-3;
   double smallest = std::numeric_limits<double>::infinity();
   for (const LocalBound& bound : bounds) {
     if (bound.kind == BoundKind::kSphere) smallest = std::min(smallest, bound.half_extents.x());
-    if (bound.kind != BoundKind::kBox) continue;
-    for (const double extent : bound.half_extents)
-      if (extent > kFlat * bound.half_extents.maxCoeff()) smallest = std::min(smallest, extent);
+    if (bound.kind == BoundKind::kBox)
+      smallest = std::min(smallest, std::max(bound.half_extents.minCoeff(), kThinnest * bound.half_extents.maxCoeff()));
   }
   return std::isinf(smallest) ? 0.0 : kMarginShare * smallest;
 }

@@ -18,9 +18,9 @@ struct LocalBound {
   Vector3 half_extents = Vector3::Zero();           // m; a sphere's radius in x
 };
 
-// The least gap up to which contacts are asked for: a hundredth of the smallest half extent, so that a contact which the
-// reactions of a step close is known to the solver. A flat mesh has no thickness that would count. m; 0 where nothing has bounds. Steps in which bodies move further ask
-// for more (kernel/simulators/substepping.cc).
+// The least gap up to which contacts are asked for: a hundredth of the smallest half extent (of what is thin, of a thousandth
+// of its largest), so that a contact which the reactions of a step close is known to the solver. m; 0 where nothing has bounds.
+// Steps in which bodies move further ask for more (kernel/simulators/substepping.cc).
 double contact_margin(std::span<const LocalBound> bounds);
 
 // World bounds.

@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::size_t kRow = 13;       // numbers of a body
 constexpr double kFinestPart = 1e-10;  // of the step
-constexpr double kCrumb = 1e-3, kCoarser = 1.02;
+constexpr double kCrumb = 1e-3, kCoarser = 1.02, kShorter = 0.25, kLonger = 4.0;
 // What the start misses of its laws within the accuracy is put right in the first inner step. s
 constexpr double kOfJump = 0.125;
 constexpr double kSeesJumps = 1e-10;  // accuracies below are less than rounding, which looks like jumps of reactions
-constexpr double kShorter = 0.25, kLonger = 4.0;
 constexpr double kOfAccuracy = 1e-3, kNothing = 1e-12;  // m, m/s or rad/s: changes that count for none
+constexpr double kStill = 1e-15;                        // of the trial velocity
 constexpr double kConverges = 0.5;                      // share of the error that a piece more leaves, at most
 constexpr double kSettled = 0.01;  // share of the accuracy: lesser errors need not converge while jumps are looked at
 
@@ -96,11 +96,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
   try {
     for (std::uint32_t pieces = 1; pieces <= kMostPieces && enough == 0; ++pieces) {
       for (std::uint32_t i = 0; i < pieces; ++i) {
-        if (!make_piece(begin, length, i, pieces) || must_restart_) {
-          go_back();
-          return 0;
-        }
-        if (i == 0) put_changes(&first_changes_[pieces - 1]);
+        if (!make_piece(begin, length, i, pieces) || must_restart_) return go_back(), 0;
+        if (i == 0) put_changes(&first_changes_[pieces - 1]), lets_go(), loaded_ = still_loaded_;
         if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
         const std::size_t before = front_;
         front_ = back_;
@@ -126,7 +123,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
   return enough;
 }
 
-// Of bodies that it moves. Other numbers stay: a difference of rounding alone would double from part to part.
+// Of bodies that it moves. Other numbers stay: a difference of rounding alone would double from part to part. What reactions leave
+// of a velocity within rounding is none: what rests rests.
 void Environment::take_extrapolated() {
   const State& end = back();
   const double nothing = std::min(kOfAccuracy * description_.accuracy, kNothing);
@@ -134,13 +132,15 @@ void Environment::take_extrapolated() {
     if (!is_awake(i)) continue;
     const double* best = &extrapolation_.best()[kRow * i];
     set_quaternion(end.orientation.span(), i, Quaternion(best[0], best[1], best[2], best[3]).normalized());
-    const auto set = [&](const Column<double>& column, std::size_t at) {
-      for (std::size_t k = 3ULL * i; k < 3ULL * i + 3; ++k, ++at)
+    const auto set = [&](const Column<double>& column, const Column<double>& trial, std::size_t at) {
+      for (std::size_t k = 3ULL * i; k < 3ULL * i + 3; ++k, ++at) {
         if (std::fabs(best[at] - column[k]) > nothing) column[k] = best[at] + 0.0;
+        if (std::fabs(column[k]) <= kStill * std::fabs(trial[k])) column[k] = 0.0;
+      }
     };
-    set(end.position, 4);
-    set(end.linear_velocity, 7);
-    set(end.angular_velocity, 10);
+    set(end.position, data_.trial_position, 4);
+    set(end.linear_velocity, data_.trial_linear_velocity, 7);
+    set(end.angular_velocity, data_.trial_angular_velocity, 10);
     end.state_changed[i] = 1;
   }
   figures_ = {};

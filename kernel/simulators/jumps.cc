@@ -5,7 +5,7 @@
 // Shorter inner steps, each an eighth of the one before, tell it: those that end before the jump miss of the change of
 // velocities that the attempts foretell as much as the jump makes in their time, and the shorter the less. What a smooth motion
 // misses, since its changes are no polynomial of the step, is prod(1 - s/h) of the attempts' steps h in a step s: the shorter
-// the more; and so is what closes a gap of rounding.
+// the more; and so is what closes a gap of rounding. Trials so short that a gap within the accuracy stays open tell nothing.
 #include <algorithm>
 #include <cmath>
 
@@ -15,8 +15,8 @@ namespace gravitas::kernel {
 namespace {
 
 constexpr double kShorterTrial = 8.0;
-constexpr double kSeen = 1.0 / 64.0;      // of the accuracy; an eighth's eighth of the jump shows in the first trial
-constexpr double kOfError = 2.0;          // that the extrapolation leaves
+constexpr double kSeen = 0.1;     // of the accuracy: seven eighths of an eighth of the jump shows in a trial, at least
+constexpr double kOfError = 2.0;  // that the extrapolation leaves
 constexpr double kRounding = 1e-12;       // m/s or rad/s
 constexpr double kShortestTrial = 1e-10;  // of the part
 constexpr double kUncertain = 0.25;       // share of what a smooth motion misses
@@ -32,6 +32,29 @@ void Environment::find_changes(std::vector<double>* changes) const {
   };
   add(start_linear_velocity(), states_[back_].linear_velocity);
   add(start_angular_velocity(), states_[back_].angular_velocity);
+}
+
+// Has the inner step that has been made left a pair apart that the attempts press together, and that starts at rest on each other
+// within the accuracy? still_loaded_: pairs that it presses, in rising order.
+bool Environment::lets_go() {
+  const auto pair = [&](std::size_t i) { return std::array{data_.contact_body[2 * i], data_.contact_body[2 * i + 1]}; };
+  still_loaded_.clear();
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
+    if (!vector_at(data_.contact_impulse.span(), i).isZero(0.0)) still_loaded_.push_back(pair(i));
+  std::ranges::sort(still_loaded_);
+  const auto start_velocity = [&](std::size_t i, std::uint32_t body) {
+    const Vector3 arm = vector_at(data_.contact_point.span(), i) - vector_at(data_.trial_position.span(), body);
+    return Vector3(vector_at(start_linear_velocity().span(), body) +
+                   vector_at(start_angular_velocity().span(), body).cross(arm));
+  };
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    const auto [a, b] = pair(i);
+    const double speed = vector_at(data_.contact_normal.span(), i).dot(start_velocity(i, b) - start_velocity(i, a));
+    if (gap_at(i, back()) <= description_.accuracy && std::fabs(speed) <= description_.accuracy &&
+        std::ranges::binary_search(loaded_, pair(i)) && !std::ranges::binary_search(still_loaded_, pair(i)))
+      return true;
+  }
+  return false;
 }
 
 // After attempts in `first` to `pieces` inner steps, two at least, which left an error of the extrapolation. The state is where
@@ -60,6 +83,7 @@ bool Environment::hides_jump(double begin, double length, std::uint32_t first, s
   for (double largest = 2.0 * allowed; largest > allowed && step > kShortestTrial * length; step /= kShorterTrial) {
     front_ = front, back_ = back;
     if (!make_piece(begin, step, 0, 1) || must_restart_) return true;
+    if (lets_go()) return false;
     find_changes(&trial_changes_);
     const bool is_first = missed_.empty();
     missed_.resize(trial_changes_.size(), 0.0);
