@@ -139,14 +139,20 @@ MassProperties solid_mass_properties(std::span<const Vector3> vertices, std::spa
 
 MassProperties shell_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
                                      double density) {
-  std::vector<MassProperties> points;
+  std::vector<MassProperties> plates;
   for (std::size_t i = 0; i + 2 < triangles.size(); i += 3) {
     const Vector3 &a = vertices[triangles[i]], &b = vertices[triangles[i + 1]], &c = vertices[triangles[i + 2]];
-    MassProperties& point = points.emplace_back();
-    point.mass = 0.5 * density * std::sqrt((b - a).cross(c - a).squaredNorm());
-    point.centre_of_mass = (a + b + c) / 3.0;
+    MassProperties& plate = plates.emplace_back();
+    plate.mass = 0.5 * density * std::sqrt((b - a).cross(c - a).squaredNorm());
+    plate.centre_of_mass = (a + b + c) / 3.0;
+    Matrix3 second = Matrix3::Zero();
+    for (const Vector3& corner : {a, b, c}) {
+      const Vector3 arm = corner - plate.centre_of_mass;
+      second += plate.mass / 12.0 * (arm * arm.transpose());
+    }
+    plate.inertia = second.trace() * Matrix3::Identity() - second;
   }
-  return combined(points);
+  return combined(plates);
 }
 
 MassProperties scaled_to_mass(const MassProperties& properties, double mass) {

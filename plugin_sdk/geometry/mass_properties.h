@@ -58,8 +58,8 @@ MassProperties cone_mass_properties(double radius, double height, double density
 MassProperties solid_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
                                      double density);
 
-// An open surface as point masses at the centroids of its triangles, in proportion to their areas (§ 4.3.1.5); density
-// in kg/m^2.
+// An open surface as thin plates, its triangles, exactly: the corners' distances d from the centroid give each the second moment
+// m/12 sum(d d^T). Density in kg/m^2. § 4.3.1.5 has point masses at the centroids, without which a single triangle has no inertia.
 MassProperties shell_mass_properties(std::span<const Vector3> vertices, std::span<const std::uint32_t> triangles,
                                      double density);
 

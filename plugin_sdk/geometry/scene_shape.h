@@ -61,8 +61,8 @@ std::optional<SceneShape> read_scene_shape(std::uint64_t type, std::span<const d
 std::vector<double> flattened_shape(const SceneShape& shape);
 std::uint64_t type_of(const SceneShape& shape);
 
-// Of a bounded shape. A mesh that is not closed has no volume: it counts as a shell of point masses at the centroids of
-// its triangles, in proportion to their areas (§ 4.3.1.5), its density being one of area (kg/m^2).
+// Of a bounded shape. A mesh that is not closed has no volume: it counts as a shell of thin triangles,
+// its density being one of area (kg/m^2).
 MassProperties mass_properties(const SceneShape& shape, double density);
 
 // Tight boxes of a bounded shape: along the axes of its frame, and of the frame R turned against it (columns: axes).

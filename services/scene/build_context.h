@@ -48,7 +48,8 @@ class IdIndex {
                                         [](const auto& row, std::string_view wanted) { return row.first < wanted; });
     if (found != rows_.end() && found->first == id) return found->second;
     std::vector<std::string> ids;
-    for (const auto& [known, row] : rows_) ids.emplace_back(known);
+    for (const auto& [known, row] : rows_)
+      if (ids.empty() || ids.back() != known) ids.emplace_back(known);
     diagnostics->error(position,
                        property + " names no " + kind_ + ": \"" + std::string(id) + "\"; " + allowed_names(id, ids));
     return kNone;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -80,6 +81,28 @@ TEST(MassProperties, ClosedFormsAreTheIntegrals) {
   expect_close(cylinder_mass_properties(0.7, 1.6, 2.0), sum_over_cells(1.0, 100, 2.0, [](const Vector3& p) {
                  return p.x() * p.x() + p.z() * p.z() <= 0.49 && std::fabs(p.y()) < 0.8;
                }));
+}
+
+// A rectangle of two triangles in the plane z = 2, and a triangle: I about the centroid from the textbook.
+TEST(MassProperties, ShellsAreThinPlates) {
+  constexpr double kWidth = 0.6, kHeight = 0.4, kDensity = 3.0;
+  const std::vector<Vector3> corners = {
+      {1, 1, 2}, {1 + kWidth, 1, 2}, {1 + kWidth, 1 + kHeight, 2}, {1, 1 + kHeight, 2}};
+  const std::vector<std::uint32_t> triangles = {0, 1, 2, 0, 2, 3};
+  const MassProperties plate = shell_mass_properties(corners, triangles, kDensity);
+  const double mass = kDensity * kWidth * kHeight;
+  EXPECT_NEAR(plate.mass, mass, 1e-15);
+  EXPECT_LT((plate.centre_of_mass - Vector3(1 + 0.5 * kWidth, 1 + 0.5 * kHeight, 2)).norm(), 1e-15);
+  const double xx = mass * kHeight * kHeight / 12.0, yy = mass * kWidth * kWidth / 12.0;
+  const Vector3 moments(xx, yy, xx + yy);
+  EXPECT_LT((plate.inertia - Matrix3(moments.asDiagonal())).norm(), 1e-15);
+
+  // legs b along x and h along y: m h^2/18, m b^2/18, and the product m b h/36
+  const MassProperties triangle = shell_mass_properties(corners, std::span(triangles).first(3), kDensity);
+  EXPECT_NEAR(triangle.inertia(0, 0), 0.5 * mass * kHeight * kHeight / 18.0, 1e-15);
+  EXPECT_NEAR(triangle.inertia(1, 1), 0.5 * mass * kWidth * kWidth / 18.0, 1e-15);
+  EXPECT_NEAR(triangle.inertia(0, 1), -0.5 * mass * kWidth * kHeight / 36.0, 1e-15);
+  EXPECT_TRUE(validate(triangle, nullptr));
 }
 
 TEST(MassProperties, ScaledToMassKeepsTheShape) {

@@ -314,6 +314,11 @@ TEST(Build, RefusesIdsThatStandTwice) {
                         "= true } } } }"),
               ElementsAre("scene:2:13: error: Body \"A\" is there already, at scene:1:44; allowed: "
                           "an id of its own"));
+  // and once among what is allowed
+  EXPECT_THAT(
+      errors_of("Environment { Space { Bodies { Body { Id = \"A\" Immovable = true }\nBody { Id = \"A\" "
+                "Immovable = true } } }\nConstraints { Constraint { Id = \"J\" Type = \"Rigid\" Body2 = \"B\" } } }"),
+      testing::Contains(testing::EndsWith("; allowed: \"A\"")));
 }
 
 }  // namespace
