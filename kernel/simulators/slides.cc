@@ -22,13 +22,14 @@ namespace {
 
 constexpr int kMostSlideTrials = 30;
 constexpr double kShortestSlide = 1e-6;  // of the step
-constexpr double kSlideShare = 1e-9;     // of the slide: how closely its end is met
+constexpr double kOfGain = 4.0;          // of what forces do in the trial: faster arrivals are impacts
+constexpr double kSlideShare = 1e-9;     // of the slide, and of the step: how closely its end is met
 
 }  // namespace
 
 std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<TrialState> trial, double begin,
                                                                        double* length, bool has_found_contacts) {
-  const double shortest = kShortestSlide * length_of_step(step_count_ + 1);
+  const double step = length_of_step(step_count_ + 1), shortest = kShortestSlide * step;
   const auto surface = [&](std::size_t contact, double side) {
     return Vector3(vector_at(data_.contact_point.span(), contact) +
                    0.5 * side * data_.contact_depth[contact] * vector_at(data_.contact_normal.span(), contact));
@@ -45,14 +46,16 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
                       motion(pair[0]), motion(pair[1]));
   };
   // velocity of b relative to a where body b's surface is, or a's
-  const auto slip_after = [&](std::size_t contact) {
+  const auto velocity = [&](std::size_t contact, const Column<double>& linear, const Column<double>& angular) {
     const auto at = [&](std::size_t end, double side) {
       const std::uint32_t body = data_.contact_body[2 * contact + end];
       const Vector3 arm = surface(contact, side) - vector_at(data_.trial_position.span(), body);
-      return Vector3(vector_at(data_.solved_linear_velocity.span(), body) +
-                     vector_at(data_.solved_angular_velocity.span(), body).cross(arm));
+      return Vector3(vector_at(linear.span(), body) + vector_at(angular.span(), body).cross(arm));
     };
     return Vector3(at(1, -1.0) - at(0, 1.0));
+  };
+  const auto slip_after = [&](std::size_t contact) {
+    return velocity(contact, data_.solved_linear_velocity, data_.solved_angular_velocity);
   };
   const auto turning = [&](std::size_t contact, const Column<double>& angular) {
     const std::uint32_t* pair = &data_.contact_body[2 * contact];
@@ -64,13 +67,15 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
     double first = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < data_.contact_key.size();) {
       Slide slide, roll, spin;
-      double gained = 0.0;
+      double gained = 0.0, arrival = 0.0;
       const std::size_t pair = i;
       for (; i < data_.contact_key.size() && data_.contact_pair[i] == data_.contact_pair[pair]; ++i) {
         const Vector3 normal = vector_at(data_.contact_normal.span(), i);
         const Vector3 impulse = vector_at(data_.contact_impulse.span(), i);
         const double* material = &data_.contact_material[kMaterialColumns * i];
         slide.add(normal, material[kDynamicFriction], slip_before(i), slip_after(i), impulse);
+        arrival =
+            std::max(arrival, std::fabs(normal.dot(velocity(i, start_linear_velocity(), start_angular_velocity()))));
         if (!(material[kRollingFriction] > 0.0 || material[kSpinningFriction] > 0.0)) continue;
         // as slides at the distance of the nearer centre of what can move
         double arm = std::numeric_limits<double>::infinity();
@@ -94,7 +99,13 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
                                    vector_at(start_linear_velocity().span(), body))
                                       .norm());
       }
-      for (const Slide& one : {slide, roll, spin}) {
+      // What rolls along an arc seems to arrive with arms of the end, by v times the angle; and to slip, by v times half its square.
+      const std::uint32_t* bodies = &data_.contact_body[2 * pair];
+      const double speed =
+          (vector_at(start_linear_velocity().span(), bodies[1]) - vector_at(start_linear_velocity().span(), bodies[0]))
+              .norm();
+      const bool rolls = arrival <= kOfGain * gained && slide.start_speed() * speed <= arrival * arrival;
+      for (const Slide& one : {rolls ? Slide() : slide, roll, spin}) {
         // what is slower has stopped
         if (!(one.start_speed() * trial_length > shortest * gained)) continue;
         const double end = one.end(trial_length);
@@ -115,7 +126,7 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
     const bool slides_on = end > *length;
     // of what slides on, the end is known, and may lie beyond a trial in which it stuck
     const bool is_part = slides_on && has_stuck && end >= stopped;
-    const bool is_end = slides_on ? is_part || *length == whole : end >= (1.0 - kSlideShare) * *length;
+    const bool is_end = slides_on ? is_part || *length == whole : end >= *length - kSlideShare * step;
     if (i == kMostSlideTrials || is_end || (end == 0.0 && *length <= 2.0 * shortest)) return solution;
     (slides_on ? clear : stopped) = *length;
     has_stuck = slides_on ? has_stuck : end == 0.0;
