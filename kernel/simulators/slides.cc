@@ -22,6 +22,7 @@ namespace {
 
 constexpr int kMostSlideTrials = 30;
 constexpr double kShortestSlide = 1e-6;  // of the step
+constexpr double kSteepest = 0.9;        // change of the estimate with the length of the trial, for the secant
 constexpr double kOfGain = 4.0;          // of what forces do in the trial: faster arrivals are impacts
 constexpr double kSlideShare = 1e-9;     // of the slide, and of the step: how closely its end is met
 
@@ -116,7 +117,7 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
     return first;
   };
   const double whole = *length;
-  double clear = 0.0, stopped = whole;
+  double clear = 0.0, stopped = whole, last_length = 0.0, last_end = 0.0;
   bool has_stuck = false;  // at `stopped`, for a reason that is not known yet
   for (int i = 0;; ++i) {
     std::optional<Trusted<Solution>> solution = react(trial, has_found_contacts);
@@ -126,12 +127,16 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
     const bool slides_on = end > *length;
     // of what slides on, the end is known, and may lie beyond a trial in which it stuck
     const bool is_part = slides_on && has_stuck && end >= stopped;
-    const bool is_end = slides_on ? is_part || *length == whole : end >= *length - kSlideShare * step;
+    const bool is_met = std::fabs(end - *length) <= kSlideShare * step;
+    const bool is_end = is_met || (slides_on && (is_part || *length == whole));
     if (i == kMostSlideTrials || is_end || (end == 0.0 && *length <= 2.0 * shortest)) return solution;
     (slides_on ? clear : stopped) = *length;
     has_stuck = slides_on ? has_stuck : end == 0.0;
-    // a little beyond the end, so that the trial has it
-    const double next = (1.0 + 0.1 * kSlideShare) * end;
+    // a little beyond the end, so that the trial has it; where the estimate moves with the trial, by the secant
+    const double rate = slides_on && last_end > last_length ? (end - last_end) / (*length - last_length) : 0.0;
+    const double met = std::fabs(rate) < kSteepest ? *length + (end - *length) / (1.0 - rate) : end;
+    const double next = (1.0 + 0.1 * kSlideShare) * met;
+    last_length = *length, last_end = end;
     *length = next > clear && next < stopped ? next : 0.5 * (clear + stopped);
     begin_inner_step(begin, *length);
     trial = integrate();
