@@ -156,6 +156,36 @@ TEST_F(JointSprings, StiffOnesMoveAsRigidJoints) {
   }
 }
 
+// A drive without bound goes at its speed whatever springs do beside it, or behind a joint that holds.
+TEST_F(JointSprings, GiveWayToDrivesWithoutBound) {
+  const auto slider = [](const std::string& id, const std::string& bodies, double x, const std::string& more) {
+    return "Constraint { Id = \"" + id + "\" Type = \"Slider\" " + bodies +
+           " CustomProperties { BindPoint = " + harness::literal(Vector3(x, 0, 0)) + " Axis = {1, 0, 0} " + more +
+           " } }\n";
+  };
+  const std::string spring = "Stiffness = 1e3", drive = "Speed = 0.5";
+  const std::string joints[] = {
+      slider("J", "Body2 = \"A\"", 0, spring + " " + drive) + slider("K", "Body1 = \"A\" Body2 = \"B\"", 1, spring),
+      slider("J", "Body2 = \"A\"", 0, drive) +
+          "Constraint { Id = \"K\" Type = \"Rigid\" Body1 = \"A\" Body2 = \"B\" }\n" +
+          slider("L", "Body2 = \"B\"", 1, spring)};
+  for (const std::string& held : joints) {
+    const std::string scene =
+        "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} }\n"
+        "Body { Id = \"B\" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} KineticProperties { Position = {1, 0, 0} } } } "
+        "}\n"
+        "Constraints { " +
+        held + "} }\n";
+    for (const std::string solver : {"Newton", "Direct", "Sequential"})
+      for (const double step : {1.0 / 60.0, 1e-3}) {
+        SceneRun run(scene, {set("Simulator.TimeStep", step), set("Simulator.Duration", 1.0), "Solver=" + solver});
+        run.to_end();
+        EXPECT_NEAR(run.body("A").pose.position.x(), 0.5 * run.time(), 1e-9) << solver << ' ' << step;
+        EXPECT_NEAR(run.body("A").twist.linear.x(), 0.5, 1e-9) << solver << ' ' << step;
+      }
+  }
+}
+
 TEST_F(JointSprings, RestWhereTheyBalanceTheLoad) {
   const Vector3 out(kArm, 0, 0), aslant(0.4, 0, 0.3);
   struct Trial {

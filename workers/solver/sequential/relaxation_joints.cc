@@ -235,8 +235,9 @@ void RelaxationJoints::orthogonalise(Block& block, double inverse_masses) {
       row.solved.subtract(share, rows_[base + static_cast<std::size_t>(i)].own);
     }
     const double left = row.solved.product(row.solved, inverse_masses);
-    if (!(left > kIndependence * full)) continue;
-    row.response = left + row.law.gamma;
+    // what gives way beside a lock or a drive has its impulse, which that bears
+    if (!(left > kIndependence * full) && !(row.law.gamma > 0.0)) continue;
+    row.response = std::max(0.0, left) + row.law.gamma;
     rows_.push_back(row);
   }
 }
@@ -347,12 +348,13 @@ bool RelaxationJoints::has_velocity_only_impulse() const {
                      [](const Row& row) { return row.law.is_velocity_only && row.multiplier != 0.0; });
 }
 
-double RelaxationJoints::largest_violation(const BodyMotion& x) const {
+double RelaxationJoints::largest_violation(const BodyMotion& x, bool is_solved) const {
   double largest = 0.0;
   for (const Block& block : blocks_) {
     for (std::size_t i = block.first; i < block.end; ++i) {
       const Row& row = rows_[i];
-      const double value = row.own.along(x[block.body1], x[block.body2]);
+      const double given_way = is_solved ? row.law.gamma * row.multiplier : 0.0;
+      const double value = row.own.along(x[block.body1], x[block.body2]) + given_way;
       double violation = 0.0;
       if (row.law.has_lower) violation = std::max(violation, row.law.lower_target - value);
       if (row.law.has_upper) violation = std::max(violation, value - row.law.upper_target);

@@ -81,7 +81,7 @@ class RelaxationJoints final : public RelaxationBlocks {
 
   // Largest violation of a row by x, and largest sum of the magnitudes that J x is made of: what
   // rounding goes by. m or m/s, angles times their length.
-  double largest_violation(const BodyMotion& x) const;
+  double largest_violation(const BodyMotion& x, bool is_solved = false) const;
   double largest_motion(const BodyMotion& x) const;
   // The same of rigid rows that depend on others of their two bodies, and are therefore not asked for.
   double largest_left_out(const BodyMotion& x) const;

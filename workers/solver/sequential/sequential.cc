@@ -409,7 +409,7 @@ bool SequentialSolver::let_drives_yield(const stage::SolverSolveRequest& request
   for (std::size_t i = 0; i < velocity_laws_.size(); ++i)
     if (velocity_laws_[i].is_unbounded_drive())
       asked = std::max(asked, discrepancies_[i / 3].length * std::fabs(velocity_laws_[i].lower_target));
-  const double missed = std::max({velocity_joints_.largest_violation(solution_.velocity),
+  const double missed = std::max({velocity_joints_.largest_violation(solution_.velocity, true),
                                   velocity_joints_.largest_left_out(solution_.velocity),
                                   impulses_.largest_violation(solution_.velocity)});
   if (!(missed > kMissed * asked)) return false;

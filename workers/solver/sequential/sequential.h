@@ -147,6 +147,8 @@ class SequentialSolver {
 
  private:
   // Joints that are open by a larger share of what their bodies measure are closed further; steps of that; rounding of many.
+  // What springs miss counts a thousandfold: energy goes by it.
+  static constexpr double kOfSprings = 1e3;
   static constexpr double kOpen = 1e-3, kClosed = 1e-6, kFarOpen = 1e-2, kRounded = 1e-12;
   static constexpr int kPoseSteps = 6;
 
@@ -155,7 +157,7 @@ class SequentialSolver {
     RelaxationJoints joints;
     ContactGaps gaps;
     std::vector<JointEnd> ends;
-    double open = 0.0;
+    double open = 0.0, unsprung = 0.0;
     bool is_at_end = false, has_converged = true;
   };
 
@@ -163,6 +165,7 @@ class SequentialSolver {
   JointLaw pose_law_of(const RelaxationDiscrepancy& d, std::size_t axis, double theta) const;
   template <class Use>
   void for_springs(Use&& use) const;
+  double share_of_bodies(const RelaxationDiscrepancy& d, std::size_t axis, double gamma) const;
   void begin(const stage::SolverSolveRequest& request);
   void solve_rows(const stage::SolverSolveRequest& request);
   bool reconcile();
@@ -236,6 +239,7 @@ class SequentialSolver {
   ContactImpulses impulses_;
   bool pose_converged_ = true;
   bool posed_at_end_ = false;  // pose_joints_ has rows where the pose change ended, not at S*
+  double unsprung_ = 0.0;      // the most that springs miss their laws by there, of what moves the bodies
   double open_ = 0.0;  // the most that pose laws are missed by where it ends, as a share of what the bodies measure
   PoseChange before_step_, before_offset_;  // gone back to where what followed left joints more open
 

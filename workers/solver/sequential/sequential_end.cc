@@ -13,16 +13,18 @@ bool SequentialSolver::touches(const RelaxationDiscrepancy& joint) const {
 // Newton's steps from the rows at S*, for what these leave of joints by the square of the turn: each with rows at the end of
 // the one before, as long as one halves what joints are open by.
 void SequentialSolver::close_at_end(const stage::SolverSolveRequest& request) {
+  const auto off = [&] { return std::max(open_, kOfSprings * unsprung_); };
   find_ends(request);
-  for (int step = 0; open_ > (step == 0 ? kOpen : kClosed) && step < kPoseSteps; ++step) {
-    const double open = open_;
+  for (int step = 0; off() > (step == 0 ? kOpen : kClosed) && step < kPoseSteps; ++step) {
+    const double before = off();
     keep_pose(&before_step_);
     build_at_end();
     pose_converged_ = relax_pose();
     posed_at_end_ = true;
     find_ends(request);
-    if (!(open_ < open)) take_pose(before_step_);
-    if (!(open_ < 0.5 * open)) return;
+    const bool goes_on = off() < 0.5 * before;
+    if (!(off() < before)) take_pose(before_step_);
+    if (!goes_on) return;
   }
 }
 
@@ -31,7 +33,7 @@ void SequentialSolver::keep_pose(PoseChange* kept) const {
   kept->joints = pose_joints_;
   kept->gaps = gaps_;
   kept->ends = ends_;
-  kept->open = open_;
+  kept->open = open_, kept->unsprung = unsprung_;
   kept->is_at_end = posed_at_end_;
   kept->has_converged = pose_converged_;
 }
@@ -41,27 +43,40 @@ void SequentialSolver::take_pose(const PoseChange& kept) {
   pose_joints_ = kept.joints;
   gaps_ = kept.gaps;
   ends_ = kept.ends;
-  open_ = kept.open;
+  open_ = kept.open, unsprung_ = kept.unsprung;
   posed_at_end_ = kept.is_at_end;
   pose_converged_ = kept.has_converged;
 }
 
-// The end of each joint, and open_.
+// Of what a spring's row misses, what it moves the bodies by; the rest is in the spring.
+double SequentialSolver::share_of_bodies(const RelaxationDiscrepancy& d, std::size_t axis, double gamma) const {
+  const double masses = bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass;
+  const double response = d.directions[axis].product(d.directions[axis], masses);
+  return response / (response + gamma);
+}
+
+// The end of each joint, open_ and unsprung_.
 void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
   const DiscrepancyColumns columns = columns_of(request);
   turned_ = bodies_;
   turned_.turn(solution_.displacement);
   ends_.resize(discrepancies_.size());
-  open_ = 0.0;
+  open_ = unsprung_ = 0.0;
+  pose_joints_.store(pushed_);
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
     ends_[i] = end_of(columns.at(i), d, turned_, solution_.displacement);
     if (touches(d)) continue;
     const double size = std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (is_spring(d.axes[axis])) continue;
-      const double missed = pose_laws_[3 * i + axis].missed_by(ends_[i].errors[axis] - d.axes[axis].error_at_trial);
-      if (size > 0.0) open_ = std::max(open_, missed * d.length / size);
+      const JointLaw& law = pose_laws_[3 * i + axis];
+      const double change = ends_[i].errors[axis] - d.axes[axis].error_at_trial;
+      const double missed = law.missed_by(change + law.gamma * pushed_[3 * i + axis]) * d.length / size;
+      if (!(size > 0.0)) continue;
+      if (law.gamma > 0.0)
+        unsprung_ = std::max(unsprung_, missed * share_of_bodies(d, axis, law.gamma));
+      else
+        open_ = std::max(open_, missed);
     }
   }
 }
