@@ -50,8 +50,8 @@ std::vector<TypeDeclaration> declared_types() {
                 "file, its path relative to the scene."),
             Property::table("Faces", 3, "1", "geometry")
                 .at_least(0.0)
-                .means("Triangles of indices of Vertices, counter-clockwise seen from outside; in a scene rows may be "
-                       "longer."),
+                .means("Triangles of indices of Vertices, counter-clockwise seen from outside (a closed mesh that is "
+                       "inside out is turned round); in a scene rows may be longer."),
             Property::number("Scale", "1").above(0.0).defaults_to({1.0}).means("Factor on the vertices."),
             Property::integer("MaximumDepth")
                 .at_least(1.0)
