@@ -156,6 +156,37 @@ TEST_F(JointSprings, StiffOnesMoveAsRigidJoints) {
   }
 }
 
+// Five straight links on hinges whose stiff springs are at rest 0.3 rad away: all motion comes out of them.
+TEST_F(JointSprings, GiveNoMoreThanTheyHold) {
+  constexpr int kLinks = 5;
+  constexpr double kLength = 0.4, kRest = 0.3;
+  for (const double stiffness : {1e5, 4e5}) {
+    std::string bodies, hinges;
+    for (int i = 0; i < kLinks; ++i) {
+      const std::string id = std::to_string(i);
+      bodies += "Body { Id = \"L" + id +
+                "\" Mass = 1 PrincipalMoments = {0.001, 0.0133, 0.0133} KineticProperties { Position = " +
+                harness::literal(Vector3((i + 0.5) * kLength, 0, 0)) + " } }\n";
+      hinges += "Constraint { Id = \"J" + id + "\" Type = \"Revolute\" Body2 = \"L" + id + "\" " +
+                (i > 0 ? "Body1 = \"L" + std::to_string(i - 1) + "\" " : std::string()) +
+                "CustomProperties { BindAxisPoint1 = " + harness::literal(Vector3(i * kLength, 0, 0)) +
+                " BindAxisPoint2 = " + harness::literal(Vector3(i * kLength, 0, 1)) +
+                " Stiffness = " + harness::literal(stiffness) + " RestAngle = " + harness::literal(kRest) + " } }\n";
+    }
+    const double held = 0.5 * kLinks * stiffness * kRest * kRest;
+    for (const std::string solver : {"Newton", "Direct", "Sequential"})
+      for (const double step : {1.0 / 60.0, 1.0 / 240.0}) {
+        SceneRun run("Environment { Space { Bodies {\n" + bodies + "} }\nConstraints {\n" + hinges + "} }\n",
+                     {set("Simulator.TimeStep", step), set("Simulator.Duration", 0.5), "Solver=" + solver});
+        while (!run.is_done()) {
+          run.step();
+          ASSERT_LE(run.kinetic_energy(), held) << solver << ' ' << step << ' ' << stiffness;
+        }
+        EXPECT_LT(run.report().max_joint_error(), solver == "Sequential" ? 1e-3 : 1e-12) << solver << ' ' << step;
+      }
+  }
+}
+
 // A drive without bound goes at its speed whatever springs do beside it, or behind a joint that holds.
 TEST_F(JointSprings, GiveWayToDrivesWithoutBound) {
   const auto slider = [](const std::string& id, const std::string& bodies, double x, const std::string& more) {
