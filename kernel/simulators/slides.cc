@@ -105,7 +105,8 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
       const double speed =
           (vector_at(start_linear_velocity().span(), bodies[1]) - vector_at(start_linear_velocity().span(), bodies[0]))
               .norm();
-      const bool rolls = arrival <= kOfGain * gained && slide.start_speed() * speed <= arrival * arrival;
+      const double slip = slide.start_speed();
+      const bool rolls = slip < speed && arrival <= kOfGain * gained && slip * speed <= arrival * arrival;
       for (const Slide& one : {rolls ? Slide() : slide, roll, spin}) {
         // what is slower has stopped
         if (!(one.start_speed() * trial_length > shortest * gained)) continue;

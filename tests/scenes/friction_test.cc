@@ -106,6 +106,46 @@ TEST(Sliding, FeelsTheDynamicCoefficient) {
   EXPECT_NEAR(run.body("Box").twist.linear.x(), 3.0 - 0.2 * kG * run.time(), 1e-9);
 }
 
+// Of bodies whose centres stand still: a ball that is spun on the spot comes to roll, a disc that spins is turned back by a torque
+// of twice what friction holds.
+TEST(Sliding, EndsOnTheSpot) {
+  const std::string floor = "Body { Id = \"Floor\" GeometryId = \"F\" Material = \"M\" }\n";
+  const auto scene = [&](const std::string& shape, const std::string& friction, const std::string& force,
+                         const std::string& body) {
+    return "Geometries { Geometry { Type = \"Halfspace\" Id = \"F\" } Geometry { Id = \"S\" Type = " + shape +
+           " } }\nMaterials { Material { Id = \"M\" StaticFrictionCoefficient = " + friction +
+           " } }\nForces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } "
+           "}\n" +
+           force + "}\nEnvironment { Space { Bodies {\n" + floor +
+           "Body { Id = \"Thing\" GeometryId = \"S\" Material = \"M\" " + body + " } } } }\n";
+  };
+  for (const double h : {1.0 / 30.0, 1.0 / 60.0, 1.0 / 80.0}) {
+    const std::vector<std::string> settings = {set("Simulator.TimeStep", h), set("Simulator.Duration", 0.1),
+                                               "Simulator=Continuous", "Integrator=Verlet", "Solver=Newton"};
+    // v = mu g t until it is r (w - 5/2 mu g t/r), the rest at 2/7 r w
+    SceneRun ball(
+        scene("\"Sphere\" CustomProperties { Radius = 0.1 }", "0.5", "",
+              "Mass = 1 Forces = {\"G\"} KineticProperties { Position = {0, 0.1, 0} AngularVelocity = {0, 0, -2} }"),
+        settings);
+    ball.to_end();
+    const double rolls = 2.0 / 7.0 * 0.1 * 2.0, slides = rolls / (0.5 * kG);
+    EXPECT_NEAR(ball.body("Thing").pose.position.x(), rolls * (ball.time() - 0.5 * slides), 1e-10) << h;
+    EXPECT_NEAR(ball.body("Thing").twist.linear.x(), rolls, 1e-10) << h;
+    // a box held by its four corners: mu m g r about its axis
+    const double arm = std::hypot(0.2, 0.2), moment = 0.3 * kG * arm, inertia = 0.05;
+    const double back = 0.4 * h, spin = -3.0 * moment / inertia * back;
+    SceneRun box(scene("\"Box\" CustomProperties { HalfExtents = {0.2, 0.05, 0.2} }", "0.3",
+                       "Force { Type = \"Basic\" Id = \"T\" CustomProperties { Torque = " +
+                           harness::literal(Vector3(0, 2.0 * moment, 0)) + " } }\n",
+                       "Mass = 1 PrincipalMoments = {0.05, 0.05, 0.05} Forces = {\"G\", \"T\"} KineticProperties { "
+                       "Position = {0, 0.05, 0} AngularVelocity = " +
+                           harness::literal(Vector3(0, spin, 0)) + " }"),
+                 settings);
+    box.to_end();
+    EXPECT_NEAR(box.body("Thing").twist.angular.y(), moment / inertia * (box.time() - back), 1e-6) << h;
+  }
+}
+
 // Up a slope: there dynamic friction and the slope stop it, wherever in a step; then it stays, where static friction is
 // enough, or slides back. (That static friction could have stopped it sooner must not matter.)
 TEST(Sliding, EndsToRoundingWhereDynamicFrictionStopsIt) {
