@@ -170,8 +170,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t pieces_to_accuracy(double begin, double length, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
   void take_extrapolated();
-  void find_changes(std::vector<double>* changes) const;
-  bool lets_go();
+  void find_changes(std::vector<double>* changes);
+  bool lets_go() const;
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
@@ -340,7 +340,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   Extrapolation extrapolation_, jumps_;
   static constexpr std::uint32_t kMostPieces = 8;                            // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, missed_;  // of velocities
-  std::vector<std::array<std::uint32_t, 2>> loaded_, still_loaded_;          // pairs
+  std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;
 
   Activity activity_;

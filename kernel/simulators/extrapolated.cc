@@ -97,7 +97,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
     for (std::uint32_t pieces = 1; pieces <= kMostPieces && enough == 0; ++pieces) {
       for (std::uint32_t i = 0; i < pieces; ++i) {
         if (!make_piece(begin, length, i, pieces) || must_restart_) return go_back(), 0;
-        if (i == 0) put_changes(&first_changes_[pieces - 1]), lets_go(), loaded_ = still_loaded_;
+        if (i == 0) put_changes(&first_changes_[pieces - 1]), pressed_by_attempts_ = pressed_;
         if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
         const std::size_t before = front_;
         front_ = back_;

@@ -23,8 +23,8 @@ constexpr double kUncertain = 0.25;       // share of what a smooth motion misse
 
 }  // namespace
 
-// Of what is awake, in the inner step that has been made.
-void Environment::find_changes(std::vector<double>* changes) const {
+// Of what is awake, in the inner step that has been made; and pressed_, the pairs that push each other there, in rising order.
+void Environment::find_changes(std::vector<double>* changes) {
   changes->clear();
   const auto add = [&](const Column<double>& from, const Column<double>& to) {
     for (std::size_t k = 0; k < to.size(); ++k)
@@ -32,26 +32,27 @@ void Environment::find_changes(std::vector<double>* changes) const {
   };
   add(start_linear_velocity(), states_[back_].linear_velocity);
   add(start_angular_velocity(), states_[back_].angular_velocity);
+  pressed_.clear();
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
+    if (!vector_at(data_.contact_impulse.span(), i).isZero(0.0))
+      pressed_.push_back({data_.contact_body[2 * i], data_.contact_body[2 * i + 1]});
+  std::ranges::sort(pressed_);
 }
 
 // Has the inner step that has been made left a pair apart that the attempts press together, and that starts at rest on each other
-// within the accuracy? still_loaded_: pairs that it presses, in rising order.
-bool Environment::lets_go() {
-  const auto pair = [&](std::size_t i) { return std::array{data_.contact_body[2 * i], data_.contact_body[2 * i + 1]}; };
-  still_loaded_.clear();
-  for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
-    if (!vector_at(data_.contact_impulse.span(), i).isZero(0.0)) still_loaded_.push_back(pair(i));
-  std::ranges::sort(still_loaded_);
+// within the accuracy?
+bool Environment::lets_go() const {
   const auto start_velocity = [&](std::size_t i, std::uint32_t body) {
     const Vector3 arm = vector_at(data_.contact_point.span(), i) - vector_at(data_.trial_position.span(), body);
     return Vector3(vector_at(start_linear_velocity().span(), body) +
                    vector_at(start_angular_velocity().span(), body).cross(arm));
   };
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
-    const auto [a, b] = pair(i);
-    const double speed = vector_at(data_.contact_normal.span(), i).dot(start_velocity(i, b) - start_velocity(i, a));
-    if (gap_at(i, back()) <= description_.accuracy && std::fabs(speed) <= description_.accuracy &&
-        std::ranges::binary_search(loaded_, pair(i)) && !std::ranges::binary_search(still_loaded_, pair(i)))
+    const std::array pair = {data_.contact_body[2 * i], data_.contact_body[2 * i + 1]};
+    if (std::ranges::binary_search(pressed_, pair) || !std::ranges::binary_search(pressed_by_attempts_, pair)) continue;
+    const Vector3 start = start_velocity(i, pair[1]) - start_velocity(i, pair[0]);
+    if (gap_at(i, states_[back_]) <= description_.accuracy &&
+        std::fabs(vector_at(data_.contact_normal.span(), i).dot(start)) <= description_.accuracy)
       return true;
   }
   return false;
@@ -83,8 +84,8 @@ bool Environment::hides_jump(double begin, double length, std::uint32_t first, s
   for (double largest = 2.0 * allowed; largest > allowed && step > kShortestTrial * length; step /= kShorterTrial) {
     front_ = front, back_ = back;
     if (!make_piece(begin, step, 0, 1) || must_restart_) return true;
-    if (lets_go()) return false;
     find_changes(&trial_changes_);
+    if (lets_go()) return false;
     const bool is_first = missed_.empty();
     missed_.resize(trial_changes_.size(), 0.0);
     const double kept = of_smooth(step * kShorterTrial) / of_smooth(step);

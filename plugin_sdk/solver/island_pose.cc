@@ -214,7 +214,7 @@ double IslandSolver::sum_of_ways() const {
       if (law.gamma == 0.0) continue;
       const ConstraintDirection row = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
       const double response = row.product(row, one.inverse_mass + two.inverse_mass);
-      sum += joint.length * law.missed_by(0.0) * response / (response + law.gamma);
+      sum += joint.length * law.missed_by(0.0) * law.share_of_bodies(response);
     }
   }
   return sum;

@@ -103,7 +103,8 @@ double IslandSolver::open() const {
   for (const EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k) {
       const double change = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial;
-      if (!is_spring(joint.states[k])) open = std::max(open, joint.pose_laws[k].missed_by(change) * joint.length);
+      const JointLaw& law = joint.pose_laws[k];
+      if (law.gamma == 0.0) open = std::max(open, law.missed_by(change) * joint.length);
     }
   }
   return open;
@@ -344,7 +345,7 @@ void IslandSolver::store() {
       const std::size_t at = 3 * joint.row + k;
       if (has_yielded(joint.velocity_laws[k]))
         answer_.joint_correction[at] = share * (joint.driven[k] - answer_.joint_impulse[at]);
-      else if (joint.pose_laws[k].is_active() && is_spring(joint.states[k]))
+      else if (joint.pose_laws[k].gamma > 0.0)
         answer_.joint_correction[at] -= share * answer_.joint_impulse[at];
     }
 }

@@ -68,6 +68,8 @@ struct JointLaw {
 
   // Work that it does is real: of a drive, friction or a spring.
   bool may_do_work() const { return is_velocity_only || gamma > 0.0; }
+  // Of what the row misses, what it moves the bodies by where they respond by so much; the rest stays in the spring.
+  double share_of_bodies(double response) const { return gamma > 0.0 ? response / (response + gamma) : 1.0; }
   bool is_active() const { return has_lower || has_upper; }
   bool is_equality() const { return has_lower && has_upper && lower_target == upper_target; }
   // An equality that nothing softens or bounds.

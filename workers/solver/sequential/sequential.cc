@@ -214,7 +214,7 @@ JointLaw SequentialSolver::pose_law_of(const RelaxationDiscrepancy& d, std::size
 template <class Use>
 void SequentialSolver::for_springs(Use&& use) const {
   for (std::size_t i = 0; i < pose_laws_.size(); ++i)
-    if (pose_laws_[i].is_active() && is_spring(discrepancies_[i / 3].axes[i % 3])) use(i);
+    if (pose_laws_[i].gamma > 0.0) use(i);
 }
 
 // Rows and multipliers as before the first sweep.

@@ -147,10 +147,10 @@ class SequentialSolver {
 
  private:
   // Joints that are open by a larger share of what their bodies measure are closed further; steps of that; rounding of many.
-  // What springs miss counts a thousandfold: energy goes by it.
-  static constexpr double kOfSprings = 1e3;
   static constexpr double kOpen = 1e-3, kClosed = 1e-6, kFarOpen = 1e-2, kRounded = 1e-12;
   static constexpr int kPoseSteps = 6;
+  // What springs miss counts a thousandfold: energy goes by it.
+  static constexpr double kOfSprings = 1e3;
 
   struct PoseChange {
     BodyMotion displacement;
@@ -165,7 +165,6 @@ class SequentialSolver {
   JointLaw pose_law_of(const RelaxationDiscrepancy& d, std::size_t axis, double theta) const;
   template <class Use>
   void for_springs(Use&& use) const;
-  double share_of_bodies(const RelaxationDiscrepancy& d, std::size_t axis, double gamma) const;
   void begin(const stage::SolverSolveRequest& request);
   void solve_rows(const stage::SolverSolveRequest& request);
   bool reconcile();

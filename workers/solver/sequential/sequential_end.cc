@@ -48,13 +48,6 @@ void SequentialSolver::take_pose(const PoseChange& kept) {
   pose_converged_ = kept.has_converged;
 }
 
-// Of what a spring's row misses, what it moves the bodies by; the rest is in the spring.
-double SequentialSolver::share_of_bodies(const RelaxationDiscrepancy& d, std::size_t axis, double gamma) const {
-  const double masses = bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass;
-  const double response = d.directions[axis].product(d.directions[axis], masses);
-  return response / (response + gamma);
-}
-
 // The end of each joint, open_ and unsprung_.
 void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
   const DiscrepancyColumns columns = columns_of(request);
@@ -68,15 +61,14 @@ void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
     ends_[i] = end_of(columns.at(i), d, turned_, solution_.displacement);
     if (touches(d)) continue;
     const double size = std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
+    if (!(size > 0.0)) continue;
+    const double masses = bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const JointLaw& law = pose_laws_[3 * i + axis];
       const double change = ends_[i].errors[axis] - d.axes[axis].error_at_trial;
       const double missed = law.missed_by(change + law.gamma * pushed_[3 * i + axis]) * d.length / size;
-      if (!(size > 0.0)) continue;
-      if (law.gamma > 0.0)
-        unsprung_ = std::max(unsprung_, missed * share_of_bodies(d, axis, law.gamma));
-      else
-        open_ = std::max(open_, missed);
+      double& most = law.gamma > 0.0 ? unsprung_ : open_;
+      most = std::max(most, missed * law.share_of_bodies(d.directions[axis].product(d.directions[axis], masses)));
     }
   }
 }
