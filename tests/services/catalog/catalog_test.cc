@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -14,6 +15,7 @@
 
 #include "plugin_sdk/host/description_message.h"
 #include "services/catalog/describe_process.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -86,6 +88,38 @@ TEST_F(CatalogTest, AsksOnceAboutAllLibrariesInOrder) {
   std::string arguments;
   std::getline(std::ifstream(folder_ / "arguments"), arguments);
   EXPECT_EQ(arguments, "--describe " + a + ' ' + b);
+}
+
+// How many pages the children of this process that have ended brought in: more after each of them.
+long pages_of_children() {
+  rusage use{};
+  getrusage(RUSAGE_CHILDREN, &use);
+  return use.ru_minflt;
+}
+
+TEST_F(CatalogTest, AsksNobodyAgainAsLongAsNoFileChanges) {
+  const std::string worker = in_build("/bin/gravitas-worker"), plugins = in_build("/lib/gravitas");
+  const long before = pages_of_children();
+  const Catalog first = Catalog::installed(worker, plugins);
+  const long asked = pages_of_children();
+  EXPECT_GT(asked, before);
+  const Catalog second = Catalog::installed(worker, plugins);
+  EXPECT_EQ(pages_of_children(), asked);
+  ASSERT_EQ(second.plugins().size(), first.plugins().size());
+  for (std::size_t i = 0; i < first.plugins().size(); ++i) {
+    EXPECT_EQ(second.plugins()[i].library, first.plugins()[i].library);
+    EXPECT_EQ(host::to_message(second.plugins()[i].declaration).SerializeAsString(),
+              host::to_message(first.plugins()[i].declaration).SerializeAsString());
+  }
+}
+
+// Files of this moment may change within the same stamp of time.
+TEST_F(CatalogTest, AsksAgainAboutFilesOfThisMoment) {
+  library("a.so");
+  const std::string worker = answering(answer_of({declare(Slot::kSolver, "Before")}));
+  EXPECT_NE(Catalog::installed(worker, plugins()).find("Before"), nullptr);
+  answering(answer_of({declare(Slot::kSolver, "Behind")}));
+  EXPECT_NE(Catalog::installed(worker, plugins()).find("Behind"), nullptr);
 }
 
 TEST_F(CatalogTest, FindsByNameAndByType) {
