@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +21,16 @@ namespace {
 // True where the error along an axis of points is the target, but for the error of the state.
 bool holds_place(const Discrepancy& d, int axis) {
   return holds_always(d, axis) && axis_mode(d.modes, axis) != AxisMode::kDriven && !(d.is_radial() && axis == 0);
+}
+
+// The turn of body 2 from body 1 as a rotation vector (of up to a turn and more) once both have turned on by a little.
+Vector3 turned(const Vector3& turn, const Quaternion& by1, const Quaternion& by2) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const Vector3 now = log_rotation(by2 * exp_rotation(turn) * by1.conjugate());
+  const double angle = now.norm();
+  if (angle == 0.0) return now;
+  const Vector3 axis = now / angle;
+  return (angle + kTurn * std::round((turn.dot(axis) - angle) / kTurn)) * axis;
 }
 
 }  // namespace
@@ -211,10 +222,14 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
     set_twisting(twisting_of(d).turned(turn1, two.pose.orientation * two.asked.orientation.conjugate()), &d);
     return d;
   }
-  Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
-  if (d.is_angular()) error += turn1 * (d.point2 - d.point1) - (d.point2 - d.point1);
-  if (!d.is_angular()) d.point1 = carried(d.point1, one.asked, one.pose);
-  d.point2 = d.point1 + error;
+  if (d.is_angular()) {
+    const Quaternion turn2 = two.pose.orientation * two.asked.orientation.conjugate();
+    d.point2 = d.point1 + turned(d.point2 - d.point1, turn1, turn2);
+  } else {
+    const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
+    d.point1 = carried(d.point1, one.asked, one.pose);
+    d.point2 = d.point1 + error;
+  }
   d.axes = one.pose.orientation * (one.asked.orientation.conjugate() * d.axes);
   return d;
 }

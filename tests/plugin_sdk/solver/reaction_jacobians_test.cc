@@ -123,8 +123,8 @@ void bushing(const Pose& one, const Pose& two, const std::function<void(const Di
   Discrepancy d;
   d.axes = one.orientation;
   d.modes = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kDriven, true);
-  // small, so that turns about several axes add up
-  d.point2 = 1e-3 * (one.orientation * Vector3(1, 2, 3)) + log_rotation(two.orientation * one.orientation.conjugate());
+  // far, so that turns about several axes do not add up
+  d.point2 = log_rotation(two.orientation * exp_rotation(Vector3(0.3, 0.6, 0.9)) * one.orientation.conjugate());
   d.velocity = one.orientation * Vector3(1, 2, 3);
   d.compliance = Vector3(0.01, 0.02, 0.0), d.damping = Vector3(3, 2, 1);
   emit(d);
