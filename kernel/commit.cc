@@ -202,7 +202,7 @@ double Environment::gap_at(std::size_t contact, const State& state) const {
                     carry(point + half, data_.contact_body[2 * contact]));
 }
 
-// Overlap of every contact at S_{n+1}, and the pairs that touch.
+// Overlap of every contact at S_{n+1}, in the first step at S_0, too, and the pairs that touch.
 void Environment::find_touching() {
   const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
   now.resize(0);
@@ -210,7 +210,7 @@ void Environment::find_touching() {
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
     const double gap = gap_at(i, back());
-    figures_.penetration = std::max(figures_.penetration, -gap);
+    figures_.penetration = std::max({figures_.penetration, -gap, step_count_ == 0 ? -gap_at(i, front()) : 0.0});
     const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
     const std::uint64_t size = now.size();
     if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;

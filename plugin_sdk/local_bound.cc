@@ -6,14 +6,17 @@
 
 namespace gravitas {
 
+void measure(const Vector3& half_extents, LocalBound* bound) {
+  constexpr double kThinnest = 1e-3;
+  bound->least_half_extent = std::max(half_extents.minCoeff(), kThinnest * half_extents.maxCoeff());
+  bound->reach = half_extents.norm();
+}
+
 double contact_margin(std::span<const LocalBound> bounds) {
-  constexpr double kMarginShare = 0.01, kThinnest = 1e-3;
+  constexpr double kMarginShare = 0.01;
   double smallest = std::numeric_limits<double>::infinity();
-  for (const LocalBound& bound : bounds) {
-    if (bound.kind == BoundKind::kSphere) smallest = std::min(smallest, bound.half_extents.x());
-    if (bound.kind == BoundKind::kBox)
-      smallest = std::min(smallest, std::max(bound.half_extents.minCoeff(), kThinnest * bound.half_extents.maxCoeff()));
-  }
+  for (const LocalBound& bound : bounds)
+    if (bound.least_half_extent > 0.0) smallest = std::min(smallest, bound.least_half_extent);
   return std::isinf(smallest) ? 0.0 : kMarginShare * smallest;
 }
 

@@ -16,10 +16,16 @@ struct LocalBound {
   Vector3 centre = Vector3::Zero();                 // m
   Quaternion orientation = Quaternion::Identity();  // box to body
   Vector3 half_extents = Vector3::Zero();           // m; a sphere's radius in x
+  // Of the shape itself, by whatever it is bounded, m; 0 where it is unbounded: its least half extent (of what is thin, a
+  // thousandth of its largest), and half of its box's diagonal (a sphere's radius).
+  double least_half_extent = 0.0, reach = 0.0;
 };
 
-// The least gap up to which contacts are asked for: a hundredth of the smallest half extent (of what is thin, of a thousandth
-// of its largest), so that a contact which the reactions of a step close is known to the solver. m; 0 where nothing has bounds.
+// Sets what is told of a shape itself, from the half extents of its box.
+void measure(const Vector3& half_extents, LocalBound* bound);
+
+// The least gap up to which contacts are asked for: a hundredth of the smallest half extent, so that a contact which the
+// reactions of a step close is known to the solver. m; 0 where all shapes are unbounded.
 // Steps in which bodies move further ask for more (kernel/simulators/substepping.cc).
 double contact_margin(std::span<const LocalBound> bounds);
 

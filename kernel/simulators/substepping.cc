@@ -25,7 +25,7 @@ Trusted<Pairs> Environment::bound_and_pair(const Trusted<TrialState>& trial) {
     if (!is_awake(i)) continue;
     const Vector3 moved = vector_at(data_.trial_position.span(), i) - vector_at(front().position.span(), i);
     const double turned = data_.time_step[0] * vector_at(data_.trial_angular_velocity.span(), i).norm();
-    longest = std::max(longest, moved.norm() + turned * model_.bound[i].half_extents.norm());
+    longest = std::max(longest, moved.norm() + turned * model_.bound[i].reach);
   }
   data_.margin[0] = std::clamp(longest, margin_, kLargestMargin * margin_);
 

@@ -507,6 +507,11 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       }
       if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
+    if (best <= enough && done > 0 && (sweeps > 0 || slides())) {
+      lambda = best_lambda, y = best_y;
+      if (settle(enough, sweeps > 0, &lambda, &y)) best_lambda = lambda, best_y = y, best = residual_of(lambda, y);
+      lambda = best_lambda, y = best_y;
+    }
     // one step more costs little and ends at rounding
     if (is_newton && best <= enough && done > 0 && newton_step(proximal_after(without), &lambda, &y)) keep_better();
     summary->iterations += done;

@@ -193,6 +193,8 @@ class ConeProblem {
   void solve_sticking();
   ConePath path() const;
   void sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const;
+  bool slides() const;
+  bool settle(double enough, bool may_differ, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const;
   bool let_slide(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double slip);
   void into_cones(Eigen::VectorXd* lambda) const;
@@ -227,12 +229,12 @@ class ConeProblem {
 
   // of a Newton step
   enum class RowKind : std::uint8_t { kHeld, kPut, kSliding };
-  std::vector<RowKind> kinds_;
+  std::vector<RowKind> kinds_, kinds_before_;
   Eigen::MatrixXd sliding_, core_;
   Eigen::VectorXd side_of_step_, step_;
   std::vector<double> rest_;
   DenseLu lu_;
-  double proximal_ = 0.0, factored_proximal_ = 0.0;
+  double draw_ = 0.0, proximal_ = 0.0, factored_proximal_ = 0.0;
   std::vector<Eigen::Index> coupled_, factored_;  // rows; of sticking_
   ProfileLdlt sticking_;
   HeldFactors held_factors_[2];  // of poses, of velocities

@@ -121,7 +121,9 @@ void add_campaign(CLI::App* app, Action* action) {
   command->add_option("--faults", options.faults, "How many, at least, over all shards")
       ->check(whole_number(1, 1'000'000'000'000))
       ->capture_default_str();
-  command->add_option("--seed", options.seed, "All that is drawn comes from it")->capture_default_str();
+  command->add_option("--seed", options.seed, "All that is drawn comes from it")
+      ->check(whole_number(0))
+      ->capture_default_str();
   command->add_option("--shard", arguments->shard, "I/K: the I-th of K parts")->capture_default_str();
   command
       ->add_option("--tier", arguments->tier,
@@ -136,6 +138,7 @@ void add_campaign(CLI::App* app, Action* action) {
       ->check(whole_number(1, 24))
       ->capture_default_str();
   command->add_option("--jobs", options.jobs, "Processes that make trials; 0: one for each core")
+      ->check(whole_number(0, 1024))
       ->capture_default_str();
   command->add_option("--deadline", options.deadline, "Of a call in the trials, s")
       ->check(CLI::Range(0.01, 100.0))
@@ -147,7 +150,8 @@ void add_campaign(CLI::App* app, Action* action) {
                       "Switch a defence off, to see the campaign fail: structure, numbers, physics, confirmation, "
                       "replay, digest, epoch "
                       "or deadline");
-  command->add_option("--trial", arguments->trial, "Only the trial with this seed, in this process; prints it");
+  command->add_option("--trial", arguments->trial, "Only the trial with this seed, in this process; prints it")
+      ->check(whole_number(0));
   command
       ->add_option("--endurance", arguments->endurance,
                    "Instead: 1 kHz for so many seconds, a kill in every slot every second, s")

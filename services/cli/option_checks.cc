@@ -28,7 +28,8 @@ CLI::Validator whole_number(std::uint64_t least, std::uint64_t most) {
   return check_of(
       [=](const std::string& text) {
         std::uint64_t number = 0;
-        return is_read(text, &number) && number >= least && number <= most;
+        // a negative one would be read as one that is large
+        return !text.starts_with('-') && is_read(text, &number) && number >= least && number <= most;
       },
       fmt::format("a whole number from {} to {}", least, most));
 }

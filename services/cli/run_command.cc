@@ -101,6 +101,13 @@ int run_scene(RunLine* line) {
   return result.is_bad_input ? kBadInput : kOurFault;
 }
 
+std::string process_of(const report::v1::PlannedSlot& slot) {
+  if (slot.process() == 0) return "this one";
+  const std::string standby =
+      slot.standby() > 0 ? fmt::format(" and {} standby{}", slot.standby(), slot.standby() == 1 ? "" : "s") : "";
+  return fmt::format("worker {}{}", slot.process(), standby);
+}
+
 int plan_scene(RunLine* line) {
   line->scene.apply();
   std::vector<std::string> warnings;
@@ -114,9 +121,9 @@ int plan_scene(RunLine* line) {
     std::cout << to_json(plan, JsonForm::kPage);
     return kDone;
   }
-  std::cout << fmt::format("{:<21} {:<20} {}\n", "slot", "plugin", "hosting");
+  std::cout << fmt::format("{:<21} {:<20} {:<8} {}\n", "slot", "plugin", "hosting", "process");
   for (const report::v1::PlannedSlot& slot : plan.slots())
-    std::cout << fmt::format("{:<21} {:<20} {}\n", slot.slot(), slot.plugin(), slot.hosting());
+    std::cout << fmt::format("{:<21} {:<20} {:<8} {}\n", slot.slot(), slot.plugin(), slot.hosting(), process_of(slot));
   for (const report::v1::LeftOut& out : plan.left_out())
     std::cout << fmt::format("{:<21} left out: {}\n", out.what(), out.why());
   return kDone;

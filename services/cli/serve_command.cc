@@ -60,7 +60,10 @@ int serve(ServeLine* line) {
   }
   const control_api::v1::Status status = run.status();
   std::cout << control::status_page(status);
-  return status.state() == "finished" ? kDone : kInterrupted;
+  if (status.state() == "finished") return kDone;
+  if (status.state() != "faulted") return kInterrupted;
+  std::cerr << "gravitas: " << status.fault() << '\n';
+  return kPaused;
 }
 
 }  // namespace
@@ -71,7 +74,8 @@ void add_serve(CLI::App* app, Action* action) {
   command->footer(
       "Example: gravitas serve deploy/scenes/two_spheres_motor.gravitas --headless --duration 3600 &\n"
       "         gravitas ctl status; gravitas ctl swap solver=Sequential,hosting=direct\n"
-      "Ends with Ctrl-C (exit code 130; 0 after the last step). The socket is the only guard: whoever may open it, or "
+      "Ends with Ctrl-C (exit code 130; 0 after the last step, 3 after a fault that the run did not survive). The "
+      "socket is the only guard: whoever may open it, or "
       "reaches the address, controls the run and what it loads.");
   line->scene.add_to(command);
   command->add_flag("--headless", line->headless, "The control API alone, without the page");

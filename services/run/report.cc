@@ -94,13 +94,21 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
 report::v1::Plan plan_message(const kernel::Environment& environment,
                               const kernel::EnvironmentDescription& description) {
   report::v1::Plan message;
+  std::vector<int> processes;
   for (const kernel::PlannedSlot& planned : environment.plan().slots) {
+    std::uint32_t number = 0;
+    if (planned.hosting != kernel::Hosting::kDirect) {
+      auto process = std::ranges::find(processes, planned.process_id);
+      if (process == processes.end()) process = processes.insert(process, planned.process_id);
+      number = static_cast<std::uint32_t>(process - processes.begin()) + 1;
+    }
     for (const std::string& plugin : planned.plugins) {
       report::v1::PlannedSlot* slot = message.add_slots();
       slot->set_slot(slot_name(planned.slot));
       slot->set_plugin(plugin);
       slot->set_hosting(kernel::hosting_name(planned.hosting));
       slot->set_pid(planned.process_id);
+      slot->set_process(number);
       slot->set_standby(planned.standbys);
       slot->set_attached(planned.is_attached);
       for (const std::string& one : planned.sandbox) slot->add_sandbox(one);

@@ -157,12 +157,21 @@ class ShapeBuilder final : private SiblingShapes {
 
 LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_type, const Pose& X_BG) {
   LocalBound bound;
-  if (bounding_volume_type == "None" || !solid.has_mass()) return bound;
+  if (!solid.has_mass()) return bound;
   const SceneShape& shape = *solid.shape;
+  const Box3 box = local_box(shape);
+  Vector3 half_extents = box.half_extents();
+  // the middle of two coordinates is rounded where they are not opposite
+  if (box.centre() != Vector3::Zero())
+    half_extents += 4.0 * std::numeric_limits<double>::epsilon() * box.centre().cwiseAbs();
+  measure(half_extents, &bound);
+  const bool is_sphere = shape.kind == SceneShape::Kind::kSphere;
+  if (is_sphere) bound.reach = shape.size.x();
+  if (bounding_volume_type == "None") return bound;
   bound.orientation = X_BG.orientation;
   // no corner outside by a rounding
   const double widened = 1.0 + 4.0 * std::numeric_limits<double>::epsilon();
-  if (shape.kind == SceneShape::Kind::kSphere) {
+  if (is_sphere) {
     bound.kind = BoundKind::kSphere;
     bound.centre = X_BG.position;
     bound.half_extents = {shape.size.x(), 0.0, 0.0};
@@ -172,13 +181,9 @@ LocalBound local_bound(const Solid& solid, const std::string& bounding_volume_ty
     bound.centre = transform_point(X_BG, ball.centre);
     bound.half_extents = {ball.radius * widened, 0.0, 0.0};
   } else {
-    const Box3 box = local_box(shape);
     bound.kind = BoundKind::kBox;
     bound.centre = transform_point(X_BG, box.centre());
-    bound.half_extents = box.half_extents();
-    // the middle of two coordinates is rounded where they are not opposite
-    if (box.centre() != Vector3::Zero())
-      bound.half_extents += 4.0 * std::numeric_limits<double>::epsilon() * box.centre().cwiseAbs();
+    bound.half_extents = half_extents;
   }
   return bound;
 }

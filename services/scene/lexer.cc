@@ -92,6 +92,11 @@ TextPosition Lexer::position() const {
   return {file_, line_, static_cast<std::uint32_t>(cursor_ - line_start_) - continuation_bytes_ + 1};
 }
 
+// A line ends with LF, CR LF (at its LF), or CR alone.
+bool Lexer::is_line_end() const {
+  return *cursor_ == '\n' || (*cursor_ == '\r' && (end_ - cursor_ < 2 || cursor_[1] != '\n'));
+}
+
 void Lexer::start_line() {
   ++line_;
   line_start_ = cursor_;
@@ -99,7 +104,7 @@ void Lexer::start_line() {
 }
 
 void Lexer::skip_line() {
-  while (cursor_ != end_ && *cursor_ != '\n') {
+  while (cursor_ != end_ && !is_line_end()) {
     if (*cursor_ == '\0') refuse_character();
     if (continues_character(*cursor_)) ++continuation_bytes_;
     ++cursor_;
@@ -116,7 +121,7 @@ void Lexer::skip_block_comment() {
     }
     if (*cursor_ == '\0') refuse_character();
     if (continues_character(*cursor_)) ++continuation_bytes_;
-    if (*cursor_ == '\n') {
+    if (is_line_end()) {
       ++line_;
       line_start_ = cursor_ + 1;
       continuation_bytes_ = 0;
@@ -128,7 +133,7 @@ void Lexer::skip_block_comment() {
 void Lexer::skip_separators() {
   while (cursor_ != end_) {
     const char c = *cursor_;
-    if (c == '\n') {
+    if (is_line_end()) {
       ++cursor_;
       start_line();
     } else if (c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f') {
@@ -220,7 +225,7 @@ void Lexer::read_text(Token* token) {
   token->text.clear();
   ++cursor_;
   while (true) {
-    if (cursor_ == end_ || *cursor_ == '\n') {
+    if (cursor_ == end_ || is_line_end()) {
       throw SyntaxError{token->position,
                         "this text does not end; a text ends with a double quote on the line it begins on"};
     }

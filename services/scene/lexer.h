@@ -44,6 +44,7 @@ class Lexer {
   void skip_separators();
   void skip_line();
   void skip_block_comment();
+  bool is_line_end() const;
   void start_line();
   void read_name(Token* token);
   void read_number(Token* token);

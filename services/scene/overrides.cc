@@ -21,8 +21,9 @@ struct Refused {
 };
 
 // Words that a path begins with.
-const std::vector<std::string> kRoots = {"Integrator", "Solver",     "Space", "Collision", "Simulator", "Body",
-                                         "Geometry",   "Constraint", "Force", "Material",  "Plugin",    "Environment"};
+const std::vector<std::string> kRoots = {"Integrator", "Solver",      "Space",          "Collision", "Simulator",
+                                         "Body",       "Geometry",    "Constraint",     "Force",     "Material",
+                                         "Plugin",     "Environment", "CollisionFilter"};
 
 bool is_space_or_tab(char c) { return c == ' ' || c == '\t'; }
 
@@ -81,6 +82,9 @@ class Override {
       return component(environment(root)->mutable_constraint_solver(), "Type", rest);
     if (word == "Collision") return component(plugin({"collision", root.offset}), "Name", rest);
     if (word == "Environment") return property(environment(root), rest, root);
+    if (word == "CollisionFilter")
+      return property(environment(root),
+                      {text_.substr(root.offset, rest.offset + rest.text.size() - root.offset), root.offset}, root);
     if (word == "Plugin") {
       const Part slot = rest.until(std::min(rest.text.find('.'), rest.text.size()));
       return property(plugin(slot), rest.from(std::min(slot.text.size() + 1, rest.text.size())), slot);

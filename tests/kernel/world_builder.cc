@@ -102,6 +102,7 @@ WorldBuilder& WorldBuilder::sphere(double radius, double mass, const Vector3& po
   body.pose.position = position;
   body.twist.linear = velocity;
   body.bound = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(radius)};
+  measure(Vector3::Constant(radius), &body.bound);
   add_body(body, "Sphere", {radius});
   return *this;
 }
@@ -115,6 +116,7 @@ WorldBuilder& WorldBuilder::box(const Vector3& half_extents, double mass, const 
   body.pose.position = position;
   body.twist.linear = velocity;
   body.bound = {BoundKind::kBox, Vector3::Zero(), Quaternion::Identity(), half_extents};
+  measure(half_extents, &body.bound);
   add_body(body, "Box", {half_extents.x(), half_extents.y(), half_extents.z()});
   return *this;
 }

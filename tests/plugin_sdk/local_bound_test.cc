@@ -13,17 +13,24 @@ namespace {
 constexpr LocalBound* kNothing = nullptr;
 
 LocalBound box(const Vector3& half_extents) {
-  return {BoundKind::kBox, Vector3::Zero(), Quaternion::Identity(), half_extents};
+  LocalBound bound = {BoundKind::kBox, Vector3::Zero(), Quaternion::Identity(), half_extents};
+  measure(half_extents, &bound);
+  return bound;
 }
 
 TEST(LocalBound, TheMarginIsAHundredthOfTheSmallest) {
   const LocalBound ground;
-  const LocalBound ball = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(2)};
+  LocalBound ball = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(2)};
+  measure(Vector3::Constant(2), &ball);
   EXPECT_EQ(contact_margin({kNothing, 0}), 0.0);
   EXPECT_EQ(contact_margin(std::array{ground}), 0.0);
   EXPECT_DOUBLE_EQ(contact_margin(std::array{ground, ball, box(Vector3(3, 0.5, 1))}), 0.005);
   for (const double thickness : {0.0, 1e-15, 1e-3})
     EXPECT_DOUBLE_EQ(contact_margin(std::array{ball, box(Vector3(3, thickness, 1))}), 3e-5) << thickness;
+  // whatever bounds it
+  LocalBound unbounded;
+  measure(Vector3(3, 0.5, 1), &unbounded);
+  EXPECT_DOUBLE_EQ(contact_margin(std::array{ball, unbounded}), 0.005);
 }
 
 TEST(LocalBound, WithoutOneABodyIsEverywhere) {

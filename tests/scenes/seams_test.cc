@@ -128,7 +128,7 @@ TEST_P(Seams, AreNotFeltOnTheSlantOrInOneCompound) {
 // its edge.
 TEST_P(Seams, AreNotFeltByACylinderThatRolls) {
   const Method& method = GetParam();
-  constexpr double kRadius = 0.1, kSpeed = 2.0;
+  constexpr double kRadius = 0.1, kRolling = 2.0;
   for (const double slant : {0.05, 0.1, 0.2, 0.35, 0.5}) {
     for (const double time_step : {1.0 / 60, 1.0 / 240}) {
       const Quaternion turn = turned(Vector3::UnitY(), slant);
@@ -146,9 +146,9 @@ TEST_P(Seams, AreNotFeltByACylinderThatRolls) {
           "Body { Id = \"Slider\" GeometryId = \"Can\" Mass = 1 Material = \"Smooth\" Forces = { \"Down\" } "
           "KineticProperties { Position = {-0.5, 0.1, 0} Orientation = " +
           literal(turn * turned(Vector3::UnitX(), 0.5 * std::numbers::pi)) + " LinearVelocity = " +
-          literal(kSpeed * ahead) + " AngularVelocity = " + literal(-kSpeed / kRadius * axis) + " } }\n} } }\n");
+          literal(kRolling * ahead) + " AngularVelocity = " + literal(-kRolling / kRadius * axis) + " } }\n} } }\n");
       run.to_end();
-      const Vector3 end = Vector3(-0.5, kRadius, 0.0) + kSpeed * run.time() * ahead;
+      const Vector3 end = Vector3(-0.5, kRadius, 0.0) + kRolling * run.time() * ahead;
       EXPECT_LE((run.body("Slider").pose.position - end).norm(), 1e-6) << slant << ' ' << time_step;
     }
   }

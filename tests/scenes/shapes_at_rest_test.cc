@@ -111,6 +111,38 @@ TEST(ShapesAtRest, SettleThereWhenDropped) {
 }
 
 // Sunk in askew by the landing, a mesh was held by its deepest corner alone: it stayed 12 mm deep and rocked for ever.
+// What bounds a body says which pairs are looked at, and nothing else: contacts were told at gaps that went by the declared
+// bounds.
+TEST(ShapesAtRest, AreTheSameInAnyBound) {
+  const auto fallen = [](const std::string& bound, const std::string& shape) {
+    std::string bodies = "Body { Id = \"Floor\" GeometryId = \"Ground\" Material = \"Stuff\" }\n";
+    for (int i = 0; i < 4; ++i)
+      bodies += "Body { Id = \"B" + std::to_string(i) +
+                "\" GeometryId = \"Piece\" Material = \"Stuff\" Mass = 1 Forces = {\"Down\"} BoundingVolumeType = \"" +
+                bound +
+                "\" KineticProperties { Position = " + harness::literal(Vector3(0.2 * i, 0.7 + 0.5 * i, 0.1 * i)) +
+                " AngularVelocity = {1, 2, 3} } }\n";
+    SceneRun run(
+        "Geometries { Geometry { Type = \"Halfspace\" Id = \"Ground\" } Geometry { Id = \"Piece\" " + shape +
+        " } }\nMaterials { Material { Id = \"Stuff\" RestitutionCoefficient = 0.3 DynamicFrictionCoefficient = 0.5 } "
+        "}\n"
+        "Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+        "Simulator { CustomProperties { Duration = 1 } }\nEnvironment { Space { Bodies {\n" +
+        bodies + "} } }\n");
+    run.to_end();
+    std::vector<Vector3> places;
+    for (int i = 0; i < 4; ++i) places.push_back(run.body("B" + std::to_string(i)).pose.position);
+    return places;
+  };
+  for (const std::string shape : {"Type = \"Sphere\" CustomProperties { Radius = 0.3 }",
+                                  "Type = \"Box\" CustomProperties { HalfExtents = {0.5, 0.25, 0.15} }",
+                                  "Type = \"Capsule\" CustomProperties { Radius = 0.1 Height = 0.6 }"}) {
+    const std::vector<Vector3> right = fallen("AxisAlignedBox", shape);
+    for (const char* bound : {"OrientedBox", "Sphere", "None"})
+      EXPECT_EQ(fallen(bound, shape), right) << bound << shape;
+  }
+}
+
 TEST(ShapesAtRest, AMeshComesToRestAsItsHullDoes) {
   const std::string vertices =
       "Vertices = {{-0.10205825317021947, -0.1877919850027808, -0.05149120845061955}, {-0.1864801544411777, "

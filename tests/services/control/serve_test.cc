@@ -140,6 +140,18 @@ TEST(Serve, ASwapThatIsRolledBackIsExitCode4) {
   EXPECT_EQ(served.status().state(), "running");
 }
 
+TEST(Serve, AFaultThatTheRunDidNotSurviveIsExitCode3) {
+  Served served({"--duration", "3600"});
+  ASSERT_FALSE(served.socket().empty());
+  EXPECT_EQ(served.ctl({"inject", "solver:kill,times=9"}).exit_code, 0);
+  for (int i = 0; i < 3000 && served.status().state() != "faulted"; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const ProgramResult result = served.end(SIGTERM);
+  EXPECT_EQ(result.exit_code, 3) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("slot solver"));
+  EXPECT_THAT(result.out, HasSubstr("checkpoint"));
+}
+
 TEST(Serve, CtlEditsTheSceneAndWakesABody) {
   Served served({"--duration", "3600", "--paused"});
   ASSERT_FALSE(served.socket().empty());

@@ -100,13 +100,18 @@ TEST(Lexer, CountsCharactersNotBytes) {
   EXPECT_EQ(all[3].position, (TextPosition{0, 2, 2}));
 }
 
-TEST(Lexer, SkipsAByteOrderMarkAndTakesBothLineEnds) {
-  const std::vector<Token> all = tokens(
-      "\xEF\xBB\xBF"
-      "a\r\n\tb\n");
-  ASSERT_EQ(all.size(), 3U);
-  EXPECT_EQ(all[0].position, (TextPosition{0, 1, 1}));
-  EXPECT_EQ(all[1].position, (TextPosition{0, 2, 2}));
+TEST(Lexer, SkipsAByteOrderMarkAndTakesAllLineEnds) {
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    const std::vector<Token> all = tokens(
+        "\xEF\xBB\xBF"
+        "a" +
+        end + "\tb // to the end of this line alone" + end + "c /*" + end + "*/ d" + end);
+    ASSERT_EQ(all.size(), 5U);
+    EXPECT_EQ(all[0].position, (TextPosition{0, 1, 1}));
+    EXPECT_EQ(all[1].position, (TextPosition{0, 2, 2}));
+    EXPECT_EQ(all[2].position, (TextPosition{0, 3, 1}));
+    EXPECT_EQ(all[3].position, (TextPosition{0, 4, 4}));
+  }
 }
 
 TEST(Lexer, ResolvesEscapes) {
@@ -119,6 +124,7 @@ TEST(Lexer, RefusesTextsAndCommentsWithoutEnd) {
   constexpr const char* kText = "this text does not end; a text ends with a double quote on the line it begins on";
   EXPECT_EQ(error_of("a\n  \"b"), std::string("2:3: ") + kText);
   EXPECT_EQ(error_of("\"b\nc\""), std::string("1:1: ") + kText);
+  EXPECT_EQ(error_of("\"b\rc\""), std::string("1:1: ") + kText);
   EXPECT_EQ(error_of("a /* b\n c"), "1:3: this comment does not end; a comment that begins with /* ends with */");
   EXPECT_EQ(error_of("/*/"), "1:1: this comment does not end; a comment that begins with /* ends with */");
 }

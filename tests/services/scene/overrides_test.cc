@@ -104,6 +104,18 @@ TEST(Overrides, CreateTheBlockThatIsNotWritten) {
   EXPECT_EQ(result.description->integrator.plugins[0].declaration.name, "RK4");
 }
 
+TEST(Overrides, NameTheCollisionFilterWithAndWithoutItsEnvironment) {
+  for (const std::string path : {"CollisionFilter", "Environment.CollisionFilter"}) {
+    for (const std::string scene : {"Environment { }", "Environment { CollisionFilter { DefaultAllow = true } }"}) {
+      BuiltScene result = build(scene, {path + ".DefaultAllow=false"});
+      ASSERT_TRUE(result.description.has_value()) << path;
+      EXPECT_FALSE(result.read.scene().environment(0).collision_filter().default_allow()) << path;
+    }
+  }
+  EXPECT_THAT(override_errors_of("CollisionFilter.DefaultAllov=false"),
+              ElementsAre(testing::HasSubstr("did you mean \"DefaultAllow\"?")));
+}
+
 TEST(Overrides, TakeTextsWithAndWithoutQuotes) {
   EXPECT_EQ(overridden({"Environment.Id=a b"}).id, "a b");
   EXPECT_EQ(overridden({"Environment.Id=\"a \\\" b\""}).id, "a \" b");
