@@ -212,25 +212,27 @@ bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::V
 bool ConeProblem::slides() const { return std::ranges::find(kinds_, RowKind::kSliding) != kinds_.end(); }
 
 // Of the solutions around one, that whose multipliers are least: which one is found goes by the order of the rows and by the
-// guess. False if it is lost on the way, or, unless `may_differ`, if other rows hold or slide in it.
+// guess. False if it is there already or lost on the way, or, unless `may_differ`, if other rows hold or slide in it.
 bool ConeProblem::settle(double enough, bool may_differ, Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
   constexpr double kLeast = 1e-6, kEnds = 1e-9;
   constexpr int kRounds = 6, kBack = 4;
   const double size = lambda->cwiseAbs().maxCoeff();
-  linearise(*lambda, *y);
-  kinds_before_ = kinds_;
+  const auto differs = [&] { return !may_differ && kinds_ != kinds_before_; };
   for (int round = 0; round < kRounds; ++round) {
     draw_ = kLeast;
     const bool is_step = newton_step(kLeast, lambda, y);
     draw_ = 0.0;
-    if (!is_step) return false;
-    if (step_.cwiseAbs().maxCoeff() <= kEnds * size) break;
+    if (round == 0) kinds_before_ = kinds_;
+    if (!is_step || differs()) return false;
+    if (step_.cwiseAbs().maxCoeff() > kEnds * size) continue;
+    if (round == 0) return false;
+    break;
   }
   for (int round = 0; round < kBack && residual_of(*lambda, *y) > enough; ++round)
     if (!newton_step(kLeast, lambda, y)) return false;
   if (!(residual_of(*lambda, *y) <= enough)) return false;
   linearise(*lambda, *y);
-  return may_differ || kinds_ == kinds_before_;
+  return !differs();
 }
 
 // Steps that are kept only where they shorten the residual; the diagonal grows where they do not.
