@@ -210,13 +210,13 @@ void Environment::find_touching() {
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
     const double gap = gap_at(i, back());
-    figures_.penetration = std::max({figures_.penetration, -gap, step_count_ == 0 ? -gap_at(i, front()) : 0.0});
+    const bool begins = step_count_ == 0 && data_.contact_depth[i] > 0.0;
+    figures_.penetration = std::max({figures_.penetration, -gap, begins ? -gap_at(i, front()) : 0.0});
     const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
     const std::uint64_t size = now.size();
     if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;
     now.resize(size + 2);
-    now[size] = a;
-    now[size + 1] = b;
+    now[size] = a, now[size + 1] = b;
   }
   const auto key = [](const Column<std::uint32_t>& pair) {
     return [&](std::size_t i) { return std::array{pair[2 * i], pair[2 * i + 1]}; };

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/channel/address.h"
 #include "services/cli/option_checks.h"
@@ -38,6 +40,8 @@ std::vector<HostingChoice> parse_hosting(const std::vector<std::string>& words,
     }
     choices.push_back(parse_mode(word, parse_slot("--hosting", word, word.substr(0, equals)), word.substr(equals + 1)));
   }
+  // the later one counts: what is said of all slots comes before what is said of one
+  std::stable_partition(choices.begin(), choices.end(), [](const HostingChoice& choice) { return !choice.slot; });
   for (const std::string& word : attached) {
     const std::size_t equals = word.find('=');
     const std::string address = equals == std::string::npos ? "" : word.substr(equals + 1);
@@ -76,7 +80,8 @@ void SceneOptions::add_to(CLI::App* command) {
   command->add_option("--dt", run_->time_step, "Time step, s")->check(any_number("a finite number of seconds > 0"));
   add_list(command, "--set", &run_->overrides, "Override anything: PATH=VALUE, such as Solver.Iterations=50");
   add_list(command, "--hosting", &hosting_,
-           "direct, shm or grpc, for all slots or for one: solver=direct; SLOT=grpc:ADDRESS: a worker of this machine "
+           "direct, shm or grpc, for all slots, or for one, which counts more: solver=direct; SLOT=grpc:ADDRESS: a "
+           "worker of this machine "
            "that listens");
   add_list(command, "--attach", &attached_,
            "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "

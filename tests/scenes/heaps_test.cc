@@ -107,6 +107,16 @@ Rest rest_of_cubes(std::uint64_t seed) {
   return rest;
 }
 
+// The report counts the overlap of the initial state, from which the first step has freed the ball.
+TEST(Heaps, TheirFirstOverlapIsInTheReport) {
+  SceneRun run(scene("Type = \"Sphere\" CustomProperties { Radius = 0.5 }", 1.0,
+                     body("Floor", Vector3::Zero(), Quaternion::Identity(), kFlat) +
+                         body("Ball", Vector3(0, 0.4, 0), Quaternion::Identity(), kPiece)));
+  run.to_end();
+  EXPECT_NEAR(run.body("Ball").pose.position.y(), 0.5, 1e-9);
+  EXPECT_NEAR(run.report().max_penetration(), 0.1, 1e-12);
+}
+
 // Bodies of one place, of which some push each other away in a circle: they part, none through the floor, and none with speed
 // (there were 8 cm below it).
 TEST(Heaps, OfOnePlacePart) {
