@@ -32,7 +32,7 @@
 //                   (coulomb_contact.h). Where the residual shrinks too slowly for the sweeps that are left, or they ran
 //                   out, kNewton goes on from the best of them.
 //     Of the solutions around the one found the least is taken where something slides, after steps in up to 96 rows alone: steps
-//     on y + 1e-6 lambda for what holds, from nought, not from where it is, then some that end at a solution again. Not after
+//     on y + 1e-8 lambda for what holds, from nought, not from where it is, then some that end at a solution again. Not after
 //     steps if other rows hold or slide there. Four corners of a box then bear alike whatever the order of the rows.
 //  4. Static and dynamic friction: all stick within mu_s first, but for what is known to slide; what slips then slides
 //     with mu_d.

@@ -214,13 +214,14 @@ bool ConeProblem::slides() const { return std::ranges::find(kinds_, RowKind::kSl
 // Of the solutions around one, that whose multipliers are least: which one is found goes by the order of the rows and by the
 // guess. False if it is there already or lost on the way, or, unless `may_differ`, if other rows hold or slide in it.
 bool ConeProblem::settle(double enough, bool may_differ, Eigen::VectorXd* lambda, Eigen::VectorXd* y) {
-  constexpr double kLeast = 1e-6, kEnds = 1e-9;
+  // what is drawn moves by 1e-8 where the rows determine it, and by the rounding of that where they do not; then it is held
+  constexpr double kDrawn = 1e-8, kHeld = 1e-6, kEnds = 1e-8;
   constexpr int kRounds = 6, kBack = 4;
   const double size = lambda->cwiseAbs().maxCoeff();
   const auto differs = [&] { return !may_differ && kinds_ != kinds_before_; };
   for (int round = 0; round < kRounds; ++round) {
-    draw_ = kLeast;
-    const bool is_step = newton_step(kLeast, lambda, y);
+    draw_ = kDrawn;
+    const bool is_step = newton_step(kDrawn, lambda, y);
     draw_ = 0.0;
     if (round == 0) kinds_before_ = kinds_;
     if (!is_step || differs()) return false;
@@ -229,7 +230,7 @@ bool ConeProblem::settle(double enough, bool may_differ, Eigen::VectorXd* lambda
     break;
   }
   for (int round = 0; round < kBack && residual_of(*lambda, *y) > enough; ++round)
-    if (!newton_step(kLeast, lambda, y)) return false;
+    if (!newton_step(kHeld, lambda, y)) return false;
   if (!(residual_of(*lambda, *y) <= enough)) return false;
   linearise(*lambda, *y);
   return !differs();
