@@ -28,7 +28,7 @@ Vector3 turned(const Vector3& turn, const Quaternion& by1, const Quaternion& by2
   constexpr double kTurn = 2.0 * std::numbers::pi;
   const Vector3 now = log_rotation(by2 * exp_rotation(turn) * by1.conjugate());
   const double angle = now.norm();
-  if (angle == 0.0) return now;
+  if (angle == 0.0) return Vector3::Zero();
   const Vector3 axis = now / angle;
   return (angle + kTurn * std::round((turn.dot(axis) - angle) / kTurn)) * axis;
 }
