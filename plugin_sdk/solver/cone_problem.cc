@@ -420,7 +420,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   constexpr double kNearly = 1e4, kRounded = 8.0;
   // sweeps of kGaussSeidel before it is asked if they will do: what some steps of Newton's cost
   constexpr std::uint32_t kLeastTrial = 64;
-  // of what Newton's steps find, the least forces are looked for with so many rows at most: half as much time again
+  // with more rows the least forces are not looked for after Newton's steps: in heaps other rows hold there nearly always
   constexpr Eigen::Index kSettledRows = 96;
   const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
   // where sweeps will not, steps take over; of large problems down to a fifth, so that what has no end takes a second or two
@@ -509,19 +509,19 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       }
       if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
-    const bool is_one = blocks_.size() < 2;
-    bool takes_one_more = is_newton || sweeps == 0;
-    if (best <= enough && done > 0 && !is_one && (sweeps > 0 || (lambda.size() <= kSettledRows && slides()))) {
+    const bool has_new = best <= enough && done > 0;
+    bool ends_with_step = is_newton || sweeps == 0;
+    if (has_new && blocks_.size() > 1 && (sweeps > 0 || (lambda.size() <= kSettledRows && slides()))) {
       lambda = best_lambda, y = best_y;
       if (settle(enough, sweeps > 0, &lambda, &y)) {
         best_lambda = lambda, best_y = y, best = residual_of(lambda, y);
-        takes_one_more = true;
+        ends_with_step = true;
+      } else {
+        lambda = best_lambda, y = best_y;
       }
-      lambda = best_lambda, y = best_y;
     }
     // one step more costs little and ends at rounding
-    if (takes_one_more && best <= enough && done > 0 && newton_step(proximal_after(without), &lambda, &y))
-      keep_better();
+    if (has_new && ends_with_step && newton_step(proximal_after(without), &lambda, &y)) keep_better();
     summary->iterations += done;
     summary->residual = best;
     summary->has_converged = best <= (idle >= kIdleGuesses ? kRounded : 1.0) * enough;

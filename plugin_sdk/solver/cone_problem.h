@@ -188,9 +188,10 @@ class ConeProblem {
   void project(const Block& block, const double* lambda, const double* y, double* projected) const;
   double residual_of(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y) const;
   double largest_sum(const Eigen::VectorXd& lambda) const;
-  bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner = 0.0);
+  bool linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner = 0.0, double drawn = 0.0);
   // With a corner, see linearise(): false, with nothing done, where a row slides.
-  bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner = 0.0);
+  bool newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner = 0.0,
+                   double drawn = 0.0);
   std::uint32_t descend(double enough, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void solve_sliding();
   void solve_sticking();
@@ -237,7 +238,7 @@ class ConeProblem {
   Eigen::VectorXd side_of_step_, step_;
   std::vector<double> rest_;
   DenseLu lu_;
-  double draw_ = 0.0, proximal_ = 0.0, factored_proximal_ = 0.0;
+  double proximal_ = 0.0, factored_proximal_ = 0.0;
   std::vector<Eigen::Index> coupled_, factored_;  // rows; of sticking_
   ProfileLdlt sticking_;
   HeldFactors held_factors_[2];  // of poses, of velocities

@@ -80,8 +80,8 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
 
 // Equations of a step, d the change of lambda: a row that its law holds as y + W' d = target, any other as where its law
 // puts it, alone or (in sliding_, and then true is returned) together with others. Rows of a contact that miss being held by
-// no more than `corner` (m/s, m) are; with a corner sliding_ is not made.
-bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner) {
+// no more than `corner` (m/s, m) are; with a corner sliding_ is not made. Multipliers that hold are `drawn` towards nought.
+bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double corner, double drawn) {
   const Eigen::Index count = lambda.size();
   const bool may_slide = corner == 0.0;
   bool any_slides = false;
@@ -91,7 +91,7 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
     kinds_[static_cast<std::size_t>(i)] = kind;
     side_of_step_[i] = side;
   };
-  const auto hold = [&](Eigen::Index i, double missing) { note(i, RowKind::kHeld, missing - draw_ * lambda[i]); };
+  const auto hold = [&](Eigen::Index i, double missing) { note(i, RowKind::kHeld, missing - drawn * lambda[i]); };
   const auto put = [&](Eigen::Index i, double place) { note(i, RowKind::kPut, place - lambda[i]); };
   const auto start_sliding = [&](Eigen::Index i, double side) {
     if (!any_slides && may_slide) sliding_.resize(count, count);
@@ -170,10 +170,11 @@ bool ConeProblem::linearise(const Eigen::VectorXd& lambda, const Eigen::VectorXd
 }
 
 // False, with nothing done, if the step is not finite. `proximal` is added to the diagonal of its matrix, which is 1.
-bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner) {
+bool ConeProblem::newton_step(double proximal, Eigen::VectorXd* lambda, Eigen::VectorXd* y, double corner,
+                              double drawn) {
   proximal_ = proximal;
   const Eigen::Index count = lambda->size();
-  const bool any_slides = linearise(*lambda, *y, corner);
+  const bool any_slides = linearise(*lambda, *y, corner, drawn);
   if (any_slides && corner > 0.0) return false;
   // what is put somewhere goes to the right
   coupled_.clear();
@@ -220,9 +221,7 @@ bool ConeProblem::settle(double enough, bool may_differ, Eigen::VectorXd* lambda
   const double size = lambda->cwiseAbs().maxCoeff();
   const auto differs = [&] { return !may_differ && kinds_ != kinds_before_; };
   for (int round = 0; round < kRounds; ++round) {
-    draw_ = kDrawn;
-    const bool is_step = newton_step(kDrawn, lambda, y);
-    draw_ = 0.0;
+    const bool is_step = newton_step(kDrawn, lambda, y, 0.0, kDrawn);
     if (round == 0) kinds_before_ = kinds_;
     if (!is_step || differs()) return false;
     if (step_.cwiseAbs().maxCoeff() > kEnds * size) continue;

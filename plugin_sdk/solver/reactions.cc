@@ -23,7 +23,8 @@ bool holds_place(const Discrepancy& d, int axis) {
   return holds_always(d, axis) && axis_mode(d.modes, axis) != AxisMode::kDriven && !(d.is_radial() && axis == 0);
 }
 
-// The turn of body 2 from body 1 as a rotation vector (of up to a turn and more) once both have turned on by a little.
+// The turn of body 2 from body 1 as a rotation vector (of up to a turn and more) once both have turned on by a little:
+// error_at() adds turns, whose slopes are right for small ones alone.
 Vector3 turned(const Vector3& turn, const Quaternion& by1, const Quaternion& by2) {
   constexpr double kTurn = 2.0 * std::numbers::pi;
   const Vector3 now = log_rotation(by2 * exp_rotation(turn) * by1.conjugate());

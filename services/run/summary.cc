@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
+#include <cstdint>
 
 #include "services/run/report.h"
 
@@ -31,14 +31,14 @@ std::string story(const report::v1::Report& report, const std::vector<EventLog::
 }
 
 std::string hosts(const report::v1::Plan& plan) {
-  std::set<int> processes;
+  std::uint32_t processes = 0;
   std::string names;
   for (const report::v1::PlannedSlot& slot : plan.slots()) {
     names += fmt::format("{}{}={}", names.empty() ? "" : ", ", slot.slot(), slot.plugin());
-    if (slot.hosting() != "direct") processes.insert(slot.pid());
+    processes = std::max(processes, slot.process());
   }
-  return processes.empty() ? fmt::format("in this process: {}", names)
-                           : fmt::format("{} worker processes: {}", processes.size(), names);
+  return processes == 0 ? fmt::format("in this process: {}", names)
+                        : fmt::format("{} worker processes: {}", processes, names);
 }
 
 // Faults that were survived, swaps and edits; of faults and edits a line each for the first ones.

@@ -103,6 +103,7 @@ WorldBuilder& WorldBuilder::sphere(double radius, double mass, const Vector3& po
   body.twist.linear = velocity;
   body.bound = {BoundKind::kSphere, Vector3::Zero(), Quaternion::Identity(), Vector3::Constant(radius)};
   measure(Vector3::Constant(radius), &body.bound);
+  body.bound.reach = radius;
   add_body(body, "Sphere", {radius});
   return *this;
 }
