@@ -24,6 +24,12 @@ class Shard {
     std::ofstream(folder_.path() + "/program") << "#!/bin/bash\n" << script << '\n';
     chmod((folder_.path() + "/program").c_str(), 0755);
   }
+  // Compiled, with line tables.
+  void set_compiled(const std::string& source) const {
+    std::ofstream(folder_.path() + "/program.cc") << source;
+    const std::string command = "cd " + folder_.path() + " && clang++ -g1 -O1 program.cc -o program";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+  }
   // Returns the exit code.
   int test(const std::string& inputs, const std::string& arguments = "") const {
     const std::string command = "cd " + folder_.path() + " && GRAVITAS_TEST_INPUTS='" + inputs + "' " +
@@ -77,6 +83,20 @@ TEST(UnlessPassed, AFailureIsRunAgain) {
   shard.set_program("echo run >>runs; echo results >results.xml; exit 3");
   EXPECT_EQ(shard.test("a"), 3);
   EXPECT_EQ(shard.test("a"), 3);
+  EXPECT_EQ(shard.runs(), 2);
+}
+
+TEST(UnlessPassed, ACommentThatMovesLinesChangesNoProgram) {
+  const Shard shard;
+  const std::string head = "#include <cstdlib>\n",
+                    body = "int main() { return system(\"echo run >>runs; >results.xml\"); }\n";
+  shard.set_compiled(head + body);
+  EXPECT_EQ(shard.test("a"), 0);
+  shard.set_compiled(head + "// A comment.\n\n" + body);
+  EXPECT_EQ(shard.test("a"), 0);
+  EXPECT_EQ(shard.runs(), 1);
+  shard.set_compiled(head + "// A comment.\nint other() { return 1; }\n" + body);
+  EXPECT_EQ(shard.test("a"), 0);
   EXPECT_EQ(shard.runs(), 2);
 }
 

@@ -9,6 +9,7 @@
 
 #include "plugin_sdk/geometry/simplex.h"
 #include "tests/plugin_sdk/geometry/random_shapes.h"
+#include "tests/sanitized.h"
 
 namespace gravitas {
 namespace {
@@ -37,7 +38,7 @@ TEST(Penetration, IsTheLeastOverAllDirections) {
   test::RandomShapes random(31);
   for (const SceneShape::Kind kind_a : test::kConvexKinds) {
     for (const SceneShape::Kind kind_b : test::kConvexKinds) {
-      for (int i = 0; i < 30; ++i) {
+      for (int i = 0; i < harness::unless_sanitized(30); ++i) {
         const SceneShape a = random.convex(kind_a), b = random.convex(kind_b);
         const auto map_a = make_support_map(a), map_b = make_support_map(b);
         const PlacedPair pair{*map_a, *map_b, random.rotation().toRotationMatrix(),
@@ -62,7 +63,7 @@ TEST(Penetration, OfPolyhedraIsExact) {
   test::RandomShapes random(32);
   for (const SceneShape::Kind kind_b : {SceneShape::Kind::kSphere, SceneShape::Kind::kBox, SceneShape::Kind::kCapsule,
                                         SceneShape::Kind::kConvexPolyhedron}) {
-    for (int i = 0; i < 200; ++i) {
+    for (int i = 0; i < harness::unless_sanitized(200); ++i) {
       const SceneShape a = random.convex(SceneShape::Kind::kConvexPolyhedron), b = random.convex(kind_b);
       const auto map_a = make_support_map(a), map_b = make_support_map(b);
       const PlacedPair pair{*map_a, *map_b, random.rotation().toRotationMatrix(),

@@ -104,41 +104,36 @@ double distance(const BodyState& a, const BodyState& b) {
                    (a.twist.linear - b.twist.linear).squaredNorm() + (a.twist.angular - b.twist.angular).squaredNorm());
 }
 
-// From two halvings of the step, against the method of order 6 at a step where only rounding is left (for drag, where
-// that one is of order 4, the group's Runge-Kutta method).
-double observed_order(const Method& method, const Motion& motion) {
+// Against the method of order 6 at a step where only rounding is left (for drag, where that one is of order 4, the
+// group's Runge-Kutta method).
+BodyState truth_of(const Motion& motion) {
   const Method exact{motion.depends_on_velocity ? "integrator_rkmk4" : "integrator_symplectic_splitting",
                      motion.depends_on_velocity ? std::vector<double>{} : std::vector<double>{6}, 6, 0};
-  const BodyState truth = state_after(exact, motion, motion.depends_on_velocity ? 3000 : 300);
+  return state_after(exact, motion, motion.depends_on_velocity ? 3000 : 300);
+}
+
+// From two halvings of the step.
+double observed_order(const Method& method, const Motion& motion, const BodyState& truth) {
   const double coarse = distance(state_after(method, motion, method.steps), truth);
   const double fine = distance(state_after(method, motion, 2 * method.steps), truth);
   return std::log2(coarse / fine);
 }
 
 TEST(Orders, AreThoseOfTheoryWithinATenth) {
-  if (harness::kSanitized) GTEST_SKIP() << "figures of what Table runs, too";
-  for (const Method& method : methods())
-    for (const Motion& motion : motions())
+  for (const Motion& motion : motions()) {
+    std::printf("observed order, %s\n", motion.name.c_str());
+    const BodyState truth = truth_of(motion);
+    for (const Method& method : methods()) {
+      const double order = observed_order(method, motion, truth);
+      std::printf("  %-26s%8.3f\n", method.name().c_str(), order);
       if (motion.depends_on_velocity && method.order > 4.0) {
         // kicks of order 4, whose error may be the smaller one at these steps
-        EXPECT_GT(observed_order(method, motion), 3.9) << method.name() << ", " << motion.name;
+        EXPECT_GT(order, 3.9) << method.name() << ", " << motion.name;
       } else {
-        EXPECT_NEAR(observed_order(method, motion), method.order, 0.1) << method.name() << ", " << motion.name;
+        EXPECT_NEAR(order, method.order, 0.1) << method.name() << ", " << motion.name;
       }
-}
-
-TEST(Orders, Table) {
-  std::printf("%-26s", "observed order");
-  for (const Motion& motion : motions()) std::printf("%22s", motion.name.c_str());
-  std::printf("\n");
-  for (const Method& method : methods()) {
-    std::printf("%-26s", method.name().c_str());
-    for (const Motion& motion : motions()) {
-      const double order = observed_order(method, motion);
-      EXPECT_GT(order, 0.0);
-      std::printf("%22.3f", order);
     }
-    std::printf("\n");
+    if (harness::kSanitized) break;  // the others are the same code
   }
 }
 

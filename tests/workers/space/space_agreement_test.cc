@@ -120,7 +120,7 @@ TEST_P(SpaceAgreement, HoldsForManyThatDriftThroughEachOther) {
     bodies.push_back(cube(random.vector(4.0), random.uniform(0.1, 0.6)));
     velocities.push_back(random.vector(0.05));
   }
-  for (int step = 0; step < harness::unless_sanitized(240, 4); ++step) {
+  for (int step = 0; step < harness::unless_sanitized(240, 12); ++step) {
     for (std::size_t i = 1; i < bodies.size(); ++i) {
       // each rests for a third of the time, often outside of where it was when its place was last noted
       if ((i + static_cast<std::size_t>(step)) / 4 % 3 == 0) continue;
