@@ -1,4 +1,4 @@
-// Every scene that ships runs to its end, and in this process and in workers to the same bits, without a fault.
+// Every scene that ships runs to its end; in this process and in workers to the same bits, as determinism_test.cc shows.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,41 +25,21 @@ std::vector<std::string> shipped_scenes() {
   return names;
 }
 
-RunResult run_in(const std::string& scene, kernel::Hosting hosting, const std::vector<std::string>& overrides = {}) {
-  RunOptions options;
-  options.overrides = overrides;
-  options.scenes = {kFolder + '/' + scene + ".gravitas"};
-  options.hosting = {{std::nullopt, hosting}};
-  return run(
-      options, [] { return false; }, [](const Progress&) {});
-}
-
 class Shipped : public ::testing::TestWithParam<std::string> {};
 
 INSTANTIATE_TEST_SUITE_P(Scene, Shipped, ::testing::ValuesIn(shipped_scenes()),
                          [](const auto& which) { return which.param; });
 
 TEST_P(Shipped, RunsToItsEnd) {
-  const RunResult whole = run_in(GetParam(), kernel::Hosting::kDirect);
+  RunOptions options;
+  options.scenes = {kFolder + '/' + GetParam() + ".gravitas"};
+  options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+  const RunResult whole = run(
+      options, [] { return false; }, [](const Progress&) {});
   ASSERT_EQ(whole.outcome, RunOutcome::kCompleted) << whole.fault;
   EXPECT_TRUE(std::isfinite(whole.report.energy().final()));
   EXPECT_LE(whole.report.max_penetration(), 1e-3);
   EXPECT_LE(whole.report.max_joint_error(), 1e-3);
-}
-
-// Of large scenes half a second.
-TEST_P(Shipped, RunsAlikeInThisProcessAndInWorkers) {
-  std::vector<std::string> overrides;
-  if (GetParam() == "pile1000") overrides = {"Simulator.Duration=0.5"};
-  const RunResult direct = run_in(GetParam(), kernel::Hosting::kDirect, overrides);
-  const RunResult workers = run_in(GetParam(), kernel::Hosting::kSharedMemory, overrides);
-  const RunResult messages = run_in(GetParam(), kernel::Hosting::kGrpc, overrides);
-  ASSERT_EQ(workers.outcome, RunOutcome::kCompleted) << workers.fault;
-  EXPECT_EQ(direct.report.state_hash(), workers.report.state_hash());
-  EXPECT_EQ(direct.report.chain_hash(), workers.report.chain_hash());
-  EXPECT_EQ(direct.report.chain_hash(), messages.report.chain_hash());
-  EXPECT_EQ(workers.report.faults_size(), 0);
-  EXPECT_GT(workers.report.steps(), 0U);
 }
 
 TEST_P(Shipped, SaysAtItsHeadWhatHappens) {
