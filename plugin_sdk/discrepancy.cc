@@ -8,12 +8,6 @@
 #include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
-namespace {
-
-constexpr double kWholeTurn = 6.28318530717958647692;
-
-}  // namespace
-
 JacobianRow jacobian_row(const Discrepancy& discrepancy, const Vector3& axis, const Vector3& com1,
                          const Vector3& com2) {
   if (discrepancy.is_angular()) return {Vector3::Zero(), -axis, Vector3::Zero(), axis};

@@ -10,8 +10,6 @@
 namespace gravitas {
 namespace {
 
-constexpr double kHalfTurn = 3.14159265358979323846;
-
 Vector3 first_axis(const Quaternion& q) { return q * Vector3::UnitX(); }
 
 Discrepancy row_of(const Twisting& twisting, AxisMode mode) {
@@ -56,7 +54,6 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 }
 
 double JointLimits::turn(double angle, double way) const {
-  constexpr double kWholeTurn = 2.0 * kHalfTurn;
   constexpr double kPast = 0.02, kOfWay = 0.5, kMostPast = 1.0;  // rad, that a step may begin beyond a limit by
   constexpr double kRests = 1e-9, kMoves = 1e-2;                 // rad; of how far it is beyond
   if (is_none()) return angle;
@@ -218,7 +215,7 @@ Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2
 Discrepancy sprung_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                              const JointLimits& limits, double rest, const JointSpring& spring) {
   Twisting twisting = {first_axis(frame1), first_axis(frame2), limited_twist(frame1, frame2, bodies, limits) - rest};
-  if (limits.is_none()) twisting.angle -= 2.0 * kHalfTurn * std::round(twisting.angle / (2.0 * kHalfTurn));
+  if (limits.is_none()) twisting.angle -= kWholeTurn * std::round(twisting.angle / kWholeTurn);
   return sprung(row_of(twisting, AxisMode::kFree), spring);
 }
 

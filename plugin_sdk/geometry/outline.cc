@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
@@ -22,7 +23,7 @@ class Pen {
     const auto at = [&](std::uint32_t i) {
       // quarters are exact, so that arcs meet the lines that begin there
       const std::uint32_t quarter = i / (kChords / 4) % 4, rest = i % (kChords / 4);
-      const double angle = 6.283185307179586477 * rest / kChords;
+      const double angle = kWholeTurn * rest / kChords;
       const double c = rest == 0 ? 1.0 : math::cos(angle), s = rest == 0 ? 0.0 : math::sin(angle);
       const double cosine = quarter == 0 ? c : quarter == 1 ? -s : quarter == 2 ? -c : s;
       const double sine = quarter == 0 ? s : quarter == 1 ? c : quarter == 2 ? -s : -c;

@@ -15,6 +15,9 @@
 
 namespace gravitas {
 
+inline constexpr double kWholeTurn = 6.28318530717958647692;  // rad
+inline constexpr double kHalfTurn = 0.5 * kWholeTurn;
+
 // q / |q|, of any finite nonzero q, also where |q|^2 would overflow or underflow. The sign is kept.
 // A zero q gives NaN.
 Quaternion normalized(const Quaternion& q);

@@ -12,11 +12,10 @@
 // A spring and a damper about a, torque -k (angle - RestAngle) - c angle', take no freedom. Beyond half a turn from RestAngle
 // (from the middle of the limits, where there are some) the angle, and so the spring, goes on from the other side.
 #include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
-
-constexpr double kTwoPi = 6.283185307179586;
 
 class Revolute final : public ConstraintPlugin {
  public:
@@ -54,7 +53,7 @@ class Revolute final : public ConstraintPlugin {
           const Vector3 point1 = properties.vector(), point2 = properties.vector();
           const double lower = properties.number(), upper = properties.number();
           const JointLimits limits = JointLimits::of(lower, upper, "Revolute: LowerLimit", "Revolute: UpperLimit");
-          if (!limits.is_none() && limits.upper - limits.lower >= kTwoPi && limits.lower > -kUnlimited &&
+          if (!limits.is_none() && limits.upper - limits.lower >= kWholeTurn && limits.lower > -kUnlimited &&
               limits.upper < kUnlimited)
             throw Refusal("Revolute: UpperLimit lies a full turn or more above LowerLimit, which limits nothing");
           const JointSpring spring = JointSpring::of(&properties);

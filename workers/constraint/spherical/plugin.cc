@@ -26,8 +26,6 @@
 namespace gravitas {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
 // c and dc/dpsi of a cone of points (azimuth, angle).
 struct ConePoint {
   double angle, slope;
@@ -37,8 +35,8 @@ ConePoint cone_at(std::span<const double> cone, double azimuth) {
   std::size_t next = 0;
   while (next < count && cone[2 * next] <= azimuth) ++next;
   const std::size_t last = next == 0 ? count - 1 : next - 1;
-  const double from = cone[2 * last] - (next == 0 ? 2.0 * kPi : 0.0);
-  const double to = next == count ? cone[0] + 2.0 * kPi : cone[2 * next];
+  const double from = cone[2 * last] - (next == 0 ? kWholeTurn : 0.0);
+  const double to = next == count ? cone[0] + kWholeTurn : cone[2 * next];
   const double end = cone[2 * (next == count ? 0 : next) + 1];
   const double slope = (end - cone[2 * last + 1]) / (to - from);
   return {cone[2 * last + 1] + slope * (azimuth - from), slope};
@@ -58,7 +56,7 @@ class Spherical final : public ConstraintPlugin {
              {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
               Property::number("ReachConeAngle", "rad")
                   .above(0.0)
-                  .at_most(kPi)
+                  .at_most(kHalfTurn)
                   .means("Largest angle of Axis in body 2 against Axis in body 1; none if absent."),
               Property::table("ReachCone", 2, "rad", "world")
                   .means(
@@ -67,10 +65,10 @@ class Spherical final : public ConstraintPlugin {
                       "-z where Axis is along x, to 1e-3."),
               Property::vector("Axis", "1", "world").means("Axis of cone and twist at the start, any length."),
               Property::number("TwistLower", "rad")
-                  .at_least(-kPi)
+                  .at_least(-kHalfTurn)
                   .at_most(0.0)
                   .means("Smallest twist of body 2 about its axis, 0 at the start; none if absent."),
-              Property::number("TwistUpper", "rad").at_least(0.0).at_most(kPi).means("Largest twist; none if absent."),
+              Property::number("TwistUpper", "rad").at_least(0.0).at_most(kHalfTurn).means("Largest twist; none if absent."),
               Property::number("Stiffness", "N*m/rad")
                   .at_least(0.0)
                   .means(
@@ -130,7 +128,7 @@ class Spherical final : public ConstraintPlugin {
     cone.twist = JointLimits::of(lower, upper, "Spherical: TwistLower", "Spherical: TwistUpper");
     if (!std::isnan(angle)) {
       if (!cone.irregular.empty()) throw Refusal("Spherical: ReachConeAngle and ReachCone are both given");
-      if (!(angle > 0.0 && angle <= kPi)) throw Refusal("Spherical: ReachConeAngle is outside 0 ... pi");
+      if (!(angle > 0.0 && angle <= kHalfTurn)) throw Refusal("Spherical: ReachConeAngle is outside 0 ... pi");
       cone.angle = angle;
     }
     demand_cone(cone.irregular);
@@ -164,9 +162,9 @@ class Spherical final : public ConstraintPlugin {
     if (cone.empty()) return;
     if (cone.size() < 6) throw Refusal("Spherical: ReachCone has fewer than three rows");
     for (std::size_t i = 0; i < cone.size(); i += 2) {
-      if (!(cone[i] >= 0.0 && cone[i] < 2.0 * kPi) || (i > 0 && !(cone[i] > cone[i - 2])))
+      if (!(cone[i] >= 0.0 && cone[i] < kWholeTurn) || (i > 0 && !(cone[i] > cone[i - 2])))
         throw Refusal("Spherical: ReachCone has azimuths that do not rise within 0 ... 2 pi");
-      if (!(cone[i + 1] > 0.0 && cone[i + 1] <= kPi))
+      if (!(cone[i + 1] > 0.0 && cone[i + 1] <= kHalfTurn))
         throw Refusal("Spherical: ReachCone has an angle outside 0 ... pi");
     }
   }
@@ -194,7 +192,7 @@ class Spherical final : public ConstraintPlugin {
     const Swing swing = swing_between(a1, a2);
     const Vector3 across = swing.axis.cross(a1);
     double azimuth = math::atan2((one * Vector3::UnitZ()).dot(across), (one * Vector3::UnitY()).dot(across));
-    if (azimuth < 0.0) azimuth += 2.0 * kPi;
+    if (azimuth < 0.0) azimuth += kWholeTurn;
     const ConePoint reach = cone_at(cone, azimuth);
     const math::SinCos swung = math::sincos(swing.angle);
     const Vector3 outward = swung.cos * across - swung.sin * a1;
