@@ -88,7 +88,7 @@ std::string describe(const Examinee& examinee, double seconds, plugin::v1::Descr
 }
 
 void complete(Examinee* examinee, bool is_quick) {
-  const std::string problem = describe(*examinee, patience_of(is_quick).start, &examinee->description);
+  const std::string problem = describe(*examinee, patience_of(*examinee, is_quick).start, &examinee->description);
   if (!problem.empty() && examinee->is_command())
     throw BadInput(fmt::format("'{}' is no plugin: {}; {}", examinee->argument, problem, kAllowed));
   examinee->problem = problem;

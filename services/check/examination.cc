@@ -195,15 +195,16 @@ report::v1::CheckReport Run::report() {
 
 }  // namespace
 
-Patience patience_of(bool is_quick) {
-  if (is_quick) return {.deadline = 1.0, .cap = 2.0, .start = 5.0};
-  return {};
+Patience patience_of(const Examinee& plugin, bool is_quick) {
+  if (!is_quick) return {};
+  // a command may start an interpreter first; a library loads in a few milliseconds
+  return {.deadline = 1.0, .cap = 2.0, .start = plugin.is_command() ? 5.0 : 1.8};
 }
 
 Examination::Examination(const Examinee& plugin, Options chosen, std::function<void(const Progress&)> progress)
     : examinee(plugin),
       options(std::move(chosen)),
-      patience(patience_of(options.quick)),
+      patience(patience_of(plugin, options.quick)),
       on_progress(std::move(progress)) {}
 
 void Examination::show(std::uint64_t done, std::uint64_t all) const {

@@ -31,7 +31,7 @@ struct Progress {
 };
 
 // How long things may take.
-Patience patience_of(bool is_quick);
+Patience patience_of(const Examinee& plugin, bool is_quick);
 
 // What cases share: the plugin, its questions, and the answers of an undisturbed process.
 class Examination {

@@ -41,7 +41,9 @@ SceneError Diagnostics::at(const TextPosition& position, std::string text, bool 
 }
 
 void Diagnostics::error(const TextPosition& position, std::string text) {
-  if (error_count_++ < kLimit) problems_->errors.push_back(at(position, std::move(text), false));
+  if (full()) return;
+  if (++error_count_ == kLimit) text += " (after " + std::to_string(kLimit) + " errors no more are looked for)";
+  problems_->errors.push_back(at(position, std::move(text), false));
 }
 
 void Diagnostics::warning(const TextPosition& position, std::string text) {

@@ -39,8 +39,8 @@ TextPosition place_of(const v1::Location& location);
 
 class Diagnostics {
  public:
-  // Errors beyond this number are dropped: the first ones tell what is wrong. Warnings beyond it
-  // are counted.
+  // Errors beyond this number are dropped, which the last one says: the first ones tell what is wrong. Warnings
+  // beyond it are counted.
   static constexpr std::size_t kLimit = 20;
 
   // Names of files are those of scene.files(); the scene must outlive this.

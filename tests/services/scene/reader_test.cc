@@ -319,7 +319,10 @@ TEST(Reader, TakesNestingUpToTheLimit) {
 TEST(Reader, ReportsSeveralErrorsUpToALimit) {
   std::string text;
   for (int i = 0; i < 100; ++i) text += "Bogus { }\n";
-  EXPECT_EQ(read_errors_of(text).size(), 20U);
+  const std::vector<std::string> errors = read_errors_of(text);
+  ASSERT_EQ(errors.size(), 20U);
+  EXPECT_THAT(errors[18], Not(HasSubstr("no more are looked for")));
+  EXPECT_THAT(errors[19], HasSubstr("(after 20 errors no more are looked for)"));
   text.clear();
   for (int i = 0; i < 50; ++i) text += "Body { Id = \" b" + std::to_string(i) + "\" }\n";
   const std::vector<std::string> warnings = warnings_of("Environment { Space { Bodies {\n" + text + "} } }");
