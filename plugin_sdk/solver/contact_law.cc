@@ -1,6 +1,7 @@
 #include "plugin_sdk/solver/contact_law.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver.h"
@@ -53,6 +54,38 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
   law.frame = frame_of(tilted);
   law.target = restitution * tilted_speed;
   return law;
+}
+
+bool SharedRestitution::goes_on(bool gains, double work) {
+  if (!gains) best_ = std::max(best_, share_);
+  switch (tried_) {
+    case Tried::kNought:
+      if (gains) return false;
+      at_nought_ = work;
+      tried_ = Tried::kHalf, share_ = 0.5;
+      return true;
+    case Tried::kHalf:
+      tried_ = Tried::kRoot, share_ = root(work);
+      return true;
+    case Tried::kRoot:
+      if (!gains) return false;
+      tried_ = Tried::kBest, share_ = best_;
+      return true;
+    case Tried::kBest:
+      break;
+  }
+  return false;
+}
+
+// Of the parabola through the three, between nought and one, and a little below.
+double SharedRestitution::root(double at_half) const {
+  constexpr double kSafely = 1.0 - 1e-10;
+  const double c = std::min(0.0, at_nought_);
+  const double b = 4.0 * at_half - 3.0 * c - at_one_, a = at_one_ - b - c;
+  const double discriminant = std::sqrt(std::max(0.0, b * b - 4.0 * a * c));
+  // without cancellation: c <= 0 < a + b + c
+  const double root = b >= 0.0 ? -2.0 * c / (b + discriminant) : (discriminant - b) / (2.0 * a);
+  return root > 0.0 && root < 1.0 ? kSafely * root : best_;
 }
 
 }  // namespace gravitas

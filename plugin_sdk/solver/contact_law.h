@@ -1,6 +1,8 @@
 // What a contact's material row asks of its velocities: a frame, the speed at which it parts, and coefficients.
 #pragma once
 
+#include <cstdint>
+
 #include "plugin_sdk/solver/bodies.h"
 
 namespace gravitas {
@@ -33,5 +35,25 @@ inline bool lower_target(const Gain& own, double arrival, double* target, std::u
   *target = lacks_little ? fair : ++*times < 3 ? 0.5 * *target : 0.0;
   return true;
 }
+
+// The largest share of the e s of contacts that gain energy together though none of them is to blame: where one bounces and
+// presses another down that was parting, say. Their work is a quadratic function of the share as long as the same contacts
+// push: known at one, at nought and at a half. Used so:
+//
+//   for (SharedRestitution restitution(work at one); solve with share(); restitution.goes_on(what it gains));
+class SharedRestitution {
+ public:
+  explicit SharedRestitution(double work_at_one) : at_one_(work_at_one) {}
+  double share() const { return share_; }
+  // After a solution with share(), by whether and what it gains: false if it stands, else there is another share to solve with.
+  bool goes_on(bool gains, double work);
+
+ private:
+  enum class Tried : std::uint8_t { kNought, kHalf, kRoot, kBest };
+  double root(double at_half) const;
+
+  double at_one_, at_nought_ = 0.0, share_ = 0.0, best_ = 0.0;
+  Tried tried_ = Tried::kNought;
+};
 
 }  // namespace gravitas

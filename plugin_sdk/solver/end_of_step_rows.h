@@ -54,6 +54,7 @@ struct EndContact {
   bool is_closed = false, slides = false;
   double softness = 0.0;  // ConeRow's
   std::uint32_t lowered = 0;
+  double whole_target = 0.0;  // of which SharedRestitution takes a share
 };
 
 // True for modes that hold an error, of an axis or of any of a discrepancy's.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -187,6 +188,7 @@ class IslandSolver {
   // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy, from what the joints allow to what
   // joints and contacts do. Lowers e s where it is positive; true if anything was, and the velocities are to be found anew.
   bool lower_restitution(const BodyMotion& before, int round);
+  void share_restitution();
 
   // ---- rows on velocity alone
 
@@ -232,6 +234,7 @@ class IslandSolver {
   StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
   bool yields_ = false;  // contacts, in the pose change
+  std::optional<SharedRestitution> restitution_;
   bool drives_yield_ = false;
   double drives_contradict_ = 0.0;  // joints or each other, m/s
   std::vector<double> reach_;       // of drives that yield

@@ -259,7 +259,8 @@ void IslandSolver::keep_impulses() {
 // ---- energy
 
 bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
-  if (!arrives() || round >= kRoundsOfLowering) return false;
+  if (round == 0) restitution_.reset();
+  if (!restitution_ && !arrives()) return false;
   Gain all;
   for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
     // a drive's or spring's work is real
@@ -268,7 +269,13 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
     add_work(cone_.rows[r], before, velocity_, &all);
   }
   // multipliers of joints do work on what the solution leaves of their rows
-  if (!(joints_.empty() ? all.is_real() : all.is_to_blame())) return false;
+  const bool gains = joints_.empty() ? all.is_real() : all.is_to_blame();
+  if (restitution_) {
+    if (!restitution_->goes_on(gains, all.work)) return false;
+    share_restitution();
+    return true;
+  }
+  if (!gains) return false;
   bool any = false;
   std::size_t cone = 0;
   for (EndContact& contact : contacts_) {
@@ -281,9 +288,16 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
     if (contact.law.target > 0.0) any = lower_target(own, arrival, &contact.law.target, &contact.lowered) || any;
   }
   // no one contact is to blame, or lowering was not enough
-  if (!any || round + 1 == kRoundsOfLowering)
-    for (EndContact& contact : contacts_) contact.law.target = 0.0;
+  if (!any || round + 1 == kRoundsOfLowering) {
+    for (EndContact& contact : contacts_) contact.whole_target = contact.law.target;
+    restitution_.emplace(all.work);
+    share_restitution();
+  }
   return true;
+}
+
+void IslandSolver::share_restitution() {
+  for (EndContact& contact : contacts_) contact.law.target = restitution_->share() * contact.whole_target;
 }
 
 // ---- rows on velocity alone

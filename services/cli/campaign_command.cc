@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -122,7 +123,7 @@ void add_campaign(CLI::App* app, Action* action) {
       ->check(whole_number(1, 1'000'000'000'000))
       ->capture_default_str();
   command->add_option("--seed", options.seed, "All that is drawn comes from it")
-      ->check(whole_number(0))
+      ->check(whole_number(0, std::numeric_limits<std::uint64_t>::max()))
       ->capture_default_str();
   command->add_option("--shard", arguments->shard, "I/K: the I-th of K parts")->capture_default_str();
   command
@@ -151,7 +152,7 @@ void add_campaign(CLI::App* app, Action* action) {
                       "replay, digest, epoch "
                       "or deadline");
   command->add_option("--trial", arguments->trial, "Only the trial with this seed, in this process; prints it")
-      ->check(whole_number(0));
+      ->check(whole_number(0, std::numeric_limits<std::uint64_t>::max()));
   command
       ->add_option("--endurance", arguments->endurance,
                    "Instead: 1 kHz for so many seconds, a kill in every slot every second, s")

@@ -149,7 +149,7 @@ TEST(SequentialEnergy, ConvergedImpactsObeyTheirLaws) {
     problem.theta = 0.0;
     const SolverAnswer answer = problem.solve(recorder);
     const SequentialSummary& summary = recorder.summary;
-    if (!answer.converged() || summary.restitutions_lowered + summary.restitutions_dropped > 0) continue;
+    if (!answer.converged() || summary.restitutions_lowered + summary.restitutions_shared > 0) continue;
     for (std::size_t i = 0; i < problem.contact_key.size(); ++i) {
       const Vector3 n = vector_at(problem.contact_normal, i);
       const auto relative = [&](const auto& linear, const auto& angular) {

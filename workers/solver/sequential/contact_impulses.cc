@@ -376,12 +376,14 @@ std::uint32_t ContactImpulses::lower_restitution(const BodyMotion& before, const
   return count;
 }
 
-std::uint32_t ContactImpulses::drop_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
-                                                const std::vector<Gain>& gains) {
+std::uint32_t ContactImpulses::share_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
+                                                 const std::vector<double>& share) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
-    if (!(row.target > 0.0) || !gains[group[owner_of(row, bodies)]].is_real()) continue;
-    row.target = 0.0;
+    const double of_group = share[group[owner_of(row, bodies)]];
+    if (std::isnan(of_group) || !(std::max(row.target, row.whole_target) > 0.0)) continue;
+    row.whole_target = std::max(row.target, row.whole_target);
+    row.target = of_group * row.whole_target;
     ++count;
   }
   return count;

@@ -99,11 +99,11 @@ class ContactImpulses final : public RelaxationBlocks {
   // Lowers e s of the contacts that arrive and whose impulse does positive work: to a half, a
   // quarter, then to zero. Returns how many were lowered.
   std::uint32_t lower_restitution(const BodyMotion& before, const BodyMotion& after);
-  // Sets e s to zero for contacts of bodies in a group (by the number of its first body) that
-  // gained. Returns how many changed.
-  std::uint32_t drop_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
-                                 const std::vector<Gain>& gains);
-  // Of all.
+  // Sets e s of the contacts of bodies in a group (by the number of its first body) to the group's share of what it is now,
+  // or was when it was shared first; NaN: it stays. Returns how many changed.
+  std::uint32_t share_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
+                                  const std::vector<double>& share);
+  // Of all, to nothing.
   void drop_restitution();
   // Multiplies all impulses by the factor of their bodies' group.
   void scale(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, const std::vector<double>& factor);
@@ -128,7 +128,8 @@ class ContactImpulses final : public RelaxationBlocks {
     Matrix3 response;    // W, in the frame
     Matrix3 inverse;     // W^-1
     FrictionDisc disc;
-    double target = 0.0;  // e s, m/s
+    double target = 0.0;        // e s, m/s
+    double whole_target = 0.0;  // of which it is a share, where it is one
     double static_friction = 0.0, dynamic_friction = 0.0;
     Vector3 impulse = Vector3::Zero();  // in the frame
   };

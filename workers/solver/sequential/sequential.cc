@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "plugin_sdk/body.h"
@@ -480,10 +481,23 @@ void SequentialSolver::bound_energy() {
   }
 
   group_bodies();
-  add_up_gains(before, solution_.velocity);
-  const std::uint32_t dropped = impulses_.drop_restitution(bodies_, group_, gains_);
-  summary_.restitutions_dropped += dropped;
-  if (dropped > 0) relax_velocity();
+  shared_.assign(bodies_.count() + 1, std::nullopt);
+  for (;;) {
+    add_up_gains(before, solution_.velocity);
+    shares_.assign(shared_.size(), std::numeric_limits<double>::quiet_NaN());
+    bool any = false;
+    for (std::size_t i = 0; i < shared_.size(); ++i) {
+      const bool gains = gains_[i].is_real(), is_first = !shared_[i] && gains;
+      if (is_first) shared_[i].emplace(gains_[i].work);
+      if (!is_first && !(shared_[i] && shared_[i]->goes_on(gains, gains_[i].work))) continue;
+      shares_[i] = shared_[i]->share();
+      any = true;
+    }
+    const std::uint32_t changed = any ? impulses_.share_restitution(bodies_, group_, shares_) : 0;
+    summary_.restitutions_shared += changed;
+    if (changed == 0) break;
+    relax_velocity();
+  }
   if (!velocity_converged_) scale_back();
 }
 

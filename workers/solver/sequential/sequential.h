@@ -35,7 +35,7 @@
 // it is positive for a contact that arrives, e s of that contact is lowered (contact_law.h), with a
 // solution after each. These works (with those of the locks and limits) sum to the change of kinetic
 // energy from what the joints alone make of v* to v_{n+1}; should it still be positive for a connected set of
-// bodies, e s is zero for all contacts of it. With that no solution gains; sweeps that ran out can,
+// bodies, all e s of it are lowered, to the largest share with which it is not. With that no solution gains; sweeps that ran out can,
 // and then all impulses of the set are scaled back to the largest share that does not.
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
 // they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
@@ -85,6 +85,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -117,7 +118,7 @@ struct SequentialSummary {
   StopReason stop_reason = StopReason::kNothingToDo;
   std::uint32_t velocity_solutions = 0;    // relaxations of the velocities
   std::uint32_t restitutions_lowered = 0;  // times an e s was lowered for doing positive work
-  std::uint32_t restitutions_dropped = 0;  // contacts set to e s = 0 for the energy of their bodies
+  std::uint32_t restitutions_shared = 0;   // times an e s was lowered for the energy of connected bodies
   std::uint32_t groups_scaled_back = 0;    // sets of bodies whose unfinished solution gained energy
 
   SolverOutcome outcome() const { return {sweeps, residual, stop_reason}; }
@@ -251,6 +252,8 @@ class SequentialSolver {
 
   std::vector<std::uint32_t> group_;
   std::vector<Gain> gains_;
+  std::vector<std::optional<SharedRestitution>> shared_;  // by group
+  std::vector<double> shares_;
   std::vector<double> factor_;
 };
 
