@@ -148,7 +148,8 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // Goes on from a saved state of the same description: the steps that follow are those that followed it, bit for bit.
   // Joints stay bound, and potentials measured, from the initial state. Possible before the first step alone. Takes
-  // any bytes: returns the first thing that cannot be (empty if restored), and then nothing has changed.
+  // any bytes: returns the first thing that cannot be (empty if restored), and then no state has changed. Swaps that
+  // are ordered for steps up to the state's have been made then, and may have been refused.
   std::string restore(const SavedState& saved);
 
  private:

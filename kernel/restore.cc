@@ -37,6 +37,8 @@ class ColumnReader {
  private:
   static constexpr std::uint64_t kUnknown = ~std::uint64_t{0};
 
+  void fail(std::string problem) { problem_ = std::move(problem); }
+
   template <typename T>
   void read(const std::string& name, StateRows rows, std::uint32_t components, const Column<T>& column) {
     if (!problem_.empty()) return;
@@ -44,24 +46,16 @@ class ColumnReader {
     if (next_ < saved_.size() && saved_[next_].name == name)
       numbers = std::get_if<std::span<const T>>(&saved_[next_].numbers);
     ++next_;
-    if (numbers == nullptr) {
-      problem_ = "the column " + name + " is missing, out of order or of another type";
-      return;
-    }
+    if (numbers == nullptr) return fail("the column " + name + " is missing, out of order or of another type");
     const std::uint64_t count = numbers->size() / components;
     std::uint64_t& expected = rows_[static_cast<std::size_t>(rows)];
     if (expected == kUnknown) expected = count;
-    if (numbers->size() != count * components || count != expected || count > kLargestColumn) {
-      problem_ = "the column " + name + " has " + std::to_string(numbers->size()) + " numbers, not " +
-                 std::to_string(components) + " for each of " + std::to_string(expected) + " rows";
-      return;
-    }
-    if constexpr (std::is_same_v<T, double>) {
-      if (const std::size_t bad = first_not_finite(*numbers); bad != kNoRow) {
-        problem_ = at_row(name, bad / components) + " is not finite";
-        return;
-      }
-    }
+    if (numbers->size() != count * components || count != expected || count > kLargestColumn)
+      return fail("the column " + name + " has " + std::to_string(numbers->size()) + " numbers, not " +
+                  std::to_string(components) + " for each of " + std::to_string(expected) + " rows");
+    if constexpr (std::is_same_v<T, double>)
+      if (const std::size_t bad = first_not_finite(*numbers); bad != kNoRow)
+        return fail(at_row(name, bad / components) + " is not finite");
     column.assign(*numbers);
   }
 
@@ -143,6 +137,9 @@ std::string Environment::find_misfit(const SavedState& saved) const {
 std::string Environment::restore(const SavedState& saved) {
   std::string problem = find_misfit(saved);
   if (!problem.empty()) return problem;
+  // what was swapped in shortly before is on probation still
+  for (std::uint32_t step = saved.step - std::min(saved.step, SlotHost::kProbation); step <= saved.step; ++step)
+    for (StageSlot* slot : slots_) slot->begin_step(step);
   problem = ColumnReader(saved.columns, model_, front()).read_into(back());
   if (problem.empty()) problem = find_wrong_body(back(), front(), model_);
   if (problem.empty()) problem = find_wrong_memory(back(), model_, has_contacts());

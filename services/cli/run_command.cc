@@ -50,6 +50,9 @@ std::string resume_command(const RunLine& line, const std::string& checkpoint) {
   for (const std::string& word : line.scene.hosting_words()) command += " " + quoted(word);
   // those that were made are known there
   for (const std::string& one : options.edits) command += " --edit " + quoted(one);
+  for (const std::string& one : options.swaps) command += " --swap " + quoted(one);
+  for (const std::string& one : options.comparisons) command += " --compare " + quoted(one);
+  for (const std::string& one : options.reruns) command += " --rerun " + quoted(one);
   return command + " --resume " + quoted(checkpoint);
 }
 

@@ -36,11 +36,22 @@ recorder::v1::Decision message_of(const kernel::Decision& decision) {
   return message;
 }
 
+bool is_swap(const recorder::v1::Decision& decision) { return decision.why() == "swap"; }
+
+void settle(recorder::v1::Decision* decision) {
+  decision->clear_before();
+  if (is_swap(*decision)) decision->set_why("settled swap");
+}
+
 void put_in_force(const recorder::v1::Decision& decision, std::vector<recorder::v1::Decision>* in_force) {
-  std::erase_if(*in_force, [&](const recorder::v1::Decision& one) {
-    return one.slot() == decision.slot() && one.target() == decision.target();
+  recorder::v1::Decision kept = decision;
+  std::erase_if(*in_force, [&](recorder::v1::Decision& one) {
+    if (one.slot() != decision.slot() || one.target() != decision.target()) return false;
+    one.clear_before();
+    if (is_swap(decision)) *kept.mutable_before() = std::move(one);
+    return true;
   });
-  in_force->push_back(decision);
+  in_force->push_back(std::move(kept));
 }
 
 kernel::SwapOrder order_of(const recorder::v1::Decision& decision, const Catalog& catalog) {
@@ -71,6 +82,44 @@ kernel::SwapOrder order_of(const recorder::v1::Decision& decision, const Catalog
   const std::string problem = check_flattened(plugin->declaration.properties, order.plugin.settings);
   if (!problem.empty()) fail(problem);
   return order;
+}
+
+void put_in_place(std::span<const recorder::v1::Decision> decisions, const Catalog& catalog,
+                  kernel::EnvironmentDescription* begun) {
+  for (const recorder::v1::Decision& decision : decisions) {
+    const kernel::SwapOrder order = order_of(decision, catalog);
+    kernel::SlotDescription& slot = begun->slot(order.slot);
+    if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
+    const auto fallback = slot.plugins[decision.target()].fallback;
+    slot.plugins[decision.target()] = order.plugin;
+    slot.plugins[decision.target()].fallback = fallback;
+    slot.hosting = *order.hosting;
+  }
+}
+
+void take_back_swaps(std::span<const recorder::v1::Decision> decisions, const Catalog& catalog,
+                     const kernel::EnvironmentDescription& scene, kernel::EnvironmentDescription* begun) {
+  for (const recorder::v1::Decision& decision : decisions) {
+    if (!is_swap(decision)) continue;
+    if (decision.has_before()) {
+      put_in_place(std::span(&decision.before(), 1), catalog, begun);
+      continue;
+    }
+    const Slot slot = *find_slot(decision.slot());
+    begun->slot(slot).plugins[decision.target()] = scene.slot(slot).plugins[decision.target()];
+    begun->slot(slot).hosting = scene.slot(slot).hosting;
+  }
+}
+
+std::vector<kernel::SwapOrder> past_swaps(std::span<const recorder::v1::Decision> decisions, const Catalog& catalog,
+                                          const kernel::EnvironmentDescription& answering) {
+  std::vector<kernel::SwapOrder> orders;
+  for (const recorder::v1::Decision& decision : decisions) {
+    if (!is_swap(decision)) continue;
+    orders.push_back(order_of(decision, catalog));
+    orders.back().hosting = answering.slot(orders.back().slot).hosting;
+  }
+  return orders;
 }
 
 }  // namespace gravitas

@@ -85,6 +85,19 @@ kernel::FaultInjection parse_fault(const std::string& specification) {
   return fault;
 }
 
+void require_worker(const kernel::FaultInjection& fault, std::span<const kernel::SwapOrder> swaps) {
+  const kernel::SwapOrder* last = nullptr;
+  for (const kernel::SwapOrder& swap : swaps)
+    if (swap.slot == fault.slot && swap.hosting && swap.step <= fault.step &&
+        (last == nullptr || swap.step >= last->step))
+      last = &swap;
+  if (last != nullptr && *last->hosting == kernel::Hosting::kDirect)
+    throw BadInput(
+        fmt::format("fault {} in slot {}: from step {} on --swap has it hosted in the kernel's own process "
+                    "(direct), which the fault would hit",
+                    fault.order, slot_name(fault.slot), last->step));
+}
+
 std::string fault_help() {
   std::string text;
   std::string_view group;

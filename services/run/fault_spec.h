@@ -1,9 +1,11 @@
 // `--fault SLOT:KIND@step=N[,ARGUMENT=VALUE]...`: a fault that a worker is told to commit.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "kernel/fault.h"
+#include "kernel/swap.h"
 
 namespace gravitas {
 
@@ -12,6 +14,9 @@ namespace gravitas {
 // rest is the worker's order, checked as the worker will check it (plugin_sdk/host/fault_kinds.h). Throws BadInput,
 // naming what was wrong and what is allowed.
 kernel::FaultInjection parse_fault(const std::string& specification);
+
+// Throws BadInput if swaps will have the fault's slot hosted in the kernel's own process when it comes.
+void require_worker(const kernel::FaultInjection& fault, std::span<const kernel::SwapOrder> swaps);
 
 // The kinds with their meanings and arguments, for help: a line each, grouped.
 std::string fault_help();

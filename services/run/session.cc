@@ -82,14 +82,16 @@ class Run final : private kernel::CommitListener {
     read_kinds();
     kernel::EnvironmentDescription begun = description_;
     if (resumed) apply_decisions(*resumed, &begun);
-    require_workers(begun);
+    const kernel::EnvironmentDescription answering = begun;
+    if (resumed) take_back_swaps(decisions_, catalog_, description_, &begun);
+    require_workers(answering);
     environment_ = start(begun, starter(), &scene_);
-    if (!options_.instrumentation.empty()) surveyor_.emplace(begun, options_.starter);
+    if (!options_.instrumentation.empty()) surveyor_.emplace(answering, options_.starter);
     if (options_.listener) begin_listening();
-    attend();
+    if (!resumed) attend();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
-    if (resumed) resume(&*resumed);
+    if (resumed) resume(&*resumed, answering);
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
     give_orders();
     warn_of_orders_beyond_the_end();
@@ -246,9 +248,15 @@ class Run final : private kernel::CommitListener {
     pair_decisions_->listen(options_.listener, options_.listener_deadline);
   }
 
-  void resume(Resumption* from) {
-    const std::string problem = environment_->restore(saved_state_of(&from->checkpoint));
-    if (!problem.empty()) throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem));
+  void resume(Resumption* from, const kernel::EnvironmentDescription& answering) {
+    const auto require = [&](const std::string& problem) {
+      if (!problem.empty()) throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem));
+    };
+    for (const kernel::SwapOrder& order : past_swaps(decisions_, catalog_, answering)) environment_->order_swap(order);
+    require(environment_->restore(saved_state_of(&from->checkpoint)));
+    for (const kernel::SwapRecord& swap : environment_->swaps())
+      require(swap.state == kernel::SwapState::kRefused ? swap.to + " answered when it was made: " + swap.reason : "");
+    attend();
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
     figures_->resume(resumed_tally_);
@@ -262,6 +270,7 @@ class Run final : private kernel::CommitListener {
     for (const std::string& text : options_.comparisons)
       comparisons_.push_back(resolve_swap(parse_compare(text), description_, &catalog_));
     for (const std::string& text : options_.faults) faults_.push_back(parse_fault(text));
+    for (const kernel::FaultInjection& fault : faults_) require_worker(fault, swaps_);
     for (const std::string& text : options_.reruns) reruns_.push_back(parse_rerun(text));
   }
 
@@ -279,7 +288,7 @@ class Run final : private kernel::CommitListener {
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
     try {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
-      put_in_place(begun);
+      put_in_place(decisions_, catalog_, begun);
       for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
         kernel::SwapOrder order = order_of(decision, catalog_);
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
@@ -293,19 +302,6 @@ class Run final : private kernel::CommitListener {
     }
     // how far hosting may differ is for the command line to say
     apply_hosting(options_.hosting, begun);
-  }
-
-  // Those of the decisions in force.
-  void put_in_place(kernel::EnvironmentDescription* begun) const {
-    for (const recorder::v1::Decision& decision : decisions_) {
-      const kernel::SwapOrder order = order_of(decision, catalog_);
-      kernel::SlotDescription& slot = begun->slot(order.slot);
-      if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
-      const auto fallback = slot.plugins[decision.target()].fallback;
-      slot.plugins[decision.target()] = order.plugin;
-      slot.plugins[decision.target()].fallback = fallback;
-      slot.hosting = *order.hosting;
-    }
   }
 
   // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.
@@ -344,7 +340,7 @@ class Run final : private kernel::CommitListener {
   void make(edit::v1::Edit* edit) {
     const EditedScene edited(options_, scene_, description_, &catalog_, edit, &*environment_);
     kernel::EnvironmentDescription active = description_, begun = edited.description();
-    put_in_place(&active);
+    put_in_place(decisions_, catalog_, &active);
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
@@ -356,6 +352,8 @@ class Run final : private kernel::CommitListener {
     write_past();
     settle_swaps(&result_.report);
     translate_decisions(description_, edited.description(), &decisions_);
+    // another environment: nothing is on probation there
+    for (recorder::v1::Decision& decision : decisions_) settle(&decision);
     take(edited);
     environment_ = std::move(next);
     edits_.note(*edit);

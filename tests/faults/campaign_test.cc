@@ -81,7 +81,8 @@ TEST(SimulatedFaults, AreSurvivedBitForBit) {
 // All that a trial does comes from its seed.
 TEST(SimulatedFaults, AreTheSameAgain) {
   const ScratchFolder folder;
-  const std::vector<std::string> words = {"campaign", "--tier", "simulated", "--trial", "12345"};
+  // as a campaign draws them, of 64 bits
+  const std::vector<std::string> words = {"campaign", "--tier", "simulated", "--trial", "6791897765849424158"};
   const ProgramResult first = run_program(words, folder), second = run_program(words, folder);
   EXPECT_EQ(first.exit_code, 0) << first.err;
   Trial trials[2];

@@ -434,6 +434,22 @@ TEST(BadInput, NumbersOfCampaign) {
   }
 }
 
+TEST(BadInput, AFaultOfASlotThatASwapHasTakenOutOfItsWorker) {
+  const ScratchFolder folder;
+  const std::vector<std::string> run = {"run", harness::shipped_scene("bounce"), "--swap",
+                                        "solver=Newton@step=50,hosting=direct"};
+  const auto with_fault = [&](const std::string& fault) {
+    std::vector<std::string> words = run;
+    words.insert(words.end(), {"--steps", "70", "--fault", fault});
+    return run_program(words, folder);
+  };
+  const ProgramResult late = with_fault("solver:kill@step=60");
+  EXPECT_EQ(late.exit_code, 2);
+  EXPECT_THAT(late.err,
+              HasSubstr("fault kill in slot solver: from step 50 on --swap has it hosted in the kernel's own"));
+  EXPECT_EQ(with_fault("solver:kill@step=40").exit_code, 0);
+}
+
 TEST(BadInput, NumbersOfReplayAndCapture) {
   const ScratchFolder folder;
   const std::string whole = "\"0\"; allowed: a whole number from 1 to 4294967295";

@@ -101,6 +101,57 @@ TEST_P(Resume, EndsWithTheChainAndTheReportOfTheRunThatNeverStopped) {
   }
 }
 
+// A swap of step 50 is on probation up to step 57: whoever resumes within knows what a failure goes back to, and afterwards
+// what a plugin that fails for good is replaced by.
+TEST(ResumedSwap, IsRolledBackAsInTheRunThatNeverStopped) {
+  const ScratchFolder folder;
+  const auto options = [](std::uint32_t steps) {
+    RunOptions options = options_of("two_spheres_motor", Hosting::kSharedMemory, steps);
+    options.swaps = {"solver=Newton@step=50"};
+    return options;
+  };
+  for (const std::uint32_t at : {55U, 57U, 58U}) {
+    const std::string fault = "solver:kill@step=" + std::to_string(at);
+    RunOptions whole = options(80);
+    whole.faults = {fault};
+    const RunResult expected = run_quietly(whole);
+    ASSERT_EQ(expected.report.swaps_size(), 1);
+    EXPECT_EQ(expected.report.swaps(0).outcome(), at < 58 ? "rolled back" : "committed");
+    for (const std::uint32_t stop : {49U, 50U, 54U}) {
+      RunOptions part = options(stop);
+      part.checkpoint = folder.path("checkpoint");
+      ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+      RunOptions rest = options(80);
+      rest.faults = {fault};
+      rest.resume = part.checkpoint;
+      const RunResult resumed = run_quietly(rest);
+      ASSERT_EQ(resumed.outcome, RunOutcome::kCompleted) << resumed.fault;
+      EXPECT_EQ(resumed.report.chain_hash(), expected.report.chain_hash()) << "kill at " << at << ", from " << stop;
+      ASSERT_EQ(resumed.report.swaps_size(), 1);
+      EXPECT_EQ(resumed.report.swaps(0).outcome(), expected.report.swaps(0).outcome());
+    }
+  }
+}
+
+// An instance of BasicVerlet or a solver's memory goes on, though the swap is made again.
+TEST(ResumedSwap, KeepsTheStateOfThePluginThatCameIn) {
+  const ScratchFolder folder;
+  const auto options = [](std::uint32_t steps) {
+    RunOptions options = options_of("pendulum", Hosting::kDirect, steps);
+    options.swaps = {"integrator=BasicVerlet@step=20", "solver=Newton@step=24"};
+    return options;
+  };
+  const RunResult whole = run_quietly(options(60));
+  for (const std::uint32_t stop : {22U, 24U, 27U, 40U}) {
+    RunOptions part = options(stop);
+    part.checkpoint = folder.path("checkpoint");
+    (void)run_quietly(part);
+    RunOptions rest = options(60);
+    rest.resume = part.checkpoint;
+    EXPECT_EQ(run_quietly(rest).report.chain_hash(), whole.report.chain_hash()) << stop;
+  }
+}
+
 // A run of the sample that ended at step 200 with checkpoints every 60 steps: the last one whose state is older than
 // the journal's end stands for what a kill leaves.
 class Killed : public ::testing::Test {
