@@ -75,8 +75,9 @@ int run_campaign(CampaignArguments* arguments) {
     options.draw.hostings = {kernel::Hosting::kGrpc};
   read_shard(arguments);
   if (arguments->serve) {
-    // Ctrl-C is for the parent, which lets its processes end their trials
+    // the parent lets its processes end their trials, though the whole group is told to end
     std::signal(SIGINT, SIG_IGN);
+    std::signal(SIGTERM, SIG_IGN);
     campaign::serve_trials(options);
     return kDone;
   }
@@ -142,10 +143,10 @@ void add_campaign(CLI::App* app, Action* action) {
       ->check(whole_number(0, 1024))
       ->capture_default_str();
   command->add_option("--deadline", options.deadline, "Of a call in the trials, s")
-      ->check(CLI::Range(0.01, 100.0))
+      ->check(seconds_between(0.01, 100.0))
       ->capture_default_str();
   command->add_option("--patience", options.patience, "A trial that is silent for longer has hung, s")
-      ->check(CLI::Range(1.0, 1e6))
+      ->check(seconds_between(1.0, 1e6))
       ->capture_default_str();
   command->add_option("--without", options.without,
                       "Switch a defence off, to see the campaign fail: structure, numbers, physics, confirmation, "
@@ -156,7 +157,7 @@ void add_campaign(CLI::App* app, Action* action) {
   command
       ->add_option("--endurance", arguments->endurance,
                    "Instead: 1 kHz for so many seconds, a kill in every slot every second, s")
-      ->check(CLI::Range(0.1, 1e6));
+      ->check(seconds_between(0.1, 1e6));
   command->add_flag("--json", arguments->json, "Print JSON");
   command->add_flag("--serve-trials", arguments->serve)->group("");
   command->callback([=] { *action = [=] { return run_campaign(arguments.get()); }; });

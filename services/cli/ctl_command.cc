@@ -143,6 +143,8 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
   request.set_slot(line.text);
   request.set_path(std::filesystem::absolute(line.out).lexically_normal().string());
   request.set_steps(line.captured_steps);
+  if (client->status().state() == "paused")
+    std::cerr << "gravitas ctl: the run is paused: the calls come with its next steps\n";
   const api::Captured captured = client->capture(request);
   if (line.json) {
     std::cout << to_json(captured, JsonForm::kPage);

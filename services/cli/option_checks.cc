@@ -43,6 +43,16 @@ CLI::Validator any_number(const std::string& allowed) {
       allowed);
 }
 
+CLI::Validator seconds_between(double least, double most) {
+  return check_of(
+      [=](const std::string& text) {
+        double number = 0.0;
+        // not a number is in no range
+        return is_read(text, &number) && number >= least && number <= most;
+      },
+      fmt::format("a number of seconds from {} to {}", least, most));
+}
+
 CLI::Validator positive_seconds() {
   return check_of(
       [](const std::string& text) {

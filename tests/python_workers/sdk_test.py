@@ -347,7 +347,8 @@ class Talk(unittest.TestCase):
         sys.stderr.close()
         sys.stderr = stderr
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
-        self.assertIn("broken at two", outcome.text)
+        # with the line that raised
+        self.assertRegex(outcome.text, r"ValueError: broken at two \(.*sdk_test\.py:\d+\)")
         stream.send(self.request(time=3.0))
         stream.send(self.answer([1.0] * 12))
         outcome = self.reply(stream.send(self.answer([1.0] * 12))).outcome

@@ -5,7 +5,9 @@ kernel's answers to derivatives come in through `incoming`.
 """
 
 import enum
+import os
 import queue
+import sysconfig
 import threading
 import time
 import traceback
@@ -21,10 +23,20 @@ from .plugin import Host
 
 Outcome = call_pb2.Outcome
 
+_PACKAGE = os.path.dirname(os.path.abspath(__file__)) + os.sep
+_INSTALLED = tuple(sysconfig.get_paths().values()) + ("/usr/lib/python3", "<")
+
 # Marks of progress closer together than this go out as one.
 MARK_SECONDS = 0.02
 # An asset beyond this many bytes is refused.
 LARGEST_ASSET = 1 << 31
+
+
+def _place_of(failure):
+    """" (FILE:LINE)" of the plugin's own line that raised, or led to what did."""
+    frames = traceback.extract_tb(failure.__traceback__)
+    own = [frame for frame in frames if not frame.filename.startswith((_PACKAGE, *_INSTALLED))]
+    return f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
 
 
 class CallFailed(Exception):
@@ -157,7 +169,8 @@ class Session:
                 call.reply(None, status=failure.status, text=str(failure))
             except Exception as failure:
                 traceback.print_exc()
-                call.reply(None, status=Outcome.STATUS_FAILED, text=f"{type(failure).__name__}: {failure}")
+                call.reply(None, status=Outcome.STATUS_FAILED,
+                           text=f"{type(failure).__name__}: {failure}{_place_of(failure)}")
             self.calls += 1
 
     def _answer(self, call, message):

@@ -432,6 +432,14 @@ TEST(BadInput, NumbersOfCampaign) {
       EXPECT_THAT(result.err, HasSubstr(option + ": \"" + value + "\"; allowed: a whole number from 0 to "));
     }
   }
+  for (const auto& [option, range] : std::vector<std::pair<std::string, std::string>>{
+           {"--deadline", "0.01 to 100"}, {"--patience", "1 to 1000000"}, {"--endurance", "0.1 to 1000000"}}) {
+    for (const std::string value : {"nan", "inf", "0", "x"}) {
+      const ProgramResult result = run_program({"campaign", option, value}, folder);
+      EXPECT_EQ(result.exit_code, 2) << option << value;
+      EXPECT_THAT(result.err, HasSubstr(option + ": \"" + value + "\"; allowed: a number of seconds from " + range));
+    }
+  }
 }
 
 TEST(BadInput, AFaultOfASlotThatASwapHasTakenOutOfItsWorker) {
