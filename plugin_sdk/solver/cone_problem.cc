@@ -509,11 +509,12 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       }
       if (best < before) enough = std::max(tolerance, kSumRounding * largest_sum(best_lambda));
     }
-    const bool has_new = best <= enough && done > 0;
+    const double reached = (idle >= kIdleGuesses ? kRounded : 1.0) * enough;
+    const bool has_new = best <= reached && done > 0;
     bool ends_with_step = is_newton || sweeps == 0;
     if (has_new && blocks_.size() > 1 && (sweeps > 0 || (lambda.size() <= kSettledRows && slides()))) {
       lambda = best_lambda, y = best_y;
-      if (settle(enough, sweeps > 0, &lambda, &y)) {
+      if (settle(reached, sweeps > 0, &lambda, &y)) {
         best_lambda = lambda, best_y = y, best = residual_of(lambda, y);
         ends_with_step = true;
       } else {
@@ -524,7 +525,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     if (has_new && ends_with_step && newton_step(proximal_after(without), &lambda, &y)) keep_better();
     summary->iterations += done;
     summary->residual = best;
-    summary->has_converged = best <= (idle >= kIdleGuesses ? kRounded : 1.0) * enough;
+    summary->has_converged = best <= reached;
     lambda_ = best_lambda;
     if (let_slide(best_lambda, best_y, kSlip * std::max(best, tolerance))) continue;
     into_cones(&lambda_);
