@@ -27,9 +27,9 @@ constexpr std::uint32_t kForeignBody = 1000000;
 
 std::string shown_pair(const Solids& world) { return world.solids[0].type + " and " + world.solids[1].type; }
 
-std::vector<TypeDeclaration> shape_types_of(Subject& subject) {
+std::vector<TypeDeclaration> shape_types_of(Subject& subject, std::string* refusal = nullptr) {
   constexpr const char* kKnown[] = {"Sphere", "Box", "Cylinder", "Halfspace", "Capsule", "Cone"};
-  return askable_types(subject.declaration(), kKnown, [&](const TypeDeclaration& type, Draw* draw) {
+  return askable_types(subject.declaration(), kKnown, refusal, [&](const TypeDeclaration& type, Draw* draw) {
     const Solid solid = random_solid(subject.declaration(), type, draw);
     return subject.ask(kManifolds, Solids::two(solid, {}, solid, draw->pose(1.0)).request());
   });

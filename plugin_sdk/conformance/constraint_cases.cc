@@ -27,9 +27,9 @@ Joints joined(const TypeDeclaration& type, Draw* draw) {
   return world;
 }
 
-std::vector<TypeDeclaration> joint_types_of(Subject& subject) {
+std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refusal = nullptr) {
   constexpr const char* kKnown[] = {"Spherical", "AngularMotor"};
-  return askable_types(subject.declaration(), kKnown, [&](const TypeDeclaration& type, Draw* draw) {
+  return askable_types(subject.declaration(), kKnown, refusal, [&](const TypeDeclaration& type, Draw* draw) {
     return subject.ask(stage::Method::kConstraintBind, joined(type, draw).bind_request());
   });
 }

@@ -104,9 +104,9 @@ Answer probe(Subject& subject, const TypeDeclaration& type, Draw* draw) {
   return subject.ask(kWrenches, forces.request());
 }
 
-std::vector<TypeDeclaration> force_types_of(Subject& subject) {
+std::vector<TypeDeclaration> force_types_of(Subject& subject, std::string* refusal = nullptr) {
   constexpr const char* kKnown[] = {"Gravity", "Basic"};
-  return askable_types(subject.declaration(), kKnown,
+  return askable_types(subject.declaration(), kKnown, refusal,
                        [&](const TypeDeclaration& type, Draw* draw) { return probe(subject, type, draw); });
 }
 

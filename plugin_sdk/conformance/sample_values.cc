@@ -101,6 +101,7 @@ const TypeDeclaration* find_type(const PluginDeclaration& declaration, std::stri
 }
 
 std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration, std::span<const char* const> known,
+                                           std::string* refusal,
                                            const std::function<Answer(const TypeDeclaration&, Draw*)>& probe) {
   constexpr int kProbes = 4;
   std::vector<TypeDeclaration> askable;
@@ -111,6 +112,7 @@ std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration,
       for (int i = 0; i < kProbes && !is_refused; ++i) {
         const Answer answer = probe(type, &draw);
         is_refused = answer.fault.empty() && answer.status == GRAVITAS_REFUSED;
+        if (is_refused && refusal != nullptr) *refusal = "; " + type.name + ": " + answer.text;
       }
     }
     if (!is_refused) askable.push_back(type);
@@ -118,13 +120,15 @@ std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration,
   return askable;
 }
 
-Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&)> askable) {
+Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&, std::string*)> askable) {
   return make_case(std::move(name), "Types are declared, and values within their bounds are answered.",
                    [askable = std::move(askable)](Subject& subject) {
                      const std::size_t count = subject.declaration().types.size();
                      Inquiry inquiry(subject, std::to_string(count) + " declared types");
                      inquiry.expect(count > 0, "a plugin of this slot serves at least one type");
-                     inquiry.expect(!askable(subject).empty(), "each refused values within its declared bounds");
+                     std::string refusal;
+                     const bool any = !askable(subject, &refusal).empty();
+                     inquiry.expect(any, "each refused values within its declared bounds" + refusal);
                    });
 }
 

@@ -36,11 +36,13 @@ std::vector<double> flattened(const TypeDeclaration& type, const std::vector<Nam
 const TypeDeclaration* find_type(const PluginDeclaration& declaration, std::string_view name);
 
 // Those declared types for which questions can be made: the `known` ones of the scene language, and others unless they
-// refuse drawn values (a list of faces, say, cannot be drawn). `probe` asks the subject with freshly drawn values.
+// refuse drawn values (a list of faces, say, cannot be drawn). `probe` asks the subject with freshly drawn values. A refusal
+// is told in `refusal`, if there is one and it is wanted.
 std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration, std::span<const char* const> known,
+                                           std::string* refusal,
                                            const std::function<Answer(const TypeDeclaration&, Draw*)>& probe);
 // A case by which there is at least one.
-Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&)> askable);
+Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration>(Subject&, std::string*)> askable);
 
 // The number behind the capability `name=`, or `otherwise`.
 double capability_number(const PluginDeclaration& declaration, std::string_view name, double otherwise);

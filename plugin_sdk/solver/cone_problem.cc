@@ -515,8 +515,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     if (has_new && blocks_.size() > 1 && (sweeps > 0 || (lambda.size() <= kSettledRows && slides()))) {
       lambda = best_lambda, y = best_y;
       if (settle(reached, sweeps > 0, &lambda, &y)) {
-        best_lambda = lambda, best_y = y, best = residual_of(lambda, y);
-        ends_with_step = true;
+        best_lambda = lambda, best_y = y, best = residual_of(lambda, y), ends_with_step = true;
       } else {
         lambda = best_lambda, y = best_y;
       }

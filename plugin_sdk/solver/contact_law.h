@@ -24,21 +24,20 @@ struct ContactLaw {
 ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
                        const SolverBody& two);
 
-// Lowers e s of a contact whose impulse did work on its bodies: to the speed at which they arrive where the step ends, if that
-// is little less; else to a half, a quarter, then zero. `times` counts the latter. False if nothing is to be lowered.
-inline bool lower_target(const Gain& own, double arrival, double* target, std::uint32_t* times) {
+// Lowers e s of a contact whose impulse did work on its bodies to the speed at which they arrive where the step ends, if that
+// is little less. False if it stays.
+inline bool lower_to_arrival(const Gain& own, double arrival, double* target) {
   constexpr double kSafely = 1.0 - 1e-10;
   const double fair = kSafely * arrival;
-  if (!own.is_real()) return false;
-  const bool lacks_little = fair < *target && fair > 0.5 * *target;
-  if (!lacks_little && !own.is_to_blame()) return false;
-  *target = lacks_little ? fair : ++*times < 3 ? 0.5 * *target : 0.0;
+  if (!own.is_real() || !(fair < *target && fair > 0.5 * *target)) return false;
+  *target = fair;
   return true;
 }
 
-// The largest share of the e s of contacts that gain energy together though none of them is to blame: where one bounces and
-// presses another down that was parting, say. Their work is a quadratic function of the share as long as the same contacts
-// push: known at one, at nought and at a half. Used so:
+// The largest share of the e s of some contacts with which an impact adds no energy: of those that are to blame, whose impulses
+// do work on their bodies (friction turns one body by what stops another), or of all that are connected where none is (one
+// bounces and presses another down that was parting) or these do not suffice. What all impulses do is a quadratic function of
+// it as long as the same contacts push: known at one, at nought and at a half. Used so:
 //
 //   for (SharedRestitution restitution(work at one); solve with share(); restitution.goes_on(what it gains));
 class SharedRestitution {

@@ -44,7 +44,7 @@
 //
 // Laws: joint_laws.h, contact_law.h; solution of the rows: cone_problem.h. Energy. Restitution with friction in coupled
 // impacts can create energy (Kane's paradox): where an island gains, e s of the contacts that arrive and do positive work
-// is lowered, to a half, a quarter, zero; if it gains still, all of them are, to the largest share with which it does not.
+// is lowered, or where none does all of them, to the largest share with which it does not (contact_law.h).
 #pragma once
 
 #include <cstdint>

@@ -188,6 +188,7 @@ class IslandSolver {
   // Work of all rows: lambda (J before + J after)/2 sums to the change of kinetic energy, from what the joints allow to what
   // joints and contacts do. Lowers e s where it is positive; true if anything was, and the velocities are to be found anew.
   bool lower_restitution(const BodyMotion& before, int round);
+  void share_restitution(double work, bool only_some);
   void share_restitution();
 
   // ---- rows on velocity alone
@@ -235,6 +236,7 @@ class IslandSolver {
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
   bool yields_ = false;  // contacts, in the pose change
   std::optional<SharedRestitution> restitution_;
+  bool all_share_ = false;
   bool drives_yield_ = false;
   double drives_contradict_ = 0.0;  // joints or each other, m/s
   std::vector<double> reach_;       // of drives that yield

@@ -271,12 +271,16 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
   // multipliers of joints do work on what the solution leaves of their rows
   const bool gains = joints_.empty() ? all.is_real() : all.is_to_blame();
   if (restitution_) {
-    if (!restitution_->goes_on(gains, all.work)) return false;
-    share_restitution();
+    if (restitution_->goes_on(gains, all.work)) {
+      share_restitution();
+      return true;
+    }
+    if (!gains || all_share_) return false;
+    share_restitution(all.work, false);
     return true;
   }
   if (!gains) return false;
-  bool any = false;
+  bool any_fair = false, any_to_blame = false;
   std::size_t cone = 0;
   for (EndContact& contact : contacts_) {
     if (!contact.is_closed) continue;
@@ -285,19 +289,29 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
     for (std::uint32_t k = 0; k < rows.count(); ++k) add_work(cone_.rows[rows.first + k], before, velocity_, &own);
     const ConeRow& normal = cone_.rows[rows.first];
     const double arrival = -normal.direction.along(before[normal.body1], before[normal.body2]);
-    if (contact.law.target > 0.0) any = lower_target(own, arrival, &contact.law.target, &contact.lowered) || any;
+    contact.shares = contact.law.target > 0.0 && own.is_to_blame();
+    any_to_blame = any_to_blame || contact.shares;
+    if (contact.law.target > 0.0 && round < kRoundsOfLowering)
+      any_fair = lower_to_arrival(own, arrival, &contact.law.target) || any_fair;
   }
-  // no one contact is to blame, or lowering was not enough
-  if (!any || round + 1 == kRoundsOfLowering) {
-    for (EndContact& contact : contacts_) contact.whole_target = contact.law.target;
-    restitution_.emplace(all.work);
-    share_restitution();
-  }
+  if (!any_fair) share_restitution(all.work, any_to_blame);
   return true;
 }
 
+// Of those that share, or of all.
+void IslandSolver::share_restitution(double work, bool only_some) {
+  all_share_ = !only_some;
+  for (EndContact& contact : contacts_) {
+    contact.shares = contact.shares || all_share_;
+    contact.whole_target = contact.law.target;
+  }
+  restitution_.emplace(work);
+  share_restitution();
+}
+
 void IslandSolver::share_restitution() {
-  for (EndContact& contact : contacts_) contact.law.target = restitution_->share() * contact.whole_target;
+  for (EndContact& contact : contacts_)
+    if (contact.shares) contact.law.target = restitution_->share() * contact.whole_target;
 }
 
 // ---- rows on velocity alone

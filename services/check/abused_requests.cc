@@ -20,6 +20,22 @@ bool shares_its_rows(std::span<const ColumnInfo> infos, std::size_t column) {
   return std::ranges::count(infos, infos[column].rows_index, &ColumnInfo::rows_index) > 1;
 }
 
+// The answer has the rows of columns of the request that have none.
+bool asks_nothing(const Question& question) {
+  const auto& method = stage::method_info(question.method);
+  const std::vector<std::uint64_t> counts = question.request.counts();
+  bool has_rows_of_request = false;
+  for (const ColumnInfo& answered : method.reply) {
+    if (answered.rows_index == stage::kScalar) continue;
+    for (std::size_t i = 0; i < method.request.size(); ++i) {
+      if (method.request[i].rows_index != answered.rows_index) continue;
+      if (counts[i] > 0) return false;
+      has_rows_of_request = true;
+    }
+  }
+  return has_rows_of_request;
+}
+
 }  // namespace
 
 void set_count(MessageColumns* columns, std::size_t column, std::uint64_t count) {
@@ -49,6 +65,7 @@ std::vector<AbusedRequest> with_uneven_rows(const Question& question) {
 }
 
 std::vector<AbusedRequest> with_wild_indices(const Question& question) {
+  if (asks_nothing(question)) return {};
   const std::span<const ColumnInfo> infos = stage::method_info(question.method).request;
   const std::vector<std::uint64_t> counts = question.request.counts();
   const auto beyond = static_cast<std::uint32_t>(*std::ranges::max_element(counts) + 1);

@@ -89,6 +89,8 @@ const Wrong kWrong[] = {
      "growth (m/s) of the joint error"},
     // the second: its type lacks properties that the scene language gives it
     {"force_wrong_torque", {"force/basic", "force/basic-table"}, "torque is"},
+    // with what its refusal says
+    {"force_reads_too_much", {"force/types"}, "within its declared bounds; Shove: "},
     {"solver_gains_energy", {"solver/energy"}, "kinetic energy grew from"},
     {"solver_hides_turning", {"solver/rolling", "solver/momentum"}, "impulse of turning"},
     {"solver_idle_reactions",

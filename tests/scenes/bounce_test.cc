@@ -259,7 +259,8 @@ TEST_P(HeadOn, ConservesMomentumAndObeysTheLawOfRestitution) {
 TEST(SecondEnd, OfAnElasticRodThatLandsAStepLaterTakesNoEnergyAway) {
   for (const char* solver : {"Newton", "Direct", "Sequential"}) {
     for (const double moment : {0.02, 0.03, 0.05}) {
-      SceneRun run(R"(
+      SceneRun run(
+          R"(
 Geometries {
   Geometry { Type = "Halfspace" Id = "Floor" }
   Geometry { Type = "Capsule" Id = "Rod" CustomProperties { Radius = 0.05 Height = 0.8 } }
@@ -275,8 +276,7 @@ Environment {
   } }
   KineticIntegrator = "SemiImplicitEuler" ConstraintSolver = "Newton"
 })",
-                   {set("Solver", std::string(solver)),
-                    set("Body.Rod.PrincipalMoments", Vector3(moment, 0.002, moment))});
+          {set("Solver", std::string(solver)), set("Body.Rod.PrincipalMoments", Vector3(moment, 0.002, moment))});
       run.to_end();
       // the share is found to 1e-10, by a parabola through three solutions
       EXPECT_NEAR(run.kinetic_energy(), 4.5, 1e-8) << solver << ", " << moment;

@@ -68,7 +68,10 @@ class Spherical final : public ConstraintPlugin {
                   .at_least(-kHalfTurn)
                   .at_most(0.0)
                   .means("Smallest twist of body 2 about its axis, 0 at the start; none if absent."),
-              Property::number("TwistUpper", "rad").at_least(0.0).at_most(kHalfTurn).means("Largest twist; none if absent."),
+              Property::number("TwistUpper", "rad")
+                  .at_least(0.0)
+                  .at_most(kHalfTurn)
+                  .means("Largest twist; none if absent."),
               Property::number("Stiffness", "N*m/rad")
                   .at_least(0.0)
                   .means(

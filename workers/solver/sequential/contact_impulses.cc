@@ -365,15 +365,38 @@ void ContactImpulses::add_work(const SolverBodies& bodies, const BodyMotion& bef
   }
 }
 
-std::uint32_t ContactImpulses::lower_restitution(const BodyMotion& before, const BodyMotion& after) {
+std::uint32_t ContactImpulses::lower_to_arrival(const BodyMotion& before, const BodyMotion& after) {
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     if (!(row.target > 0.0)) continue;
     Gain gain;
     gain.work = work_of(row, before, after, &gain.size);
-    if (lower_target(gain, -velocity_of(row, before).x(), &row.target, &row.lowered)) ++count;
+    if (gravitas::lower_to_arrival(gain, -velocity_of(row, before).x(), &row.target)) ++count;
   }
   return count;
+}
+
+std::vector<bool> ContactImpulses::mark_sharing(const SolverBodies& bodies, const BodyMotion& before,
+                                                const BodyMotion& after, const std::vector<std::uint32_t>& group) {
+  std::vector<bool> is_some(group.size(), false);
+  for (Row& row : rows_) {
+    Gain gain;
+    gain.work = work_of(row, before, after, &gain.size);
+    row.whole_target = row.target;
+    row.shares = row.target > 0.0 && gain.is_to_blame();
+    if (row.shares) is_some[group[owner_of(row, bodies)]] = true;
+  }
+  for (Row& row : rows_) row.shares = row.shares || !is_some[group[owner_of(row, bodies)]];
+  return is_some;
+}
+
+void ContactImpulses::share_all(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
+                                std::uint32_t which) {
+  for (Row& row : rows_) {
+    if (group[owner_of(row, bodies)] != which) continue;
+    row.whole_target = row.target;
+    row.shares = true;
+  }
 }
 
 std::uint32_t ContactImpulses::share_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
@@ -381,8 +404,7 @@ std::uint32_t ContactImpulses::share_restitution(const SolverBodies& bodies, con
   std::uint32_t count = 0;
   for (Row& row : rows_) {
     const double of_group = share[group[owner_of(row, bodies)]];
-    if (std::isnan(of_group) || !(std::max(row.target, row.whole_target) > 0.0)) continue;
-    row.whole_target = std::max(row.target, row.whole_target);
+    if (std::isnan(of_group) || !row.shares || !(row.whole_target > 0.0)) continue;
     row.target = of_group * row.whole_target;
     ++count;
   }

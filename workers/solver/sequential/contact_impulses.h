@@ -96,11 +96,16 @@ class ContactImpulses final : public RelaxationBlocks {
   // second is not pushed.
   void add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
                 const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const;
-  // Lowers e s of the contacts that arrive and whose impulse does positive work: to a half, a
-  // quarter, then to zero. Returns how many were lowered.
-  std::uint32_t lower_restitution(const BodyMotion& before, const BodyMotion& after);
-  // Sets e s of the contacts of bodies in a group (by the number of its first body) to the group's share of what it is now,
-  // or was when it was shared first; NaN: it stays. Returns how many changed.
+  // Lowers e s of contacts that arrive and whose impulse does positive work to the speed of arrival (contact_law.h). Returns
+  // how many were lowered.
+  std::uint32_t lower_to_arrival(const BodyMotion& before, const BodyMotion& after);
+  // Marks the contacts whose e s is to be shared, of each group (by the number of its first body) those to blame, or all where
+  // none is. Returns by group whether some are not.
+  std::vector<bool> mark_sharing(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
+                                 const std::vector<std::uint32_t>& group);
+  // All of a group share, from what their e s are now.
+  void share_all(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, std::uint32_t which);
+  // Sets e s of the contacts that share to their group's share of the whole; NaN: it stays. Returns how many there are.
   std::uint32_t share_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                   const std::vector<double>& share);
   // Of all, to nothing.
@@ -122,14 +127,14 @@ class ContactImpulses final : public RelaxationBlocks {
     bool has_inverse = false;   // `inverse` is there
     bool slides = false;
     bool has_friction = false;
-    std::uint32_t lowered = 0;
+    bool shares = false;
     Vector3 arm1, arm2;  // from the centres of mass to the contact, m
     Matrix3 frame;       // columns: direction of the normal law and two tangents, world
     Matrix3 response;    // W, in the frame
     Matrix3 inverse;     // W^-1
     FrictionDisc disc;
     double target = 0.0;        // e s, m/s
-    double whole_target = 0.0;  // of which it is a share, where it is one
+    double whole_target = 0.0;  // of which it is a share, if it shares
     double static_friction = 0.0, dynamic_friction = 0.0;
     Vector3 impulse = Vector3::Zero();  // in the frame
   };

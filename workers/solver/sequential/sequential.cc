@@ -474,22 +474,36 @@ void SequentialSolver::bound_energy() {
   if (!bounces && velocity_converged_) return;
   const BodyMotion before = bounces ? velocity_of_joints() : trial_velocity_;
   for (int round = 0; round < 3; ++round) {
-    const std::uint32_t lowered = impulses_.lower_restitution(before, solution_.velocity);
+    const std::uint32_t lowered = impulses_.lower_to_arrival(before, solution_.velocity);
     if (lowered == 0) break;
     summary_.restitutions_lowered += lowered;
     relax_velocity();
   }
 
   group_bodies();
+  add_up_gains(before, solution_.velocity);
+  if (std::ranges::any_of(gains_, &Gain::is_real)) share_restitution(before);
+  if (!velocity_converged_) scale_back();
+}
+
+// gains_ as they are; by group, first the contacts to blame, then all.
+void SequentialSolver::share_restitution(const BodyMotion& before) {
+  std::vector<bool> only_some = impulses_.mark_sharing(bodies_, before, solution_.velocity, group_);
   shared_.assign(bodies_.count() + 1, std::nullopt);
-  for (;;) {
-    add_up_gains(before, solution_.velocity);
+  for (;; add_up_gains(before, solution_.velocity)) {
     shares_.assign(shared_.size(), std::numeric_limits<double>::quiet_NaN());
     bool any = false;
-    for (std::size_t i = 0; i < shared_.size(); ++i) {
-      const bool gains = gains_[i].is_real(), is_first = !shared_[i] && gains;
-      if (is_first) shared_[i].emplace(gains_[i].work);
-      if (!is_first && !(shared_[i] && shared_[i]->goes_on(gains, gains_[i].work))) continue;
+    for (std::uint32_t i = 0; i < shared_.size(); ++i) {
+      const bool gains = gains_[i].is_real();
+      bool goes_on = shared_[i] ? shared_[i]->goes_on(gains, gains_[i].work) : gains;
+      if (!goes_on && shared_[i] && gains && only_some[i]) {
+        // those to blame do not suffice
+        only_some[i] = false, goes_on = true;
+        impulses_.share_all(bodies_, group_, i);
+        shared_[i].reset();
+      }
+      if (!goes_on) continue;
+      if (!shared_[i]) shared_[i].emplace(gains_[i].work);
       shares_[i] = shared_[i]->share();
       any = true;
     }
@@ -498,7 +512,6 @@ void SequentialSolver::bound_energy() {
     if (changed == 0) break;
     relax_velocity();
   }
-  if (!velocity_converged_) scale_back();
 }
 
 // What the joints alone make of v*: what an impact gains is counted from there.

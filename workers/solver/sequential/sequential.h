@@ -31,11 +31,10 @@
 // Impacts (§ 2.6.2, corrected). Normal law and friction of a contact are solved together
 // (contact_impulses.h); with (2.64) and (2.69) in turn friction breaks the normal law in every
 // oblique impact. Restitution with friction in coupled impacts can create energy all the same
-// (Kane's paradox). Bound: the work of a contact's impulse is lambda.(u_before + u_after)/2; where
-// it is positive for a contact that arrives, e s of that contact is lowered (contact_law.h), with a
-// solution after each. These works (with those of the locks and limits) sum to the change of kinetic
-// energy from what the joints alone make of v* to v_{n+1}; should it still be positive for a connected set of
-// bodies, all e s of it are lowered, to the largest share with which it is not. With that no solution gains; sweeps that ran out can,
+// (Kane's paradox). Bound: the work of a contact's impulse is lambda.(u_before + u_after)/2. These works (with those of the
+// locks and limits) sum to the change of kinetic energy from what the joints alone make of v* to v_{n+1}; where it is positive
+// for a connected set of bodies, e s is lowered of its contacts that arrive and whose own work is, or of all where none is, to the
+// largest share with which the set does not gain (contact_law.h). With that no solution gains; sweeps that ran out can,
 // and then all impulses of the set are scaled back to the largest share that does not.
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
 // they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
@@ -117,7 +116,7 @@ struct SequentialSummary {
   double residual = 0.0;     // largest change of a velocity in the last one's last sweep, m/s
   StopReason stop_reason = StopReason::kNothingToDo;
   std::uint32_t velocity_solutions = 0;    // relaxations of the velocities
-  std::uint32_t restitutions_lowered = 0;  // times an e s was lowered for doing positive work
+  std::uint32_t restitutions_lowered = 0;  // times an e s was lowered to the speed of arrival
   std::uint32_t restitutions_shared = 0;   // times an e s was lowered for the energy of connected bodies
   std::uint32_t groups_scaled_back = 0;    // sets of bodies whose unfinished solution gained energy
 
@@ -200,6 +199,7 @@ class SequentialSolver {
   double choose_start(const BodyMotion& base, double tolerance, Contacts* contacts, BodyMotion* x);
   bool sweep_velocity(double tolerance);
   void bound_energy();
+  void share_restitution(const BodyMotion& before);
   void group_bodies();
   BodyMotion velocity_of_joints();
   void add_up_gains(const BodyMotion& before, const BodyMotion& after);
