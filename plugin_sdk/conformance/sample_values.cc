@@ -112,7 +112,7 @@ std::vector<TypeDeclaration> askable_types(const PluginDeclaration& declaration,
       for (int i = 0; i < kProbes && !is_refused; ++i) {
         const Answer answer = probe(type, &draw);
         is_refused = answer.fault.empty() && answer.status == GRAVITAS_REFUSED;
-        if (is_refused && refusal != nullptr) *refusal = "; " + type.name + ": " + answer.text;
+        if (is_refused && refusal != nullptr) *refusal = type.name + ": " + answer.text;
       }
     }
     if (!is_refused) askable.push_back(type);
@@ -128,7 +128,7 @@ Case make_types_case(std::string name, std::function<std::vector<TypeDeclaration
                      inquiry.expect(count > 0, "a plugin of this slot serves at least one type");
                      std::string refusal;
                      const bool any = !askable(subject, &refusal).empty();
-                     inquiry.expect(any, "each refused values within its declared bounds" + refusal);
+                     inquiry.expect(any, "each refused values within its declared bounds; " + refusal);
                    });
 }
 

@@ -7,6 +7,7 @@
 #include "gravitas/recorder/v1/checkpoint.pb.h"
 #include "kernel/description.h"
 #include "services/recorder/journal.h"
+#include "services/run/session.h"
 
 namespace gravitas {
 
@@ -19,6 +20,16 @@ struct Resumption {
 // end of the run. A journal that is missing is none; one that cannot be used in full is a warning.
 Resumption read_resumption(const std::string& path, const kernel::EnvironmentDescription& description,
                            std::vector<std::string>* warnings);
+
+// Whatever `action` throws is what the checkpoint asks for and cannot be had: BadInput that names it.
+template <typename Action>
+void from_checkpoint(const std::string& path, Action&& action) {
+  try {
+    action();
+  } catch (const std::exception& problem) {
+    throw BadInput("checkpoint '" + path + "': " + problem.what());
+  }
+}
 
 // The file itself where `path` is a symbolic link to one. Throws BadInput if there is something else than an ordinary
 // file, which a checkpoint must not replace.

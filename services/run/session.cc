@@ -80,18 +80,16 @@ class Run final : private kernel::CommitListener {
     read_edits(resumed ? &*resumed : nullptr);
     read_orders();
     read_kinds();
-    kernel::EnvironmentDescription begun = description_;
-    if (resumed) apply_decisions(*resumed, &begun);
-    const kernel::EnvironmentDescription answering = begun;
-    if (resumed) take_back_swaps(decisions_, catalog_, description_, &begun);
+    kernel::EnvironmentDescription answering = description_, begun = description_;
+    if (resumed) apply_decisions(*resumed, &answering, &begun);
     require_workers(answering);
     environment_ = start(begun, starter(), &scene_);
     if (!options_.instrumentation.empty()) surveyor_.emplace(answering, options_.starter);
     if (options_.listener) begin_listening();
-    if (!resumed) attend();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
     if (resumed) resume(&*resumed, answering);
+    attend();
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
     give_orders();
     warn_of_orders_beyond_the_end();
@@ -249,14 +247,15 @@ class Run final : private kernel::CommitListener {
   }
 
   void resume(Resumption* from, const kernel::EnvironmentDescription& answering) {
-    const auto require = [&](const std::string& problem) {
-      if (!problem.empty()) throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem));
-    };
-    for (const kernel::SwapOrder& order : past_swaps(decisions_, catalog_, answering)) environment_->order_swap(order);
-    require(environment_->restore(saved_state_of(&from->checkpoint)));
-    for (const kernel::SwapRecord& swap : environment_->swaps())
-      require(swap.state == kernel::SwapState::kRefused ? swap.to + " answered when it was made: " + swap.reason : "");
-    attend();
+    from_checkpoint(options_.resume, [&] {
+      for (const kernel::SwapOrder& order : past_swaps(decisions_, catalog_, answering))
+        environment_->order_swap(order);
+      const std::string problem = environment_->restore(saved_state_of(&from->checkpoint));
+      if (!problem.empty()) throw std::runtime_error(problem);
+      for (const kernel::SwapRecord& swap : environment_->swaps())
+        if (swap.state == kernel::SwapState::kRefused)
+          throw std::runtime_error(swap.to + " answered when it was made: " + swap.reason);
+    });
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
     figures_->resume(resumed_tally_);
@@ -276,7 +275,8 @@ class Run final : private kernel::CommitListener {
 
   // Whoever answered when the checkpoint was made answers again; what the journal knows of later steps is ordered for
   // them. Swaps of the command line up to the checkpoint are done, or were refused.
-  void apply_decisions(const Resumption& resumed, kernel::EnvironmentDescription* begun) {
+  void apply_decisions(const Resumption& resumed, kernel::EnvironmentDescription* answering,
+                       kernel::EnvironmentDescription* begun) {
     const std::uint32_t step = resumed.checkpoint.step();
     for (const kernel::SwapOrder& one : swaps_)
       if (one.step <= step && std::ranges::find(resumed.checkpoint.decisions(), slot_name(one.slot),
@@ -286,9 +286,11 @@ class Run final : private kernel::CommitListener {
                         "then, or not ordered",
                         slot_name(one.slot), one.step, step));
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
-    try {
+    from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
-      put_in_place(decisions_, catalog_, begun);
+      put_in_place(decisions_, catalog_, answering);
+      *begun = *answering;
+      take_back_swaps(decisions_, catalog_, description_, begun);
       for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
         kernel::SwapOrder order = order_of(decision, catalog_);
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
@@ -297,11 +299,9 @@ class Run final : private kernel::CommitListener {
         });
         if (!is_ordered) swaps_.push_back(std::move(order));
       }
-    } catch (const std::runtime_error& problem) {
-      throw BadInput(fmt::format("checkpoint '{}': {}", options_.resume, problem.what()));
-    }
+    });
     // how far hosting may differ is for the command line to say
-    apply_hosting(options_.hosting, begun);
+    for (kernel::EnvironmentDescription* one : {answering, begun}) apply_hosting(options_.hosting, one);
   }
 
   // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.

@@ -24,7 +24,7 @@ from .plugin import Host
 Outcome = call_pb2.Outcome
 
 _PACKAGE = os.path.dirname(os.path.abspath(__file__)) + os.sep
-_INSTALLED = tuple(sysconfig.get_paths().values()) + ("/usr/lib/python3", "<")
+_INSTALLED = ("/usr/lib/python3", "<", *map(sysconfig.get_path, ("stdlib", "platstdlib", "purelib", "platlib")))
 
 # Marks of progress closer together than this go out as one.
 MARK_SECONDS = 0.02
@@ -33,7 +33,7 @@ LARGEST_ASSET = 1 << 31
 
 
 def _place_of(failure):
-    """" (FILE:LINE)" of the plugin's own line that raised, or led to what did."""
+    """The plugin's own line that raised, or led to what did, as ' (FILE:LINE)'."""
     frames = traceback.extract_tb(failure.__traceback__)
     own = [frame for frame in frames if not frame.filename.startswith((_PACKAGE, *_INSTALLED))]
     return f" ({own[-1].filename}:{own[-1].lineno})" if own else ""

@@ -133,6 +133,29 @@ TEST(ResumedSwap, IsRolledBackAsInTheRunThatNeverStopped) {
   }
 }
 
+// To the plugin before it, which another swap had brought in, and not to the scene's.
+TEST(ResumedSwap, GoesBackToTheSwapBefore) {
+  const ScratchFolder folder;
+  const auto options = [](std::uint32_t steps) {
+    RunOptions options = options_of("bounce", Hosting::kSharedMemory, steps);
+    options.swaps = {"integrator=Verlet@step=10", "integrator=RK4@step=50"};
+    options.faults = {"integrator:kill@step=55"};
+    return options;
+  };
+  const RunResult whole = run_quietly(options(80));
+  RunOptions part = options(52);
+  part.faults.clear();
+  part.checkpoint = folder.path("checkpoint");
+  ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+  RunOptions rest = options(80);
+  rest.resume = part.checkpoint;
+  const RunResult resumed = run_quietly(rest);
+  EXPECT_EQ(resumed.report.chain_hash(), whole.report.chain_hash());
+  ASSERT_EQ(resumed.report.swaps_size(), 1);
+  EXPECT_EQ(resumed.report.swaps(0).from(), "Verlet");
+  EXPECT_EQ(resumed.report.swaps(0).outcome(), "rolled back");
+}
+
 // An instance of BasicVerlet or a solver's memory goes on, though the swap is made again.
 TEST(ResumedSwap, KeepsTheStateOfThePluginThatCameIn) {
   const ScratchFolder folder;
