@@ -39,6 +39,8 @@ void read_shard(CampaignArguments* arguments) {
 }
 
 int endure(const CampaignArguments& arguments) {
+  if (arguments.options.scenes.size() > 1)
+    throw BadInput(fmt::format("--endurance: {} scenes; allowed: one, or none", arguments.options.scenes.size()));
   campaign::EnduranceResult result;
   {
     StatusLine line;
@@ -154,10 +156,14 @@ void add_campaign(CLI::App* app, Action* action) {
                       "or deadline");
   command->add_option("--trial", arguments->trial, "Only the trial with this seed, in this process; prints it")
       ->check(whole_number(0, std::numeric_limits<std::uint64_t>::max()));
-  command
-      ->add_option("--endurance", arguments->endurance,
-                   "Instead: 1 kHz for so many seconds, a kill in every slot every second, s")
-      ->check(seconds_between(0.1, 1e6));
+  CLI::Option* endurance =
+      command
+          ->add_option("--endurance", arguments->endurance,
+                       "Instead, of one scene: 1 kHz for so many seconds, a kill in every slot every second, s")
+          ->check(seconds_between(0.1, 1e6));
+  for (const char* of_trials : {"--faults", "--seed", "--shard", "--tier", "--hosting", "--out", "--per-trial",
+                                "--jobs", "--deadline", "--patience", "--without", "--trial"})
+    endurance->excludes(of_trials);
   command->add_flag("--json", arguments->json, "Print JSON");
   command->add_flag("--serve-trials", arguments->serve)->group("");
   command->callback([=] { *action = [=] { return run_campaign(arguments.get()); }; });

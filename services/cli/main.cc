@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -37,6 +38,13 @@ void raise_descriptor_limit() {
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
   limit.rlim_cur = limit.rlim_max;
   setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+// `code`, unless what was printed is lost.
+int exit_code(int code) {
+  if (std::cout.flush() && std::fflush(stdout) == 0) return code;
+  std::cerr << "gravitas: standard output cannot be written\n";
+  return gravitas::cli::kOurFault;
 }
 
 // `--name=`, whose value would be taken from the next word; empty: there is none.
@@ -83,14 +91,12 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const int code = app.exit(error, std::cout, std::cerr);
-    return code == 0 ? cli::kDone : cli::kBadInput;
+    return exit_code(code == 0 ? cli::kDone : cli::kBadInput);
   }
   raise_descriptor_limit();
+  setenv("GRPC_VERBOSITY", "NONE", 0);  // what fails is told in words of our own
   try {
-    const int code = action();
-    if (std::cout.flush() && std::fflush(stdout) == 0) return code;
-    std::cerr << "gravitas: standard output cannot be written\n";
-    return cli::kOurFault;
+    return exit_code(action());
   } catch (const BadInput& problem) {
     std::cerr << problem.what() << '\n';
     return cli::kBadInput;

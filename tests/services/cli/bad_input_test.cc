@@ -442,6 +442,20 @@ TEST(BadInput, NumbersOfCampaign) {
   }
 }
 
+TEST(BadInput, WhatOnlyTrialsTakeBesideEndurance) {
+  const ScratchFolder folder;
+  for (const auto& [option, value] :
+       std::vector<std::pair<std::string, std::string>>{{"--faults", "5"}, {"--tier", "simulated"}, {"--out", "o"},
+                                                        {"--trial", "1"}, {"--seed", "2"}}) {
+    const ProgramResult result = run_program({"campaign", "--endurance", "1", option, value}, folder);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr(option + " excludes --endurance"));
+  }
+  const ProgramResult scenes = run_program({"campaign", "--endurance", "1", "joints", "contacts"}, folder);
+  EXPECT_EQ(scenes.exit_code, 2);
+  EXPECT_THAT(scenes.err, HasSubstr("--endurance: 2 scenes; allowed: one, or none"));
+}
+
 TEST(BadInput, AFaultOfASlotThatASwapHasTakenOutOfItsWorker) {
   const ScratchFolder folder;
   const std::vector<std::string> run = {"run", harness::shipped_scene("bounce"), "--swap",
@@ -502,8 +516,9 @@ TEST(BadInput, AReportThatCannotBeWrittenIsRefusedBeforeTheRun) {
 
 // What could not be printed is not done.
 TEST(StandardOutput, ThatCannotBeWrittenIsAFailure) {
-  for (const char* words : {"plan --json", "run --duration 0.1 --hosting direct --json"}) {
-    const std::string command = in_build("/bin/gravitas") + " " + words + " " + kSample + " > /dev/full 2> /dev/null";
+  for (const std::string& words : {"plan --json " + kSample, "run --duration 0.1 --hosting direct --json " + kSample,
+                                   std::string("--help"), std::string("--version"), std::string("run --help")}) {
+    const std::string command = in_build("/bin/gravitas") + " " + words + " > /dev/full 2> /dev/null";
     EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 1) << words;
   }
 }

@@ -198,6 +198,10 @@ TEST(Serve, CtlReachesItAtAnAddressAndCapturesCalls) {
   result = harness::run_program({"replay", file}, folder);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("15 calls: 15 same, 0 different"));
+  result = harness::run_program({"serve", kSample, "--headless", "--listen", address}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--listen " + address + ": cannot listen there"));
+  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("UNKNOWN"))) << "gRPC's own words";
 }
 
 TEST(Serve, WhatCannotBeIsExitCode2) {
