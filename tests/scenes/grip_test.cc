@@ -61,6 +61,45 @@ TEST(Clamp, HoldsWhatItsFrictionBears) {
   }
 }
 
+// Two jaws on hinges press a nut of a tenth of their mass with 25 times the force it takes to hold it: it stays, as the told
+// speed says.
+TEST(Jaws, HoldALightNut) {
+  const auto jaw = [](const std::string& id, double y) {
+    return "  Body { Id = \"" + id + "\" GeometryId = \"Jaw\" Material = \"Steel\" Mass = 0.3 Forces = {\"Press" + id +
+           "\"} KineticProperties { Position = {0.3, " + harness::literal(y) + ", 0} } }\n";
+  };
+  const auto press = [](const std::string& id, double force) {
+    return "  Force { Type = \"Basic\" Id = \"Press" + id + "\" CustomProperties { Force = {0, " +
+           harness::literal(force) + ", 0} ApplicationPoint = {0.2, 0, 0} } }\n";
+  };
+  const auto hinge = [](const std::string& id, const std::string& y) {
+    return "  Constraint { Type = \"Revolute\" Id = \"Hinge" + id + "\" Body2 = \"" + id +
+           "\" CustomProperties { BindAxisPoint1 = {0, " + y + ", 0} BindAxisPoint2 = {0, " + y + ", 1} } }\n";
+  };
+  const std::string scene = R"(
+Geometries {
+  Geometry { Type = "Box" Id = "Jaw" CustomProperties { HalfExtents = {0.3, 0.01, 0.05} } }
+  Geometry { Type = "Box" Id = "Nut" CustomProperties { HalfExtents = {0.02, 0.02, 0.02} } }
+}
+Materials { Material { Id = "Steel" RestitutionCoefficient = 0 StaticFrictionCoefficient = 0.8 } }
+Simulator { CustomProperties { TimeStep = 0.003333333333333333 Duration = 1 SleepEnergy = 0 } }
+Forces {
+)" + press("Upper", -10.0) + press("Lower", 10.0) +
+                            R"(}
+Environment { Space { Bodies {
+  Body { Id = "Nut" GeometryId = "Nut" Material = "Steel" Mass = 0.02 KineticProperties { Position = {0.1, 0, 0} } }
+)" + jaw("Upper", 0.03) + jaw("Lower", -0.03) +
+                            "} }\nConstraints {\n" + hinge("Upper", "0.03") + hinge("Lower", "-0.03") +
+                            "}\nKineticIntegrator = \"SemiImplicitEuler\"\n}\n";
+  for (const std::string solver : {"Sequential", "Newton", "Direct"}) {
+    for (const char* step : {"0.003333333333333333", "0.001"}) {
+      SceneRun run(scene, {"Solver=" + solver, set("Simulator.TimeStep", step)});
+      run.to_end();
+      EXPECT_LT((run.body("Nut").pose.position - Vector3(0.1, 0.0, 0.0)).norm(), 2e-4) << solver << ", " << step;
+    }
+  }
+}
+
 // Between two pads on sprung sliders, just above that load: it slides straight down.
 TEST(Gripper, LetsASymmetricLoadSlideStraight) {
   const double share = 1.02, mass = share * 2.0 * kGrip * kPressed / kG, h = 1.0 / 240.0;

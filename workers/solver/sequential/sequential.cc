@@ -99,21 +99,6 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
   }
 }
 
-// Sweeps over what friction and drives displace a light body by, which joints are to take back, may leave much of it:
-// the pose change is that without friction's then, or that without any.
-void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor) {
-  if (!discrepancies_.empty()) keep_pose(&before_offset_);
-  for (const bool with_friction : {true, false}) {
-    set_offset(request, factor, with_friction);
-    solve_pose(request);
-    if (discrepancies_.empty()) return;
-    if (!(open_ > std::max(before_offset_.open, pose_converged_ ? kFarOpen : kRounded))) return;
-    used_up_ = true;
-    if (!(open_ > kClosed)) return;
-  }
-  take_pose(before_offset_);
-}
-
 // Sweeps ran out, or rows that were left out are not met: was something asked for that no motion can do? Rows that hold
 // always and contradict each other then get the nearest targets that agree, and true is returned. Rows of loops and of frames
 // contradict each other, too, because they are taken at S*, where joints are open, and not where they close: by the square of
@@ -242,11 +227,7 @@ void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
 
 // solution_.displacement and the multipliers of the pose rows, on top of offset_: of rows at S*, then of rows where that ends.
 void SequentialSolver::solve_pose(const stage::SolverSolveRequest& request) {
-  if (posed_at_end_) {
-    pose_joints_.store(pushed_);
-    pose_joints_.build(bodies_, discrepancies_, pose_laws_, pushed_);
-    posed_at_end_ = false;
-  }
+  pose_at_trial();
   pose_converged_ = relax_pose();
   used_up_ = used_up_ || !pose_converged_;
   if (!discrepancies_.empty()) close_at_end(request);
@@ -380,23 +361,6 @@ bool SequentialSolver::sweep_velocity(double tolerance) {
     if (converged) return true;
   }
   return false;
-}
-
-bool SequentialSolver::acts_on_velocity_alone() const {
-  return velocity_joints_.has_velocity_only_impulse() || impulses_.has_friction_impulse();
-}
-
-void SequentialSolver::set_offset(const stage::SolverSolveRequest& request, double factor, bool with_friction) {
-  std::fill(offset_.begin(), offset_.end(), Twist{});
-  velocity_joints_.push_velocity_only(bodies_, factor, offset_);
-  if (with_friction) impulses_.push_friction(bodies_, factor, offset_);
-  // turns by the inertia there, which is taken where the bodies end
-  const auto inertia = [&](std::size_t i) {
-    return world_inertia(bodies_[i].trial.orientation, moments_of(vector_at(request.inverse_inertia(), i)));
-  };
-  for (std::size_t i = 0; i < bodies_.count(); ++i)
-    offset_moment_[i] =
-        offset_[i].angular.isZero(0.0) ? Vector3(Vector3::Zero()) : Vector3(inertia(i) * offset_[i].angular);
 }
 
 // ---- drives that something is in the way of

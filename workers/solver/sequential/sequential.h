@@ -26,7 +26,8 @@
 // change without them, closed set, velocities; then pose change again on top of theta h M^-1 J^T
 // lambda. If that closes a contact or a limit more, velocities are solved for the larger set and
 // the pose change once more, and the set is not looked at again. A contact that this opens stays in
-// the set: it did close within the step, and let go it would be closed again without its impulse.
+// the set: it did close within the step, and let go it would be closed again without its impulse. Beside joints the pose change on
+// top of theta h M^-1 J^T lambda starts from mu = theta h lambda, where that misses less than what was found without.
 //
 // Impacts (§ 2.6.2, corrected). Normal law and friction of a contact are solved together
 // (contact_impulses.h); with (2.64) and (2.69) in turn friction breaks the normal law in every
@@ -42,8 +43,8 @@
 // What rows at S* leave of joints is of second order in the step's turn. Where that is more than a thousandth of the bodies' radius
 // of gyration, steps of Newton's method follow: rows where the bodies are by then, for what is missing there, relaxed again,
 // until a millionth is left or a step does not halve it. Friction and drives may displace a light body by many times its
-// size, which joints are to take back: where that leaves joints open by more than a hundredth then (a millionth where sweeps ran
-// out), the pose change is that without friction's part, or that without any.
+// size, which joints are to take back: where that leaves joints open by more than twice what they were and a hundredth (a millionth
+// where sweeps ran out), the pose change is that without friction's part, or that without any.
 //
 // Joints' velocities are made right where the pose change leaves the bodies. Made right at S*, the spin of a wheel is left
 // across its hinge by what that turned, and where it turns by more than a radian in a step, this grows from step to step. Those
@@ -179,6 +180,9 @@ class SequentialSolver {
   void keep_pose(PoseChange* kept) const;
   void take_pose(const PoseChange& kept);
   void solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor);
+  void guess_pose(const stage::SolverSolveRequest& request, double factor);
+  double error_of_pose();
+  void pose_at_trial();
   static std::pair<std::uint32_t, std::uint32_t> pair_of(std::uint32_t body1, std::uint32_t body2) {
     return std::minmax(body1, body2);
   }
@@ -241,7 +245,9 @@ class SequentialSolver {
   bool posed_at_end_ = false;  // pose_joints_ has rows where the pose change ended, not at S*
   double unsprung_ = 0.0;      // the most that springs miss their laws by there, of what moves the bodies
   double open_ = 0.0;  // the most that pose laws are missed by where it ends, as a share of what the bodies measure
-  PoseChange before_step_, before_offset_;  // gone back to where what followed left joints more open
+  PoseChange before_step_, before_offset_, before_guess_;  // gone back to where what followed leaves more open
+  RelaxationJoints::Multipliers guess_of_joints_;          // as velocities' impulses push
+  std::vector<double> guess_of_contacts_;
 
   SolverSolution solution_;
   BodyMotion trial_velocity_;           // v*, as joints turn it
