@@ -167,7 +167,7 @@ void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   const DiscrepancyAnswer& d = data_.discrepancies;
   const DiscrepancyColumns columns = d.columns();
-  const std::span<const double> reactions = knows_reactions() ? data_.discrepancy_force.span() : std::span<double>();
+  const std::span<const double> reactions = knows_reactions() ? data_.held_force.span() : std::span<double>();
   const auto body = [&](std::uint32_t i) {
     if (i == kNone) return JointBody{};
     return JointBody{pose_of(data_.trial_position, data_.trial_orientation, i),
@@ -183,8 +183,8 @@ void Environment::update_joints() {
     const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
     const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
     const JointLoad load = joint_load(rows, one, two, h);
-    const bool breaks = (force > 0.0 && load.force > force) ||
-                        (threshold > 0.0 && std::max(load.error, held_back(rows, one, two, h)) > threshold);
+    const bool breaks =
+        (force > 0.0 && load.force > force) || (threshold > 0.0 && opening(rows, one, two, h) > threshold);
     back().intact[joint] = breaks ? 0 : 1;
     if (!breaks) figures_.joint_error = std::max(figures_.joint_error, load.error);
   }

@@ -119,8 +119,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   discrepancies = DiscrepancyAnswer(arena, rows);
   discrepancy_body = Column<std::uint32_t>(arena, 0, 2 * rows);
   const auto axis_numbers = [&] { return Column<double>(arena, 0, 3 * rows); };
-  discrepancy_force = axis_numbers(), discrepancy_warm_impulse = axis_numbers(),
-  discrepancy_warm_correction = axis_numbers();
+  discrepancy_force = axis_numbers(), held_force = axis_numbers();
+  discrepancy_warm_impulse = axis_numbers(), discrepancy_warm_correction = axis_numbers();
 
   solved_linear_velocity = bodies_if(has_reactions, 3), solved_angular_velocity = bodies_if(has_reactions, 3);
   pose_change = bodies_if(has_reactions, 6);

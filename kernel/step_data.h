@@ -60,8 +60,9 @@ struct StepData {
   Column<double> start_wrench;
 
   // Simulator Smooth: accelerations of kinematic bodies, what the joints answer, and the wrenches with it. Written by
-  // Stage::kSolve inside kIntegrate.
-  Column<double> kinematic_acceleration, reaction, discrepancy_force, reaction_residual, wrench_with_reactions;
+  // Stage::kSolve inside kIntegrate; held_force: the discrepancy_force that an integration which is only compared leaves.
+  Column<double> kinematic_acceleration, reaction, discrepancy_force, held_force, reaction_residual,
+      wrench_with_reactions;
 
   // Stage::kIntegrate: S*.
   Column<double> trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity, error_estimate,

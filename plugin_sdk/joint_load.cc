@@ -1,6 +1,7 @@
 #include "plugin_sdk/joint_load.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/math/rotation.h"
@@ -19,6 +20,12 @@ Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::
 double response(const JointBody& body, const Vector3& linear_row, const Vector3& angular_row) {
   const Vector3 local = body.trial.orientation.conjugate() * angular_row;
   return body.inverse_mass * linear_row.squaredNorm() + local.dot(body.inverse_moments.cwiseProduct(local));
+}
+
+// Radius of gyration, m; 0 if nothing turns the body.
+double gyration(const JointBody& body) {
+  const double turning = body.inverse_moments.sum() / 3.0;
+  return turning > 0.0 && body.inverse_mass > 0.0 ? std::sqrt(body.inverse_mass / turning) : 0.0;
 }
 
 }  // namespace
@@ -44,12 +51,15 @@ double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const J
   return size * time_step * (response(body1, row.linear1, row.angular1) + response(body2, row.linear2, row.angular2));
 }
 
-double held_back(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
+double opening(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
   double most = 0.0;
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
-    most =
-        std::max(most, held_back(discrepancy, impulse_of(joint, discrepancy, row, time_step), body1, body2, time_step));
+    const Vector3 error = error_in_axes_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next);
+    const Vector3 impulse = impulse_of(joint, discrepancy, row, time_step);
+    const double length = discrepancy.is_angular() ? std::max(gyration(body1), gyration(body2)) : 1.0;
+    most = std::max({most, length * joint_error(discrepancy, error),
+                     length * held_back(discrepancy, impulse, body1, body2, time_step)});
   }
   return most;
 }

@@ -36,7 +36,8 @@ JointLoad joint_load(const JointRows& joint, const JointBody& body1, const Joint
 double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const JointBody& body1, const JointBody& body2,
                  double time_step);
 
-// The most of a joint's rows: what a breaking threshold is compared with, beside the error that the solver leaves.
-double held_back(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
+// What a breaking threshold is compared with, m: the most that a row of the joint is open at S_{n+1}, or was held back. Turns
+// count by the larger radius of gyration of the two bodies.
+double opening(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
 
 }  // namespace gravitas

@@ -38,6 +38,7 @@ void Environment::ask_reactions() {
   const auto asked = request(data_.block_body, data_.block);
   ask(Stage::kSolve, &solver_, {stage::Method::kSolverReactions, 0, asked, reply}, nullptr,
       [&](const auto& answer) { return validator_.reactions(answer); });
+  if (attempt_counts_) data_.held_force.assign(data_.discrepancy_force);
   std::ranges::transform(data_.wrench.span(), data_.reaction.span(), data_.wrench_with_reactions.data(), std::plus());
   if (!wants_jacobian()) return;
   const auto with_forces = request(data_.jacobian_body, data_.jacobian);

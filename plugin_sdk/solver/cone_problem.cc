@@ -206,7 +206,7 @@ bool ConeProblem::is_solved_by_nothing(double smallest) const {
   return worst <= std::max(smallest, kEpsilon * motion_);
 }
 
-// The response that a contact or a limit keeps at least: a share of what moving all bodies together would give it.
+// The response that a contact or a limit keeps at least, of its way, 1/kg: a share of what moving all bodies together gives it.
 double ConeProblem::least_response(const SolverBodies& bodies) const {
   constexpr double kOfWhole = 1e-5;
   double mass = 0.0;
@@ -220,12 +220,12 @@ bool ConeProblem::is_out_of_reach(double least, double tolerance) const {
   return std::ranges::any_of(blocks_, [&](const Block& block) {
     const auto i = static_cast<Eigen::Index>(block.first);
     const std::uint32_t r = other_[block.first];
-    if (response_(i, i) * scale_[r] * scale_[r] > least) return false;
+    if (response_(i, i) * way_of(r) * way_of(r) > least) return false;
     const double lower = block.contact < 0 ? block.law.lower_target : block.target;
     const bool has_lower = block.contact >= 0 || block.law.has_lower;
     const double below = has_lower ? lower - start_others_[i] : 0.0;
     const double above = block.contact < 0 && block.law.has_upper ? start_others_[i] - block.law.upper_target : 0.0;
-    return std::max(below, above) * scale_[r] * rows[r].length > tolerance;
+    return std::max(below, above) * way_of(r) > tolerance;
   });
 }
 
@@ -238,7 +238,7 @@ void ConeProblem::give_way(double least) {
     if (!is_one_sided) continue;
     const auto i = static_cast<Eigen::Index>(block.first);
     const std::uint32_t r = other_[block.first];
-    const double missing = std::max(least / (scale_[r] * scale_[r]) - response_(i, i), rows[r].softness);
+    const double missing = std::max(least / (way_of(r) * way_of(r)) - response_(i, i), rows[r].softness);
     if (!(missing > 0.0)) continue;
     response_(i, i) += missing;
     rows[r].law.gamma += missing * scale_[r] * scale_[r];
@@ -274,7 +274,7 @@ double ConeProblem::size() const {
 double ConeProblem::make_consistent(double smallest) {
   if (factor_.dropped() == 0) return 0.0;
   double largest = 0.0;
-  for (const std::uint32_t r : held_) largest = std::max(largest, scale_[r] * rows[r].length);
+  for (const std::uint32_t r : held_) largest = std::max(largest, way_of(r));
   const double distance = largest * factor_.make_consistent(&side_);
   return distance > std::max(smallest, 1e-9 * size()) ? distance : 0.0;
 }
@@ -371,7 +371,7 @@ double ConeProblem::largest_held_sum() const {
   std::ranges::transform(held_of_body_, of_body.begin(), pushed);
   double most = 0.0;
   for (const std::uint32_t r : held_)
-    most = std::max(most, scale_[r] * rows[r].length * std::max(of_body[rows[r].body1], of_body[rows[r].body2]));
+    most = std::max(most, way_of(r) * std::max(of_body[rows[r].body1], of_body[rows[r].body2]));
   return most;
 }
 
@@ -431,7 +431,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   bool is_newton = settings.method == ConeMethod::kNewton;
   std::uint32_t most_steps = is_newton ? affordable(settings.iterations) : settings.iterations;
   double most = 0.0;
-  for (const std::uint32_t r : other_) most = std::max(most, scale_[r] * rows[r].length);
+  for (const std::uint32_t r : other_) most = std::max(most, way_of(r));
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
     double best = residual_of(lambda, y);
@@ -538,7 +538,7 @@ double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
   for (Eigen::Index i = 0; i < lambda.size(); ++i) {
     const std::uint32_t r = other_[static_cast<std::size_t>(i)];
     const double sum = std::fabs(start_others_[i]) + response_.col(i).cwiseAbs().dot(lambda.cwiseAbs());
-    most = std::max(most, sum * scale_[r] * rows[r].length);
+    most = std::max(most, sum * way_of(r));
   }
   return most;
 }

@@ -170,6 +170,8 @@ class ConeProblem {
   double make_consistent(double smallest);
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
+  // Of a scaled unit of a row, m.
+  double way_of(std::uint32_t row) const { return scale_[row] * rows[row].length; }
   double least_response(const SolverBodies& bodies) const;
   bool is_out_of_reach(double least, double tolerance) const;
   void give_way(double least);

@@ -72,7 +72,7 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
     project(block, &lambda[block.first], &y[block.first], projected);
     for (std::uint32_t k = 0; k < block.count; ++k) {
       const std::uint32_t r = other_[block.first + k];
-      worst = std::max(worst, std::fabs(lambda[block.first + k] - projected[k]) * scale_[r] * rows[r].length);
+      worst = std::max(worst, std::fabs(lambda[block.first + k] - projected[k]) * way_of(r));
     }
   }
   return worst;

@@ -65,7 +65,7 @@ void ReactionLog::add_joints(const kernel::StepData& data) {
     if (joint != known) sum.point = point;
     known = joint;
     Vector3 along = vector_at(data.discrepancy_impulse.span(), i);
-    if (acts_in_derivatives) along += data.time_step[0] * vector_at(data.discrepancy_force.span(), i);
+    if (acts_in_derivatives) along += data.time_step[0] * vector_at(data.held_force.span(), i);
     const Vector3 impulse = row.axes * along;
     if (row.is_angular()) {
       sum.turn += impulse;

@@ -57,7 +57,24 @@ TEST(JointLoad, OfAJointIsItsWorstRowAndTheSumOfItsForces) {
   const JointLoad load = joint_load(rows, one, two, 0.01);
   EXPECT_DOUBLE_EQ(load.error, 1e-3);
   EXPECT_DOUBLE_EQ(load.force, 500.0);
-  EXPECT_DOUBLE_EQ(held_back(rows, one, two, 0.01), 4.0 * 0.01);
+  EXPECT_DOUBLE_EQ(opening(rows, one, two, 0.01), 4.0 * 0.01);
+}
+
+// Of two bodies with radii of gyration of 0.02 m and 0.05 m: a turn by 0.1 rad is open by 5 mm, however it is held.
+TEST(JointLoad, OpeningOfATurnIsAWay) {
+  const std::vector<double> point(3, 0.0), moved{0.1, 0, 0}, zero(3, 0.0), correction(1, 1.0), axes{1, 0, 0, 0};
+  const std::vector<double> unlimited(3, kUnlimited);
+  const std::vector<std::uint32_t> modes{pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked, true)};
+  const DiscrepancyColumns columns{point, moved, zero, correction, axes, modes, zero, zero, zero, zero, unlimited};
+  JointBody one, two;
+  one.inverse_mass = two.inverse_mass = 0.5;
+  one.inverse_moments = Vector3::Constant(0.5 / (0.02 * 0.02));
+  two.inverse_moments = Vector3::Constant(0.5 / (0.05 * 0.05));
+  EXPECT_NEAR(opening({columns, zero, 0, 1}, one, two, 0.01), 0.05 * 0.1, 1e-12);
+  // 0.02 N m s on 0.8e-3 kg m^2 and 5e-3 kg m^2 for 0.01 s
+  const std::vector<double> impulse{2e-2, 0, 0};
+  EXPECT_NEAR(opening({columns, impulse, 0, 1}, one, two, 0.01), 0.05 * 2e-2 * 0.01 * (1 / 0.8e-3 + 1 / 5e-3), 1e-12);
+  EXPECT_EQ(opening({columns, impulse, 0, 1}, {}, {}, 0.01), 0.0) << "nothing that turns";
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -136,6 +137,54 @@ TEST_P(JointsOfAnySize, MoveAlikeWithAnAxisToldFromAfar) {
     EXPECT_LE(apart(unit, end, 1.0), 1e-11) << "points " << out << " m along the axis";
     EXPECT_LE(end.joint_error, is_end_of_step() ? 1e-13 : 2e-4);
   }
+}
+
+// What the joints break at grows with them: they break in the same step.
+TEST_P(JointsOfAnySize, BreakAlike) {
+  const auto broken_after = [&](double size, double threshold) {
+    std::string scene = chain(joint(), size, 0.0);
+    const std::string type = "Constraint { ";
+    for (std::size_t at = scene.find(type); at != std::string::npos; at = scene.find(type, at + 1))
+      scene.insert(at + type.size(), "BreakingThreshold = " + literal(threshold * size) + " ");
+    SceneRun run(scene, {set("Solver", std::string(std::get<1>(GetParam())))});
+    int steps = 0;
+    while (run.holds("J0") && run.holds("J1") && run.holds("J2") && steps < 200) run.step(), ++steps;
+    return steps;
+  };
+  // of motors that turn freely nothing holds much
+  const double threshold = std::string(joint().type) == "AngularMotor" ? 1e-4 : 1.5e-3;
+  const int unit = broken_after(1.0, threshold);
+  EXPECT_LT(unit, 200);
+  for (const double size : {0x1p-10, 0x1p-5, 0x1p10}) EXPECT_EQ(broken_after(size, threshold), unit) << size << " m";
+}
+
+// Beams that fall on a stop of their hinge, or on the cone of their ball joint.
+TEST(LimitsOfAnySize, HoldAlike) {
+  const auto end_of = [](const std::string& joint, const char* solver, double size) {
+    SceneRun run("Forces { Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = " +
+                     literal(Vector3(0, -kG * size, 0)) +
+                     " } } }\nSimulator { CustomProperties { TimeStep = 0.0078125 Duration = 1 } }\n"
+                     "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = " +
+                     literal(Vector3(size * size * Vector3(0.01, 0.33, 0.33))) +
+                     " KineticProperties { Position = " + literal(Vector3(size, 0, 0)) +
+                     " } Forces = { \"Down\" } } } }\nConstraints { Constraint { " + joint + " } } }\n",
+                 {set("Solver", std::string(solver))});
+    double lowest = 0.0;
+    while (!run.is_done()) {
+      run.step();
+      lowest = std::min(lowest, run.body("A").pose.position.y() / size);
+    }
+    return lowest;
+  };
+  for (const std::string joint :
+       {"Type = \"Revolute\" Id = \"J\" Body2 = \"A\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = "
+        "{0, 0, 1} "
+        "LowerLimit = -0.5 }",
+        "Type = \"Spherical\" Id = \"J\" Body2 = \"A\" CustomProperties { BindPoint = {0, 0, 0} Axis = {1, 0, 0} "
+        "ReachConeAngle = 0.5 }"})
+    for (const char* solver : {"Newton", "Direct", "Sequential"})
+      for (const double size : {1e-6, 1e-3, 1.0, 300.0, 1e3, 1e4, 1e6})
+        EXPECT_NEAR(end_of(joint, solver, size), -std::sin(0.5), 1e-6) << solver << ", " << size << " m: " << joint;
 }
 
 }  // namespace
