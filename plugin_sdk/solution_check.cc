@@ -214,6 +214,12 @@ class Balance {
       // at the end of the step, where the error is closed, it is where either point is
       const bool is_closed = directions == Directions::kOfEnd && !d.is_angular();
       const Vector3 to_point = is_closed ? Vector3(0.5 * (d.point2 - d.point1)) : Vector3(Vector3::Zero());
+      // a spring stays open there, and its axes may turn with either body
+      const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
+      const Vector3 open =
+          is_closed ? Vector3(0.5 * (carried(two, d.point2) - carried(one, d.point1))) : Vector3(Vector3::Zero());
+      const bool turns_at_end = directions == Directions::kOfEnd && d.is_angular();
+      const double both_turn = turns_at_end ? turn_of(one).norm() + turn_of(two).norm() : 0.0;
       const bool is_at_own =
           directions == Directions::kOfTrialAtOwn && is_only_point(request_.discrepancy_body(), request_.mode(), i);
       const Vector3 apart =
@@ -238,6 +244,9 @@ class Balance {
           add(d, arm, sign * correction, &body.pose);
           body.velocity.unreported += to_point.cross(impulse).norm();
           body.pose.unreported += to_point.cross(correction).norm();
+          const auto off = [&](const Vector3& push) { return open.cross(push).norm() + both_turn * push.norm(); };
+          if (is_soft) body.velocity.unreported += off(impulse);
+          if (is_soft) body.pose.unreported += off(correction) + share * off(impulse);
           body.velocity.turned += turned * impulse.norm();
           body.velocity.unreported += turned * impulse.norm() * arm.norm();
           const double moved = correction.norm() + (on_velocity ? share * impulse.norm() : 0.0);

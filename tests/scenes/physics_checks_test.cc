@@ -107,5 +107,31 @@ Environment { Space { Bodies {
   }
 }
 
+// Two bodies of unlike mass on a bushing in free space: its springs stay open at the end of a step, and push there.
+TEST(SprungBodies, AreTakenWhereTheirSpringsStayOpen) {
+  const std::string body = " PrincipalMoments = {4.1, 6.1, 5.2} KineticProperties { ";
+  for (const std::string springs :
+       {"", " Damping = {5, 5, 5} AngularStiffness = {20, 10, 30} AngularDamping = {1, 1, 1}"}) {
+    const std::string scene =
+        "Simulator { CustomProperties { Duration = 1 CheckPhysicsEvery = 1 } }\nEnvironment { Space { Bodies {\n"
+        "Body { Id = \"A\" Mass = 120" +
+        body +
+        "LinearVelocity = {-0.26, 0.99, -1.29} AngularVelocity = {-1.1, -1.77, -1.17} } }\n"
+        "Body { Id = \"B\" Mass = 36.8" +
+        body +
+        "Position = {0.7, 0, 0} LinearVelocity = {0.97, -0.43, -0.32} "
+        "AngularVelocity = {-0.09, 1.64, -0.8} } }\n} }\nConstraints { Constraint { Type = \"Bushing\" Id = \"H\" "
+        "Body1 = \"A\" "
+        "Body2 = \"B\" CustomProperties { BindPoint = {0.35, 0, 0} Axes = {1, 0, 0, 0} Stiffness = {500, 800, 300}" +
+        springs + " } } } }\n";
+    for (const std::string solver : {"Newton", "Direct", "Sequential"}) {
+      for (const double step : {0.01, 0.003, 0.001}) {
+        harness::SceneRun run(scene, {"Solver=" + solver, harness::set("Simulator.TimeStep", step)});
+        while (!run.is_done()) ASSERT_NO_THROW(run.step()) << solver << ", " << step << springs << " at " << run.time();
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace gravitas
