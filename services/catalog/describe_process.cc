@@ -118,9 +118,10 @@ std::string last_line(const std::string& messages) {
   return ": " + messages.substr(begin, std::min(end + 1 - begin, kShownCharacters));
 }
 
-// `what` stands for the program in messages.
-bool describe(const std::string& what, const std::vector<std::string>& words, int entries,
-              std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem) {
+// `what` stands for the program in messages. `was_killed`: from outside, which says nothing about the plugins.
+bool describe_once(const std::string& what, const std::vector<std::string>& words, int entries,
+                   std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem,
+                   bool* was_killed) {
   Pipe out, err;
   if (out.read < 0 || err.read < 0) {
     *problem = std::string("no pipe could be made: ") + std::strerror(errno);
@@ -139,6 +140,7 @@ bool describe(const std::string& what, const std::vector<std::string>& words, in
   const DescribeClock::time_point until = DescribeClock::now() + timeout;
   bool is_complete = read_all(&out, &err, until, &bytes, &messages);
   const int status = wait_for(pid, until, &is_complete);
+  *was_killed = is_complete && WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
   if (!is_complete) {
     *problem = what + " --describe did not end within " + std::to_string(timeout.count()) + " ms" + last_line(messages);
   } else if (WIFSIGNALED(status)) {
@@ -151,6 +153,13 @@ bool describe(const std::string& what, const std::vector<std::string>& words, in
     return true;
   }
   return false;
+}
+
+bool describe(const std::string& what, const std::vector<std::string>& words, int entries,
+              std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem) {
+  bool was_killed = false;
+  if (describe_once(what, words, entries, timeout, answer, problem, &was_killed)) return true;
+  return was_killed && describe_once(what, words, entries, timeout, answer, problem, &was_killed);
 }
 
 }  // namespace

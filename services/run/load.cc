@@ -1,9 +1,14 @@
 // From scene files and a command line to an environment.
 #include <fmt/format.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <set>
+#include <stop_token>
+#include <utility>
 
 #include "plugin_sdk/slots.h"
 #include "services/run/session.h"
@@ -113,13 +118,37 @@ kernel::EnvironmentDescription build_scene(const RunOptions& options, const scen
   return std::move(*description);
 }
 
+namespace {
+
+// A worker that is killed while it starts says nothing about its plugin: it is started once more, as long as `is_first`. What
+// fails later the kernel repeats; what fails slowly is no accident.
+kernel::HostStarter patient(kernel::HostStarter starter, std::shared_ptr<std::atomic<bool>> is_first) {
+  return [starter = std::move(starter), is_first = std::move(is_first)](const kernel::SlotDescription& slot,
+                                                                        std::uint32_t threads, std::stop_token stop) {
+    constexpr auto kQuick = std::chrono::seconds(1);
+    const auto begin = std::chrono::steady_clock::now();
+    try {
+      return starter(slot, threads, stop);
+    } catch (const kernel::StageFault&) {
+      const bool is_ours = slot.hosting != kernel::Hosting::kDirect && slot.plugins[0].address.empty();
+      const bool is_quick = std::chrono::steady_clock::now() - begin < kQuick;
+      if (!*is_first || !is_ours || !is_quick || stop.stop_requested()) throw;
+      return starter(slot, threads, stop);
+    }
+  };
+}
+
+}  // namespace
+
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
                                            const kernel::HostStarter& starter, const scene::v1::Scene* scene) {
+  const auto is_first = std::make_shared<std::atomic<bool>>(true);
   const auto require_none = [](const std::optional<scene::SceneError>& refused) {
     if (refused) throw BadInput(scene::to_string(*refused));
   };
   try {
-    auto environment = std::make_unique<kernel::Environment>(description, starter);
+    auto environment = std::make_unique<kernel::Environment>(description, patient(starter, is_first));
+    *is_first = false;
     for (const Slot slot : kConfirmed) environment->set_rerun_every(slot, description.check_physics_every);
     return environment;
   } catch (const kernel::StageFault& fault) {

@@ -444,9 +444,8 @@ TEST(BadInput, NumbersOfCampaign) {
 
 TEST(BadInput, WhatOnlyTrialsTakeBesideEndurance) {
   const ScratchFolder folder;
-  for (const auto& [option, value] :
-       std::vector<std::pair<std::string, std::string>>{{"--faults", "5"}, {"--tier", "simulated"}, {"--out", "o"},
-                                                        {"--trial", "1"}, {"--seed", "2"}}) {
+  for (const auto& [option, value] : std::vector<std::pair<std::string, std::string>>{
+           {"--faults", "5"}, {"--tier", "simulated"}, {"--out", "o"}, {"--trial", "1"}, {"--seed", "2"}}) {
     const ProgramResult result = run_program({"campaign", "--endurance", "1", option, value}, folder);
     EXPECT_EQ(result.exit_code, 2) << option;
     EXPECT_THAT(result.err, HasSubstr(option + " excludes --endurance"));

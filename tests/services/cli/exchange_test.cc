@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -93,6 +94,56 @@ TEST(Exchange, ComparisonAndRerunChangeNoBit) {
   EXPECT_EQ(run.report.comparisons(0).shadow().calls(), 120U);
   EXPECT_GT(run.report.comparisons(0).shadow().disagreements_size(), 0);
   EXPECT_EQ(run.report.comparisons(0).shadow().disagreements(0).quantity(), "Integrator.Integrate position");
+}
+
+// Whoever kills a worker while it starts says nothing about its plugin: the scene is as good as it was.
+TEST(Exchange, AWorkerThatIsKilledWhileItStartsIsStartedOnceMore) {
+  const ScratchFolder folder;
+  const std::string worker = folder.write("worker.sh",
+                                          "[ \"$1\" = --describe ] && start=describe || start=$(cat start)\n"
+                                          "[ -e killed.$start ] || { touch killed.$start; kill -9 $$; }\n"
+                                          "exec " +
+                                              in_build("/bin/gravitas-worker") + " \"$@\" " +
+                                              in_build("/lib/gravitas/solver_sequential.so") + "\n");
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Command = \"sh worker.sh\" } }");
+  folder.write("start", "run");
+  const std::vector<std::string> run = {"run", kSample, plugins, "--steps", "20", "--no-sandbox", "--json"};
+  const ProgramResult first = run_program(run, folder);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_TRUE(std::filesystem::exists(folder.path("killed.describe")));
+  EXPECT_TRUE(std::filesystem::exists(folder.path("killed.run")));
+  EXPECT_EQ(read_report(first.out).chain_hash(), read_report(run_program(run, folder).out).chain_hash());
+}
+
+// With Smooth joints answer inside the derivative: what breaks them, and what is told of them, is the derivative of the plugin
+// that answers, not of the one that is compared.
+TEST(Exchange, AComparedIntegratorAsksJointsWithoutATrace) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write("pendulum.gravitas", R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.02 Duration = 0.4 } }
+Environment {
+  Space { Bodies { Body { Id = "Bar" Mass = 1 PrincipalMoments = {0.002, 0.08, 0.08} Forces = {"Down"}
+    KineticProperties { Position = {0.5, 0, 0} } } } }
+  Constraints { Constraint { Type = "Revolute" Id = "Hinge" Body2 = "Bar"
+    CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} } } }
+  KineticIntegrator = "RK4"
+  ConstraintSolver = "Direct"
+}
+)");
+  const auto run = [&](const std::string& force, const std::vector<std::string>& more) {
+    const std::string reactions = folder.path("reactions.jsonl");
+    std::vector<std::string> words = {
+        "run",         scene,    "--hosting", "direct", "--json", "--set", "Constraint.Hinge.BreakingForce=" + force,
+        "--reactions", reactions};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult result = run_program(words, folder);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return read_report(result.out).chain_hash() + '\n' + read_file(reactions);
+  };
+  for (const std::string force : {"2.64", "3.31", "5.70593", "11", "15.8", "1000"})
+    EXPECT_EQ(run(force, {}), run(force, {"--compare", "integrator=Euler"})) << force;
 }
 
 // A resumed run knows who answered, and that a swap of the past is done.
