@@ -69,6 +69,10 @@ void ContactGaps::clear_multipliers() {
   for (Row& row : rows_) row.multiplier = 0.0;
 }
 
+void ContactGaps::scale(double share) {
+  for (Row& row : rows_) row.multiplier *= share;
+}
+
 double ContactGaps::relax(std::size_t block, double share, const SolverBodies& bodies, BodyMotion& x) {
   const Patch& patch = patches_[block];
   double change = 0.0;

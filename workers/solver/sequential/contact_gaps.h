@@ -32,6 +32,7 @@ class ContactGaps final : public RelaxationBlocks {
   double largest_violation(const BodyMotion& x) const;
   double largest_motion(const BodyMotion& x) const;
   void clear_multipliers();
+  void scale(double share);
 
   std::size_t block_count() const override { return patches_.size(); }
   std::array<std::uint32_t, 2> bodies_of(std::size_t block) const override {

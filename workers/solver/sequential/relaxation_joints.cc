@@ -390,6 +390,10 @@ void RelaxationJoints::clear_multipliers() {
   for (Row& row : rows_) row.multiplier = 0.0;
 }
 
+void RelaxationJoints::scale(double share) {
+  for (Row& row : rows_) row.multiplier *= share;
+}
+
 void RelaxationJoints::take_drives(const Multipliers& multipliers) {
   for (Row& row : rows_)
     if (row.law.is_unbounded_drive()) row.multiplier = multipliers[row.place];

@@ -87,6 +87,7 @@ class RelaxationJoints final : public RelaxationBlocks {
   double largest_left_out(const BodyMotion& x) const;
   bool leaves_out() const { return !left_out_.empty(); }
   void clear_multipliers();
+  void scale(double share);
 
   // Of the rows, locks go a share of their way, others at most the whole.
   std::size_t block_count() const override { return blocks_.size(); }

@@ -230,7 +230,9 @@ void SequentialSolver::solve_pose(const stage::SolverSolveRequest& request) {
   pose_at_trial();
   pose_converged_ = relax_pose();
   used_up_ = used_up_ || !pose_converged_;
-  if (!discrepancies_.empty()) close_at_end(request);
+  if (discrepancies_.empty()) return;
+  close_at_end(request);
+  shorten_pose(request);
 }
 
 // Returns whether sweeps came to their end.

@@ -177,6 +177,10 @@ class SequentialSolver {
   void close_at_end(const stage::SolverSolveRequest& request);
   void find_ends(const stage::SolverSolveRequest& request);
   void build_at_end();
+  void shorten_pose(const stage::SolverSolveRequest& request);
+  double open_at_trial() const;
+  double share_of_miss(const RelaxationDiscrepancy& d, std::size_t axis, const JointLaw& law, double missed) const;
+  double size_of(const RelaxationDiscrepancy& d) const;
   void keep_pose(PoseChange* kept) const;
   void take_pose(const PoseChange& kept);
   void solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor);

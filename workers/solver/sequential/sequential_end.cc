@@ -28,6 +28,59 @@ void SequentialSolver::close_at_end(const stage::SolverSolveRequest& request) {
   }
 }
 
+// Sweeps that ran out may turn bodies so far that joints are wider open than they were: the largest share of that change is
+// made which does not open them, or the one that leaves them least open.
+void SequentialSolver::shorten_pose(const stage::SolverSolveRequest& request) {
+  if (pose_converged_ || !(open_ > kFarOpen)) return;
+  const double were = open_at_trial();
+  if (!(open_ > were)) return;
+  keep_pose(&before_step_);
+  const BodyMotion& whole = before_step_.displacement;
+  double best = 1.0, least = open_;
+  const auto take = [&](double share) {
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      solution_.displacement[i].linear = offset_[i].linear + share * (whole[i].linear - offset_[i].linear);
+      solution_.displacement[i].angular = offset_[i].angular + share * (whole[i].angular - offset_[i].angular);
+    }
+    find_ends(request);
+  };
+  for (const double share : {0.5, 0.25, 0.125, 0.0}) {
+    take(share);
+    if (open_ < least) best = share, least = open_;
+    if (!(open_ > were)) break;
+  }
+  if (best == 1.0) {
+    take_pose(before_step_);
+    return;
+  }
+  take(best);
+  pose_joints_.scale(best);
+  gaps_.scale(best);
+}
+
+// The most that pose laws miss where nothing is corrected, as a share of what the bodies measure.
+double SequentialSolver::open_at_trial() const {
+  double open = 0.0;
+  for (std::size_t i = 0; i < discrepancies_.size(); ++i)
+    if (const double size = size_of(discrepancies_[i]); size > 0.0)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (const JointLaw& law = pose_laws_[3 * i + axis]; law.gamma == 0.0)
+          open = std::max(open, share_of_miss(discrepancies_[i], axis, law, law.missed_by(0.0)));
+  return open;
+}
+
+// What a row of a joint that does not touch misses, of what its bodies measure and of what these move by.
+double SequentialSolver::share_of_miss(const RelaxationDiscrepancy& d, std::size_t axis, const JointLaw& law,
+                                       double missed) const {
+  const double size = size_of(d), masses = bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass;
+  return missed * d.length / size * law.share_of_bodies(d.directions[axis].product(d.directions[axis], masses));
+}
+
+// 0: that row does not count.
+double SequentialSolver::size_of(const RelaxationDiscrepancy& d) const {
+  return touches(d) ? 0.0 : std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
+}
+
 void SequentialSolver::keep_pose(PoseChange* kept) const {
   kept->displacement = solution_.displacement;
   kept->joints = pose_joints_;
@@ -59,16 +112,12 @@ void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
     ends_[i] = end_of(columns.at(i), d, turned_, solution_.displacement);
-    if (touches(d)) continue;
-    const double size = std::max(bodies_[d.body1].gyration(), bodies_[d.body2].gyration());
-    if (!(size > 0.0)) continue;
-    const double masses = bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass;
+    if (!(size_of(d) > 0.0)) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const JointLaw& law = pose_laws_[3 * i + axis];
       const double change = ends_[i].errors[axis] - d.axes[axis].error_at_trial;
-      const double missed = law.missed_by(change + law.gamma * pushed_[3 * i + axis]) * d.length / size;
       double& most = law.gamma > 0.0 ? unsprung_ : open_;
-      most = std::max(most, missed * law.share_of_bodies(d.directions[axis].product(d.directions[axis], masses)));
+      most = std::max(most, share_of_miss(d, axis, law, law.missed_by(change + law.gamma * pushed_[3 * i + axis])));
     }
   }
 }
