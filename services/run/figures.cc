@@ -8,12 +8,15 @@
 
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/property_value.h"
+#include "plugin_sdk/solver.h"
 
 namespace gravitas {
 namespace {
 
 // Joints that are open by more than this share of what they hold together hold it no more.
 constexpr double kTorn = 0.01;
+// Ways of a step, of what the scene measures: nobody means that.
+constexpr double kRunaway = 1e6;
 
 void write_change(const Vector3& initial, const Vector3& final_value, report::v1::VectorChange* change) {
   for (int k = 0; k < 3; ++k) {
@@ -79,6 +82,7 @@ Figures::Totals Figures::totals(kernel::Environment* environment) const {
     const Twist twist{vector_at(state.linear_velocity, i), vector_at(state.angular_velocity, i)};
     const Vector3 inertia = vector_at(model.inertia.span(), i);
     sum.kinetic += kinetic_energy(model.mass[i], inertia, pose.orientation, twist);
+    if (const double speed = twist.linear.norm(); !(speed <= sum.speed)) sum.speed = speed, sum.fastest = i;
     sum.linear += model.mass[i] * twist.linear;
     sum.angular += angular_momentum(model.mass[i], inertia, pose, twist);
   }
@@ -86,28 +90,39 @@ Figures::Totals Figures::totals(kernel::Environment* environment) const {
   return sum;
 }
 
-// From end to end of the centres of bodies with joints, or the diameter of gyration of the largest of them.
-void Figures::measure_joined(kernel::Environment* environment) {
+// Of the bodies with joints, and of all.
+void Figures::measure(kernel::Environment* environment) {
   const kernel::StateView state = environment->state();
   const kernel::Model& model = environment->model();
-  Eigen::AlignedBox3d centres;
-  double gyration = 0.0;
-  for (const kernel::ConstraintDescription& joint : description_.constraints) {
-    for (const std::uint32_t body : {joint.body1, joint.body2}) {
-      if (body == kNone) continue;
-      centres.extend(vector_at(state.position, body));
-      if (model.mass[body] > 0.0)
-        gyration = std::max(gyration, std::sqrt(vector_at(model.inertia.span(), body).maxCoeff() / model.mass[body]));
-    }
-  }
-  joined_size_ = centres.isEmpty() ? 0.0 : std::max(centres.diagonal().norm(), 2.0 * gyration);
+  // from end to end of the centres, or the diameter of gyration of the largest
+  struct Extent {
+    Eigen::AlignedBox3d centres;
+    double gyration = 0.0;
+    double size() const { return centres.isEmpty() ? 0.0 : std::max(centres.diagonal().norm(), 2.0 * gyration); }
+  } joined, all;
+  const auto add = [&](std::uint32_t body, Extent* to) {
+    if (body == kNone) return;
+    to->centres.extend(vector_at(state.position, body));
+    if (model.mass[body] > 0.0)
+      to->gyration =
+          std::max(to->gyration, std::sqrt(vector_at(model.inertia.span(), body).maxCoeff() / model.mass[body]));
+  };
+  for (const kernel::ConstraintDescription& joint : description_.constraints)
+    for (const std::uint32_t body : {joint.body1, joint.body2}) add(body, &joined);
+  for (std::uint32_t body = 0; body < model.body_count; ++body) add(body, &all);
+  joined_size_ = joined.size(), scene_size_ = all.size();
+}
+
+void Figures::look_at(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  if (!contradicting_step_ && inner.data.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction))
+    contradicting_step_ = environment.step_count() + 1;
 }
 
 void Figures::follow(kernel::Environment* environment) {
   last_ = totals(environment);
   if (!initial_) {
     reference_energy_ = (initial_ = last_)->energy();
-    measure_joined(environment);
+    measure(environment);
   }
   largest_kinetic_ = std::max(largest_kinetic_, last_.kinetic);
   const double deviation = std::fabs(last_.energy() - reference_energy_);
@@ -116,13 +131,16 @@ void Figures::follow(kernel::Environment* environment) {
   joint_error_ = std::max(joint_error_, environment->figures().joint_error);
   if (!opening_step_ && joined_size_ > 0.0 && joint_error_ > kTorn * joined_size_)
     opening_step_ = environment->step_count();
+  if (const double way = environment->time_step() * last_.speed;
+      !runaway_ && scene_size_ > 0.0 && way > kRunaway * scene_size_)
+    runaway_ = Runaway{environment->step_count(), last_.fastest, way};
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
 }
 
 void Figures::begin_again(kernel::Environment* environment) {
   drives_.clear();
   find_drives();
-  measure_joined(environment);
+  measure(environment);
   reference_energy_ = totals(environment).energy();
   follow(environment);
 }
@@ -142,8 +160,16 @@ void Figures::write(report::v1::Report* report) const {
   if (opening_step_)
     report->add_warnings(fmt::format(
         "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "
-        "on: TimeStep is too long for this scene, or the solver leaves its joints unfinished",
-        joint_error_, 100.0 * kTorn, joined_size_, *opening_step_));
+        "on: {}",
+        joint_error_, 100.0 * kTorn, joined_size_, *opening_step_,
+        contradicting_step_ ? "they, or limits or drives, ask for what no motion gives, and get a compromise"
+                            : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));
+  if (runaway_)
+    report->add_warnings(
+        fmt::format("body \"{}\" went {:.3g} m in step {}, over a million times what the scene measures ({:.3g} m): it "
+                    "runs away, as "
+                    "where TimeStep is too long for the forces and the integrator",
+                    description_.bodies[runaway_->body].id, runaway_->way, runaway_->step, scene_size_));
   for (const Drive& drive : drives_) {
     report::v1::Drive* message = report->add_drives();
     message->set_constraint(description_.constraints[drive.constraint].id);

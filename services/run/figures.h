@@ -17,10 +17,12 @@ class Figures {
 
   // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential).
   void follow(kernel::Environment* environment);
+  // Called for every inner step.
+  void look_at(const kernel::Environment& environment, const kernel::InnerStep& inner);
   // The scene was edited: energy is compared with that of now.
   void begin_again(kernel::Environment* environment);
 
-  // Energy, momenta, penetration, joint error, drives; a warning where joints came open.
+  // Energy, momenta, penetration, joint error, drives; warnings where joints came open, and why, and where a body runs away.
   void write(report::v1::Report* report) const;
 
   // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
@@ -33,6 +35,8 @@ class Figures {
     double kinetic = 0.0, potential = 0.0;  // J
     Vector3 linear = Vector3::Zero();       // kg m/s
     Vector3 angular = Vector3::Zero();      // kg m^2/s, about the origin
+    double speed = 0.0;                     // m/s, of the fastest body
+    std::uint32_t fastest = kNone;
     double energy() const { return kinetic + potential; }
   };
   // A joint that drives its second body about an axis.
@@ -43,9 +47,15 @@ class Figures {
     double speed = 0.0;     // rad/s, in the last state
   };
 
+  struct Runaway {
+    std::uint64_t step;
+    std::uint32_t body;
+    double way;  // m
+  };
+
   Totals totals(kernel::Environment* environment) const;
   void find_drives();
-  void measure_joined(kernel::Environment* environment);
+  void measure(kernel::Environment* environment);
   double drive_speed(const Drive& drive, const kernel::StateView& state) const;
 
   const kernel::EnvironmentDescription& description_;
@@ -55,8 +65,10 @@ class Figures {
   Totals last_;
   double largest_kinetic_ = 0.0, largest_deviation_ = 0.0;
   double penetration_ = 0.0, joint_error_ = 0.0;
-  double joined_size_ = 0.0;                   // m, what joints hold together
-  std::optional<std::uint64_t> opening_step_;  // the first in which joints came open by kTorn of it
+  double joined_size_ = 0.0, scene_size_ = 0.0;      // m, of what joints hold together, and of all
+  std::optional<std::uint64_t> contradicting_step_;  // the first
+  std::optional<Runaway> runaway_;                   // the first
+  std::optional<std::uint64_t> opening_step_;        // the first in which joints came open by kTorn of it
 };
 
 }  // namespace gravitas

@@ -21,6 +21,18 @@ using ::testing::DoubleNear;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
+class Looks final : public kernel::CommitListener {
+ public:
+  explicit Looks(Figures* figures) : figures_(*figures) {}
+  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
+    figures_.look_at(environment, inner);
+  }
+  void on_commit(const kernel::Environment&) override {}
+
+ private:
+  Figures& figures_;
+};
+
 report::v1::Report figures_of(const std::string& scene, int steps) {
   const ScratchFolder folder;
   RunOptions options;
@@ -30,6 +42,8 @@ report::v1::Report figures_of(const std::string& scene, int steps) {
   const kernel::EnvironmentDescription description = load(options, &warnings);
   const std::unique_ptr<kernel::Environment> environment = start(description);
   Figures figures(description);
+  Looks looks(&figures);
+  environment->set_commit_listener(&looks);
   figures.follow(environment.get());
   for (int i = 0; i < steps; ++i) {
     EXPECT_EQ(environment->step(), kernel::StepOutcome::kCommitted);
@@ -123,6 +137,43 @@ Environment {
               // 3 4 5
               ElementsAre(AllOf(HasSubstr("joints came open by up to"),
                                 HasSubstr("by more than 1 % of what they hold together (5 m) from step "))));
+}
+
+// Held at two points that part.
+TEST(Figures, JointsThatContradictEachOtherAreToldAsThat) {
+  const report::v1::Report report = figures_of(R"(
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment {
+  Space { Bodies {
+    Body { Id = "Held" Mass = 1 PrincipalMoments = {1, 1, 1} }
+    Body { Id = "Leaves" Kinematic = true Mass = 1 PrincipalMoments = {1, 1, 1}
+      KineticProperties { Position = {2, 0, 0} LinearVelocity = {1, 0, 0} } }
+  } }
+  Constraints {
+    Constraint { Type = "Spherical" Id = "Stays" Body2 = "Held" CustomProperties { BindPoint = {-1, 0, 0} } }
+    Constraint { Type = "Spherical" Id = "Goes" Body1 = "Leaves" Body2 = "Held" CustomProperties { BindPoint = {1, 0, 0} } }
+  }
+  ConstraintSolver = "Newton" })",
+                                               100);
+  ASSERT_EQ(report.warnings_size(), 1);
+  EXPECT_THAT(report.warnings(0), HasSubstr("ask for what no motion gives"));
+}
+
+// k h^2/m = 5.6, above the 4 that the method bears.
+TEST(Figures, ABodyThatRunsAwayIsWarnedOf) {
+  const auto warnings = [](double stiffness) {
+    const report::v1::Report report =
+        figures_of("Forces { Force { Type = \"Spring\" Id = \"Stiff\" CustomProperties { Stiffness = " +
+                       std::to_string(stiffness) +
+                       R"( } } }
+Simulator { CustomProperties { Duration = 1 } }
+Environment { Space { Bodies {
+  Body { Id = "Bob" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} } Forces = { "Stiff" } } } } })",
+                   60);
+    return std::vector<std::string>(report.warnings().begin(), report.warnings().end());
+  };
+  EXPECT_THAT(warnings(2e4), ElementsAre(AllOf(HasSubstr("body \"Bob\" went "), HasSubstr("it runs away"))));
+  EXPECT_THAT(warnings(1e4), ElementsAre());
 }
 
 TEST(Figures, OfAnEmptyWorldAreZero) {
