@@ -60,7 +60,7 @@ struct StepData {
   Column<double> start_wrench;
 
   // Simulator Smooth: accelerations of kinematic bodies, what the joints answer, and the wrenches with it. Written by
-  // Stage::kSolve inside kIntegrate; held_force: the discrepancy_force that an integration which is only compared leaves.
+  // Stage::kSolve inside kIntegrate; held_force: the last discrepancy_force of the integration that counts.
   Column<double> kinematic_acceleration, reaction, discrepancy_force, held_force, reaction_residual,
       wrench_with_reactions;
 

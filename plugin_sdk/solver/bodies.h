@@ -48,6 +48,7 @@ class SolverBodies {
 
   // Turns the world inertia to where a displacement from the trial pose leaves the bodies.
   void turn(const BodyMotion& displacement);
+  void set_inverse_inertia(std::uint32_t row, const Matrix3& inverse) { bodies_[row].inverse_inertia = inverse; }
 
   // Without the world.
   std::size_t count() const { return bodies_.size() - 1; }

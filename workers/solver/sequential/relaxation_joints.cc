@@ -63,6 +63,10 @@ JointEnd end_of(const Discrepancy& discrepancy, const RelaxationDiscrepancy& at_
   joint.is_only_point = at_trial.is_only_point;
   move_joint(one, two, body_end(one, change1), body_end(two, change2), change2.angular - change1.angular, &joint);
   JointEnd end;
+  end.is_linear = !discrepancy.is_angular();
+  end.is_radial = discrepancy.is_radial();
+  end.arm1 = discrepancy.is_radial() ? joint.own_arm1() : joint.arm1;
+  end.arm2 = discrepancy.is_radial() ? joint.own_arm2() : joint.arm2;
   for (std::size_t k = 0; k < 3; ++k) {
     end.directions[k] = with_turns(joint.directions[k], one.inverse_inertia, two.inverse_inertia);
     end.errors[k] = joint.errors[static_cast<Eigen::Index>(k)];

@@ -58,6 +58,9 @@ RelaxationDiscrepancy relaxation_discrepancy(const Discrepancy& discrepancy, std
 struct JointEnd {
   std::array<ConstraintDirection, 3> directions;
   std::array<double, 3> errors;
+  Vector3 arm1, arm2;     // where it pushes its bodies
+  bool is_linear = true;  // it has arms
+  bool is_radial = false;
 };
 JointEnd end_of(const Discrepancy& discrepancy, const RelaxationDiscrepancy& at_trial, const SolverBodies& turned,
                 const BodyMotion& displacement);

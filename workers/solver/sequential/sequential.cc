@@ -62,6 +62,8 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   if (contradicts || drives_contradict_) summary_.stop_reason = StopReason::kContradiction;
   if (used_up_) summary_.stop_reason = StopReason::kIterations;
   pose_joints_.store(solution_.joint_correction);
+  for (std::size_t i = 0; i < pose_laws_.size(); ++i)
+    if (!pose_laws_[i].is_active()) solution_.joint_correction[i] = 0.0;
   for (std::size_t i = 0; i < moved_.size(); ++i)
     if (velocity_laws_[i].is_unbounded_drive())
       solution_.joint_correction[i] = request.theta() * time_step_ * (moved_[i] - solution_.joint_impulse[i]);
@@ -227,7 +229,8 @@ void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
 
 // solution_.displacement and the multipliers of the pose rows, on top of offset_: of rows at S*, then of rows where that ends.
 void SequentialSolver::solve_pose(const stage::SolverSolveRequest& request) {
-  pose_at_trial();
+  pose_at_trial(request);
+  base_ = offset_;
   pose_converged_ = relax_pose();
   used_up_ = used_up_ || !pose_converged_;
   if (discrepancies_.empty()) return;
@@ -237,7 +240,7 @@ void SequentialSolver::solve_pose(const stage::SolverSolveRequest& request) {
 
 // Returns whether sweeps came to their end.
 bool SequentialSolver::relax_pose() {
-  solution_.displacement = offset_;
+  solution_.displacement = base_;
   const double violation =
       std::max(pose_joints_.largest_violation(solution_.displacement), gaps_.largest_violation(solution_.displacement));
   const double motion =
@@ -263,7 +266,7 @@ bool SequentialSolver::relax_pose() {
     converged = sweep_.sweep(bodies_, solution_.displacement) <= tolerance;
     ++summary_.sweeps;
   }
-  solution_.displacement = offset_;
+  solution_.displacement = base_;
   pose_joints_.push_all(bodies_, solution_.displacement);
   gaps_.push_all(bodies_, solution_.displacement);
   return converged;

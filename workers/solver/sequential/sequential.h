@@ -42,9 +42,13 @@
 //
 // What rows at S* leave of joints is of second order in the step's turn. Where that is more than a thousandth of the bodies' radius
 // of gyration, steps of Newton's method follow: rows where the bodies are by then, for what is missing there, relaxed again,
-// until a millionth is left or a step does not halve it. Friction and drives may displace a light body by many times its
+// until a millionth is left or a step does not halve it. Where tension h^2 over mass and length is more than half, as of light links
+// between heavy ends, rows at S* drive a swing of the links from step to step, however well they are solved: there the steps follow in
+// any case, with what a turn adds to the corrections' moments (geometric stiffness; a rod's across it), which is left out again in the
+// end unless sweeps ran out and it would open joints. Friction and drives may displace a light body by many times its
 // size, which joints are to take back: where that leaves joints open by more than twice what they were and a hundredth (a millionth
-// where sweeps ran out), the pose change is that without friction's part, or that without any.
+// where sweeps ran out), the pose change is that without friction's part, or that without any. Sweeps that ran out where joints end
+// wider open than S* has them: the largest share (1/2, 1/4, 1/8, none) of their correction that does not open them.
 //
 // Joints' velocities are made right where the pose change leaves the bodies. Made right at S*, the spin of a wheel is left
 // across its hinge by what that turned, and where it turns by more than a radian in a step, this grows from step to step. Those
@@ -149,7 +153,9 @@ class SequentialSolver {
  private:
   // Joints that are open by a larger share of what their bodies measure are closed further; steps of that; rounding of many.
   static constexpr double kOpen = 1e-3, kClosed = 1e-6, kFarOpen = 1e-2, kRounded = 1e-12;
-  static constexpr int kPoseSteps = 6;
+  static constexpr int kPoseSteps = 6, kStiffSteps = 12;
+  // Corrections that stiffen a body by a larger share of its inertia send steps without that away from where rows hold.
+  static constexpr double kStiff = 0.5;
   // What springs miss counts a thousandfold: energy goes by it.
   static constexpr double kOfSprings = 1e3;
 
@@ -176,7 +182,12 @@ class SequentialSolver {
   bool relax_pose();
   void close_at_end(const stage::SolverSolveRequest& request);
   void find_ends(const stage::SolverSolveRequest& request);
-  void build_at_end();
+  double stiffen(const stage::SolverSolveRequest& request);
+  double largest_change(const BodyMotion& from) const;
+  void build_at_end(const stage::SolverSolveRequest& request, bool is_stiff);
+  void add_turns_of_rod(std::size_t row);
+  double pull_of_rod(std::size_t row) const;
+  void end_unstiffened(const stage::SolverSolveRequest& request);
   void shorten_pose(const stage::SolverSolveRequest& request);
   double open_at_trial() const;
   double share_of_miss(const RelaxationDiscrepancy& d, std::size_t axis, const JointLaw& law, double missed) const;
@@ -186,7 +197,8 @@ class SequentialSolver {
   void solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor);
   void guess_pose(const stage::SolverSolveRequest& request, double factor);
   double error_of_pose();
-  void pose_at_trial();
+  void pose_at_trial(const stage::SolverSolveRequest& request);
+  void build_gaps(const SolverBodies& bodies, const stage::SolverSolveRequest& request);
   static std::pair<std::uint32_t, std::uint32_t> pair_of(std::uint32_t body1, std::uint32_t body2) {
     return std::minmax(body1, body2);
   }
@@ -246,6 +258,7 @@ class SequentialSolver {
   ContactGaps gaps_;
   ContactImpulses impulses_;
   bool pose_converged_ = true;
+  bool gaps_are_stiff_ = false;
   bool posed_at_end_ = false;  // pose_joints_ has rows where the pose change ended, not at S*
   double unsprung_ = 0.0;      // the most that springs miss their laws by there, of what moves the bodies
   double open_ = 0.0;  // the most that pose laws are missed by where it ends, as a share of what the bodies measure
@@ -256,6 +269,9 @@ class SequentialSolver {
   SolverSolution solution_;
   BodyMotion trial_velocity_;           // v*, as joints turn it
   BodyMotion turn_;                     // by joints
+  BodyMotion base_;                     // of the pose change: offset_, or where a stiffened step begins
+  std::vector<Matrix3> stiffness_;      // by which corrections hold turns, N m h^2
+  SolverBodies stiffened_;              // turned_ with that
   BodyMotion offset_;                   // theta h M^-1 J^T lambda of rows on velocity alone
   std::vector<Vector3> offset_moment_;  // that turns by it, kg m^2
   std::vector<std::uint8_t> closed_, closed_now_;

@@ -1,7 +1,10 @@
 // Where the pose change ends: rows and errors there, and what is closed.
 #include <algorithm>
+#include <limits>
 
+#include "plugin_sdk/math/pose.h"
 #include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/end_of_step_rows.h"
 #include "workers/solver/sequential/sequential.h"
 
 namespace gravitas {
@@ -11,21 +14,113 @@ bool SequentialSolver::touches(const RelaxationDiscrepancy& joint) const {
 }
 
 // Newton's steps from the rows at S*, for what these leave of joints by the square of the turn: each with rows at the end of
-// the one before, as long as one halves what joints are open by.
+// the one before, as long as one halves what joints are open by. Where corrections stiffen bodies, the steps know it, and go on
+// until what they change moves nothing any more.
 void SequentialSolver::close_at_end(const stage::SolverSolveRequest& request) {
   const auto off = [&] { return std::max(open_, kOfSprings * unsprung_); };
   find_ends(request);
-  for (int step = 0; off() > (step == 0 ? kOpen : kClosed) && step < kPoseSteps; ++step) {
-    const double before = off();
+  double stiffness = stiffen(request);
+  const bool is_stiff = stiffness > kStiff;
+  double before = is_stiff ? std::numeric_limits<double>::infinity() : off();
+  for (int step = 0; before > (step == 0 ? kOpen : kClosed) && step < (is_stiff ? kStiffSteps : kPoseSteps); ++step) {
     keep_pose(&before_step_);
-    build_at_end();
+    if (is_stiff && step > 0) stiffness = stiffen(request);
+    build_at_end(request, is_stiff);
     pose_converged_ = relax_pose();
     posed_at_end_ = true;
     find_ends(request);
-    const bool goes_on = off() < 0.5 * before;
-    if (!(off() < before)) take_pose(before_step_);
-    if (!goes_on) return;
+    // what is left moves bodies by as much more as they are stiffer
+    const double left = std::max(off(), is_stiff ? stiffness * largest_change(before_step_.displacement) : 0.0);
+    // sweeps that ran out go on from where they are
+    const bool goes_on = left < 0.5 * before || (is_stiff && !pose_converged_ && left < before);
+    if (!(left < before)) take_pose(before_step_);
+    if (!goes_on) break;
+    before = left;
   }
+  if (is_stiff) end_unstiffened(request);
+}
+
+// From a displacement to that there is, of what the bodies measure.
+double SequentialSolver::largest_change(const BodyMotion& from) const {
+  double most = 0.0;
+  for (std::uint32_t i = 0; i < bodies_.count(); ++i) {
+    const double gyration = bodies_[i].gyration();
+    if (!bodies_[i].is_pushed() || !(gyration > 0.0)) continue;
+    const Twist &now = solution_.displacement[i], &then = from[i];
+    most = std::max(most, (now.linear - then.linear).norm() / gyration + (now.angular - then.angular).norm());
+  }
+  return most;
+}
+
+// What a turn of a body adds to the moments that the corrections exert on it: under tension this holds a light link more than its
+// inertia does (end_of_step.h). Returns the largest share of a body's inertia.
+double SequentialSolver::stiffen(const stage::SolverSolveRequest& request) {
+  double most = 0.0;
+  stiffness_.assign(bodies_.count() + 1, Matrix3::Zero());
+  pose_joints_.store(pushed_);
+  for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
+    const RelaxationDiscrepancy& d = discrepancies_[i];
+    if (!ends_[i].is_linear || touches(d)) continue;
+    Vector3 push = Vector3::Zero();
+    for (std::size_t k = 0; k < 3; ++k) push += pushed_[3 * i + k] * ends_[i].directions[k].linear;
+    stiffness_[d.body1] += geometric_stiffness(ends_[i].arm1, -push);
+    stiffness_[d.body2] += geometric_stiffness(ends_[i].arm2, push);
+    if (const double pull = pull_of_rod(i); pull > 0.0)
+      most =
+          std::max(most, pull / ends_[i].errors[0] * (bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass));
+  }
+  stiffened_ = turned_;
+  for (std::uint32_t i = 0; i < bodies_.count(); ++i) {
+    const Matrix3 share = turned_[i].inverse_inertia * stiffness_[i];
+    if (share.isZero(0.0)) continue;
+    most = std::max(most, share.norm());
+    const Twist& change = solution_.displacement[i];
+    stiffened_.set_inverse_inertia(
+        i, stiffened_inverse(displaced(bodies_[i].trial, change.linear, change.angular).orientation,
+                             vector_at(request.inverse_inertia(), i), stiffness_[i]));
+  }
+  return most;
+}
+
+// A rod that pulls with mu resists to being turned: across it, with mu/length, as rows with that compliance, whose multipliers
+// vanish where the steps end.
+void SequentialSolver::add_turns_of_rod(std::size_t i) {
+  RelaxationDiscrepancy& d = posed_[i];
+  const double pull = pull_of_rod(i);
+  if (!(pull > 0.0)) return;
+  const auto [first, second] = orthonormal_basis(ends_[i].directions[0].linear);
+  std::size_t axis = 1;
+  for (const Vector3& across : {first, second}) {
+    d.directions[axis] = with_turns(direction_at(across, ends_[i].arm1, ends_[i].arm2),
+                                    stiffened_[d.body1].inverse_inertia, stiffened_[d.body2].inverse_inertia);
+    JointLaw& law = posed_laws_[3 * i + axis] = JointLaw{};
+    law.has_lower = law.has_upper = true;
+    law.gamma = ends_[i].errors[0] / pull;
+    law.lower_target = law.upper_target =
+        d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
+    ++axis;
+  }
+}
+
+// By which a rod holds its bodies together; 0: it is none, or presses.
+double SequentialSolver::pull_of_rod(std::size_t i) const {
+  return ends_[i].is_radial && pose_laws_[3 * i].is_active() && ends_[i].errors[0] > 0.0 ? -pushed_[3 * i] : 0.0;
+}
+
+// What stiffens only leads there: in the end corrections move the bodies by their inertia alone, unless the steps are so far
+// from their end that this would open joints.
+void SequentialSolver::end_unstiffened(const stage::SolverSolveRequest& request) {
+  const double open = open_;
+  keep_pose(&before_step_);
+  build_at_end(request, false);
+  solution_.displacement = base_;
+  pose_joints_.push_all(bodies_, solution_.displacement);
+  gaps_.push_all(bodies_, solution_.displacement);
+  find_ends(request);
+  if (!(open_ > std::max(2.0 * open, kClosed))) return;
+  used_up_ = true;
+  take_pose(before_step_);
+  gaps_are_stiff_ = true;
 }
 
 // Sweeps that ran out may turn bodies so far that joints are wider open than they were: the largest share of that change is
@@ -123,21 +218,45 @@ void SequentialSolver::find_ends(const stage::SolverSolveRequest& request) {
 }
 
 // Rows there, which ask for what is missing there: J x with x from S*.
-void SequentialSolver::build_at_end() {
+void SequentialSolver::build_at_end(const stage::SolverSolveRequest& request, bool is_stiff) {
+  const SolverBodies& bodies = is_stiff ? stiffened_ : turned_;
   posed_ = discrepancies_;
   posed_laws_ = pose_laws_;
   for (std::size_t i = 0; i < posed_.size(); ++i) {
     RelaxationDiscrepancy& d = posed_[i];
     if (touches(d)) continue;
     d.directions = ends_[i].directions;
+    if (is_stiff)
+      for (ConstraintDirection& direction : d.directions)
+        direction = with_turns(direction, bodies[d.body1].inverse_inertia, bodies[d.body2].inverse_inertia);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double along = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
       posed_laws_[3 * i + axis].shift(along - (ends_[i].errors[axis] - d.axes[axis].error_at_trial));
     }
+    if (is_stiff) add_turns_of_rod(i);
   }
   pose_joints_.store(pushed_);
-  pose_joints_.build(turned_, posed_, posed_laws_, pushed_);
+  pose_joints_.build(bodies, posed_, posed_laws_, pushed_);
   turn_offset(turned_);
+  base_ = offset_;
+  if (!is_stiff && !gaps_are_stiff_) return;
+  build_gaps(is_stiff ? stiffened_ : bodies_, request);
+  gaps_are_stiff_ = is_stiff;
+  // x0 = delta_k + (M + K)^-1 M (offset - delta_k)
+  for (std::uint32_t i = 0; i < bodies_.count() && is_stiff; ++i) {
+    const Vector3 missing = offset_[i].angular - solution_.displacement[i].angular;
+    if (stiffness_[i].isZero(0.0) || missing.isZero(0.0) || !bodies_[i].is_pushed()) continue;
+    const Quaternion end = displaced(bodies_[i].trial, Vector3::Zero(), solution_.displacement[i].angular).orientation;
+    const Matrix3 inertia = world_inertia(end, moments_of(vector_at(request.inverse_inertia(), i)));
+    base_[i].angular = solution_.displacement[i].angular + stiffened_[i].inverse_inertia * (inertia * missing);
+  }
+}
+
+// Rows of contacts anew, of bodies with another inertia.
+void SequentialSolver::build_gaps(const SolverBodies& bodies, const stage::SolverSolveRequest& request) {
+  guess_of_contacts_.resize(closed_.size());
+  gaps_.store(guess_of_contacts_);
+  gaps_.build(bodies, request, settings_.correction_factor, guess_of_contacts_);
 }
 
 // What acts on velocities alone keeps its moment while steps turn the inertia.

@@ -32,7 +32,7 @@ bool SequentialSolver::acts_on_velocity_alone() const {
 // The first sweep begins with multipliers that push as the velocities' impulses do, where that misses less than those found
 // without the offset: what rests, held by large forces that cancel, is found at once.
 void SequentialSolver::guess_pose(const stage::SolverSolveRequest& request, double factor) {
-  pose_at_trial();
+  pose_at_trial(request);
   guess_of_joints_.assign(pose_laws_.size(), 0.0);
   for (std::size_t i = 0; i < pose_laws_.size(); ++i)
     if (!velocity_laws_[i].is_velocity_only) guess_of_joints_[i] = factor * solution_.joint_impulse[i];
@@ -61,8 +61,10 @@ double SequentialSolver::error_of_pose() {
 }
 
 // Rows of joints at S* again.
-void SequentialSolver::pose_at_trial() {
+void SequentialSolver::pose_at_trial(const stage::SolverSolveRequest& request) {
   if (!posed_at_end_) return;
+  if (gaps_are_stiff_) build_gaps(bodies_, request);
+  gaps_are_stiff_ = false;
   pose_joints_.store(pushed_);
   pose_joints_.build(bodies_, discrepancies_, pose_laws_, pushed_);
   posed_at_end_ = false;
