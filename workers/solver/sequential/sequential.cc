@@ -161,7 +161,7 @@ double SequentialSolver::reconcile(const std::vector<RelaxationDiscrepancy>& dis
 
 void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   summary_ = {};
-  used_up_ = drives_yield_ = drives_contradict_ = posed_at_end_ = false;
+  used_up_ = drives_yield_ = drives_contradict_ = posed_at_end_ = gaps_are_stiff_ = false;
   time_step_ = request.time_step();
   coordinates_ = 0.0;
   bodies_.load(request);

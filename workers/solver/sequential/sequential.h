@@ -165,7 +165,7 @@ class SequentialSolver {
     ContactGaps gaps;
     std::vector<JointEnd> ends;
     double open = 0.0, unsprung = 0.0;
-    bool is_at_end = false, has_converged = true;
+    bool is_at_end = false, has_stiff_gaps = false, has_converged = true;
   };
 
   void load(const stage::SolverSolveRequest& request);
@@ -258,9 +258,9 @@ class SequentialSolver {
   ContactGaps gaps_;
   ContactImpulses impulses_;
   bool pose_converged_ = true;
-  bool gaps_are_stiff_ = false;
-  bool posed_at_end_ = false;  // pose_joints_ has rows where the pose change ended, not at S*
-  double unsprung_ = 0.0;      // the most that springs miss their laws by there, of what moves the bodies
+  bool gaps_are_stiff_ = false;  // gaps_ has rows of stiffened_
+  bool posed_at_end_ = false;    // pose_joints_ has rows where the pose change ended, not at S*
+  double unsprung_ = 0.0;        // the most that springs miss their laws by there, of what moves the bodies
   double open_ = 0.0;  // the most that pose laws are missed by where it ends, as a share of what the bodies measure
   PoseChange before_step_, before_offset_, before_guess_;  // gone back to where what followed leaves more open
   RelaxationJoints::Multipliers guess_of_joints_;          // as velocities' impulses push

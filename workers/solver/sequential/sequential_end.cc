@@ -120,7 +120,6 @@ void SequentialSolver::end_unstiffened(const stage::SolverSolveRequest& request)
   if (!(open_ > std::max(2.0 * open, kClosed))) return;
   used_up_ = true;
   take_pose(before_step_);
-  gaps_are_stiff_ = true;
 }
 
 // Sweeps that ran out may turn bodies so far that joints are wider open than they were: the largest share of that change is
@@ -183,6 +182,7 @@ void SequentialSolver::keep_pose(PoseChange* kept) const {
   kept->ends = ends_;
   kept->open = open_, kept->unsprung = unsprung_;
   kept->is_at_end = posed_at_end_;
+  kept->has_stiff_gaps = gaps_are_stiff_;
   kept->has_converged = pose_converged_;
 }
 
@@ -193,6 +193,7 @@ void SequentialSolver::take_pose(const PoseChange& kept) {
   ends_ = kept.ends;
   open_ = kept.open, unsprung_ = kept.unsprung;
   posed_at_end_ = kept.is_at_end;
+  gaps_are_stiff_ = kept.has_stiff_gaps;
   pose_converged_ = kept.has_converged;
 }
 
@@ -224,11 +225,11 @@ void SequentialSolver::build_at_end(const stage::SolverSolveRequest& request, bo
   posed_laws_ = pose_laws_;
   for (std::size_t i = 0; i < posed_.size(); ++i) {
     RelaxationDiscrepancy& d = posed_[i];
-    if (touches(d)) continue;
-    d.directions = ends_[i].directions;
+    if (!touches(d)) d.directions = ends_[i].directions;
     if (is_stiff)
       for (ConstraintDirection& direction : d.directions)
         direction = with_turns(direction, bodies[d.body1].inverse_inertia, bodies[d.body2].inverse_inertia);
+    if (touches(d)) continue;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double along = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
       posed_laws_[3 * i + axis].shift(along - (ends_[i].errors[axis] - d.axes[axis].error_at_trial));
