@@ -2,6 +2,7 @@
 // velocity and torque in world axes.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 
@@ -20,6 +21,13 @@ struct Twist {
   Vector3 linear = Vector3::Zero();   // of the centre of mass, world, m/s
   Vector3 angular = Vector3::Zero();  // world, rad/s
 };
+
+// sqrt(moment/mass), m, by the mean of the inverse moments: turns rad/s of a body into m/s where the two must be compared. 0 where
+// nothing turns the body, 1 m where nothing moves its centre.
+inline double radius_of_gyration(double inverse_mass, double inverse_moment) {
+  if (!(inverse_moment > 0.0)) return 0.0;
+  return inverse_mass > 0.0 ? std::sqrt(inverse_mass / inverse_moment) : 1.0;
+}
 
 // Angular acceleration (world, rad/s^2) of a body with orientation q (body to world), angular velocity w
 // (world) and principal moments, under a torque (world):

@@ -1,9 +1,9 @@
 #include "plugin_sdk/joint_load.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
@@ -22,10 +22,8 @@ double response(const JointBody& body, const Vector3& linear_row, const Vector3&
   return body.inverse_mass * linear_row.squaredNorm() + local.dot(body.inverse_moments.cwiseProduct(local));
 }
 
-// Radius of gyration, m; 0 if nothing turns the body.
 double gyration(const JointBody& body) {
-  const double turning = body.inverse_moments.sum() / 3.0;
-  return turning > 0.0 && body.inverse_mass > 0.0 ? std::sqrt(body.inverse_mass / turning) : 0.0;
+  return radius_of_gyration(body.inverse_mass, body.inverse_moments.sum() / 3.0);
 }
 
 }  // namespace

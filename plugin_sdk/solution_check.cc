@@ -314,7 +314,7 @@ class Balance {
     const Vector3 displaced = inertia * change.angular;
     // a turn settles by what it moves at the radius of gyration
     const double give = vector_at(request_.inverse_inertia(), i).mean();
-    const double gyration = inverse_mass > 0.0 && give > 0.0 ? std::sqrt(inverse_mass / give) : 1.0;
+    const double gyration = give > 0.0 ? radius_of_gyration(inverse_mass, give) : 1.0;
     return off_by("pose_change", i, (displaced - pose.angular).norm(),
                   arms(pose, displaced.norm()) + before_last * pushes_[i].loose_moment +
                       kOfSolution * displaced.norm() + inertia.norm() * settled / gyration,

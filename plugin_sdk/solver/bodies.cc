@@ -2,18 +2,13 @@
 #include "plugin_sdk/solver/bodies.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 
-double SolverBody::gyration() const {
-  const double turning = inverse_inertia.trace() / 3.0;
-  if (!(turning > 0.0)) return 0.0;
-  return inverse_mass > 0.0 ? std::sqrt(inverse_mass / turning) : 1.0;
-}
+double SolverBody::gyration() const { return radius_of_gyration(inverse_mass, inverse_inertia.trace() / 3.0); }
 
 void SolverBodies::load(const stage::SolverSolveRequest& request) {
   const std::size_t rows = request.flags().size();

@@ -26,9 +26,7 @@ struct SolverBody {
   Twist trial_velocity;
 
   bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
-  // Radius of gyration, m: turns rad/s of this body into m/s where the two must be compared. 1 m
-  // for a body that only turns, 0 for one that does not turn.
-  double gyration() const;
+  double gyration() const;  // radius_of_gyration() of dynamics.h, m
 };
 
 // Displacement or velocity of every body, by the number of its row; the last is the world's, and

@@ -520,7 +520,7 @@ void ServedRun::leave_aside(const std::string& why) {
 
 void ServedRun::on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) {
   reactions_->add(environment, inner);
-  figures_->look_at(environment, inner);
+  figures_->look_at(inner);
   event_source_->on_inner_step(environment, inner);
   with_subscriptions([&](Subscription* one) { one->source().on_inner_step(environment, inner); });
 }

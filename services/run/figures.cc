@@ -113,9 +113,8 @@ void Figures::measure(kernel::Environment* environment) {
   joined_size_ = joined.size(), scene_size_ = all.size();
 }
 
-void Figures::look_at(const kernel::Environment& environment, const kernel::InnerStep& inner) {
-  if (!contradicting_step_ && inner.data.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction))
-    contradicting_step_ = environment.step_count() + 1;
+void Figures::look_at(const kernel::InnerStep& inner) {
+  contradicts_ = contradicts_ || inner.data.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction);
 }
 
 void Figures::follow(kernel::Environment* environment) {
@@ -162,8 +161,8 @@ void Figures::write(report::v1::Report* report) const {
         "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "
         "on: {}",
         joint_error_, 100.0 * kTorn, joined_size_, *opening_step_,
-        contradicting_step_ ? "they, or limits or drives, ask for what no motion gives, and get a compromise"
-                            : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));
+        contradicts_ ? "they, or limits or drives, ask for what no motion gives, and get a compromise"
+                     : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));
   if (runaway_)
     report->add_warnings(
         fmt::format("body \"{}\" went {:.3g} m in step {}, over a million times what the scene measures ({:.3g} m): it "

@@ -18,7 +18,7 @@ class Figures {
   // Called for the initial state and after every commit. May throw StageFault (a force was asked for its potential).
   void follow(kernel::Environment* environment);
   // Called for every inner step.
-  void look_at(const kernel::Environment& environment, const kernel::InnerStep& inner);
+  void look_at(const kernel::InnerStep& inner);
   // The scene was edited: energy is compared with that of now.
   void begin_again(kernel::Environment* environment);
 
@@ -65,10 +65,10 @@ class Figures {
   Totals last_;
   double largest_kinetic_ = 0.0, largest_deviation_ = 0.0;
   double penetration_ = 0.0, joint_error_ = 0.0;
-  double joined_size_ = 0.0, scene_size_ = 0.0;      // m, of what joints hold together, and of all
-  std::optional<std::uint64_t> contradicting_step_;  // the first
-  std::optional<Runaway> runaway_;                   // the first
-  std::optional<std::uint64_t> opening_step_;        // the first in which joints came open by kTorn of it
+  double joined_size_ = 0.0, scene_size_ = 0.0;  // m, of what joints hold together, and of all
+  bool contradicts_ = false;                     // joints, limits or drives each other, in some step
+  std::optional<Runaway> runaway_;               // the first
+  std::optional<std::uint64_t> opening_step_;    // the first in which joints came open by kTorn of it
 };
 
 }  // namespace gravitas

@@ -419,7 +419,7 @@ class Run final : private kernel::CommitListener {
   }
 
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
-    figures_->look_at(environment, inner);
+    figures_->look_at(inner);
     if (reactions_) reactions_->add(environment, inner);
     if (event_source_) event_source_->on_inner_step(environment, inner);
   }

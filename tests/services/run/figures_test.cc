@@ -24,9 +24,7 @@ using ::testing::HasSubstr;
 class Looks final : public kernel::CommitListener {
  public:
   explicit Looks(Figures* figures) : figures_(*figures) {}
-  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
-    figures_.look_at(environment, inner);
-  }
+  void on_inner_step(const kernel::Environment&, const kernel::InnerStep& inner) override { figures_.look_at(inner); }
   void on_commit(const kernel::Environment&) override {}
 
  private:

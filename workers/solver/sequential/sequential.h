@@ -182,7 +182,8 @@ class SequentialSolver {
   bool relax_pose();
   void close_at_end(const stage::SolverSolveRequest& request);
   void find_ends(const stage::SolverSolveRequest& request);
-  double stiffen(const stage::SolverSolveRequest& request);
+  double measure_stiffness();
+  void stiffen(const stage::SolverSolveRequest& request);
   double largest_change(const BodyMotion& from) const;
   void build_at_end(const stage::SolverSolveRequest& request, bool is_stiff);
   void add_turns_of_rod(std::size_t row);
@@ -254,7 +255,9 @@ class SequentialSolver {
   double shifted_pose_ = 0.0, shifted_velocity_ = 0.0;
   RelaxationJoints::Multipliers moved_;  // by what drives moved the pose before they yielded; empty: none has
   RelaxationJoints pose_joints_, velocity_joints_;
-  RelaxationJoints::Multipliers pushed_;  // by the pose change
+  // by the pose change: by joints, and at contacts
+  RelaxationJoints::Multipliers pushed_;
+  std::vector<double> pressed_;
   ContactGaps gaps_;
   ContactImpulses impulses_;
   bool pose_converged_ = true;
@@ -262,9 +265,7 @@ class SequentialSolver {
   bool posed_at_end_ = false;    // pose_joints_ has rows where the pose change ended, not at S*
   double unsprung_ = 0.0;        // the most that springs miss their laws by there, of what moves the bodies
   double open_ = 0.0;  // the most that pose laws are missed by where it ends, as a share of what the bodies measure
-  PoseChange before_step_, before_offset_, before_guess_;  // gone back to where what followed leaves more open
-  RelaxationJoints::Multipliers guess_of_joints_;          // as velocities' impulses push
-  std::vector<double> guess_of_contacts_;
+  PoseChange before_step_, before_offset_;  // gone back to where what followed leaves more open
 
   SolverSolution solution_;
   BodyMotion trial_velocity_;           // v*, as joints turn it

@@ -19,12 +19,13 @@ bool SequentialSolver::touches(const RelaxationDiscrepancy& joint) const {
 void SequentialSolver::close_at_end(const stage::SolverSolveRequest& request) {
   const auto off = [&] { return std::max(open_, kOfSprings * unsprung_); };
   find_ends(request);
-  double stiffness = stiffen(request);
+  double stiffness = measure_stiffness();
   const bool is_stiff = stiffness > kStiff;
   double before = is_stiff ? std::numeric_limits<double>::infinity() : off();
   for (int step = 0; before > (step == 0 ? kOpen : kClosed) && step < (is_stiff ? kStiffSteps : kPoseSteps); ++step) {
     keep_pose(&before_step_);
-    if (is_stiff && step > 0) stiffness = stiffen(request);
+    if (is_stiff && step > 0) stiffness = measure_stiffness();
+    if (is_stiff) stiffen(request);
     build_at_end(request, is_stiff);
     pose_converged_ = relax_pose();
     posed_at_end_ = true;
@@ -53,11 +54,10 @@ double SequentialSolver::largest_change(const BodyMotion& from) const {
 }
 
 // What a turn of a body adds to the moments that the corrections exert on it: under tension this holds a light link more than its
-// inertia does (end_of_step.h). Returns the largest share of a body's inertia.
-double SequentialSolver::stiffen(const stage::SolverSolveRequest& request) {
+// inertia does (end_of_step.h). Returns the largest share of a body's inertia, and of masses by which rods hold them across.
+double SequentialSolver::measure_stiffness() {
   double most = 0.0;
   stiffness_.assign(bodies_.count() + 1, Matrix3::Zero());
-  pose_joints_.store(pushed_);
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
     if (!ends_[i].is_linear || touches(d)) continue;
@@ -69,17 +69,21 @@ double SequentialSolver::stiffen(const stage::SolverSolveRequest& request) {
       most =
           std::max(most, pull / ends_[i].errors[0] * (bodies_[d.body1].inverse_mass + bodies_[d.body2].inverse_mass));
   }
+  for (std::uint32_t i = 0; i < bodies_.count(); ++i)
+    most = std::max(most, Matrix3(turned_[i].inverse_inertia * stiffness_[i]).norm());
+  return most;
+}
+
+// stiffened_, by stiffness_.
+void SequentialSolver::stiffen(const stage::SolverSolveRequest& request) {
   stiffened_ = turned_;
   for (std::uint32_t i = 0; i < bodies_.count(); ++i) {
-    const Matrix3 share = turned_[i].inverse_inertia * stiffness_[i];
-    if (share.isZero(0.0)) continue;
-    most = std::max(most, share.norm());
+    if (!bodies_[i].is_pushed() || stiffness_[i].isZero(0.0)) continue;
     const Twist& change = solution_.displacement[i];
     stiffened_.set_inverse_inertia(
         i, stiffened_inverse(displaced(bodies_[i].trial, change.linear, change.angular).orientation,
                              vector_at(request.inverse_inertia(), i), stiffness_[i]));
   }
-  return most;
 }
 
 // A rod that pulls with mu resists to being turned: across it, with mu/length, as rows with that compliance, whose multipliers
@@ -255,9 +259,9 @@ void SequentialSolver::build_at_end(const stage::SolverSolveRequest& request, bo
 
 // Rows of contacts anew, of bodies with another inertia.
 void SequentialSolver::build_gaps(const SolverBodies& bodies, const stage::SolverSolveRequest& request) {
-  guess_of_contacts_.resize(closed_.size());
-  gaps_.store(guess_of_contacts_);
-  gaps_.build(bodies, request, settings_.correction_factor, guess_of_contacts_);
+  pressed_.resize(closed_.size());
+  gaps_.store(pressed_);
+  gaps_.build(bodies, request, settings_.correction_factor, pressed_);
 }
 
 // What acts on velocities alone keeps its moment while steps turn the inertia.

@@ -33,22 +33,21 @@ bool SequentialSolver::acts_on_velocity_alone() const {
 // without the offset: what rests, held by large forces that cancel, is found at once.
 void SequentialSolver::guess_pose(const stage::SolverSolveRequest& request, double factor) {
   pose_at_trial(request);
-  guess_of_joints_.assign(pose_laws_.size(), 0.0);
   for (std::size_t i = 0; i < pose_laws_.size(); ++i)
-    if (!velocity_laws_[i].is_velocity_only) guess_of_joints_[i] = factor * solution_.joint_impulse[i];
-  guess_of_contacts_.resize(closed_.size());
+    pushed_[i] = velocity_laws_[i].is_velocity_only ? 0.0 : factor * solution_.joint_impulse[i];
+  pressed_.resize(closed_.size());
   for (std::size_t i = 0; i < closed_.size(); ++i) {
     const Vector3 normal = vector_at(request.contact_normal(), i);
-    guess_of_contacts_[i] = factor * normal.dot(vector_at(solution_.contact_impulse, i));
+    pressed_[i] = factor * normal.dot(vector_at(solution_.contact_impulse, i));
   }
-  before_guess_.joints = pose_joints_;
-  before_guess_.gaps = gaps_;
+  before_step_.joints = pose_joints_;
+  before_step_.gaps = gaps_;
   const double error = error_of_pose();
-  pose_joints_.build(bodies_, discrepancies_, pose_laws_, guess_of_joints_);
-  gaps_.build(bodies_, request, settings_.correction_factor, guess_of_contacts_);
+  pose_joints_.build(bodies_, discrepancies_, pose_laws_, pushed_);
+  gaps_.build(bodies_, request, settings_.correction_factor, pressed_);
   if (error_of_pose() < error) return;
-  pose_joints_ = before_guess_.joints;
-  gaps_ = before_guess_.gaps;
+  pose_joints_ = before_step_.joints;
+  gaps_ = before_step_.gaps;
 }
 
 // What the multipliers there are leave of a row at S*, at most.
