@@ -130,7 +130,8 @@ class ConeProblem {
   double correct(const SolverBodies& bodies, const BodyMotion& x0, double smallest);
 
   // Gives rows that hold always and contradict each other the nearest targets that some motion meets (least squares of the
-  // scaled rows). Returns by how much they were off (m/s, m), 0 if by no more than `smallest` or rounding.
+  // scaled rows). Returns by how much they were off (m/s, m), 0 if by no more than `smallest` or rounding, or if they are so
+  // many that they are not looked at.
   double reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest);
 
   // x += M^-1 J^T lambda
@@ -162,9 +163,18 @@ class ConeProblem {
     std::vector<Eigen::Index> rows;  // in it, among other_; empty: there are none
   };
 
+  // Empty lists that keep their room.
+  template <typename List>
+  static void clear_lists(std::size_t count, std::vector<List>* lists) {
+    lists->resize(count);
+    for (List& list : *lists) list.clear();
+  }
+
   double value(const BodyMotion& x, std::uint32_t r) const;
   void classify(const SolverBodies& bodies, const BodyMotion& x0);
   void factorise(const SolverBodies& bodies);
+  // Puts the held rows in the order of elimination_order.h, where they are many; returns where their profiles begin.
+  std::vector<std::size_t> order_held(const SolverBodies& bodies);
   double size() const;
   // The side of the held rows; as reconcile().
   double make_consistent(double smallest);

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+
+#include "plugin_sdk/plugin.h"
 
 namespace gravitas {
 namespace {
@@ -28,6 +31,10 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
   first_ = first;
   begin_.assign(first.size() + 1, 0);
   for (std::size_t i = 0; i < first.size(); ++i) begin_[i + 1] = begin_[i] + (i - first[i] + 1);
+  constexpr std::size_t kMostEntries = std::size_t{2} << 27;
+  if (begin_.back() > kMostEntries)
+    throw Refusal(std::to_string(first.size()) + " rows of joints depend on each other so that their factors take " +
+                  std::to_string((begin_.back() * sizeof(double)) >> 30) + " GB; at most 2 GB are taken");
   values_.assign(begin_.back(), 0.0);
   pivot_.assign(first.size(), 0.0);
   dropped_.clear();

@@ -17,7 +17,8 @@ namespace gravitas {
 
 class ProfileLdlt {
  public:
-  // Starts a matrix of zeros; first[i] <= i is the first column of row i that may have an entry.
+  // Starts a matrix of zeros; first[i] <= i is the first column of row i that may have an entry. Throws Refusal where that
+  // is more than 2 GB.
   void start(const std::vector<std::size_t>& first);
   // Entry of the lower triangle, within the profile.
   double& entry(std::size_t row, std::size_t column) { return values_[begin_[row] + column - first_[row]]; }

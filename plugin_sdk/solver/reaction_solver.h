@@ -96,6 +96,7 @@ class ReactionSolver {
   void accelerate();
   std::uint32_t row_of(std::uint32_t body) const;
   void load_joints();
+  void order_joints();
   void load_springs();
   Spring spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
   static void add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two);

@@ -10,6 +10,7 @@
 
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver/elimination_order.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/reaction_solver.h"
@@ -147,6 +148,21 @@ void ReactionSolver::load_joints() {
       joints_.push_back(
           {3 * i, one, two, columns.at(i), is_only_point(request_->discrepancy_body(), request_->mode(), i)});
   }
+  order_joints();
+}
+
+// Of the whole scene, not of an island: pendulums whose first joints come before their second ones are many chains.
+void ReactionSolver::order_joints() {
+  constexpr std::size_t kFew = 32;
+  if (joints_.size() <= kFew) return;
+  std::vector<RowEnds> ends;
+  for (const Joint& joint : joints_) {
+    const auto end = [&](std::uint32_t body) { return bodies_[body].is_pushed() ? body : kNone; };
+    ends.emplace_back(end(joint.body1), end(joint.body2));
+  }
+  std::vector<Joint> ordered;
+  for (const std::uint32_t place : elimination_order(ends)) ordered.push_back(joints_[place]);
+  if (!ordered.empty()) joints_ = std::move(ordered);
 }
 
 void ReactionSolver::load_springs() {

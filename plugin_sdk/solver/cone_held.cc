@@ -1,0 +1,168 @@
+// Rows that hold always: their factors, what of them contradicts itself, and what rounding leaves of them.
+#include <algorithm>
+#include <cmath>
+
+#include "plugin_sdk/solver/cone_problem.h"
+#include "plugin_sdk/solver/elimination_order.h"
+
+namespace gravitas {
+namespace {
+
+// What is left of held rows is rounding where it is this many units of what their multipliers do.
+constexpr double kRefined = 4.0;
+
+}  // namespace
+
+std::vector<std::size_t> ConeProblem::order_held(const SolverBodies& bodies) {
+  constexpr std::size_t kFew = 96;
+  const auto ends_of = [&](std::uint32_t r) {
+    const auto end = [&](std::uint32_t body) { return bodies[body].is_pushed() ? body : kNone; };
+    return RowEnds(end(rows[r].body1), end(rows[r].body2));
+  };
+  if (held_.size() > kFew) {
+    std::vector<RowEnds> ends(held_.size());
+    std::ranges::transform(held_, ends.begin(), ends_of);
+    std::vector<std::uint32_t> ordered;
+    for (const std::uint32_t place : elimination_order(ends)) ordered.push_back(held_[place]);
+    if (!ordered.empty()) held_ = std::move(ordered);
+  }
+  clear_lists(bodies.count() + 1, &held_of_body_);
+  std::vector<std::size_t> first(held_.size());
+  for (std::uint32_t i = 0; i < held_.size(); ++i) {
+    first[i] = i;
+    const RowEnds ends = ends_of(held_[i]);
+    for (const std::uint32_t body : {ends.first, ends.second}) {
+      if (body == kNone) continue;
+      std::vector<std::uint32_t>& list = held_of_body_[body];
+      if (!list.empty()) first[i] = std::min<std::size_t>(first[i], list.front());
+      list.push_back(i);
+    }
+  }
+  return first;
+}
+
+// W_EE = L D L^T, and the side of the held rows.
+void ConeProblem::factorise(const SolverBodies& bodies) {
+  const std::vector<std::size_t> first = order_held(bodies);
+  side_.resize(held_.size());
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    side_[i] = (rows[held_[i]].law.lower_target - free_[held_[i]]) / scale_[held_[i]];
+  factor_.start(first);
+  for (std::uint32_t i = 0; i < held_.size(); ++i) {
+    for (std::size_t j = first[i]; j <= i; ++j) {
+      double entry = coupling(rows[held_[i]], rows[held_[j]], bodies);
+      if (i == j) entry += rows[held_[i]].law.gamma;
+      factor_.entry(i, j) = entry / (scale_[held_[i]] * scale_[held_[j]]);
+    }
+  }
+  factor_.factorise();
+}
+
+double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
+  constexpr double kMostEntries = 2e7;  // a second or two
+  classify(bodies, x0);
+  const std::vector<std::size_t> first = order_held(bodies);
+  double entries = 0.0;
+  for (std::size_t i = 0; i < first.size(); ++i) entries += static_cast<double>(i - first[i]);
+  if (entries > kMostEntries) return 0.0;
+  factorise(bodies);
+  const double contradiction = make_consistent(smallest);
+  for (std::size_t i = 0; i < held_.size() && contradiction > 0.0; ++i) {
+    JointLaw& law = rows[held_[i]].law;
+    law.lower_target = law.upper_target = free_[held_[i]] + scale_[held_[i]] * side_[i];
+  }
+  return contradiction;
+}
+
+double ConeProblem::make_consistent(double smallest) {
+  if (factor_.dropped() == 0) return 0.0;
+  double largest = 0.0;
+  for (const std::uint32_t r : held_) largest = std::max(largest, way_of(r));
+  const double distance = largest * factor_.make_consistent(&side_);
+  return distance > std::max(smallest, 1e-9 * size()) ? distance : 0.0;
+}
+
+// Held rows that depend on each other bear alike: of all multipliers that move alike the shortest ones, scaled. Not beside
+// drives: what these bear moves the bodies, what joints bear does not.
+void ConeProblem::share_out() {
+  const auto drives = [&](std::uint32_t r) { return rows[r].law.is_velocity_only; };
+  if (factor_.dropped() == 0 || std::ranges::any_of(held_, drives)) return;
+  std::vector<double> scaled(held_.size());
+  for (std::size_t i = 0; i < held_.size(); ++i) scaled[i] = rows[held_[i]].multiplier * scale_[held_[i]];
+  factor_.shorten(&scaled);
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier = scaled[i] / scale_[held_[i]];
+}
+
+void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
+                         const ConeSettings& settings, ConeSummary* summary) {
+  if (held_.empty()) return;
+  const double tolerance = std::max(smallest, settings.tolerance * size());
+  // what a row's own multiplier does to it is what rounding goes by
+  const auto summed = [&] {
+    double most = 0.0;
+    for (const std::uint32_t r : held_)
+      most = std::max(most, scale_[r] * scale_[r] * std::fabs(rows[r].multiplier) * rows[r].length);
+    return most;
+  };
+  // once for what rounding left of the answer: twice if that was much
+  double missing = 0.0;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    const double rounding = kRefined * kEpsilon * summed();
+    missing = refine_held(bodies, x0);
+    if (missing <= rounding) break;
+  }
+  summary->residual = std::max(summary->residual, missing);
+  summary->has_converged =
+      summary->has_converged && missing <= std::max(tolerance, 64.0 * kEpsilon * largest_held_sum());
+}
+
+// A row's value is summed from what all rows of its bodies push: a hinge's turn about a thin rod is, too, from what holds the
+// rod's end, whatever its own torque.
+double ConeProblem::largest_held_sum() const {
+  const auto pushed = [&](const std::vector<std::uint32_t>& list) {
+    double most = 0.0;
+    for (const std::uint32_t i : list) most = std::max(most, scale_[held_[i]] * std::fabs(rows[held_[i]].multiplier));
+    return most;
+  };
+  std::vector<double> of_body(held_of_body_.size());
+  std::ranges::transform(held_of_body_, of_body.begin(), pushed);
+  double most = 0.0;
+  for (const std::uint32_t r : held_)
+    most = std::max(most, way_of(r) * std::max(of_body[rows[r].body1], of_body[rows[r].body2]));
+  return most;
+}
+
+std::vector<double> ConeProblem::missing_of_held(const SolverBodies& bodies, const BodyMotion& x0) const {
+  BodyMotion x = x0;
+  push(bodies, &x);
+  std::vector<double> missing(held_.size());
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    const ConeRow& row = rows[held_[i]];
+    missing[i] = (row.law.lower_target - value(x, held_[i]) - row.law.gamma * row.multiplier) / scale_[held_[i]];
+  }
+  return missing;
+}
+
+void ConeProblem::add_to_held(std::vector<double>* missing) {
+  factor_.solve(missing);
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier += (*missing)[i] / scale_[held_[i]];
+}
+
+double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
+  std::vector<double> missing = missing_of_held(bodies, x0);
+  if (factor_.dropped() > 0) factor_.make_consistent(&missing);
+  double largest = 0.0;
+  for (std::size_t i = 0; i < held_.size(); ++i)
+    largest = std::max(largest, std::fabs(missing[i]) * scale_[held_[i]] * rows[held_[i]].length);
+  add_to_held(&missing);
+  return largest;
+}
+
+double ConeProblem::correct(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
+  side_ = missing_of_held(bodies, x0);
+  const double contradiction = make_consistent(smallest);
+  add_to_held(&side_);
+  return contradiction;
+}
+
+}  // namespace gravitas

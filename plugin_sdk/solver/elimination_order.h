@@ -1,0 +1,26 @@
+// In which order a profile factorisation (profile_ldlt.h) had best take rows that meet in bodies.
+//
+// A row's profile reaches back to the first row that shares a body with it, so that the order decides what is stored and
+// computed: a chain whose even links come before its odd ones costs the cube of its length, in a row the length. Two orders of
+// the bodies are tried, and each row taken where the later of its bodies comes:
+//   by level    from a body at the end of everything (Cuthill and McKee 1969): bands, as of chains and nets
+//   by branch   what hangs on a body before the body, the largest branch first: trees, at n log n entries
+// N rows that meet in one movable body depend on each other in any order.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gravitas {
+
+// Bodies of a row; kNone for one that nothing pushes.
+using RowEnds = std::pair<std::uint32_t, std::uint32_t>;
+
+// Places of the rows in the order found; empty where the given one costs little, or less than twice as much. Rows between
+// the same bodies that follow each other stay together.
+std::vector<std::uint32_t> elimination_order(std::span<const RowEnds> rows);
+
+}  // namespace gravitas
