@@ -73,8 +73,7 @@ class CommitListener {
   virtual void on_poison(const Environment&, const PoisonedCall&) {}
   // An inner step ends. With number 0 those before count no longer: the step has been begun again.
   virtual void on_inner_step(const Environment&, const InnerStep&) {}
-  // Called at the end of a step, when S_{n+1} is the committed state. What it throws comes out of step(); the commit
-  // stands.
+  // At the end of a step, when S_{n+1} is committed. What it throws comes out of step(); the commit stands.
   virtual void on_commit(const Environment& environment) = 0;
 };
 
@@ -177,6 +176,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
+  double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();

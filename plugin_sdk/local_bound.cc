@@ -13,11 +13,10 @@ void measure(const Vector3& half_extents, LocalBound* bound) {
 }
 
 double contact_margin(std::span<const LocalBound> bounds) {
-  constexpr double kMarginShare = 0.01;
   double smallest = std::numeric_limits<double>::infinity();
   for (const LocalBound& bound : bounds)
     if (bound.least_half_extent > 0.0) smallest = std::min(smallest, bound.least_half_extent);
-  return std::isinf(smallest) ? 0.0 : kMarginShare * smallest;
+  return std::isinf(smallest) ? 0.0 : kMarginOfHalfExtent * smallest;
 }
 
 Bounds bounds_of(const LocalBound& bound, const Pose& body) {

@@ -3,13 +3,12 @@
 // it are cut so that the last is short against the flight (the solver takes slow arrivals for rest).
 //
 //   Continuous   asks the collision slot for times of impact on the way from S_n to S*; event_location.h says where to
-//                stop. Pairs that touch at the start are the solver's: what they run into next is found at S* only.
+//                stop. Pairs that touch at the start are the solver's: what they run into next is found at S* (turns.cc).
 //   Bisection    (§ 1.4) halves trials until one ends just after a contact closes. It sees contacts at S* alone: what
 //                passes through within a trial is missed. Pairs that touch and do not fly up are the solver's, too.
 //
-// Both also end inner steps where surfaces stop sliding on each other (slides.cc), up to some number in a step.
-// A Zeno sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps: the rest
-// of the step is then made as Basic makes it.
+// Both also end inner steps where surfaces stop sliding on each other (slides.cc), up to some number in a step. A Zeno
+// sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps: the rest is Basic's.
 #include <algorithm>
 
 #include "kernel/environment.h"
@@ -55,6 +54,7 @@ void Environment::locate_events(double begin, double length) {
         begin_inner_step(begin + done, stop);
         trial = integrate();
       }
+      stop = shorten_turns(&trial, begin + done, stop, &has_found_contacts);
     }
     const double before = stop;
     const std::optional<Trusted<Solution>> solution =

@@ -167,9 +167,10 @@ class FilterBuilder {
     }
     if (bits.empty() && !kinds_.empty()) {
       diagnostics_.error(place_of(filter_.location()),
-                         "the CollisionFilter tells " + std::to_string(kinds_.size()) +
-                             " kinds of bodies apart, in a way that 64 bits cannot hold; allowed: fewer kinds, such as "
-                             "rules about groups instead of single bodies");
+                         "the CollisionFilter tells " + std::to_string(kinds_.size()) + " kinds of bodies apart, " +
+                             (kinds_.size() > kMostKinds ? "more than " + std::to_string(kMostKinds)
+                                                         : "in a way that 64 bits cannot hold") +
+                             "; allowed: fewer kinds, such as rules about groups instead of single bodies");
       return;
     }
     for (std::uint32_t i = 0; i < body_count_; ++i) {

@@ -240,6 +240,16 @@ TEST(BuildFilter, RefusesWhatItsBitsCannotHold) {
                                     "hold; allowed: fewer kinds")));
 }
 
+TEST(BuildFilter, SaysThatThereAreTooManyKinds) {
+  TestFilter filter;
+  for (int i = 0; i < 2100; ++i) filter.rules.push_back({TestRule::Kind::kBody, "B" + std::to_string(i), "", false});
+  for (int i = 0; i < 2100; ++i)
+    filter.rules.push_back(
+        {TestRule::Kind::kBodies, "B" + std::to_string(i), "B" + std::to_string((i + 1) % 2100), true});
+  EXPECT_THAT(build(scene_text(numbered_bodies(2101), filter.text())).errors(),
+              ElementsAre(HasSubstr("kinds of bodies apart, more than 2048; allowed: fewer kinds")));
+}
+
 // ---- mistakes
 
 std::vector<std::string> filter_errors_of(const std::string& rule) {
