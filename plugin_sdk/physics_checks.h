@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "plugin_sdk/math/types.h"
+#include "plugin_sdk/solver/bodies.h"
 #include "schemas/stage_frames.h"
 
 namespace gravitas {
@@ -126,7 +127,10 @@ class SolutionCheck {
   };
 
  private:
-  std::vector<Pushes> pushes_;  // scratch, a row per body
+  // scratch, a row per body, and per contact
+  std::vector<Pushes> pushes_;
+  SolverBodies bodies_;
+  std::vector<double> displacing_;
 };
 
 }  // namespace gravitas

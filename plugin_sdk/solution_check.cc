@@ -9,6 +9,7 @@
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/physics_checks.h"
 #include "plugin_sdk/solver.h"
+#include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/joint_laws.h"
 
 namespace gravitas {
@@ -60,8 +61,14 @@ enum class Directions : std::uint8_t { kOfTrial, kOfTrialAtOwn, kOfEnd };
 
 class Balance {
  public:
-  Balance(const stage::SolverSolveRequest& request, const SolutionColumns& answer, std::vector<Pushes>* pushes)
-      : request_(request), answer_(answer), bodies_(request.flags().size()), pushes_(*pushes) {}
+  // `displacing`: shares of friction's impulses that displace, by contact (contact_law.h).
+  Balance(const stage::SolverSolveRequest& request, const SolutionColumns& answer,
+          const std::vector<double>& displacing, std::vector<Pushes>* pushes)
+      : request_(request),
+        answer_(answer),
+        bodies_(request.flags().size()),
+        displacing_(displacing),
+        pushes_(*pushes) {}
 
   std::string check() {
     std::string wrong = check_bodies(Directions::kOfTrial);
@@ -154,8 +161,8 @@ class Balance {
   }
 
   void add_contacts() {
-    const double share = request_.theta() * request_.time_step();
     for (std::size_t i = 0; i < request_.contact_key().size(); ++i) {
+      const double share = displacing_[i] * request_.theta() * request_.time_step();
       const Vector3 impulse = vector_at(answer_.contact_impulse, i);
       const Vector3 direction = vector_at(answer_.contact_direction, i);
       const double along = direction.dot(impulse), correction = answer_.contact_correction[i];
@@ -488,6 +495,7 @@ class Balance {
   const stage::SolverSolveRequest& request_;
   const SolutionColumns& answer_;
   std::size_t bodies_;
+  const std::vector<double>& displacing_;
   std::vector<Pushes>& pushes_;
   bool is_driven_ = false;
   bool has_yielded_ = false;  // a drive, to what is in its way
@@ -496,7 +504,12 @@ class Balance {
 }  // namespace
 
 std::string SolutionCheck::check(const stage::SolverSolveRequest& request, const SolutionColumns& answer) {
-  return Balance(request, answer, &pushes_).check();
+  bodies_.load(request);
+  find_displacing_friction(
+      request, request.contact_key().size(), [](std::size_t k) { return k; },
+      [&](std::size_t i, std::size_t end) -> const SolverBody& { return bodies_[request.contact_body()[2 * i + end]]; },
+      &displacing_);
+  return Balance(request, answer, displacing_, &pushes_).check();
 }
 
 }  // namespace gravitas

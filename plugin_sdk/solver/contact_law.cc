@@ -40,7 +40,7 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
   const double speed = arrival_speed(start, trial, way, request.time_step());
   const double restitution = material[kRestitution];
   law.frame = frame_of(normal);
-  law.target = restitution * speed;
+  law.arrival = speed, law.target = restitution * speed;
 
   const double epsilon = material[kSurfacePerturbation];
   if (!(speed > 0.0) || !(epsilon > 0.0)) return law;
@@ -52,8 +52,27 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
   const bool keeps_signs = tilted_trial < 0.0 && (tilted_start < 0.0) == (start < 0.0);
   if (!keeps_signs || !(tilted_speed > 0.0) || !(tilted.dot(normal) > 0.0)) return law;
   law.frame = frame_of(tilted);
-  law.target = restitution * tilted_speed;
+  law.arrival = tilted_speed, law.target = restitution * tilted_speed;
   return law;
+}
+
+void DisplacingFriction::add(std::size_t contact) {
+  const ContactLaw law = contact_law(request_, contact, one_, two_);
+  const auto through = ConstraintDirection::through(vector_at(request_.contact_point(), contact),
+                                                    vector_at(request_.contact_normal(), contact), one_, two_);
+  has_pressed_ = has_pressed_ || !vector_at(request_.contact_warm_impulse(), contact).isZero(0.0);
+  arrival_ = std::max(arrival_, law.arrival);
+  overlap_ += std::max(0.0, request_.contact_depth()[contact]);
+  change_ += law.target + std::max(0.0, -through.along(one_.trial_velocity, two_.trial_velocity));
+}
+
+double DisplacingFriction::share() const {
+  const auto gained = [](const SolverBody& body) {
+    return (body.trial_velocity.linear - body.start_velocity.linear).norm();
+  };
+  if (has_pressed_ || !(arrival_ > std::max(gained(one_), gained(two_)))) return 1.0;
+  const double way = request_.theta() * request_.time_step() * change_;
+  return overlap_ < way ? overlap_ / way : 1.0;
 }
 
 bool SharedRestitution::goes_on(bool gains, double work) {

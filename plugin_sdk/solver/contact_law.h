@@ -1,8 +1,12 @@
 // What a contact's material row asks of its velocities: a frame, the speed at which it parts, and coefficients.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
+#include <vector>
 
+#include "plugin_sdk/solver.h"
 #include "plugin_sdk/solver/bodies.h"
 
 namespace gravitas {
@@ -12,7 +16,7 @@ namespace gravitas {
 // acts across it. A resting contact uses the true normal: a tilt that persists would roll a resting ball away for ever.
 struct ContactLaw {
   Matrix3 frame = Matrix3::Identity();  // columns: direction of the normal law and two tangents, world
-  double target = 0.0;                  // e s, m/s (arrival.h)
+  double arrival = 0.0, target = 0.0;   // s and e s, m/s (arrival.h)
   double static_friction = 0.0;         // never below the dynamic one
   double dynamic_friction = 0.0;
   double rolling_friction = 0.0, spinning_friction = 0.0;  // m
@@ -23,6 +27,41 @@ struct ContactLaw {
 // Of contact `i` of the request, between two bodies.
 ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, const SolverBody& one,
                        const SolverBody& two);
+
+// The share of friction's impulse that displaces two bodies in the pose change, of all their contacts. What arrives in this
+// step, faster than loads make it, is pressed for part of it alone, and rubs for that part: as far as its contacts overlap at
+// S*, beside how far what they change of the velocities goes in theta h. A box that keeps flat in its velocities, where
+// friction is balanced by where the ground presses, then does in its pose. 1 for all else, and where one of the contacts
+// pressed in the step before.
+class DisplacingFriction {
+ public:
+  DisplacingFriction(const stage::SolverSolveRequest& request, const SolverBody& one, const SolverBody& two)
+      : request_(request), one_(one), two_(two) {}
+  void add(std::size_t contact);
+  double share() const;
+
+ private:
+  const stage::SolverSolveRequest& request_;
+  const SolverBody &one_, &two_;
+  double overlap_ = 0.0, change_ = 0.0, arrival_ = 0.0;  // m, m/s, m/s
+  bool has_pressed_ = false;
+};
+
+// Those of `count` contacts of the request, contact(k) being its rows in turn, pair by pair; body(i, end) is the first or
+// second body of row i.
+template <typename ContactAt, typename BodyOf>
+void find_displacing_friction(const stage::SolverSolveRequest& request, std::size_t count, ContactAt&& contact,
+                              BodyOf&& body, std::vector<double>* shares) {
+  shares->clear();
+  while (shares->size() < count) {
+    const std::size_t first = contact(shares->size());
+    const auto pair_of = [&](std::size_t i) { return request.contact_body().subspan(2 * i, 2); };
+    DisplacingFriction friction(request, body(first, 0), body(first, 1));
+    std::size_t end = shares->size();
+    for (; end < count && std::ranges::equal(pair_of(contact(end)), pair_of(first)); ++end) friction.add(contact(end));
+    shares->resize(end, friction.share());
+  }
+}
 
 // Lowers e s of a contact whose impulse did work on its bodies to the speed at which they arrive where the step ends, if that
 // is little less. False if it stays.

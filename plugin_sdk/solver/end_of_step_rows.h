@@ -52,9 +52,10 @@ struct EndContact {
   Vector3 arm1, arm2;                 // to the surface points
   Vector3 turning = Vector3::Zero();  // impulses of rolling and spinning friction in the law's frame, N m s
   bool is_closed = false, slides = false;
-  double softness = 0.0;      // ConeRow's
-  double whole_target = 0.0;  // of which SharedRestitution takes a share
-  bool shares = false;        // it does
+  double displacing_friction = 1.0;  // contact_law.h
+  double softness = 0.0;             // ConeRow's
+  double whole_target = 0.0;         // of which SharedRestitution takes a share
+  bool shares = false;               // it does
 };
 
 // True for modes that hold an error, of an axis or of any of a discrepancy's.

@@ -130,6 +130,14 @@ void IslandSolver::load() {
   for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
   find_joined();
   for (const std::uint32_t row : island_.contacts) load_contact(row);
+  std::vector<double> displacing;
+  find_displacing_friction(
+      request_, contacts_.size(), [&](std::size_t k) { return contacts_[k].row; },
+      [&](std::size_t i, std::size_t end) -> const SolverBody& {
+        return bodies_[place_of(request_.contact_body()[2 * i + end])];
+      },
+      &displacing);
+  for (std::size_t k = 0; k < contacts_.size(); ++k) contacts_[k].displacing_friction = displacing[k];
 }
 
 std::uint32_t IslandSolver::place_of(std::uint32_t row) const {

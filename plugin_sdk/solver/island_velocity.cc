@@ -331,9 +331,13 @@ bool IslandSolver::set_offset(double share) {
     push(row, is_drive ? *driven : row.multiplier);
   });
   driven_ = next;
-  for (const ConeContact& contact : cone_.contacts)
+  std::size_t cone = 0;
+  for (const EndContact& closed : contacts_) {
+    if (!closed.is_closed) continue;
+    const ConeContact& contact = cone_.contacts[cone++];
     for (std::uint32_t k = 1; k < contact.count(); ++k)
-      push(cone_.rows[contact.first + k], cone_.rows[contact.first + k].multiplier);
+      push(cone_.rows[contact.first + k], closed.displacing_friction * cone_.rows[contact.first + k].multiplier);
+  }
   shorten(driven_, &next);
   const bool changes = is_change(next, offset_, 0.0);
   offset_ =

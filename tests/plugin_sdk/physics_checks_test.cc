@@ -361,6 +361,7 @@ struct Solution {
     request.f64(Request::kContactDepth) = {0.01};
     request.u64(Request::kContactKey) = {7};
     request.f64(Request::kContactMaterial) = {0.5, 0.5, 0.5, 0.05, 0.05, 0};
+    request.f64(Request::kContactWarmImpulse) = {0, 1, 0};
     solve(theta);
     close_joint();
   }

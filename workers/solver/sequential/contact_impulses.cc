@@ -120,13 +120,15 @@ void ContactImpulses::push_row(const Row& row, const SolverBodies& bodies, BodyM
   if (!rolling.impulse.isZero(0.0)) push_turning(row, rolling.impulse, bodies, x);
 }
 
-void ContactImpulses::push_friction(const SolverBodies& bodies, double factor, BodyMotion& x) const {
+void ContactImpulses::push_friction(const SolverBodies& bodies, double factor, const std::vector<double>& shares,
+                                    BodyMotion& x) const {
   for (const Row& row : rows_) {
-    const Vector3 tangent(0.0, factor * row.impulse.y(), factor * row.impulse.z());
+    const double part = factor * shares[row.contact];
+    const Vector3 tangent(0.0, part * row.impulse.y(), part * row.impulse.z());
     if (!tangent.isZero(0.0)) push(row, tangent, bodies, x);
     if (row.rolling < 0) continue;
     const Rolling& rolling = rolling_[static_cast<std::size_t>(row.rolling)];
-    if (!rolling.impulse.isZero(0.0)) push_turning(row, factor * rolling.impulse, bodies, x);
+    if (!rolling.impulse.isZero(0.0)) push_turning(row, part * rolling.impulse, bodies, x);
   }
 }
 

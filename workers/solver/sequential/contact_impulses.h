@@ -46,7 +46,8 @@ class ContactImpulses final : public RelaxationBlocks {
   bool is_empty() const { return rows_.empty(); }
   void push_all(const SolverBodies& bodies, BodyMotion& x) const;
   // The same for friction (all three kinds) alone, times `factor`.
-  void push_friction(const SolverBodies& bodies, double factor, BodyMotion& x) const;
+  // By contact of the request, times a share.
+  void push_friction(const SolverBodies& bodies, double factor, const std::vector<double>& shares, BodyMotion& x) const;
   bool has_friction_impulse() const;
 
   // Largest violation of a normal law by velocities x, and largest sum of the speeds that meet at a

@@ -10,6 +10,7 @@
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver.h"
 #include "plugin_sdk/solver/cone_problem.h"
+#include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/request_check.h"
@@ -221,6 +222,10 @@ void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
   offset_.assign(bodies_.count() + 1, Twist{});
   offset_moment_.assign(bodies_.count() + 1, Vector3::Zero());
   closed_.assign(request.contact_key().size(), 0);
+  find_displacing_friction(
+      request, closed_.size(), [](std::size_t k) { return k; },
+      [&](std::size_t i, std::size_t end) -> const SolverBody& { return bodies_[request.contact_body()[2 * i + end]]; },
+      &displacing_friction_);
   velocity_laws_.assign(pose_laws_.size(), JointLaw{});
   pushed_.resize(pose_laws_.size());
 }

@@ -258,6 +258,7 @@ class SequentialSolver {
   // by the pose change: by joints, and at contacts
   RelaxationJoints::Multipliers pushed_;
   std::vector<double> pressed_;
+  std::vector<double> displacing_friction_;  // by contact
   ContactGaps gaps_;
   ContactImpulses impulses_;
   bool pose_converged_ = true;

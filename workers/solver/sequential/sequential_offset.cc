@@ -72,7 +72,7 @@ void SequentialSolver::pose_at_trial(const stage::SolverSolveRequest& request) {
 void SequentialSolver::set_offset(const stage::SolverSolveRequest& request, double factor, bool with_friction) {
   std::fill(offset_.begin(), offset_.end(), Twist{});
   velocity_joints_.push_velocity_only(bodies_, factor, offset_);
-  if (with_friction) impulses_.push_friction(bodies_, factor, offset_);
+  if (with_friction) impulses_.push_friction(bodies_, factor, displacing_friction_, offset_);
   // turns by the inertia there, which is taken where the bodies end
   const auto inertia = [&](std::size_t i) {
     return world_inertia(bodies_[i].trial.orientation, moments_of(vector_at(request.inverse_inertia(), i)));
