@@ -24,11 +24,10 @@ struct LocalBound {
 // Sets what is told of a shape itself, from the half extents of its box.
 void measure(const Vector3& half_extents, LocalBound* bound);
 
-// The least gap up to which contacts are asked for, as a share of the smallest half extent of a scene.
+// The margin, of the smallest half extent of a scene: a contact that the reactions of a step close is then known to the solver.
 inline constexpr double kMarginOfHalfExtent = 0.01;
 
-// That gap: so that a contact which the reactions of a step close is known to the solver. m; 0 where all shapes are
-// unbounded.
+// The least gap up to which contacts are asked for, m; 0 where all shapes are unbounded.
 // Steps in which bodies move further ask for more (kernel/simulators/substepping.cc).
 double contact_margin(std::span<const LocalBound> bounds);
 

@@ -38,12 +38,9 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
   const double shortest = kShortestTurn * length_of_step(step_count_ + 1);
   if (!may_turn_far || length <= shortest) return length;
 
-  const auto find = [&] {
+  const auto is_too_deep = [&] {
     if (!*has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(*trial)));
     *has_found_contacts = true;
-  };
-  const auto is_too_deep = [&] {
-    find();
     for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
       const std::uint32_t one = data_.contact_body[2 * i], two = data_.contact_body[2 * i + 1];
       const LocalBound &first = model_.bound[one], &second = model_.bound[two];
@@ -61,10 +58,12 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
   };
   if (!is_too_deep()) return length;
   // what overlaps from the beginning has not turned there
-  double end = length;
-  const bool is_from_before = is_too_deep_at(shortest);
-  if (!is_from_before) end *= 0.5;
-  while (is_too_deep_at(end) && !is_from_before && end > shortest) end *= 0.5;
+  if (is_too_deep_at(shortest)) {
+    is_too_deep_at(length);
+    return length;
+  }
+  double end = 0.5 * length;
+  while (is_too_deep_at(end) && end > shortest) end *= 0.5;
   return end;
 }
 

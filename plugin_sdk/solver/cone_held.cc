@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "plugin_sdk/solver/cone_problem.h"
-#include "plugin_sdk/solver/elimination_order.h"
 
 namespace gravitas {
 namespace {
@@ -14,18 +13,11 @@ constexpr double kRefined = 4.0;
 }  // namespace
 
 std::vector<std::size_t> ConeProblem::order_held(const SolverBodies& bodies) {
-  constexpr std::size_t kFew = 96;
   const auto ends_of = [&](std::uint32_t r) {
     const auto end = [&](std::uint32_t body) { return bodies[body].is_pushed() ? body : kNone; };
     return RowEnds(end(rows[r].body1), end(rows[r].body2));
   };
-  if (held_.size() > kFew) {
-    std::vector<RowEnds> ends(held_.size());
-    std::ranges::transform(held_, ends.begin(), ends_of);
-    std::vector<std::uint32_t> ordered;
-    for (const std::uint32_t place : elimination_order(ends)) ordered.push_back(held_[place]);
-    if (!ordered.empty()) held_ = std::move(ordered);
-  }
+  elimination_.arrange(ends_of, &held_);
   clear_lists(bodies.count() + 1, &held_of_body_);
   std::vector<std::size_t> first(held_.size());
   for (std::uint32_t i = 0; i < held_.size(); ++i) {
@@ -42,8 +34,7 @@ std::vector<std::size_t> ConeProblem::order_held(const SolverBodies& bodies) {
 }
 
 // W_EE = L D L^T, and the side of the held rows.
-void ConeProblem::factorise(const SolverBodies& bodies) {
-  const std::vector<std::size_t> first = order_held(bodies);
+void ConeProblem::factorise(const SolverBodies& bodies, const std::vector<std::size_t>& first) {
   side_.resize(held_.size());
   for (std::size_t i = 0; i < held_.size(); ++i)
     side_[i] = (rows[held_[i]].law.lower_target - free_[held_[i]]) / scale_[held_[i]];
@@ -65,7 +56,7 @@ double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, 
   double entries = 0.0;
   for (std::size_t i = 0; i < first.size(); ++i) entries += static_cast<double>(i - first[i]);
   if (entries > kMostEntries) return 0.0;
-  factorise(bodies);
+  factorise(bodies, first);
   const double contradiction = make_consistent(smallest);
   for (std::size_t i = 0; i < held_.size() && contradiction > 0.0; ++i) {
     JointLaw& law = rows[held_[i]].law;

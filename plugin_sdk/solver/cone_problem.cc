@@ -232,7 +232,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     for (ConeRow& row : rows) row.multiplier = 0.0;
     return summary;
   }
-  factorise(bodies);
+  factorise(bodies, order_held(bodies));
   summary.contradiction = make_consistent(smallest);
   const double tolerance = std::max(smallest, settings.tolerance * size());
   lambda_.resize(static_cast<Eigen::Index>(other_.size()));

@@ -12,7 +12,7 @@
 // PROBLEMS' FCLIB measure.
 //
 // Method.
-//  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt, dependent rows
+//  1. The rows that hold always (equalities without bound) are eliminated: W_EE = L D L^T by ProfileLdlt in an order of its own, dependent rows
 //     left out, contradicting ones at their least-squares compromise; of the multipliers that move alike the shortest are told,
 //     so that four rods bear a plate alike. What the other rows then feel of each other is
 //     W' = W_OO - W_OE W_EE^-1 W_EO: a joint with its whole chain behind it is as good as a body.
@@ -51,6 +51,7 @@
 #include "plugin_sdk/math/dense_lu.h"
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/cone_path.h"
+#include "plugin_sdk/solver/elimination_order.h"
 #include "plugin_sdk/solver/held_step.h"
 #include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/profile_ldlt.h"
@@ -172,9 +173,9 @@ class ConeProblem {
 
   double value(const BodyMotion& x, std::uint32_t r) const;
   void classify(const SolverBodies& bodies, const BodyMotion& x0);
-  void factorise(const SolverBodies& bodies);
-  // Puts the held rows in the order of elimination_order.h, where they are many; returns where their profiles begin.
+  // Puts the held rows in the order of elimination_order.h; returns where their profiles begin.
   std::vector<std::size_t> order_held(const SolverBodies& bodies);
+  void factorise(const SolverBodies& bodies, const std::vector<std::size_t>& first);
   double size() const;
   // The side of the held rows; as reconcile().
   double make_consistent(double smallest);
@@ -233,6 +234,7 @@ class ConeProblem {
   std::vector<std::pair<double, double>> speeds_;  // |v|, |w| by body
   double motion_ = 0.0;                            // largest sum of what meets in a row, m/s
 
+  EliminationOrder elimination_;
   ProfileLdlt factor_;
   std::vector<std::vector<std::uint32_t>> held_of_body_;                // places among held_
   std::vector<std::vector<std::uint32_t>> others_of_body_;              // places among other_

@@ -57,10 +57,11 @@ ContactLaw contact_law(const stage::SolverSolveRequest& request, std::size_t i, 
 }
 
 void DisplacingFriction::add(std::size_t contact) {
+  has_pressed_ = has_pressed_ || !vector_at(request_.contact_warm_impulse(), contact).isZero(0.0);
+  if (has_pressed_) return;
   const ContactLaw law = contact_law(request_, contact, one_, two_);
   const auto through = ConstraintDirection::through(vector_at(request_.contact_point(), contact),
                                                     vector_at(request_.contact_normal(), contact), one_, two_);
-  has_pressed_ = has_pressed_ || !vector_at(request_.contact_warm_impulse(), contact).isZero(0.0);
   arrival_ = std::max(arrival_, law.arrival);
   overlap_ += std::max(0.0, request_.contact_depth()[contact]);
   change_ += law.target + std::max(0.0, -through.along(one_.trial_velocity, two_.trial_velocity));

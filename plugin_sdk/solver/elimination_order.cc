@@ -74,10 +74,9 @@ class BodyGraph {
     std::vector<bool> is_known(count(), false);
     for (std::uint32_t body = 0; body < count(); ++body) {
       if (is_known[body]) continue;
-      std::vector<bool> is_reached = is_known;
       std::uint32_t end = body;
       for (int repeat = 0; repeat < 2; ++repeat) {
-        std::vector<bool> seen = is_reached;
+        std::vector<bool> seen = is_known;
         end = reach(end, &seen).back();
       }
       const std::vector<std::uint32_t> part = reach(end, &is_known);
@@ -177,8 +176,10 @@ class BodyGraph {
 }  // namespace
 
 std::vector<std::uint32_t> elimination_order(std::span<const RowEnds> rows) {
+  constexpr std::size_t kFew = 32;
   constexpr double kLittle = 1000.0;  // for a row
   constexpr double kWorth = 0.5;
+  if (rows.size() <= kFew) return {};
   BodyGraph graph(rows);
   const double given = graph.work(graph.given());
   if (given <= kLittle * static_cast<double>(rows.size())) return {};

@@ -23,4 +23,23 @@ using RowEnds = std::pair<std::uint32_t, std::uint32_t>;
 // the same bodies that follow each other stay together.
 std::vector<std::uint32_t> elimination_order(std::span<const RowEnds> rows);
 
+// Puts rows in that order, which it remembers as long as the same bodies meet.
+class EliminationOrder {
+ public:
+  template <typename Row, typename EndsOf>
+  void arrange(EndsOf&& ends_of, std::vector<Row>* rows) {
+    ends_.clear();
+    for (const Row& row : *rows) ends_.push_back(ends_of(row));
+    if (ends_ != known_) order_ = elimination_order(ends_), known_ = ends_;
+    if (order_.empty()) return;
+    std::vector<Row> arranged;
+    for (const std::uint32_t place : order_) arranged.push_back((*rows)[place]);
+    *rows = std::move(arranged);
+  }
+
+ private:
+  std::vector<RowEnds> ends_, known_;
+  std::vector<std::uint32_t> order_;  // of known_
+};
+
 }  // namespace gravitas

@@ -9,6 +9,7 @@
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver/bodies.h"
+#include "plugin_sdk/solver/elimination_order.h"
 #include "plugin_sdk/solver/profile_ldlt.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
@@ -96,7 +97,6 @@ class ReactionSolver {
   void accelerate();
   std::uint32_t row_of(std::uint32_t body) const;
   void load_joints();
-  void order_joints();
   void load_springs();
   Spring spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
   static void add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two);
@@ -171,6 +171,7 @@ class ReactionSolver {
   std::vector<Row> rows_;
   std::vector<Spring> springs_;
   std::vector<Wrench> sprung_;  // of the springs, by body
+  EliminationOrder elimination_;
   ProfileLdlt factor_;
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;

@@ -10,7 +10,6 @@
 
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/math/rotation.h"
-#include "plugin_sdk/solver/elimination_order.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/reaction_solver.h"
@@ -148,21 +147,12 @@ void ReactionSolver::load_joints() {
       joints_.push_back(
           {3 * i, one, two, columns.at(i), is_only_point(request_->discrepancy_body(), request_->mode(), i)});
   }
-  order_joints();
-}
-
-// Of the whole scene, not of an island: pendulums whose first joints come before their second ones are many chains.
-void ReactionSolver::order_joints() {
-  constexpr std::size_t kFew = 32;
-  if (joints_.size() <= kFew) return;
-  std::vector<RowEnds> ends;
-  for (const Joint& joint : joints_) {
+  // of the whole scene, not of an island: pendulums whose first joints come before their second ones are many chains
+  const auto ends_of = [&](const Joint& joint) {
     const auto end = [&](std::uint32_t body) { return bodies_[body].is_pushed() ? body : kNone; };
-    ends.emplace_back(end(joint.body1), end(joint.body2));
-  }
-  std::vector<Joint> ordered;
-  for (const std::uint32_t place : elimination_order(ends)) ordered.push_back(joints_[place]);
-  if (!ordered.empty()) joints_ = std::move(ordered);
+    return RowEnds(end(joint.body1), end(joint.body2));
+  };
+  elimination_.arrange(ends_of, &joints_);
 }
 
 void ReactionSolver::load_springs() {

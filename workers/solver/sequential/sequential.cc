@@ -190,6 +190,10 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
   shifted_pose_ = shifted_velocity_ = 0.0;
   trial_velocity_.clear();
   for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);
+  find_displacing_friction(
+      request, request.contact_key().size(), [](std::size_t k) { return k; },
+      [&](std::size_t i, std::size_t end) -> const SolverBody& { return bodies_[request.contact_body()[2 * i + end]]; },
+      &displacing_friction_);
 }
 
 JointLaw SequentialSolver::pose_law_of(const RelaxationDiscrepancy& d, std::size_t axis, double theta) const {
@@ -222,10 +226,6 @@ void SequentialSolver::begin(const stage::SolverSolveRequest& request) {
   offset_.assign(bodies_.count() + 1, Twist{});
   offset_moment_.assign(bodies_.count() + 1, Vector3::Zero());
   closed_.assign(request.contact_key().size(), 0);
-  find_displacing_friction(
-      request, closed_.size(), [](std::size_t k) { return k; },
-      [&](std::size_t i, std::size_t end) -> const SolverBody& { return bodies_[request.contact_body()[2 * i + end]]; },
-      &displacing_friction_);
   velocity_laws_.assign(pose_laws_.size(), JointLaw{});
   pushed_.resize(pose_laws_.size());
 }
