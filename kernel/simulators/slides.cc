@@ -107,9 +107,10 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
               .norm();
       const double slip = slide.start_speed();
       const bool rolls = slip < speed && arrival <= kOfGain * gained && slip * speed <= arrival * arrival;
+      const bool impacts = arrival > kOfGain * gained;  // whose friction stops a slide at once
       for (const Slide& one : {rolls ? Slide() : slide, roll, spin}) {
         // what is slower has stopped
-        if (!(one.start_speed() * trial_length > shortest * gained)) continue;
+        if (impacts || !(one.start_speed() * trial_length > shortest * gained)) continue;
         const double end = one.end(trial_length);
         if (one.has_stuck() && !(end > shortest && end <= (1.0 + kSlideShare) * trial_length)) return 0.0;
         if (end > shortest) first = std::min(first, end);

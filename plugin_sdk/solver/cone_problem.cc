@@ -19,8 +19,13 @@ bool will_do(double residual, double rate, double enough, std::uint32_t times) {
 
 }  // namespace
 
-void ConeProblem::start() {
+void ConeProblem::start(const Host* host) {
+  host_ = host;
   for (HeldFactors& factors : held_factors_) factors.rows.clear();
+}
+
+void ConeProblem::mark_progress() const {
+  if (host_ != nullptr) host_->mark_progress();
 }
 
 double ConeProblem::value(const BodyMotion& x, std::uint32_t r) const {
@@ -284,9 +289,22 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   constexpr std::uint32_t kLeastTrial = 64;
   // with more rows the least forces are not looked for after Newton's steps: in heaps other rows hold there nearly always
   constexpr Eigen::Index kSettledRows = 96;
+  constexpr std::uint32_t kStepsOfSweeps = 12;
+  constexpr Eigen::Index kSweepsOfRow = 5, kLooks = 8;
+  constexpr double kGrowth = 100.0;  // the best is kept
   const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
   // where sweeps will not, steps take over; of large problems down to a fifth, so that what has no end takes a second or two
   constexpr double kRowsOfAll = 368.0, kLeastShare = 0.2;
+  // With friction of many rows sweeps come nearer than guesses, in less time: they come first, then in turn; of more than
+  // kRowsOfAll alone.
+  constexpr double kGuessedRows = 96.0;
+  const bool any_friction =
+      std::ranges::any_of(contacts, [](const ConeContact& c) { return c.has_friction || c.has_turning; });
+  const auto count = static_cast<double>(any_friction ? other_.size() : 0);
+  const bool only_sweeps = count > kRowsOfAll;
+  const auto are_swept = [&](std::uint32_t guess) {
+    return only_sweeps || (count > kGuessedRows ? guess % 2 == 0 : guess % 3 == 2);
+  };
   const double fewer = kRowsOfAll / static_cast<double>(lambda_.size());
   const double share = std::clamp(fewer * fewer * fewer, kLeastShare, 1.0);
   const auto affordable = [&](std::uint32_t steps) { return static_cast<std::uint32_t>(std::ceil(share * steps)); };
@@ -306,8 +324,14 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       if (residual < best) best = residual, best_lambda = lambda, best_y = y;
       return residual;
     };
+    const Eigen::VectorXd first_guess = lambda;
     ConePath guesses = path();
-    Eigen::VectorXd swept = lambda, start = lambda;
+    Eigen::VectorXd start = lambda;
+    Sweeps swept{kGrowth};
+    const auto start_sweeps = [&] {
+      begin_sweeps();
+      swept.start(lambda, y);
+    };
     int without = 0;
     bool holds = true;  // of kGaussSeidel: nothing has slid yet
     double attempt = best;
@@ -317,7 +341,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     double swept_to = best;
     const auto start_newton = [&] {
       is_newton = true;
-      lambda = swept = start = best_lambda, y = best_y;
+      lambda = start = best_lambda, y = best_y;
       attempt = best;
       summary->iterations += done;
       most_steps = affordable(ConeSettings{}.iterations);
@@ -337,27 +361,40 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       if (takes_step()) {
         ++done, ++without;
       } else if (!is_newton) {
-        if (holds) lambda = best_lambda, y = best_y, holds = false, swept_to = best;
+        if (holds) {
+          lambda = best_lambda, y = best_y, holds = false, swept_to = best;
+          start_sweeps();
+        }
         ++done, ++sweeps;
-        sweep(&lambda, &y);
+        sweep(&swept);
+        lambda = swept.lambda, y = swept.y;
       } else {
         if (best < 0.5 * found) {
           found = best, idle = 0;
-        } else if (++idle >= kIdleGuesses && best <= kNearly * enough) {
+        } else if (++idle >= kIdleGuesses && (only_sweeps || best <= kNearly * enough)) {
           break;
         }
-        lambda = start, y = start_others_ + response_ * lambda;
-        done += descend(enough, &lambda, &y);
-        if (keep_better() <= enough) break;
-        if (++guess % 3 != 0) {
+        const bool sweeps_on = are_swept(guess++);
+        mark_progress();
+        if (!sweeps_on || count <= kGuessedRows) {
+          lambda = start, y = start_others_ + response_ * lambda;
+          done += descend(enough, &lambda, &y);
+          if (keep_better() <= enough) break;
+        }
+        if (!sweeps_on) {
           done += guesses.next(enough / most, &lambda, &y);
         } else {
-          // sweeps go on from the first guess, some twelve steps' cost the first time, then more
-          const std::uint32_t rounds = 4 * (guess / 3);
-          lambda = swept, y = start_others_ + response_ * lambda;
-          for (Eigen::Index i = 0; i < rounds * lambda.size(); ++i) sweep(&lambda, &y);
-          swept = lambda;
-          done += 3 * rounds;
+          // they go on from the first guess; some twelve steps' cost
+          if (swept.lambda.size() == 0) {
+            lambda = first_guess, y = start_others_ + response_ * lambda;
+            start_sweeps();
+          }
+          done += kStepsOfSweeps;
+          for (Eigen::Index i = 0; i < kSweepsOfRow * swept.lambda.size() && best > enough; ++i) {
+            sweep(&swept);
+            if (i % kLooks == 0) lambda = swept.lambda, y = swept.y, keep_better();
+          }
+          lambda = best_lambda, y = start_others_ + response_ * best_lambda;
         }
         without = 0;
         attempt = std::numeric_limits<double>::infinity();
@@ -408,37 +445,57 @@ double ConeProblem::largest_sum(const Eigen::VectorXd& lambda) const {
 // Held rows and the others in turn.
 void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings,
                               double tolerance, ConeSummary* summary) {
-  std::vector<Eigen::MatrixXd> own(blocks_.size());
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    const Block& block = blocks_[b];
-    own[b].resize(block.count, block.count);
+  own_.clear();
+  for (const Block& block : blocks_) {
+    Eigen::MatrixXd own(block.count, block.count);
     for (std::uint32_t i = 0; i < block.count; ++i) {
       for (std::uint32_t j = 0; j < block.count; ++j) {
         const std::uint32_t r = other_[block.first + i], s = other_[block.first + j];
         const double gamma = i == j ? rows[r].law.gamma : 0.0;
-        own[b](i, j) = (coupling(rows[r], rows[s], bodies) + gamma) / (scale_[r] * scale_[s]);
+        own(i, j) = (coupling(rows[r], rows[s], bodies) + gamma) / (scale_[r] * scale_[s]);
       }
     }
+    own_.emplace_back(own);
   }
   set_multipliers();
-  Eigen::VectorXd y(lambda_.size());
+  Eigen::VectorXd y(lambda_.size()), best = lambda_;
   BodyMotion x;
+  constexpr double kGrowth = 10.0;
+  Sweeps swept{kGrowth};
   summary->has_converged = false;
+  summary->residual = std::numeric_limits<double>::infinity();
   const std::uint32_t sweeps = 10 * settings.iterations;
-  bool may_slide = true;
+  constexpr std::uint32_t kMarks = 64;
+  constexpr std::uint32_t kIdleSweeps = 1000;  // that have not halved the residual
+  double halved = std::numeric_limits<double>::infinity();
+  std::uint32_t last_halved = 0;
   for (std::uint32_t done = 0; done < sweeps; ++done) {
-    ++summary->iterations;
+    if (summary->iterations++ % kMarks == 0) mark_progress();
     if (!held_.empty()) refine_held(bodies, x0);
     x = x0;
     push(bodies, &x);
     find_values(x, &y);
-    summary->residual = residual_of(lambda_, y);
-    summary->has_converged = summary->residual <= tolerance;
-    if (may_slide && (summary->has_converged || done == sweeps / 2)) {
-      may_slide = false;
-      if (let_slide(lambda_, y, kSlip * std::max(summary->residual, tolerance))) continue;
+    const double residual = residual_of(lambda_, y);
+    if (residual < 0.5 * halved) halved = residual, last_halved = done;
+    if (residual < summary->residual) summary->residual = residual, best = lambda_;
+    summary->has_converged = residual <= tolerance;
+    const bool ends = summary->has_converged || done - last_halved == kIdleSweeps;
+    if ((ends || done == sweeps / 2) && let_slide(lambda_, y, kSlip * std::max(residual, tolerance))) {
+      summary->residual = halved = std::numeric_limits<double>::infinity();
+      swept.acceleration.forget();
+      continue;
     }
-    if (summary->has_converged) break;
+    if (ends) break;
+    swept.lambda = lambda_;
+    if (done > 0) swept.acceleration.note(swept, residual);
+    swept.acceleration.go_ahead(&swept);
+    if (swept.lambda != lambda_) {
+      lambda_ = swept.lambda;
+      set_multipliers();
+      if (!held_.empty()) refine_held(bodies, x0);
+      x = x0;
+      push(bodies, &x);
+    }
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       const Block& block = blocks_[b];
       double at[6];
@@ -446,7 +503,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
         const std::uint32_t r = other_[block.first + k];
         at[k] = (value(x, r) + rows[r].law.gamma * rows[r].multiplier) / scale_[r];
       }
-      relax(block, own[b], &lambda_[block.first], at);
+      relax(block, own_[b], &lambda_[block.first], at);
       for (std::uint32_t k = 0; k < block.count; ++k) {
         ConeRow& row = rows[other_[block.first + k]];
         const double now = lambda_[block.first + k] / scale_[other_[block.first + k]];
@@ -456,6 +513,7 @@ void ConeProblem::solve_large(const SolverBodies& bodies, const BodyMotion& x0, 
       }
     }
   }
+  lambda_ = best;
   into_cones(&lambda_);
 }
 

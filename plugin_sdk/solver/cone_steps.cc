@@ -1,10 +1,9 @@
-// The laws of ConeProblem: projections, the linear equations of a Newton step, and a sweep.
+// The laws of ConeProblem: projections, and the linear equations of a Newton step.
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "plugin_sdk/solver/cone_problem.h"
-#include "plugin_sdk/solver/coulomb_contact.h"
 
 namespace gravitas {
 namespace {
@@ -13,15 +12,14 @@ using Vector2 = Eigen::Vector2d;
 
 double length_of(double a, double b) { return std::sqrt(a * a + b * b); }
 
-// Shortens a vector of two to a radius.
-void into_disc(double radius, double* v) {
+}  // namespace
+
+void ConeProblem::into_disc(double radius, double* v) {
   const double length = length_of(v[0], v[1]);
   if (length <= radius) return;
   const double share = length > 0.0 ? radius / length : 0.0;
   v[0] *= share, v[1] *= share;
 }
-
-}  // namespace
 
 JointLaw ConeProblem::scaled_law(std::uint32_t row) const {
   JointLaw law = rows[row].law;
@@ -313,57 +311,6 @@ ConePath ConeProblem::path() const {
     path.add_disc(i + bounds.turning + 1, 2, i, bounds.rolling);
   }
   return path;
-}
-
-// The law of a block alone, with all others as they are.
-void ConeProblem::relax(const Block& block, const Eigen::MatrixXd& own, double* lambda, const double* y) const {
-  if (!(own(0, 0) > 0.0)) return;
-  if (block.contact < 0) {
-    lambda[0] = relaxed_multiplier(block.law, lambda[0], y[0], own(0, 0));
-    return;
-  }
-  const double target = block.target;
-  const Bounds bounds = bounds_of(block);
-  if (bounds.turning != 1 && block.count > 1) {
-    const Matrix3 response = 0.5 * (own.topLeftCorner<3, 3>() + own.topLeftCorner<3, 3>().transpose());
-    const Vector3 now(lambda[0], lambda[1], lambda[2]);
-    const Vector3 alone = Vector3(y[0], y[1], y[2]) - response * now;
-    Vector3 next = now;
-    const double size = response.trace();
-    const bool has_inverse = response.determinant() > 1e-12 * size * size * size;
-    if (!has_inverse || !solve_coulomb_contact(response, response.inverse(), alone, target, bounds.friction, &next)) {
-      next.x() = std::max(0.0, now.x() + (target - y[0]) / response(0, 0));
-      const Vector3 moved = Vector3(y[0], y[1], y[2]) + response.col(0) * (next.x() - now.x());
-      const double stiffest = response.bottomRightCorner<2, 2>().trace();
-      if (stiffest > 0.0) next.tail<2>() -= moved.tail<2>() / stiffest;
-      into_disc(bounds.friction * next.x(), &next.y());
-    }
-    for (int i = 0; i < 3; ++i) lambda[i] = next[i];
-  } else {
-    lambda[0] = std::max(0.0, lambda[0] + (target - y[0]) / own(0, 0));
-  }
-  if (bounds.turning == 0) return;
-  const std::uint32_t k = bounds.turning;
-  if (own(k, k) > 0.0) lambda[k] -= y[k] / own(k, k);
-  const double stiffest = own(k + 1, k + 1) + own(k + 2, k + 2);
-  if (stiffest > 0.0) {
-    lambda[k + 1] -= y[k + 1] / stiffest;
-    lambda[k + 2] -= y[k + 2] / stiffest;
-  }
-  confine_turning(bounds, lambda[0], lambda + k);
-}
-
-void ConeProblem::sweep(Eigen::VectorXd* lambda, Eigen::VectorXd* y) const {
-  for (const Block& block : blocks_) {
-    const auto i = static_cast<Eigen::Index>(block.first);
-    double before[6];
-    std::copy_n(&(*lambda)[i], block.count, before);
-    relax(block, response_.block(i, i, block.count, block.count), &(*lambda)[i], &(*y)[i]);
-    for (std::uint32_t k = 0; k < block.count; ++k) {
-      const double change = (*lambda)[i + k] - before[k];
-      if (change != 0.0) *y += change * response_.col(i + k);
-    }
-  }
 }
 
 bool ConeProblem::let_slide(const Eigen::VectorXd& lambda, const Eigen::VectorXd& y, double slip) {

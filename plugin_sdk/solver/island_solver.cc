@@ -26,7 +26,7 @@ IslandSolver::IslandSolver(const stage::SolverSolveRequest& request, const Solve
 
 ConeSummary IslandSolver::solve(Host& host) {
   load();
-  cone_.start();
+  cone_.start(&host);
   const double share = request_.theta() * request_.time_step();
   guess_offset(share);
   int failures = 0;

@@ -247,6 +247,7 @@ class BoxPair {
       if (!add_tilted_face(prefers_b, face, edges) && !add_edges(edges)) add_closest(edges.normal);
       return;
     }
+    if (add_between(of_a, of_b)) return;
     // As long as its patch is about as deep as the preferred face, a vertex deeper still lies beside it, in touch with
     // nothing. Else the shallowest axis decides.
     if (add_face(prefers_b, face, shortfall)) return;
@@ -319,6 +320,24 @@ class BoxPair {
       place(placement_.R_WA, Vector3::Zero(), out_);
     }
     return true;
+  }
+
+  // Of two faces that are equally shallow because an edge or a corner of one box meets that of the other any direction between
+  // would do: the one in the middle, so that what is symmetric stays so. False if one is shallower, or if they lie on each other.
+  bool add_between(const FaceAxis& of_a, const FaceAxis& of_b) {
+    const double tie = tie_length(pair_);
+    const Vector3 normal_a = sign_a(of_a.axis) * Vector3::Unit(of_a.axis);
+    const Vector3 sum = normal_a + sign_b(of_b.axis) * pair_.R_AB.col(of_b.axis);
+    const double length = sum.norm();  // twice the cosine of half their angle
+    if (std::fabs(of_a.depth - of_b.depth) > tie || !(length > 0.0)) return false;
+    const Vector3 normal = sum / length;
+    const double cosine = normal.dot(normal_a), depth = pair_.depth_along(normal);
+    // between the two the same points are the deepest: h is linear there
+    if (2.0 * cosine * cosine - 1.0 > kNearlyFlat || std::fabs(depth * cosine - of_a.depth) > tie) return false;
+    if (depth < -margin_) return true;
+    candidates_.clear();
+    add_patch_contacts(pair_, {normal, depth, AxisKind::kFree, -1}, &candidates_);
+    return keep_patch(false, depth - tie);
   }
 
   // Boxes that are apart, by their closest points; along `otherwise` where these are nearer than rounding knows.

@@ -39,7 +39,8 @@ class Sequential final : public SolverPlugin {
             .means("How a sweep goes: joints, then contacts, by their bodies; the largest error "
                    "first, kept up to date (what few sweeps leave does not go by how bodies are "
                    "numbered); or all from the velocities that the sweep began with "
-                   "(what is symmetric stays so in every sweep; takes several times as many)."),
+                   "(what is symmetric stays so in every sweep, but for contacts of one pair, which go in "
+                   "turn where they slide; takes several times as many)."),
         Property::number("RelaxationFactor", "1")
             .above(0.0)
             .at_most(kLargestFactor)

@@ -7,6 +7,37 @@ namespace {
 
 constexpr std::size_t kMostNeighbours = 64;
 
+// Multipliers, then x.
+class SweptBlocks final : public SweptState {
+ public:
+  SweptBlocks(const std::array<RelaxationBlocks*, 2>& parts, BodyMotion* x) : parts_(parts), x_(*x) {}
+
+  void read(std::vector<double>* state) const override {
+    state->clear();
+    for (const RelaxationBlocks* part : parts_) part->append_multipliers(state);
+    for (const Twist& twist : x_) {
+      state->insert(state->end(), twist.linear.begin(), twist.linear.end());
+      state->insert(state->end(), twist.angular.begin(), twist.angular.end());
+    }
+  }
+  void read_responses(std::vector<double>* responses) const override {
+    responses->clear();
+    for (const RelaxationBlocks* part : parts_) part->append_responses(responses);
+  }
+  void write(const std::vector<double>& state) override {
+    const double* from = state.data();
+    for (RelaxationBlocks* part : parts_) from = part->take_multipliers(from);
+    for (Twist& twist : x_) {
+      twist.linear = Vector3::Map(from), twist.angular = Vector3::Map(from + 3);
+      from += 6;
+    }
+  }
+
+ private:
+  const std::array<RelaxationBlocks*, 2>& parts_;
+  BodyMotion& x_;
+};
+
 }  // namespace
 
 void RelaxationSweep::begin(const SolverBodies& bodies, std::array<RelaxationBlocks*, 2> parts) {
@@ -27,9 +58,10 @@ void RelaxationSweep::begin(const SolverBodies& bodies, std::array<RelaxationBlo
 
 double RelaxationSweep::sweep(const SolverBodies& bodies, BodyMotion& x) {
   if (!is_accelerated_ || factor_ != 1.0) return sweep_once(bodies, x);
-  acceleration_.go_ahead(parts_, x);
+  SweptBlocks swept(parts_, &x);
+  acceleration_.go_ahead(&swept);
   const double change = sweep_once(bodies, x);
-  acceleration_.note(parts_, x, change);
+  acceleration_.note(swept, change);
   return change;
 }
 

@@ -1,6 +1,6 @@
 // Nesterov acceleration of the sweeps: what takes plain relaxation n^2 of them takes some n.
 //
-// With z_k the multipliers (and x, which is linear in them) after sweep k, a sweep starts from where they are going,
+// With z_k the multipliers (and what is linear in them) after sweep k, a sweep starts from where they are going,
 //
 //   y_k = z_k + (t_k - 1)/t_{k+1} (z_k - z_{k-1}),   t_{k+1} = (1 + sqrt(1 + 4 t_k^2))/2,   z_{k+1} = sweep(y_k)
 //
@@ -8,7 +8,7 @@
 // as the energy that it is, times its response. What sweeps end with has been relaxed and projected like any other, so they
 // end at the same place; only the way is another.
 //
-// The first kPlain sweeps are plain: most of what touches is done by then. Where a sweep changes kGrowth times what one did
+// The first kPlain sweeps are plain: most of what touches is done by then. Where a sweep changes `growth` times what one did
 // since, twice as many follow as before: sliding friction is no gradient, and of thousands of contacts on one body the
 // multipliers may be anything, on which acceleration swings without end.
 //
@@ -17,35 +17,45 @@
 // of sweeps.
 #pragma once
 
-#include <array>
 #include <vector>
-
-#include "workers/solver/sequential/relaxation_blocks.h"
 
 namespace gravitas {
 
+// What is swept: multipliers, then what is linear in them.
+class SweptState {
+ public:
+  virtual ~SweptState() = default;
+
+  virtual void read(std::vector<double>* state) const = 0;
+  // What a law's value changes by with one of each multiplier.
+  virtual void read_responses(std::vector<double>* responses) const = 0;
+  virtual void write(const std::vector<double>& state) = 0;
+
+ protected:
+  SweptState() = default;
+  SweptState(const SweptState&) = default;
+  SweptState& operator=(const SweptState&) = default;
+};
+
 class NesterovAcceleration {
  public:
-  using Parts = std::array<RelaxationBlocks*, 2>;
-
+  explicit NesterovAcceleration(double growth = 10.0) : growth_(growth) {}
   // What was swept before says nothing about what comes.
   void forget() { sweeps_ = 0, plain_ = kPlain; }
-  // Before a sweep: multipliers and x go on to y_k.
-  void go_ahead(const Parts& parts, BodyMotion& x);
+  // Before a sweep: the state goes on to y_k.
+  void go_ahead(SweptState* swept);
   // After it; `change`: of the sweep, m or m/s.
-  void note(const Parts& parts, const BodyMotion& x, double change);
+  void note(const SweptState& swept, double change);
 
  private:
   static constexpr int kPlain = 8;
-  static constexpr double kGrowth = 10.0;
-
-  void read(const Parts& parts, const BodyMotion& x, std::vector<double>* state) const;
+  const double growth_;
 
   int sweeps_ = 0, plain_ = kPlain;
   double t_ = 1.0;
   double least_ = 0.0;                        // change since t began
   std::vector<double> response_;              // of the multipliers
-  std::vector<double> before_, now_, ahead_;  // z_{k-1}, z_k, y_k: multipliers, then x
+  std::vector<double> before_, now_, ahead_;  // z_{k-1}, z_k, y_k
 };
 
 }  // namespace gravitas
