@@ -140,6 +140,7 @@ void Figures::begin_again(kernel::Environment* environment) {
   drives_.clear();
   find_drives();
   measure(environment);
+  edited_step_ = environment->step_count() + 1;
   reference_energy_ = totals(environment).energy();
   follow(environment);
 }
@@ -162,7 +163,9 @@ void Figures::write(report::v1::Report* report) const {
         "on: {}",
         joint_error_, 100.0 * kTorn, joined_size_, *opening_step_,
         contradicts_ ? "they, or limits or drives, ask for what no motion gives, and get a compromise"
-                     : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));
+        : *opening_step_ == edited_step_
+            ? "the edit before that step left apart what they hold"
+            : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));
   if (runaway_)
     report->add_warnings(
         fmt::format("body \"{}\" went {:.3g} m in step {}, over a million times what the scene measures ({:.3g} m): it "

@@ -69,6 +69,7 @@ class Figures {
   bool contradicts_ = false;                     // joints, limits or drives each other, in some step
   std::optional<Runaway> runaway_;               // the first
   std::optional<std::uint64_t> opening_step_;    // the first in which joints came open by kTorn of it
+  std::optional<std::uint64_t> edited_step_;     // the one after the last edit
 };
 
 }  // namespace gravitas

@@ -213,6 +213,18 @@ TEST(BadInput, AnEditThatAPluginRefusesIsNamedAndWhatWasComputedIsKept) {
   EXPECT_THAT(harness::read_file(trajectory), HasSubstr("\n0.0666"));
 }
 
+TEST(BadInput, AnEditThatTearsAJointOpenIsToldAsThat) {
+  const ScratchFolder folder;
+  const std::string report = folder.path("report.json");
+  EXPECT_EQ(run_program({"run", kSample, "--steps", "10", "--hosting", "direct", "--report", report, "--edit",
+                         "set Body.Ball01.Position={3,1,0}@step=5"},
+                        folder)
+                .exit_code,
+            0);
+  EXPECT_THAT(harness::read_file(report),
+              HasSubstr("from step 5 on: the edit before that step left apart what they hold"));
+}
+
 TEST(BadInput, AQuaternionThatIsNearlyUnitIsRepairedWithAWarning) {
   const ScratchFolder folder;
   const std::string scene =
