@@ -292,6 +292,8 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   constexpr std::uint32_t kStepsOfSweeps = 12;
   constexpr Eigen::Index kSweepsOfRow = 5, kLooks = 8;
   constexpr double kGrowth = 100.0;  // the best is kept
+  constexpr std::size_t kTriedRows = 192;
+  constexpr std::uint32_t kMostTries = 8, kTrySweeps = 32;
   const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
   // where sweeps will not, steps take over; of large problems down to a fifth, so that what has no end takes a second or two
   constexpr double kRowsOfAll = 368.0, kLeastShare = 0.2;
@@ -355,6 +357,18 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     };
     // what rounding leaves of sums of large terms is no violation
     double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
+    if (other_.size() > kTriedRows && best > enough) {
+      // what hardly pushes each other is done in fewer sweeps than a step costs
+      start_sweeps();
+      for (std::uint32_t tries = kMostTries; tries > 0 && best > enough; --tries) {
+        const double from = best;
+        for (std::uint32_t i = 0; i < kTrySweeps; ++i) sweep(&swept);
+        lambda = swept.lambda, y = start_others_ + response_ * lambda;
+        keep_better();
+        if (!will_do(best, best / from, enough, tries)) break;
+      }
+      if (best > enough) lambda = first_guess, y = start_others_ + response_ * lambda, swept.lambda.resize(0);
+    }
     while (best > enough && (!is_newton || (done < most_steps && (without < kPatience || guesses.has_next())))) {
       const double before = best;
       if (!is_newton && done >= most_steps) start_newton();
