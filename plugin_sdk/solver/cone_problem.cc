@@ -289,10 +289,11 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   constexpr std::uint32_t kLeastTrial = 64;
   // with more rows the least forces are not looked for after Newton's steps: in heaps other rows hold there nearly always
   constexpr Eigen::Index kSettledRows = 96;
-  constexpr std::uint32_t kStepsOfSweeps = 12;
+  // sweeps in place of a guess, by rows; what they count as, in steps; and how often the best of them is looked for
   constexpr Eigen::Index kSweepsOfRow = 5, kLooks = 8;
-  constexpr double kGrowth = 100.0;  // the best is kept
-  constexpr std::size_t kTriedRows = 192;
+  constexpr std::uint32_t kStepsOfSweeps = 12;
+  constexpr double kGrowth = 100.0;        // the best is kept
+  constexpr std::size_t kTriedRows = 192;  // more are swept before the first step
   constexpr std::uint32_t kMostTries = 8, kTrySweeps = 32;
   const std::uint32_t trial = std::max(kLeastTrial, static_cast<std::uint32_t>(other_.size()));
   // where sweeps will not, steps take over; of large problems down to a fifth, so that what has no end takes a second or two
@@ -302,10 +303,10 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   constexpr double kGuessedRows = 96.0;
   const bool any_friction =
       std::ranges::any_of(contacts, [](const ConeContact& c) { return c.has_friction || c.has_turning; });
-  const auto count = static_cast<double>(any_friction ? other_.size() : 0);
-  const bool only_sweeps = count > kRowsOfAll;
+  const auto rubbing = static_cast<double>(any_friction ? other_.size() : 0);
+  const bool only_sweeps = rubbing > kRowsOfAll;
   const auto are_swept = [&](std::uint32_t guess) {
-    return only_sweeps || (count > kGuessedRows ? guess % 2 == 0 : guess % 3 == 2);
+    return only_sweeps || (rubbing > kGuessedRows ? guess % 2 == 0 : guess % 3 == 2);
   };
   const double fewer = kRowsOfAll / static_cast<double>(lambda_.size());
   const double share = std::clamp(fewer * fewer * fewer, kLeastShare, 1.0);
@@ -390,7 +391,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
         }
         const bool sweeps_on = are_swept(guess++);
         mark_progress();
-        if (!sweeps_on || count <= kGuessedRows) {
+        if (!sweeps_on || rubbing <= kGuessedRows) {
           lambda = start, y = start_others_ + response_ * lambda;
           done += descend(enough, &lambda, &y);
           if (keep_better() <= enough) break;
@@ -398,7 +399,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
         if (!sweeps_on) {
           done += guesses.next(enough / most, &lambda, &y);
         } else {
-          // they go on from the first guess; some twelve steps' cost
+          // they go on from the first guess
           if (swept.lambda.size() == 0) {
             lambda = first_guess, y = start_others_ + response_ * lambda;
             start_sweeps();

@@ -29,8 +29,8 @@
 //                   anew, from the guesses of cone_path.h, and every third time from sweeps, until three guesses near the
 //                   tolerance have not halved the residual: up to 8 times of it then counts as rounding. More than 192 rows
 //                   are swept before the first step, as long as some 256 sweeps will do. With friction in more than 96 rows
-//                   sweeps come first and every other time, in more than 368 alone: there guesses end
-//                   at 1e-3 to 1e-5 m/s, sweeps in a tenth of their time at 1e-6 to 1e-8.
+//                   sweeps come first and every other time, in more than 368 alone: there guesses end at 1e-3 to 1e-5 m/s,
+//                   sweeps in a tenth of their time at 1e-6 to 1e-8.
 //     kGaussSeidel  as long as nothing slides, the same steps; then projected block Gauss-Seidel, each contact solved exactly
 //                   (coulomb_contact.h). Where the residual shrinks too slowly for the sweeps that are left, or they ran
 //                   out, kNewton goes on from the best of them. All sweeps are accelerated (nesterov_acceleration.h).
