@@ -100,17 +100,18 @@ std::optional<Trusted<Solution>> Environment::react_until_a_slide_ends(Trusted<T
                                    vector_at(start_linear_velocity().span(), body))
                                       .norm());
       }
+      // an impact's friction stops a slide at once
+      if (arrival > kOfGain * gained) continue;
       // What rolls along an arc seems to arrive with arms of the end, by v times the angle; and to slip, by v times half its square.
       const std::uint32_t* bodies = &data_.contact_body[2 * pair];
       const double speed =
           (vector_at(start_linear_velocity().span(), bodies[1]) - vector_at(start_linear_velocity().span(), bodies[0]))
               .norm();
       const double slip = slide.start_speed();
-      const bool rolls = slip < speed && arrival <= kOfGain * gained && slip * speed <= arrival * arrival;
-      const bool impacts = arrival > kOfGain * gained;  // whose friction stops a slide at once
+      const bool rolls = slip < speed && slip * speed <= arrival * arrival;
       for (const Slide& one : {rolls ? Slide() : slide, roll, spin}) {
         // what is slower has stopped
-        if (impacts || !(one.start_speed() * trial_length > shortest * gained)) continue;
+        if (!(one.start_speed() * trial_length > shortest * gained)) continue;
         const double end = one.end(trial_length);
         if (one.has_stuck() && !(end > shortest && end <= (1.0 + kSlideShare) * trial_length)) return 0.0;
         if (end > shortest) first = std::min(first, end);

@@ -315,6 +315,7 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
   std::uint32_t most_steps = is_newton ? affordable(settings.iterations) : settings.iterations;
   double most = 0.0;
   for (const std::uint32_t r : other_) most = std::max(most, way_of(r));
+  own_.clear();
   for (;;) {
     Eigen::VectorXd lambda = lambda_, y = start_others_ + response_ * lambda;
     double best = residual_of(lambda, y);
@@ -327,14 +328,10 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
       if (residual < best) best = residual, best_lambda = lambda, best_y = y;
       return residual;
     };
-    const Eigen::VectorXd first_guess = lambda;
     ConePath guesses = path();
     Eigen::VectorXd start = lambda;
-    Sweeps swept{kGrowth};
-    const auto start_sweeps = [&] {
-      begin_sweeps();
-      swept.start(lambda, y);
-    };
+    Sweeps swept{kGrowth};  // from the first guess on
+    swept.start(lambda, y);
     int without = 0;
     bool holds = true;  // of kGaussSeidel: nothing has slid yet
     double attempt = best;
@@ -358,18 +355,17 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
     };
     // what rounding leaves of sums of large terms is no violation
     double enough = std::max(tolerance, kSumRounding * largest_sum(lambda));
-    if (other_.size() > kTriedRows && best > enough) {
-      // what hardly pushes each other is done in fewer sweeps than a step costs
-      start_sweeps();
-      for (std::uint32_t tries = kMostTries; tries > 0 && best > enough; --tries) {
-        const double from = best;
-        for (std::uint32_t i = 0; i < kTrySweeps; ++i) sweep(&swept);
-        lambda = swept.lambda, y = start_others_ + response_ * lambda;
-        keep_better();
-        if (!will_do(best, best / from, enough, tries)) break;
-      }
-      if (best > enough) lambda = first_guess, y = start_others_ + response_ * lambda, swept.lambda.resize(0);
+    // what hardly pushes each other is done in fewer sweeps than a step costs
+    for (std::uint32_t tries = other_.size() > kTriedRows ? kMostTries : 0; tries > 0 && best > enough; --tries) {
+      const double from = best;
+      for (std::uint32_t i = 0; i < kTrySweeps; ++i) sweep(&swept);
+      summary->iterations += kTrySweeps;
+      lambda = swept.lambda, y = start_others_ + response_ * lambda;
+      keep_better();
+      if (!will_do(best, best / from, enough, tries)) break;
     }
+    // steps settle sooner from the guess than from what sweeps have not finished
+    if (best > enough && lambda != start) lambda = start, y = start_others_ + response_ * lambda;
     while (best > enough && (!is_newton || (done < most_steps && (without < kPatience || guesses.has_next())))) {
       const double before = best;
       if (!is_newton && done >= most_steps) start_newton();
@@ -377,8 +373,8 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
         ++done, ++without;
       } else if (!is_newton) {
         if (holds) {
-          lambda = best_lambda, y = best_y, holds = false, swept_to = best;
-          start_sweeps();
+          swept.start(best_lambda, best_y);
+          holds = false, swept_to = best;
         }
         ++done, ++sweeps;
         sweep(&swept);
@@ -399,11 +395,6 @@ void ConeProblem::solve_dense(const ConeSettings& settings, double tolerance, Co
         if (!sweeps_on) {
           done += guesses.next(enough / most, &lambda, &y);
         } else {
-          // they go on from the first guess
-          if (swept.lambda.size() == 0) {
-            lambda = first_guess, y = start_others_ + response_ * lambda;
-            start_sweeps();
-          }
           done += kStepsOfSweeps;
           for (Eigen::Index i = 0; i < kSweepsOfRow * swept.lambda.size() && best > enough; ++i) {
             sweep(&swept);

@@ -28,7 +28,7 @@
 //                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
 //                   anew, from the guesses of cone_path.h, and every third time from sweeps, until three guesses near the
 //                   tolerance have not halved the residual: up to 8 times of it then counts as rounding. More than 192 rows
-//                   are swept before the first step, as long as some 256 sweeps will do. With friction in more than 96 rows
+//                   are swept before the first step, as long as 256 sweeps will do. With friction in more than 96 rows
 //                   sweeps come first and every other time, in more than 368 alone: there guesses end at 1e-3 to 1e-5 m/s,
 //                   sweeps in a tenth of their time at 1e-6 to 1e-8.
 //     kGaussSeidel  as long as nothing slides, the same steps; then projected block Gauss-Seidel, each contact solved exactly
@@ -176,7 +176,7 @@ class ConeProblem {
   struct RowRange {
     Eigen::Index first, count;
   };
-  // Where sweeps are, and how they go on.
+  // Where sweeps are, and how they go on; of too many rows for steps without y.
   struct Sweeps final : SweptState {
     explicit Sweeps(double growth) : acceleration(growth) {}
 
@@ -244,7 +244,7 @@ class ConeProblem {
   void solve_sticking();
   ConePath path() const;
   void begin_sweeps();
-  void sweep(Sweeps* sweeps) const;
+  void sweep(Sweeps* sweeps);
   bool slides() const;
   bool settle(double enough, bool may_differ, Eigen::VectorXd* lambda, Eigen::VectorXd* y);
   void relax(const Block& block, const OwnResponse& own, double* lambda, const double* y) const;

@@ -16,7 +16,6 @@ ConeProblem::OwnResponse::OwnResponse(const Eigen::MatrixXd& own) : all(own) {
 }
 
 void ConeProblem::begin_sweeps() {
-  own_.clear();
   for (const Block& block : blocks_) {
     const auto i = static_cast<Eigen::Index>(block.first);
     own_.emplace_back(response_.block(i, i, block.count, block.count));
@@ -71,7 +70,8 @@ void ConeProblem::relax(const Block& block, const OwnResponse& own, double* lamb
   confine_turning(bounds, lambda[0], lambda + k);
 }
 
-void ConeProblem::sweep(Sweeps* sweeps) const {
+void ConeProblem::sweep(Sweeps* sweeps) {
+  if (own_.empty()) begin_sweeps();
   sweeps->acceleration.go_ahead(sweeps);
   Eigen::VectorXd &lambda = sweeps->lambda, &y = sweeps->y;
   double change = 0.0;

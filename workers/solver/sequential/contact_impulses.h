@@ -45,8 +45,7 @@ class ContactImpulses final : public RelaxationBlocks {
 
   bool is_empty() const { return rows_.empty(); }
   void push_all(const SolverBodies& bodies, BodyMotion& x) const;
-  // The same for friction (all three kinds) alone, times `factor`.
-  // By contact of the request, times a share.
+  // The same for friction (all three kinds) alone, times `factor` and a share of each contact of the request.
   void push_friction(const SolverBodies& bodies, double factor, const std::vector<double>& shares, BodyMotion& x) const;
   bool has_friction_impulse() const;
 
