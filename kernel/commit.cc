@@ -6,7 +6,6 @@
 #include "kernel/environment.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/dynamics.h"
-#include "plugin_sdk/joint_load.h"
 #include "plugin_sdk/merged_rows.h"
 
 namespace gravitas::kernel {
@@ -155,39 +154,11 @@ void Environment::remember_joints() {
   const State& old = front();
   const Column<std::uint32_t>&now = data_.discrepancies.constraint, &before = old.discrepancy_constraint;
   const auto key = [](const Column<std::uint32_t>& joint) { return [&](std::size_t i) { return joint[i]; }; };
-  const auto goes_on = [&](std::size_t i) { return sleeps(model_.constraints[before[i]]); };
+  const auto goes_on = [&](std::size_t i) { return sleeps(before[i]); };
   merge_rows(now.size(), key(now), sleepers_ > 0 ? before.size() : 0, key(before), goes_on, &merged_);
   copy_rows(merged_, 1, now, before, back().discrepancy_constraint);
   copy_rows(merged_, 3, data_.discrepancy_impulse, old.discrepancy_impulse, back().discrepancy_impulse);
   copy_rows(merged_, 3, data_.discrepancy_correction, old.discrepancy_correction, back().discrepancy_correction);
-}
-
-// Joint errors at S_{n+1}; joints whose error or load is beyond what they bear end with this commit.
-void Environment::update_joints() {
-  std::ranges::copy(front().intact.span(), back().intact.data());
-  const DiscrepancyAnswer& d = data_.discrepancies;
-  const DiscrepancyColumns columns = d.columns();
-  const std::span<const double> reactions = knows_reactions() ? data_.held_force.span() : std::span<double>();
-  const auto body = [&](std::uint32_t i) {
-    if (i == kNone) return JointBody{};
-    return JointBody{pose_of(data_.trial_position, data_.trial_orientation, i),
-                     pose_of(back().position, back().orientation, i), model_.inverse_mass[i],
-                     vector_at(model_.inverse_inertia.span(), i)};
-  };
-  for (std::size_t row = 0; row < columns.size();) {
-    const std::size_t first = row;
-    const std::uint32_t joint = d.constraint[first];
-    const ConstraintDescription& description = model_.constraints[joint];
-    while (row < columns.size() && d.constraint[row] == joint) ++row;
-    const JointBody one = body(description.body1), two = body(description.body2);
-    const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
-    const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
-    const JointLoad load = joint_load(rows, one, two, h);
-    const bool breaks =
-        (force > 0.0 && load.force > force) || (threshold > 0.0 && opening(rows, one, two, h) > threshold);
-    back().intact[joint] = breaks ? 0 : 1;
-    if (!breaks) figures_.joint_error = std::max(figures_.joint_error, load.error);
-  }
 }
 
 double Environment::gap_at(std::size_t contact, const State& state) const {

@@ -177,6 +177,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
+  double first_limit(double begin, double length, bool* passes);                                            // limits.cc
   // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();
@@ -184,9 +185,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void let_sleep(std::uint32_t body, bool sleeps);
   bool does_anything_move() const;
   bool is_awake(std::uint32_t body) const { return body != kNone && (data_.flags[body] & kMovable) != 0; }
-  bool sleeps(const ConstraintDescription& joint) const {
-    return sleepers_ > 0 && !is_awake(joint.body1) && !is_awake(joint.body2);
-  }
+  bool sleeps(std::uint32_t joint) const;
   bool is_carrying(std::uint32_t body) const;
   void leave_out_sleepers();
   void look_for_pushes();
@@ -229,7 +228,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   void complete_state();
   void remember_contacts();
   void remember_joints();
+  // breaking.cc: S_{n+1}; false: the inner step is to be begun again.
+  bool write_what_joints_bear(const Trusted<TrialState>& trial, std::optional<Trusted<Solution>> solution);
   void update_joints();
+  bool has_broken(std::uint32_t joint) const { return std::ranges::find(broken_, joint) != broken_.end(); }
   // Gap of a contact whose two surface points move with their bodies from S* to a state.
   double gap_at(std::size_t contact, const State& state) const;
   void find_touching();
@@ -337,10 +339,12 @@ class Environment : private DerivativeSource, private SlotObserver {
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
+  std::vector<std::uint32_t> broken_;             // joints, under their load in the inner step that is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last
   Extrapolation extrapolation_, jumps_;
   static constexpr std::uint32_t kMostPieces = 8;                            // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, missed_;  // of velocities
+  std::vector<double> start_gaps_, trial_gaps_;                              // of limits
   std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;
 

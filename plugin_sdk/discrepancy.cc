@@ -143,6 +143,23 @@ double joint_error(const Discrepancy& discrepancy, const Vector3& error) {
   return std::sqrt(sum);
 }
 
+Vector3 limit_gaps(const Discrepancy& discrepancy) {
+  const Matrix3 axes = discrepancy.axes.toRotationMatrix();
+  const Vector3 error = discrepancy.point2 - discrepancy.point1;
+  Vector3 gaps = Vector3::Constant(kUnlimited);
+  for (int i = 0; i < 3; ++i) {
+    if (discrepancy.compliance[i] > 0.0) continue;
+    const double along = discrepancy.is_radial() && i == 0 ? error.norm() : axes.col(i).dot(error);
+    const double lower = discrepancy.lower[i], upper = discrepancy.upper[i];
+    const AxisMode mode = axis_mode(discrepancy.modes, i);
+    if (mode == AxisMode::kUnilateral) gaps[i] = along;
+    if (mode != AxisMode::kLimited || lower == upper) continue;
+    if (lower > -kUnlimited) gaps[i] = along - lower;
+    if (upper < kUnlimited) gaps[i] = std::min(gaps[i], upper - along);
+  }
+  return gaps;
+}
+
 Discrepancy contact_discrepancy(const Vector3& point, const Vector3& normal, double depth) {
   Discrepancy contact;
   contact.point1 = point + 0.5 * depth * normal;

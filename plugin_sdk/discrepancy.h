@@ -156,6 +156,10 @@ Vector3 error_in_axes_at(const Discrepancy& discrepancy, const Pose& now1, const
 // over the limits where they are exceeded; what gives way (compliance) is no error. m, or rad for the angular twin.
 double joint_error(const Discrepancy& discrepancy, const Vector3& error);
 
+// How far the error is from the nearer limit of each axis, m or rad, negative beyond it; kUnlimited where there is none, or
+// where it gives way.
+Vector3 limit_gaps(const Discrepancy& discrepancy);
+
 // A contact as a discrepancy (§ 2.7.5.1, with x1 and x2 as they must be: x2 - x1 along the normal is minus the
 // depth): first axis the normal (unit, from body 1 to body 2), unilateral; the others friction.
 Discrepancy contact_discrepancy(const Vector3& point, const Vector3& normal, double depth);

@@ -60,9 +60,7 @@ void Environment::make_part(double begin, double length) {
 bool Environment::make_next_state() {
   const auto trial = integrate();
   if (!has_reactions()) return write_trial(trial), true;
-  const auto solution = react(trial);
-  if (solution) write_solution(*solution);
-  return solution.has_value();
+  return write_what_joints_bear(trial, react(trial));
 }
 
 void Environment::begin_inner_step(double begin, double length) {
@@ -70,6 +68,7 @@ void Environment::begin_inner_step(double begin, double length) {
   data_.time[0] = time() + begin;
   data_.time_step[0] = length;
   inner_end_ = begin + length;
+  broken_.clear();
   data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
   start_wrench_known_ = false;
   if (!wrench_is_constant_) {

@@ -6,7 +6,7 @@
 // shortened until it ends before the jump, to kFinestPart of the step, and one inner step as it is passes it. What flickers
 // would crumble the whole step: each part below kCrumb of it makes the finest a little longer. A jump in the first or the last
 // inner step of every attempt would look smooth; one of velocities shows in that step's change of them, which then does not
-// tend to 0 with the step, one of reactions in shorter steps (jumps.cc). Impacts are found first.
+// tend to 0 with the step, one of reactions in shorter steps (jumps.cc). Impacts and joints' limits (limits.cc) are found first.
 #include <algorithm>
 #include <cmath>
 
@@ -54,9 +54,13 @@ void Environment::extrapolate_parts(double begin, double length) {
       begin_inner_step(from, part);
       part = first_impact(integrate(), from, part);
     }
-    if (part < kCrumb * step) finest *= kCoarser;
     const bool ends_with_impact = part < std::min(wanted, left);
-    const std::uint32_t pieces = part > finest ? pieces_to_accuracy(from, part, ends_with_impact) : 1;
+    bool passes_limit = false;
+    part = first_limit(from, part, &passes_limit);
+    const bool is_cut = part < std::min(wanted, left);
+    if (part < kCrumb * step) finest *= kCoarser;
+    const bool is_passed = part <= finest || passes_limit;
+    const std::uint32_t pieces = is_passed ? 1 : pieces_to_accuracy(from, part, ends_with_impact);
     if (pieces == 0) wanted = kShorter * part, has_failed = true;
     for (std::uint32_t i = 0; i < pieces && !must_restart_; ++i) {
       if (!make_piece(from, part, i, pieces)) return;
@@ -65,15 +69,9 @@ void Environment::extrapolate_parts(double begin, double length) {
     }
     if (pieces == 0) continue;
     done = part == left ? length : done + part;
-    if (!ends_with_impact) wanted = has_failed ? part : kLonger * part;
+    if (!is_cut) wanted = has_failed ? part : kLonger * part;
     has_failed = false;
   }
-}
-
-bool Environment::make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces) {
-  const double from = i * length / pieces, to = (i + 1) * length / pieces;
-  begin_inner_step(begin + from, to - from);
-  return make_next_state();
 }
 
 // The number of inner steps whose extrapolation meets the accuracy; 0: none does, or the step is to be begun again. Where

@@ -23,6 +23,12 @@ constexpr double kUncertain = 0.25;       // share of what a smooth motion misse
 
 }  // namespace
 
+bool Environment::make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces) {
+  const double from = i * length / pieces, to = (i + 1) * length / pieces;
+  begin_inner_step(begin + from, to - from);
+  return make_next_state();
+}
+
 // Of what is awake, in the inner step that has been made; and pressed_, the pairs that push each other there, in rising order.
 void Environment::find_changes(std::vector<double>* changes) {
   changes->clear();

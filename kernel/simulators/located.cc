@@ -61,9 +61,8 @@ void Environment::locate_events(double begin, double length) {
         slides < kMostSlides + kMostSlidesOfPair * (front().touching.size() / 2)
             ? react_until_a_slide_ends(trial, begin + done, &stop, has_found_contacts)
             : react(trial, has_found_contacts);
-    if (!solution) return;
+    if (!write_what_joints_bear(trial, solution)) return;
     slides += stop < before ? 1 : 0;
-    write_solution(*solution);
     end_inner_step();
     done = stop == left ? length : done + stop;
   }

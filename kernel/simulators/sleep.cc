@@ -35,6 +35,10 @@ void Environment::find_sleepers() {
   for (const std::uint32_t body : wake_orders_) wake_island(body);
 }
 
+bool Environment::sleeps(std::uint32_t joint) const {
+  return sleepers_ > 0 && !is_awake(model_.constraints[joint].body1) && !is_awake(model_.constraints[joint].body2);
+}
+
 void Environment::let_sleep(std::uint32_t body, bool sleeps) {
   const std::uint32_t flags = sleeps ? model_.flags[body] & ~std::uint32_t{kMovable} : model_.flags[body];
   if (data_.flags[body] == flags) return;

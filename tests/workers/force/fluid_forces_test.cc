@@ -184,6 +184,20 @@ TEST(Buoyancy, EndsWithItsRegion) {
   EXPECT_EQ(ask(&force, "Buoyancy", fluid.flat(), body).wrench.force.y(), 0.0);
 }
 
+// A pool that ends at its surface carries what floats with its centre above it.
+TEST(Buoyancy, OfARegionUpToItsLevelIsThatOfNone) {
+  PluginUnderTest force("force_buoyancy");
+  ForcedBody body;
+  body.shape = 0;
+  for (const double height : {-0.4, 0.0, 0.1, 0.4}) {
+    body.pose.position.y() = height;
+    const double lift = ask(&force, "Buoyancy", FluidProperties{}.flat(), body).wrench.force.y();
+    EXPECT_GT(lift, 0.0) << height;
+    const FluidProperties pool{.region = {-1, -5, -1, 1, 0, 1}};
+    EXPECT_EQ(ask(&force, "Buoyancy", pool.flat(), body).wrench.force.y(), lift) << height;
+  }
+}
+
 TEST(Buoyancy, RefusesRegionsThatAreNoBoxes) {
   PluginUnderTest force("force_buoyancy");
   for (const std::vector<double>& region : {std::vector<double>{1, 1, 1}, std::vector<double>{-1, 1, -1, 1, -1, 1}}) {

@@ -7,7 +7,7 @@
 //
 // Exact for Sphere, Box and ConvexPolyhedron cut by the surface (submerged.h); Cylinder, Cone and Capsule are polyhedra of 48
 // sides of the same volume, and but for the Capsule's caps of the same sections. Other shapes are refused. A floating body finds its depth and rocks back upright by itself, since b
-// moves. Region bounds the fluid: a body whose geometry's origin is outside feels nothing, which is a jump at its sides.
+// moves. Region bounds the fluid: where b is outside nothing is felt, which is a jump at its sides.
 // Level is along up through the world's origin. The seed leaves buoyancy to future work (§ 6.2.3).
 #include "plugin_sdk/plugin.h"
 
@@ -58,7 +58,7 @@ class Buoyancy final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {.name = "Buoyancy",
-            .version = "1.0",
+            .version = "1.1",
             .slot = Slot::kForce,
             .meaning = "Lift and drag of a fluid on the submerged part of a body.",
             .capabilities = {"potential", "jacobians"},
@@ -70,7 +70,9 @@ class Buoyancy final : public OwnStateForce {
                   Property::vector("Gravity", "m/s^2", "world")
                       .means("What makes the weight; up is against it. Absent: the sum of the body's Gravity forces."),
                   Property::table("Region", 3, "m", "world")
-                      .means("{min} and {max} of the box that holds the fluid; absent: everywhere."),
+                      .means("{min} and {max} of the box that holds the fluid: what has the centre of its submerged "
+                             "part in it "
+                             "is lifted; absent: everywhere."),
                   Property::vector("FluidVelocity", "m/s", "world").defaults_to({0, 0, 0}).means("Flow."),
                   Property::number("LinearDrag", "N*s/m")
                       .at_least(0.0)
@@ -94,10 +96,10 @@ class Buoyancy final : public OwnStateForce {
     const Pose pose = geometry_pose(request, body);
     const BodyShape shape = shape_of(request, body);
     const double weight = std::isnan(fluid.gravity.x()) ? 0.0 : fluid.gravity.stableNorm();
-    if (weight == 0.0 || !contains(fluid, pose.position)) return {.flags = kHasPotential};
+    if (weight == 0.0) return {.flags = kHasPotential};
     const Vector3 up = fluid.gravity / -weight;
     const Submerged part = submerged(shape, pose, up, fluid.level);
-    if (part.volume == 0.0) return {.flags = kHasPotential};
+    if (part.volume == 0.0 || !contains(fluid, part.centre)) return {.flags = kHasPotential};
 
     const Vector3 arm = part.centre - vector_at(request.position(), body);
     const Vector3 w = vector_at(request.angular_velocity(), body);

@@ -1,0 +1,56 @@
+// Joints that break. One that would bear more than its BreakingForce, or come open beyond its BreakingThreshold, bears nothing
+// in the inner step that would ask for it, which is solved again without it: with its impulse, a thread would stop a truck.
+// The most overloaded is the first to go, since that may relieve others.
+#include <algorithm>
+#include <optional>
+
+#include "kernel/environment.h"
+#include "plugin_sdk/joint_load.h"
+
+namespace gravitas::kernel {
+
+bool Environment::write_what_joints_bear(const Trusted<TrialState>& trial, std::optional<Trusted<Solution>> solution) {
+  const CommitFigures figures = figures_;
+  while (solution) {
+    const std::size_t before = broken_.size();
+    figures_ = figures;
+    write_solution(*solution);
+    if (broken_.size() == before) return true;
+    solution = react(knows_reactions() ? integrate() : trial, true);
+  }
+  return false;
+}
+
+// Joint errors at S_{n+1}, and what is overloaded.
+void Environment::update_joints() {
+  std::ranges::copy(front().intact.span(), back().intact.data());
+  for (const std::uint32_t joint : broken_) back().intact[joint] = 0;
+  std::uint32_t overloaded = kNone;
+  double most = 1.0;  // of what it bears
+  const DiscrepancyAnswer& d = data_.discrepancies;
+  const DiscrepancyColumns columns = d.columns();
+  const std::span<const double> reactions = knows_reactions() ? data_.held_force.span() : std::span<double>();
+  const auto body = [&](std::uint32_t i) {
+    if (i == kNone) return JointBody{};
+    return JointBody{pose_of(data_.trial_position, data_.trial_orientation, i),
+                     pose_of(back().position, back().orientation, i), model_.inverse_mass[i],
+                     vector_at(model_.inverse_inertia.span(), i)};
+  };
+  for (std::size_t row = 0; row < columns.size();) {
+    const std::size_t first = row;
+    const std::uint32_t joint = d.constraint[first];
+    const ConstraintDescription& description = model_.constraints[joint];
+    while (row < columns.size() && d.constraint[row] == joint) ++row;
+    const JointBody one = body(description.body1), two = body(description.body2);
+    const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
+    const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
+    const JointLoad load = joint_load(rows, one, two, h);
+    const double overload = std::max(force > 0.0 ? load.force / force : 0.0,
+                                     threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0);
+    if (overload > most) overloaded = joint, most = overload;
+    figures_.joint_error = std::max(figures_.joint_error, load.error);
+  }
+  if (overloaded != kNone) broken_.push_back(overloaded);
+}
+
+}  // namespace gravitas::kernel
