@@ -98,5 +98,58 @@ TEST(HangingLoad, NetsOfRopesStayClosed) {
   EXPECT_LT(run.report().max_joint_error(), 1e-3);
 }
 
+// A scissor lift: `stages` of two crossed rods of 0.5 kg and 1 m, 0.5 rad from level, 100 kg on top, and a foot that a joint
+// holds in place against 1.8 times that weight for each stage.
+std::string scissor_lift(int stages, const std::string& joint_of_foot) {
+  constexpr double kTilt = 0.5;
+  const double width = std::cos(kTilt), height = std::sin(kTilt);
+  const auto turned_rod = [&](const std::string& id, int stage, double angle) {
+    return hanging_body(id, 0.5, {0.001, 0.042, 0.042},
+                        {{0.5 * width, (stage + 0.5) * height, 0.0}, exp_rotation({0.0, 0.0, angle})});
+  };
+  const auto level_body = [&](const std::string& id, double mass, double x, double y) {
+    return hanging_body(id, mass, Vector3::Constant(0.1 * mass), {{x, y, 0.0}, Quaternion::Identity()});
+  };
+  const auto joint = [](const std::string& type, const std::string& one, const std::string& two,
+                        const std::string& place) {
+    return "Constraint { Type = \"" + type + "\" Id = \"" + one + "-" + two + "\" Body1 = \"" + one + "\" Body2 = \"" +
+           two + "\" CustomProperties { " + place + " } }\n";
+  };
+  const auto hinge = [&](const std::string& one, const std::string& two, double x, double y) {
+    return joint("Revolute", one, two,
+                 "BindAxisPoint1 = " + literal(Vector3(x, y, 0)) + " BindAxisPoint2 = " + literal(Vector3(x, y, 1)));
+  };
+  std::string bodies = level_body("Foot", 0.1, width, 0.0), joints = joint_of_foot;
+  for (int i = 0; i < stages; ++i) {
+    const std::string a = "A" + std::to_string(i), b = "B" + std::to_string(i), below = std::to_string(i - 1);
+    bodies += turned_rod(a, i, kTilt) + turned_rod(b, i, -kTilt);
+    joints += hinge(a, b, 0.5 * width, (i + 0.5) * height) + hinge(i == 0 ? "" : "B" + below, a, 0.0, i * height) +
+              hinge(i == 0 ? "Foot" : "A" + below, b, width, i * height);
+  }
+  const std::string top = std::to_string(stages - 1);
+  const double roof = stages * height;
+  bodies += level_body("Platform", 100.0, 0.5 * width, roof) + level_body("Shoe", 0.1, width, roof);
+  joints += hinge("B" + top, "Platform", 0.0, roof) + hinge("A" + top, "Shoe", width, roof) +
+            joint("Slider", "Platform", "Shoe", "BindPoint = {0, 0, 0} Axis = {1, 0, 0}");
+  return kDownwards + "Simulator { CustomProperties { Duration = 0.5 } }\nEnvironment { Space { Bodies {\n" + bodies +
+         "} }\nConstraints {\n" + joints + "} }\n";
+}
+
+// Sweeps that ended at 200 let lifts down: by 0.65 m of six stages on a drive, by 0.5 m on a foot that is bolted.
+TEST(StandingLoad, IsHeldByAScissorLift) {
+  const std::string bolted = "Constraint { Type = \"Rigid\" Id = \"Bolt\" Body2 = \"Foot\" }\n";
+  const std::string driven =
+      "Constraint { Type = \"Slider\" Id = \"Drive\" Body2 = \"Foot\" CustomProperties { BindPoint = {0, 0, 0} Axis = "
+      "{1, "
+      "0, 0} Speed = 0 } }\n";
+  for (const auto& [stages, foot, sag] :
+       {std::tuple{6, bolted, 1e-6}, {2, driven, 1e-3}, {4, driven, 1e-3}, {6, driven, 3e-3}}) {
+    SceneRun run(scissor_lift(stages, foot));
+    run.to_end();
+    EXPECT_NEAR(run.body("Platform").pose.position.y(), stages * std::sin(0.5), sag) << stages << foot;
+    EXPECT_LT(run.report().max_joint_error(), 1e-4) << stages << foot;
+  }
+}
+
 }  // namespace
 }  // namespace gravitas

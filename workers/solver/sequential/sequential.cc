@@ -267,7 +267,7 @@ bool SequentialSolver::relax_pose() {
     gaps_.push_all(bodies_, solution_.displacement);
   }
   bool converged = false;
-  for (std::uint32_t i = 0; i < settings_.iterations && !converged; ++i) {
+  for (std::uint32_t i = 0, cap = most_sweeps(gaps_.is_empty()); i < cap && !converged; ++i) {
     converged = sweep_.sweep(bodies_, solution_.displacement) <= tolerance;
     ++summary_.sweeps;
   }
@@ -356,7 +356,7 @@ void SequentialSolver::relax_velocity() {
 
 // Sweeps until nothing changes by more than the tolerance (m/s); false if the sweeps ran out.
 bool SequentialSolver::sweep_velocity(double tolerance) {
-  const std::uint32_t cap = settings_.iterations;
+  const std::uint32_t cap = most_sweeps(impulses_.is_empty());
   for (std::uint32_t done = 1; done <= cap; ++done) {
     summary_.residual = sweep_.sweep(bodies_, solution_.velocity);
     ++summary_.sweeps;

@@ -107,7 +107,8 @@ namespace gravitas {
 enum class ShockPropagation : std::uint8_t { kNever, kStacks, kAlways };
 
 struct SequentialSettings {
-  std::uint32_t iterations = 200;  // largest number of sweeps of one relaxation, 1 ... 100000
+  std::uint32_t iterations =
+      200;  // largest number of sweeps of one relaxation, 1 ... 100000; of joints alone ten times that
   double correction_factor = 1.0;  // share of an old error that a step removes, 0 ... 1
   RelaxationOrder order = RelaxationOrder::kGiven;
   double relaxation_factor = 1.0;  // of the way of locks and contacts, 0 ... 2
@@ -219,6 +220,8 @@ class SequentialSolver {
   template <typename Contacts>
   double choose_start(const BodyMotion& base, double tolerance, Contacts* contacts, BodyMotion* x);
   bool sweep_velocity(double tolerance);
+  // Frames and mechanisms need more sweeps than what lies on each other, which is given up before.
+  std::uint32_t most_sweeps(bool has_joints_alone) const { return (has_joints_alone ? 10 : 1) * settings_.iterations; }
   void bound_energy();
   void share_restitution(const BodyMotion& before);
   void group_bodies();
