@@ -9,6 +9,8 @@
 namespace gravitas {
 namespace {
 
+constexpr double kPulledApart = 1e-3;  // of the bodies' ways
+
 // Impulse of a row, world.
 Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::size_t row, double time_step) {
   Vector3 along = vector_at(joint.impulses, row);
@@ -60,6 +62,23 @@ double opening(const JointRows& joint, const JointBody& body1, const JointBody& 
                      length * held_back(discrepancy, impulse, body1, body2, time_step)});
   }
   return most;
+}
+
+bool is_pulled_apart(const JointRows& joint, const JointBody& body1, const JointBody& body2) {
+  const auto way = [](const JointBody& body) {
+    const double turn = log_rotation(body.next.orientation * body.start.orientation.conjugate()).norm();
+    return (body.next.position - body.start.position).norm() + gyration(body) * turn;
+  };
+  double opened = 0.0;
+  for (std::size_t row = joint.first; row < joint.end; ++row) {
+    const Discrepancy discrepancy = joint.rows.at(row);
+    const auto open = [&](const Pose& one, const Pose& two) {
+      return joint_error(discrepancy, error_in_axes_at(discrepancy, body1.trial, body2.trial, one, two));
+    };
+    const double length = discrepancy.is_angular() ? std::max(gyration(body1), gyration(body2)) : 1.0;
+    opened = std::max(opened, length * (open(body1.next, body2.next) - open(body1.start, body2.start)));
+  }
+  return opened > kPulledApart * (way(body1) + way(body2));
 }
 
 }  // namespace gravitas

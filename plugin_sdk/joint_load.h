@@ -13,6 +13,7 @@ struct JointBody {
   Pose trial, next;  // centre of mass at S* and S_{n+1}, world
   double inverse_mass = 0.0;
   Vector3 inverse_moments = Vector3::Zero();  // principal, 1/(kg m^2)
+  Pose start;                                 // at S_n
 };
 
 // Rows [first, end) of one joint, with the impulses (N s, along each row's axes) that the solver answered, and the forces (N)
@@ -39,5 +40,9 @@ double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const J
 // What a breaking threshold is compared with, m: the most that a row of the joint is open at S_{n+1}, or was held back. Turns
 // count by the larger radius of gyration of the two bodies.
 double opening(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
+
+// Where joints contradict each other no force holds them, and none is told: is this joint one of those that a step has opened,
+// by a share of the ways of its bodies?
+bool is_pulled_apart(const JointRows& joint, const JointBody& body1, const JointBody& body2);
 
 }  // namespace gravitas

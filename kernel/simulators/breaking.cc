@@ -1,11 +1,12 @@
 // Joints that break. One that would bear more than its BreakingForce, or come open beyond its BreakingThreshold, bears nothing
 // in the inner step that would ask for it, which is solved again without it: with its impulse, a thread would stop a truck.
-// The most overloaded is the first to go, since that may relieve others.
+// The most overloaded is the first to go, since that may relieve others; of joints that contradict each other the weakest.
 #include <algorithm>
 #include <optional>
 
 #include "kernel/environment.h"
 #include "plugin_sdk/joint_load.h"
+#include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
 
@@ -25,6 +26,7 @@ bool Environment::write_what_joints_bear(const Trusted<TrialState>& trial, std::
 void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   for (const std::uint32_t joint : broken_) back().intact[joint] = 0;
+  const bool contradicts = data_.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction);
   std::uint32_t overloaded = kNone;
   double most = 1.0;  // of what it bears
   const DiscrepancyAnswer& d = data_.discrepancies;
@@ -34,7 +36,7 @@ void Environment::update_joints() {
     if (i == kNone) return JointBody{};
     return JointBody{pose_of(data_.trial_position, data_.trial_orientation, i),
                      pose_of(back().position, back().orientation, i), model_.inverse_mass[i],
-                     vector_at(model_.inverse_inertia.span(), i)};
+                     vector_at(model_.inverse_inertia.span(), i), pose_of(front().position, front().orientation, i)};
   };
   for (std::size_t row = 0; row < columns.size();) {
     const std::size_t first = row;
@@ -45,7 +47,8 @@ void Environment::update_joints() {
     const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
     const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
     const JointLoad load = joint_load(rows, one, two, h);
-    const double overload = std::max(force > 0.0 ? load.force / force : 0.0,
+    const bool is_torn = contradicts && force > 0.0 && is_pulled_apart(rows, one, two);
+    const double overload = std::max(force > 0.0 ? (is_torn ? kUnlimited : load.force) / force : 0.0,
                                      threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0);
     if (overload > most) overloaded = joint, most = overload;
     figures_.joint_error = std::max(figures_.joint_error, load.error);

@@ -226,6 +226,33 @@ TEST_P(BreakingOf, OneOfTwoInARow) {
   EXPECT_NE(run.holds("AB"), run.holds("BC"));
 }
 
+// A specimen between the world and a kinematic body that goes away from it: no force holds it, and none was told, so that it was
+// drawn out by 5 cm. The weakest joint breaks; of others that nobody tears none does.
+TEST_P(BreakingOf, ASpecimenInATensileTest) {
+  for (const char* type : {"Spherical", "Rigid"})
+    for (const char* simulator : {"Basic", "Continuous"})
+      for (const int weakest : {0, 1, 2}) {
+        std::string bodies =
+            "Body { Id = \"Puller\" Kinematic = true KineticProperties { Position = {2, 0, 0} "
+            "LinearVelocity = {0.1, 0, 0} } }\n" +
+            body("0", 0.1, {0, 0, 0}, "") + body("1", 0.1, {1, 0, 0}, "") + body("Aside", 1, {0, 5, 0}, "\"Down\"");
+        std::string joints =
+            "Constraint { Type = \"Spherical\" Id = \"Hook\" Body2 = \"Aside\" BreakingForce = 50 "
+            "CustomProperties { BindPoint = {0.3, 5, 0} } }\n";
+        const char* const ends[] = {"", "0", "1", "Puller"};
+        for (int i = 0; i < 3; ++i)
+          joints += std::string("Constraint { Type = \"") + type + "\" Id = \"J" + std::to_string(i) + "\" Body1 = \"" +
+                    ends[i] + "\" Body2 = \"" + ends[i + 1] + "\" BreakingForce = " + (i == weakest ? "90" : "100") +
+                    " CustomProperties { BindPoint = " + literal(Vector3(i - 0.5, 0, 0)) + " } }\n";
+        SceneRun run(scene_of(kGravityDown, bodies, joints, GetParam()), {std::string("Simulator=") + simulator});
+        run.steps(50);
+        for (int i = 0; i < 3; ++i)
+          EXPECT_EQ(run.holds("J" + std::to_string(i)), i != weakest) << type << ' ' << simulator << ' ' << weakest;
+        EXPECT_TRUE(run.holds("Hook"));
+        EXPECT_LT(run.report().max_joint_error(), 1e-3) << type << ' ' << simulator << ' ' << weakest;
+      }
+}
+
 // Joints that hold the same freedoms again bear alike: of a plate of 98.1 N on four of them none breaks at 30 N (once two bore
 // half the weight each, or one all of it, and the plate fell).
 TEST(RedundantJoints, BearAlike) {
