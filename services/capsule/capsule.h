@@ -20,14 +20,16 @@
 #include "kernel/arena.h"
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/message_columns.h"
+#include "services/recorder/output_file.h"
 
 namespace gravitas::capsule {
 
 // Writes while hosts are asked, from whatever thread.
 class Writer {
  public:
-  // Throws std::system_error if the file cannot be made.
-  Writer(const std::string& path, const recorder::v1::CapsuleHeader& header);
+  // Throws as OutputFile does.
+  Writer(const std::string& path, const recorder::v1::CapsuleHeader& header,
+         OutputFile::Allowed allowed = OutputFile::Allowed::kAny);
 
   // Index of the plugin in the capsule.
   std::uint32_t add_plugin(const kernel::PluginChoice& plugin);
@@ -41,8 +43,7 @@ class Writer {
   void put(const recorder::v1::CapsuleRecord& record);
 
   mutable std::mutex mutex_;
-  const std::string path_;
-  std::ofstream file_;
+  OutputFile file_;
   std::uint64_t check_ = 0;
   std::uint32_t plugins_ = 0, calls_ = 0;
 };

@@ -14,8 +14,8 @@
 #include "services/control/client.h"
 #include "services/control/server_socket.h"
 #include "services/control/status_text.h"
-#include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
+#include "services/recorder/output_file.h"
 #include "services/run/edit_spec.h"
 #include "services/run/session.h"
 #include "services/survey/picture.h"
@@ -177,8 +177,10 @@ int show_instrumentation(const CtlLine& line, ControlClient* client) {
     return kDone;
   }
   try {
-    write_text_file(line.out, text, "instrumentation");
-  } catch (const std::system_error& problem) {
+    OutputFile file("instrumentation", line.out, OutputFile::Allowed::kOrdinary);
+    file.write(text);
+    file.close();
+  } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());
   }
   return kDone;

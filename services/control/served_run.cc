@@ -388,8 +388,9 @@ std::future<api::Captured> ServedRun::capture(const api::CaptureRequest& request
     for (const kernel::LeftOut& left_out : environment_->plan().left_out)
       if (left_out.what == slot_name(slot)) throw BadInput(what + ": the plan leaves the slot out: " + left_out.why);
     try {
-      tape_->writer = std::make_shared<capsule::Writer>(request.path(), capsule_header(options_, slot));
-    } catch (const std::system_error& problem) {
+      tape_->writer = std::make_shared<capsule::Writer>(request.path(), capsule_header(options_, slot),
+                                                        OutputFile::Allowed::kOrdinary);
+    } catch (const std::runtime_error& problem) {
       throw BadInput(fmt::format("{}: {}", what, problem.what()));
     }
     tape_->slot = slot;

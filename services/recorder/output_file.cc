@@ -1,15 +1,28 @@
 #include "services/recorder/output_file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cerrno>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
 namespace gravitas {
 
-OutputFile::OutputFile(std::string what, std::string path) : what_(std::move(what)), path_(std::move(path)) {
+OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
+    : what_(std::move(what)), path_(std::move(path)) {
   if (path_.empty()) return;
-  file_.reset(std::fopen(path_.c_str(), "we"));
-  if (!file_) fail();
+  const bool is_any = allowed == Allowed::kAny;
+  const int handle = open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (is_any ? 0 : O_NONBLOCK), 0666);
+  // ENXIO: a pipe that nobody reads
+  struct stat about = {};
+  if (handle < 0 ? errno != ENXIO || is_any : fstat(handle, &about) != 0) fail();
+  if (handle >= 0) file_.reset(fdopen(handle, "w"));
+  const bool is_ordinary = S_ISREG(about.st_mode);
+  if (!is_ordinary && !is_any) throw std::runtime_error(named() + ": it is not an ordinary file");
+  if (!file_ || (is_ordinary && ftruncate(handle, 0) != 0)) fail();
 }
 
 void OutputFile::write(std::string_view text) {
@@ -20,6 +33,6 @@ void OutputFile::close() {
   if (file_ && std::fclose(file_.release()) != 0) fail();
 }
 
-void OutputFile::fail() const { throw std::system_error(errno, std::generic_category(), what_ + " '" + path_ + "'"); }
+void OutputFile::fail() const { throw std::system_error(errno, std::generic_category(), named()); }
 
 }  // namespace gravitas

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -216,6 +217,9 @@ TEST(Capsule, RefusalsSayWhatIsAllowed) {
   expect({"capture", scene, "--slot", "solver", "--out", folder.path("no/x")}, "No such file");
   expect({"replay", folder.path("missing")}, "No such file");
   expect({"replay", scene}, "is no capsule");
+  const std::string pipe = folder.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  expect({"replay", pipe}, "it is not an ordinary file");
   const std::string file = capture("solver", folder);
   expect({"replay", file, "--call", "999"}, "has no such call");
   expect({"bisect", file, "Sequential", "Nobody"}, "Nobody");

@@ -260,6 +260,15 @@ TEST(ServedRun, ACaptureThatTheRunOutlivesIsKeptAsFarAsItCame) {
   EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("/nowhere/at/all"));
   request.set_path("relative");
   EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("an absolute path"));
+  // the server would wait for who reads it
+  const std::string pipe = folder.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe, std::string("/dev/null")}) {
+    request.set_path(path);
+    EXPECT_THAT(refusal([&] { served.client.capture(request); }),
+                HasSubstr("capsule '" + path + "': it is not an ordinary file"));
+  }
+  EXPECT_EQ(served.client.step(3).step(), 3U);
 }
 
 TEST(ServedRun, ItListensAtAnAddress) {
