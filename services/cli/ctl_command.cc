@@ -17,6 +17,7 @@
 #include "services/recorder/json.h"
 #include "services/recorder/output_file.h"
 #include "services/run/edit_spec.h"
+#include "services/run/file_names.h"
 #include "services/run/session.h"
 #include "services/survey/picture.h"
 
@@ -169,9 +170,12 @@ int show_instrumentation(const CtlLine& line, ControlClient* client) {
   for (const std::string& kind : line.kinds) request.add_kinds(kind);
   const instrumentation::v1::Frame frame = client->instrumentation(request);
   for (const std::string& reason : frame.missing()) std::cerr << "gravitas ctl: missing: " << reason << '\n';
+  const api::Status status = client->status();
+  std::vector<NamedFile> files;
+  for (const std::string& file : status.files()) files.push_back({"a file of the scene,", file});
+  require_separate(files, {{"--out", line.out}});
   const bool is_picture = line.out.ends_with(".svg");
-  const std::string text =
-      is_picture ? survey::picture(frame, client->status().scene()) : to_json(frame, JsonForm::kLine);
+  const std::string text = is_picture ? survey::picture(frame, status.scene()) : to_json(frame, JsonForm::kLine);
   if (line.out.empty()) {
     std::cout << text;
     return kDone;

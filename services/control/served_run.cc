@@ -15,6 +15,7 @@
 #include "services/recorder/identity.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
+#include "services/run/file_names.h"
 #include "services/run/kernel_names.h"
 #include "services/scene/parser.h"
 #include "services/scene/refusal.h"
@@ -383,6 +384,8 @@ std::future<api::Captured> ServedRun::capture(const api::CaptureRequest& request
   if (request.steps() == 0) throw BadInput(what + ": allowed: a number of steps from 1");
   if (!request.path().starts_with('/')) throw BadInput(what + ": allowed: an absolute path for the capsule");
   return between_steps([&] {
+    for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
+      require_separate(files_of(*scene), {{"--out", request.path()}});
     require_steps_left("capture");
     if (capture_) throw NotNow(what + ": another capture is being made");
     for (const kernel::LeftOut& left_out : environment_->plan().left_out)

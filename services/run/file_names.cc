@@ -43,19 +43,21 @@ std::vector<NamedFile> kept_by(const RunOptions& options) {
   return {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
 }
 
-std::vector<NamedFile> meshes_of(const scene::v1::Scene& scene) {
-  std::vector<NamedFile> meshes;
+}  // namespace
+
+std::vector<NamedFile> files_of(const scene::v1::Scene& scene) {
+  std::vector<NamedFile> files;
+  // names of overrides among them are those of no file
+  for (const std::string& name : scene.files()) files.push_back({"the scene", name});
   for (const scene::v1::Geometry& geometry : scene.geometries().geometry()) {
     const auto file = static_cast<int>(geometry.location().file());
     const fs::path folder = file < scene.files_size() ? fs::path(scene.files(file)).parent_path() : fs::path();
     for (const scene::v1::Property& property : geometry.custom_properties().property())
       if (property.name() == "File" && !property.value().text().empty())
-        meshes.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
+        files.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
   }
-  return meshes;
+  return files;
 }
-
-}  // namespace
 
 void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -66,11 +68,10 @@ void require_separate(const std::vector<NamedFile>& inputs, const std::vector<Na
 
 void require_separate_files(const RunOptions& options, const scene::v1::Scene& scene,
                             const std::vector<edit::v1::Edit>& edits) {
-  std::vector<NamedFile> inputs = meshes_of(scene);
+  std::vector<NamedFile> inputs = files_of(scene);
   const std::vector<NamedFile> kept = kept_by(options);
   const std::vector<NamedFile> resumed = {{"--resume", options.resume},
                                           {"the journal of --resume", journal(options.resume)}};
-  for (const std::string& one : options.scenes) inputs.push_back({"the scene", one});
   for (const edit::v1::Edit& edit : edits)
     for (const edit::v1::Change& change : edit.changes())
       if (change.has_add()) inputs.push_back({"--edit add", change.add().name()});

@@ -168,6 +168,29 @@ TEST(Serve, CtlEditsTheSceneAndWakesABody) {
   EXPECT_EQ(served.ctl({"wake", "Ball01"}).exit_code, 0);
 }
 
+TEST(Serve, CtlWritesOverNothingThatTheSceneWasReadFrom) {
+  const ScratchFolder folder;
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const std::string mesh = folder.write("x.obj", text);
+  const std::string solid = folder.write(
+      "solid.gravitas",
+      "Geometries { Geometry { Type = \"TriangleMesh\" Id = \"X\" CustomProperties { File = \"x.obj\" } } }");
+  Served served({solid, "--duration", "3600"});
+  ASSERT_FALSE(served.socket().empty());
+  for (const std::string& file : {mesh, solid}) {
+    const std::string before = read_file(file);
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"capture", "solver", "--steps", "1"}, {"instrumentation"}}) {
+      std::vector<std::string> all = words;
+      all.insert(all.end(), {"--out", file});
+      const ProgramResult result = served.ctl(all);
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err, HasSubstr("--out " + file + ": it is the same file as "));
+      EXPECT_EQ(read_file(file), before);
+    }
+  }
+}
+
 TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   Served served({"--duration", "3600"});
   ASSERT_FALSE(served.socket().empty());
