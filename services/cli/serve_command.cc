@@ -12,6 +12,7 @@
 #include "services/cli/commands.h"
 #include "services/cli/option_checks.h"
 #include "services/cli/scene_options.h"
+#include "services/cli/terminal.h"
 #include "services/control/served_run.h"
 #include "services/control/server.h"
 #include "services/control/server_socket.h"
@@ -39,6 +40,8 @@ int serve(ServeLine* line) {
         "127.0.0.1:PORT or [::1]:PORT; others with --allow-remote",
         line->listen));
   line->scene.apply();
+  listen_to_interrupts();
+  control::ServedRun run(line->options);
   // from here on a signal ends it in order
   boost::asio::io_context loop;
   boost::asio::signal_set signals(loop, SIGINT, SIGTERM, SIGHUP);
@@ -47,7 +50,6 @@ int serve(ServeLine* line) {
     signals.clear();
   });
 
-  control::ServedRun run(line->options);
   for (const std::string& warning : run.scene_warnings()) std::cerr << warning << '\n';
   {
     const control::ServerSocket socket(line->socket);

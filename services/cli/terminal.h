@@ -6,7 +6,8 @@
 
 namespace gravitas::cli {
 
-// From now on the first SIGINT, SIGTERM or SIGHUP is noted, and the second ends the program.
+// From now on a SIGINT, SIGTERM or SIGHUP ends the program at once, with a word and exit code 130: it may wait for a file
+// that is a pipe. From the first interrupted() on the first one is noted, and the second ends the program.
 void listen_to_interrupts();
 // The first has come.
 bool interrupted();
