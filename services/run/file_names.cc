@@ -13,13 +13,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// The file that a name leads to over symbolic links, of which the last may lead to none yet.
+fs::path target_of(fs::path path) {
+  std::error_code none;
+  // as many as Linux follows
+  for (int i = 0; i < 40 && fs::is_symlink(fs::symlink_status(path, none)); ++i)
+    path = path.parent_path() / fs::read_symlink(path, none);
+  return fs::weakly_canonical(fs::absolute(path), none);
+}
+
 bool is_same_file(const std::string& a, const std::string& b) {
   std::error_code none;
   const fs::file_status one = fs::status(a, none), other = fs::status(b, none);
   if (fs::exists(one) != fs::exists(other)) return false;
   if (fs::exists(one)) return fs::is_regular_file(one) && fs::equivalent(a, b, none);
   // neither is there yet
-  return fs::weakly_canonical(fs::absolute(a), none) == fs::weakly_canonical(fs::absolute(b), none);
+  return target_of(a) == target_of(b);
 }
 
 void require_other(const NamedFile& output, const NamedFile& file) {

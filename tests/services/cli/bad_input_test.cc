@@ -303,6 +303,12 @@ TEST(BadInput, NoFileIsWrittenTwice) {
   EXPECT_THAT(result.err, HasSubstr("/x: it is the same file as --trajectory x; allowed: a file of its own"));
   EXPECT_FALSE(std::filesystem::exists(folder.path("x")));
   EXPECT_EQ(run({"--report", "/dev/null", "--events", "/dev/null"}).exit_code, 0);
+  // over links, though nothing is there yet
+  std::filesystem::create_symlink("x", folder.path("z"));
+  std::filesystem::create_symlink(folder.path("z"), folder.path("y"));
+  EXPECT_THAT(run({"--trajectory", "x", "--report", "y"}).err, HasSubstr("--report y: it is the same file as"));
+  EXPECT_EQ(run({"--checkpoint", "z", "--report", "y"}).exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(folder.path("x")));
 
   // a checkpoint may take the place of the one that the run goes on from, and nothing else may
   EXPECT_EQ(run({"--checkpoint", "c"}).exit_code, 0);
