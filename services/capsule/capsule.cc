@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "services/run/session.h"
 
@@ -71,21 +72,19 @@ v1::CapsuleCall begin_call(const kernel::StageCall& call, const kernel::Arena& a
 
 Writer::Writer(const std::string& path, const v1::CapsuleHeader& header, OutputFile::Allowed allowed)
     : file_("capsule", path, allowed) {
-  const FileHeader start;
-  file_.write(text_of(start));
   v1::CapsuleRecord record;
   *record.mutable_header() = header;
-  put(record);
+  start_ = std::string(text_of(FileHeader())) + framed(record);
 }
 
-void Writer::put(const v1::CapsuleRecord& record) {
+std::string Writer::framed(const v1::CapsuleRecord& record) {
   const std::string bytes = record.SerializeAsString();
   const auto size = static_cast<std::uint32_t>(bytes.size());
   check_ = XXH3_64bits_withSeed(bytes.data(), bytes.size(), check_);
-  file_.write(text_of(size));
-  file_.write(bytes);
-  file_.write(text_of(check_));
+  return std::string(text_of(size)) + bytes + std::string(text_of(check_));
 }
+
+void Writer::put(const v1::CapsuleRecord& record) { file_.write(std::exchange(start_, {}) + framed(record)); }
 
 std::uint32_t Writer::add_plugin(const kernel::PluginChoice& plugin) {
   v1::CapsuleRecord record;
@@ -110,7 +109,7 @@ void Writer::add_call(const v1::CapsuleCall& call) {
 
 void Writer::close() {
   const std::lock_guard lock(mutex_);
-  file_.close();
+  if (calls_ > 0) file_.close();
 }
 
 std::uint32_t Writer::calls() const {

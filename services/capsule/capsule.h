@@ -35,16 +35,18 @@ class Writer {
   std::uint32_t add_plugin(const kernel::PluginChoice& plugin);
   // Throws std::system_error when the disk is full.
   void add_call(const recorder::v1::CapsuleCall& call);
-  // All calls are in the file. Throws likewise.
+  // All calls are in the file; without any, what stood there still is. Throws likewise.
   void close();
   std::uint32_t calls() const;
 
  private:
+  std::string framed(const recorder::v1::CapsuleRecord& record);
   void put(const recorder::v1::CapsuleRecord& record);
 
   mutable std::mutex mutex_;
   OutputFile file_;
   std::uint64_t check_ = 0;
+  std::string start_;  // until it is written, before the first record
   std::uint32_t plugins_ = 0, calls_ = 0;
 };
 

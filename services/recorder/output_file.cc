@@ -20,16 +20,22 @@ OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
   struct stat about = {};
   if (handle < 0 ? errno != ENXIO || is_any : fstat(handle, &about) != 0) fail();
   if (handle >= 0) file_.reset(fdopen(handle, "w"));
-  const bool is_ordinary = S_ISREG(about.st_mode);
-  if (!is_ordinary && !is_any) throw std::runtime_error(named() + ": it is not an ordinary file");
-  if (!file_ || (is_ordinary && ftruncate(handle, 0) != 0)) fail();
+  is_old_ = S_ISREG(about.st_mode);
+  if (!is_old_ && !is_any) throw std::runtime_error(named() + ": it is not an ordinary file");
+  if (!file_) fail();
+}
+
+void OutputFile::begin() {
+  if (std::exchange(is_old_, false) && ftruncate(fileno(file_.get()), 0) != 0) fail();
 }
 
 void OutputFile::write(std::string_view text) {
+  begin();
   if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
 }
 
 void OutputFile::close() {
+  begin();
   if (file_ && std::fclose(file_.release()) != 0) fail();
 }
 

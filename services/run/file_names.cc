@@ -44,7 +44,8 @@ std::vector<NamedFile> outputs_of(const RunOptions& options) {
           {"--report", options.report},
           {"--events", options.events},
           {"--reactions", options.reactions},
-          {"--instrumentation", options.instrumentation}};
+          {"--instrumentation", options.instrumentation},
+          {"--out", options.capsule}};
 }
 
 std::vector<NamedFile> kept_by(const RunOptions& options) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -222,6 +223,16 @@ TEST(Capsule, RefusalsSayWhatIsAllowed) {
   expect({"replay", pipe}, "it is not an ordinary file");
   const std::string file = capture("solver", folder);
   expect({"replay", file, "--call", "999"}, "has no such call");
+  // what is there is not lost to a run that records nothing
+  const std::string whole = harness::read_file(file);
+  expect({"capture", scene, "--slot", "solver", "--out", file, "--steps", "5", "--from-step", "10"},
+         "ended after step 5");
+  expect({"capture", scene, "--slot", "solver", "--out", file, "--set", "Solver.Iterations=0"}, "Iterations");
+  EXPECT_EQ(harness::read_file(file), whole);
+  // a check of nothing is none
+  std::uint32_t header = 0;
+  std::memcpy(&header, &whole[24], sizeof header);
+  expect({"replay", folder.write("empty", whole.substr(0, 24 + 4 + header + 8))}, "it holds no calls");
   expect({"bisect", file, "Sequential", "Nobody"}, "Nobody");
 }
 

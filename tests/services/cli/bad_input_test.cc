@@ -289,6 +289,9 @@ TEST(BadInput, WhatIsReadIsNotWrittenOver) {
       run_program({"capture", scene, "--steps", "1", "--slot", "solver", "--out", scene}, folder);
   EXPECT_EQ(capture.exit_code, 2);
   EXPECT_EQ(harness::read_file(scene), text);
+  EXPECT_EQ(run_program({"capture", scene, solid, "--steps", "1", "--slot", "solver", "--out", obj}, folder).exit_code,
+            2);
+  EXPECT_EQ(harness::read_file(obj), mesh);
 }
 
 TEST(BadInput, NoFileIsWrittenTwice) {

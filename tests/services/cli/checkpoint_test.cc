@@ -112,6 +112,9 @@ TEST(Checkpoints, WhatCannotBeUsedIsBadInputWithTheReason) {
   EXPECT_THAT(refusal({"--checkpoint", "/dev/full"}), HasSubstr("not an ordinary file"));
   EXPECT_THAT(refusal({"--checkpoint", folder.path("none/kept")}), HasSubstr("No such file"));
   EXPECT_THAT(refusal({"--checkpoint-every", "5"}), HasSubstr("requires --checkpoint"));
+  const std::string before = read_file(kept);
+  EXPECT_THAT(refusal({"--checkpoint", kept, "--report", folder.path("none/x")}), HasSubstr("No such file"));
+  EXPECT_EQ(read_file(kept), before);
   EXPECT_THAT(refusal({"--checkpoint", kept, "--checkpoint-every", "0"}), HasSubstr("--checkpoint-every"));
   std::string bytes = read_file(kept);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] + 1);
