@@ -1,6 +1,7 @@
 #include "services/recorder/output_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,6 +24,9 @@ OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
   is_old_ = S_ISREG(about.st_mode);
   if (!is_old_ && !is_any) throw std::runtime_error(named() + ": it is not an ordinary file");
   if (!file_) fail();
+  // where the file system has no locks there is none
+  if (is_old_ && flock(handle, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw std::runtime_error(named() + ": another run is writing it");
 }
 
 void OutputFile::begin() {

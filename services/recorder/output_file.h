@@ -15,7 +15,7 @@ class OutputFile {
   enum class Allowed : std::uint8_t { kAny, kOrdinary };
 
   // `what` names it in errors: "trajectory". No file if `path` is empty. What stands there stays up to begin(). Throws
-  // std::system_error if it cannot be made, std::runtime_error if it is not allowed.
+  // std::system_error if it cannot be made, std::runtime_error if it is not allowed, or another run is writing it.
   OutputFile(std::string what, std::string path, Allowed allowed = Allowed::kAny);
 
   bool is_open() const { return file_ != nullptr; }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "services/recorder/output_file.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
@@ -321,6 +322,21 @@ TEST(BadInput, NoFileIsWrittenTwice) {
   EXPECT_EQ(run({"--resume", "c", "--checkpoint", "c.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--checkpoint", "d", "--events", "d.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--resume", "c"}).exit_code, 0);
+}
+
+TEST(BadInput, NoFileIsWrittenByTwoRunsAtOnce) {
+  const ScratchFolder folder;
+  const std::string path = folder.write("x", "of an earlier run");
+  const OutputFile held("of another run", path);
+  for (const char* option : {"--trajectory", "--report", "--events", "--reactions", "--instrumentation"}) {
+    const ProgramResult result = run_program({"run", kSample, "--hosting", "direct", option, path}, folder);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr(std::string(option + 2) + " '" + path + "': another run is writing it"));
+  }
+  const ProgramResult capture = run_program({"capture", kSample, "--slot", "solver", "--out", path}, folder);
+  EXPECT_EQ(capture.exit_code, 2);
+  EXPECT_THAT(capture.err, HasSubstr("another run is writing it"));
+  EXPECT_EQ(harness::read_file(path), "of an earlier run");
 }
 
 TEST(BadInput, AFileThatIsNoSceneAtAll) {
