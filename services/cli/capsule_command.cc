@@ -32,6 +32,7 @@ int capture(CaptureLine* line) {
   capsule::Tape& tape = *line->tape;
   tape.slot = parse_slot("--slot", line->slot, line->slot);
   listen_to_interrupts();
+  let_writes_fail();
   std::shared_ptr<capsule::Writer> writer;
   try {
     tape.writer = writer =

@@ -41,6 +41,11 @@ bool interrupted() {
   return interrupt_requested != 0;
 }
 
+void let_writes_fail() {
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+}
+
 StatusLine::StatusLine(bool is_wanted) : is_terminal_(isatty(STDERR_FILENO) == 1), is_wanted_(is_wanted) {}
 
 StatusLine::~StatusLine() {

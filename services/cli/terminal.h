@@ -1,4 +1,4 @@
-// What the commands share of a person's terminal: Ctrl-C, and a line that tells how far the work is.
+// What the commands share of a person's terminal: Ctrl-C and other signals, and a line that tells how far the work is.
 #pragma once
 
 #include <chrono>
@@ -11,6 +11,9 @@ namespace gravitas::cli {
 void listen_to_interrupts();
 // The first has come.
 bool interrupted();
+
+// A file beyond the limit of its size, and a pipe that nobody reads any more, are errors of that write, as a full disk is.
+void let_writes_fail();
 
 // A line on standard error for work longer than two seconds, rewritten in place and gone at the end. Where that is no
 // terminal: nothing, or a line a second if it `is_wanted`, from the start.
