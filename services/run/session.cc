@@ -399,6 +399,7 @@ class Run final : private kernel::CommitListener {
     };
     for (const kernel::SwapOrder& order : swaps_) warn("--swap", order.step);
     for (const kernel::FaultInjection& fault : faults_) warn("--fault", fault.step);
+    for (const edit::v1::Edit& edit : edits_.to_come()) warn("--edit", edit.step());
   }
 
   // Those of steps up to the next edit; after it another environment gets the rest.

@@ -309,11 +309,15 @@ TEST(Run, WarnsOfOrdersBeyondItsEnd) {
   const ScratchFolder folder;
   const ProgramResult result =
       run_program({"run", kSample, "--steps", "3", "--hosting", "direct", "--hosting", "solver=shm", "--fault",
-                   "solver:kill@step=9", "--swap", "solver=Newton@step=8"},
+                   "solver:kill@step=9", "--swap", "solver=Newton@step=8", "--edit",
+                   "set Body.Ball01.LinearVelocity={0,1,0}@step=7", "--report", "report.json"},
                   folder);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("--fault at step 9 never comes: the run has 3 steps"));
   EXPECT_THAT(result.err, HasSubstr("--swap at step 8 never comes: the run has 3 steps"));
+  const std::string edit = "--edit at step 7 never comes: the run has 3 steps";
+  EXPECT_THAT(result.err, HasSubstr(edit));
+  EXPECT_THAT(read_file(folder.path("report.json")), HasSubstr(edit));
 }
 
 }  // namespace
