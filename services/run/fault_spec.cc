@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <optional>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "plugin_sdk/host/fault_kinds.h"
 #include "plugin_sdk/near_miss.h"
 #include "plugin_sdk/slots.h"
+#include "schemas/stage_frames.h"
 #include "services/run/session.h"
 
 namespace gravitas {
@@ -60,6 +62,26 @@ std::optional<std::uint32_t> take_count(std::vector<std::string_view>* arguments
   return found;
 }
 
+// Of a reply of the slot; where rows are numbered, one of numbers.
+void require_column(const host::FaultOrder& order, Slot slot, const std::string& specification) {
+  const std::string name(order.word("column"));
+  const bool is_of_numbers =
+      std::ranges::find(order.info().arguments, "row", &host::FaultArgument::name) != order.info().arguments.end();
+  std::vector<std::string> names;
+  for (const stage::MethodInfo& method : stage::kMethods) {
+    std::string owner = std::string(method.name).substr(0, std::string_view(method.name).find('.'));
+    owner[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(owner[0])));
+    if (owner != slot_name(slot)) continue;
+    for (const stage::ColumnInfo& column : method.reply)
+      if ((!is_of_numbers || column.type == stage::ElementType::kF64) &&
+          std::ranges::find(names, column.name) == names.end())
+        names.emplace_back(column.name);
+  }
+  if (std::ranges::find(names, name) == names.end())
+    refuse(specification, fmt::format("replies of slot {} have no column '{}'{}: {}", slot_name(slot), name,
+                                      is_of_numbers ? " of numbers" : "", allowed_names(name, names)));
+}
+
 }  // namespace
 
 kernel::FaultInjection parse_fault(const std::string& specification) {
@@ -80,7 +102,9 @@ kernel::FaultInjection parse_fault(const std::string& specification) {
   fault.times = take_count(&order, "times", specification).value_or(1);
   for (const std::string_view part : order) fault.order += (fault.order.empty() ? "" : ",") + std::string(part);
   std::string problem;
-  if (!host::parse_fault_order(fault.order, &problem)) refuse(specification, problem);
+  const std::optional<host::FaultOrder> read = host::parse_fault_order(fault.order, &problem);
+  if (!read) refuse(specification, problem);
+  if (read->gives("column")) require_column(*read, fault.slot, specification);
   fault.step = *step;
   return fault;
 }
