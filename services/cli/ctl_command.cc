@@ -11,6 +11,7 @@
 #include "services/cli/option_checks.h"
 #include "services/cli/query_text.h"
 #include "services/cli/scene_options.h"
+#include "services/cli/terminal.h"
 #include "services/control/client.h"
 #include "services/control/server_socket.h"
 #include "services/control/status_text.h"
@@ -145,8 +146,11 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
   request.set_path(std::filesystem::absolute(line.out).lexically_normal().string());
   request.set_steps(line.captured_steps);
   if (client->status().state() == "paused")
-    std::cerr << "gravitas ctl: the run is paused: the calls come with its next steps\n";
-  const api::Captured captured = client->capture(request);
+    std::cerr << "gravitas ctl: the run is paused: the calls come with its next steps; Ctrl-C ends the capture\n";
+  listen_to_interrupts();
+  // from here on a signal ends the capture, not the program
+  if (interrupted()) return kInterrupted;
+  const api::Captured captured = client->capture(request, interrupted);
   if (line.json) {
     std::cout << to_json(captured, JsonForm::kPage);
   } else {
@@ -154,6 +158,7 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
                              line.text, captured.steps(), captured.first_step());
   }
   if (captured.steps() == line.captured_steps) return kDone;
+  if (interrupted()) return kInterrupted;
   std::cerr << "gravitas ctl: the run ended or was reset before\n";
   return kExaminedFailed;
 }

@@ -191,6 +191,25 @@ TEST(Serve, CtlWritesOverNothingThatTheSceneWasReadFrom) {
   }
 }
 
+TEST(Serve, AnInterruptedCaptureIsWhole) {
+  Served served({"--duration", "3600", "--speed", "0"});
+  ASSERT_FALSE(served.socket().empty());
+  const ScratchFolder own;
+  const std::string file = own.path("solver.capsule");
+  const pid_t capture = harness::start_program(
+      {"ctl", "--socket", served.socket(), "capture", "solver", "--out", file, "--steps", "100000"}, own);
+  std::error_code none;
+  for (int i = 0; i < 3000 && !(std::filesystem::file_size(file, none) > 0 && !none); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  kill(capture, SIGINT);
+  const ProgramResult result = harness::finish_program(capture, own);
+  EXPECT_EQ(result.exit_code, 130) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("calls of slot solver in "));
+  const ProgramResult replay = harness::run_program({"replay", file}, own);
+  EXPECT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr(" 0 different"));
+}
+
 TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   Served served({"--duration", "3600"});
   ASSERT_FALSE(served.socket().empty());
