@@ -267,7 +267,7 @@ void add_ctl(CLI::App* app, Action* action) {
   add("resume", "Go on", "resume", then_line(&ControlClient::resume));
   add("step", "Make steps of a paused run; Ctrl-C ends them", "step 10", make_steps)
       ->add_option("N", line->steps, "Number of steps [1]")
-      ->check(whole_number(0));
+      ->check(whole_number(1));
   add("reset", "Back to t = 0, with the plugins of the scene", "reset", then_line(&ControlClient::reset));
   const auto add_order = [&](const char* name, const char* meaning, const char* example, Order order, const char* word,
                              const char* form) {

@@ -360,9 +360,8 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
 api::InjectOrdered ServedRun::inject(const api::InjectRequest& request) {
   return between_steps([&] {
     const std::string what = "inject " + request.fault();
-    const bool has_step = request.fault().find('@') != std::string::npos;
-    kernel::FaultInjection fault = parse_fault(request.fault() + (has_step ? "" : "@step=1"));
-    fault.step = next_step(what, has_step ? fault.step : 0);
+    kernel::FaultInjection fault = parse_inject(request.fault());
+    fault.step = next_step(what, fault.step);
     api::InjectOrdered ordered;
     ordered.set_step(fault.step);
     try {

@@ -429,6 +429,21 @@ TEST(BadInput, OptionsOfTheCommandLine) {
   }
 }
 
+TEST(BadInput, NamesTheOptionThatWasGiven) {
+  const ScratchFolder folder;
+  ProgramResult result = run_program({"run", kSample, "--dt", "1e-300", "--duration", "1"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--dt 1e-300: Duration 1 s in steps of 1e-300 s is"));
+  const std::string pendulum = folder.write(
+      "pendulum.gravitas",
+      "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} } } } Constraints { "
+      "Constraint { Type = \"Spherical\" Id = \"H\" Body1 = \"A\" CustomProperties { BindPoint = {1, 0, 0} } } } }\n"
+      "Simulator { CustomProperties { Duration = 1 } }");
+  result = run_program({"run", pendulum, "--hosting", "direct", "--set", "Simulator=Smooth"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("and Sequential has it not; allowed: \"Direct\", \"Newton\""));
+}
+
 // An empty value would count as an option that is left out.
 TEST(BadInput, EmptyValuesOfOptions) {
   const ScratchFolder folder;
@@ -535,6 +550,9 @@ TEST(BadInput, AWordThatIsNoSubcommandIsNamed) {
   const ScratchFolder folder;
   for (const auto& [arguments, message] : std::vector<std::pair<std::vector<std::string>, const char*>>{
            {{"runn"}, "there is no sub-command \"runn\"; did you mean \"run\"?"},
+           {{"ctl", "--socket", "x", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"},
+           {{"--bogus"}, "there is no option \"--bogus\""},
+           {{"ctl", "--bogus"}, "there is no option \"--bogus\""},
            {{"ctl", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"}}) {
     const ProgramResult result = run_program(arguments, folder);
     EXPECT_EQ(result.exit_code, 2);

@@ -305,6 +305,21 @@ TEST(Run, LooksForTheKindsOfEventsThatAreAskedFor) {
   EXPECT_THAT(result.err, HasSubstr("--ongoing-rate 0"));
 }
 
+TEST(Run, TellsWhatHasNoNumber) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "fast.gravitas",
+      "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { "
+      "LinearVelocity = {1e200, 0, 0} } } Body { Id = \"B\" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { "
+      "Position = {1, 0, 0} } } } } }\nSimulator { CustomProperties { Duration = 0.1 } }");
+  const ProgramResult result = run_program({"run", scene, "--hosting", "direct"}, folder);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr("energy not finite -> not finite J"));
+  EXPECT_THAT(result.err,
+              HasSubstr("m in step 1, over a million times what the scene measures (2 m): that is the speed "
+                        "which it was given"));
+}
+
 TEST(Run, WarnsOfOrdersBeyondItsEnd) {
   const ScratchFolder folder;
   const ProgramResult result =

@@ -257,6 +257,13 @@ TEST(Serve, WhatCannotBeIsExitCode2) {
   result = harness::run_program({"serve", kSample, "--headless", "--listen", "0.0.0.0:4711"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("others with --allow-remote"));
+  for (const char* address : {"127.0.0.1:99999", "127.0.0.1", "[::1]", "foo"}) {
+    result = harness::run_program({"serve", kSample, "--headless", "--listen", address}, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(std::string(address) + ": allowed: ADDR:PORT, with a port from 0 to 65535"));
+  }
+  result = harness::run_program({"ctl", "step", "0"}, folder);
+  EXPECT_THAT(result.err, HasSubstr("N: \"0\"; allowed: a whole number from 1"));
   result = harness::run_program({"serve", folder.path("none.gravitas"), "--headless"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   result = harness::run_program({"ctl", "--socket", folder.path("none.sock"), "status"}, folder);

@@ -307,7 +307,8 @@ TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
   EXPECT_THAT(set("Solvr.Iterations=5"), HasSubstr("unknown slot"));
   const auto inject = [&](const std::string& text) { return refusal([&] { served.client.inject(text); }); };
   EXPECT_THAT(inject("solver:kil"), HasSubstr("kill"));
-  EXPECT_THAT(inject("solver"), HasSubstr("SLOT:KIND"));
+  EXPECT_THAT(inject("solver:foo"), HasSubstr("inject solver:foo: there is no fault 'foo'"));
+  EXPECT_THAT(inject("solver"), HasSubstr("SLOT:KIND[@step=N]"));
   EXPECT_THAT(inject("force:kill"), HasSubstr("the plan leaves the slot out"));
   EXPECT_THAT(inject("solver:kill@step=121"), HasSubstr("1 (the next) to 120"));
   EXPECT_THAT(refusal([&] { served.client.step(0); }), HasSubstr("from 1"));
