@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 #include "services/run/session.h"
 
@@ -26,6 +27,11 @@ struct FileHeader {
   std::uint32_t zero = 0;
   std::uint64_t schema_hash = stage::kSchemaHash;
 };
+
+template <typename Number>
+std::string_view text_of(const Number& number) {
+  return {reinterpret_cast<const char*>(&number), sizeof number};
+}
 
 }  // namespace
 
@@ -64,24 +70,21 @@ v1::CapsuleCall begin_call(const kernel::StageCall& call, const kernel::Arena& a
   return record;
 }
 
-Writer::Writer(const std::string& path, const v1::CapsuleHeader& header)
-    : path_(path), file_(path, std::ios::binary | std::ios::trunc) {
-  const FileHeader start;
-  file_.write(reinterpret_cast<const char*>(&start), sizeof start);
+Writer::Writer(const std::string& path, const v1::CapsuleHeader& header, OutputFile::Allowed allowed)
+    : file_("capsule", path, allowed) {
   v1::CapsuleRecord record;
   *record.mutable_header() = header;
-  put(record);
+  start_ = std::string(text_of(FileHeader())) + framed(record);
 }
 
-void Writer::put(const v1::CapsuleRecord& record) {
+std::string Writer::framed(const v1::CapsuleRecord& record) {
   const std::string bytes = record.SerializeAsString();
   const auto size = static_cast<std::uint32_t>(bytes.size());
   check_ = XXH3_64bits_withSeed(bytes.data(), bytes.size(), check_);
-  file_.write(reinterpret_cast<const char*>(&size), sizeof size);
-  file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  file_.write(reinterpret_cast<const char*>(&check_), sizeof check_);
-  if (!file_) throw std::system_error(errno, std::generic_category(), "capsule '" + path_ + "'");
+  return std::string(text_of(size)) + bytes + std::string(text_of(check_));
 }
+
+void Writer::put(const v1::CapsuleRecord& record) { file_.write(std::exchange(start_, {}) + framed(record)); }
 
 std::uint32_t Writer::add_plugin(const kernel::PluginChoice& plugin) {
   v1::CapsuleRecord record;
@@ -106,8 +109,7 @@ void Writer::add_call(const v1::CapsuleCall& call) {
 
 void Writer::close() {
   const std::lock_guard lock(mutex_);
-  file_.close();
-  if (!file_) throw std::system_error(errno, std::generic_category(), "capsule '" + path_ + "'");
+  if (calls_ > 0) file_.close();
 }
 
 std::uint32_t Writer::calls() const {
@@ -115,10 +117,12 @@ std::uint32_t Writer::calls() const {
   return calls_;
 }
 
-Reader::Reader(const std::string& path) : path_(path), file_(path, std::ios::binary) {
+Reader::Reader(const std::string& path) : path_(path) {
   std::error_code problem;
-  if (!file_ || std::filesystem::is_directory(path, problem))
-    throw BadInput(fmt::format("capsule '{}': {}", path, std::strerror(file_ ? EISDIR : errno)));
+  if (std::filesystem::exists(path, problem) && !std::filesystem::is_regular_file(path, problem))
+    throw BadInput(fmt::format("capsule '{}': it is not an ordinary file", path));
+  file_.open(path, std::ios::binary);
+  if (!file_) throw BadInput(fmt::format("capsule '{}': {}", path, std::strerror(errno)));
   left_ = std::filesystem::file_size(path, problem);
   if (problem) throw BadInput(fmt::format("capsule '{}': {}", path, problem.message()));
   FileHeader start;

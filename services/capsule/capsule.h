@@ -20,30 +20,33 @@
 #include "kernel/arena.h"
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/message_columns.h"
+#include "services/recorder/output_file.h"
 
 namespace gravitas::capsule {
 
 // Writes while hosts are asked, from whatever thread.
 class Writer {
  public:
-  // Throws std::system_error if the file cannot be made.
-  Writer(const std::string& path, const recorder::v1::CapsuleHeader& header);
+  // Throws as OutputFile does.
+  Writer(const std::string& path, const recorder::v1::CapsuleHeader& header,
+         OutputFile::Allowed allowed = OutputFile::Allowed::kAny);
 
   // Index of the plugin in the capsule.
   std::uint32_t add_plugin(const kernel::PluginChoice& plugin);
   // Throws std::system_error when the disk is full.
   void add_call(const recorder::v1::CapsuleCall& call);
-  // All calls are in the file. Throws likewise.
+  // All calls are in the file; without any, what stood there still is. Throws likewise.
   void close();
   std::uint32_t calls() const;
 
  private:
+  std::string framed(const recorder::v1::CapsuleRecord& record);
   void put(const recorder::v1::CapsuleRecord& record);
 
   mutable std::mutex mutex_;
-  const std::string path_;
-  std::ofstream file_;
+  OutputFile file_;
   std::uint64_t check_ = 0;
+  std::string start_;  // until it is written, before the first record
   std::uint32_t plugins_ = 0, calls_ = 0;
 };
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <system_error>
+#include <stdexcept>
 
 #include "services/capsule/capsule.h"
 #include "services/capsule/recording_host.h"
@@ -15,7 +15,6 @@
 #include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/exchange_spec.h"
-#include "services/run/file_names.h"
 #include "services/run/session.h"
 
 namespace gravitas::cli {
@@ -25,21 +24,20 @@ struct CaptureLine {
   RunOptions options;
   SceneOptions scene{&options};
   std::shared_ptr<capsule::Tape> tape = std::make_shared<capsule::Tape>();
-  std::string slot, out;
+  std::string slot;
 };
 
 int capture(CaptureLine* line) {
   line->scene.apply();
-  std::vector<NamedFile> scenes;
-  for (const std::string& scene : line->options.scenes) scenes.push_back({"the scene", scene});
-  require_separate(scenes, {{"--out", line->out}});
   capsule::Tape& tape = *line->tape;
   tape.slot = parse_slot("--slot", line->slot, line->slot);
   listen_to_interrupts();
+  let_writes_fail();
   std::shared_ptr<capsule::Writer> writer;
   try {
-    tape.writer = writer = std::make_shared<capsule::Writer>(line->out, capsule_header(line->options, tape.slot));
-  } catch (const std::system_error& problem) {
+    tape.writer = writer =
+        std::make_shared<capsule::Writer>(line->options.capsule, capsule_header(line->options, tape.slot));
+  } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());
   }
   line->options.starter = capsule::recording(line->tape);
@@ -60,7 +58,7 @@ int capture(CaptureLine* line) {
     return kOurFault;
   }
   writer->close();
-  std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->out, writer->calls(), line->slot,
+  std::cout << fmt::format("{}: {} calls of slot {} in {} steps\n", line->options.capsule, writer->calls(), line->slot,
                            result.report.steps());
   if (writer->calls() == 0 && tape.first_step > result.report.steps()) {
     std::cerr << fmt::format("gravitas: --from-step {}: the run ended after step {}\n", tape.first_step,
@@ -114,6 +112,8 @@ void print_solutions(const report::v1::ReplayReport& report) {
 // A damaged capsule shows nothing of the calls that cannot be read.
 int verdict(const report::v1::ReplayReport& report, std::uint64_t failures) {
   if (failures > 0) return kExaminedFailed;
+  if (report.calls() == 0) std::cerr << fmt::format("capsule '{}': it holds no calls\n", report.capsule());
+  if (report.calls() == 0) return kBadInput;
   return report.note().empty() ? kDone : kBadInput;
 }
 
@@ -183,7 +183,7 @@ void add_capture(CLI::App* app, Action* action) {
       "         gravitas replay solver.capsule");
   line->scene.add_to(command);
   command->add_option("--slot", line->slot, "space, collision, constraint, force, solver or integrator")->required();
-  command->add_option("--out", line->out, "The capsule's file")->required();
+  command->add_option("--out", line->options.capsule, "The capsule's file")->required();
   command->add_option("--from-step", line->tape->first_step, "First step whose calls are kept [1]")
       ->check(whole_number(1));
   command->add_option("--calls", line->tape->most_calls, "Stop after so many calls")->check(whole_number(1));

@@ -11,12 +11,14 @@
 #include "services/cli/option_checks.h"
 #include "services/cli/query_text.h"
 #include "services/cli/scene_options.h"
+#include "services/cli/terminal.h"
 #include "services/control/client.h"
 #include "services/control/server_socket.h"
 #include "services/control/status_text.h"
-#include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
+#include "services/recorder/output_file.h"
 #include "services/run/edit_spec.h"
+#include "services/run/file_names.h"
 #include "services/run/session.h"
 #include "services/survey/picture.h"
 
@@ -144,8 +146,11 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
   request.set_path(std::filesystem::absolute(line.out).lexically_normal().string());
   request.set_steps(line.captured_steps);
   if (client->status().state() == "paused")
-    std::cerr << "gravitas ctl: the run is paused: the calls come with its next steps\n";
-  const api::Captured captured = client->capture(request);
+    std::cerr << "gravitas ctl: the run is paused: the calls come with its next steps; Ctrl-C ends the capture\n";
+  listen_to_interrupts();
+  // from here on a signal ends the capture, not the program
+  if (interrupted()) return kInterrupted;
+  const api::Captured captured = client->capture(request, interrupted);
   if (line.json) {
     std::cout << to_json(captured, JsonForm::kPage);
   } else {
@@ -153,6 +158,7 @@ int capture_calls(const CtlLine& line, ControlClient* client) {
                              line.text, captured.steps(), captured.first_step());
   }
   if (captured.steps() == line.captured_steps) return kDone;
+  if (interrupted()) return kInterrupted;
   std::cerr << "gravitas ctl: the run ended or was reset before\n";
   return kExaminedFailed;
 }
@@ -169,16 +175,21 @@ int show_instrumentation(const CtlLine& line, ControlClient* client) {
   for (const std::string& kind : line.kinds) request.add_kinds(kind);
   const instrumentation::v1::Frame frame = client->instrumentation(request);
   for (const std::string& reason : frame.missing()) std::cerr << "gravitas ctl: missing: " << reason << '\n';
+  const api::Status status = client->status();
+  std::vector<NamedFile> files;
+  for (const std::string& file : status.files()) files.push_back({"a file of the scene,", file});
+  require_separate(files, {{"--out", line.out}});
   const bool is_picture = line.out.ends_with(".svg");
-  const std::string text =
-      is_picture ? survey::picture(frame, client->status().scene()) : to_json(frame, JsonForm::kLine);
+  const std::string text = is_picture ? survey::picture(frame, status.scene()) : to_json(frame, JsonForm::kLine);
   if (line.out.empty()) {
     std::cout << text;
     return kDone;
   }
   try {
-    write_text_file(line.out, text, "instrumentation");
-  } catch (const std::system_error& problem) {
+    OutputFile file("instrumentation", line.out, OutputFile::Allowed::kOrdinary);
+    file.write(text);
+    file.close();
+  } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());
   }
   return kDone;
@@ -256,7 +267,7 @@ void add_ctl(CLI::App* app, Action* action) {
   add("resume", "Go on", "resume", then_line(&ControlClient::resume));
   add("step", "Make steps of a paused run; Ctrl-C ends them", "step 10", make_steps)
       ->add_option("N", line->steps, "Number of steps [1]")
-      ->check(whole_number(0));
+      ->check(whole_number(1));
   add("reset", "Back to t = 0, with the plugins of the scene", "reset", then_line(&ControlClient::reset));
   const auto add_order = [&](const char* name, const char* meaning, const char* example, Order order, const char* word,
                              const char* form) {

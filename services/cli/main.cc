@@ -32,6 +32,16 @@ std::string unknown_subcommand(const CLI::App& app, const std::vector<std::strin
   return {};
 }
 
+// Instead of the sub-command that is missing: what could not be one; empty: nothing is there.
+std::string unexpected_word(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands()[0];
+  const std::vector<std::string> words = app.remaining(true);
+  if (words.empty() || command->get_subcommands(nullptr).empty()) return {};
+  if (words[0].starts_with('-')) return "there is no option \"" + words[0] + "\"; --help names those that there are";
+  return unknown_subcommand(*command, words);
+}
+
 // Workers of many slots, with their standbys, take more files than shells allow at first.
 void raise_descriptor_limit() {
   rlimit limit{};
@@ -90,6 +100,11 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    const bool is_missing = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+    if (const std::string word = is_missing ? unexpected_word(app) : ""; !word.empty()) {
+      std::cerr << "gravitas: " << word << '\n';
+      return cli::kBadInput;
+    }
     const int code = app.exit(error, std::cout, std::cerr);
     return exit_code(code == 0 ? cli::kDone : cli::kBadInput);
   }

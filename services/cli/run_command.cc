@@ -1,7 +1,6 @@
 // `gravitas run` and `gravitas plan`.
 #include <fmt/format.h>
 
-#include <csignal>
 #include <iostream>
 #include <memory>
 
@@ -69,8 +68,7 @@ void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warni
 int run_scene(RunLine* line) {
   line->scene.apply();
   listen_to_interrupts();
-  // a file beyond the limit of its size is an error of that write, as a full disk is
-  std::signal(SIGXFSZ, SIG_IGN);
+  let_writes_fail();
   RunResult result;
   {
     StatusLine progress(line->progress && !line->quiet);

@@ -3,6 +3,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <charconv>
 #include <cmath>
 #include <csignal>
 #include <iostream>
@@ -12,6 +13,7 @@
 #include "services/cli/commands.h"
 #include "services/cli/option_checks.h"
 #include "services/cli/scene_options.h"
+#include "services/cli/terminal.h"
 #include "services/control/served_run.h"
 #include "services/control/server.h"
 #include "services/control/server_socket.h"
@@ -27,11 +29,23 @@ struct ServeLine {
   bool headless = false, remote = false;
 };
 
+bool has_port(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos) return false;
+  std::uint16_t port = 0;
+  const char* const last = address.data() + address.size();
+  const auto [end, error] = std::from_chars(address.data() + colon + 1, last, port);
+  return error == std::errc() && end == last;
+}
+
 int serve(ServeLine* line) {
   if (!line->headless) throw BadInput("gravitas serve: the page comes later; allowed: --headless");
   if (!std::isfinite(line->options.speed) || line->options.speed < 0.0)
     throw BadInput(
         fmt::format("--speed {:g}: allowed: a finite number > 0, or 0: as fast as possible", line->options.speed));
+  if (!line->listen.empty() && !line->listen.starts_with("unix:") && !has_port(line->listen))
+    throw BadInput(fmt::format("--listen {}: allowed: ADDR:PORT, with a port from 0 to 65535, such as 127.0.0.1:4711",
+                               line->listen));
   if (!line->listen.empty() && !line->remote &&
       (line->listen.starts_with("unix:") || !channel::is_local_address(line->listen)))
     throw BadInput(fmt::format(
@@ -39,6 +53,8 @@ int serve(ServeLine* line) {
         "127.0.0.1:PORT or [::1]:PORT; others with --allow-remote",
         line->listen));
   line->scene.apply();
+  listen_to_interrupts();
+  control::ServedRun run(line->options);
   // from here on a signal ends it in order
   boost::asio::io_context loop;
   boost::asio::signal_set signals(loop, SIGINT, SIGTERM, SIGHUP);
@@ -47,7 +63,6 @@ int serve(ServeLine* line) {
     signals.clear();
   });
 
-  control::ServedRun run(line->options);
   for (const std::string& warning : run.scene_warnings()) std::cerr << warning << '\n';
   {
     const control::ServerSocket socket(line->socket);

@@ -6,6 +6,8 @@
 #include <csignal>
 #include <iostream>
 
+#include "services/cli/commands.h"
+
 namespace gravitas::cli {
 namespace {
 
@@ -13,9 +15,14 @@ constexpr std::chrono::milliseconds kPatience{2000}, kOnTerminal{100}, kElsewher
 // Of a narrow terminal; a longer line would not be rewritten in place.
 constexpr std::size_t kWidth = 78;
 
-volatile std::sig_atomic_t interrupt_requested = 0;
+volatile std::sig_atomic_t interrupt_requested = 0, has_begun = 0;
 
 void request_interrupt(int number) {
+  if (has_begun == 0) {
+    constexpr char kText[] = "gravitas: interrupted before it began\n";
+    [[maybe_unused]] const ssize_t said = write(STDERR_FILENO, kText, sizeof kText - 1);
+    _exit(kInterrupted);
+  }
   interrupt_requested = 1;
   std::signal(number, SIG_DFL);
 }
@@ -29,7 +36,15 @@ void listen_to_interrupts() {
   if (std::signal(SIGHUP, request_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
-bool interrupted() { return interrupt_requested != 0; }
+bool interrupted() {
+  has_begun = 1;
+  return interrupt_requested != 0;
+}
+
+void let_writes_fail() {
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+}
 
 StatusLine::StatusLine(bool is_wanted) : is_terminal_(isatty(STDERR_FILENO) == 1), is_wanted_(is_wanted) {}
 

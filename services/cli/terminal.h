@@ -1,4 +1,4 @@
-// What the commands share of a person's terminal: Ctrl-C, and a line that tells how far the work is.
+// What the commands share of a person's terminal: Ctrl-C and other signals, and a line that tells how far the work is.
 #pragma once
 
 #include <chrono>
@@ -6,10 +6,14 @@
 
 namespace gravitas::cli {
 
-// From now on the first SIGINT, SIGTERM or SIGHUP is noted, and the second ends the program.
+// From now on a SIGINT, SIGTERM or SIGHUP ends the program at once, with a word and exit code 130: it may wait for a file
+// that is a pipe. From the first interrupted() on the first one is noted, and the second ends the program.
 void listen_to_interrupts();
 // The first has come.
 bool interrupted();
+
+// A file beyond the limit of its size, and a pipe that nobody reads any more, are errors of that write, as a full disk is.
+void let_writes_fail();
 
 // A line on standard error for work longer than two seconds, rewritten in place and gone at the end. Where that is no
 // terminal: nothing, or a line a second if it `is_wanted`, from the start.

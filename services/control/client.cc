@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <future>
 
 #include "gravitas/control_api/v1/control_api.grpc.pb.h"
 #include "services/run/exchange_spec.h"
@@ -15,6 +16,8 @@ namespace {
 
 constexpr std::chrono::seconds kConnect{3};
 constexpr std::uint32_t kSwapIntervalMs = 20;
+// How soon a call that waits notices that it was interrupted.
+constexpr std::chrono::milliseconds kInterruptGlance{20};
 
 grpc::ChannelArguments channel_arguments() {
   grpc::ChannelArguments arguments;
@@ -112,8 +115,13 @@ api::InjectOrdered ControlClient::inject(const std::string& fault) {
   return connection_->call(&api::Control::Stub::Inject, request);
 }
 
-api::Captured ControlClient::capture(const api::CaptureRequest& request) {
-  return connection_->call(&api::Control::Stub::Capture, request);
+api::Captured ControlClient::capture(const api::CaptureRequest& request, const std::function<bool()>& interrupted) {
+  std::future<api::Captured> captured =
+      std::async(std::launch::async, [&] { return connection_->call(&api::Control::Stub::Capture, request); });
+  // again and again: it may not have begun
+  while (captured.wait_for(kInterruptGlance) == std::future_status::timeout)
+    if (interrupted()) connection_->call(&api::Control::Stub::EndCapture, api::EndCaptureRequest());
+  return captured.get();
 }
 
 query::v1::Answers ControlClient::query(const query::v1::Batch& batch) {

@@ -40,7 +40,9 @@ class ControlClient {
   api::EditMade edit(const api::EditRequest& request);
   api::Status wake(const std::string& body);
   api::InjectOrdered inject(const std::string& fault);
-  api::Captured capture(const api::CaptureRequest& request);
+  // Ends early, with what there is, when `interrupted` says so.
+  api::Captured capture(
+      const api::CaptureRequest& request, const std::function<bool()>& interrupted = [] { return false; });
   query::v1::Answers query(const query::v1::Batch& batch);
   instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
   api::Reactions reactions();

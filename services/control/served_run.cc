@@ -15,6 +15,7 @@
 #include "services/recorder/identity.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/fault_spec.h"
+#include "services/run/file_names.h"
 #include "services/run/kernel_names.h"
 #include "services/scene/parser.h"
 #include "services/scene/refusal.h"
@@ -359,9 +360,8 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
 api::InjectOrdered ServedRun::inject(const api::InjectRequest& request) {
   return between_steps([&] {
     const std::string what = "inject " + request.fault();
-    const bool has_step = request.fault().find('@') != std::string::npos;
-    kernel::FaultInjection fault = parse_fault(request.fault() + (has_step ? "" : "@step=1"));
-    fault.step = next_step(what, has_step ? fault.step : 0);
+    kernel::FaultInjection fault = parse_inject(request.fault());
+    fault.step = next_step(what, fault.step);
     api::InjectOrdered ordered;
     ordered.set_step(fault.step);
     try {
@@ -383,13 +383,16 @@ std::future<api::Captured> ServedRun::capture(const api::CaptureRequest& request
   if (request.steps() == 0) throw BadInput(what + ": allowed: a number of steps from 1");
   if (!request.path().starts_with('/')) throw BadInput(what + ": allowed: an absolute path for the capsule");
   return between_steps([&] {
+    for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
+      require_separate(files_of(*scene), {{"--out", request.path()}});
     require_steps_left("capture");
     if (capture_) throw NotNow(what + ": another capture is being made");
     for (const kernel::LeftOut& left_out : environment_->plan().left_out)
       if (left_out.what == slot_name(slot)) throw BadInput(what + ": the plan leaves the slot out: " + left_out.why);
     try {
-      tape_->writer = std::make_shared<capsule::Writer>(request.path(), capsule_header(options_, slot));
-    } catch (const std::system_error& problem) {
+      tape_->writer = std::make_shared<capsule::Writer>(request.path(), capsule_header(options_, slot),
+                                                        OutputFile::Allowed::kOrdinary);
+    } catch (const std::runtime_error& problem) {
       throw BadInput(fmt::format("{}: {}", what, problem.what()));
     }
     tape_->slot = slot;

@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <set>
+#include <system_error>
 
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
+#include "services/run/file_names.h"
 #include "services/run/kernel_names.h"
 #include "services/run/report.h"
 
@@ -69,6 +73,12 @@ api::Status ServedRun::status() {
   return between_steps([this] {
     api::Status status;
     status.set_scene(scene_name_);
+    std::set<std::string> files;
+    for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
+      for (const NamedFile& file : files_of(*scene))
+        if (std::error_code none; std::filesystem::exists(file.path, none))
+          files.insert(std::filesystem::absolute(file.path).string());
+    status.mutable_files()->Assign(files.begin(), files.end());
     status.set_state(state_name());
     status.set_fault(fault_);
     status.set_checkpoint(checkpoint_);

@@ -105,6 +105,9 @@ class ControlServer::Service final : public api::Control::Service {
       *reply = captured.get();
     });
   }
+  grpc::Status EndCapture(grpc::ServerContext*, const api::EndCaptureRequest*, api::Status* reply) override {
+    return then_status([&] { run_.end_capture(); }, reply);
+  }
   grpc::Status Query(grpc::ServerContext*, const query::v1::Batch* request, query::v1::Answers* reply) override {
     return answered([&] { *reply = run_.query(*request); });
   }

@@ -33,8 +33,6 @@ void EditSchedule::leave_out_past(std::uint32_t step, const std::vector<edit::v1
 void EditSchedule::rehearse(const RunOptions& options, scene::v1::Scene scene,
                             kernel::EnvironmentDescription description, Catalog* catalog) const {
   for (edit::v1::Edit edit : to_come_) {
-    if (edit.step() > description.steps)
-      throw BadInput(fmt::format("--edit: there is no step {}; the run has {}", edit.step(), description.steps));
     const EditedScene edited(options, scene, description, catalog, &edit, nullptr);
     scene = edited.scene();
     description = edited.description();

@@ -26,6 +26,9 @@ class EventLog final : public EventListener {
   // cannot be made.
   EventLog(const std::string& path, const kernel::EnvironmentDescription& description);
 
+  // Empties the file, which writing does, too. Throws std::system_error.
+  void begin() { file_.begin(); }
+
   // A file that cannot be written is said by close(): events come in the middle of a commit.
   void on_event(const Event& event) override;
 

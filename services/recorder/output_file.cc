@@ -1,25 +1,48 @@
 #include "services/recorder/output_file.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cerrno>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
 namespace gravitas {
 
-OutputFile::OutputFile(std::string what, std::string path) : what_(std::move(what)), path_(std::move(path)) {
+OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
+    : what_(std::move(what)), path_(std::move(path)) {
   if (path_.empty()) return;
-  file_.reset(std::fopen(path_.c_str(), "we"));
+  const bool is_any = allowed == Allowed::kAny;
+  const int handle = open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (is_any ? 0 : O_NONBLOCK), 0666);
+  // ENXIO: a pipe that nobody reads
+  struct stat about = {};
+  if (handle < 0 ? errno != ENXIO || is_any : fstat(handle, &about) != 0) fail();
+  if (handle >= 0) file_.reset(fdopen(handle, "w"));
+  is_old_ = S_ISREG(about.st_mode);
+  if (!is_old_ && !is_any) throw std::runtime_error(named() + ": it is not an ordinary file");
   if (!file_) fail();
+  // where the file system has no locks there is none
+  if (is_old_ && flock(handle, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    throw std::runtime_error(named() + ": another run is writing it");
+}
+
+void OutputFile::begin() {
+  if (std::exchange(is_old_, false) && ftruncate(fileno(file_.get()), 0) != 0) fail();
 }
 
 void OutputFile::write(std::string_view text) {
+  begin();
   if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
 }
 
 void OutputFile::close() {
+  begin();
   if (file_ && std::fclose(file_.release()) != 0) fail();
 }
 
-void OutputFile::fail() const { throw std::system_error(errno, std::generic_category(), what_ + " '" + path_ + "'"); }
+void OutputFile::fail() const { throw std::system_error(errno, std::generic_category(), named()); }
 
 }  // namespace gravitas

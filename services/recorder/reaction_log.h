@@ -25,6 +25,9 @@ class ReactionLog {
   // std::system_error if the file cannot be made.
   ReactionLog(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
 
+  // Empties the file, which writing does, too. Throws std::system_error.
+  void begin() { file_.begin(); }
+
   // What kernel::CommitListener hears of an inner step.
   void add(const kernel::Environment& environment, const kernel::InnerStep& inner);
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <iterator>
+#include <utility>
 
 namespace gravitas {
 namespace {
@@ -21,7 +22,10 @@ TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::Enviro
                                    double interval)
     : file_("trajectory", path), sampling_(interval) {
   follow(description);
-  file_.write("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n");
+}
+
+void TrajectoryWriter::begin() {
+  if (!std::exchange(has_begun_, true)) file_.write("time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz\n");
 }
 
 void TrajectoryWriter::follow(const kernel::EnvironmentDescription& description) {
@@ -37,6 +41,7 @@ void TrajectoryWriter::offer(const kernel::Environment& environment, bool last) 
 }
 
 void TrajectoryWriter::write_sample(const kernel::Environment& environment) {
+  begin();
   const kernel::StateView state = environment.state();
   fmt::memory_buffer text;
   for (const Row& row : rows_) {

@@ -22,6 +22,9 @@ class TrajectoryWriter {
   // `interval` 0: every step. Throws std::system_error if the file cannot be made.
   TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description, double interval);
 
+  // Empties the file and writes its first line, which the first sample does, too. Throws std::system_error.
+  void begin();
+
   // The bodies are these from now on.
   void follow(const kernel::EnvironmentDescription& description);
 
@@ -41,6 +44,7 @@ class TrajectoryWriter {
   };
 
   OutputFile file_;
+  bool has_begun_ = false;
   std::vector<Row> rows_;
   Sampling sampling_;
 };

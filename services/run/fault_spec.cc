@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <optional>
 #include <string_view>
@@ -11,24 +12,23 @@
 #include "plugin_sdk/host/fault_kinds.h"
 #include "plugin_sdk/near_miss.h"
 #include "plugin_sdk/slots.h"
+#include "schemas/stage_frames.h"
 #include "services/run/session.h"
 
 namespace gravitas {
 namespace {
 
-constexpr char kForm[] = "SLOT:KIND@step=N[,ARGUMENT=VALUE]...";
-
-[[noreturn]] void refuse(const std::string& specification, const std::string& why) {
-  throw BadInput(fmt::format("--fault {}: {}", specification, why));
+[[noreturn]] void refuse(const std::string& what, const std::string& why) {
+  throw BadInput(fmt::format("{}: {}", what, why));
 }
 
-Slot slot_of(const std::string& name, const std::string& specification) {
+Slot slot_of(const std::string& name, const std::string& what) {
   std::vector<std::string> names;
   for (const Slot slot : kSlots) {
     if (name == slot_name(slot)) return slot;
     names.emplace_back(slot_name(slot));
   }
-  refuse(specification, fmt::format("there is no slot '{}': {}", name, allowed_names(name, names)));
+  refuse(what, fmt::format("there is no slot '{}': {}", name, allowed_names(name, names)));
 }
 
 std::vector<std::string_view> split(std::string_view text) {
@@ -43,47 +43,78 @@ std::vector<std::string_view> split(std::string_view text) {
 
 // Takes `name=N` out of the arguments, once at most.
 std::optional<std::uint32_t> take_count(std::vector<std::string_view>* arguments, std::string_view name,
-                                        const std::string& specification) {
+                                        const std::string& what) {
   std::optional<std::uint32_t> found;
   const std::string key = std::string(name) + "=";
   for (const std::string_view argument : *arguments) {
     if (argument != name && !argument.starts_with(key)) continue;
-    if (found) refuse(specification, fmt::format("'{}' is given twice", name));
+    if (found) refuse(what, fmt::format("'{}' is given twice", name));
     const std::string_view text = argument.substr(std::min(key.size(), argument.size()));
     std::uint32_t number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || end != text.data() + text.size() || number < 1)
-      refuse(specification, fmt::format("'{}': allowed for {}: a whole number from 1 to 4294967295", argument, name));
+      refuse(what, fmt::format("'{}': allowed for {}: a whole number from 1 to 4294967295", argument, name));
     found = number;
   }
   std::erase_if(*arguments, [&](std::string_view one) { return one.starts_with(key); });
   return found;
 }
 
-}  // namespace
+// Of a reply of the slot; where rows are numbered, one of numbers.
+void require_column(const host::FaultOrder& order, Slot slot, const std::string& what) {
+  const std::string name(order.word("column"));
+  const bool is_of_numbers =
+      std::ranges::find(order.info().arguments, "row", &host::FaultArgument::name) != order.info().arguments.end();
+  std::vector<std::string> names;
+  for (const stage::MethodInfo& method : stage::kMethods) {
+    std::string owner = std::string(method.name).substr(0, std::string_view(method.name).find('.'));
+    owner[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(owner[0])));
+    if (owner != slot_name(slot)) continue;
+    for (const stage::ColumnInfo& column : method.reply)
+      if ((!is_of_numbers || column.type == stage::ElementType::kF64) &&
+          std::ranges::find(names, column.name) == names.end())
+        names.emplace_back(column.name);
+  }
+  if (std::ranges::find(names, name) == names.end())
+    refuse(what, fmt::format("replies of slot {} have no column '{}'{}: {}", slot_name(slot), name,
+                             is_of_numbers ? " of numbers" : "", allowed_names(name, names)));
+}
 
-kernel::FaultInjection parse_fault(const std::string& specification) {
-  const std::size_t colon = specification.find(':');
-  if (colon == std::string::npos) refuse(specification, fmt::format("no ':' behind the slot; the form is {}", kForm));
+// Where no step is needed and none is given, it is 0.
+kernel::FaultInjection parse(const std::string& option, const std::string& text, bool needs_step) {
+  const std::string what = option + " " + text;
+  const std::string form = fmt::format("; the form is {}", needs_step ? "SLOT:KIND@step=N[,ARGUMENT=VALUE]..."
+                                                                      : "SLOT:KIND[@step=N][,ARGUMENT=VALUE]...");
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) refuse(what, "no ':' behind the slot" + form);
   kernel::FaultInjection fault;
-  fault.slot = slot_of(specification.substr(0, colon), specification);
+  fault.slot = slot_of(text.substr(0, colon), what);
 
-  const std::string_view rest = std::string_view(specification).substr(colon + 1);
-  const std::size_t at = rest.find('@');
-  if (at == std::string_view::npos)
-    refuse(specification, fmt::format("no '@step=N' behind the kind; the form is {}", kForm));
+  const std::string_view rest = std::string_view(text).substr(colon + 1);
+  const std::size_t at = std::min(rest.find('@'), rest.size());
+  const bool has_step = at < rest.size();
+  if (!has_step && needs_step) refuse(what, "no '@step=N' behind the kind" + form);
   std::vector<std::string_view> order = split(rest.substr(0, at));
-  for (const std::string_view argument : split(rest.substr(at + 1))) order.push_back(argument);
+  if (has_step)
+    for (const std::string_view argument : split(rest.substr(at + 1))) order.push_back(argument);
 
-  const std::optional<std::uint32_t> step = take_count(&order, "step", specification);
-  if (!step) refuse(specification, fmt::format("no step=N behind '@'; the form is {}", kForm));
-  fault.times = take_count(&order, "times", specification).value_or(1);
+  const std::optional<std::uint32_t> step = take_count(&order, "step", what);
+  if (!step && has_step) refuse(what, "no step=N behind '@'" + form);
+  fault.times = take_count(&order, "times", what).value_or(1);
   for (const std::string_view part : order) fault.order += (fault.order.empty() ? "" : ",") + std::string(part);
   std::string problem;
-  if (!host::parse_fault_order(fault.order, &problem)) refuse(specification, problem);
-  fault.step = *step;
+  const std::optional<host::FaultOrder> read = host::parse_fault_order(fault.order, &problem);
+  if (!read) refuse(what, problem);
+  if (read->gives("column")) require_column(*read, fault.slot, what);
+  fault.step = step.value_or(0);
   return fault;
 }
+
+}  // namespace
+
+kernel::FaultInjection parse_fault(const std::string& text) { return parse("--fault", text, true); }
+
+kernel::FaultInjection parse_inject(const std::string& text) { return parse("inject", text, false); }
 
 void require_worker(const kernel::FaultInjection& fault, std::span<const kernel::SwapOrder> swaps) {
   const kernel::SwapOrder* last = nullptr;

@@ -132,7 +132,8 @@ void Figures::follow(kernel::Environment* environment) {
     opening_step_ = environment->step_count();
   if (const double way = environment->time_step() * last_.speed;
       !runaway_ && scene_size_ > 0.0 && way > kRunaway * scene_size_)
-    runaway_ = Runaway{environment->step_count(), last_.fastest, way};
+    runaway_ = Runaway{environment->step_count(), last_.fastest, way,
+                       environment->step_count() == 0 || environment->step_count() + 1 == edited_step_};
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
 }
 
@@ -167,11 +168,12 @@ void Figures::write(report::v1::Report* report) const {
             ? "the edit before that step left apart what they hold"
             : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));
   if (runaway_)
-    report->add_warnings(
-        fmt::format("body \"{}\" went {:.3g} m in step {}, over a million times what the scene measures ({:.3g} m): it "
-                    "runs away, as "
-                    "where TimeStep is too long for the forces and the integrator",
-                    description_.bodies[runaway_->body].id, runaway_->way, runaway_->step, scene_size_));
+    report->add_warnings(fmt::format(
+        "body \"{}\" {} {:.3g} m in step {}, over a million times what the scene measures ({:.3g} m): {}",
+        description_.bodies[runaway_->body].id, runaway_->is_given ? "goes" : "went", runaway_->way,
+        runaway_->step + (runaway_->is_given ? 1 : 0), scene_size_,
+        runaway_->is_given ? "that is the speed which it was given"
+                           : "it runs away, as where TimeStep is too long for the forces and the integrator"));
   for (const Drive& drive : drives_) {
     report::v1::Drive* message = report->add_drives();
     message->set_constraint(description_.constraints[drive.constraint].id);

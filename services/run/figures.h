@@ -48,9 +48,10 @@ class Figures {
   };
 
   struct Runaway {
-    std::uint64_t step;
+    std::uint64_t step;  // that was made last
     std::uint32_t body;
-    double way;  // m
+    double way;     // m, in a step
+    bool is_given;  // no step has been made with that speed
   };
 
   Totals totals(kernel::Environment* environment) const;

@@ -13,13 +13,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// The file that a name leads to over symbolic links, of which the last may lead to none yet.
+fs::path target_of(fs::path path) {
+  std::error_code none;
+  // as many as Linux follows
+  for (int i = 0; i < 40 && fs::is_symlink(fs::symlink_status(path, none)); ++i)
+    path = path.parent_path() / fs::read_symlink(path, none);
+  return fs::weakly_canonical(fs::absolute(path), none);
+}
+
 bool is_same_file(const std::string& a, const std::string& b) {
   std::error_code none;
   const fs::file_status one = fs::status(a, none), other = fs::status(b, none);
   if (fs::exists(one) != fs::exists(other)) return false;
   if (fs::exists(one)) return fs::is_regular_file(one) && fs::equivalent(a, b, none);
   // neither is there yet
-  return fs::weakly_canonical(fs::absolute(a), none) == fs::weakly_canonical(fs::absolute(b), none);
+  return target_of(a) == target_of(b);
 }
 
 void require_other(const NamedFile& output, const NamedFile& file) {
@@ -35,7 +44,8 @@ std::vector<NamedFile> outputs_of(const RunOptions& options) {
           {"--report", options.report},
           {"--events", options.events},
           {"--reactions", options.reactions},
-          {"--instrumentation", options.instrumentation}};
+          {"--instrumentation", options.instrumentation},
+          {"--out", options.capsule}};
 }
 
 std::vector<NamedFile> kept_by(const RunOptions& options) {
@@ -43,19 +53,21 @@ std::vector<NamedFile> kept_by(const RunOptions& options) {
   return {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
 }
 
-std::vector<NamedFile> meshes_of(const scene::v1::Scene& scene) {
-  std::vector<NamedFile> meshes;
+}  // namespace
+
+std::vector<NamedFile> files_of(const scene::v1::Scene& scene) {
+  std::vector<NamedFile> files;
+  // names of overrides among them are those of no file
+  for (const std::string& name : scene.files()) files.push_back({"the scene", name});
   for (const scene::v1::Geometry& geometry : scene.geometries().geometry()) {
     const auto file = static_cast<int>(geometry.location().file());
     const fs::path folder = file < scene.files_size() ? fs::path(scene.files(file)).parent_path() : fs::path();
     for (const scene::v1::Property& property : geometry.custom_properties().property())
       if (property.name() == "File" && !property.value().text().empty())
-        meshes.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
+        files.push_back({"a mesh of the scene,", (folder / property.value().text()).string()});
   }
-  return meshes;
+  return files;
 }
-
-}  // namespace
 
 void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -66,11 +78,10 @@ void require_separate(const std::vector<NamedFile>& inputs, const std::vector<Na
 
 void require_separate_files(const RunOptions& options, const scene::v1::Scene& scene,
                             const std::vector<edit::v1::Edit>& edits) {
-  std::vector<NamedFile> inputs = meshes_of(scene);
+  std::vector<NamedFile> inputs = files_of(scene);
   const std::vector<NamedFile> kept = kept_by(options);
   const std::vector<NamedFile> resumed = {{"--resume", options.resume},
                                           {"the journal of --resume", journal(options.resume)}};
-  for (const std::string& one : options.scenes) inputs.push_back({"the scene", one});
   for (const edit::v1::Edit& edit : edits)
     for (const edit::v1::Change& change : edit.changes())
       if (change.has_add()) inputs.push_back({"--edit add", change.add().name()});

@@ -14,11 +14,14 @@ struct NamedFile {
   std::string path;  // none if empty
 };
 
+// What a scene was read from: its files, and the meshes that they name.
+std::vector<NamedFile> files_of(const scene::v1::Scene& scene);
+
 // Throws BadInput if an output is the same file as an input or as another output, by whatever names. Files that are not
 // ordinary ones (devices, pipes) may be named twice.
 void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
-// Of a run of a scene: the scene's files and meshes, those of edits, and what it is resumed from, which the checkpoint alone
+// Of a run of a scene: files_of() it, those of edits, and what it is resumed from, which the checkpoint alone
 // may replace.
 void require_separate_files(const RunOptions& options, const scene::v1::Scene& scene,
                             const std::vector<edit::v1::Edit>& edits);

@@ -10,7 +10,9 @@
 #include <stop_token>
 #include <utility>
 
+#include "plugin_sdk/plugin.h"
 #include "plugin_sdk/slots.h"
+#include "services/catalog/catalog.h"
 #include "services/run/session.h"
 #include "services/scene/build.h"
 #include "services/scene/overrides.h"
@@ -83,10 +85,14 @@ kernel::EnvironmentDescription load(const RunOptions& options, std::vector<std::
   scene::SceneDocument document;
   scene::read_files(options.scenes, &document, &problems);
   require(problems);
-  std::vector<std::string> overrides = options.overrides;
-  if (options.time_step) overrides.push_back(fmt::format("Simulator.TimeStep={:.17g}", *options.time_step));
-  if (options.duration) overrides.push_back(fmt::format("Simulator.Duration={:.17g}", *options.duration));
-  for (const std::string& one : overrides) scene::apply_override(&document.scene(), one, &problems);
+  for (const std::string& one : options.overrides) scene::apply_override(&document.scene(), one, &problems);
+  const auto set = [&](const char* option, const char* property, std::optional<double> value) {
+    if (value)
+      scene::apply_override(&document.scene(), fmt::format("Simulator.{}={:.17g}", property, *value), &problems,
+                            fmt::format("{} {:g}", option, *value));
+  };
+  set("--dt", "TimeStep", options.time_step);
+  set("--duration", "Duration", options.duration);
   require(problems);
   // whatever the scene's Duration
   if (options.steps && document.scene().has_simulator()) {
@@ -138,6 +144,21 @@ kernel::HostStarter patient(kernel::HostStarter starter, std::shared_ptr<std::at
   };
 }
 
+// Where a simulator needs another plugin: those that there are, `; allowed: "Direct", "Newton"`.
+std::string capable_plugins(const std::string& why) {
+  constexpr std::string_view kMark = "the capability '";
+  const std::size_t mark = why.find(kMark);
+  if (mark == std::string::npos) return {};
+  const std::size_t begin = mark + kMark.size();
+  const std::string capability = why.substr(begin, why.find('\'', begin) - begin);
+  std::string names;
+  const Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
+  for (const InstalledPlugin& plugin : catalog.plugins())
+    if (has_capability(plugin.declaration, capability))
+      names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", plugin.declaration.name);
+  return names.empty() ? "" : "; allowed: " + names;
+}
+
 }  // namespace
 
 std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& description,
@@ -156,8 +177,9 @@ std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription&
     throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin,
                                scene::refusal_text(description, fault)));
   } catch (const std::invalid_argument& problem) {
-    if (scene != nullptr) require_none(scene::find_refused(*scene, problem.what()));
-    throw BadInput(problem.what());
+    const std::string why = problem.what() + capable_plugins(problem.what());
+    if (scene != nullptr) require_none(scene::find_refused(*scene, why));
+    throw BadInput(why);
   }
 }
 

@@ -3,10 +3,15 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <latch>
+#include <stdexcept>
+#include <string>
 #include <system_error>
 #include <thread>
 #include <vector>
+
+#include "plugin_sdk/slots.h"
 
 namespace gravitas {
 namespace {
@@ -27,8 +32,7 @@ bool has_threads() {
   return has;
 }
 
-}  // namespace
-
+// Empty: nothing is in the way.
 std::string too_little_for_workers() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0 && limit.rlim_cur < kDescriptors)
@@ -43,6 +47,15 @@ std::string too_little_for_workers() {
         "container may have)",
         kThreads);
   return {};
+}
+
+}  // namespace
+
+void require_workers(const kernel::EnvironmentDescription& description) {
+  const bool any = std::ranges::any_of(
+      kSlots, [&](Slot slot) { return description.slot(slot).hosting != kernel::Hosting::kDirect; });
+  const std::string lacking = any ? too_little_for_workers() : "";
+  if (!lacking.empty()) throw std::runtime_error(lacking + "; --hosting direct does without workers");
 }
 
 }  // namespace gravitas

@@ -1,11 +1,12 @@
 // What Linux lets this process have, told before workers are started: gRPC hangs or aborts where it gets less.
 #pragma once
 
-#include <string>
+#include "kernel/description.h"
 
 namespace gravitas {
 
-// Why workers cannot be started; empty: nothing is in the way that can be seen from here.
-std::string too_little_for_workers();
+// Throws std::runtime_error if the description needs workers and they cannot be started, as far as that can be seen from
+// here.
+void require_workers(const kernel::EnvironmentDescription& description);
 
 }  // namespace gravitas

@@ -3,7 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <filesystem>
-#include <system_error>
+#include <stdexcept>
 
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
@@ -36,7 +36,7 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
     return fmt::format(
         "slot {}, plugin {}: the request that it fails at in step {} is kept; to ask it alone: gravitas replay {}",
         header.slot(), poisoned.plugin.declaration.name, step, path);
-  } catch (const std::system_error& problem) {
+  } catch (const std::runtime_error& problem) {
     return fmt::format("the request that plugin {} fails at in step {} could not be kept: {}",
                        poisoned.plugin.declaration.name, step, problem.what());
   }

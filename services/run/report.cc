@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "plugin_sdk/host/fault_kinds.h"
 #include "services/run/kernel_names.h"
 #include "services/run/omissions.h"
 
@@ -27,6 +28,13 @@ void write_comparison(const Comparison& from, const kernel::Environment& environ
     disagreement->set_rows(one.rows);
     disagreement->set_other_counts(one.other_counts);
   }
+}
+
+// A worker that cannot change its reply as it was ordered to says that it failed.
+bool was_injected(const kernel::FaultRecord& record) {
+  const auto kind = std::ranges::find(host::fault_kinds(), record.injected, &host::FaultInfo::name);
+  if (kind == host::fault_kinds().end()) return false;
+  return record.fault.kind != kernel::FaultKind::kFailure || (kind->group != "values" && kind->group != "wire");
 }
 
 }  // namespace
@@ -57,7 +65,10 @@ void write_faults(const kernel::Environment& environment, report::v1::Report* re
     report::v1::FaultRecord* fault = report->add_faults();
     fault->set_step(record.step);
     fault->set_slot(slot_name(record.fault.slot));
-    fault->set_kind(record.injected.empty() ? fault_kind_name(record.fault.kind) : record.injected);
+    fault->set_kind(was_injected(record) ? record.injected : fault_kind_name(record.fault.kind));
+    if (!record.injected.empty() && !was_injected(record))
+      report->add_warnings(fmt::format("fault {} of step {} in slot {} was not injected: {}", record.injected,
+                                       record.step, slot_name(record.fault.slot), record.fault.text()));
     fault->set_detected_by(record.fault.detected_by);
     fault->set_recovered_by(record.recovered_by.empty() ? "none: paused" : record.recovered_by);
     fault->set_recovery_us(record.recovery_us);

@@ -93,9 +93,9 @@ class Run final : private kernel::CommitListener {
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
     give_orders();
     warn_of_orders_beyond_the_end();
-    if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
   }
 
+  // What stands in the files stays until all that was asked for can be had.
   void open_files() {
     try {
       events_ = std::make_unique<EventLog>(options_.events, description_);
@@ -110,12 +110,20 @@ class Run final : private kernel::CommitListener {
             std::make_unique<ReactionLog>(options_.reactions, description_, options_.sample_every.value_or(0.0));
       // opened now, so that nothing is simulated for a report that cannot be written
       if (!options_.report.empty()) report_.emplace("report", options_.report);
-    } catch (const std::system_error& error) {
+    } catch (const std::runtime_error& error) {
       throw BadInput(error.what());
     }
     events_->resume(resumed_tally_);
     if (!event_kinds_.is_empty())
       event_source_.emplace(events_.get(), event_kinds_, options_.ongoing_rate.value_or(kOngoingRate));
+    if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
+    guard([&] {
+      events_->begin();
+      if (trajectory_) trajectory_->begin();
+      if (frames_) frames_->begin();
+      if (reactions_) reactions_->begin();
+      if (report_) report_->begin();
+    });
   }
 
   void go(const std::function<void(const Progress&)>& progress) {
@@ -228,13 +236,6 @@ class Run final : private kernel::CommitListener {
     for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
     note_survey();
     frames_->close();
-  }
-
-  static void require_workers(const kernel::EnvironmentDescription& description) {
-    const bool any = std::ranges::any_of(
-        kSlots, [&](Slot slot) { return description.slot(slot).hosting != kernel::Hosting::kDirect; });
-    const std::string lacking = any ? too_little_for_workers() : "";
-    if (!lacking.empty()) throw std::runtime_error(lacking + "; --hosting direct does without workers");
   }
 
   void begin_listening() {
@@ -398,6 +399,7 @@ class Run final : private kernel::CommitListener {
     };
     for (const kernel::SwapOrder& order : swaps_) warn("--swap", order.step);
     for (const kernel::FaultInjection& fault : faults_) warn("--fault", fault.step);
+    for (const edit::v1::Edit& edit : edits_.to_come()) warn("--edit", edit.step());
   }
 
   // Those of steps up to the next edit; after it another environment gets the rest.

@@ -34,6 +34,7 @@ struct RunOptions {
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events, reactions;
+  std::string capsule;  // that `starter` writes: nothing else does, and it is none of what is read
   // What is looked for, written to `events` and counted (services/events/event.h); default_event_kinds() if absent.
   std::optional<std::vector<std::string>> event_kinds;
   std::optional<double> ongoing_rate;              // Hz, of collision_ongoing; kOngoingRate if absent

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 #include "services/run/report.h"
@@ -78,8 +79,11 @@ std::string summarize(const report::v1::Report& report, const std::vector<EventL
                                  report.wall_seconds(), report.microseconds_per_step().median());
   const std::string happened = story(report, meetings);
   if (!happened.empty()) text += "  " + happened + "\n";
-  text += fmt::format("  energy {:.6g} -> {:.6g} J, penetration <= {:.2g} m, joint error <= {:.2g} m\n",
-                      report.energy().initial(), report.energy().final(), report.max_penetration(),
+  const auto energy = [](double number) {
+    return std::isfinite(number) ? fmt::format("{:.6g}", number) : std::string("not finite");
+  };
+  text += fmt::format("  energy {} -> {} J, penetration <= {:.2g} m, joint error <= {:.2g} m\n",
+                      energy(report.energy().initial()), energy(report.energy().final()), report.max_penetration(),
                       report.max_joint_error());
   text += exchanges(report);
   text += fmt::format("  {}\n  chain hash {}\n", hosts(report.plan()), report.chain_hash());

@@ -17,11 +17,12 @@ constexpr std::int64_t kLargestFile = std::int64_t{4} << 30;
 constexpr const char* kTooLarge = "it is larger than 4 GiB";
 
 // Why a file that is open is not read; empty: it is.
-std::string find_obstacle(int file, const struct stat& about) {
+std::string find_obstacle(int file, const struct stat& about, InputKind allowed) {
   if (S_ISDIR(about.st_mode)) return "it is a folder";
   // a terminal ends when the person says so
   if (S_ISBLK(about.st_mode) || (S_ISCHR(about.st_mode) && isatty(file) == 0))
     return "it is no file that ends but a device";
+  if (allowed == InputKind::kOrdinary && !S_ISREG(about.st_mode)) return "it is not an ordinary file";
   return about.st_size > kLargestFile ? kTooLarge : "";
 }
 
@@ -45,13 +46,13 @@ std::string read_all(int file, std::size_t expected, std::string* text) {
 
 }  // namespace
 
-bool read_input_file(const std::string& path, std::string* text, std::string* why) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+bool read_input_file(const std::string& path, std::string* text, std::string* why, InputKind allowed) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | (allowed == InputKind::kOrdinary ? O_NONBLOCK : 0));
   struct stat about = {};
   if (file < 0 || ::fstat(file, &about) != 0) {
     *why = std::strerror(errno);
   } else {
-    *why = find_obstacle(file, about);
+    *why = find_obstacle(file, about, allowed);
   }
   if (why->empty()) *why = read_all(file, static_cast<std::size_t>(about.st_size), text);
   if (file >= 0) ::close(file);

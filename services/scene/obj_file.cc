@@ -108,7 +108,7 @@ class LineCheck {
 
 bool read_obj(const std::string& path, ObjMesh* mesh, std::string* why) {
   std::string text;
-  if (!read_input_file(path, &text, why)) {
+  if (!read_input_file(path, &text, why, InputKind::kOrdinary)) {
     *why = ": cannot be read: " + *why + "; allowed: an OBJ file";
     return false;
   }

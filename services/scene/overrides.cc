@@ -259,9 +259,9 @@ class Override {
 
 }  // namespace
 
-bool apply_override(v1::Scene* scene, std::string_view override_text, Problems* problems) {
+bool apply_override(v1::Scene* scene, std::string_view override_text, Problems* problems, std::string_view name) {
   const auto file = static_cast<std::uint32_t>(scene->files_size());
-  scene->add_files("--set " + std::string(override_text));
+  scene->add_files(name.empty() ? "--set " + std::string(override_text) : std::string(name));
   Diagnostics diagnostics(*scene, problems);
   Override override_of_scene(scene, override_text, file, &diagnostics);
   try {

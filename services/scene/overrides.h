@@ -20,8 +20,8 @@
 
 namespace gravitas::scene {
 
-// Applies one override, "PATH=VALUE". Errors name it: file "--set PATH=VALUE", the column counted
+// Applies one override, "PATH=VALUE". Errors name it: file `name`, "--set PATH=VALUE" if that is empty, the column counted
 // in PATH=VALUE. Returns true if there was no error.
-bool apply_override(v1::Scene* scene, std::string_view override_text, Problems* problems);
+bool apply_override(v1::Scene* scene, std::string_view override_text, Problems* problems, std::string_view name = {});
 
 }  // namespace gravitas::scene

@@ -8,7 +8,7 @@ namespace {
 
 // Of an override or a change, which has no lines.
 bool is_one_word(const std::string& file) {
-  return file.starts_with("--set ") || file.starts_with("set ") || file.starts_with("remove ");
+  return file.starts_with("--") || file.starts_with("set ") || file.starts_with("remove ");
 }
 
 }  // namespace

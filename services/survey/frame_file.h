@@ -17,6 +17,9 @@ class FrameFile {
   // `interval` as in Sampling. Throws std::system_error if the file cannot be made.
   FrameFile(const std::string& path, Surveyor* surveyor, std::vector<Kind> kinds, double interval);
 
+  // Empties the file, which writing does, too. Throws std::system_error.
+  void begin() { file_.begin(); }
+
   // The scene was edited, and who answers knows it.
   void begin_again(Surveyor* surveyor) { instrumentation_.emplace(surveyor); }
 

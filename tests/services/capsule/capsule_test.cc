@@ -5,7 +5,9 @@
 #include <gmock/gmock.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -216,8 +218,21 @@ TEST(Capsule, RefusalsSayWhatIsAllowed) {
   expect({"capture", scene, "--slot", "solver", "--out", folder.path("no/x")}, "No such file");
   expect({"replay", folder.path("missing")}, "No such file");
   expect({"replay", scene}, "is no capsule");
+  const std::string pipe = folder.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  expect({"replay", pipe}, "it is not an ordinary file");
   const std::string file = capture("solver", folder);
   expect({"replay", file, "--call", "999"}, "has no such call");
+  // what is there is not lost to a run that records nothing
+  const std::string whole = harness::read_file(file);
+  expect({"capture", scene, "--slot", "solver", "--out", file, "--steps", "5", "--from-step", "10"},
+         "ended after step 5");
+  expect({"capture", scene, "--slot", "solver", "--out", file, "--set", "Solver.Iterations=0"}, "Iterations");
+  EXPECT_EQ(harness::read_file(file), whole);
+  // a check of nothing is none
+  std::uint32_t header = 0;
+  std::memcpy(&header, &whole[24], sizeof header);
+  expect({"replay", folder.write("empty", whole.substr(0, 24 + 4 + header + 8))}, "it holds no calls");
   expect({"bisect", file, "Sequential", "Nobody"}, "Nobody");
 }
 

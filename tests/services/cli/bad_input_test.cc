@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "services/recorder/output_file.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
 
@@ -289,6 +290,9 @@ TEST(BadInput, WhatIsReadIsNotWrittenOver) {
       run_program({"capture", scene, "--steps", "1", "--slot", "solver", "--out", scene}, folder);
   EXPECT_EQ(capture.exit_code, 2);
   EXPECT_EQ(harness::read_file(scene), text);
+  EXPECT_EQ(run_program({"capture", scene, solid, "--steps", "1", "--slot", "solver", "--out", obj}, folder).exit_code,
+            2);
+  EXPECT_EQ(harness::read_file(obj), mesh);
 }
 
 TEST(BadInput, NoFileIsWrittenTwice) {
@@ -303,6 +307,12 @@ TEST(BadInput, NoFileIsWrittenTwice) {
   EXPECT_THAT(result.err, HasSubstr("/x: it is the same file as --trajectory x; allowed: a file of its own"));
   EXPECT_FALSE(std::filesystem::exists(folder.path("x")));
   EXPECT_EQ(run({"--report", "/dev/null", "--events", "/dev/null"}).exit_code, 0);
+  // over links, though nothing is there yet
+  std::filesystem::create_symlink("x", folder.path("z"));
+  std::filesystem::create_symlink(folder.path("z"), folder.path("y"));
+  EXPECT_THAT(run({"--trajectory", "x", "--report", "y"}).err, HasSubstr("--report y: it is the same file as"));
+  EXPECT_EQ(run({"--checkpoint", "z", "--report", "y"}).exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(folder.path("x")));
 
   // a checkpoint may take the place of the one that the run goes on from, and nothing else may
   EXPECT_EQ(run({"--checkpoint", "c"}).exit_code, 0);
@@ -312,6 +322,21 @@ TEST(BadInput, NoFileIsWrittenTwice) {
   EXPECT_EQ(run({"--resume", "c", "--checkpoint", "c.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--checkpoint", "d", "--events", "d.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--resume", "c"}).exit_code, 0);
+}
+
+TEST(BadInput, NoFileIsWrittenByTwoRunsAtOnce) {
+  const ScratchFolder folder;
+  const std::string path = folder.write("x", "of an earlier run");
+  const OutputFile held("of another run", path);
+  for (const char* option : {"--trajectory", "--report", "--events", "--reactions", "--instrumentation"}) {
+    const ProgramResult result = run_program({"run", kSample, "--hosting", "direct", option, path}, folder);
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_THAT(result.err, HasSubstr(std::string(option + 2) + " '" + path + "': another run is writing it"));
+  }
+  const ProgramResult capture = run_program({"capture", kSample, "--slot", "solver", "--out", path}, folder);
+  EXPECT_EQ(capture.exit_code, 2);
+  EXPECT_THAT(capture.err, HasSubstr("another run is writing it"));
+  EXPECT_EQ(harness::read_file(path), "of an earlier run");
 }
 
 TEST(BadInput, AFileThatIsNoSceneAtAll) {
@@ -402,6 +427,21 @@ TEST(BadInput, OptionsOfTheCommandLine) {
     EXPECT_EQ(result.out, "");
     EXPECT_THAT(result.err, HasSubstr(expected));
   }
+}
+
+TEST(BadInput, NamesTheOptionThatWasGiven) {
+  const ScratchFolder folder;
+  ProgramResult result = run_program({"run", kSample, "--dt", "1e-300", "--duration", "1"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--dt 1e-300: Duration 1 s in steps of 1e-300 s is"));
+  const std::string pendulum = folder.write(
+      "pendulum.gravitas",
+      "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} } } } Constraints { "
+      "Constraint { Type = \"Spherical\" Id = \"H\" Body1 = \"A\" CustomProperties { BindPoint = {1, 0, 0} } } } }\n"
+      "Simulator { CustomProperties { Duration = 1 } }");
+  result = run_program({"run", pendulum, "--hosting", "direct", "--set", "Simulator=Smooth"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("and Sequential has it not; allowed: \"Direct\", \"Newton\""));
 }
 
 // An empty value would count as an option that is left out.
@@ -510,6 +550,9 @@ TEST(BadInput, AWordThatIsNoSubcommandIsNamed) {
   const ScratchFolder folder;
   for (const auto& [arguments, message] : std::vector<std::pair<std::vector<std::string>, const char*>>{
            {{"runn"}, "there is no sub-command \"runn\"; did you mean \"run\"?"},
+           {{"ctl", "--socket", "x", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"},
+           {{"--bogus"}, "there is no option \"--bogus\""},
+           {{"ctl", "--bogus"}, "there is no option \"--bogus\""},
            {{"ctl", "swapp"}, "there is no sub-command \"swapp\"; did you mean \"swap\"?"}}) {
     const ProgramResult result = run_program(arguments, folder);
     EXPECT_EQ(result.exit_code, 2);

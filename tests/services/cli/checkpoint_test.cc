@@ -27,6 +27,7 @@ namespace {
 
 using harness::ProgramResult;
 using harness::read_file;
+using harness::read_report;
 using harness::run_program;
 using harness::ScratchFolder;
 using harness::shipped_scene;
@@ -112,6 +113,9 @@ TEST(Checkpoints, WhatCannotBeUsedIsBadInputWithTheReason) {
   EXPECT_THAT(refusal({"--checkpoint", "/dev/full"}), HasSubstr("not an ordinary file"));
   EXPECT_THAT(refusal({"--checkpoint", folder.path("none/kept")}), HasSubstr("No such file"));
   EXPECT_THAT(refusal({"--checkpoint-every", "5"}), HasSubstr("requires --checkpoint"));
+  const std::string before = read_file(kept);
+  EXPECT_THAT(refusal({"--checkpoint", kept, "--report", folder.path("none/x")}), HasSubstr("No such file"));
+  EXPECT_EQ(read_file(kept), before);
   EXPECT_THAT(refusal({"--checkpoint", kept, "--checkpoint-every", "0"}), HasSubstr("--checkpoint-every"));
   std::string bytes = read_file(kept);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] + 1);
@@ -128,6 +132,22 @@ TEST(Checkpoints, AFullDiskUnderTheTrajectoryStopsTheRunAtACommitThatGoesOn) {
   EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step "));
   EXPECT_EQ(chain_after({"run", kSample, "--hosting", "direct", "--resume", kept}, folder),
             chain_after({"run", kSample, "--hosting", "direct"}, folder));
+}
+
+TEST(Checkpoints, APipeThatIsReadNoMoreStopsTheRunAtACommitThatGoesOn) {
+  const ScratchFolder folder;
+  const std::string pipe = folder.path("motion.csv"), kept = folder.path("kept");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const pid_t process = harness::start_program(
+      {"run", kSample, "--hosting", "direct", "--trajectory", pipe, "--checkpoint", kept, "--report", "report.json"},
+      folder);
+  std::string line;
+  EXPECT_TRUE(std::getline(std::ifstream(pipe), line));
+  const ProgramResult result = harness::finish_program(process, folder);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("trajectory '" + pipe + "': Broken pipe"));
+  EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step "));
+  EXPECT_EQ(read_report(read_file(folder.path("report.json"))).outcome(), "failed");
 }
 
 // Kills the program at moments left to chance, again and again, and resumes from what is there: every file can be read,

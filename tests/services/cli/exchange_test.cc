@@ -60,6 +60,15 @@ TEST(Exchange, AFaultInEverySlotIsSurvivedBitForBit) {
   EXPECT_THAT(run.program.out, HasSubstr("survived: step 10, solver Sequential: kill; standby"));
 }
 
+TEST(Exchange, AFaultThatCannotBeInjectedIsToldAsThat) {
+  const Outcome run = run_sample({"--fault", "solver:nan@step=5,row=99999"});
+  ASSERT_EQ(run.program.exit_code, 0) << run.program.err;
+  EXPECT_THAT(run.program.err, HasSubstr("fault nan of step 5 in slot solver was not injected: it failed: column "));
+  ASSERT_EQ(run.report.faults_size(), 1);
+  EXPECT_EQ(run.report.faults(0).kind(), "failure");
+  EXPECT_EQ(run.report.chain_hash(), quiet_chain());
+}
+
 TEST(Exchange, ASwapToTheSamePluginOrAnotherHostingChangesNoBit) {
   const Outcome run = run_sample({"--swap", "solver=Sequential@step=10", "--swap", "collision=Standard@step=20",
                                   "--swap", "solver=Sequential@step=60,hosting=direct"});

@@ -61,6 +61,17 @@ Interrupted interrupt(int number) {
   return seen;
 }
 
+// Waits until the program listens to SIGTERM, as Linux tells it.
+void await_listening(pid_t process) {
+  for (int i = 0; i < 30'000; ++i) {
+    std::ifstream status("/proc/" + std::to_string(process) + "/status");
+    for (std::string line; std::getline(status, line);)
+      if (line.starts_with("SigCgt:") && (std::stoull(line.substr(7), nullptr, 16) >> (SIGTERM - 1) & 1) != 0) return;
+    usleep(1000);
+  }
+  ADD_FAILURE() << "it does not listen";
+}
+
 class Signal : public ::testing::TestWithParam<int> {};
 
 INSTANTIATE_TEST_SUITE_P(Each, Signal, ::testing::Values(SIGINT, SIGTERM, SIGHUP),
@@ -78,6 +89,27 @@ TEST_P(Signal, EndsTheRunAfterItsStepAndDoesNotReachTheWorkers) {
   // the trajectory ends with a whole row of the state that the report is about
   EXPECT_NEAR(std::stod(seen.last_row), seen.report.simulated_seconds(), 1e-9);
   EXPECT_EQ(std::ranges::count(seen.last_row, ','), 14);
+}
+
+TEST(Interrupt, EndsWhatWaitsForAPipe) {
+  const ScratchFolder folder;
+  const std::string pipe = folder.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const std::string sample = harness::shipped_scene("two_spheres_motor");
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"run", pipe},
+                                                {"run", sample, "--hosting", "direct", "--trajectory", pipe},
+                                                {"run", sample, "--hosting", "direct", "--events", pipe},
+                                                {"run", sample, "--hosting", "direct", "--report", pipe},
+                                                {"run", sample, "--edit", "add " + pipe + "@step=1"},
+                                                {"capture", sample, "--slot", "solver", "--out", pipe},
+                                                {"serve", pipe, "--headless"}}) {
+    const pid_t process = harness::start_program(words, folder);
+    await_listening(process);
+    kill(process, SIGTERM);
+    const ProgramResult result = harness::finish_program(process, folder);
+    EXPECT_EQ(result.exit_code, 130) << words[0];
+    EXPECT_THAT(result.err, ::testing::HasSubstr("gravitas: interrupted before it began"));
+  }
 }
 
 }  // namespace

@@ -305,15 +305,34 @@ TEST(Run, LooksForTheKindsOfEventsThatAreAskedFor) {
   EXPECT_THAT(result.err, HasSubstr("--ongoing-rate 0"));
 }
 
+TEST(Run, TellsWhatHasNoNumber) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "fast.gravitas",
+      "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { "
+      "LinearVelocity = {1e200, 0, 0} } } Body { Id = \"B\" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { "
+      "Position = {1, 0, 0} } } } } }\nSimulator { CustomProperties { Duration = 0.1 } }");
+  const ProgramResult result = run_program({"run", scene, "--hosting", "direct"}, folder);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr("energy not finite -> not finite J"));
+  EXPECT_THAT(result.err,
+              HasSubstr("m in step 1, over a million times what the scene measures (2 m): that is the speed "
+                        "which it was given"));
+}
+
 TEST(Run, WarnsOfOrdersBeyondItsEnd) {
   const ScratchFolder folder;
   const ProgramResult result =
       run_program({"run", kSample, "--steps", "3", "--hosting", "direct", "--hosting", "solver=shm", "--fault",
-                   "solver:kill@step=9", "--swap", "solver=Newton@step=8"},
+                   "solver:kill@step=9", "--swap", "solver=Newton@step=8", "--edit",
+                   "set Body.Ball01.LinearVelocity={0,1,0}@step=7", "--report", "report.json"},
                   folder);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("--fault at step 9 never comes: the run has 3 steps"));
   EXPECT_THAT(result.err, HasSubstr("--swap at step 8 never comes: the run has 3 steps"));
+  const std::string edit = "--edit at step 7 never comes: the run has 3 steps";
+  EXPECT_THAT(result.err, HasSubstr(edit));
+  EXPECT_THAT(read_file(folder.path("report.json")), HasSubstr(edit));
 }
 
 }  // namespace

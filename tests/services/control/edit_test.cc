@@ -1,6 +1,7 @@
 // The scene of a served run changes while it goes on: the chain is that of `gravitas run --edit`.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <string>
 
@@ -78,6 +79,13 @@ TEST(ServedEdit, WhatCannotBeChangesNothing) {
               HasSubstr("names no Body: \"Ball01\""));
   EXPECT_THAT(refusal([&] { edit(&served, {}); }), HasSubstr("nothing to change"));
   EXPECT_THAT(refusal([&] { served.client.wake("Ball03"); }), HasSubstr("wake: no body \"Ball03\""));
+  // the server would wait for who writes it
+  ASSERT_EQ(mkfifo(served.folder.path("pipe").c_str(), 0600), 0);
+  const std::string mesh = served.folder.write(
+      "mesh.gravitas",
+      "Geometries { Geometry { Type = \"TriangleMesh\" Id = \"X\" CustomProperties { File = \"pipe\" } } }");
+  EXPECT_THAT(refusal([&] { edit(&served, {"add " + mesh}); }),
+              HasSubstr("pipe: cannot be read: it is not an ordinary"));
   EXPECT_EQ(served.client.wake("Ball01").step(), 10U);
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }

@@ -168,6 +168,48 @@ TEST(Serve, CtlEditsTheSceneAndWakesABody) {
   EXPECT_EQ(served.ctl({"wake", "Ball01"}).exit_code, 0);
 }
 
+TEST(Serve, CtlWritesOverNothingThatTheSceneWasReadFrom) {
+  const ScratchFolder folder;
+  const std::string text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const std::string mesh = folder.write("x.obj", text);
+  const std::string solid = folder.write(
+      "solid.gravitas",
+      "Geometries { Geometry { Type = \"TriangleMesh\" Id = \"X\" CustomProperties { File = \"x.obj\" } } }");
+  Served served({solid, "--duration", "3600"});
+  ASSERT_FALSE(served.socket().empty());
+  for (const std::string& file : {mesh, solid}) {
+    const std::string before = read_file(file);
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"capture", "solver", "--steps", "1"}, {"instrumentation"}}) {
+      std::vector<std::string> all = words;
+      all.insert(all.end(), {"--out", file});
+      const ProgramResult result = served.ctl(all);
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err, HasSubstr("--out " + file + ": it is the same file as "));
+      EXPECT_EQ(read_file(file), before);
+    }
+  }
+}
+
+TEST(Serve, AnInterruptedCaptureIsWhole) {
+  Served served({"--duration", "3600", "--speed", "0"});
+  ASSERT_FALSE(served.socket().empty());
+  const ScratchFolder own;
+  const std::string file = own.path("solver.capsule");
+  const pid_t capture = harness::start_program(
+      {"ctl", "--socket", served.socket(), "capture", "solver", "--out", file, "--steps", "100000"}, own);
+  std::error_code none;
+  for (int i = 0; i < 3000 && !(std::filesystem::file_size(file, none) > 0 && !none); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  kill(capture, SIGINT);
+  const ProgramResult result = harness::finish_program(capture, own);
+  EXPECT_EQ(result.exit_code, 130) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("calls of slot solver in "));
+  const ProgramResult replay = harness::run_program({"replay", file}, own);
+  EXPECT_EQ(replay.exit_code, 0) << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr(" 0 different"));
+}
+
 TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   Served served({"--duration", "3600"});
   ASSERT_FALSE(served.socket().empty());
@@ -215,6 +257,13 @@ TEST(Serve, WhatCannotBeIsExitCode2) {
   result = harness::run_program({"serve", kSample, "--headless", "--listen", "0.0.0.0:4711"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("others with --allow-remote"));
+  for (const char* address : {"127.0.0.1:99999", "127.0.0.1", "[::1]", "foo"}) {
+    result = harness::run_program({"serve", kSample, "--headless", "--listen", address}, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(std::string(address) + ": allowed: ADDR:PORT, with a port from 0 to 65535"));
+  }
+  result = harness::run_program({"ctl", "step", "0"}, folder);
+  EXPECT_THAT(result.err, HasSubstr("N: \"0\"; allowed: a whole number from 1"));
   result = harness::run_program({"serve", folder.path("none.gravitas"), "--headless"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   result = harness::run_program({"ctl", "--socket", folder.path("none.sock"), "status"}, folder);

@@ -260,6 +260,15 @@ TEST(ServedRun, ACaptureThatTheRunOutlivesIsKeptAsFarAsItCame) {
   EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("/nowhere/at/all"));
   request.set_path("relative");
   EXPECT_THAT(refusal([&] { served.client.capture(request); }), HasSubstr("an absolute path"));
+  // the server would wait for who reads it
+  const std::string pipe = folder.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe, std::string("/dev/null")}) {
+    request.set_path(path);
+    EXPECT_THAT(refusal([&] { served.client.capture(request); }),
+                HasSubstr("capsule '" + path + "': it is not an ordinary file"));
+  }
+  EXPECT_EQ(served.client.step(3).step(), 3U);
 }
 
 TEST(ServedRun, ItListensAtAnAddress) {
@@ -298,7 +307,8 @@ TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
   EXPECT_THAT(set("Solvr.Iterations=5"), HasSubstr("unknown slot"));
   const auto inject = [&](const std::string& text) { return refusal([&] { served.client.inject(text); }); };
   EXPECT_THAT(inject("solver:kil"), HasSubstr("kill"));
-  EXPECT_THAT(inject("solver"), HasSubstr("SLOT:KIND"));
+  EXPECT_THAT(inject("solver:foo"), HasSubstr("inject solver:foo: there is no fault 'foo'"));
+  EXPECT_THAT(inject("solver"), HasSubstr("SLOT:KIND[@step=N]"));
   EXPECT_THAT(inject("force:kill"), HasSubstr("the plan leaves the slot out"));
   EXPECT_THAT(inject("solver:kill@step=121"), HasSubstr("1 (the next) to 120"));
   EXPECT_THAT(refusal([&] { served.client.step(0); }), HasSubstr("from 1"));

@@ -394,10 +394,9 @@ TEST_P(StoppedAt, AnEditedRunIsResumedToItsChain) {
   run.options.steps = GetParam();
   run.options.checkpoint = run.folder.path("checkpoint");
   run.options.checkpoint_every = 7;
-  const std::vector<std::string> edits = std::exchange(run.options.edits, {});
-  for (const std::string& one : edits)
-    if (std::stoul(one.substr(one.rfind('=') + 1)) <= GetParam()) run.options.edits.push_back(one);
+  // with edits beyond its end, too
   run.run();
+  const std::vector<std::string> edits = run.options.edits;
   run.options.steps = 100;
   run.options.checkpoint.clear();
   run.options.checkpoint_every = 0;
@@ -506,7 +505,6 @@ TEST(EditedRun, WhatCannotBeIsSaidBeforeTheRunBegins) {
       {"jump Body.A@step=5", "allowed: add FILE, remove PATH, set PATH=VALUE"},
       {"remove Body.A", "allowed: CHANGE@step=N"},
       {"remove Body.A@step=0", "allowed: CHANGE@step=N"},
-      {"remove Body.A@step=101", "there is no step 101; the run has 100"},
       {"remove Body.a@step=5", "did you mean \"A\"?"},
       {"remove Body.A@step=6", "names no Body: \"A\""},
       {"remove Solver.X@step=5", "\"Solver\" is nothing that can go"},

@@ -63,6 +63,12 @@ TEST(FaultSpec, AMistakeIsNamedWithWhatIsAllowed) {
               StartsWith("--fault solver:kil@step=1: there is no fault 'kil': did you mean 'kill'? Allowed: kill, "));
   EXPECT_THAT(problem_of("solver:slow@step=1,faktor=2"),
               HasSubstr("fault 'slow' has no argument 'faktor': did you mean 'factor'? Allowed: factor, seconds"));
+  EXPECT_THAT(
+      problem_of("solver:nan@step=1,column=pose_chnge"),
+      HasSubstr("replies of slot solver have no column 'pose_chnge' of numbers: did you mean \"pose_change\"?"));
+  EXPECT_THAT(problem_of("solver:nan@step=1,column=iterations"), HasSubstr("no column 'iterations' of numbers"));
+  EXPECT_THAT(problem_of("space:permute@step=1,column=foo"),
+              HasSubstr("slot space have no column 'foo': allowed: \"pair\""));
   EXPECT_THAT(problem_of("solver:kill@step=1,at=noon"), HasSubstr("allowed for at: read, compute, write, reply"));
 }
 
