@@ -10,6 +10,7 @@ namespace gravitas {
 namespace {
 
 constexpr double kPulledApart = 1e-3;  // of the bodies' ways
+constexpr double kClosed = 1e-9;       // of what the joint holds, and of its coordinates
 
 // Impulse of a row, world.
 Vector3 impulse_of(const JointRows& joint, const Discrepancy& discrepancy, std::size_t row, double time_step) {
@@ -69,16 +70,18 @@ bool is_pulled_apart(const JointRows& joint, const JointBody& body1, const Joint
     const double turn = log_rotation(body.next.orientation * body.start.orientation.conjugate()).norm();
     return (body.next.position - body.start.position).norm() + gyration(body) * turn;
   };
-  double opened = 0.0;
+  double opened = 0.0, error = 0.0, size = gyration(body1) + gyration(body2);
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
-    const auto open = [&](const Pose& one, const Pose& two) {
-      return joint_error(discrepancy, error_in_axes_at(discrepancy, body1.trial, body2.trial, one, two));
-    };
     const double length = discrepancy.is_angular() ? std::max(gyration(body1), gyration(body2)) : 1.0;
-    opened = std::max(opened, length * (open(body1.next, body2.next) - open(body1.start, body2.start)));
+    const auto open = [&](const Pose& one, const Pose& two) {
+      return length * joint_error(discrepancy, error_in_axes_at(discrepancy, body1.trial, body2.trial, one, two));
+    };
+    error = std::max(error, open(body1.next, body2.next));
+    opened = std::max(opened, open(body1.next, body2.next) - open(body1.start, body2.start));
+    if (!discrepancy.is_angular()) size = std::max(size, discrepancy.point1.norm());
   }
-  return opened > kPulledApart * (way(body1) + way(body2));
+  return error > kClosed * size && opened > kPulledApart * (way(body1) + way(body2));
 }
 
 }  // namespace gravitas

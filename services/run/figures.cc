@@ -41,35 +41,43 @@ std::optional<std::vector<double>> property_of(const TypeDeclaration& type, cons
 
 Figures::Figures(const kernel::EnvironmentDescription& description) : description_(description) { find_drives(); }
 
-// A drive is a joint whose type has an axis of two points and an angular speed, as AngularMotor does.
+// A drive is a joint whose type has an axis of two points and an angular speed, as AngularMotor does, or a direction and a
+// speed, as Slider does.
 void Figures::find_drives() {
   for (std::uint32_t i = 0; i < description_.constraints.size(); ++i) {
     const kernel::ConstraintDescription& joint = description_.constraints[i];
+    const Quaternion q = joint.bound_at         ? joint.bound_at->at(0).orientation
+                         : joint.body1 == kNone ? Quaternion::Identity()
+                                                : description_.bodies[joint.body1].pose.orientation;
+    const auto add = [&](const Vector3& axis, double speed, bool slides) {
+      drives_.push_back({i, q.conjugate() * axis.normalized(), speed, slides});
+    };
     for (const TypeDeclaration& type : description_.constraint.plugins[joint.plugin].declaration.types) {
       if (type.name != joint.type) continue;
-      const auto point1 = property_of(type, joint.parameters, "BindAxisPoint1");
-      const auto point2 = property_of(type, joint.parameters, "BindAxisPoint2");
-      const auto speed = property_of(type, joint.parameters, "AngularSpeed");
-      if (!point1 || !point2 || !speed) continue;
-      const Vector3 axis = vector_at(*point2, 0) - vector_at(*point1, 0);
-      const Quaternion q = joint.bound_at         ? joint.bound_at->at(0).orientation
-                           : joint.body1 == kNone ? Quaternion::Identity()
-                                                  : description_.bodies[joint.body1].pose.orientation;
-      drives_.push_back({i, q.conjugate() * axis.normalized(), (*speed)[0]});
+      const auto find = [&](const char* name) { return property_of(type, joint.parameters, name); };
+      const auto point1 = find("BindAxisPoint1"), point2 = find("BindAxisPoint2"), angular_speed = find("AngularSpeed");
+      if (point1 && point2 && angular_speed)
+        add(vector_at(*point2, 0) - vector_at(*point1, 0), (*angular_speed)[0], false);
+      const auto axis = find("Axis"), speed = find("Speed");
+      if (axis && speed && !std::isnan((*speed)[0])) add(vector_at(*axis, 0), (*speed)[0], true);
     }
   }
 }
 
 double Figures::drive_speed(const Drive& drive, const kernel::StateView& state) const {
   const kernel::ConstraintDescription& joint = description_.constraints[drive.constraint];
-  Vector3 axis = drive.axis_in_body1;
-  Vector3 relative = Vector3::Zero();
-  if (joint.body1 != kNone) {
-    axis = quaternion_at(state.orientation, joint.body1) * axis;
-    relative -= vector_at(state.angular_velocity, joint.body1);
-  }
-  if (joint.body2 != kNone) relative += vector_at(state.angular_velocity, joint.body2);
-  return axis.dot(relative);
+  const std::uint32_t one = joint.body1, two = joint.body2;
+  const auto of = [](std::uint32_t body, std::span<const double> column) {
+    return body == kNone ? Vector3(Vector3::Zero()) : Vector3(vector_at(column, body));
+  };
+  const Vector3 axis =
+      one == kNone ? drive.axis_in_body1 : Vector3(quaternion_at(state.orientation, one) * drive.axis_in_body1);
+  if (!drive.slides) return axis.dot(of(two, state.angular_velocity) - of(one, state.angular_velocity));
+  // both turn alike, the one that is the world not at all
+  const Vector3 arm = one == kNone || two == kNone ? Vector3(Vector3::Zero())
+                                                   : Vector3(of(two, state.position) - of(one, state.position));
+  return axis.dot(of(two, state.linear_velocity) - of(one, state.linear_velocity) -
+                  of(one, state.angular_velocity).cross(arm));
 }
 
 Figures::Totals Figures::totals(kernel::Environment* environment) const {
@@ -175,10 +183,15 @@ void Figures::write(report::v1::Report* report) const {
         runaway_->is_given ? "that is the speed which it was given"
                            : "it runs away, as where TimeStep is too long for the forces and the integrator"));
   for (const Drive& drive : drives_) {
-    report::v1::Drive* message = report->add_drives();
-    message->set_constraint(description_.constraints[drive.constraint].id);
-    message->set_target(drive.target);
-    message->set_speed(drive.speed);
+    const auto write_drive = [&](auto* message) {
+      message->set_constraint(description_.constraints[drive.constraint].id);
+      message->set_target(drive.target);
+      message->set_speed(drive.speed);
+    };
+    if (drive.slides)
+      write_drive(report->add_sliding_drives());
+    else
+      write_drive(report->add_drives());
   }
 }
 

@@ -39,12 +39,13 @@ class Figures {
     std::uint32_t fastest = kNone;
     double energy() const { return kinetic + potential; }
   };
-  // A joint that drives its second body about an axis.
+  // A joint that drives its second body about an axis, or along it.
   struct Drive {
     std::uint32_t constraint;
     Vector3 axis_in_body1;  // unit
-    double target;          // rad/s
-    double speed = 0.0;     // rad/s, in the last state
+    double target;          // rad/s or m/s
+    bool slides = false;
+    double speed = 0.0;  // in the last state
   };
 
   struct Runaway {

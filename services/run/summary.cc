@@ -21,11 +21,13 @@ std::string story(const report::v1::Report& report, const std::vector<EventLog::
                         meetings[i].time, meetings[i].speed);
   }
   if (meetings.size() > kMostNamed) text += fmt::format(" and {} more", meetings.size() - kMostNamed);
-  for (int i = 0; i < report.drives_size() && i < static_cast<int>(kMostNamed); ++i) {
-    const report::v1::Drive& drive = report.drives(i);
-    text += fmt::format("{}{} turns at {:.6g} rad/s (set: {:.6g})", text.empty() ? "" : "; ", drive.constraint(),
-                        drive.speed(), drive.target());
-  }
+  const auto tell_drives = [&](const auto& drives, const char* moves, const char* unit) {
+    for (int i = 0; i < drives.size() && i < static_cast<int>(kMostNamed); ++i)
+      text += fmt::format("{}{} {} at {:.6g} {} (set: {:.6g})", text.empty() ? "" : "; ", drives[i].constraint(), moves,
+                          drives[i].speed(), unit, drives[i].target());
+  };
+  tell_drives(report.drives(), "turns", "rad/s");
+  tell_drives(report.sliding_drives(), "slides", "m/s");
   if (report.events().break_() > 0)
     text += fmt::format("{}{} joints broke", text.empty() ? "" : "; ", report.events().break_());
   return text;

@@ -39,6 +39,29 @@ TEST_P(Motor, ReachesItsSpeedInAStepAndKeepsIt) {
   EXPECT_LE(run.report().max_joint_error(), 1e-12);
 }
 
+// A lift that turns with its shaft, half as strong as the load wants: the report has its speed along the axis, which is missed.
+TEST_P(Motor, OfASliderThatIsTooWeakIsTold) {
+  for (const double strength : {10.0, 0.5}) {
+    SceneRun run(
+        "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+        "Environment { Space { Bodies { Body { Id = \"Shaft\" Mass = 1 PrincipalMoments = {1, 1, 1} Kinematic = true "
+        "KineticProperties { AngularVelocity = {0, 3, 0} } } Body { Id = \"Load\" Mass = 2 PrincipalMoments = {1, 1, "
+        "1} "
+        "Forces = {\"G\"} KineticProperties { Position = {1, 0, 0} } } } }\n"
+        "Constraints { Constraint { Type = \"Slider\" Id = \"Lift\" Body1 = \"Shaft\" Body2 = \"Load\" "
+        "CustomProperties { "
+        "BindPoint = {1, 0, 0} Axis = {0, 2, 0} Speed = 0.4 MaximumForce = " +
+            harness::literal(strength * 2 * kG) + " } } } }\n",
+        with({"Simulator.Duration=0.5"}));
+    run.to_end();
+    const report::v1::Report report = run.report();
+    ASSERT_EQ(report.sliding_drives_size(), 1);
+    EXPECT_EQ(report.sliding_drives(0).target(), 0.4);
+    EXPECT_NEAR(report.sliding_drives(0).speed(), strength > 1.0 ? 0.4 : -0.5 * kG * run.time(), 1e-6) << strength;
+    EXPECT_EQ(report.drives_size(), 0);
+  }
+}
+
 TEST_P(Motor, BetweenFreeBodiesTurnsEachInTheMeasureOfTheOther) {
   SceneRun run("motor_pair.gravitas", with({}));
   const double stator = run.moments("Stator").y(), rotor = run.moments("Rotor").y();
