@@ -258,6 +258,36 @@ TEST(JointError, CountsAUnilateralAxisOnOneSide) {
   EXPECT_NEAR(joint_error_of(kFree, kUnilateral, kFree), 0.4, kCopyRounding);
 }
 
+// The same error between the same limits: how far it is from the nearer one.
+TEST(LimitGaps, AreTheWaysToTheNearerLimits) {
+  using enum AxisMode;
+  Draw random(8);
+  Discrepancy d;
+  d.axes = random.rotation();
+  d.point1 = Vector3(1, 2, 3);
+  d.point2 = d.point1 + d.axes * Vector3(0.3, -0.4, 0.5);
+  d.lower = Vector3(-0.1, -0.1, -0.1);
+  d.upper = Vector3(0.1, kUnlimited, 0.6);
+  d.modes = pack_modes(kLimited, kLimited, kLimited);
+  EXPECT_LE((limit_gaps(d) - Vector3(-0.2, -0.3, 0.1)).norm(), 1e-14);
+  d.modes = pack_modes(kUnilateral, kLocked, kDriven);
+  EXPECT_NEAR(limit_gaps(d).x(), 0.3, 1e-14);
+  EXPECT_EQ(limit_gaps(d).y(), kUnlimited);
+  EXPECT_EQ(limit_gaps(d).z(), kUnlimited);
+  // what gives way, and what leaves no room, is no limit
+  d.modes = pack_modes(kLimited, kLimited, kLimited);
+  d.compliance.x() = 1e-3;
+  d.upper.z() = d.lower.z();
+  EXPECT_EQ(limit_gaps(d).x(), kUnlimited);
+  EXPECT_EQ(limit_gaps(d).z(), kUnlimited);
+  // a rope of 1 m whose ends are sqrt(0.5) m apart
+  d.compliance.setZero();
+  d.modes = kRadialDiscrepancy | pack_modes(kLimited, kFree, kFree);
+  d.lower.x() = -kUnlimited;
+  d.upper.x() = 1.0;
+  EXPECT_NEAR(limit_gaps(d).x(), 1.0 - std::sqrt(0.5), 1e-14);
+}
+
 TEST(JointError, KnowsNoErrorOfVelocityRows) {
   using enum AxisMode;
   EXPECT_EQ(joint_error_of(kFree, kFree, kFree), 0.0);

@@ -77,5 +77,25 @@ TEST(JointLoad, OpeningOfATurnIsAWay) {
   EXPECT_EQ(opening({columns, impulse, 0, 1}, {}, {}, 0.01), 0.0) << "nothing that turns";
 }
 
+// A body that goes 1 mm along x while its joint to the world opens by all of that, or closes by it.
+TEST(JointLoad, IsPulledApartByAShareOfTheBodiesWays) {
+  const std::vector<double> point(3, 0.0), zero(3, 0.0), correction(1, 1.0), axes{1, 0, 0, 0};
+  const std::vector<double> unlimited(3, kUnlimited);
+  const auto is_apart = [&](AxisMode along, double moved, double started) {
+    const std::vector<std::uint32_t> modes{pack_modes(along, AxisMode::kLocked, AxisMode::kLocked)};
+    const DiscrepancyColumns columns{point, point, zero, correction, axes, modes, zero, zero, zero, zero, unlimited};
+    JointBody body;
+    body.inverse_mass = 0.5;
+    body.inverse_moments = Vector3::Constant(0.5);
+    body.start.position.x() = started;
+    body.next.position.x() = moved;
+    return is_pulled_apart({columns, zero, 0, 1}, {}, body);
+  };
+  EXPECT_TRUE(is_apart(AxisMode::kLocked, 1e-3, 0.0));
+  EXPECT_FALSE(is_apart(AxisMode::kFree, 1e-3, 0.0));
+  EXPECT_FALSE(is_apart(AxisMode::kLocked, 1e-3, 2e-3)) << "it closes";
+  EXPECT_FALSE(is_apart(AxisMode::kLocked, 1e-16, 0.0)) << "rounding";
+}
+
 }  // namespace
 }  // namespace gravitas
