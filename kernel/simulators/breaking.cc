@@ -1,14 +1,22 @@
 // Joints that break. One that would bear more than its BreakingForce, or come open beyond its BreakingThreshold, bears nothing
 // in the inner step that would ask for it, which is solved again without it: with its impulse, a thread would stop a truck.
-// The most overloaded is the first to go, since that may relieve others; of joints that contradict each other the weakest.
+// The most overloaded is the first to go, since that may relieve others; of joints that contradict each other the weakest. Where
+// many break, more go at once.
 #include <algorithm>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "kernel/environment.h"
 #include "plugin_sdk/joint_load.h"
 #include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
+namespace {
+
+constexpr std::size_t kToOne = 8;  // joints that have broken in the step, to one more that goes with the next
+
+}  // namespace
 
 bool Environment::write_what_joints_bear(const Trusted<TrialState>& trial, std::optional<Trusted<Solution>> solution) {
   const CommitFigures figures = figures_;
@@ -27,8 +35,7 @@ void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   for (const std::uint32_t joint : broken_) back().intact[joint] = 0;
   const bool contradicts = data_.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction);
-  std::uint32_t overloaded = kNone;
-  double most = 1.0;  // of what it bears
+  std::vector<std::pair<double, std::uint32_t>> overloaded;  // by how much of what it bears, and joint
   const DiscrepancyAnswer& d = data_.discrepancies;
   const DiscrepancyColumns columns = d.columns();
   const std::span<const double> reactions = knows_reactions() ? data_.held_force.span() : std::span<double>();
@@ -50,10 +57,12 @@ void Environment::update_joints() {
     const bool is_torn = contradicts && force > 0.0 && is_pulled_apart(rows, one, two);
     const double overload = std::max(force > 0.0 ? (is_torn ? kUnlimited : load.force) / force : 0.0,
                                      threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0);
-    if (overload > most) overloaded = joint, most = overload;
+    if (overload > 1.0) overloaded.emplace_back(-overload, joint);
     figures_.joint_error = std::max(figures_.joint_error, load.error);
   }
-  if (overloaded != kNone) broken_.push_back(overloaded);
+  const std::size_t at_once = std::min(overloaded.size(), 1 + broken_.size() / kToOne);
+  std::ranges::sort(overloaded);
+  for (std::size_t i = 0; i < at_once; ++i) broken_.push_back(overloaded[i].second);
 }
 
 }  // namespace gravitas::kernel

@@ -226,6 +226,24 @@ TEST_P(BreakingOf, OneOfTwoInARow) {
   EXPECT_NE(run.holds("AB"), run.holds("BC"));
 }
 
+// A hundred bolts that all bear too much, and one that does not: they break in one step, which is not solved a hundred times.
+TEST_P(BreakingOf, ManyInOneStep) {
+  std::string bodies, joints;
+  for (int i = 0; i <= 100; ++i) {
+    const std::string id = std::to_string(i);
+    bodies += body("B" + id, 1, Vector3(2.0 * i, 0, 0), "\"Down\"");
+    joints += "Constraint { Type = \"Rigid\" Id = \"J" + id + "\" Body2 = \"B" + id +
+              "\" BreakingForce = " + literal(i < 100 ? 9.0 - 0.01 * i : 10.0) + " }\n";
+  }
+  SceneRun run(scene_of(kGravityDown, bodies, joints, GetParam()));
+  run.step();
+  EXPECT_EQ(run.count_events(EventKind::kBreak), 100U);
+  EXPECT_TRUE(run.holds("J100"));
+  EXPECT_LT(run.environment().stage_time(kernel::Stage::kSolve).count(), 30U);
+  for (int i = 0; i <= 100; ++i)
+    EXPECT_NEAR(run.body("B" + std::to_string(i)).twist.linear.y(), i < 100 ? -kG * run.time_step() : 0.0, 1e-12) << i;
+}
+
 // A specimen between the world and a kinematic body that goes away from it: no force holds it, and none was told, so that it was
 // drawn out by 5 cm. The weakest joint breaks; of others that nobody tears none does.
 TEST_P(BreakingOf, ASpecimenInATensileTest) {
