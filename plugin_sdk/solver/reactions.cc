@@ -69,6 +69,8 @@ double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   }
   const double missed = factor_.make_consistent(&side);
   factor_.solve(&side);
+  // rows that depend on each other bear alike
+  if (!agrees_) factor_.shorten(&side);
   for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
   return missed;
 }
