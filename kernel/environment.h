@@ -9,11 +9,14 @@
 // kPaused, fault() says why, and the state is that of the last commit. An environment is used by one thread at a time.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernel/arena.h"
@@ -75,6 +78,12 @@ class CommitListener {
   virtual void on_inner_step(const Environment&, const InnerStep&) {}
   // At the end of a step, when S_{n+1} is committed. What it throws comes out of step(); the commit stands.
   virtual void on_commit(const Environment& environment) = 0;
+};
+
+// A plugin lacks what the simulator needs of its slot.
+struct UnfitPlugin : std::invalid_argument {
+  UnfitPlugin(const std::string& why, std::string needed) : invalid_argument(why), capability(std::move(needed)) {}
+  std::string capability;
 };
 
 class Environment : private DerivativeSource, private SlotObserver {
@@ -275,6 +284,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   StageSlot& slot_of(Slot slot);
   std::uint32_t place_of(const SwapOrder& order);
   void check_fallbacks() const;
+  const char* needed_capability(Slot slot) const;
   std::string why_unfit(const PluginDeclaration& plugin) const;
   void on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) override;
   void on_decision(const Decision& decision) override;

@@ -65,13 +65,17 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
   impossible(order, why);
 }
 
+// What the simulator needs of the plugins of a slot; null: nothing.
+const char* Environment::needed_capability(Slot slot) const {
+  if (knows_reactions()) return slot == Slot::kSolver ? "reactions" : nullptr;
+  return description_.simulator == Simulator::kContinuous && slot == Slot::kCollision ? "times_of_impact" : nullptr;
+}
+
 // Why a plugin cannot serve the simulator; empty if it can.
 std::string Environment::why_unfit(const PluginDeclaration& plugin) const {
-  const bool is_smooth = knows_reactions(), asks = is_smooth || description_.simulator == Simulator::kContinuous;
-  const char* capability = is_smooth ? "reactions" : "times_of_impact";
-  if (!asks || plugin.slot != (is_smooth ? Slot::kSolver : Slot::kCollision)) return {};
-  if (has_capability(plugin, capability)) return {};
-  return std::string("the simulator ") + (is_smooth ? "Smooth" : "Continuous") +
+  const char* capability = needed_capability(plugin.slot);
+  if (capability == nullptr || has_capability(plugin, capability)) return {};
+  return std::string("the simulator ") + (knows_reactions() ? "Smooth" : "Continuous") +
          " needs a plugin with the capability '" + capability + "' in slot " + slot_name(plugin.slot) + ", and " +
          plugin.name + " has it not";
 }
@@ -79,7 +83,8 @@ std::string Environment::why_unfit(const PluginDeclaration& plugin) const {
 void Environment::check_fallbacks() const {
   for (const StageSlot* slot : slots_)
     for (const PluginChoice& plugin : slot->description().plugins) {
-      if (const std::string why = why_unfit(plugin.declaration); !why.empty()) throw std::invalid_argument(why);
+      if (const std::string why = why_unfit(plugin.declaration); !why.empty())
+        throw UnfitPlugin(why, needed_capability(slot->which()));
       if (!plugin.fallback) continue;
       const PluginDeclaration& fallback = plugin.fallback->declaration;
       std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));

@@ -31,8 +31,9 @@ double Environment::first_limit(double begin, double length, bool* passes) {
     begin_inner_step(begin, trial);
     constrain(integrate());
     gaps->clear();
-    for (std::size_t i = 0; i < data_.discrepancies.constraint.size(); ++i) {
-      const Discrepancy row = data_.discrepancies.columns().at(i);
+    const DiscrepancyColumns rows = data_.discrepancies.columns();
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Discrepancy row = rows.at(i);
       const Vector3 middle = 0.5 * (row.point1 + row.point2);
       double slop = row.is_angular() ? kSlop : 8.0 * kEpsilon * middle.cwiseAbs().maxCoeff();
       for (const std::uint32_t body : data_.discrepancy_body.span().subspan(2 * i, 2))

@@ -144,19 +144,14 @@ kernel::HostStarter patient(kernel::HostStarter starter, std::shared_ptr<std::at
   };
 }
 
-// Where a simulator needs another plugin: those that there are, `; allowed: "Direct", "Newton"`.
-std::string capable_plugins(const std::string& why) {
-  constexpr std::string_view kMark = "the capability '";
-  const std::size_t mark = why.find(kMark);
-  if (mark == std::string::npos) return {};
-  const std::size_t begin = mark + kMark.size();
-  const std::string capability = why.substr(begin, why.find('\'', begin) - begin);
+// Those that have a capability, `"Direct", "Newton"`.
+std::string capable_plugins(const std::string& capability) {
   std::string names;
   const Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
   for (const InstalledPlugin& plugin : catalog.plugins())
     if (has_capability(plugin.declaration, capability))
       names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", plugin.declaration.name);
-  return names.empty() ? "" : "; allowed: " + names;
+  return names.empty() ? "none that is installed" : names;
 }
 
 }  // namespace
@@ -177,7 +172,9 @@ std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription&
     throw BadInput(fmt::format("slot {}, plugin {}: {}", slot_name(fault.slot), fault.plugin,
                                scene::refusal_text(description, fault)));
   } catch (const std::invalid_argument& problem) {
-    const std::string why = problem.what() + capable_plugins(problem.what());
+    std::string why = problem.what();
+    if (const auto* unfit = dynamic_cast<const kernel::UnfitPlugin*>(&problem))
+      why += "; allowed: " + capable_plugins(unfit->capability);
     if (scene != nullptr) require_none(scene::find_refused(*scene, why));
     throw BadInput(why);
   }

@@ -11,8 +11,9 @@
 //                   numbering shows in the answer beyond rounding, and what is symmetric stays so even where sweeps run
 //                   out, but for the contacts of one pair, which are one block and go in turn where they slide. As printed
 //                   it solves 1/k of each error in k sweeps with impulses that were found once. Here the errors are those
-//                   of now, and a block goes 1/n of its way, n the larger number of blocks at its two bodies. With A = J M^-1 J^T, D its blocks: (sum of n terms)^2 <= n (sum of squares) gives
-//                   A <= n D, so that the sweeps converge. Some n times as many are needed.
+//                   of now, and a block goes 1/n of its way, n the larger number of blocks at its two bodies. With
+//                   A = J M^-1 J^T, D its blocks: (sum of n terms)^2 <= n (sum of squares) gives A <= n D, so that the
+//                   sweeps converge. Some n times as many are needed.
 #pragma once
 
 #include <array>

@@ -107,8 +107,7 @@ namespace gravitas {
 enum class ShockPropagation : std::uint8_t { kNever, kStacks, kAlways };
 
 struct SequentialSettings {
-  std::uint32_t iterations =
-      200;  // largest number of sweeps of one relaxation, 1 ... 100000; of joints alone ten times that
+  std::uint32_t iterations = 200;  // most sweeps of one relaxation, 1 ... 100000; of joints alone ten times as many
   double correction_factor = 1.0;  // share of an old error that a step removes, 0 ... 1
   RelaxationOrder order = RelaxationOrder::kGiven;
   double relaxation_factor = 1.0;  // of the way of locks and contacts, 0 ... 2
