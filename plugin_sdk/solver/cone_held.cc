@@ -47,6 +47,7 @@ void ConeProblem::factorise(const SolverBodies& bodies, const std::vector<std::s
     }
   }
   factor_.factorise();
+  has_nearest_ = false;
 }
 
 double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
@@ -57,7 +58,7 @@ double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, 
   for (std::size_t i = 0; i < first.size(); ++i) entries += static_cast<double>(i - first[i]);
   if (entries > kMostEntries) return 0.0;
   factorise(bodies, first);
-  const double contradiction = make_consistent(smallest);
+  const double contradiction = make_consistent(bodies, smallest);
   for (std::size_t i = 0; i < held_.size() && contradiction > 0.0; ++i) {
     JointLaw& law = rows[held_[i]].law;
     law.lower_target = law.upper_target = free_[held_[i]] + scale_[held_[i]] * side_[i];
@@ -65,23 +66,57 @@ double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, 
   return contradiction;
 }
 
-double ConeProblem::make_consistent(double smallest) {
+double ConeProblem::make_consistent(const SolverBodies& bodies, double smallest) {
   if (factor_.dropped() == 0) return 0.0;
   double largest = 0.0;
   for (const std::uint32_t r : held_) largest = std::max(largest, way_of(r));
-  const double distance = largest * factor_.make_consistent(&side_);
+  const double distance = largest * make_consistent(bodies, &side_);
   return distance > std::max(smallest, 1e-9 * size()) ? distance : 0.0;
 }
 
-// Held rows that depend on each other bear alike: of all multipliers that move alike the shortest ones, scaled. Not beside
-// drives: what these bear moves the bodies, what joints bear does not.
-void ConeProblem::share_out() {
+// Where many rows depend on each other equal springs tell the nearest side; the factors, what lies where their dependence and
+// that of the springs differ.
+double ConeProblem::make_consistent(const SolverBodies& bodies, std::vector<double>* side) {
+  constexpr std::size_t kMany = 32;
+  constexpr double kRounded =
+      1e-7;  // of a side: what rounding may leave of it, which dependent rows of a large wall amplify
+  if (factor_.dropped() < kMany || factor_.is_consistent(*side)) return factor_.make_consistent(side);
+  if (!has_nearest_) {
+    nearest_.start(bodies.count() + 1);
+    for (const std::uint32_t r : held_)
+      nearest_.add(rows[r], bodies, rows[r].law.gamma > 0.0 ? 0.0 : 1.0 / (scale_[r] * scale_[r]));
+    nearest_.factorise();
+    has_nearest_ = true;
+  }
+  std::vector<double> fitted(held_.size());
+  for (std::size_t i = 0; i < held_.size(); ++i) fitted[i] = (*side)[i] * scale_[held_[i]];
+  nearest_.fit(&fitted);
+  double squared = 0.0, largest = 0.0;
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    const double way = fitted[i] / scale_[held_[i]] - (*side)[i];
+    largest = std::max(largest, std::fabs((*side)[i]));
+    (*side)[i] += way;
+    squared += way * way;
+  }
+  const double left = factor_.is_consistent(*side, kRounded * largest) ? 0.0 : factor_.make_consistent(side);
+  return std::sqrt(squared) + left;
+}
+
+// Held rows that depend on each other bear as equal springs would, moments by way of their rows' lengths. Not beside drives:
+// what these bear moves the bodies, what joints bear does not.
+void ConeProblem::share_out(const SolverBodies& bodies) {
   const auto drives = [&](std::uint32_t r) { return rows[r].law.is_velocity_only; };
   if (factor_.dropped() == 0 || std::ranges::any_of(held_, drives)) return;
-  std::vector<double> scaled(held_.size());
-  for (std::size_t i = 0; i < held_.size(); ++i) scaled[i] = rows[held_[i]].multiplier * scale_[held_[i]];
-  factor_.shorten(&scaled);
-  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier = scaled[i] / scale_[held_[i]];
+  shares_.start(bodies.count() + 1);
+  std::vector<double> multipliers;
+  for (const std::uint32_t r : held_) {
+    const ConeRow& row = rows[r];
+    shares_.add(row, bodies, row.law.gamma > 0.0 ? 0.0 : row.length > 0.0 ? row.length * row.length : 1.0);
+    multipliers.push_back(row.multiplier);
+  }
+  shares_.factorise();
+  if (!shares_.share(&multipliers)) return;
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier = multipliers[i];
 }
 
 void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, double smallest,
@@ -141,7 +176,7 @@ void ConeProblem::add_to_held(std::vector<double>* missing) {
 
 double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
   std::vector<double> missing = missing_of_held(bodies, x0);
-  if (factor_.dropped() > 0) factor_.make_consistent(&missing);
+  if (factor_.dropped() > 0) make_consistent(bodies, &missing);
   double largest = 0.0;
   for (std::size_t i = 0; i < held_.size(); ++i)
     largest = std::max(largest, std::fabs(missing[i]) * scale_[held_[i]] * rows[held_[i]].length);
@@ -151,7 +186,7 @@ double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0
 
 double ConeProblem::correct(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
   side_ = missing_of_held(bodies, x0);
-  const double contradiction = make_consistent(smallest);
+  const double contradiction = make_consistent(bodies, smallest);
   add_to_held(&side_);
   return contradiction;
 }

@@ -238,7 +238,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     return summary;
   }
   factorise(bodies, order_held(bodies));
-  summary.contradiction = make_consistent(smallest);
+  summary.contradiction = make_consistent(bodies, smallest);
   const double tolerance = std::max(smallest, settings.tolerance * size());
   lambda_.resize(static_cast<Eigen::Index>(other_.size()));
   for (std::size_t o = 0; o < other_.size(); ++o)
@@ -271,7 +271,7 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
   }
   if (settings.is_rough) return summary;
   refine(bodies, x0, smallest, settings, &summary);
-  share_out();
+  share_out(bodies);
   return summary;
 }
 

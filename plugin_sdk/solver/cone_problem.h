@@ -55,6 +55,7 @@
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/cone_path.h"
 #include "plugin_sdk/solver/elimination_order.h"
+#include "plugin_sdk/solver/equal_springs.h"
 #include "plugin_sdk/solver/held_step.h"
 #include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/nesterov_acceleration.h"
@@ -211,7 +212,9 @@ class ConeProblem {
   void factorise(const SolverBodies& bodies, const std::vector<std::size_t>& first);
   double size() const;
   // The side of the held rows; as reconcile().
-  double make_consistent(double smallest);
+  double make_consistent(const SolverBodies& bodies, double smallest);
+  // As ProfileLdlt::make_consistent().
+  double make_consistent(const SolverBodies& bodies, std::vector<double>* side);
   void reduce(const SolverBodies& bodies);
   bool is_solved_by_nothing(double smallest) const;
   // Of a scaled unit of a row, m.
@@ -258,7 +261,7 @@ class ConeProblem {
   // Mends the held rows; returns by how much they were off (m/s, m).
   double refine_held(const SolverBodies& bodies, const BodyMotion& x0);
   void add_to_held(std::vector<double>* missing);
-  void share_out();
+  void share_out(const SolverBodies& bodies);
   // Largest of what the value of a held row is summed from, m/s, m.
   double largest_held_sum() const;
 
@@ -273,6 +276,9 @@ class ConeProblem {
 
   EliminationOrder elimination_;
   ProfileLdlt factor_;
+  EqualSprings shares_;   // of multipliers
+  EqualSprings nearest_;  // of sides, where has_nearest_
+  bool has_nearest_ = false;
   std::vector<std::vector<std::uint32_t>> held_of_body_;                // places among held_
   std::vector<std::vector<std::uint32_t>> others_of_body_;              // places among other_
   std::vector<double> side_;                                            // (target - q)/scale of held rows

@@ -162,7 +162,7 @@ void ProfileLdlt::add(double share, const NullVector& a, NullVector* b) {
 
 // What is left of a dropped row's number by substitution is z^T b of its combination z. Rounding of a side is told by its
 // largest number among rows that are connected, by way of others, with this one.
-bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
+bool ProfileLdlt::is_consistent(const std::vector<double>& b, double enough) const {
   constexpr double kAgrees = 64.0 * std::numeric_limits<double>::epsilon();
   std::vector<double> y = b, largest;
   double most = 0.0;
@@ -182,7 +182,7 @@ bool ProfileLdlt::is_consistent(const std::vector<double>& b) const {
       terms += std::fabs(term);
     }
     const double left = std::fabs(y[i]);
-    if (left <= kAgrees * terms) continue;
+    if (left <= std::max(enough, kAgrees * terms)) continue;
     if (!(left <= kAgrees * std::max(terms, most))) return false;
     if (largest.empty()) largest = largest_of_parts(b);
     if (!(left <= kAgrees * std::max(terms, largest[i]))) return false;
@@ -219,10 +219,6 @@ void ProfileLdlt::find_parts() const {
 
 double ProfileLdlt::make_consistent(std::vector<double>* b) const {
   return dropped_.empty() || is_consistent(*b) ? 0.0 : project(b);
-}
-
-void ProfileLdlt::shorten(std::vector<double>* x) const {
-  if (!dropped_.empty()) project(x);
 }
 
 // Takes away what lies in the null space; returns its length.

@@ -34,8 +34,8 @@ class ProfileLdlt {
   std::size_t dropped() const { return dropped_.size(); }
   // x with A x = b; entries of dropped rows are 0 and not looked at.
   void solve(std::vector<double>* b) const;
-  // The shortest x of those with the same A x.
-  void shorten(std::vector<double>* x) const;
+  // Is there an x with A x = b, but for rounding and for `enough` in any row?
+  bool is_consistent(const std::vector<double>& b, double enough = 0.0) const;
   // The side nearest to b that A x can be. Returns the distance; 0, and leaves b, where it is only of rounding.
   double make_consistent(std::vector<double>* b) const;
 
@@ -53,7 +53,6 @@ class ProfileLdlt {
   std::vector<double> difference(std::size_t row) const;
   // May the pivot of a row be what rounding left there?
   bool is_rounding(std::size_t row, double pivot);
-  bool is_consistent(const std::vector<double>& b) const;
   double project(std::vector<double>* b) const;
   std::vector<double> largest_of_parts(const std::vector<double>& b) const;
   void find_parts() const;

@@ -10,6 +10,7 @@
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver/bodies.h"
 #include "plugin_sdk/solver/elimination_order.h"
+#include "plugin_sdk/solver/equal_springs.h"
 #include "plugin_sdk/solver/profile_ldlt.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
@@ -159,6 +160,8 @@ class ReactionSolver {
   // Change of pose or velocity, along M^-1 J^T, that takes errors of the rows away.
   std::vector<Twist> taken_out(std::vector<double> errors) const;
 
+  void share_out();
+
   // Rows whose pivot is less than `least` of their diagonal count as dependent.
   void factorise(double least);
 
@@ -173,6 +176,7 @@ class ReactionSolver {
   std::vector<Wrench> sprung_;  // of the springs, by body
   EliminationOrder elimination_;
   ProfileLdlt factor_;
+  EqualSprings shares_;
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;
   // of the Jacobian: are states made to agree with the joints? joints where the bodies are; and by body for one number

@@ -69,10 +69,25 @@ double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   }
   const double missed = factor_.make_consistent(&side);
   factor_.solve(&side);
-  // rows that depend on each other bear alike
-  if (!agrees_) factor_.shorten(&side);
   for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
+  if (!agrees_) share_out();
   return missed;
+}
+
+// Rows that depend on each other bear as equal springs would, moments by way of the longer radius of gyration.
+void ReactionSolver::share_out() {
+  if (factor_.dropped() == 0) return;
+  const auto gyration = [&](std::uint32_t body) {
+    return radius_of_gyration(bodies_[body].inverse_mass, bodies_[body].inverse_inertia.trace() / 3.0);
+  };
+  shares_.start(bodies_.size());
+  for (const Row& row : rows_) {
+    const bool is_angular = row.direction.linear.isZero(0.0);
+    const double length = is_angular ? std::max(gyration(row.body1), gyration(row.body2)) : 1.0;
+    shares_.add(row, bodies_, length > 0.0 ? length * length : 1.0);
+  }
+  shares_.factorise();
+  shares_.share(&multipliers_);
 }
 
 void ReactionSolver::write(double residual, const stage::SolverReactionsReply& reply) const {

@@ -427,5 +427,31 @@ TEST_P(JointsInMotion, ContradictingJointsCompromise) {
   }
 }
 
+// A wall of n x n bricks between the world and what goes away from it: each row of joints opens alike, those at the ends, which
+// one side alone gives way to, half as far. Beyond n = 10 a step met its deadline of 2 s no more.
+TEST_P(JointsInMotion, AWallThatIsPulledApartOpensAlike) {
+  const int count = is_end_of_step() ? 12 : 3;
+  std::string bodies =
+      body("Puller", {0, static_cast<double>(count), 0}, "Kinematic = true", " LinearVelocity = {0, 0.1, 0}");
+  std::string joints;
+  const auto brick = [](int i, int j) { return "B" + std::to_string(i) + "_" + std::to_string(j); };
+  const auto join = [&](const std::string& one, const std::string& two, const Vector3& at) {
+    joints += joint("Rigid", one + "-" + two, one, two, "BindPoint = " + literal(at));
+  };
+  for (int i = 0; i < count; ++i)
+    for (int j = 0; j < count; ++j) {
+      bodies += body(brick(i, j), {static_cast<double>(i), static_cast<double>(j), 0});
+      join(j > 0 ? brick(i, j - 1) : "", brick(i, j), {i + 0.0, j - 0.5, 0});
+      if (i > 0) join(brick(i - 1, j), brick(i, j), {i - 0.5, j + 0.0, 0});
+      if (j == count - 1) join(brick(i, j), "Puller", {i + 0.0, j + 0.5, 0});
+    }
+  SceneRun run(scene(bodies, joints, 0.01, 0.05), solver());
+  run.to_end();
+  const double opened = 0.1 * run.time();
+  for (int i = 0; i < count; ++i)
+    for (int j = 0; j < count; ++j)
+      EXPECT_NEAR(run.body(brick(i, j)).pose.position.y() - j, opened * (j + 0.5) / count, 1e-6) << i << ' ' << j;
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -62,6 +62,7 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
   summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
   if (contradicts || drives_contradict_) summary_.stop_reason = StopReason::kContradiction;
   if (used_up_) summary_.stop_reason = StopReason::kIterations;
+  share_out();
   pose_joints_.store(solution_.joint_correction);
   for (std::size_t i = 0; i < pose_laws_.size(); ++i)
     if (!pose_laws_[i].is_active()) solution_.joint_correction[i] = 0.0;

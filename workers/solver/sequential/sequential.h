@@ -76,6 +76,9 @@
 // Drives without a bound whose velocity is missed by a tenth, or what is in their way, ask for what joints, limits and contacts let
 // them reach (end_of_step.h, found by cone_problem.h), and velocities are solved anew.
 //
+// Joints that hold the same freedoms share their load as equal springs would (equal_springs.h): where bodies are held in loops or
+// by several joints, and by more rows than they have freedoms.
+//
 // Islands are solved each by itself (sequential_islands.h).
 //
 // One joint, one contact, or one patch of contacts that rests or sticks is exact in one sweep; n bodies in a row take of
@@ -93,6 +96,8 @@
 #include <utility>
 #include <vector>
 
+#include "plugin_sdk/solver/elimination_order.h"
+#include "plugin_sdk/solver/equal_springs.h"
 #include "plugin_sdk/solver/reply.h"
 #include "plugin_sdk/solver/stalled_drives.h"
 #include "workers/solver/sequential/contact_gaps.h"
@@ -211,6 +216,7 @@ class SequentialSolver {
   void build_velocity(const stage::SolverSolveRequest& request);
   void take_directions(bool drives_yield);
   void solve_velocity();
+  void share_out();
   void relax_velocity();
   bool let_drives_yield(const stage::SolverSolveRequest& request);
   bool find_reach();
@@ -246,6 +252,11 @@ class SequentialSolver {
   SolverBodies bodies_, turned_;                      // the latter with the inertia of the velocities' rows
   std::vector<RelaxationDiscrepancy> discrepancies_;  // at S*
   std::vector<RelaxationDiscrepancy> directed_;       // with the directions of the velocities' rows
+  // Rows that hold always, and their bodies; of these the rows that may share a load, as long as the same bodies meet.
+  std::vector<std::uint32_t> held_rows_, sharing_;
+  std::vector<RowEnds> held_ends_, known_ends_;
+  EliminationOrder sharing_order_;
+  EqualSprings equal_springs_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> touching_;  // bodies, where there are joints; rising
   std::vector<RelaxationDiscrepancy> posed_;                       // with those of the pose change's
   std::vector<JointEnd> ends_;                                     // where solution_.displacement ends
