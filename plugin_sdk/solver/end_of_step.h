@@ -33,8 +33,9 @@
 // direction; the others 1e-6 of it.
 //
 // Recovery is bounded: contacts that leave a body no room (walls that crush it, shapes one in another) ask for a pose change
-// without end. Where it goes beyond 16 times the ways of the step (S_n to S*, and h v*) and twice what is overlapped at S*,
-// summed over the island, all of it is shortened, and what overlaps stays for the steps to come.
+// without end. Where it goes, from S* and from where lambda_v alone leads, beyond 16 times the ways of the step (S_n to S*, and
+// h v*) and twice what is overlapped at S*, summed over the island, all of it is shortened, and what overlaps stays for the
+// steps to come.
 //
 // Drives without a bound ask for their velocity whatever is in the way. Where that has no solution, they are given a compliance of
 // 1e-3 of their own response, which finds the velocities that joints, limits and contacts let them reach (steps of the proximal

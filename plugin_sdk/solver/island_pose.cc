@@ -9,6 +9,8 @@
 namespace gravitas {
 
 void IslandSolver::solve_pose() {
+  // where the steps before did not end, or were shortened to, is no place to begin
+  if (round_ > 0 && !joints_.empty() && (!has_pose_ || is_shortened_)) forget_corrections();
   find_pose();
   if (!yields_ && contradicts()) {
     yields_ = true;
@@ -16,7 +18,8 @@ void IslandSolver::solve_pose() {
     find_pose();
   }
   const double share = shorten(offset_, &displacement_);
-  if (share == 1.0) return;
+  is_shortened_ = share < 1.0;
+  if (!is_shortened_) return;
   for (ConeRow& row : cone_.rows) row.multiplier *= share;
   keep_corrections();
   move_to_end();
@@ -181,7 +184,8 @@ bool IslandSolver::are_closed() const {
 
 double IslandSolver::shorten(const BodyMotion& from, BodyMotion* motion) const {
   if (contacts_.empty()) return 1.0;
-  const double moved = largest_change(*motion, from), most = most_of(moved);
+  // what takes back where friction or drives alone would bring bodies ends near S*
+  const double moved = std::min(largest_change(*motion, from), largest(*motion)), most = most_of(moved);
   if (!(moved > most)) return 1.0;
   const double share = most / moved;
   for (const std::uint32_t i : pushed_) {

@@ -234,6 +234,7 @@ class IslandSolver {
   int round_ = 0;
   StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
+  bool is_shortened_ = false;  // the pose change
   bool yields_ = false;  // contacts, in the pose change
   std::optional<SharedRestitution> restitution_;
   bool all_share_ = false;
