@@ -235,7 +235,7 @@ class IslandSolver {
   StalledDrives stalled_;
   bool has_settled_ = true, has_pose_ = true, has_velocity_ = true;
   bool is_shortened_ = false;  // the pose change
-  bool yields_ = false;  // contacts, in the pose change
+  bool yields_ = false;        // contacts, in the pose change
   std::optional<SharedRestitution> restitution_;
   bool all_share_ = false;
   bool drives_yield_ = false;
