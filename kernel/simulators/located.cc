@@ -8,7 +8,8 @@
 //                passes through within a trial is missed. Pairs that touch and do not fly up are the solver's, too.
 //
 // Both also end inner steps where surfaces stop sliding on each other (slides.cc), up to some number in a step. A Zeno
-// sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps: the rest is Basic's.
+// sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps (when bisecting, each of some
+// 45 trials, kMostBisections): the rest is Basic's.
 #include <algorithm>
 
 #include "kernel/environment.h"
@@ -18,7 +19,7 @@
 namespace gravitas::kernel {
 namespace {
 
-constexpr int kMostInnerSteps = 10'000, kMostTrials = 200;
+constexpr int kMostInnerSteps = 10'000, kMostBisections = 200, kMostTrials = 200;
 constexpr std::size_t kMostSlides = 8, kMostSlidesOfPair = 4;    // whose ends are met in a step
 constexpr double kShortestFlight = 1e-6;                         // of the step
 constexpr double kTargetShare = 1e-8;                            // of the margin: gap at which a pair has met
@@ -36,6 +37,7 @@ bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint3
 }  // namespace
 
 void Environment::locate_events(double begin, double length) {
+  const bool bisects = description_.simulator == Simulator::kBisection;
   double done = 0.0;
   bool is_near = false;
   std::size_t slides = 0;
@@ -45,8 +47,7 @@ void Environment::locate_events(double begin, double length) {
     bool has_found_contacts = false;
     begin_inner_step(begin + done, left);
     Trusted<TrialState> trial = integrate();
-    if (inner < kMostInnerSteps) {
-      const bool bisects = description_.simulator == Simulator::kBisection;
+    if (inner < (bisects ? kMostBisections : kMostInnerSteps)) {
       stop = bisects ? bisect(trial, begin + done, left, is_near) : first_impact(trial, begin + done, left);
       is_near = !is_near && stop < left;
       has_found_contacts = bisects && stop == data_.time_step[0];

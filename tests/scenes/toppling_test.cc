@@ -61,5 +61,36 @@ TEST(Toppling, EndsOnThePlate) {
   }
 }
 
+// Two capsules in one body that roll over a plane: their flights shorten without end, and `Bisection` halved its way to each of
+// 1400 impacts in a step. It ends after 200; what is left of the step is that of `Basic`.
+TEST(Toppling, OfACompoundIsHalvedToNoEnd) {
+  SceneRun run(R"(
+Geometries {
+  Geometry { Type = "Capsule" Id = "One" CustomProperties { Radius = 0.097 Height = 0.18 } }
+  Geometry { Type = "Capsule" Id = "Two" CustomProperties { Radius = 0.12 Height = 0.2 } }
+  Geometry { Type = "Compound" Id = "Both" CustomProperties { Children = {
+    {"One", {0.18581091243277087, 0.06009828161917598, 0.02757384287213407}, {0.6793630091333567, 0.31580531653518157, 0.3650631787442695, 0.5526859681541718}},
+    {"Two", {0.10575528818478613, 0.08451653000889521, 0.1434245119204598}, {-0.9088665053579256, 0.34168569086008505, 0.08371666184523957, -0.22406268013533176}} } } }
+  Geometry { Type = "Halfspace" Id = "Ground" CustomProperties { } } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { Type = "Bisection" CustomProperties { TimeStep = 0.008333333333333333 Duration = 0.6 } }
+Environment { Space { Bodies {
+  Body { Id = "Body" GeometryId = "Both" MassDensity = 1000 Forces = { "Down" } KineticProperties { Position = {0.8, -0.3, -0.2}
+    Orientation = {0.44863789014779154, 0.7348415708406236, 0.06444789192161257, -0.5045576067359236} } }
+  Body { Id = "Ground" GeometryId = "Ground" KineticProperties { Position = {0, -2.3, 0} } } } }
+  KineticIntegrator = "Radau" ConstraintSolver = "Sequential" }
+)");
+  std::uint64_t before = 0, most = 0;
+  while (!run.is_done()) {
+    run.step();
+    const std::uint64_t solved = run.environment().stage_time(kernel::Stage::kSolve).count();
+    most = std::max(most, solved - before);
+    before = solved;
+  }
+  EXPECT_LE(most, 450U);
+  EXPECT_LE(run.report().max_penetration(), 0.02);
+  EXPECT_LE(run.energy(), run.report().energy().initial());
+}
+
 }  // namespace
 }  // namespace gravitas
