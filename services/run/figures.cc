@@ -171,7 +171,8 @@ void Figures::write(report::v1::Report* report) const {
         "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "
         "on: {}",
         joint_error_, 100.0 * kTorn, joined_size_, *opening_step_,
-        contradicts_ ? "they, or limits or drives, ask for what no motion gives, and get a compromise"
+        runaway_ && !runaway_->is_given ? "a body runs away"
+        : contradicts_ ? "they, or limits or drives, ask for what no motion gives, and get a compromise"
         : *opening_step_ == edited_step_
             ? "the edit before that step left apart what they hold"
             : "TimeStep is too long for this scene, or the solver leaves its joints unfinished"));

@@ -157,6 +157,22 @@ Environment {
   EXPECT_THAT(report.warnings(0), HasSubstr("ask for what no motion gives"));
 }
 
+// A spring that RK4 cannot follow throws its body along a slider, whose error is rounding of 1e40 m: that was told as a contradiction.
+TEST(Figures, JointsOfABodyThatRunsAwayAreToldAsThat) {
+  const report::v1::Report report = figures_of(R"(
+Simulator { Type = "Smooth" CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment {
+  Space { Bodies { Body { Id = "Car" Mass = 1 PrincipalMoments = {1, 1, 1}
+    KineticProperties { LinearVelocity = {0.6, 0.8, 0} } } } }
+  Constraints { Constraint { Type = "Slider" Id = "Rail" Body2 = "Car" CustomProperties {
+    BindPoint = {1, 1, 0} Axis = {0.6, 0.8, 0} Stiffness = 3e5 } } }
+  KineticIntegrator = "RK4" ConstraintSolver = "Newton" })",
+                                               15);
+  ASSERT_EQ(report.warnings_size(), 2);
+  EXPECT_THAT(report.warnings(0), AllOf(HasSubstr("joints came open"), HasSubstr("on: a body runs away")));
+  EXPECT_THAT(report.warnings(1), HasSubstr("TimeStep is too long for the forces and the integrator"));
+}
+
 // k h^2/m = 5.6, above the 4 that the method bears.
 TEST(Figures, ABodyThatRunsAwayIsWarnedOf) {
   const auto warnings = [](double stiffness) {
