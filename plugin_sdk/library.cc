@@ -160,8 +160,9 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     close(copy);
     return known->second;
   }
-  // the descriptor stays open: debuggers and sanitizers read symbols through this name
-  void* handle = load("/proc/self/fd/" + std::to_string(copy), path, problem);
+  // the descriptor stays open: debuggers and sanitizers read symbols through this name, which for a debugger must not be one of its
+  // own files (`self`), where it may wait for ever
+  void* handle = load("/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(copy), path, problem);
   if (handle == nullptr) {
     close(copy);
     return {};

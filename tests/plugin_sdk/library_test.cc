@@ -6,7 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <link.h>
+#include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -75,6 +77,17 @@ TEST(PluginLibrary, AFileThatIsReplacedDoesNotChangeALoadedPlugin) {
   ASSERT_EQ(library.table->create(nullptr, 0, &instance, &error), GRAVITAS_OK) << error.text;
   library.table->destroy(instance);
   EXPECT_EQ(read_declaration(*library.table->description).name, "Hello");
+}
+
+// A debugger opens the name of a library itself: one under /proc/self was a file of its own, a pipe that it read for ever.
+TEST(PluginLibrary, GoesByANameThatOtherProcessesCanOpen) {
+  std::string problem;
+  const PluginLibrary library = load_plugin_library(kHello, &problem);
+  Dl_info info;
+  ASSERT_NE(dladdr(library.table, &info), 0);
+  EXPECT_THAT(info.dli_fname, StartsWith("/proc/" + std::to_string(getpid()) + "/fd/"));
+  const std::string command = std::string("cmp -s '") + info.dli_fname + "' '" + kHello + "'";
+  EXPECT_EQ(std::system(command.c_str()), 0);
 }
 
 TEST(PluginLibrary, RefusesWhatCannotBeRead) {
