@@ -11,7 +11,8 @@
 // Velocity of a row along the unit axis a (world):  J v = a.(v2 + w2 x r2) - a.(v1 + w1 x r1), r1 and r2 from the
 // centres of mass to m, so J = [-a, -(r1 x a), a, r2 x a]; the angular twin has J = [0, -a, 0, a]. An impulse lambda
 // along a pushes body 2 by +lambda a and body 1 by -lambda a, both at m: pushed at x1 and x2 they would turn by the
-// couple (x2 - x1) x lambda a, out of nothing. J delta is the change of a.(x2 - x1) to first order in the error.
+// couple (x2 - x1) x lambda a, out of nothing. J delta is the change of a.(x2 - x1) to first order in the error; so x1 is
+// told along free axes where x2 is (held_point() of joint_rows.h), or half of a body's way along them would be an arm.
 #pragma once
 
 #include <cstdint>

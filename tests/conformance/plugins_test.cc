@@ -87,6 +87,7 @@ const Wrong kWrong[] = {
     {"constraint_unturned_anchor",
      {"constraint/rows", "constraint/frames", "constraint/spherical"},
      "growth (m/s) of the joint error"},
+    {"constraint_far_points", {"constraint/ways"}, "growth (m/s) of the joint error"},
     // the second: its type lacks properties that the scene language gives it
     {"force_wrong_torque", {"force/basic", "force/basic-table"}, "torque is"},
     // with what its refusal says
