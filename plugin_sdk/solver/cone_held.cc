@@ -78,8 +78,8 @@ double ConeProblem::make_consistent(const SolverBodies& bodies, double smallest)
 // that of the springs differ.
 double ConeProblem::make_consistent(const SolverBodies& bodies, std::vector<double>* side) {
   constexpr std::size_t kMany = 32;
-  constexpr double kRounded =
-      1e-7;  // of a side: what rounding may leave of it, which dependent rows of a large wall amplify
+  // of a side: what rounding may leave of it, which dependent rows of a large wall amplify
+  constexpr double kRounded = 1e-7;
   if (factor_.dropped() < kMany || factor_.is_consistent(*side)) return factor_.make_consistent(side);
   if (!has_nearest_) {
     nearest_.start(bodies.count() + 1);
@@ -111,7 +111,7 @@ void ConeProblem::share_out(const SolverBodies& bodies) {
   std::vector<double> multipliers;
   for (const std::uint32_t r : held_) {
     const ConeRow& row = rows[r];
-    shares_.add(row, bodies, row.law.gamma > 0.0 ? 0.0 : row.length > 0.0 ? row.length * row.length : 1.0);
+    shares_.add(row, bodies, row.law.gamma > 0.0 ? 0.0 : EqualSprings::stiffness(row.length));
     multipliers.push_back(row.multiplier);
   }
   shares_.factorise();

@@ -25,6 +25,9 @@ namespace gravitas {
 
 class EqualSprings {
  public:
+  // Of a row whose unit is `length` m: moments count by way of that length.
+  static double stiffness(double length) { return length > 0.0 ? length * length : 1.0; }
+
   void start(std::size_t bodies);
   // The next row; the order should be one of elimination. Bodies that nothing pushes do not move. One of stiffness 0 is no
   // spring: its numbers stay as they are.

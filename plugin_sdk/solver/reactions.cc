@@ -84,7 +84,7 @@ void ReactionSolver::share_out() {
   for (const Row& row : rows_) {
     const bool is_angular = row.direction.linear.isZero(0.0);
     const double length = is_angular ? std::max(gyration(row.body1), gyration(row.body2)) : 1.0;
-    shares_.add(row, bodies_, length > 0.0 ? length * length : 1.0);
+    shares_.add(row, bodies_, EqualSprings::stiffness(length));
   }
   shares_.factorise();
   shares_.share(&multipliers_);

@@ -92,7 +92,7 @@ void SequentialSolver::share_out() {
   std::vector<double> impulses;
   for (const std::uint32_t row : rows) {
     const ConeRow one = row_of(directed_[row / 3], row % 3, velocity_laws_[row]);
-    equal_springs_.add(one, bodies_, one.length > 0.0 ? one.length * one.length : 1.0);
+    equal_springs_.add(one, bodies_, EqualSprings::stiffness(one.length));
     impulses.push_back(solution_.joint_impulse[row]);
   }
   equal_springs_.factorise();
