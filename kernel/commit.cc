@@ -29,6 +29,7 @@ StepOutcome Environment::step() {
   try {
     if (!is_idle_ || !wake_orders_.empty()) find_sleepers();
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
+    times_finer_ = 1;
     for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
     finish_step();
   } catch (...) {

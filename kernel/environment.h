@@ -168,7 +168,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double length_to_switch(double begin, double length);
   // Inner steps begin some time after S_n, in front() what the one before has made of it.
   void begin_inner_step(double begin, double length);
-  // Basic's, in back(); false, and nothing, where somebody asleep is woken: the step starts again.
+  // Basic's, in back(); false, and nothing, where somebody asleep is woken or loads turn far: the step starts again.
   bool make_next_state();
   std::optional<Trusted<Solution>> react(const Trusted<TrialState>& trial, bool has_found_contacts = false);
   Trusted<Pairs> bound_and_pair(const Trusted<TrialState>& trial);
@@ -187,6 +187,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
+  // loads.cc: what loads turn a jointed body by in the inner step, rad, and the body; true where the step starts again, in more of them.
+  std::pair<double, std::uint32_t> largest_turn_by_loads() const;
+  bool makes_step_finer();
+  std::string why_turned_far(double turn, std::uint32_t body) const;
   // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();
@@ -348,6 +352,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
+  std::uint32_t times_finer_ = 1;                 // are the inner steps of this step
+  std::pair<double, std::uint32_t> turned_far_;   // in the finest ones, since warnings() told of it
   bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
   std::vector<std::uint32_t> broken_;             // joints, under their load in the inner step that is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last

@@ -34,8 +34,8 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
                          data_.derivative_with_jacobian)),
       answer_columns_(ids(told_wrench(), data_.jacobian_body, data_.jacobian)) {
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
-  const bool has_inner_steps =
-      description_.simulator >= Simulator::kBisection || description_.substeps > 1 || !description_.switches.empty();
+  const bool has_inner_steps = description_.simulator >= Simulator::kBisection || description_.substeps > 1 ||
+                               !description_.switches.empty() || model_.constraint_count > 0;
   const std::size_t states = description_.accuracy > 0.0 ? kSpareState + 1 : has_inner_steps ? 3 : 2;
   while (states_.size() < states) states_.emplace_back(&arena_, description_);
   arena_.seal();

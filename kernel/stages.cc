@@ -1,5 +1,6 @@
 // The stages between S_n and the solver's answer: each asks its slot and checks what comes back.
 #include <algorithm>
+#include <utility>
 
 #include "kernel/environment.h"
 #include "plugin_sdk/contact_key.h"
@@ -34,6 +35,7 @@ std::vector<std::string> Environment::warnings() {
     lines.push_back(std::string("stage ") + kStageNames[i] + " took " + std::to_string(overrun_ns_[i] / 1'000'000) +
                     " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
   }
+  if (const auto [turn, body] = std::exchange(turned_far_, {}); turn > 0.0) lines.push_back(why_turned_far(turn, body));
   for (StageSlot* slot : slots_)
     for (const std::string& complaint : slot->take_complaints())
       lines.push_back(std::string("worker of slot ") + slot_name(slot->which()) + ": " + complaint);

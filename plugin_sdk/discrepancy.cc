@@ -89,6 +89,39 @@ void set_twisting(const Twisting& twisting, Discrepancy* twist) {
   twist->axes = to_quaternion(axes);
 }
 
+Vector3 turn_after(const Vector3& turn, const Quaternion& turn1, const Quaternion& turn2) {
+  const Vector3 now = log_rotation(turn2 * exp_rotation(turn) * turn1.conjugate());
+  const double angle = now.norm();
+  if (angle == 0.0) return Vector3::Zero();
+  const Vector3 axis = now / angle;
+  return (angle + kWholeTurn * std::round((turn.dot(axis) - angle) / kWholeTurn)) * axis;
+}
+
+TurnComponent TurnComponent::turned(const Quaternion& turn1, const Quaternion& turn2) const {
+  return {turn_after(turn, turn1, turn2), turn1 * direction};
+}
+
+Vector3 TurnComponent::gradient() const {
+  constexpr double kLargest = 0.75 * kWholeTurn;
+  const double angle = turn.norm();
+  // dexp_t^-T = dexp_-t^-1
+  return rotation_vector_rate(angle > kLargest ? Vector3(-kLargest / angle * turn) : Vector3(-turn), direction);
+}
+
+TurnComponent turn_component_of(const Discrepancy& component) {
+  return {component.point2 - component.point1, component.point1};
+}
+
+void set_turn_component(const TurnComponent& component, Discrepancy* d) {
+  d->point1 = component.direction;
+  d->point2 = component.direction + component.turn;
+  const Vector3 first = component.gradient().normalized();
+  const auto [second, third] = orthonormal_basis(first);
+  Matrix3 axes;
+  axes << first, second, third;
+  d->axes = to_quaternion(axes);
+}
+
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2) {
   const Vector3 error = discrepancy.point2 - discrepancy.point1;
@@ -106,6 +139,12 @@ Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& n
     const Twisting then =
         now.turned(then1.orientation * now1.orientation.conjugate(), then2.orientation * now2.orientation.conjugate());
     return now.cosine() * then.angle * (discrepancy.axes * Vector3::UnitX());
+  }
+  if (discrepancy.is_component()) {
+    const TurnComponent now = turn_component_of(discrepancy);
+    const TurnComponent then =
+        now.turned(then1.orientation * now1.orientation.conjugate(), then2.orientation * now2.orientation.conjugate());
+    return then.value() / now.gradient().norm() * (discrepancy.axes * Vector3::UnitX());
   }
   const Vector3 turn1 = log_rotation(then1.orientation * now1.orientation.conjugate());
   const Vector3 turn2 = log_rotation(then2.orientation * now2.orientation.conjugate());

@@ -48,6 +48,11 @@ inline constexpr std::uint32_t kSwingDiscrepancy = 1U << 14;
 // bend between the two. The first axis bisects them and turns with both; point1 is half their difference, across it.
 inline constexpr std::uint32_t kTwistDiscrepancy = 1U << 16;
 
+// With kAngularDiscrepancy: a component of the rotation vector x2 - x1 by which body 2 has turned against body 1, along x1, a
+// unit direction fixed in body 1. The first axis is its gradient made unit, so the error along that is the component over the
+// gradient's length. For what gives way: springs and dampers.
+inline constexpr std::uint32_t kComponentDiscrepancy = 1U << 17;
+
 // Beside these, in SolverSolveRequest alone: what of the discrepancy acts_as_force() (solver/joint_laws.h) acted among the
 // wrenches while S* was integrated (simulator Smooth), and is not to be applied again. No mode that a constraint may answer.
 inline constexpr std::uint32_t kForcesApplied = 1U << 15;
@@ -65,7 +70,8 @@ constexpr AxisMode axis_mode(std::uint32_t modes, int axis) {
 constexpr bool is_valid_mode(std::uint32_t modes) {
   const std::uint32_t flags = modes & ~0xFFFU;
   return (flags <= kAngularDiscrepancy || flags == kRadialDiscrepancy ||
-          flags == (kAngularDiscrepancy | kSwingDiscrepancy) || flags == (kAngularDiscrepancy | kTwistDiscrepancy)) &&
+          flags == (kAngularDiscrepancy | kSwingDiscrepancy) || flags == (kAngularDiscrepancy | kTwistDiscrepancy) ||
+          flags == (kAngularDiscrepancy | kComponentDiscrepancy)) &&
          (modes & 0xFU) <= 5 && ((modes >> 4) & 0xFU) <= 5 && ((modes >> 8) & 0xFU) <= 5;
 }
 
@@ -89,6 +95,7 @@ struct Discrepancy {
   bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
   bool is_swing() const { return (modes & kSwingDiscrepancy) != 0; }
   bool is_twist() const { return (modes & kTwistDiscrepancy) != 0; }
+  bool is_component() const { return (modes & kComponentDiscrepancy) != 0; }
   bool has_forces_applied() const { return (modes & kForcesApplied) != 0; }
 };
 
@@ -143,9 +150,26 @@ struct Twisting {
 Twisting twisting_of(const Discrepancy& twist);
 void set_twisting(const Twisting& twisting, Discrepancy* twist);
 
+// The rotation vector of a turn of body 2 against body 1 (world, rad, of up to a turn and more) once either has turned on.
+Vector3 turn_after(const Vector3& turn, const Quaternion& turn1, const Quaternion& turn2);
+
+// A component of that, and as it is once either body has turned on; what body 2 turns by against body 1, by a little, changes
+// it by gradient() times as much: dexp_t^-T of the direction. Of turns beyond 3/4 of a whole one, where it grows without bound,
+// the gradient is that there.
+struct TurnComponent {
+  Vector3 turn;       // t
+  Vector3 direction;  // unit, world, fixed in body 1
+
+  TurnComponent turned(const Quaternion& turn1, const Quaternion& turn2) const;
+  double value() const { return direction.dot(turn); }
+  Vector3 gradient() const;
+};
+TurnComponent turn_component_of(const Discrepancy& component);
+void set_turn_component(const TurnComponent& component, Discrepancy* d);
+
 // Error x2 - x1 (world) when the bodies are at `then` poses, for a discrepancy that was written at `now` poses.
-// Exact for points, and along the first axis for swings and twists (times the cosine that the twist was written with);
-// other angular errors are carried to first order in the rotation between the two.
+// Exact for points, and along the first axis for swings, twists (times the cosine that the twist was written with) and
+// components (over the length of the gradient that they were written with); other angular errors are carried to first order in the rotation between the two.
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2);
 

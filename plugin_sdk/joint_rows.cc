@@ -196,6 +196,16 @@ Discrepancy sprung_turn(const Quaternion& frame1, const Quaternion& frame2, cons
   return d;
 }
 
+Discrepancy sprung_component(const Quaternion& frame1, const Quaternion& frame2, int axis, const JointSpring& spring) {
+  const TurnComponent component = {log_rotation(frame2 * frame1.conjugate()), frame1 * Vector3::Unit(axis)};
+  Discrepancy d;
+  set_turn_component(component, &d);
+  d.modes = pack_modes(AxisMode::kFree, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kComponentDiscrepancy;
+  // its error is over the gradient's length
+  const double square = component.gradient().squaredNorm();
+  return sprung(d, {square * spring.stiffness, square * spring.damping});
+}
+
 Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMode mode, double* scale) {
   const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist_between(frame1, frame2)};
   *scale = twisting.cosine();

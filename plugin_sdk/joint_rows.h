@@ -83,6 +83,10 @@ Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& oth
 Discrepancy turn_between(const Quaternion& frame1, const Quaternion& frame2);
 Discrepancy sprung_turn(const Quaternion& frame1, const Quaternion& frame2, const JointSpring& spring);
 
+// The component of that turn along an axis (0 ... 2) of frame 1, which a spring and a damper turn back along its gradient: a
+// torque -(k t + c t') grad t. With unequal springs about several axes these have a potential, what acts along the axes has none.
+Discrepancy sprung_component(const Quaternion& frame1, const Quaternion& frame2, int axis, const JointSpring& spring);
+
 // The frame of a hinge about the axis from one point to another (world): the first axis along it, the origin at its point next
 // to bodies.centre(), since with one far out ways and turns could not be told apart. Refuses points that name no axis.
 Pose hinge_frame(const Vector3& point1, const Vector3& point2, const JointBodies& bodies, std::string_view type);

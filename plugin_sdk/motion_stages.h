@@ -26,12 +26,6 @@
 
 namespace gravitas {
 
-// Rate of the rotation vector r with exp(r) q0 = q, at the angular velocity w (world): the inverse of dexp,
-//   dexp_r^-1 w = w - r x w / 2 + (1 - (|r|/2) cot(|r|/2)) / |r|^2  r x (r x w).
-// Singular at |r| = 2 pi k, k > 0. Source: Iserles, Munthe-Kaas, Norsett, Zanna, "Lie-group methods", Acta Numerica
-// 2000, (B.11).
-Vector3 rotation_vector_rate(const Vector3& rotation_vector, const Vector3& angular_velocity);
-
 // Attitudes by rotation vectors from q0 (Munthe-Kaas 1999): every stage is a rotation.
 struct GroupChart {
   using Coordinates = Vector3;

@@ -188,7 +188,7 @@ class Balance {
     }
   }
 
-  // Linear ones turn with body 1, a radial axis with its points, a swing's and a twist's with their directions.
+  // Linear ones turn with body 1, a radial axis with its points, those of swings, twists and components with what they are of.
   Matrix3 axes_of(std::size_t i, const Discrepancy& d, Directions directions) const {
     const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
     Matrix3 axes = d.axes.toRotationMatrix();
@@ -198,6 +198,11 @@ class Balance {
     }
     if (directions == Directions::kOfEnd && d.is_twist())
       axes.col(0) = twisting_of(d).turned(exp_rotation(turn_of(one)), exp_rotation(turn_of(two))).bisector();
+    if (directions == Directions::kOfEnd && d.is_component()) {
+      const TurnComponent trial = turn_component_of(d);
+      const TurnComponent end = trial.turned(exp_rotation(turn_of(one)), exp_rotation(turn_of(two)));
+      axes.col(0) = end.gradient() / trial.gradient().norm();
+    }
     if (directions != Directions::kOfEnd || d.is_angular()) return axes;
     axes = exp_rotation(turn_of(one)).toRotationMatrix() * axes;
     const Vector3 between = carried(two, d.point2) - carried(one, d.point1);

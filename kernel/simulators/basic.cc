@@ -4,8 +4,9 @@
 //   S_n -> integrate (asks for forces): S* -> bounds -> broad phase -> narrow phase at S*
 //       -> constrain -> solve -> commit S_{n+1} -> events
 //
-// A committed step is made of one or more inner steps: `Substeps` equal ones, cut where a force jumps, and whatever a
-// simulator makes of each. A force is asked as it is between the jump before and the next, whatever the time.
+// A committed step is made of one or more inner steps: `Substeps` equal ones, more where loads turn jointed bodies far
+// (loads.cc), cut where a force jumps, and whatever a simulator makes of each. A force is asked as it is between the jump
+// before and the next, whatever the time.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -23,8 +24,9 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon(), kInfinity = 
 
 void Environment::make_inner_steps() {
   if (!does_anything_move()) return;
-  const double length = length_of_step(step_count_ + 1) / description_.substeps;
-  for (std::uint32_t i = 0; i < description_.substeps; ++i) {
+  const std::uint32_t count = description_.substeps * times_finer_;
+  const double length = length_of_step(step_count_ + 1) / count;
+  for (std::uint32_t i = 0; i < count; ++i) {
     for (double done = 0.0; done < length && !must_restart_;) {
       const double left = length - done, part = length_to_switch(i * length + done, left);
       make_part(i * length + done, part);
@@ -111,6 +113,7 @@ void Environment::constrain(const Trusted<TrialState>&) {
 }
 
 std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& trial, bool has_found_contacts) {
+  if (makes_step_finer()) return std::nullopt;
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (sleepers_ > 0 && wakes_sleepers()) return std::nullopt;
   if (constraint_.is_running()) constrain(trial);

@@ -8,8 +8,8 @@
 //                passes through within a trial is missed. Pairs that touch and do not fly up are the solver's, too.
 //
 // Both also end inner steps where surfaces stop sliding on each other (slides.cc), up to some number in a step. A Zeno
-// sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps (when bisecting, each of some
-// 45 trials, kMostBisections): the rest is Basic's.
+// sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps (of Bisection, with some 45
+// trials each, kMostBisections): the rest is Basic's.
 #include <algorithm>
 
 #include "kernel/environment.h"

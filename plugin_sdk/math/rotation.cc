@@ -126,6 +126,22 @@ Quaternion rotate_by(const Quaternion& q, const Vector3& rotation_vector) {
   return normalized(exp_rotation(rotation_vector) * q);
 }
 
+Vector3 rotation_vector_rate(const Vector3& rotation_vector, const Vector3& angular_velocity) {
+  // below this squared angle the series of the factor ends within 2^-53
+  constexpr double kSeriesRateSquared = 4e-3;
+  const Vector3 &r = rotation_vector, &w = angular_velocity;
+  const Vector3 turned = r.cross(w);
+  if (turned.isZero(0.0)) return w;
+  const double square = r.squaredNorm();
+  double factor = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0));
+  if (square > kSeriesRateSquared) {
+    const double half = 0.5 * std::sqrt(square);
+    const math::SinCos angle = math::sincos(half);
+    factor = (1.0 - half * angle.cos / angle.sin) / square;
+  }
+  return w - 0.5 * turned + factor * r.cross(turned);
+}
+
 std::optional<Matrix3> orthonormalized(const Matrix3& matrix) {
   if (!matrix.allFinite()) return std::nullopt;
   Matrix3 unit;

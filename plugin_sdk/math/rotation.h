@@ -59,6 +59,12 @@ Vector3 log_rotation(const Quaternion& q);
 // for bit, not renormalised.
 Quaternion rotate_by(const Quaternion& q, const Vector3& rotation_vector);
 
+// Rate of the rotation vector r with exp(r) q0 = q, at the angular velocity w (world): the inverse of dexp,
+//   dexp_r^-1 w = w - r x w / 2 + (1 - (|r|/2) cot(|r|/2)) / |r|^2  r x (r x w).
+// Singular at |r| = 2 pi k, k > 0. Source: Iserles, Munthe-Kaas, Norsett, Zanna, "Lie-group methods", Acta Numerica
+// 2000, (B.11).
+Vector3 rotation_vector_rate(const Vector3& rotation_vector, const Vector3& angular_velocity);
+
 // A rotation near the matrix with columns (u, v, w), whose first column is along u and whose second
 // lies in the plane of u and v:
 //   u' = u/|u|,  v' = (v - (v.u')u') / |...|,  w' = u' x v'.

@@ -11,8 +11,8 @@
 // under 1000 times its mass, linearised at S*, flies apart at 1/60 s.
 //
 // Joints. The pose change is found by Newton's method on the errors themselves: points are carried as rigid bodies, axes
-// turn with body 1, a radial axis with its points, swings and twists with their directions; other angular errors are
-// carried to first order in delta's turn. Rows push both bodies at body 2's point, midway to body 1's along what is held
+// turn with body 1, a radial axis with its points, swings, twists and components with what they are of; other angular errors
+// are carried to first order in delta's turn. Rows push both bodies at body 2's point, midway to body 1's along what is held
 // (where a point is all that holds them together, each at its own), which is one place at the end. Where a step of it was
 // small (1e-7 rad), those that follow are chords: new rows and errors, the same factors. What the turn changes of the inertia,
 // and of the offset of what acts on velocities alone, is taken anew at each step; where steps shrink slowly by that (capsules

@@ -45,6 +45,15 @@ void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end
     joint->directions = {turning_about(end.bisector()), turning_about(second), turning_about(third)};
     return;
   }
+  if (d.is_component()) {
+    const TurnComponent trial = turn_component_of(d);
+    const TurnComponent end = trial.turned(to_quaternion(end1.turn), to_quaternion(end2.turn));
+    const double scale = trial.gradient().norm();
+    joint->errors = {end.value() / scale, 0.0, 0.0};
+    joint->directions = {turning_about(end.gradient() / scale), turning_about(joint->axes.col(1)),
+                         turning_about(joint->axes.col(2))};
+    return;
+  }
   if (d.is_angular()) {
     const Vector3 error = d.point2 - d.point1 + turn;
     for (int k = 0; k < 3; ++k) {

@@ -125,8 +125,8 @@ class ReactionSolver {
   void make_rows();
   static double target(const Discrepancy& d, int axis);
 
-  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's or
-  // twist's, which is to first order.
+  // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's,
+  // twist's or component's, which is to first order.
   const Discrepancy& at_pose(const Joint& joint);
   Arms arms_of(const Discrepancy& d, const Matrix3& axes, const Joint& joint) const;
   Row row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;

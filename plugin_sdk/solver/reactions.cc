@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,17 +20,6 @@ namespace {
 // True where the error along an axis of points is the target, but for the error of the state.
 bool holds_place(const Discrepancy& d, int axis) {
   return holds_always(d, axis) && axis_mode(d.modes, axis) != AxisMode::kDriven && !(d.is_radial() && axis == 0);
-}
-
-// The turn of body 2 from body 1 as a rotation vector (of up to a turn and more) once both have turned on by a little:
-// error_at() adds turns, whose slopes are right for small ones alone.
-Vector3 turned(const Vector3& turn, const Quaternion& by1, const Quaternion& by2) {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  const Vector3 now = log_rotation(by2 * exp_rotation(turn) * by1.conjugate());
-  const double angle = now.norm();
-  if (angle == 0.0) return Vector3::Zero();
-  const Vector3 axis = now / angle;
-  return (angle + kTurn * std::round((turn.dot(axis) - angle) / kTurn)) * axis;
 }
 
 }  // namespace
@@ -246,9 +234,17 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
     set_twisting(twisting_of(d).turned(turn1, two.pose.orientation * two.asked.orientation.conjugate()), &d);
     return d;
   }
+  if (d.is_component()) {
+    const TurnComponent asked = turn_component_of(d);
+    const TurnComponent now = asked.turned(turn1, two.pose.orientation * two.asked.orientation.conjugate());
+    set_turn_component(now, &d);
+    const double grown = now.gradient().squaredNorm() / asked.gradient().squaredNorm();
+    d.compliance.x() /= grown, d.damping.x() *= grown;
+    return d;
+  }
   if (d.is_angular()) {
     const Quaternion turn2 = two.pose.orientation * two.asked.orientation.conjugate();
-    d.point2 = d.point1 + turned(d.point2 - d.point1, turn1, turn2);
+    d.point2 = d.point1 + turn_after(d.point2 - d.point1, turn1, turn2);
   } else {
     const Vector3 error = error_at(d, one.asked, two.asked, one.pose, two.pose);
     d.point1 = carried(d.point1, one.asked, one.pose);

@@ -205,6 +205,34 @@ TEST(DiscrepancyError, OfATwistGoesOnBeyondHalfATurn) {
   EXPECT_NEAR(error_at(d, still, still, turned, still).x(), 3.0, 1e-14);
 }
 
+// A component of a rotation vector, over the length of its gradient, which is what turning changes it by.
+TEST(DiscrepancyError, OfAComponentIsThatOfTheRotationVector) {
+  Draw random(13);
+  for (int i = 0; i < 50; ++i) {
+    const Quaternion frame1 = random.rotation(), frame2 = exp_rotation(random.vector(1.5)) * frame1;
+    const auto component = [&](const Quaternion& one, const Quaternion& two) {
+      return log_rotation(one.conjugate() * two).y();
+    };
+    const Discrepancy d = sprung_component(frame1, frame2, 1, {50.0, 2.0});
+    EXPECT_TRUE(is_valid_mode(d.modes));
+    const TurnComponent written = turn_component_of(d);
+    const double length = written.gradient().norm();
+    EXPECT_GE(length, 1.0 - 1e-15);
+    EXPECT_NEAR((d.axes * Vector3::UnitX()).dot(d.point2 - d.point1) * length, component(frame1, frame2), 1e-14);
+    EXPECT_NEAR(d.compliance.x() * 50.0 * length * length, 1.0, 1e-14);
+    const Pose now1 = random.pose(3.0), now2 = random.pose(3.0);
+    const Vector3 turn1 = random.vector(0.3), turn2 = random.vector(0.3);
+    const auto turned = [&](double share) {
+      const Pose then1{now1.position, exp_rotation(share * turn1) * now1.orientation};
+      const Pose then2{now2.position, exp_rotation(share * turn2) * now2.orientation};
+      return length * (d.axes * Vector3::UnitX()).dot(error_at(d, now1, now2, then1, then2));
+    };
+    EXPECT_NEAR(turned(1.0), component(exp_rotation(turn1) * frame1, exp_rotation(turn2) * frame2), 1e-13);
+    const double rate = (turned(1e-5) - turned(-1e-5)) / 2e-5;
+    EXPECT_NEAR(rate, written.gradient().dot(turn2 - turn1), kDifferenceTolerance);
+  }
+}
+
 TEST(CarriedPoint, StaysWithItsBody) {
   Draw random(7);
   for (int i = 0; i < 200; ++i) {
@@ -357,11 +385,11 @@ TEST(AxisModes, PackAndUnpack) {
   }
 }
 
-// Of all small codes exactly 5 * 6^3 are modes: plain, angular, radial, swing, twist.
+// Of all small codes exactly 6 * 6^3 are modes: plain, angular, radial, swing, twist, component.
 TEST(AxisModes, OtherCodesAreInvalid) {
   int valid = 0;
-  for (std::uint32_t code = 0; code < (1U << 17); ++code) valid += is_valid_mode(code) ? 1 : 0;
-  EXPECT_EQ(valid, 1080);
+  for (std::uint32_t code = 0; code < (1U << 18); ++code) valid += is_valid_mode(code) ? 1 : 0;
+  EXPECT_EQ(valid, 1296);
   for (int bit = 14; bit < 32; ++bit) EXPECT_FALSE(is_valid_mode(1U << bit)) << bit;
   EXPECT_FALSE(is_valid_mode(kAngularDiscrepancy | kRadialDiscrepancy));
   EXPECT_FALSE(is_valid_mode(kRadialDiscrepancy | kSwingDiscrepancy));

@@ -330,6 +330,120 @@ TEST_F(JointSprings, AreStableForEveryStiffness) {
     }
 }
 
+// Springs of unequal stiffness about the axes of a body that turns far about all of them.
+class UnevenBushing : public ::testing::Test {
+ protected:
+  static constexpr double kMoment = 0.1, kAlong = 1000.0;  // kg m^2, N/m
+
+  static std::string bushing(const Vector3& stiffness, const std::string& more = "") {
+    return "Constraints { Constraint { Id = \"J\" Type = \"Bushing\" Body2 = \"B\" " + more +
+           "CustomProperties { BindPoint = {0.2, 0, 0} Stiffness = {1000, 1000, 1000} AngularStiffness = " +
+           harness::literal(stiffness) + " } } }\n";
+  }
+  static std::string body(const std::string& id, const std::string& moments, const std::string& motion) {
+    return "Body { Id = \"" + id + "\" Mass = 1 PrincipalMoments = " + moments + " KineticProperties { " + motion +
+           " } }\n";
+  }
+  static std::string simulator(double duration) {
+    return "Simulator { CustomProperties { TimeStep = 0.002 SleepEnergy = 0 Duration = " + harness::literal(duration) +
+           " } }\n";
+  }
+  // One in the world, at the spring's point.
+  static std::string turning(const Vector3& stiffness, const Vector3& spin) {
+    return simulator(5.0) + "Environment { Space { Bodies { " +
+           body("B", "{0.1, 0.1, 0.1}", "Position = {0.2, 0, 0} AngularVelocity = " + harness::literal(spin)) +
+           "} }\n" + bushing(stiffness) + "}\n";
+  }
+  // What the springs hold, J, the second point at `arm` in the second body.
+  static double held(const Pose& one, const Pose& two, const Vector3& arm1, const Vector3& arm2,
+                     const Vector3& stiffness) {
+    const Quaternion turn = one.orientation.conjugate() * two.orientation;
+    const Eigen::AngleAxisd angle(turn.w() < 0.0 ? Quaternion(-turn.coeffs()) : turn);
+    const Vector3 components = angle.angle() * angle.axis();
+    const Vector3 way = two.position + two.orientation * arm2 - one.position - one.orientation * arm1;
+    return 0.5 * kAlong * way.squaredNorm() + 0.5 * components.dot(stiffness.cwiseProduct(components));
+  }
+};
+
+TEST_F(UnevenBushing, KeepsItsEnergy) {
+  const Vector3 spin(6, 4, 5);
+  for (const Vector3& stiffness : {Vector3(1, 5, 50), Vector3(10, 20, 40), Vector3(1, 1, 50), Vector3(5, 5, 5)}) {
+    const double energy = 0.5 * kMoment * spin.squaredNorm();
+    for (const std::string integrator : {"DormandPrince853", "RK4"}) {
+      SceneRun run(turning(stiffness, spin), {"Simulator=Smooth", "Integrator=" + integrator, "Solver=Newton"});
+      double worst = 0.0;
+      while (!run.is_done()) {
+        run.step();
+        const double now = held({{0.2, 0, 0}, Quaternion::Identity()}, run.body("B").pose, Vector3::Zero(),
+                                Vector3::Zero(), stiffness) +
+                           run.kinetic_energy();
+        worst = std::max(worst, std::fabs(now / energy - 1.0));
+      }
+      // RK4: (w h)^5 a step, w = 22 rad/s
+      EXPECT_LT(worst, integrator == "RK4" ? 1e-5 : 1e-11) << stiffness.transpose() << integrator;
+    }
+    // springs that are implicit take energy away
+    for (const std::string solver : {"Newton", "Direct", "Sequential"}) {
+      SceneRun run(turning(stiffness, spin), {"Solver=" + solver});
+      double most = 0.0;
+      while (!run.is_done()) {
+        run.step();
+        most = std::max(most, run.kinetic_energy());
+      }
+      EXPECT_LT(most, 1.001 * energy) << stiffness.transpose() << solver;
+    }
+  }
+}
+
+// Two free bodies.
+TEST_F(UnevenBushing, KeepsEnergyAndMomentaBetweenBodies) {
+  const Vector3 stiffness(1, 5, 50);
+  const std::string scene =
+      simulator(5.0) + "Environment { Space { Bodies {\n" +
+      body("A", "{0.1, 0.15, 0.2}", "Position = {0, 0, 0} AngularVelocity = {-2, 1, 3}") +
+      body("B", "{0.1, 0.08, 0.05}", "Position = {0.5, 0, 0} LinearVelocity = {0, 1, 0} AngularVelocity = {4, 3, -2}") +
+      "} }\n" + bushing(stiffness, "Body1 = \"A\" ") + "}\n";
+  SceneRun run(scene, {"Simulator=Smooth", "Integrator=DormandPrince853", "Solver=Newton"});
+  const Vector3 momentum = run.momentum(), angular = run.angular_momentum();
+  const Pose one = run.body("A").pose, two = run.body("B").pose;
+  const Vector3 point(0.2, 0, 0), arm1 = one.orientation.conjugate() * (point - one.position),
+                                  arm2 = two.orientation.conjugate() * (point - two.position);
+  const Quaternion axes1 = one.orientation, axes2 = two.orientation;
+  const auto energy = [&] {
+    const Pose a = run.body("A").pose, b = run.body("B").pose;
+    // the spring's axes are the world's at the start
+    return run.kinetic_energy() + held({a.position, a.orientation * axes1.conjugate()},
+                                       {b.position, b.orientation * axes2.conjugate()}, axes1 * arm1, axes2 * arm2,
+                                       stiffness);
+  };
+  const double start = energy();
+  while (!run.is_done()) {
+    run.step();
+    ASSERT_NEAR(energy(), start, 1e-10 * start) << run.time();
+  }
+  EXPECT_LT((run.momentum() - momentum).norm(), 1e-12);
+  EXPECT_LT((run.angular_momentum() - angular).norm(), 1e-11);
+}
+
+TEST_F(UnevenBushing, DampersTakeEnergyAway) {
+  for (const std::string simulator : {"Smooth", "Basic"}) {
+    SceneRun run(
+        turning({1, 5, 50}, {6, 4, 5}),
+        {"Simulator=" + simulator, "Integrator=" + std::string(simulator == "Smooth" ? "RK4" : "SemiImplicitEuler"),
+         "Solver=Newton", set("Constraint.J.AngularDamping", Vector3(0.01, 0.02, 0.0))});
+    double energy = 0.5 * kMoment * Vector3(6, 4, 5).squaredNorm();
+    while (!run.is_done()) {
+      run.step();
+      const double now = held({{0.2, 0, 0}, Quaternion::Identity()}, run.body("B").pose, Vector3::Zero(),
+                              Vector3::Zero(), {1, 5, 50}) +
+                         run.kinetic_energy();
+      ASSERT_LT(now, energy * (simulator == "Smooth" ? 1.0 + 1e-9 : 1.002)) << simulator << run.time();
+      energy = now;
+    }
+    EXPECT_LT(energy, 0.7 * 3.85) << simulator;
+  }
+}
+
 // A wheel that rolls at 20 rad/s about z and may steer about y.
 class Steering : public JointSprings {
  protected:

@@ -129,6 +129,14 @@ void bushing(const Pose& one, const Pose& two, const std::function<void(const Di
   d.compliance = Vector3(0.01, 0.02, 0.0), d.damping = Vector3(3, 2, 1);
   emit(d);
 }
+// The same by the components of the turn.
+void uneven_bushing(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  ball(one, two, emit);
+  const Quaternion turned = two.orientation * exp_rotation(Vector3(0.3, 0.6, 0.9));
+  emit(sprung_component(one.orientation, turned, 0, {100.0, 3.0}));
+  emit(sprung_component(one.orientation, turned, 1, {20.0, 2.0}));
+  emit(sprung_component(one.orientation, turned, 2, {0.0, 1.0}));
+}
 void rod(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
   Discrepancy d;
   d.point1 = one.position + one.orientation * Vector3(0, 2, 0), d.point2 = two.position;
@@ -153,8 +161,8 @@ Mechanism links(std::uint64_t seed) {
 
 TEST(ReactionJacobians, AreTheSlopesOfTheReactions) {
   const std::vector<std::pair<std::string, decltype(Joint::describe)>> kinds = {
-      {"balls", ball}, {"hinges", hinge},   {"even shafts", even_shafts},
-      {"rods", rod},   {"springs", spring}, {"bushings", bushing}};
+      {"balls", ball},     {"hinges", hinge},     {"even shafts", even_shafts},       {"rods", rod},
+      {"springs", spring}, {"bushings", bushing}, {"uneven bushings", uneven_bushing}};
   for (const auto& [name, describe] : kinds) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       Draw draw(100 + seed);

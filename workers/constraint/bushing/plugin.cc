@@ -1,15 +1,18 @@
 // Constraint `Bushing`: what gives way between two bodies, in each of the six ways by itself; beside another joint of the same
 // bodies, springs and dampers of the freedoms that it leaves.
 //
-//      force on body 2   -K d - C d'      d: where the point of body 2 is, from that of body 1
-//      torque on body 2  -K' t - C' w     t: the rotation vector by which body 2 has turned against body 1, w its rate
+//      force on body 2   -K d - C d'              d: where the point of body 2 is, from that of body 1
+//      torque on body 2  -dexp_t^-T (K' t + C' t')   t: the rotation vector by which body 2 has turned against body 1
 //
-// all in axes that are fixed in body 1, at rest at the start, K, C, K' and C' diagonal. It takes no freedom: nothing is
-// held, there is no joint error. A row for each way, where body 2 is, so that a way along one axis is no lever for another;
-// one discrepancy for the three turns.
-// The forces have a potential. So has the torque for turns up to half a one with equal stiffnesses about all axes, and about one
-// axis alone; with others to second order in the turn. The springs are implicit (joint_laws.h): stable for every stiffness, of
-// order one, but for `Smooth`, which has the integrator's.
+// all in axes that are fixed in body 1, at rest at the start, K, C, K' and C' diagonal. The forces are the gradient of
+// (d.K d + t.K' t)/2, and dampers take energy only; t' = dexp_t^-1 w, w the turning of body 2 against body 1 (rotation.h). At
+// half a turn t goes on from the other side, with the same energy. With one stiffness about all axes the springs' torque is
+// -K' t, and that of dampers -C' w along body 1's axes, of which the above differs by the square of the turn, |t|^2/12.
+//
+// It takes no freedom: nothing is held, there is no joint error. A row for each way, where body 2 is, so that a way along one
+// axis is no lever for another; one discrepancy for the three turns, or where their springs differ one along the gradient of
+// each component. The springs are implicit (joint_laws.h): stable for every stiffness, of order one, but for `Smooth`, which has
+// the integrator's.
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -23,6 +26,7 @@ struct Springs {
     const Vector3 stiffness = numbers->vector();
     return {stiffness, numbers->vector()};
   }
+  bool is_even() const { return stiffness.x() == stiffness.y() && stiffness.y() == stiffness.z(); }
   bool is_none() const { return stiffness.isZero(0.0) && damping.isZero(0.0); }
   void write(BoundWriter* out) const { out->vector(stiffness), out->vector(damping); }
   JointSpring on(int axis) const { return {stiffness[axis], damping[axis]}; }
@@ -33,7 +37,7 @@ class Bushing final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Bushing",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Springs and dampers in six ways.",
         .types = {
@@ -45,8 +49,9 @@ class Bushing final : public ConstraintPlugin {
                   .means("Attitude of the axes at the start; they are fixed in body 1."),
               Property::vector("Stiffness", "N/m", "axes").at_least(0.0).required().means("Springs along the axes."),
               along("Damping", "N*s/m", "Dampers along them."),
-              along("AngularStiffness", "N*m/rad", "Springs about them."),
-              along("AngularDamping", "N*m*s/rad", "Dampers about them.")}}}};
+              along("AngularStiffness", "N*m/rad",
+                    "Springs about them: against the components of the rotation vector of the turn."),
+              along("AngularDamping", "N*m*s/rad", "Dampers about them: against the rates of these.")}}}};
   }
   explicit Bushing(PropertyCursor) {}
 
@@ -78,9 +83,15 @@ class Bushing final : public ConstraintPlugin {
         spring.yield_on(axis, &way);
         emit(way);
       }
-      Discrepancy turn = turn_between(one.orientation, two.orientation);
-      for (int axis = 0; axis < 3; ++axis) angular.on(axis).yield_on(axis, &turn);
-      if (!angular.is_none()) emit(turn);
+      if (angular.is_even()) {
+        Discrepancy turn = turn_between(one.orientation, two.orientation);
+        for (int axis = 0; axis < 3; ++axis) angular.on(axis).yield_on(axis, &turn);
+        if (!angular.is_none()) emit(turn);
+        return;
+      }
+      for (int axis = 0; axis < 3; ++axis)
+        if (const JointSpring spring = angular.on(axis); !spring.is_none())
+          emit(sprung_component(one.orientation, two.orientation, axis, spring));
     });
   }
 
