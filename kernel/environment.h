@@ -67,12 +67,6 @@ struct InnerStep {
   double end;            // s
 };
 
-// By what loads turn a jointed body that is free, rad.
-struct LargestTurn {
-  double turn = 0.0;
-  std::uint32_t body = 0;
-};
-
 // Hears of what a recorder keeps, and of what happens.
 class CommitListener {
  public:
@@ -194,9 +188,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
   // loads.cc: what loads turn jointed bodies by in the inner step, rad; true where the step starts again, in more of them.
-  LargestTurn largest_turn_by_loads() const;
+  std::pair<double, std::uint32_t> largest_turn_by_loads() const;  // and the body
   bool makes_step_finer();
-  std::string why_turned_far(const LargestTurn& largest) const;
+  std::string why_turned_far(double turn, std::uint32_t body) const;
   // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();
@@ -359,7 +353,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
   std::uint32_t times_finer_ = 1;                 // are the inner steps of this step
-  LargestTurn turned_far_;                        // in the finest ones, since warnings() told of it
+  std::pair<double, std::uint32_t> turned_far_;   // in the finest ones, since warnings() told of it
   bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
   std::vector<std::uint32_t> broken_;             // joints, under their load in the inner step that is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last

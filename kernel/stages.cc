@@ -35,7 +35,7 @@ std::vector<std::string> Environment::warnings() {
     lines.push_back(std::string("stage ") + kStageNames[i] + " took " + std::to_string(overrun_ns_[i] / 1'000'000) +
                     " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
   }
-  if (turned_far_.turn > 0.0) lines.push_back(why_turned_far(std::exchange(turned_far_, {})));
+  if (const auto [turn, body] = std::exchange(turned_far_, {}); turn > 0.0) lines.push_back(why_turned_far(turn, body));
   for (StageSlot* slot : slots_)
     for (const std::string& complaint : slot->take_complaints())
       lines.push_back(std::string("worker of slot ") + slot_name(slot->which()) + ": " + complaint);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "kernel/environment.h"
 
@@ -16,16 +17,16 @@ constexpr std::uint32_t kMostTimes = 256;
 
 }  // namespace
 
-LargestTurn Environment::largest_turn_by_loads() const {
+std::pair<double, std::uint32_t> Environment::largest_turn_by_loads() const {
   const double h = data_.time_step[0];
-  LargestTurn largest;
+  std::pair<double, std::uint32_t> largest;
   const auto look_at = [&](std::uint32_t body) {
     if (!is_awake(body) || (model_.flags[body] & kKinematic) != 0) return;
     const Vector3 start = vector_at(start_angular_velocity().span(), body);
     const Vector3 by_impulses = start - vector_at(front().angular_velocity.span(), body);
     const Vector3 by_forces = vector_at(data_.trial_angular_velocity.span(), body) - start;
     const double turn = h * (by_impulses.norm() + data_.theta[0] * by_forces.norm());
-    if (turn > largest.turn) largest = {turn, body};
+    if (turn > largest.first) largest = {turn, body};
   };
   for (std::uint32_t i = 0; i < model_.constraint_count; ++i) {
     if (front().intact[i] == 0) continue;
@@ -37,21 +38,21 @@ LargestTurn Environment::largest_turn_by_loads() const {
 
 bool Environment::makes_step_finer() {
   if (knows_reactions()) return false;
-  const LargestTurn largest = largest_turn_by_loads();
-  if (!(largest.turn > kFar)) return false;
+  const auto [turn, body] = largest_turn_by_loads();
+  if (!(turn > kFar)) return false;
   if (times_finer_ == kMostTimes) {
-    if (largest.turn > turned_far_.turn) turned_far_ = largest;
+    if (turn > turned_far_.first) turned_far_ = {turn, body};
     return false;
   }
-  const double times = std::ceil(std::sqrt(largest.turn / kSmall)) * times_finer_;
+  const double times = std::ceil(std::sqrt(turn / kSmall)) * times_finer_;
   times_finer_ = times < kMostTimes ? static_cast<std::uint32_t>(times) : kMostTimes;
   must_restart_ = true;
   return true;
 }
 
-std::string Environment::why_turned_far(const LargestTurn& largest) const {
-  return "loads that joints bear turned body \"" + description_.bodies[largest.body].id + "\" by up to " +
-         std::to_string(largest.turn) + " rad in 1/" + std::to_string(kMostTimes) +
+std::string Environment::why_turned_far(double turn, std::uint32_t body) const {
+  return "loads that joints bear turned body \"" + description_.bodies[body].id + "\" by up to " +
+         std::to_string(turn) + " rad in 1/" + std::to_string(kMostTimes) +
          " of a step, so that its joints may have closed in another assembly of theirs: it is too light for its loads, "
          "or TimeStep is too long";
 }
