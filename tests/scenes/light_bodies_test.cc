@@ -42,7 +42,7 @@ TEST(LightBodies, StandWhereTheirJointsBearAllThatTurnsThem) {
       const bool is_hinge = joint.find("Revolute") != std::string::npos;
       const Vector3 borne = is_hinge ? Vector3(torque.x(), 0.0, torque.z()) : torque;
       for (const std::string solver : {"Newton", "Direct", "Sequential"}) {
-        // `Sequential` closes joints to a millionth of what their bodies measure, and its rows at S* leave 2e-4 of what a
+        // `Sequential` closes joints further that are open by more than a thousandth, and its rows at S* leave 2e-4 of what a
         // hinge bears to its free turn
         const bool is_swept = solver == "Sequential";
         const double bound = !is_swept ? 1e-9 : is_hinge ? 0.05 : 1e-7;
@@ -54,7 +54,7 @@ TEST(LightBodies, StandWhereTheirJointsBearAllThatTurnsThem) {
           ASSERT_LT(pose.position.norm() + kGyration * turned, bound)
               << joint << solver << turn << " at " << run.time();
         }
-        EXPECT_LT(run.report().max_joint_error(), is_swept ? 1e-4 : 1e-9) << joint << solver << turn;
+        EXPECT_LT(run.report().max_joint_error(), is_swept ? 1e-3 : 1e-9) << joint << solver << turn;
       }
     }
   }
