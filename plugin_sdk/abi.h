@@ -92,8 +92,8 @@ typedef struct gravitas_plugin_table {
   uint32_t abi_version;
   uint32_t layout_version;
   uint64_t schema_hash;
-  const char* build_id;
-  const gravitas_description* description;
+  const char* build_id;                     // says what the library was built by; nothing compares it
+  const gravitas_description* description;  // null if it could not be made: the error of `create` says why
   // Settings are the plugin's own properties, flattened in the order of their declaration.
   int32_t (*create)(const double* settings, uint64_t count, void** instance, gravitas_error* error);
   void (*destroy)(void* instance);

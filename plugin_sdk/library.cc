@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "plugin_sdk/channel/digest.h"
+#include "plugin_sdk/floating_point.h"
 
 namespace gravitas {
 namespace {
@@ -116,6 +117,14 @@ PluginLibrary checked(void* handle, const std::string& path, std::string* proble
     *problem = "'" + path + "' was built for another schema of the stage contracts: rebuild it against this plugin_sdk";
     return {};
   }
+  if (table->description == nullptr && table->create != nullptr) {
+    void* instance = nullptr;
+    gravitas_error error{};
+    if (table->create(nullptr, 0, &instance, &error) != GRAVITAS_OK) {
+      *problem = "'" + path + "' does not say what it is: its declaration failed: " + error.text;
+      return {};
+    }
+  }
   if (table->description == nullptr || table->create == nullptr || table->destroy == nullptr ||
       table->call == nullptr) {
     *problem = "'" + path + "' is not a whole plugin: its table lacks a description or a function";
@@ -125,6 +134,19 @@ PluginLibrary checked(void* handle, const std::string& path, std::string* proble
   library.table = table;
   library.declaration = read_declaration(*table->description);
   return library;
+}
+
+// The same, unless the library changed the floating-point environment while it was loaded: `control` is that of before, which
+// is back after this.
+PluginLibrary checked(void* handle, std::uint32_t control, const std::string& path, std::string* problem) {
+  PluginLibrary library = checked(handle, path, problem);
+  if (floating_point_control() == control) return library;
+  set_floating_point_control(control);
+  if (library.table == nullptr) return library;
+  *problem = "'" + path +
+             "' changes the floating-point environment of the process that loads it: it was probably linked with "
+             "-ffast-math or -Ofast; link it without";
+  return {};
 }
 
 }  // namespace
@@ -160,6 +182,7 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     close(copy);
     return known->second;
   }
+  const std::uint32_t control = floating_point_control();
   // the descriptor stays open: debuggers and sanitizers read symbols through this name, which for a debugger must not be one of its
   // own files (`self`), where it may wait for ever
   void* handle = load("/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(copy), path, problem);
@@ -167,7 +190,7 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     close(copy);
     return {};
   }
-  PluginLibrary library = checked(handle, path, problem);
+  PluginLibrary library = checked(handle, control, path, problem);
   if (library.table != nullptr) loaded.emplace(content, library);
   return library;
 }
@@ -179,9 +202,10 @@ PluginLibrary look_into_plugin_library(const std::string& path, std::string* pro
     return {};
   }
   close(file);
+  const std::uint32_t control = floating_point_control();
   // without a slash it would be looked for elsewhere
   void* handle = load(path.find('/') == std::string::npos ? "./" + path : path, path, problem);
-  return handle == nullptr ? PluginLibrary() : checked(handle, path, problem);
+  return handle == nullptr ? PluginLibrary() : checked(handle, control, path, problem);
 }
 
 }  // namespace gravitas

@@ -18,7 +18,8 @@ struct PluginLibrary {
 // under a running program must not change it; equal content is loaded once), checks magic, versions and schema hash, and reads its
 // declaration. Running its constructors may do anything: a kernel does this for direct hosting only.
 // On failure returns a library without table, and `problem` says why: not a readable file, no shared library,
-// no plugin, made for another schema or version of the interface.
+// no plugin, made for another schema or version of the interface, a declaration that throws, a floating-point environment
+// that it changed (which is restored).
 PluginLibrary load_plugin_library(const std::string& path, std::string* problem);
 
 // The same from the file itself, of which no copy is made: for a process that asks for each path once, and ends before

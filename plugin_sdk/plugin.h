@@ -28,6 +28,11 @@
 #include "plugin_sdk/property.h"
 #include "schemas/stage_frames.h"
 
+// What a library was built by: our own build says it. Nothing compares it.
+#ifndef GRAVITAS_BUILD_ID
+#define GRAVITAS_BUILD_ID "unknown"
+#endif
+
 namespace gravitas {
 
 enum class Slot : std::uint32_t {
@@ -42,11 +47,12 @@ enum class Slot : std::uint32_t {
 // "space", "collision", …
 const char* slot_name(Slot slot);
 
-// A name of the scene language that the plugin serves: a force type, a joint type, a shape.
+// A name of the scene language that the plugin serves: a force type, a joint type, a shape. A request that names another is
+// refused.
 struct TypeDeclaration {
   std::string name;
   std::string meaning;
-  std::vector<Property> properties;
+  std::vector<Property> properties;  // of what the scene says of one force, joint or shape; live() means nothing here
 };
 
 struct PluginDeclaration {
@@ -54,9 +60,9 @@ struct PluginDeclaration {
   std::string version;
   Slot slot = Slot::kForce;
   std::string meaning;
-  std::vector<std::string> capabilities = {};
-  std::vector<TypeDeclaration> types = {};  // empty for a space, solver or integrator: its name is the type
-  std::vector<Property> properties = {};    // settings of the plugin itself
+  std::vector<std::string> capabilities = {};  // of those that the slot knows (declaration_check.h)
+  std::vector<TypeDeclaration> types = {};     // empty for a space, solver or integrator: its name is the type
+  std::vector<Property> properties = {};       // settings of the plugin itself
   // Integrators: share of a velocity-only impulse's effect that moves the pose within the step.
   // Euler 0, SemiImplicitEuler 1, methods of order two and more 1/2.
   double theta = 0.5;
@@ -164,6 +170,7 @@ class CollisionPlugin {
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 
+// Both refuse joints of types that are not declared: demand_type() of joint_rows.h.
 class ConstraintPlugin {
  public:
   static constexpr Slot kSlot = Slot::kConstraint;
@@ -205,6 +212,8 @@ class IntegratorPlugin {
  public:
   static constexpr Slot kSlot = Slot::kIntegrator;
   virtual ~IntegratorPlugin() = default;
+  // The column `damping` slows the velocities of a body by exactly exp(-c h) in a step of length h, with any method
+  // (damping_factor() of integrator.h).
   virtual void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                          Host& host) = 0;
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
@@ -250,6 +259,16 @@ std::int32_t guarded(gravitas_error* error, Body&& body) {
   }
 }
 
+// Null if the declaration throws. Then `create` does so too, and its error says why.
+template <typename P>
+const gravitas_description* description() noexcept {
+  try {
+    return plain_description(P::declaration());
+  } catch (...) {
+    return nullptr;
+  }
+}
+
 template <typename P>
 std::int32_t create(const double* settings, std::uint64_t count, void** instance, gravitas_error* error) {
   return guarded(error, [&]() -> std::int32_t {
@@ -279,10 +298,9 @@ std::int32_t call(void* instance, std::uint32_t method, const gravitas_column* r
 
 template <typename P>
 const gravitas_plugin_table* plugin_table() {
-  static const gravitas_plugin_table table = {
-      GRAVITAS_MAGIC,     GRAVITAS_ABI_VERSION, GRAVITAS_LAYOUT_VERSION,
-      stage::kSchemaHash, GRAVITAS_BUILD_ID,    detail::plain_description(P::declaration()),
-      &detail::create<P>, &detail::destroy<P>,  &detail::call<P>};
+  static const gravitas_plugin_table table = {GRAVITAS_MAGIC,     GRAVITAS_ABI_VERSION, GRAVITAS_LAYOUT_VERSION,
+                                              stage::kSchemaHash, GRAVITAS_BUILD_ID,    detail::description<P>(),
+                                              &detail::create<P>, &detail::destroy<P>,  &detail::call<P>};
   return &table;
 }
 

@@ -44,7 +44,9 @@ struct Property {
   std::vector<double> default_numbers;
   std::vector<std::string> choices;
   std::uint32_t columns = 0;  // of a table
-  bool is_live = false;       // may be changed while the simulation runs
+  // May be changed while the simulation runs, by `gravitas ctl set`. Of a plugin's own properties only: those of types are
+  // part of the scene, of which `gravitas ctl edit` changes any.
+  bool is_live = false;
   std::string meaning;
 
   static Property number(std::string name, std::string unit);

@@ -13,7 +13,7 @@ void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSetti
   SolverBodies bodies;
   bodies.load(request);
   SolverSolution answer;
-  set_unpushed(request, bodies, &answer);
+  set_all_unpushed(request, bodies, &answer);
   IslandFinder finder;
   const std::span<const Island> islands = finder.find(request, bodies);
   std::vector<ConeSummary> summaries(islands.size());

@@ -14,7 +14,7 @@ DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
           r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
 }
 
-void set_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution) {
+void set_all_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution) {
   const std::size_t joints = request.mode().size(), contacts = request.contact_key().size();
   solution->velocity.assign(bodies.count() + 1, Twist{});
   for (std::uint32_t i = 0; i < bodies.count(); ++i) solution->velocity[i] = bodies[i].trial_velocity;

@@ -17,8 +17,9 @@ struct SolverSolution {
   std::vector<double> contact_correction;                                   // one a contact
 };
 
-// What holds where nobody is pushed: bodies keep v*.
-void set_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution);
+// Makes all of the solution, whatever it holds, what holds where nobody is pushed: bodies keep v*, impulses and corrections
+// are zero.
+void set_all_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution);
 
 // How a solution ended.
 struct SolverOutcome {

@@ -10,8 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "plugin_sdk/body.h"
 #include "plugin_sdk/solver.h"
 #include "services/capsule/capsule.h"
+#include "services/catalog/catalog.h"
 #include "services/check/answer_text.h"
 #include "services/check/carrier_subject.h"
 #include "services/check/describe.h"
@@ -112,6 +114,41 @@ check::Examinee usable(const std::string& argument) {
   return examinee;
 }
 
+// Ids of the types that a call is about.
+std::vector<std::uint64_t> types_of(const v1::CapsuleCall& call, Slot slot) {
+  const MessageColumns request = columns_of(call.request(), method_named(call.method())->request);
+  if (slot == Slot::kConstraint) return request.u64("constraint_type");
+  if (slot == Slot::kCollision) return request.u64("shape_type");
+  std::vector<std::uint64_t> types;
+  if (slot != Slot::kForce) return types;
+  const std::vector<std::uint64_t>& of_force = request.u64("force_type");
+  const std::vector<std::uint32_t>& application = request.u32("application");
+  for (std::size_t i = 0; i + 1 < application.size(); i += 2)
+    if (application[i] < of_force.size()) types.push_back(of_force[application[i]]);
+  return types;
+}
+
+// A type by its id, as plugins that are known call it.
+std::string type_text(std::uint64_t id, Slot slot, const std::string& own_library) {
+  Catalog catalog = Catalog::installed(installed_worker(), installed_plugins());
+  std::string problem;
+  if (!own_library.empty()) catalog.add_library(own_library, &problem);
+  for (const std::string& name : catalog.type_names(slot))
+    if (type_id(name) == id) return "'" + name + "'";
+  return fmt::format("of id {:016x}", id);
+}
+
+// It serves every type that the call is about.
+void demand_types(const v1::CapsuleCall& call, const check::Examinee& examinee, const std::string& own_library) {
+  const PluginDeclaration& declaration = examinee.declaration;
+  for (const std::uint64_t id : types_of(call, declaration.slot)) {
+    const auto is_it = [&](const TypeDeclaration& type) { return type_id(type.name) == id; };
+    if (std::ranges::none_of(declaration.types, is_it))
+      throw BadInput(fmt::format("'{}' cannot take the place: it does not serve the type {}", examinee.argument,
+                                 type_text(id, declaration.slot, own_library)));
+  }
+}
+
 // Asks the plugins of a capsule.
 class Player {
  public:
@@ -137,6 +174,7 @@ class Player {
     if (slot_name(examinee.declaration.slot) != capsule_.header().slot())
       throw BadInput(fmt::format("'{}' is of slot {}, the capsule of slot {}", examinee.argument,
                                  slot_name(examinee.declaration.slot), capsule_.header().slot()));
+    if (substitute) demand_types(call, examinee, plugin.library());
     // what the run had set holds for a plugin of the same properties
     if (examinee.declaration.name == plugin.name() &&
         examinee.settings.size() == static_cast<std::size_t>(plugin.settings_size()))

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "plugin_sdk/declaration_check.h"
 #include "plugin_sdk/host/description_message.h"
 #include "services/catalog/describe_process.h"
 
@@ -73,17 +74,14 @@ bool describe_once(const std::string& worker_path, const std::vector<std::string
 
 // Why a described plugin cannot be used, or empty.
 std::string usability(const plugin::v1::Catalog::Entry& entry, const PluginDeclaration& declaration) {
-  if (!entry.problem().empty()) return entry.problem();
-  const bool has_slot = declaration.slot >= Slot::kSpace && declaration.slot <= Slot::kIntegrator;
-  if (!has_slot) return "it declares a slot that this version does not have";
-  if (declaration.name.empty()) return "it declares no name";
-  return "";
+  return entry.problem().empty() ? check_declaration(declaration) : entry.problem();
 }
 
 }  // namespace
 
 Catalog::Catalog(std::vector<InstalledPlugin> plugins)
-    : plugins_(std::make_move_iterator(plugins.begin()), std::make_move_iterator(plugins.end())) {}
+    : plugins_(std::make_move_iterator(plugins.begin()), std::make_move_iterator(plugins.end())),
+      of_folder_(plugins_.size()) {}
 
 Catalog Catalog::installed(const std::string& worker_path, const std::string& plugin_dir) {
   Catalog catalog;
@@ -106,6 +104,7 @@ Catalog Catalog::installed(const std::string& worker_path, const std::string& pl
     const std::string why = usability(entry, declaration);
     catalog.add(libraries[i], why, std::move(declaration));
   }
+  catalog.of_folder_ = catalog.plugins_.size();
   return catalog;
 }
 
@@ -162,6 +161,26 @@ const InstalledPlugin* Catalog::find_type(Slot slot, const std::string& type) co
   for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
     if (plugin->declaration.slot == slot && gravitas::find_type(plugin->declaration, type) != nullptr) return &*plugin;
   return nullptr;
+}
+
+std::vector<const InstalledPlugin*> Catalog::installed_for(Slot slot, const std::string& type) const {
+  std::vector<const InstalledPlugin*> found;
+  for (std::size_t i = 0; i < of_folder_; ++i)
+    if (plugins_[i].declaration.slot == slot && gravitas::find_type(plugins_[i].declaration, type) != nullptr)
+      found.push_back(&plugins_[i]);
+  return found;
+}
+
+std::vector<const InstalledPlugin*> Catalog::installed_as(Slot slot, const std::string& name) const {
+  std::vector<const InstalledPlugin*> found;
+  for (std::size_t i = 0; i < of_folder_; ++i)
+    if (plugins_[i].declaration.slot == slot && plugins_[i].declaration.name == name) found.push_back(&plugins_[i]);
+  return found;
+}
+
+bool Catalog::is_of_folder(const InstalledPlugin* plugin) const {
+  return std::any_of(plugins_.begin(), plugins_.begin() + static_cast<std::ptrdiff_t>(of_folder_),
+                     [&](const InstalledPlugin& one) { return &one == plugin; });
 }
 
 const InstalledPlugin* Catalog::find(const std::string& name) const {

@@ -47,6 +47,12 @@ class Catalog {
   // The plugin of the slot that serves a type of the scene language (a shape, force or joint), or
   // null.
   const InstalledPlugin* find_type(Slot slot, const std::string& type) const;
+  // Those of the folder that serve a type, or that have a name, in the order of their finding: nothing but their files tells
+  // which of several is meant.
+  std::vector<const InstalledPlugin*> installed_for(Slot slot, const std::string& type) const;
+  std::vector<const InstalledPlugin*> installed_as(Slot slot, const std::string& name) const;
+  // Whether it is one of the folder, and was not added.
+  bool is_of_folder(const InstalledPlugin* plugin) const;
   // The plugin of that name in any slot, or null.
   const InstalledPlugin* find(const std::string& name) const;
 
@@ -65,6 +71,7 @@ class Catalog {
 
   std::string worker_path_;
   std::deque<InstalledPlugin> plugins_;
+  std::size_t of_folder_ = 0;  // how many of them
   std::vector<BrokenLibrary> broken_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "kernel/carrier/carrier.h"
 #include "plugin_sdk/conformance/sample_values.h"
+#include "plugin_sdk/declaration_check.h"
 #include "plugin_sdk/host/description_message.h"
 #include "services/catalog/catalog.h"
 #include "services/catalog/describe_process.h"
@@ -94,7 +95,7 @@ void complete(Examinee* examinee, bool is_quick) {
   examinee->problem = problem;
   if (!problem.empty()) return;
   examinee->declaration = host::from_message(examinee->description);
-  if (judge_declaration(examinee->declaration).empty())
+  if (check_declaration(examinee->declaration).empty())
     examinee->settings = conformance::default_settings(examinee->declaration);
 }
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin_sdk/declaration_check.h"
 #include "services/check/answer_text.h"
 #include "services/check/shell_word.h"
 
@@ -28,6 +29,8 @@ constexpr std::uint64_t kSeed = 20090131;
 constexpr std::uint32_t kMostFaults = 3;
 // In a quick check, cases after the first finding are left out beyond this.
 constexpr std::chrono::milliseconds kQuickBudget{1100};
+// It ends at this, for a plugin whose calls are slow; a command may start an interpreter for each process.
+constexpr double kQuickLimit = 20.0, kQuickLimitOfCommands = 60.0;  // s
 
 constexpr const char* kMeanings[] = {"handshake and refusals",           "wire abuse",
                                      "purity: same request, same bytes", "state: nothing kept that can be lost",
@@ -46,13 +49,15 @@ class Run {
  public:
   Run(const Examinee& examinee, const Options& options, const std::function<void(const Progress&)>& progress,
       const std::function<bool()>& interrupted)
-      : examination_(examinee, options, progress) {
-    examination_.patience.ends = interrupted;
+      : examination_(examinee, options, progress), interrupted_(interrupted) {
+    examination_.patience.ends = [this] { return !why_ended().empty(); };
   }
 
   report::v1::CheckReport report();
 
  private:
+  // Why no further call is made, or empty.
+  std::string why_ended() const;
   bool is_chosen(const CheckCase& one) const;
   void judge_level(Level level, const std::vector<CheckCase>& cases);
   std::string judge(const CheckCase& one);
@@ -64,10 +69,20 @@ class Run {
   void conclude();
 
   Examination examination_;
+  const std::function<bool()> interrupted_;
   report::v1::CheckReport report_;
   Clock::time_point start_ = Clock::now();
   bool is_unusable_ = false;
 };
+
+std::string Run::why_ended() const {
+  if (interrupted_()) return kInterrupted;
+  const Options& options = examination_.options;
+  const double usual = examination_.examinee.is_command() ? kQuickLimitOfCommands : kQuickLimit;
+  const double limit = options.quick_limit > 0.0 ? options.quick_limit : usual;
+  if (!options.quick || seconds_since(start_) < limit) return {};
+  return fmt::format("its calls take too long for --quick, which ends after {:g} s", limit);
+}
 
 bool Run::is_chosen(const CheckCase& one) const {
   const Options& options = examination_.options;
@@ -85,7 +100,7 @@ std::string Run::premise_of(Level level) const {
 }
 
 std::string Run::reason_to_stop(Level level, std::uint32_t faults) const {
-  if (examination_.patience.ends()) return kInterrupted;
+  if (const std::string ended = why_ended(); !ended.empty()) return ended;
   if (faults >= kMostFaults) return fmt::format("its processes died or hung {} times", faults);
   const bool is_late = examination_.options.quick && Clock::now() - start_ > kQuickBudget;
   if (is_late && report_.findings_size() > 0) return "it has failed, and the time of --quick is over";
@@ -133,7 +148,7 @@ void Run::judge_level(Level level, const std::vector<CheckCase>& cases) {
     try {
       finding = judge(one);
     } catch (const Interrupted&) {
-      why = kInterrupted;
+      why = why_ended();
       verdict.set_left_out(verdict.left_out() + 1);
       continue;
     }
@@ -281,7 +296,7 @@ std::vector<CheckCase> all_cases(const PluginDeclaration& declaration) {
     cases.insert(cases.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
   };
   // cases of a declaration that is not well-formed would mean nothing
-  if (!judge_declaration(declaration).empty()) return cases;
+  if (!check_declaration(declaration).empty()) return cases;
   append(purity_cases());
   append(stream_cases());
   append(mailbox_cases());

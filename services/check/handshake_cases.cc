@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "kernel/control_session.h"
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/declaration_check.h"
 #include "plugin_sdk/property_value.h"
 #include "services/check/bare_worker.h"
 #include "services/check/describe.h"
@@ -19,55 +19,6 @@ using conformance::Level;
 using control::v1::Hello;
 
 namespace {
-
-// ---- the declaration
-
-// What is wrong with the default of a property, or empty.
-std::string judge_default(const Property& p) {
-  if (p.default_numbers.empty()) return {};
-  if (p.is_required) return "is required and has a default";
-  const std::string problem = check_flattened({p}, p.default_numbers);
-  return problem.empty() ? "" : "has a default that it does not allow: " + problem;
-}
-
-std::string judge_property(const Property& p) {
-  if (p.kind < PropertyKind::kNumber || p.kind > PropertyKind::kBody) return "is of no kind that exists";
-  if (p.meaning.empty()) return "has no meaning";
-  if (!(p.minimum <= p.maximum)) return "has bounds between which there is no number";
-  if (p.kind == PropertyKind::kChoice && p.choices.empty()) return "is a choice between nothing";
-  if (p.kind == PropertyKind::kTable && p.columns == 0) return "is a table without columns";
-  return judge_default(p);
-}
-
-std::string judge_properties(const std::string& owner, const std::vector<Property>& properties) {
-  std::set<std::string> names;
-  for (const Property& p : properties) {
-    if (p.name.empty()) return owner + " has a property without a name";
-    if (!names.insert(p.name).second) return fmt::format("{} declares {} twice", owner, p.name);
-    const std::string problem = judge_property(p);
-    if (!problem.empty()) return fmt::format("{}.{} {}", owner, p.name, problem);
-  }
-  return {};
-}
-
-bool is_word(const std::string& text) {
-  return !text.empty() && std::ranges::all_of(text, [](char c) { return c > ' ' && c < 0x7f; });
-}
-
-std::string judge_types(const PluginDeclaration& d) {
-  const bool serves_types = d.slot == Slot::kCollision || d.slot == Slot::kConstraint || d.slot == Slot::kForce;
-  if (serves_types && d.types.empty())
-    return fmt::format("a plugin of slot {} serves types; it declares none", slot_name(d.slot));
-  std::set<std::string> names;
-  for (const TypeDeclaration& type : d.types) {
-    if (!is_word(type.name)) return "a type has no name, or one that a scene cannot write";
-    if (!names.insert(type.name).second) return fmt::format("type {} is declared twice", type.name);
-    if (type.meaning.empty()) return fmt::format("type {} has no meaning", type.name);
-    const std::string problem = judge_properties(type.name, type.properties);
-    if (!problem.empty()) return problem;
-  }
-  return {};
-}
 
 // ---- greetings
 
@@ -178,23 +129,8 @@ CheckCase refuses(std::string name, const std::string& what, void (*spoil)(Hello
 
 }  // namespace
 
-std::string judge_declaration(const PluginDeclaration& d) {
-  if (!is_word(d.name)) return "it has no name, or one that a scene cannot write";
-  if (d.version.empty()) return "it has no version";
-  if (d.meaning.empty()) return "it has no meaning";
-  if (d.slot < Slot::kSpace || d.slot > Slot::kIntegrator) return "it declares a slot that does not exist";
-  if (!(d.theta >= 0.0 && d.theta <= 1.0)) return fmt::format("theta is {}; allowed: 0 to 1", number_text(d.theta));
-  std::set<std::string> words;
-  for (const std::string& word : d.capabilities) {
-    if (!is_word(word)) return fmt::format("the capability '{}' is no word", word);
-    if (!words.insert(word).second) return fmt::format("the capability '{}' is declared twice", word);
-  }
-  const std::string problem = judge_properties(d.name, d.properties);
-  return problem.empty() ? judge_types(d) : problem;
-}
-
 std::vector<CheckCase> handshake_cases() {
-  const auto declaration = [](Examination& examination) { return judge_declaration(examination.examinee.declaration); };
+  const auto declaration = [](Examination& examination) { return check_declaration(examination.examinee.declaration); };
   return {
       {Level::kHandshake, "handshake/declaration", "Names, bounds, defaults and types of its declaration fit together.",
        declaration, false, true},

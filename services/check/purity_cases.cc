@@ -1,11 +1,12 @@
-// C2: the same request gets the same bytes: twice, after others, in a fresh process, on another carrier, with other
-// numbers of threads.
+// C2: the same request gets the same bytes: twice, after others, in a fresh process, on another carrier, hosted direct, with
+// other numbers of threads.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <numeric>
 
 #include "services/check/answer_text.h"
+#include "services/check/direct_child.h"
 #include "services/check/examination.h"
 
 namespace gravitas::check {
@@ -79,6 +80,10 @@ std::string judge_carriers(Examination& examination) {
   return {};
 }
 
+std::string judge_direct(Examination& examination) {
+  return examination.examinee.is_command() ? "" : compare_direct(examination);
+}
+
 std::string judge_threads(Examination& examination) {
   for (const std::uint32_t threads : {2U, 3U}) {
     const std::unique_ptr<CarrierSubject> subject = examination.fresh(examination.usual_hosting(), threads);
@@ -97,7 +102,8 @@ std::vector<CheckCase> purity_cases() {
       {Level::kPurity, "purity/twice", "The same question gets the same bytes.", judge_twice},
       {Level::kPurity, "purity/after-others", "What was asked before does not matter.", judge_after_others},
       {Level::kPurity, "purity/fresh-process", "Which process answers does not matter.", judge_fresh},
-      {Level::kPurity, "purity/carriers", "How the process is reached does not matter.", judge_carriers},
+      {Level::kPurity, "purity/carriers", "How its process is reached does not matter.", judge_carriers},
+      {Level::kPurity, "purity/direct", "Being hosted in the kernel's own process does not matter.", judge_direct},
       {Level::kPurity, "purity/threads", "The number of threads does not matter.", judge_threads},
   };
 }

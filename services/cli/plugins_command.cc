@@ -55,10 +55,12 @@ std::string default_text(const Property& p) {
   return fmt::format("{}", fmt::join(p.default_numbers, ", "));
 }
 
-void print_properties(const std::vector<Property>& properties, const std::string& indent) {
+// `change`: how one of them may be changed while the simulation runs.
+template <typename Change>
+void print_properties(const std::vector<Property>& properties, const Change& change) {
   for (const Property& p : properties) {
-    std::cout << fmt::format("{}{:<18} {:<14} {:<8} {:<14} {:<12} {:<9} {}\n", indent, p.name, kind_name(p.kind),
-                             p.unit, range_text(p), default_text(p), p.is_live ? "live" : "init-only", p.meaning);
+    std::cout << fmt::format("    {:<18} {:<14} {:<8} {:<14} {:<12} {:<9} {}\n", p.name, kind_name(p.kind), p.unit,
+                             range_text(p), default_text(p), change(p), p.meaning);
   }
 }
 
@@ -70,12 +72,12 @@ void print_declaration(const InstalledPlugin& plugin) {
       d.capabilities.empty() ? std::string("none") : fmt::format("{}", fmt::join(d.capabilities, ", ")));
   if (d.slot == Slot::kIntegrator) std::cout << fmt::format("  theta         {:g}\n", d.theta);
   if (!d.properties.empty()) {
-    std::cout << "  properties (name, type, unit, range, default, when it may change, meaning)\n";
-    print_properties(d.properties, "    ");
+    std::cout << "  properties (name, type, unit, range, default, live: `ctl set` may change it, meaning)\n";
+    print_properties(d.properties, [](const Property& p) { return p.is_live ? "live" : "init-only"; });
   }
   for (const TypeDeclaration& type : d.types) {
     std::cout << fmt::format("  type {}: {}\n", type.name, type.meaning);
-    print_properties(type.properties, "    ");
+    print_properties(type.properties, [](const Property&) { return "ctl edit"; });
   }
 }
 
@@ -101,7 +103,10 @@ int list_plugins(bool json) {
                                d.meaning);
     }
   }
-  for (const BrokenLibrary& broken : catalog.broken()) std::cerr << broken.problem << '\n';
+  for (const BrokenLibrary& broken : catalog.broken()) {
+    const bool is_named = broken.problem.find(broken.library) != std::string::npos;
+    std::cerr << (is_named ? "" : "'" + broken.library + "': ") << broken.problem << '\n';
+  }
   return kDone;
 }
 

@@ -43,11 +43,13 @@ int serve(ServeLine* line) {
   if (!std::isfinite(line->options.speed) || line->options.speed < 0.0)
     throw BadInput(
         fmt::format("--speed {:g}: allowed: a finite number > 0, or 0: as fast as possible", line->options.speed));
-  if (!line->listen.empty() && !line->listen.starts_with("unix:") && !has_port(line->listen))
+  if (line->listen.starts_with("unix:"))
+    throw BadInput(fmt::format("--listen {}: allowed: ADDR:PORT; a path is given by --socket {}", line->listen,
+                               line->listen.substr(std::string_view("unix:").size())));
+  if (!line->listen.empty() && !has_port(line->listen))
     throw BadInput(fmt::format("--listen {}: allowed: ADDR:PORT, with a port from 0 to 65535, such as 127.0.0.1:4711",
                                line->listen));
-  if (!line->listen.empty() && !line->remote &&
-      (line->listen.starts_with("unix:") || !channel::is_local_address(line->listen)))
+  if (!line->listen.empty() && !line->remote && !channel::is_local_address(line->listen))
     throw BadInput(fmt::format(
         "--listen {}: nothing is encrypted and whoever connects controls the run, so only this machine is allowed: "
         "127.0.0.1:PORT or [::1]:PORT; others with --allow-remote",

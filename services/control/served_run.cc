@@ -326,6 +326,11 @@ const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot
     if (orders_[i].slot == slot && find_property(orders_[i].plugin, property) != nullptr &&
         is_pending(record_of(orders_[i], records).state))
       return orders_[i].plugin;
+  if (property.find('.') != std::string::npos)
+    throw BadInput(
+        fmt::format("{}: this changes settings of plugins, as in `set Solver.Iterations=50`; allowed for what "
+                    "the scene says of a single force, joint or shape: gravitas ctl edit 'set PATH=VALUE'",
+                    what));
   std::vector<std::string> names;
   for (const kernel::PluginChoice& plugin : active_.slot(slot).plugins) {
     if (find_property(plugin, property) != nullptr) return plugin;

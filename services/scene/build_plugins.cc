@@ -1,5 +1,6 @@
 #include "services/scene/build_plugins.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "plugin_sdk/channel/address.h"
@@ -196,9 +197,41 @@ void PluginSelection::read_library(Slot slot, Block* block) {
 // ---------------------------------------------------------------------------------------
 
 void PluginSelection::missing(Slot slot, const std::string& name, const TextPosition& position) {
+  if (lacks_library(slot)) return;
   context_.diagnostics->error(
       position, std::string("no ") + slot_name(slot) + " plugin " + quoted(name) + " is installed; " +
                     allowed_names(name, context_.catalog->plugin_names(slot)) + context_.catalog->broken_text());
+}
+
+void PluginSelection::ambiguous(Slot slot, const std::string& what, const std::vector<const InstalledPlugin*>& found,
+                                const TextPosition& position) {
+  std::string files;
+  for (const InstalledPlugin* plugin : found)
+    files += (files.empty() ? "" : ", ") + quoted(plugin->declaration.name) + " (" + plugin->library + ')';
+  const bool names_differ = found[0]->declaration.name != found[1]->declaration.name;
+  context_.diagnostics->error(position,
+                              std::to_string(found.size()) + " installed plugins " + what + ": " + files +
+                                  "; required: which of them, as Plugins { Plugin { Slot = " + quoted(slot_name(slot)) +
+                                  (names_differ ? " Name = …" : " Library = …") + " } }");
+}
+
+bool PluginSelection::lacks_library(Slot slot) {
+  return std::ranges::any_of(blocks(slot), [](const Block& block) {
+    return block.library == nullptr && (is_written(*block.message, Plugin::kLibraryFieldNumber) ||
+                                        is_written(*block.message, Plugin::kCommandFieldNumber));
+  });
+}
+
+const InstalledPlugin* PluginSelection::find_named(Slot slot, const std::string& name, const TextPosition& position) {
+  const InstalledPlugin* plugin = context_.catalog->find_plugin(slot, name);
+  if (plugin == nullptr) {
+    missing(slot, name, position);
+    return nullptr;
+  }
+  const std::vector<const InstalledPlugin*> namesakes = context_.catalog->installed_as(slot, name);
+  if (!context_.catalog->is_of_folder(plugin) || namesakes.size() == 1) return plugin;
+  ambiguous(slot, "of slot " + std::string(slot_name(slot)) + " are called " + quoted(name), namesakes, position);
+  return nullptr;
 }
 
 void PluginSelection::choose_named(Slot slot, const std::string& name, bool is_named, const TextPosition& name_place,
@@ -206,11 +239,10 @@ void PluginSelection::choose_named(Slot slot, const std::string& name, bool is_n
   const InstalledPlugin* library = blocks(slot).empty() ? nullptr : blocks(slot)[0].library;
   // a library that the scene brings along is meant to be used, unless the scene names another
   // plugin
-  const InstalledPlugin* plugin = library != nullptr && !is_named ? library : context_.catalog->find_plugin(slot, name);
-  if (plugin == nullptr) {
-    if (is_named || is_needed) missing(slot, name, name_place);
-    return;
-  }
+  const bool is_brought = library != nullptr && !is_named;
+  if (!is_brought && !is_named && !is_needed && context_.catalog->find_plugin(slot, name) == nullptr) return;
+  const InstalledPlugin* plugin = is_brought ? library : find_named(slot, name, name_place);
+  if (plugin == nullptr) return;
   if (plugin == library) blocks(slot)[0].is_used = true;
   add_choice(*plugin, &settings, block_place);
 }
@@ -225,17 +257,19 @@ const InstalledPlugin* PluginSelection::default_collision() const {
 const InstalledPlugin* PluginSelection::choose_collision(bool is_needed) {
   Block* block = blocks(Slot::kCollision).empty() ? nullptr : blocks(Slot::kCollision).data();
   const bool is_named = block != nullptr && is_written(*block->message, Plugin::kNameFieldNumber);
-  const InstalledPlugin* plugin = is_named ? context_.catalog->find_plugin(Slot::kCollision, block->message->name())
-                                  : block != nullptr && block->library != nullptr ? block->library
-                                                                                  : default_collision();
+  const TextPosition position =
+      is_named ? place_of(*block->message, Plugin::kNameFieldNumber) : place_of(context_.environment.location());
+  const InstalledPlugin* plugin = block != nullptr && !is_named ? block->library : nullptr;
   if (block != nullptr) block->is_used = true;
   if (plugin == nullptr) {
-    const TextPosition position =
-        is_named ? place_of(*block->message, Plugin::kNameFieldNumber) : place_of(context_.environment.location());
-    if (is_needed || is_named)
-      missing(Slot::kCollision, is_named ? block->message->name() : kDefaultCollision, position);
-    return nullptr;
+    const InstalledPlugin* standard = is_named ? nullptr : default_collision();
+    if (!is_named && !is_needed && standard == nullptr) return nullptr;
+    const std::string name = is_named              ? block->message->name()
+                             : standard != nullptr ? standard->declaration.name
+                                                   : kDefaultCollision;
+    plugin = find_named(Slot::kCollision, name, position);
   }
+  if (plugin == nullptr) return nullptr;
   add_choice(*plugin, nullptr, place_of(context_.environment.location()));
   return plugin;
 }
@@ -243,15 +277,33 @@ const InstalledPlugin* PluginSelection::choose_collision(bool is_needed) {
 // ---- slots with a list
 // -------------------------------------------------------------------------------------------
 
-std::uint32_t PluginSelection::serve(Slot slot, const std::string& type, const TextPosition& position,
-                                     const TypeDeclaration** declaration) {
+// That of a Library goes before what is installed; of what is installed, the one that a block names.
+const InstalledPlugin* PluginSelection::find_server(Slot slot, const std::string& type, const TextPosition& position) {
   const InstalledPlugin* plugin = context_.catalog->find_type(slot, type);
   if (plugin == nullptr) {
-    context_.diagnostics->error(
-        position, std::string("no installed ") + slot_name(slot) + " plugin knows the type " + quoted(type) + "; " +
-                      allowed_names(type, context_.catalog->type_names(slot)) + context_.catalog->broken_text());
-    return kNone;
+    if (!lacks_library(slot))
+      context_.diagnostics->error(
+          position, std::string("no installed ") + slot_name(slot) + " plugin knows the type " + quoted(type) + "; " +
+                        allowed_names(type, context_.catalog->type_names(slot)) + context_.catalog->broken_text());
+    return nullptr;
   }
+  std::vector<const InstalledPlugin*> servers = context_.catalog->installed_for(slot, type);
+  if (!context_.catalog->is_of_folder(plugin) || servers.size() == 1) return plugin;
+  std::vector<const InstalledPlugin*> named;
+  for (const InstalledPlugin* server : servers)
+    if (std::ranges::any_of(blocks(slot),
+                            [&](const Block& block) { return block.message->name() == server->declaration.name; }))
+      named.push_back(server);
+  if (named.size() == 1) return named[0];
+  ambiguous(slot, "serve the " + std::string(slot_name(slot)) + " type " + quoted(type),
+            named.empty() ? servers : named, position);
+  return nullptr;
+}
+
+std::uint32_t PluginSelection::serve(Slot slot, const std::string& type, const TextPosition& position,
+                                     const TypeDeclaration** declaration) {
+  const InstalledPlugin* plugin = find_server(slot, type, position);
+  if (plugin == nullptr) return kNone;
   *declaration = find_type(plugin->declaration, type);
   const std::size_t next = context_.description.slot(slot).plugins.size();
   const auto [row, is_new] =

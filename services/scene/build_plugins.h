@@ -51,7 +51,14 @@ class PluginSelection {
   void choose_named(Slot slot, const std::string& name, bool is_named, const TextPosition& name_place,
                     const TextPosition& block_place, const v1::Properties& settings, bool is_needed);
   const InstalledPlugin* default_collision() const;
+  // The plugin of a name, or that serves a type, and null after an error.
+  const InstalledPlugin* find_named(Slot slot, const std::string& name, const TextPosition& position);
+  const InstalledPlugin* find_server(Slot slot, const std::string& type, const TextPosition& position);
   void missing(Slot slot, const std::string& name, const TextPosition& position);
+  void ambiguous(Slot slot, const std::string& what, const std::vector<const InstalledPlugin*>& found,
+                 const TextPosition& position);
+  // A Library or Command of the slot's blocks could not be used, which an error says.
+  bool lacks_library(Slot slot);
   // Appends the plugin to its slot. `settings` may be null: then they are looked up in the Plugins
   // blocks.
   void add_choice(const InstalledPlugin& plugin, const v1::Properties* settings, const TextPosition& position);

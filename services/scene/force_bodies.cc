@@ -24,9 +24,7 @@ void for_each_property(const TypeDeclaration& type, std::vector<double>* paramet
 }
 
 const TypeDeclaration* type_of(const kernel::ForceDescription& force, const BuildContext& context) {
-  const InstalledPlugin* plugin = context.catalog->find_type(Slot::kForce, force.type);
-  const auto found = std::ranges::find(plugin->declaration.types, force.type, &TypeDeclaration::name);
-  return &*found;
+  return find_type(context.description.force.plugins[force.plugin].declaration, force.type);
 }
 
 // Applies a force to the body that it names, too.

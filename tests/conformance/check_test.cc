@@ -119,6 +119,31 @@ INSTANTIATE_TEST_SUITE_P(All, CheckOfTheTree, ::testing::ValuesIn(libraries_of(k
 INSTANTIATE_TEST_SUITE_P(All, CheckOfFaults, ::testing::ValuesIn(libraries_of(kFaulty)), name_of);
 INSTANTIATE_TEST_SUITE_P(All, CheckOfSlowFaults, ::testing::ValuesIn(libraries_of(kFaulty + "/long")), name_of);
 
+// A slow plugin is not decided by a quick check, which does not go on for minutes.
+TEST(QuickCheck, EndsAtItsLimit) {
+  kernel::set_worker_program(in_build("/bin/gravitas-worker"));
+  Examinee examinee = find_examinee(kPlugins + "/" + libraries_of(kPlugins).front() + ".so");
+  complete(&examinee, true);
+  const auto report = examine(
+      examinee, {.quick = true, .quick_limit = 1e-3, .level = {}, .only_case = {}}, [](const Progress&) {},
+      [] { return false; });
+  EXPECT_FALSE(report.conforms());
+  EXPECT_EQ(report.findings_size(), 0);
+  for (const report::v1::CheckLevel& level : report.levels()) {
+    EXPECT_EQ(level.verdict(), "not judged");
+    EXPECT_EQ(level.why(), "its calls take too long for --quick, which ends after 0.001 s");
+  }
+}
+
+TEST(CheckOfDirectHosting, TellsWhatDependsOnIt) {
+  const auto report =
+      check_library(kFaulty + "/depends_on_program.so", {.quick = true, .level = {}, .only_case = "purity/direct"});
+  ASSERT_EQ(report.findings_size(), 1) << report.DebugString();
+  EXPECT_NE(report.findings(0).text().find("hosted direct: number 0 of column error_estimate was 1, then 0"),
+            std::string::npos)
+      << report.findings(0).text();
+}
+
 // A command is judged as a library is, over the one carrier that it has.
 TEST(CheckOfACommand, ThatServesAGoodPluginConforms) {
   const std::vector<std::string> good = libraries_of(kPlugins);

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <string>
 
+#include "plugin_sdk/floating_point.h"
 #include "tests/paths.h"
 
 namespace gravitas {
@@ -142,6 +143,25 @@ TEST(PluginLibrary, RefusesAPluginForOtherStageContracts) {
   EXPECT_EQ(problem_of(path), "'" + path +
                                   "' was built for another schema of the stage "
                                   "contracts: rebuild it against this plugin_sdk");
+}
+
+TEST(PluginLibrary, SaysWhatADeclarationThrows) {
+  const std::string path = faulty("declaration_throws");
+  EXPECT_EQ(problem_of(path),
+            "'" + path + "' does not say what it is: its declaration failed: its table of types is missing");
+}
+
+TEST(PluginLibrary, RefusesOneThatChangesFloatingPointArithmeticAndPutsItBack) {
+  const std::string path = faulty("flushes_to_zero_on_load");
+  const std::uint32_t control = floating_point_control();
+  EXPECT_EQ(problem_of(path), "'" + path +
+                                  "' changes the floating-point environment of the process that loads it: it was "
+                                  "probably linked with -ffast-math or -Ofast; link it without");
+  EXPECT_EQ(floating_point_control(), control);
+  std::string problem;
+  EXPECT_EQ(look_into_plugin_library(path, &problem).table, nullptr);
+  EXPECT_THAT(problem, HasSubstr("-ffast-math"));
+  EXPECT_EQ(floating_point_control(), control);
 }
 
 TEST(PluginLibrary, LoadsEqualContentOnceAndKeepsNoMoreForTheSecondTime) {

@@ -12,21 +12,21 @@
 namespace gravitas {
 namespace {
 
-using Row = std::array<double, MotionCurve::kColumns>;
+using CurveRow = std::array<double, MotionCurve::kColumns>;
 
-std::vector<double> table(const std::vector<Row>& rows) {
+std::vector<double> table(const std::vector<CurveRow>& rows) {
   std::vector<double> numbers;
-  for (const Row& row : rows) numbers.insert(numbers.end(), row.begin(), row.end());
+  for (const CurveRow& row : rows) numbers.insert(numbers.end(), row.begin(), row.end());
   return numbers;
 }
 
-Row row(double time, const Vector3& x, const Quaternion& q) {
+CurveRow row(double time, const Vector3& x, const Quaternion& q) {
   return {time, x.x(), x.y(), x.z(), q.w(), q.x(), q.y(), q.z()};
 }
 
 // Uneven times, turns of up to 2.5 rad about changing axes.
 std::vector<double> winding_table() {
-  std::vector<Row> rows;
+  std::vector<CurveRow> rows;
   const double times[] = {0.0, 0.3, 0.5, 1.2, 1.3, 2.0};
   Quaternion q = Quaternion::Identity();
   for (int i = 0; i < 6; ++i) {
@@ -56,7 +56,7 @@ TEST(MotionCurve, GoesThroughEveryRow) {
 TEST(MotionCurve, AtConstantVelocitiesIsExactAlsoBeyondItsEnds) {
   const Vector3 v(1.0, -2.0, 0.5), w(0.4, 2.0, -1.0);
   const Quaternion start(0.8, 0.0, 0.6, 0.0);
-  std::vector<Row> rows;
+  std::vector<CurveRow> rows;
   for (const double t : {0.0, 0.1, 0.7, 1.0, 1.9})
     rows.push_back(row(t, Vector3(3, 4, 5) + t * v, rotate_by(start, t * w)));
   const MotionCurve curve(table(rows), {});
@@ -73,7 +73,7 @@ TEST(MotionCurve, AtConstantVelocitiesIsExactAlsoBeyondItsEnds) {
 
 TEST(MotionCurve, AtConstantAccelerationItsPositionsAreExact) {
   const Vector3 a(2.0, -1.0, 4.0);
-  std::vector<Row> rows;
+  std::vector<CurveRow> rows;
   for (const double t : {0.0, 0.2, 0.3, 1.0}) rows.push_back(row(t, 0.5 * t * t * a, Quaternion::Identity()));
   const MotionCurve curve(table(rows), {});
   for (double t = 0.0; t < 1.0; t += 0.01) {
@@ -91,7 +91,7 @@ TEST(MotionCurve, FollowsASmoothWayToThirdOrder) {
     const auto q = [](double t) {
       return exp_rotation(Vector3(0.0, 0.0, t)) * exp_rotation(Vector3(std::sin(t), 0.0, 0.0));
     };
-    std::vector<Row> rows;
+    std::vector<CurveRow> rows;
     for (int i = -2; i * h < 1.0 + 3.0 * h; ++i) rows.push_back(row(i * h, x(i * h), q(i * h)));
     const MotionCurve curve(table(rows), {});
     double most = 0.0;
@@ -147,7 +147,7 @@ TEST(MotionCurve, ARowThatStandsTwiceIsARest) {
 // A door that turns about its hinge: the hinge stays, the centre of mass goes round it.
 TEST(MotionCurve, TheFrameFollowsTheTableAndTheCentreOfMassWithIt) {
   const Vector3 w(0, 0, 1.5);
-  std::vector<Row> rows;
+  std::vector<CurveRow> rows;
   for (const double t : {0.0, 0.5, 1.0}) rows.push_back(row(t, {1, 2, 3}, exp_rotation(t * w)));
   const MotionCurve curve(table(rows), kOffset);
   for (double t = 0.0; t < 1.0; t += 0.05) {

@@ -111,6 +111,17 @@ TEST(Capsule, AnotherPluginIsComparedWithTheOneThatAnswered) {
   EXPECT_THAT(foreign.err, HasSubstr("is of slot solver, the capsule of slot integrator"));
 }
 
+TEST(Capsule, APluginThatServesOtherTypesCannotTakeThePlace) {
+  const ScratchFolder folder;
+  for (const auto& [slot, plugin] :
+       std::vector<std::pair<std::string, std::string>>{{"force", "hello"}, {"constraint", "constraint_rigid"}}) {
+    const std::string library = in_build("/lib/gravitas/") + plugin + ".so";
+    const ProgramResult result = run_program({"replay", capture(slot, folder), "--plugin", library}, folder);
+    EXPECT_EQ(result.exit_code, 2) << result.out;
+    EXPECT_THAT(result.err, ::testing::ContainsRegex("cannot take the place: it does not serve the type '[A-Z]"));
+  }
+}
+
 // Problems of a run, solved alone: each says how it ended, by the solver that had it and by another one.
 TEST(Capsule, OfASolverSaysHowEachProblemEnded) {
   const ScratchFolder folder;

@@ -28,9 +28,12 @@ using testing::IsEmpty;
 PluginDeclaration declare(Slot slot, const std::string& name, const std::vector<std::string>& types = {}) {
   PluginDeclaration declaration;
   declaration.name = name;
+  declaration.version = "1";
   declaration.slot = slot;
+  declaration.meaning = "Serves a test.";
   for (const std::string& type : types)
-    declaration.types.push_back({type, "", {Property::number("Size", "m").above(0.0).required()}});
+    declaration.types.push_back(
+        {type, "A type.", {Property::number("Size", "m").above(0.0).required().means("How large.")}});
   return declaration;
 }
 
@@ -152,6 +155,36 @@ TEST_F(CatalogTest, KeepsWhatCannotBeUsedWithTheReason) {
   EXPECT_THAT(catalog.broken_text(), HasSubstr("; not usable: " + a + " (made for another schema), "));
 }
 
+// As `gravitas check` refuses it, and in its words.
+TEST_F(CatalogTest, RefusesWhatIsDeclaredBadly) {
+  library("a.so");
+  PluginDeclaration twice = declare(Slot::kForce, "Winds", {"Wind"});
+  twice.types[0].properties.push_back(twice.types[0].properties[0]);
+  Catalog catalog = Catalog::installed(answering(answer_of({twice})), plugins());
+  EXPECT_THAT(catalog.plugins(), IsEmpty());
+  ASSERT_EQ(catalog.broken().size(), 1U);
+  EXPECT_EQ(catalog.broken()[0].problem, "Wind declares Size twice");
+  std::string problem;
+  EXPECT_EQ(catalog.add_library(library("a.so"), &problem), nullptr);
+  EXPECT_EQ(problem, "Wind declares Size twice");
+}
+
+TEST_F(CatalogTest, TellsWhatTheFolderHasSeveralOf) {
+  const Catalog catalog({{"/a.so", declare(Slot::kForce, "Winds", {"Wind"})},
+                         {"/b.so", declare(Slot::kForce, "Gales", {"Wind", "Gust"})},
+                         {"/c.so", declare(Slot::kForce, "Gales", {"Gale"})}});
+  const auto files_of = [](const std::vector<const InstalledPlugin*>& found) {
+    std::vector<std::string> libraries;
+    for (const InstalledPlugin* plugin : found) libraries.push_back(plugin->library);
+    return libraries;
+  };
+  EXPECT_THAT(files_of(catalog.installed_for(Slot::kForce, "Wind")), ElementsAre("/a.so", "/b.so"));
+  EXPECT_THAT(files_of(catalog.installed_for(Slot::kForce, "Gust")), ElementsAre("/b.so"));
+  EXPECT_THAT(files_of(catalog.installed_for(Slot::kSolver, "Wind")), IsEmpty());
+  EXPECT_THAT(files_of(catalog.installed_as(Slot::kForce, "Gales")), ElementsAre("/b.so", "/c.so"));
+  EXPECT_TRUE(catalog.is_of_folder(&catalog.plugins()[2]));
+}
+
 TEST_F(CatalogTest, SaysWhenNobodyCanBeAsked) {
   library("a.so");
   const auto problem = [&](const std::string& worker) {
@@ -189,7 +222,8 @@ TEST_F(CatalogTest, EndsAWorkerThatHangs) {
 
 TEST_F(CatalogTest, TakesLongAnswers) {
   // more than a pipe holds
-  std::vector<std::string> types(5000, std::string(40, 't'));
+  std::vector<std::string> types;
+  for (int i = 0; i < 5000; ++i) types.push_back(std::string(40, 't') + std::to_string(i));
   const std::string worker = answering(answer_of({declare(Slot::kForce, "Many", types)}));
   library("a.so");
   const Catalog catalog = Catalog::installed(worker, plugins());

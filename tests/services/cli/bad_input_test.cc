@@ -367,11 +367,14 @@ ProgramResult run_with_solver_library(const std::string& library, const ScratchF
 TEST(BadInput, LibrariesThatAreNoPluginsOrOfAnotherSchema) {
   const ScratchFolder folder;
   const std::string faulty = in_build("/lib/gravitas-faulty/");
-  for (const auto& [library, expected] :
-       std::vector<std::pair<std::string, std::string>>{{folder.path("missing.so"), "No such file"},
-                                                        {folder.write("text.so", "not a library"), "shared library"},
-                                                        {faulty + "wrong_schema_hash.so", "schema"},
-                                                        {faulty + "crash_on_load.so", "signal"}}) {
+  for (const auto& [library, expected] : std::vector<std::pair<std::string, std::string>>{
+           {folder.path("missing.so"), "No such file"},
+           {folder.write("text.so", "not a library"), "shared library"},
+           {faulty + "wrong_schema_hash.so", "schema"},
+           {faulty + "crash_on_load.so", "signal"},
+           {faulty + "flushes_to_zero_on_load.so", "-ffast-math"},
+           {faulty + "declaration_throws.so", "its table of types"},
+           {faulty + "declares_bad_default.so", "BadDefault.Margin has a default that it does not allow"}}) {
     const ProgramResult result = run_with_solver_library(library, folder);
     EXPECT_EQ(result.exit_code, 2) << library;
     EXPECT_THAT(result.err, HasSubstr("plugins.gravitas:1:"));
@@ -442,6 +445,13 @@ TEST(BadInput, NamesTheOptionThatWasGiven) {
   result = run_program({"run", pendulum, "--hosting", "direct", "--set", "Simulator=Smooth"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("and Sequential has it not; allowed: \"Direct\", \"Newton\""));
+}
+
+TEST(BadInput, ServeListensAtAPathBySocket) {
+  const ScratchFolder folder;
+  const ProgramResult result = run_program({"serve", kSample, "--headless", "--listen", "unix:/tmp/s"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("allowed: ADDR:PORT; a path is given by --socket /tmp/s"));
 }
 
 // An empty value would count as an option that is left out.

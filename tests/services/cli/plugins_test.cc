@@ -83,7 +83,8 @@ TEST(Describe, ShowsPropertiesWithUnitRangeDefaultAndMeaning) {
   EXPECT_EQ(solver.exit_code, 0);
   EXPECT_THAT(solver.out, HasSubstr("slot solver"));
   EXPECT_THAT(solver.out, HasSubstr("Iterations"));
-  EXPECT_THAT(solver.out, HasSubstr("live"));
+  EXPECT_THAT(solver.out, HasSubstr("live: `ctl set` may change it"));
+  EXPECT_THAT(run_program({"describe", "Gravity"}, folder).out, ContainsRegex("Acceleration .* required +ctl edit "));
   // a name may stand for several
   google::protobuf::ListValue several;
   ASSERT_TRUE(JsonStringToMessage(run_program({"describe", "Basic", "--json"}, folder).out, &several).ok());

@@ -305,6 +305,7 @@ TEST(ServedRun, WhatCannotBeIsRefusedWithTheReason) {
   EXPECT_THAT(set("Solver.Iterations=many"), HasSubstr("many"));
   EXPECT_THAT(set("Solver.Iterations=5 6"), HasSubstr("one value"));
   EXPECT_THAT(set("Solvr.Iterations=5"), HasSubstr("unknown slot"));
+  EXPECT_THAT(set("Force.Down.Acceleration={0,0,0}"), HasSubstr("gravitas ctl edit 'set PATH=VALUE'"));
   const auto inject = [&](const std::string& text) { return refusal([&] { served.client.inject(text); }); };
   EXPECT_THAT(inject("solver:kil"), HasSubstr("kill"));
   EXPECT_THAT(inject("solver:foo"), HasSubstr("inject solver:foo: there is no fault 'foo'"));

@@ -36,9 +36,11 @@ class BuildLibrary : public testing::Test {
     PluginDeclaration declaration;
     declaration.slot = slot;
     declaration.name = name;
-    declaration.properties = {Property::number("Strength", "1").defaults_to({1.0})};
-    if (slot == Slot::kForce) declaration.types = {{"Wind", "", {}}};
-    if (slot == Slot::kCollision) declaration.types = {{"Torus", "", {}}};
+    declaration.version = "1";
+    declaration.meaning = "Serves a test.";
+    declaration.properties = {Property::number("Strength", "1").defaults_to({1.0}).means("How much.")};
+    if (slot == Slot::kForce) declaration.types = {{"Wind", "Blows.", {}}};
+    if (slot == Slot::kCollision) declaration.types = {{"Torus", "A ring.", {}}};
     plugin::v1::Catalog answer;
     *answer.add_entries()->mutable_description() = host::to_message(declaration);
     std::ofstream(folder_ / "answer", std::ios::binary) << answer.SerializeAsString();
@@ -101,6 +103,20 @@ TEST_F(BuildLibrary, OfAnotherSlotIsRefused) {
                          "Environment { }\nPlugins { Plugin { Slot = \"solver\" Library = \"own.so\" } }")
                   .errors(),
               ElementsAre(at("2:46") + "error: Library \"own.so\" is a plugin for the slot \"force\", not \"solver\""));
+}
+
+// One error says it, not one more for each type and name that it would have served.
+TEST_F(BuildLibrary, ThatCannotBeUsedIsSaidOnce) {
+  EXPECT_THAT(build_with(Slot::kForce, "Winds",
+                         "Forces { Force { Type = \"Magnet\" Id = \"W\" } } Environment { }\n"
+                         "Plugins { Plugin { Slot = \"force\" Library = \"none.so\" } }")
+                  .errors(),
+              ElementsAre(testing::StartsWith(at("2:45") + "error: Library \"none.so\" cannot be used: ")));
+  EXPECT_THAT(build_with(Slot::kSolver, "Own",
+                         "Environment { ConstraintSolver = \"Own\" }\n"
+                         "Plugins { Plugin { Slot = \"solver\" Library = \"none.so\" } }")
+                  .errors(),
+              ElementsAre(testing::StartsWith(at("2:46") + "error: Library \"none.so\" cannot be used: ")));
 }
 
 TEST_F(BuildLibrary, OfAnotherNameIsRefused) {

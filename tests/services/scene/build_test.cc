@@ -248,6 +248,48 @@ TEST(Build, FlattensForcesAndFindsTheirPlugins) {
   EXPECT_EQ(description.force.plugins[0].declaration.name, "Drag");
 }
 
+// A second plugin for the type "Gravity", and one more solver "LCP".
+Catalog with_rivals(const std::string& name) {
+  std::vector<InstalledPlugin> plugins = declared_plugins();
+  const auto copy = [&](Slot slot, const std::string& of, const std::string& as, const std::string& library) {
+    InstalledPlugin twin = *std::ranges::find_if(plugins, [&](const InstalledPlugin& one) {
+      return one.declaration.slot == slot && one.declaration.name == of;
+    });
+    twin.declaration.name = as;
+    twin.library = library;
+    plugins.push_back(twin);
+  };
+  copy(Slot::kForce, "Gravity", name, "/plugins/own.so");
+  copy(Slot::kSolver, "LCP", "LCP", "/plugins/lcp2.so");
+  return Catalog(std::move(plugins));
+}
+
+TEST(Build, TwoInstalledPluginsForATypeMustBeToldApart) {
+  const std::string scene =
+      "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -1, 0} } } } "
+      "Environment { }";
+  EXPECT_THAT(build(scene, {}, with_rivals("Moon")).errors(),
+              ElementsAre("scene:1:25: error: 2 installed plugins serve the force type \"Gravity\": \"Gravity\" "
+                          "(/plugins/force_Gravity.so), \"Moon\" (/plugins/own.so); required: which of them, as "
+                          "Plugins { Plugin { Slot = \"force\" Name = … } }"));
+  EXPECT_THAT(build(scene, {}, with_rivals("Gravity")).errors(),
+              ElementsAre(HasSubstr("Plugins { Plugin { Slot = \"force\" Library = … } }")));
+  for (const char* name : {"Moon", "Gravity"}) {
+    const BuiltScene chosen =
+        build(scene + "Plugins { Plugin { Slot = \"force\" Name = \"" + name + "\" } }", {}, with_rivals("Moon"));
+    ASSERT_TRUE(chosen.description.has_value()) << testing::PrintToString(chosen.errors());
+    EXPECT_EQ(chosen.description->force.plugins.at(0).declaration.name, name);
+  }
+}
+
+TEST(Build, TwoInstalledPluginsOfANameMustBeToldApart) {
+  EXPECT_THAT(build("Environment { ConstraintSolver = \"LCP\" }", {}, with_rivals("Moon")).errors(),
+              ElementsAre("scene:1:34: error: 2 installed plugins of slot solver are called \"LCP\": \"LCP\" "
+                          "(/plugins/solver_LCP.so), \"LCP\" (/plugins/lcp2.so); required: which of them, as "
+                          "Plugins { Plugin { Slot = \"solver\" Library = … } }"));
+  EXPECT_THAT(build("Environment { ConstraintSolver = \"Sequential\" }", {}, with_rivals("Moon")).errors(), IsEmpty());
+}
+
 TEST(Build, RefusesUnknownForces) {
   EXPECT_THAT(errors_of("Forces { Force { Type = \"Gravty\" Id = \"G\" } } Environment { }"),
               ElementsAre("scene:1:25: error: no installed force plugin knows the type \"Gravty\"; did you mean "

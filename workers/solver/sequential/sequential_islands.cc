@@ -30,7 +30,7 @@ void SequentialIslands::solve(const stage::SolverSolveRequest& request, const st
     const SequentialSummary summary = whole_.solve(request);
     return write(whole_.solution(), summary.outcome(), reply);
   }
-  set_unpushed(request, bodies_, &solution_);
+  set_all_unpushed(request, bodies_, &solution_);
   outcomes_.resize(islands.size());
   const auto solve_island = [&](std::uint64_t i) {
     thread_local IslandRequest part;
