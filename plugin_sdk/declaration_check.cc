@@ -62,7 +62,7 @@ std::string check_properties(const std::string& owner, const std::vector<Propert
              "', which a scene cannot write; allowed: letters, digits and '_', and no digit first";
     if (!names.insert(p.name).second) return owner + " declares " + p.name + " twice";
     const std::string problem = check_property(p);
-    if (!problem.empty()) return owner + '.' + p.name + ' ' + problem;
+    if (!problem.empty()) return std::string(owner).append(".").append(p.name).append(" ").append(problem);
   }
   return {};
 }
@@ -78,7 +78,7 @@ std::string check_types(const PluginDeclaration& d) {
     if (!is_written_in_quotes(type.name)) return "a type has no name, or one that a scene cannot write";
     if (!names.insert(type.name).second) return "type " + type.name + " is declared twice";
     if (type.meaning.empty()) return "type " + type.name + " has no meaning";
-    const std::string problem = check_properties(type.name, type.properties);
+    std::string problem = check_properties(type.name, type.properties);
     if (!problem.empty()) return problem;
   }
   return {};

@@ -104,6 +104,7 @@
 #include "workers/solver/sequential/contact_impulses.h"
 #include "workers/solver/sequential/relaxation_joints.h"
 #include "workers/solver/sequential/relaxation_order.h"
+#include "workers/solver/sequential/rows_in_loops.h"
 
 namespace gravitas {
 
@@ -252,9 +253,10 @@ class SequentialSolver {
   SolverBodies bodies_, turned_;                      // the latter with the inertia of the velocities' rows
   std::vector<RelaxationDiscrepancy> discrepancies_;  // at S*
   std::vector<RelaxationDiscrepancy> directed_;       // with the directions of the velocities' rows
-  // Rows that hold always, and their bodies; of these the rows that may share a load, as long as the same bodies meet.
-  std::vector<std::uint32_t> held_rows_, sharing_;
-  std::vector<RowEnds> held_ends_, known_ends_;
+  // Rows that hold always, and their bodies.
+  std::vector<std::uint32_t> held_rows_;
+  std::vector<RowEnds> held_ends_;
+  RowsInLoops rows_in_loops_;
   EliminationOrder sharing_order_;
   EqualSprings equal_springs_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> touching_;  // bodies, where there are joints; rising
