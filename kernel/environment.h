@@ -187,7 +187,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
-  // loads.cc: what loads turn a jointed body by in the inner step, rad, and the body; true where the step starts again, in more of them.
+  // loads.cc: by what loads turn a jointed body in the inner step, rad, and which; true where the step starts again, finer.
   std::pair<double, std::uint32_t> largest_turn_by_loads() const;
   bool makes_step_finer();
   std::string why_turned_far(double turn, std::uint32_t body) const;

@@ -169,7 +169,8 @@ void set_turn_component(const TurnComponent& component, Discrepancy* d);
 
 // Error x2 - x1 (world) when the bodies are at `then` poses, for a discrepancy that was written at `now` poses.
 // Exact for points, and along the first axis for swings, twists (times the cosine that the twist was written with) and
-// components (over the length of the gradient that they were written with); other angular errors are carried to first order in the rotation between the two.
+// components (over the length of the gradient that they were written with); other angular errors are carried to first order
+// in the rotation between the two.
 Vector3 error_at(const Discrepancy& discrepancy, const Pose& now1, const Pose& now2, const Pose& then1,
                  const Pose& then2);
 

@@ -13,8 +13,6 @@
 #include <cerrno>
 #include <cstring>
 #include <exception>
-#include <filesystem>
-#include <system_error>
 #include <vector>
 
 #include "plugin_sdk/channel/mailbox.h"
@@ -57,25 +55,12 @@ std::string first_difference(Examination& examination, const std::vector<Answer>
   return {};
 }
 
-// The copies of libraries that this process has loaded (plugin_sdk/library.cc): a library behind the same number would be
-// taken for the one that was.
-std::vector<int> open_copies() {
-  std::vector<int> copies;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", error))
-    if (std::filesystem::read_symlink(entry.path(), error).string().starts_with("/memfd:gravitas plugin"))
-      copies.push_back(std::stoi(entry.path().filename().string()));
-  return copies;
-}
-
 [[noreturn]] void ask_in_child(Examination& examination, const std::vector<Answer>& expected, int out) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT}) signal(number, SIG_DFL);
   // what a plugin prints must not mix with the report
   dup2(STDERR_FILENO, STDOUT_FILENO);
-  std::vector<int> kept = open_copies();
-  kept.push_back(out);
-  host::close_inherited(kept);
+  host::close_inherited({out});
   host::enter_sandbox({examination.examinee.library}, kMemoryLimit);
   std::string found;
   try {

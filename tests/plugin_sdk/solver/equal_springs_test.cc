@@ -19,8 +19,6 @@ struct TestRow {
   ConstraintDirection direction;
 };
 
-Vector3 drawn(Draw* draw) { return {draw->uniform(-1, 1), draw->uniform(-1, 1), draw->uniform(-1, 1)}; }
-
 std::vector<SolverBody> bodies_of(std::uint32_t count, double mass) {
   SolverBody body;
   body.inverse_mass = 1.0 / mass;
@@ -49,28 +47,35 @@ std::vector<TestRow> ring(Draw* draw) {
   for (const auto& [one, two] : {std::pair(3U, 0U), {0U, 1U}, {1U, 2U}, {2U, 3U}, {0U, 2U}, {1U, 3U}})
     for (int k = 0; k < 6; ++k) {
       TestRow row{one, two, {}};
-      row.direction.linear = drawn(draw);
-      row.direction.angular1 = one == 3 ? Vector3::Zero() : drawn(draw);
-      row.direction.angular2 = two == 3 ? Vector3::Zero() : drawn(draw);
+      row.direction.linear = draw->vector(1.0);
+      row.direction.angular1 = one == 3 ? Vector3::Zero() : draw->vector(1.0);
+      row.direction.angular2 = two == 3 ? Vector3::Zero() : draw->vector(1.0);
       rows.push_back(row);
     }
   return rows;
+}
+
+// With roots of their stiffnesses.
+EqualSprings springs_of(const std::vector<TestRow>& rows, const Eigen::VectorXd& weight) {
+  const std::vector<SolverBody> bodies = bodies_of(3, 2.0);
+  EqualSprings springs;
+  springs.start(bodies.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double root = weight[static_cast<Eigen::Index>(i)];
+    springs.add(rows[i], bodies, root * root);
+  }
+  springs.factorise();
+  return springs;
 }
 
 TEST(EqualSprings, FitsTheNearestThatMotionsMake) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Draw draw(seed);
     const std::vector<TestRow> rows = ring(&draw);
-    const std::vector<SolverBody> bodies = bodies_of(3, 2.0);
-    EqualSprings springs;
-    springs.start(bodies.size());
     Eigen::VectorXd weight(36), target(36);
-    for (Eigen::Index i = 0; i < 36; ++i) {
-      weight[i] = draw.uniform(0.1, 10);
-      target[i] = draw.uniform(-1, 1);
-      springs.add(rows[static_cast<std::size_t>(i)], bodies, weight[i] * weight[i]);
-    }
-    springs.factorise();
+    for (double& number : weight) number = draw.uniform(0.1, 10);
+    for (double& number : target) number = draw.uniform(-1, 1);
+    const EqualSprings springs = springs_of(rows, weight);
     const Eigen::MatrixXd matrix = matrix_of(rows, 3);
     const Eigen::VectorXd motion =
         (weight.asDiagonal() * matrix).colPivHouseholderQr().solve(weight.asDiagonal() * target);
@@ -85,15 +90,9 @@ TEST(EqualSprings, ShareTheLoadTheyAreGiven) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Draw draw(seed);
     const std::vector<TestRow> rows = ring(&draw);
-    const std::vector<SolverBody> bodies = bodies_of(3, 2.0);
-    EqualSprings springs;
-    springs.start(bodies.size());
-    std::vector<double> shares;
-    for (const TestRow& row : rows) {
-      springs.add(row, bodies, 1.0);
-      shares.push_back(draw.uniform(-1, 1));
-    }
-    springs.factorise();
+    const EqualSprings springs = springs_of(rows, Eigen::VectorXd::Ones(36));
+    std::vector<double> shares(36);
+    for (double& share : shares) share = draw.uniform(-1, 1);
     const Eigen::MatrixXd push = matrix_of(rows, 3).transpose();
     const Eigen::VectorXd load = push * Eigen::VectorXd::Map(shares.data(), 36);
     ASSERT_TRUE(springs.share(&shares));
@@ -103,8 +102,8 @@ TEST(EqualSprings, ShareTheLoadTheyAreGiven) {
   }
 }
 
-// A beam on three supports, pressed at a: each bears F/3 + F a x/sum of x^2, whatever the beam's mass; and as many more rows, all
-// but parallel to these, change nothing where rounding alone tilts them.
+// A beam on three supports, pressed at a: each bears F/3 + F a x/sum of x^2, both from their middle, whatever
+// the beam's mass. Tilts by rounding alone are none: balanced, too, they would leave the shares as they came.
 TEST(EqualSprings, ABeamOnThreeSupports) {
   constexpr double kForce = 60.0;
   for (const double mass : {1e-3, 1.0, 1e4})
