@@ -83,11 +83,13 @@ double ContactGaps::relax(std::size_t block, double share, const SolverBodies& b
 }
 
 void ContactGaps::append_multipliers(std::vector<double>* to) const {
-  for (const Row& row : rows_) to->push_back(row.multiplier);
+  double* next = append(rows_.size(), to);
+  for (const Row& row : rows_) *next++ = row.multiplier;
 }
 
 void ContactGaps::append_responses(std::vector<double>* to) const {
-  for (const Row& row : rows_) to->push_back(row.response);
+  double* next = append(rows_.size(), to);
+  for (const Row& row : rows_) *next++ = row.response;
 }
 
 const double* ContactGaps::take_multipliers(const double* from) {

@@ -175,13 +175,15 @@ double ContactImpulses::relax(std::size_t block, double share, const SolverBodie
 }
 
 void ContactImpulses::append_multipliers(std::vector<double>* to) const {
-  for (const Row& row : rows_) to->insert(to->end(), row.impulse.begin(), row.impulse.end());
-  for (const Rolling& rolling : rolling_) to->insert(to->end(), rolling.impulse.begin(), rolling.impulse.end());
+  double* next = append(3 * (rows_.size() + rolling_.size()), to);
+  for (const Row& row : rows_) Vector3::Map(next) = row.impulse, next += 3;
+  for (const Rolling& rolling : rolling_) Vector3::Map(next) = rolling.impulse, next += 3;
 }
 
 void ContactImpulses::append_responses(std::vector<double>* to) const {
-  for (const Row& row : rows_) to->insert(to->end(), 3, row.response.trace() / 3.0);
-  for (const Rolling& rolling : rolling_) to->insert(to->end(), 3, rolling.disc.largest);
+  double* next = append(3 * (rows_.size() + rolling_.size()), to);
+  for (const Row& row : rows_) Vector3::Map(next).setConstant(row.response.trace() / 3.0), next += 3;
+  for (const Rolling& rolling : rolling_) Vector3::Map(next).setConstant(rolling.disc.largest), next += 3;
 }
 
 const double* ContactImpulses::take_multipliers(const double* from) {

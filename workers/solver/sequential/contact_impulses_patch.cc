@@ -1,7 +1,9 @@
 // The contacts of one pair of bodies as a whole, within the relaxation of contact_impulses.h.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "plugin_sdk/math/rotation.h"
 #include "workers/solver/sequential/contact_impulses.h"
 
 namespace gravitas {
@@ -45,21 +47,34 @@ bool ContactImpulses::is_flat(const Patch& patch) const {
 }
 
 ContactPatch ContactImpulses::whole_of(const Patch& patch, const SolverBodies& bodies) const {
-  const int width = rows_[patch.first].has_friction ? 3 : 1;
   const auto count = static_cast<int>(patch.end - patch.first);
-  ContactPatch::Response response = ContactPatch::Response::Zero();
-  for (int i = 0; i < count; ++i) {
-    const Row& at = rows_[patch.first + static_cast<std::size_t>(i)];
-    for (int j = 0; j <= i; ++j) {
-      const Row& from = rows_[patch.first + static_cast<std::size_t>(j)];
-      const Matrix3 world =
-          point_response(bodies[at.body1], at.arm1, from.arm1) + point_response(bodies[at.body2], at.arm2, from.arm2);
-      const Matrix3 part = at.frame.transpose() * world * from.frame;
-      response.block(width * i, width * j, width, width) = part.topLeftCorner(width, width);
-      response.block(width * j, width * i, width, width) = part.topLeftCorner(width, width).transpose();
+  const Row* rows = &rows_[patch.first];
+  if (!rows[0].has_friction) {
+    ContactPatch::Response response;
+    for (int i = 0; i < count; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        const Matrix3 world = point_response(bodies[rows[0].body1], rows[i].arm1, rows[j].arm1) +
+                              point_response(bodies[rows[0].body2], rows[i].arm2, rows[j].arm2);
+        response(i, j) = response(j, i) = rows[i].frame.col(0).dot(world * rows[j].frame.col(0));
+      }
     }
+    return ContactPatch::of(response, count);
   }
-  return ContactPatch::of(response, width * count);
+  std::array<ContactPatch::Point, ContactPatch::kPoints> points;
+  Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
+  for (int i = 0; i < count; ++i) {
+    points[static_cast<std::size_t>(i)] = {0.5 * (rows[i].arm1 + rows[i].arm2), rows[i].frame};
+    arm1 += rows[i].arm1 / count, arm2 += rows[i].arm2 / count;
+  }
+  ContactPatch::Square mobility = ContactPatch::Square::Zero();
+  for (const auto& [body, arm] : {std::pair(rows[0].body1, arm1), std::pair(rows[0].body2, arm2)}) {
+    const Matrix3 &turn = bodies[body].inverse_inertia, across = turn * skew(arm);
+    mobility.topLeftCorner<3, 3>() += point_response(bodies[body], arm, arm);
+    mobility.bottomLeftCorner<3, 3>() += across;
+    mobility.topRightCorner<3, 3>() += across.transpose();
+    mobility.bottomRightCorner<3, 3>() += turn;
+  }
+  return ContactPatch::of_points(points, count, mobility);
 }
 
 // All contacts of a patch as sticking and arriving at e s; false, with nothing done, if an impulse
@@ -91,11 +106,20 @@ bool ContactImpulses::relax_whole(const Patch& patch, double share, const Solver
     if (!patch.is_flat || !spread_friction(patch, &impulses)) return false;
     if (!is_in_cones(patch, impulses)) return false;
   }
+  // pushed at once
+  const Row& first = rows_[patch.first];
+  const SolverBody &one = bodies[first.body1], &two = bodies[first.body2];
+  Vector3 force = Vector3::Zero(), moment1 = Vector3::Zero(), moment2 = Vector3::Zero();
   for (std::size_t i = 0; i < count; ++i) {
     Row& row = rows_[patch.first + i];
-    push(row, impulses[i] - row.impulse, bodies, x);
+    const Vector3 world = row.frame * (impulses[i] - row.impulse);
+    force += world, moment1 += row.arm1.cross(world), moment2 += row.arm2.cross(world);
     row.impulse = impulses[i];
   }
+  x[first.body1].linear -= one.inverse_mass * force;
+  x[first.body1].angular -= one.inverse_inertia * moment1;
+  x[first.body2].linear += two.inverse_mass * force;
+  x[first.body2].angular += two.inverse_inertia * moment2;
   *change = std::max(*change, missing.cwiseAbs().maxCoeff());
   return true;
 }

@@ -10,6 +10,12 @@
 
 namespace gravitas {
 
+// Makes room for `count` numbers more; returns the first of them.
+inline double* append(std::size_t count, std::vector<double>* to) {
+  to->resize(to->size() + count);
+  return to->data() + (to->size() - count);
+}
+
 // The rows of a joint, or of the contacts of one pair of bodies.
 class RelaxationBlocks {
  public:

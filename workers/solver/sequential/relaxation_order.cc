@@ -15,9 +15,10 @@ class SweptBlocks final : public SweptState {
   void read(std::vector<double>* state) const override {
     state->clear();
     for (const RelaxationBlocks* part : parts_) part->append_multipliers(state);
+    double* next = append(6 * x_.size(), state);
     for (const Twist& twist : x_) {
-      state->insert(state->end(), twist.linear.begin(), twist.linear.end());
-      state->insert(state->end(), twist.angular.begin(), twist.angular.end());
+      Vector3::Map(next) = twist.linear, Vector3::Map(next + 3) = twist.angular;
+      next += 6;
     }
   }
   void read_responses(std::vector<double>* responses) const override {
