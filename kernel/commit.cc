@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "kernel/environment.h"
-#include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/merged_rows.h"
 
@@ -160,18 +159,6 @@ void Environment::remember_joints() {
   copy_rows(merged_, 1, now, before, back().discrepancy_constraint);
   copy_rows(merged_, 3, data_.discrepancy_impulse, old.discrepancy_impulse, back().discrepancy_impulse);
   copy_rows(merged_, 3, data_.discrepancy_correction, old.discrepancy_correction, back().discrepancy_correction);
-}
-
-double Environment::gap_at(std::size_t contact, const State& state) const {
-  const Vector3 point = vector_at(data_.contact_point.span(), contact);
-  const Vector3 normal = vector_at(data_.contact_normal.span(), contact);
-  const Vector3 half = 0.5 * data_.contact_depth[contact] * normal;
-  const auto carry = [&](const Vector3& from, std::uint32_t body) {
-    return carried(from, pose_of(data_.trial_position, data_.trial_orientation, body),
-                   pose_of(state.position, state.orientation, body));
-  };
-  return normal.dot(carry(point - half, data_.contact_body[2 * contact + 1]) -
-                    carry(point + half, data_.contact_body[2 * contact]));
 }
 
 // Overlap of every contact at S_{n+1}, in the first step at S_0, too, and the pairs that touch.

@@ -1,10 +1,12 @@
 // Bodies that turn far while they touch, for simulators that locate events: such a pair has no time of impact, and what it
 // meets next of each other is found at S* alone, where a rod that topples may lie in or behind the thin plate it stood on. An
-// inner step that makes two bodies overlap by more than half of the thinner one's half thickness, and turns them so far, is
-// halved until it does not.
+// inner step that turns two bodies by more than half of the thinner one's half thickness, and makes them overlap by so much or
+// meet no more where they did (a die that a corner of it struck may be behind the wall), is halved until it does not.
+#include <algorithm>
 #include <limits>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/local_bound.h"
 
 namespace gravitas::kernel {
@@ -38,32 +40,71 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
   const double shortest = kShortestTurn * length_of_step(step_count_ + 1);
   if (!may_turn_far || length <= shortest) return length;
 
-  const auto is_too_deep = [&] {
+  const auto turns_by = [&](std::span<const std::uint32_t> pair, double way, double within) {
+    return (spin(pair[1]) - spin(pair[0])).norm() * longest_arm(model_.bound[pair[0]], model_.bound[pair[1]]) * within >
+           way;
+  };
+  const auto harmless = [&](std::span<const std::uint32_t> pair) {
+    return harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]);
+  };
+  const auto overlaps = [&] {
     if (!*has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(*trial)));
     *has_found_contacts = true;
     for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
-      const std::uint32_t one = data_.contact_body[2 * i], two = data_.contact_body[2 * i + 1];
-      const LocalBound &first = model_.bound[one], &second = model_.bound[two];
-      const double harmless = harmless_depth(first, second);
-      if (!(data_.contact_depth[i] > harmless)) continue;
-      if ((spin(two) - spin(one)).norm() * longest_arm(first, second) * length > harmless) return true;
+      const auto pair = data_.contact_body.span().subspan(2 * i, 2);
+      if (data_.contact_depth[i] > harmless(pair) && turns_by(pair, harmless(pair), length)) return true;
     }
     return false;
   };
-  const auto is_too_deep_at = [&](double end) {
+  // the centre of one comes to the side of the contact's plane that it is pushed to from the other
+  const auto changes_sides = [&](std::size_t i) {
+    const Vector3 normal = vector_at(data_.contact_normal.span(), i), point = vector_at(data_.contact_point.span(), i);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const std::uint32_t body = data_.contact_body[2 * i + side], other = data_.contact_body[2 * i + 1 - side];
+      const Vector3 outward = side == 1 ? normal : Vector3(-normal);
+      const Vector3 before = carried(point, pose_of(data_.trial_position, data_.trial_orientation, other),
+                                     pose_of(front().position, front().orientation, other));
+      if (model_.inverse_mass[body] > 0.0 && outward.dot(vector_at(front().position.span(), body) - before) < 0.0 &&
+          outward.dot(vector_at(data_.trial_position.span(), body) - point) > 0.0)
+        return true;
+    }
+    return false;
+  };
+  const auto may_be_behind = [&] {
+    const double now = data_.time_step[0];
+    std::span<const std::uint32_t> touching = front().touching.span();
+    // those before `next` are met no more
+    const auto has_lost_one = [&](std::span<const std::uint32_t> next) {
+      for (; !touching.empty() && (next.empty() || std::ranges::lexicographical_compare(touching.first(2), next));
+           touching = touching.subspan(2))
+        if (turns_by(touching, harmless(touching), now)) return true;
+      if (!touching.empty() && std::ranges::equal(touching.first(2), next)) touching = touching.subspan(2);
+      return false;
+    };
+    for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+      const auto pair = data_.contact_body.span().subspan(2 * i, 2);
+      if (turns_by(pair, harmless(pair), now) && (gap_at(i, front()) < -harmless(pair) || changes_sides(i)))
+        return true;
+      if (has_lost_one(pair)) return true;
+    }
+    return has_lost_one({});
+  };
+  const auto try_step = [&](double end) {
     begin_inner_step(begin, end);
     *trial = integrate();
     *has_found_contacts = false;
-    return is_too_deep();
+    return end;
   };
-  if (!is_too_deep()) return length;
-  // what overlaps from the beginning has not turned there
-  if (is_too_deep_at(shortest)) {
-    is_too_deep_at(length);
-    return length;
+  double end = length;
+  while (end > shortest && (overlaps() || may_be_behind())) {
+    if (end == length) {
+      // what overlaps from the beginning has not turned there
+      try_step(shortest);
+      if (overlaps()) return try_step(length);
+      if (may_be_behind()) return shortest;
+    }
+    end = try_step(std::max(shortest, 0.5 * end));
   }
-  double end = 0.5 * length;
-  while (is_too_deep_at(end) && end > shortest) end *= 0.5;
   return end;
 }
 
