@@ -78,6 +78,18 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
   build_steps(properties, context);
 }
 
+// As written; where it is not, what the simulator needs for what it promises.
+v1::Component integrator_of(const v1::Environment& environment, kernel::Simulator simulator) {
+  v1::Component integrator = environment.kinetic_integrator();
+  if (is_written(environment, v1::Environment::kKineticIntegratorFieldNumber) ||
+      is_written(integrator, v1::Component::kTypeFieldNumber))
+    return integrator;
+  if (simulator == kernel::Simulator::kContinuous || simulator == kernel::Simulator::kBisection)
+    integrator.set_type("Verlet");
+  if (simulator == kernel::Simulator::kSmooth) integrator.set_type("DormandPrince54");
+  return integrator;
+}
+
 // The Accuracy of Smooth is the integrator's.
 void hand_on_accuracy(BuildContext* context) {
   const SimulatorProperties& properties = context->scene.simulator().custom_properties();
@@ -200,7 +212,7 @@ void build_world(BuildContext* context) {
   if (!diagnostics->full()) build_constraints(bodies, &plugins, context);
   if (!diagnostics->full()) build_filter(bodies, context);
   plugins.choose(Slot::kSolver, environment.constraint_solver(), has_shapes || has_joints);
-  plugins.choose(Slot::kIntegrator, environment.kinetic_integrator(), has_bodies);
+  plugins.choose(Slot::kIntegrator, integrator_of(environment, context->description.simulator), has_bodies);
   if (diagnostics->ok()) hand_on_accuracy(context);
   plugins.report_unused();
   if (diagnostics->ok()) build_materials(context);

@@ -25,7 +25,9 @@ class Vortex final : public OwnStateForce {
         .meaning = "Columnar vortex around an axis.",
         .capabilities = {"jacobians"},
         .types = {{"Vortex",
-                   "Drives bodies around an axis, towards it and along it.",
+                   "Drives bodies around an axis, towards it and along it: at rho Radius from the axis with 2 rho/(1 + "
+                   "rho^2) of Strength "
+                   "and Inflow, and 1/(1 + rho^2) of Lift.",
                    {Property::vector("Centre", "m", "world").required().means("A point of the axis."),
                     Property::vector("Axis", "1", "world").required().means("Direction of the axis, of any length."),
                     Property::number("Strength", "N")

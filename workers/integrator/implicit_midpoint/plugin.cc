@@ -7,7 +7,9 @@
 //
 // A free rotor keeps its angular momentum (the last line) and its energy (W.(Pi' - Pi) = 0, since the Cayley map makes
 // Pi' - Pi = h Pi_bar x W) to rounding at any step. With forces: energy is kept exactly where the potential is quadratic
-// in x, to O(h^2) without drift elsewhere; momentum always. With damping c, a = f/m, and D = (1 - e^(-c h))/c for h,
+// in x and does not turn bodies, to O(h^2) elsewhere, and there it wanders: a body that tumbles on a spring off its centre
+// is 1, 2.6 and 3.6 % off after 1000, 4000 and 16,000 s at 1/60 s (Verlet 0.6 % at any time); momentum always.
+// With damping c, a = f/m, and D = (1 - e^(-c h))/c for h,
 //
 //   x' = x + h v_bar          h v_bar = D v + (h - D)/c a          v' = e^(-c h) v + D a
 //
@@ -61,7 +63,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return {.name = "ImplicitMidpoint",
             .version = "1.0",
             .slot = Slot::kIntegrator,
-            .meaning = "Implicit midpoint rule on the rotation group, order 2, keeps energy and momentum.",
+            .meaning =
+                "Implicit midpoint rule on the rotation group, order 2, keeps momentum, and the energy of what no "
+                "force turns.",
             .capabilities = {"order=2"},
             .theta = 0.5};
   }
