@@ -134,10 +134,12 @@ class EmbeddedPair : public IntegratorPlugin {
     return std::ranges::none_of(request.state_changed(), [](std::uint32_t changed) { return changed != 0; });
   }
 
-  // Within what damping lets a dense step be long (dense_step.h).
+  // Half of what the error at its end allows, since states within it are worse; within what damping lets a dense step be long
+  // (dense_step.h).
   static double passing_inner_step(const stage::IntegratorIntegrateRequest& request, double inner, double left) {
-    const double most = std::ranges::max(request.damping());
-    return most * inner <= 1.0 ? inner : std::min(inner, std::max(next_inner_step(inner, left), 1.0 / most));
+    if (inner < 2.0 * left) return next_inner_step(inner, left);
+    const double most = std::ranges::max(request.damping()), half = 0.5 * inner;
+    return most * half <= 1.0 ? half : std::min(half, std::max(left, 1.0 / most));
   }
 
   void make_dense(const stage::IntegratorIntegrateRequest& request, double h) {
