@@ -81,7 +81,8 @@ void StageSlot::drain() {
 
 std::vector<std::string> StageSlot::take_complaints() {
   std::vector<std::string> all = std::exchange(complaints_, {});
-  if (std::string slow = slow_calls_.take_complaint(); !slow.empty()) all.push_back(std::move(slow));
+  std::string slow = slow_calls_.take_complaint();
+  if (!slow.empty() && description().hosting != Hosting::kDirect) all.push_back(std::move(slow));
   for (const std::shared_ptr<SlotHost>& host : hosts_)
     for (std::string& one : host->take_complaints()) all.push_back(std::move(one));
   return all;

@@ -66,7 +66,11 @@ void SlotHost::retire(std::shared_ptr<Carrier> carrier) {
   if (!carrier) return;
   carrier->drain();
   for (std::string& one : carrier->take_complaints()) complaints_.push_back(std::move(one));
-  retired_.push_back(std::async(std::launch::async, [carrier = std::move(carrier)]() mutable { carrier.reset(); }));
+  try {
+    retired_.push_back(std::async(std::launch::async, [carrier = std::move(carrier)]() mutable { carrier.reset(); }));
+  } catch (const std::system_error&) {
+    // no thread to wait for its end in: that was waited for here
+  }
 }
 
 void SlotHost::retire(std::unique_ptr<Spare> spare) {

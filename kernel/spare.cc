@@ -1,28 +1,36 @@
 #include "kernel/spare.h"
 
+#include <system_error>
+
 namespace gravitas::kernel {
 
-Spare::Spare(SlotDescription host, std::uint32_t threads, const HostStarter& start)
-    : thread_([this, host = std::move(host), threads, start](const std::stop_token& stop) {
-        std::unique_ptr<Carrier> carrier;
-        std::optional<StageFault> fault;
-        try {
-          carrier = start(host, threads, stop);
-        } catch (const StageFault& failed) {
-          fault = failed;
-        } catch (const std::exception& failed) {
-          fault.emplace(FaultKind::kHandshake, "start", failed.what());
-        }
-        const std::lock_guard lock(mutex_);
-        carrier_ = std::move(carrier);
-        fault_ = std::move(fault);
-        done_ = true;
-        changed_.notify_all();
-      }) {}
+Spare::Spare(SlotDescription host, std::uint32_t threads, const HostStarter& start) {
+  try {
+    thread_ = std::jthread([this, host = std::move(host), threads, start](const std::stop_token& stop) {
+      std::unique_ptr<Carrier> carrier;
+      std::optional<StageFault> fault;
+      try {
+        carrier = start(host, threads, stop);
+      } catch (const StageFault& failed) {
+        fault = failed;
+      } catch (const std::exception& failed) {
+        fault.emplace(FaultKind::kHandshake, "start", failed.what());
+      }
+      const std::lock_guard lock(mutex_);
+      carrier_ = std::move(carrier);
+      fault_ = std::move(fault);
+      done_ = true;
+      changed_.notify_all();
+    });
+  } catch (const std::system_error& lacking) {
+    fault_.emplace(FaultKind::kHandshake, "start", std::string("no thread for it: ") + lacking.what());
+    done_ = true;
+  }
+}
 
 Spare::~Spare() {
   give_up();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
   if (carrier_) carrier_->kill();
 }
 

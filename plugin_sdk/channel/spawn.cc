@@ -67,9 +67,9 @@ bool make_output_pipe(int* ours, int* theirs) {
 
 std::string take_ending(int pidfd) {
   siginfo_t info{};
-  if (waitid(static_cast<idtype_t>(P_PIDFD), static_cast<id_t>(pidfd), &info, WEXITED | WNOHANG) != 0 ||
-      info.si_pid == 0)
-    return {};
+  if (waitid(static_cast<idtype_t>(P_PIDFD), static_cast<id_t>(pidfd), &info, WEXITED | WNOHANG) != 0)
+    return errno == ECHILD ? "ended" : "";  // where SIGCHLD is ignored nobody is told how
+  if (info.si_pid == 0) return {};
   if (info.si_code == CLD_EXITED) return "ended by itself with exit code " + std::to_string(info.si_status);
   return "killed by signal " + std::to_string(info.si_status) + " (" + strsignal(info.si_status) + ")";
 }

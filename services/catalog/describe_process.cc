@@ -118,7 +118,8 @@ std::string last_line(const std::string& messages) {
   return ": " + messages.substr(begin, std::min(end + 1 - begin, kShownCharacters));
 }
 
-// `what` stands for the program in messages. `was_killed`: from outside, which says nothing about the plugins.
+// `what` stands for the program in messages. `was_killed`: by a signal. Libraries are each looked at in a process of their own,
+// so that it came from outside, which says nothing about them.
 bool describe_once(const std::string& what, const std::vector<std::string>& words, int entries,
                    std::chrono::milliseconds timeout, plugin::v1::Catalog* answer, std::string* problem,
                    bool* was_killed) {
@@ -140,7 +141,7 @@ bool describe_once(const std::string& what, const std::vector<std::string>& word
   const DescribeClock::time_point until = DescribeClock::now() + timeout;
   bool is_complete = read_all(&out, &err, until, &bytes, &messages);
   const int status = wait_for(pid, until, &is_complete);
-  *was_killed = is_complete && WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;
+  *was_killed = is_complete && WIFSIGNALED(status);
   if (!is_complete) {
     *problem = what + " --describe did not end within " + std::to_string(timeout.count()) + " ms" + last_line(messages);
   } else if (WIFSIGNALED(status)) {

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -75,6 +76,8 @@ int main(int argc, char** argv) {
     return cli::kOurFault;
   }
 
+  // a parent that ignores it would make Linux forget how workers ended
+  std::signal(SIGCHLD, SIG_DFL);
   CLI::App app{"Gravitas: a rigid-body physics engine whose parts are plugins in worker processes."};
   app.require_subcommand(1);
   app.set_version_flag("--version", GRAVITAS_BUILD_ID);

@@ -1,6 +1,7 @@
 // `gravitas run` and `gravitas plan`.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -56,7 +57,8 @@ std::string resume_command(const RunLine& line, const std::string& checkpoint) {
 }
 
 void print_checkpoint(const RunLine& line, const RunResult& result) {
-  if (result.checkpoint.empty()) return;
+  // it may have gone with its folder, whatever was put into it
+  if (std::error_code none; !std::filesystem::is_regular_file(result.checkpoint, none)) return;
   std::cerr << fmt::format("gravitas: checkpoint '{}' holds step {}; to go on: {}\n", result.checkpoint,
                            result.checkpoint_step, resume_command(line, result.checkpoint));
 }
@@ -145,13 +147,16 @@ void add_run(CLI::App* app, Action* action) {
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
   command
       ->add_option("--sample-every", options.sample_every,
-                   "Interval of the samples of trajectory, instrumentation and reactions, s; every step if absent")
+                   "Interval of the samples of trajectory, instrumentation and reactions, s: of each multiple the "
+                   "first end of a step "
+                   "at or after it, and the last; every step if absent")
       ->check(any_number("a finite number of seconds > 0"));
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
-  command->add_option("--reactions", options.reactions,
-                      "Write the force of each joint and contact that is awake, and joints' torque, to this file (JSON "
-                      "lines, the mean over "
-                      "the step that ends with the sample); the report then has those of the last step");
+  command->add_option(
+      "--reactions", options.reactions,
+      "Write the force of each joint and contact that is awake, and joints' torque, to this file (JSON "
+      "lines, the mean over "
+      "the step that ends with the sample, with Smooth at its end); the report then has those of the last step");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
   add_event_options(command, "--event-kinds", &options.event_kinds, &options.ongoing_rate);
   CLI::Option* instrumentation = command->add_option(

@@ -121,6 +121,7 @@ void ServedRun::begin_environment() {
   checkpoint_.clear();
   next_collection_ = {};
   stand(environment_->total_steps() == 0 ? State::kFinished : State::kPaused);
+  status_now();
 }
 
 // ---- the steps
@@ -166,13 +167,25 @@ void ServedRun::on_turn() {
   const bool is_paced = speed_ > 0.0 && !steps_left_;
   const Clock::time_point now = Clock::now();
   // a timer that was cancelled comes early
-  if (!is_paced || now >= due()) make_step();
+  if (!is_paced || now >= due()) {
+    note_step(now);
+    make_step();
+    note_step({});
+  }
   if (state_ != State::kRunning) return;
   if (is_paced && now > due() + kLatest) {
     anchor_ = now;
     anchor_step_ = environment_->step_count();
   }
   schedule();
+}
+
+void ServedRun::note_step(std::optional<Clock::time_point> begin) {
+  const std::lock_guard lock(known_mutex_);
+  step_begin_ = begin;
+  known_.set_step(environment_->step_count());
+  known_.set_time(environment_->time());
+  known_.set_state(state_name());
 }
 
 void ServedRun::make_step() {

@@ -15,6 +15,7 @@
 #include <chrono>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -127,6 +128,8 @@ class ServedRun final : private kernel::CommitListener {
   void stand(State state);
   void schedule();
   void on_turn();
+  // It begins, or has ended.
+  void note_step(std::optional<Clock::time_point> begin);
   void make_step();
   void keep_faulted_state();
   void close_capture();
@@ -148,6 +151,7 @@ class ServedRun final : private kernel::CommitListener {
     for (const auto& one : subscriptions_)
       if (const std::shared_ptr<Subscription> held = one.lock()) action(held.get());
   }
+  api::Status status_now();
   void write_plan(api::Plan* plan) const;
   std::vector<api::ServedSwap> swap_messages() const;
   void require_settled_swaps() const;
@@ -204,6 +208,11 @@ class ServedRun final : private kernel::CommitListener {
   Clock::time_point anchor_, rate_begin_;  // where pacing began, where counting did
   std::uint32_t anchor_step_ = 0, rate_step_ = 0;
   double rate_ = 0.0;  // 1/s
+
+  // What is known of a run whose step does not end.
+  std::mutex known_mutex_;
+  api::Status known_;
+  std::optional<Clock::time_point> step_begin_;
 
   std::atomic<bool> is_ending_ = false;
   boost::asio::io_context loop_;

@@ -69,46 +69,62 @@ std::string ServedRun::state_name() const {
   return "faulted";
 }
 
+// A step may wait for a worker that hangs; what hangs is what one asks for then.
 api::Status ServedRun::status() {
-  return between_steps([this] {
-    api::Status status;
-    status.set_scene(scene_name_);
-    std::set<std::string> files;
-    for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
-      for (const NamedFile& file : files_of(*scene))
-        if (std::error_code none; std::filesystem::exists(file.path, none))
-          files.insert(std::filesystem::absolute(file.path).string());
-    status.mutable_files()->Assign(files.begin(), files.end());
-    status.set_state(state_name());
-    status.set_fault(fault_);
-    status.set_checkpoint(checkpoint_);
-    status.set_time(environment_->time());
-    status.set_time_step(environment_->time_step());
-    status.set_step(environment_->step_count());
-    status.set_total_steps(environment_->total_steps());
-    const double counted = std::chrono::duration<double>(Clock::now() - rate_begin_).count();
-    const double rate = rate_ > 0.0 ? rate_ : (environment_->step_count() - rate_step_) / std::max(counted, 1e-6);
-    status.set_steps_per_second(state_ == State::kRunning ? rate : 0.0);
-    status.set_speed(speed_);
-    status.set_state_hash(environment_->state_hash().text());
-    status.set_chain_hash(environment_->chain_hash().text());
-    write_plan(status.mutable_plan());
-    for (api::ServedSwap& swap : swap_messages()) *status.add_swaps() = std::move(swap);
-    status.set_swap_count(static_cast<std::uint32_t>(status.swaps_size()));
-    keep_last(status.mutable_swaps());
-    report::v1::Report report = past_;
-    write_faults(*environment_, &report);
-    status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
-    status.mutable_faults()->Swap(report.mutable_faults());
-    keep_last(status.mutable_faults());
-    status.set_edit_count(static_cast<std::uint32_t>(report.edits_size()));
-    status.mutable_edits()->Swap(report.mutable_edits());
-    keep_last(status.mutable_edits());
-    collect_warnings();
-    status.set_warning_count(static_cast<std::uint32_t>(warnings_.size()));
-    if (!warnings_.empty()) status.set_last_warning(warnings_.back());
+  constexpr std::chrono::milliseconds kPatience{250};
+  auto task = std::make_shared<std::packaged_task<api::Status()>>([this] { return status_now(); });
+  auto done = task->get_future();
+  boost::asio::post(loop_, [task] { (*task)(); });
+  while (done.wait_for(kPatience) != std::future_status::ready) {
+    const std::lock_guard lock(known_mutex_);
+    if (!step_begin_ || Clock::now() - *step_begin_ < kPatience) continue;
+    api::Status status = known_;
+    status.set_waited(std::chrono::duration<double>(Clock::now() - *step_begin_).count());
     return status;
-  });
+  }
+  return done.get();
+}
+
+api::Status ServedRun::status_now() {
+  api::Status status;
+  status.set_scene(scene_name_);
+  std::set<std::string> files;
+  for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
+    for (const NamedFile& file : files_of(*scene))
+      if (std::error_code none; std::filesystem::exists(file.path, none))
+        files.insert(std::filesystem::absolute(file.path).string());
+  status.mutable_files()->Assign(files.begin(), files.end());
+  status.set_state(state_name());
+  status.set_fault(fault_);
+  status.set_checkpoint(checkpoint_);
+  status.set_time(environment_->time());
+  status.set_time_step(environment_->time_step());
+  status.set_step(environment_->step_count());
+  status.set_total_steps(environment_->total_steps());
+  const double counted = std::chrono::duration<double>(Clock::now() - rate_begin_).count();
+  const double rate = rate_ > 0.0 ? rate_ : (environment_->step_count() - rate_step_) / std::max(counted, 1e-6);
+  status.set_steps_per_second(state_ == State::kRunning ? rate : 0.0);
+  status.set_speed(speed_);
+  status.set_state_hash(environment_->state_hash().text());
+  status.set_chain_hash(environment_->chain_hash().text());
+  write_plan(status.mutable_plan());
+  for (api::ServedSwap& swap : swap_messages()) *status.add_swaps() = std::move(swap);
+  status.set_swap_count(static_cast<std::uint32_t>(status.swaps_size()));
+  keep_last(status.mutable_swaps());
+  report::v1::Report report = past_;
+  write_faults(*environment_, &report);
+  status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
+  status.mutable_faults()->Swap(report.mutable_faults());
+  keep_last(status.mutable_faults());
+  status.set_edit_count(static_cast<std::uint32_t>(report.edits_size()));
+  status.mutable_edits()->Swap(report.mutable_edits());
+  keep_last(status.mutable_edits());
+  collect_warnings();
+  status.set_warning_count(static_cast<std::uint32_t>(warnings_.size()));
+  if (!warnings_.empty()) status.set_last_warning(warnings_.back());
+  const std::lock_guard lock(known_mutex_);
+  known_ = status;
+  return status;
 }
 
 void ServedRun::write_plan(api::Plan* plan) const {

@@ -28,6 +28,8 @@ class EventLog final : public EventListener {
 
   // Empties the file, which writing does, too. Throws std::system_error.
   void begin() { file_.begin(); }
+  // Writes out what was told so far; throws as close().
+  void flush() { file_.flush(); }
 
   // A file that cannot be written is said by close(): events come in the middle of a commit.
   void on_event(const Event& event) override;

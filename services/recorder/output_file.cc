@@ -38,6 +38,10 @@ void OutputFile::write(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
 }
 
+void OutputFile::flush() {
+  if (file_ && std::fflush(file_.get()) != 0) fail();
+}
+
 void OutputFile::close() {
   begin();
   if (file_ && std::fclose(file_.release()) != 0) fail();

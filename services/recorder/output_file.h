@@ -25,6 +25,8 @@ class OutputFile {
   void begin();
   // Needs an open file. Throws std::system_error (a full disk).
   void write(std::string_view text);
+  // What was written is the file's, whatever becomes of this process. Throws std::system_error.
+  void flush();
   // Writes out everything; throws std::system_error if that fails. Does nothing the second time.
   void close();
 

@@ -27,6 +27,8 @@ class ReactionLog {
 
   // Empties the file, which writing does, too. Throws std::system_error.
   void begin() { file_.begin(); }
+  // Writes out what was told so far; throws as close().
+  void flush() { file_.flush(); }
 
   // What kernel::CommitListener hears of an inner step.
   void add(const kernel::Environment& environment, const kernel::InnerStep& inner);

@@ -47,7 +47,6 @@ void Recorder::on_commit(const kernel::Environment& environment) {
   check(commit);
   if (!journal_) return;
   journal_->append(commit);
-  if (every_ != 0 && commit.step % every_ == 0) save(environment);
 }
 
 void Recorder::on_decision(const kernel::Environment&, const kernel::Decision& decision) {

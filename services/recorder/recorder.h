@@ -49,8 +49,8 @@ class Recorder final : public kernel::CommitListener {
   // The next steps must have the chain hashes of this journal.
   void expect(const std::string& journal, std::vector<JournalEntry> commits);
 
-  // Keeps a checkpoint in the file, now, after every `every` steps counted from t = 0 (never if 0), and at save(); and
-  // the journal beside it, which goes on behind `known`. Throws as JournalWriter and replace_file() do.
+  // Keeps a checkpoint in the file, now and at save(), which is due after every `every` steps counted from t = 0 (never if 0);
+  // and the journal beside it, which goes on behind `known`. Throws as JournalWriter and replace_file() do.
   void keep(const std::string& path, std::uint32_t every, const JournalReading& known,
             const kernel::Environment& environment);
 
@@ -58,6 +58,9 @@ class Recorder final : public kernel::CommitListener {
   void on_commit(const kernel::Environment& environment) override;
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
 
+  bool is_due(const kernel::Environment& environment) const {
+    return keeps() && every_ != 0 && environment.step_count() % every_ == 0 && saved_step_ != environment.step_count();
+  }
   // Brings file and journal to the committed state. Throws std::system_error.
   void save(const kernel::Environment& environment);
 

@@ -33,6 +33,7 @@ class TrajectoryWriter {
 
   // Writes out everything; throws std::system_error if that fails (a full disk).
   void close() { file_.close(); }
+  void flush() { file_.flush(); }
 
  private:
   void write_sample(const kernel::Environment& environment);

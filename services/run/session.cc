@@ -118,10 +118,7 @@ class Run final : private kernel::CommitListener {
       event_source_.emplace(events_.get(), event_kinds_, options_.ongoing_rate.value_or(kOngoingRate));
     if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
     guard([&] {
-      events_->begin();
-      if (trajectory_) trajectory_->begin();
-      if (frames_) frames_->begin();
-      if (reactions_) reactions_->begin();
+      for_outputs([](auto& output) { output.begin(); });
       if (report_) report_->begin();
     });
   }
@@ -138,6 +135,7 @@ class Run final : private kernel::CommitListener {
         } else if (make_step()) {
           figures_->follow(environment_.get());
           offer_sample(is_done());
+          if (recorder_ && recorder_->is_due(*environment_)) save();
           progress({environment_->time(), environment_->time_step() * description_.steps, environment_->step_count(),
                     environment_->total_steps()});
         }
@@ -169,7 +167,7 @@ class Run final : private kernel::CommitListener {
     guard([&] {
       if (is_unrepeatable_) return;
       if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
-      if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
+      if (keeps && recorder_->saved_step() != environment_->step_count()) save();
     });
     // after a failure the one before
     if (!keeps || !recorder_->saved_step()) return;
@@ -181,15 +179,12 @@ class Run final : private kernel::CommitListener {
     guard([&] {
       if (result_.outcome != RunOutcome::kFailed) offer_sample(true);
     });
-    guard([&] {
-      if (trajectory_) trajectory_->close();
-    });
-    guard([&] { close_frames(); });
-    guard([&] {
-      if (reactions_) reactions_->close();
-    });
     if (event_source_) event_source_->tell_incidents(*environment_);
-    guard([&] { events_->close(); });
+    for_outputs([&](auto& output) { guard([&] { output.close(); }); });
+    if (frames_) {
+      for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
+      note_survey();
+    }
     write_report();
     guard([&] {
       if (!report_) return;
@@ -231,11 +226,17 @@ class Run final : private kernel::CommitListener {
             failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
   }
 
-  void close_frames() {
-    if (!frames_) return;
-    for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
-    note_survey();
-    frames_->close();
+  void for_outputs(auto use) {
+    if (trajectory_) use(*trajectory_);
+    if (frames_) use(*frames_);
+    if (reactions_) use(*reactions_);
+    use(*events_);
+  }
+
+  // Outputs first: who goes on from the checkpoint has what came before it.
+  void save() {
+    for_outputs([](auto& output) { output.flush(); });
+    recorder_->save(*environment_);
   }
 
   void begin_listening() {
@@ -518,7 +519,7 @@ class Run final : private kernel::CommitListener {
 
   const RunOptions& options_;
   const std::function<bool()>& interrupted_;
-  bool is_stepping_ = false;
+  bool is_stepping_ = false, is_unrepeatable_ = false;
   std::vector<std::string> warnings_;
   Catalog catalog_;
   scene::v1::Scene scene_;
@@ -547,7 +548,6 @@ class Run final : private kernel::CommitListener {
   std::optional<survey::Surveyor> surveyor_;
   std::unique_ptr<survey::FrameFile> frames_;
   std::optional<Recorder> recorder_;
-  bool is_unrepeatable_ = false;
   double wall_seconds_ = 0.0;
 };
 

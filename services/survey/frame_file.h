@@ -19,6 +19,8 @@ class FrameFile {
 
   // Empties the file, which writing does, too. Throws std::system_error.
   void begin() { file_.begin(); }
+  // Writes out what was told so far; throws as close().
+  void flush() { file_.flush(); }
 
   // The scene was edited, and who answers knows it.
   void begin_again(Surveyor* surveyor) { instrumentation_.emplace(surveyor); }

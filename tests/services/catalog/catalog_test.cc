@@ -201,6 +201,23 @@ TEST_F(CatalogTest, SaysWhenNobodyCanBeAsked) {
   EXPECT_THAT(nowhere.broken().at(0).problem, HasSubstr("the folder cannot be read"));
 }
 
+// A signal that its program was sent says nothing about libraries, of which each is looked at in a process of its own.
+TEST_F(CatalogTest, AsksAgainWhereASignalEndedTheProgram) {
+  for (const std::string signal : {"KILL", "TERM", "SEGV"}) {
+    answering(answer_of({declare(Slot::kForce, "One", {"Push"})}));
+    std::ifstream whole(folder_ / "worker");
+    std::string lines((std::istreambuf_iterator<char>(whole)), {});
+    const std::string first = (folder_ / ("first" + signal)).string();
+    const std::string worker =
+        program("[ -e " + first + " ] || { touch " + first + "; kill -" + signal + " $$; }\n" + lines);
+    library("of_" + signal + ".so");
+    const Catalog catalog = Catalog::installed(worker, plugins());
+    EXPECT_THAT(catalog.broken(), IsEmpty()) << signal;
+    EXPECT_NE(catalog.find("One"), nullptr) << signal;
+    std::filesystem::remove(folder_ / "plugins" / ("of_" + signal + ".so"));
+  }
+}
+
 TEST_F(CatalogTest, AnEmptyFolderIsAnEmptyCatalogue) {
   const Catalog catalog = Catalog::installed("/nowhere", plugins());
   EXPECT_THAT(catalog.plugins(), IsEmpty());

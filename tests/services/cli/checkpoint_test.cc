@@ -150,6 +150,36 @@ TEST(Checkpoints, APipeThatIsReadNoMoreStopsTheRunAtACommitThatGoesOn) {
   EXPECT_EQ(read_report(read_file(folder.path("report.json"))).outcome(), "failed");
 }
 
+// A kill loses what the program had not written yet; but nothing of the time before the checkpoint, which the run that goes on
+// from it does not write again. Before, all of a few samples was lost.
+TEST(Checkpoints, WhatCameBeforeThemIsInTheFilesWhenTheProgramIsKilled) {
+  const ScratchFolder folder;
+  const std::string kept = folder.path("kept"), motion = folder.path("motion.csv"),
+                    reactions = folder.path("reactions");
+  const pid_t process = harness::start_program(
+      {"run", kSample, "--hosting", "direct", "--steps", "10000000", "--dt", "0.01", "--quiet", "--checkpoint", kept,
+       "--checkpoint-every", "50", "--sample-every", "0.5", "--trajectory", motion, "--reactions", reactions},
+      folder);
+  std::string before = read_file(kept);
+  for (int seen = 0; seen < 5;) {
+    std::string now = read_file(kept);
+    if (now != before) before = std::move(now), ++seen;
+    ASSERT_EQ(kill(process, 0), 0);
+  }
+  kill(process, SIGKILL);
+  EXPECT_EQ(harness::finish_program(process, folder).exit_code, 137);
+  // the refusal tells which step the checkpoint holds
+  const std::string refusal =
+      run_program({"run", kSample, "--dt", "0.01", "--steps", "1", "--resume", kept}, folder).err;
+  const std::string words = "after step ";
+  ASSERT_THAT(refusal, HasSubstr(words));
+  const double time = 0.01 * std::stoi(refusal.substr(refusal.find(words) + words.size()));
+  for (double sample = 0.5; sample < time + 1e-9; sample += 0.5) {
+    EXPECT_THAT(read_file(motion), HasSubstr(fmt::format("\n{},", sample)));
+    EXPECT_THAT(read_file(reactions), HasSubstr(fmt::format("\"time\":{},", sample)));
+  }
+}
+
 // Kills the program at moments left to chance, again and again, and resumes from what is there: every file can be read,
 // and every run ends with the same chain. GRAVITAS_KILLS sets how many kills each variant gets.
 struct Variant {

@@ -335,5 +335,18 @@ TEST(Run, WarnsOfOrdersBeyondItsEnd) {
   EXPECT_THAT(read_file(folder.path("report.json")), HasSubstr(edit));
 }
 
+// A parent that ignores SIGCHLD passes that on, and Linux then forgets how children ended: what became of a worker was not
+// told, and waiting for each took seconds.
+TEST(Run, KnowsHowWorkersEndedUnderAParentThatIgnoresThem) {
+  const ScratchFolder folder;
+  const auto before = signal(SIGCHLD, SIG_IGN);
+  const pid_t process =
+      harness::start_program({"run", kSample, "--steps", "20", "--fault", "solver:kill@step=5", "--json"}, folder);
+  signal(SIGCHLD, before);
+  const ProgramResult result = harness::finish_program(process, folder);
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, HasSubstr("was killed by signal 9 (Killed)"));
+}
+
 }  // namespace
 }  // namespace gravitas
