@@ -78,16 +78,26 @@ void build_simulator(const Simulator& simulator, BuildContext* context) {
   build_steps(properties, context);
 }
 
-// As written; where it is not, what the simulator needs for what it promises.
+bool names(const v1::Environment& environment, int field, const v1::Component& component) {
+  return is_written(environment, field) || is_written(component, v1::Component::kTypeFieldNumber);
+}
+
+// As written; where they are not, what the simulator needs for what it promises.
 v1::Component integrator_of(const v1::Environment& environment, kernel::Simulator simulator) {
   v1::Component integrator = environment.kinetic_integrator();
-  if (is_written(environment, v1::Environment::kKineticIntegratorFieldNumber) ||
-      is_written(integrator, v1::Component::kTypeFieldNumber))
-    return integrator;
+  if (names(environment, v1::Environment::kKineticIntegratorFieldNumber, integrator)) return integrator;
   if (simulator == kernel::Simulator::kContinuous || simulator == kernel::Simulator::kBisection)
     integrator.set_type("Verlet");
   if (simulator == kernel::Simulator::kSmooth) integrator.set_type("DormandPrince54");
   return integrator;
+}
+
+v1::Component solver_of(const v1::Environment& environment, kernel::Simulator simulator) {
+  v1::Component solver = environment.constraint_solver();
+  if (simulator == kernel::Simulator::kSmooth &&
+      !names(environment, v1::Environment::kConstraintSolverFieldNumber, solver))
+    solver.set_type("Direct");
+  return solver;
 }
 
 // The Accuracy of Smooth is the integrator's.
@@ -211,8 +221,9 @@ void build_world(BuildContext* context) {
   // rows of bodies are complete unless there were too many errors to go on
   if (!diagnostics->full()) build_constraints(bodies, &plugins, context);
   if (!diagnostics->full()) build_filter(bodies, context);
-  plugins.choose(Slot::kSolver, environment.constraint_solver(), has_shapes || has_joints);
-  plugins.choose(Slot::kIntegrator, integrator_of(environment, context->description.simulator), has_bodies);
+  const kernel::Simulator simulator = context->description.simulator;
+  plugins.choose(Slot::kSolver, solver_of(environment, simulator), has_shapes || has_joints);
+  plugins.choose(Slot::kIntegrator, integrator_of(environment, simulator), has_bodies);
   if (diagnostics->ok()) hand_on_accuracy(context);
   plugins.report_unused();
   if (diagnostics->ok()) build_materials(context);

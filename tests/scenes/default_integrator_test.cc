@@ -1,4 +1,4 @@
-// The integrator of a scene that names none is what its simulator needs.
+// The integrator and solver of a scene that names none are what its simulator needs.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -41,7 +41,7 @@ TEST(DefaultIntegrator, IsNotTakenForOneThatIsNamed) {
     EXPECT_LT(run.energy(), 9.0) << word;
   }
   std::string named = kBall;
-  named.insert(named.rfind("} } }") + 6, "KineticIntegrator = \"SemiImplicitEuler\" ");
+  named.insert(named.rfind("} } }") + 4, "KineticIntegrator = \"SemiImplicitEuler\" ");
   SceneRun run(named, {"Simulator=Continuous"});
   run.to_end();
   EXPECT_LT(run.energy(), 9.0);
