@@ -43,6 +43,12 @@
 // and what they press does not bounce. What they had moved their bodies by before stays in delta, so that an arm comes to rest
 // at the wall and not a step before it. Drives that contradict joints or each other are reported as contradictions.
 //
+// Places from which no motion leads (links in a row that just reach their end), with reactions in S* already: rows are
+// dependent there, so that velocities are allowed which go nowhere, and would gather what forces give them from step to step.
+// Where steps of the pose change shrink slowly, as towards such places, and it takes a body back by a tenth of its way,
+// v* loses its share along delta, up to 2 delta/h; drives without bound stall. Elsewhere delta is of the size of the method's
+// error. Of the steps that of the smallest error counts; nearer than rounding lets them they lead away again.
+//
 // Laws: joint_laws.h, contact_law.h; solution of the rows: cone_problem.h. Energy. Restitution with friction in coupled
 // impacts can create energy (Kane's paradox): where an island gains, e s of the contacts that arrive and do positive work
 // is lowered, or where none does all of them, to the largest share with which it does not (contact_law.h).

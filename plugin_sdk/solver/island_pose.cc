@@ -32,6 +32,7 @@ void IslandSolver::find_pose() {
   ShrinkingSteps steps;
   AndersonAcceleration acceleration;
   double last_change = 0.0;
+  NearestPose nearest;
   for (bool is_last = false; !is_last;) {
     settings_.may_rest = may_rest();
     stiffen();
@@ -59,11 +60,44 @@ void IslandSolver::find_pose() {
     // the steps know how directions turn, but not inertia: bodies with a small moment end slowly, or run away
     shrinks_slowly_ = shrinks_slowly_ || (steps.count() > kStepsAlone && change > kSlow * last_change);
     last_change = change;
-    move_to_end(shrinks_slowly_ && !is_last ? accelerated(displacement_, next, &acceleration) : std::move(next));
+    // reactions leave so little to close that only where rows become dependent steps shrink slowly
+    move_to_end(shrinks_slowly_ && !is_last && !has_reactions() ? accelerated(displacement_, next, &acceleration)
+                                                                : std::move(next));
     keep_corrections();
-    if (!is_last && may_chord) is_last = follow_chords(change);
+    const bool goes_on = !has_reactions() || steps.count() < kStepsAlone || keep_nearest(&nearest);
+    if (shrinks_slowly_ && has_reactions())
+      is_last = is_last || !goes_on;
+    else if (!is_last && may_chord)
+      is_last = follow_chords(change);
   }
+  if (shrinks_slowly_ && nearest.has_change()) take(nearest.change);
   settings_.is_rough = false;
+}
+
+bool IslandSolver::keep_nearest(NearestPose* nearest) const {
+  constexpr int kIdleSteps = 4;
+  constexpr double kLetsGo = 0.1;
+  // a row that became dependent is left out, and what it pushed is in none of the others
+  double most = 0.0;
+  for (const ConeRow& row : cone_.rows) most = std::max(most, std::fabs(row.multiplier));
+  if (most < kLetsGo * nearest->push) return false;
+  nearest->push = std::max(nearest->push, most);
+  const double now = open();
+  if (!(now < nearest->open)) return ++nearest->idle < kIdleSteps;
+  nearest->open = now, nearest->idle = 0, nearest->change = pose_change();
+  // what pushed along directions as they were before, told along those of here
+  auto of = nearest->change.of_joints.begin();
+  std::size_t next = 0;
+  for (const EndJoint& joint : joints_) {
+    Vector3 push = Vector3::Zero();
+    for (std::size_t k = 0; k < 3; ++k)
+      if (joint.pose_laws[k].is_active())
+        push += cone_.rows[next].multiplier * cone_.rows[next].direction.linear, ++next;
+    if (joint.has_turns) next += 2;
+    for (std::size_t k = 0; k < 3; ++k, ++of)
+      if (joint.pose_laws[k].is_active() && !joint.discrepancy.is_angular()) *of = push.dot(joint.directions[k].linear);
+  }
+  return true;
 }
 
 BodyMotion IslandSolver::accelerated(const BodyMotion& from, const BodyMotion& image,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -107,6 +108,17 @@ class IslandSolver {
   void solve_pose();
   void find_pose();
 
+  // Near a place where rows become dependent steps lead to it no nearer than rounding lets them, and away again.
+  struct NearestPose {
+    double open = std::numeric_limits<double>::infinity();
+    double push = 0.0;  // largest of all steps
+    int idle = 0;       // steps since
+    PoseChange change = {};
+    bool has_change() const { return open < std::numeric_limits<double>::infinity(); }
+  };
+  // False where steps come no nearer.
+  bool keep_nearest(NearestPose* nearest) const;
+
   // Where the next step begins after one to `image`: there, or beyond what steps that shrink slowly tell.
   BodyMotion accelerated(const BodyMotion& from, const BodyMotion& image, AndersonAcceleration* acceleration) const;
 
@@ -182,6 +194,16 @@ class IslandSolver {
   void build_velocity(const EndContact& contact, bool with_turning);
 
   void keep_impulses();
+
+  // Are reactions of joints in S* already?
+  bool has_reactions() const { return !joints_.empty() && joints_.front().discrepancy.has_forces_applied(); }
+
+  // ---- places from which no motion leads, though velocities are allowed there
+
+  // Does the pose change take a body back by most of its way? In regular places it is of the size of the method's error.
+  bool is_taken_back(std::uint32_t body) const;
+  // Takes from v* what the pose change took back; returns the share of that which it was, 1/s, 0 where nothing was.
+  double stop_what_is_locked(BodyMotion* trial);
 
   // ---- energy
 

@@ -28,7 +28,8 @@ void turn_arms(const Vector3& normal, const SolverBody& one, const SolverBody& t
 }  // namespace
 
 void IslandSolver::solve_velocity() {
-  const BodyMotion trial = turned_trial_velocity();
+  BodyMotion trial = turned_trial_velocity();
+  const double taken_back = stop_what_is_locked(&trial);
   settings_.may_rest = may_rest();
   if (!drives_yield_) {
     settings_.gives_up = has_unbounded_drive();
@@ -50,6 +51,47 @@ void IslandSolver::solve_velocity() {
   std::size_t cone = 0;
   for (EndContact& contact : contacts_)
     if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
+  if (taken_back == 0.0) return;
+  for (const EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      answer_.joint_impulse[3 * joint.row + k] += taken_back * answer_.joint_correction[3 * joint.row + k];
+}
+
+bool IslandSolver::is_taken_back(std::uint32_t body) const {
+  constexpr double kMost = 0.1;
+  const SolverBody& of = bodies_[body];
+  const Twist& back = displacement_[body];
+  const double turn = log_rotation(shorter_arc(of.trial.orientation * of.start.orientation.conjugate())).norm();
+  const double way = (of.trial.position - of.start.position).norm() + gyration_[body] * turn;
+  return back.linear.norm() + gyration_[body] * back.angular.norm() > kMost * way;
+}
+
+double IslandSolver::stop_what_is_locked(BodyMotion* trial) {
+  if (!has_reactions() || !shrinks_slowly_) return 0.0;
+  if (std::ranges::none_of(pushed_, [&](std::uint32_t i) { return is_taken_back(i); })) return 0.0;
+  double along = 0.0, size = 0.0;
+  for (const std::uint32_t i : pushed_) {
+    const Twist &d = displacement_[i], &v = (*trial)[i];
+    const double mass = bodies_[i].inverse_mass > 0.0 ? 1.0 / bodies_[i].inverse_mass : 0.0;
+    const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
+    const Vector3 turned = world_inertia(end_[i].pose.orientation, moments) * d.angular;
+    along -= mass * v.linear.dot(d.linear) + v.angular.dot(turned);
+    size += mass * d.linear.squaredNorm() + d.angular.dot(turned);
+  }
+  if (!(along > 0.0)) return 0.0;
+  // a body from rest comes half as far as its last velocity would take it
+  const double share = std::min(along / size, 2.0 / request_.time_step());
+  for (const std::uint32_t i : pushed_) {
+    (*trial)[i].linear += share * displacement_[i].linear;
+    (*trial)[i].angular += share * displacement_[i].angular;
+  }
+  // drives stall
+  const auto stalls = [&](std::uint32_t body) { return bodies_[body].is_pushed() && is_taken_back(body); };
+  for (EndJoint& joint : joints_)
+    for (JointLaw& law : joint.velocity_laws)
+      if (law.is_unbounded_drive() && (stalls(joint.body1) || stalls(joint.body2)))
+        law.lower_target = law.upper_target = 0.0;
+  return share;
 }
 
 void IslandSolver::find_velocity(const BodyMotion& trial) {

@@ -88,6 +88,8 @@ class ReactionSolver {
   static constexpr double kOnJoints = 1e-15, kRounding = 1e-13, kNearEnough = 1e-5;
   // Of a diagonal: a row with a lesser pivot, at a state that agrees with the joints, says nothing but rounding.
   static constexpr double kSingular = 1e-10;
+  // Of a turn that no step takes away: what such a state is off by is the square of how far it is from where rows are dependent.
+  static constexpr double kStuck = 100.0;
   // What an error leaves of the pivots of dependent rows, in its squares.
   static constexpr double kMargin = 100.0, kMostMargin = 1e9;
 

@@ -331,7 +331,8 @@ double ReactionSolver::longer_arm(const Body& one, const Vector3& arm1, const Bo
 double ReactionSolver::reach_of(const Row& row) const {
   constexpr double kShortest = 1e-3;  // of the longest reach
   if (row.direction.linear.isZero(0.0) || longest_ == 0.0) return 1.0;
-  return std::max(row.reach, kShortest * longest_);
+  // without an arm nothing turns but others
+  return row.reach > kShortest * longest_ ? row.reach : longest_;
 }
 
 double ReactionSolver::largest_turn() const {
@@ -357,7 +358,8 @@ void ReactionSolver::agree_with_joints() {
   constexpr int kRounds = 12;
   constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
   const std::vector<Body> asked = bodies_;
-  double turn = largest_turn(), margin = kMargin;
+  const double far = largest_turn();
+  double turn = far, margin = kMargin;
   bool is_factored = margin * turn * turn < factor_.least_pivot();
   for (int round = 0; round < kRounds && turn > kOnJoints && margin < kMostMargin; ++round) {
     const std::vector<Body> before = bodies_;
@@ -378,13 +380,16 @@ void ReactionSolver::agree_with_joints() {
     if (turn < kRounding) break;
     if (is_new) margin *= kMargin;
   }
-  if (turn > kNearEnough) {
+  const bool is_stuck = turn > std::max(kRounding, kQuick * far);
+  if (turn > kNearEnough || is_stuck) {
     bodies_ = asked;
     has_moved_ = false;
+    turn = far;
     make_rows();
-    return factorise(0.0);
   }
-  if (has_moved_ || factor_.least_pivot() < kSingular) factorise(std::max(kSingular, kMargin * turn * turn));
+  if (turn > kNearEnough) return factorise(0.0);
+  const double least = std::max({kSingular, kMargin * turn * turn, turn > kRounding ? kStuck * turn : 0.0});
+  if (has_moved_ || factor_.least_pivot() < least) factorise(least);
   const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
   for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
     bodies_[i].velocity.linear += change[i].linear;

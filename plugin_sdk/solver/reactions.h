@@ -36,6 +36,11 @@
 // tries are off by its error e, and at a distance x from a singular configuration J and gamma in them are off by e/x^2: the
 // motion would turn away on the hyperbola x y = e instead of going through. There a row counts as dependent within a pivot
 // of 1e-10 of its diagonal, elsewhere of 1e-12; what is left are roundings over x^3.
+//
+// Where no state near by agrees (steps towards it do not leave a thousandth of the error: links in a row that just reach their
+// end are locked, and what they are off by, e, is the square of how far they are from being in a row), the question is answered
+// as asked, and rows within a pivot of 100 e of their diagonal count as dependent. Else their gamma, v^2/L, would be
+// answered by v^2/r, r the distance from the place: the motion on a circle of that radius, which no step resolves.
 #pragma once
 
 #include "plugin_sdk/plugin.h"
