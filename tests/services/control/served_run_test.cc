@@ -58,6 +58,23 @@ TEST(ServedRun, StepsAreCountedAndTheEndIsAState) {
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }
 
+// What hangs is what one asks for then: the status came with the end of the step.
+TEST(ServedRun, TellsItsStatusWhileAStepWaitsForAWorkerThatHangs) {
+  Served served;
+  served.client.step(10);
+  served.client.inject("solver:hang@step=11");
+  std::future<api::Status> step = std::async(std::launch::async, [&] { return served.client.step(1); });
+  api::Status status;
+  while (status.waited() == 0.0 && step.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    status = served.client.status();
+  EXPECT_GT(status.waited(), 0.0);
+  EXPECT_EQ(status.step(), 10U);
+  EXPECT_EQ(planned(status, "solver").plugin(), "Sequential");
+  EXPECT_EQ(step.get().step(), 11U);
+  EXPECT_EQ(served.client.status().waited(), 0.0);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
 TEST(ServedRun, ResumedItGoesOnAndPausedItStands) {
   ServeOptions options = sample();
   options.run.steps = 100'000'000;
