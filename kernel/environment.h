@@ -176,14 +176,14 @@ class Environment : private DerivativeSource, private SlotObserver {
   void locate_events(double begin, double length);
   // extrapolated.cc, jumps.cc
   void extrapolate_parts(double begin, double length);
-  std::uint32_t pieces_to_accuracy(double begin, double length, bool ends_with_impact);
+  std::uint32_t pieces_to_accuracy(double begin, double length, bool is_before_impact, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
   void take_extrapolated();
   void find_changes(std::vector<double>* changes);
   bool lets_go() const;
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
-  // Lengths of the inner step that ends at the next event, at most `length`, for which S* is in place.
-  double first_impact(const Trusted<TrialState>& trial, double begin, double length);
+  // The inner step that ends at the next event, of at most `length`, for which S* is in place.
+  NextStop first_impact(const Trusted<TrialState>& trial, double begin, double length);
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc
@@ -358,10 +358,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<std::uint32_t> broken_;             // joints, under their load in the inner step that is being made
   std::optional<Trusted<Pairs>> pairs_;           // the last
   Extrapolation extrapolation_, jumps_;
-  static constexpr std::uint32_t kMostPieces = 8;                            // of a part that is extrapolated
-  std::vector<double> first_changes_[kMostPieces], trial_changes_, missed_;  // of velocities
-  std::vector<double> start_gaps_, trial_gaps_;                              // of limits
-  std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
+  static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
+  std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
+  std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
+  std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;           // pairs
   double margin_ = 0.0;
 
   Activity activity_;

@@ -37,7 +37,7 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   if (encounter.fraction <= 0.0) {
     const double closing = -encounter.start_speed;
     if (encounter.is_touching || encounter.gap < -kMostUnseen * near || closing <= 0.0) return {length};
-    return {std::min(length, (std::fabs(encounter.gap) + 2.0 * target_gap) / closing)};
+    return {std::min(length, (std::fabs(encounter.gap) + 2.0 * target_gap) / closing), false, true};
   }
   const double closing = -(encounter.start_speed + acceleration * time);
   const double bend = 0.5 * std::fabs(acceleration) * time;
@@ -46,7 +46,7 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
     const double lead = 2.0 * near / closing;
     if (time > std::max(shortest_flight, 2.0 * lead)) return {time - lead};
     // grazing, the last part of the way is not worth a step of its own
-    return {closing * (length - time) <= 2.0 * target_gap ? length : time + 2.0 * target_gap / closing};
+    return {closing * (length - time) <= 2.0 * target_gap ? length : time + 2.0 * target_gap / closing, false, true};
   }
   if (const double met = accelerated_time(encounter, acceleration, time); length > 2.5 * met) return {2.0 * met, true};
   return {time * (closing > bend ? std::max(0.5, 1.0 - 2.0 * bend * (length - time) / (closing * time)) : 0.5)};

@@ -21,6 +21,7 @@ struct Encounter {
 struct NextStop {
   double length = 0.0;    // of the next inner step
   bool is_trial = false;  // look again at a trial of this length, rather than commit it
+  bool meets = false;     // it ends with the pair closed
 };
 
 // The longest inner step, up to `length` (that of the trial), that an encounter allows.

@@ -6,6 +6,7 @@
 
 namespace gravitas {
 
+constexpr std::size_t kLeast = 2;  // of results beside the last: two may agree by chance
 constexpr double kUnknownError = std::numeric_limits<double>::infinity();
 
 void Extrapolation::begin() {
@@ -21,23 +22,39 @@ void Extrapolation::put(double number, double scale) {
 
 double Extrapolation::add() {
   const auto pieces = static_cast<double>(++pieces_);
-  if (table_.size() < pieces_) table_.emplace_back();
+  if (table_.size() < pieces_) table_.emplace_back(), error_.emplace_back();
   table_[pieces_ - 1].resize(row_.size());
-  double error = pieces_ == 1 ? kUnknownError : 0.0;
+  std::fill_n(error_.begin(), pieces_, 0.0);
+  error_[0] = kUnknownError;
   for (std::size_t i = 0; i < row_.size(); ++i) {
     double next = row_[i];
     for (std::size_t k = 1; k < pieces_; ++k) {
       const double before = table_[k - 1][i], ratio = pieces / (pieces - static_cast<double>(k));
+      const double change = (next - before) / (ratio - 1.0);
       table_[k - 1][i] = next;
-      next += (next - before) / (ratio - 1.0);
+      next += change;
+      const double error = std::fabs(k + 1 < pieces_ ? next - before : change) / scale_[i];
+      error_[k] = std::isfinite(next) ? std::max(error_[k], error) : kUnknownError;
     }
     table_[pieces_ - 1][i] = next;
-    if (pieces_ > 1) error = std::max(error, std::fabs(next - table_[pieces_ - 2][i]) / scale_[i]);
-    if (!std::isfinite(next)) error = kUnknownError;
   }
   row_.clear();
   scale_.clear();
-  return error;
+  // the last of equals, which leaves out least
+  best_ = pieces_ - 1;
+  for (std::size_t k = best_; k-- > kLeast;)
+    if (error_[k] < error_[best_]) best_ = k;
+  return error_[best_];
+}
+
+double Extrapolation::least_size() const {
+  double least = kUnknownError;
+  for (std::size_t k = std::min<std::size_t>(kLeast, pieces_ - 1); k < pieces_; ++k) {
+    double size = 0.0;
+    for (const double number : table_[k]) size = std::max(size, std::fabs(number));
+    least = std::min(least, size);
+  }
+  return least;
 }
 
 }  // namespace gravitas

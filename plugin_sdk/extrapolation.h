@@ -5,6 +5,10 @@
 //
 // is of order k + 1 where the error of the method has an expansion in powers of the step, as it does while nothing in the
 // interval jumps. Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.9.
+//
+// The coarsest results may have no part in it: their first piece brings the start, which is that of no method, to where the
+// method's own results lie, and that is all there is of them. T_{j,k} leaves out the first j - k of them. That one is taken
+// whose estimated error is the least (as in C. J. F. Ridders' differentiation), one for all numbers.
 #pragma once
 
 #include <cstddef>
@@ -19,17 +23,21 @@ class Extrapolation {
   // A number of the result in one piece more than the last, and the size of an error of 1 in it (> 0), in the same order
   // each time.
   void put(double number, double scale);
-  // With all numbers in place: the estimated error, the largest |T_{j,j} - T_{j,j-1}| / scale; infinite for the first
-  // result, and where a number is not finite.
+  // With all numbers in place: the least estimated error of an extrapolation, which is the largest |T_{j,k} - T_{j,k-1}| / scale
+  // of its numbers, and where results are left out (1 < k < j) |T_{j,k} - T_{j-1,k-1}| / scale; infinite for the first result, and
+  // where a number is not finite.
   double add();
-  // T_{j,j} of the last result.
-  std::span<const double> best() const { return table_[pieces_ - 1]; }
+  // That extrapolation.
+  std::span<const double> best() const { return table_[best_]; }
+  // What tends to 0, how near it is in the extrapolation that leaves least of it: the largest |T_{j,k}| there.
+  double least_size() const;
 
  private:
   std::vector<double> row_;
   std::vector<double> scale_;
   std::vector<std::vector<double>> table_;  // the last row: T_{j,1} … T_{j,j}
-  std::size_t pieces_ = 0;
+  std::vector<double> error_;               // of each of these
+  std::size_t pieces_ = 0, best_ = 0;
 };
 
 }  // namespace gravitas

@@ -13,6 +13,7 @@
 
 #include "kernel/environment.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/solver.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -117,6 +118,12 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
   if (has_contacts() && !has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(trial)));
   if (sleepers_ > 0 && wakes_sleepers()) return std::nullopt;
   if (constraint_.is_running()) constrain(trial);
+  // What pressed before does not arrive, and has nothing to bounce with: it came no nearer then, and what turning makes of that
+  // since is less the shorter the step. Under a fast rim, whose points come down faster than they would fall, it is more than
+  // what solvers take for rest.
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
+    if (!vector_at(data_.contact_warm_impulse.span(), i).isZero(0.0))
+      data_.contact_material[kMaterialColumns * i + kRestitution] = 0.0;
   return solve();
 }
 

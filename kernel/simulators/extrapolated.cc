@@ -49,18 +49,19 @@ void Environment::extrapolate_parts(double begin, double length) {
   bool has_failed = false;
   while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
-    double part = std::min(wanted, left);
+    NextStop stop{std::min(wanted, left)};
     if (has_contacts()) {
-      begin_inner_step(from, part);
-      part = first_impact(integrate(), from, part);
+      begin_inner_step(from, stop.length);
+      stop = first_impact(integrate(), from, stop.length);
     }
-    const bool ends_with_impact = part < std::min(wanted, left);
     bool passes_limit = false;
-    part = first_limit(from, part, &passes_limit);
+    const double part = first_limit(from, stop.length, &passes_limit);
+    const bool is_before_impact = stop.length < std::min(wanted, left);
+    const bool ends_with_impact = stop.meets && part == stop.length;
     const bool is_cut = part < std::min(wanted, left);
     if (part < kCrumb * step) finest *= kCoarser;
     const bool is_passed = part <= finest || passes_limit;
-    const std::uint32_t pieces = is_passed ? 1 : pieces_to_accuracy(from, part, ends_with_impact);
+    const std::uint32_t pieces = is_passed ? 1 : pieces_to_accuracy(from, part, is_before_impact, ends_with_impact);
     if (pieces == 0) wanted = kShorter * part, has_failed = true;
     for (std::uint32_t i = 0; i < pieces && !must_restart_; ++i) {
       if (!make_piece(from, part, i, pieces)) return;
@@ -76,19 +77,21 @@ void Environment::extrapolate_parts(double begin, double length) {
 
 // The number of inner steps whose extrapolation meets the accuracy; 0: none does, or the step is to be begun again. Where
 // the part ends with an impact its last inner step jumps as it should.
-std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool ends_with_impact) {
+std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool is_before_impact,
+                                              bool ends_with_impact) {
   const std::size_t front = front_, back = back_;
   const CommitFigures figures = figures_;
   const auto go_back = [&] { front_ = front, back_ = back, figures_ = figures; };
   extrapolation_.begin();
   jumps_.begin();
-  const auto put_changes = [&](std::vector<double>* changes) {
-    find_changes(changes);
-    for (const double change : *changes) jumps_.put(change, 1.0);
-  };
   const std::uint32_t first = ends_with_impact ? 2 : 1;  // whose first inner step does not end with the impact
   const bool sees_jumps = description_.accuracy >= kSeesJumps;
-  const double most_of_jump = sees_jumps && !ends_with_impact ? std::max(length, kOfJump) : length;
+  const double of_jump = sees_jumps && !is_before_impact ? kOfJump : 0.0;
+  const auto put_changes = [&](std::vector<double>* changes) {
+    find_changes(changes);
+    for (std::size_t k = 0; k < changes->size(); ++k)
+      jumps_.put((*changes)[k] * std::max(length, of_jump / scales_[k]), 1.0);
+  };
   double error = 0.0;
   std::uint32_t enough = 0;
   try {
@@ -105,8 +108,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
       const double now = extrapolation_.add();
       go_back();
       jumps_.add();
-      double jump = 0.0;
-      for (const double change : jumps_.best()) jump = std::max(jump, std::fabs(change) * most_of_jump);
+      const double jump = jumps_.least_size();
       if (std::max(now, jump) <= description_.accuracy && pieces > first) enough = pieces;
       const bool converges = pieces <= 2 || now <= std::max(kConverges * error, kSettled * description_.accuracy);
       error = now;

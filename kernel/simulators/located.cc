@@ -48,7 +48,7 @@ void Environment::locate_events(double begin, double length) {
     begin_inner_step(begin + done, left);
     Trusted<TrialState> trial = integrate();
     if (inner < (bisects ? kMostBisections : kMostInnerSteps)) {
-      stop = bisects ? bisect(trial, begin + done, left, is_near) : first_impact(trial, begin + done, left);
+      stop = bisects ? bisect(trial, begin + done, left, is_near) : first_impact(trial, begin + done, left).length;
       is_near = !is_near && stop < left;
       has_found_contacts = bisects && stop == data_.time_step[0];
       if (stop != data_.time_step[0]) {
@@ -69,7 +69,7 @@ void Environment::locate_events(double begin, double length) {
   }
 }
 
-double Environment::first_impact(const Trusted<TrialState>& trial, double begin, double length) {
+NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begin, double length) {
   data_.target_gap[0] = kTargetShare * margin_;
   const double shortest_flight = kShortestFlight * length_of_step(step_count_ + 1);
   double left = length;
@@ -86,7 +86,7 @@ double Environment::first_impact(const Trusted<TrialState>& trial, double begin,
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;
     }
-    if (!next.is_trial || i == kMostTrials) return std::max(next.length, kFinest * length);
+    if (!next.is_trial || i == kMostTrials) return {std::max(next.length, kFinest * length), false, next.meets};
     left = next.length;
     begin_inner_step(begin, left);
   }

@@ -319,7 +319,14 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
     }
     return rows;
   };
-  const std::vector<std::size_t> contacts = kept_pairs(old.at<std::uint32_t>("contact_body"));
+  // what an edit throws at what it touched arrives there, as what pressed does not
+  const std::span<const std::uint32_t> pressed = old.at<std::uint32_t>("contact_body");
+  const auto is_thrown = [&](std::uint32_t old_one) {
+    const auto set = log_.motions.find(description_.bodies[body_row[old_one]].id);
+    return set != log_.motions.end() && (set->second.linear_velocity || set->second.angular_velocity);
+  };
+  std::vector<std::size_t> contacts = kept_pairs(pressed);
+  std::erase_if(contacts, [&](std::size_t i) { return is_thrown(pressed[2 * i]) || is_thrown(pressed[2 * i + 1]); });
   const std::span<const std::uint32_t> touched = old.at<std::uint32_t>("touching");
   const std::vector<std::size_t> touching = kept_pairs(touched);
   std::vector<std::size_t> discrepancies;

@@ -134,7 +134,18 @@ TEST(EventLocation, GrazingIsNotWorthAStep) {
 
 // Up at 0.01 m/s and back at 0.03 m/s in 4 ms: it is at the top of its flight, 5e-6 m, after 1 ms.
 TEST(NextStop, FollowsAFlightToItsTop) {
-  EXPECT_NEAR(stop_before({0.0, 0.0, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
+  const NextStop top = stop_before({0.0, 0.0, 0.01, -0.03}, 0.004, 1e-10, 1e-9);
+  EXPECT_NEAR(top.length, 0.001, 1e-15);
+  EXPECT_FALSE(top.meets);
+}
+
+// From 1 mm and so near that the solver closes it, at 100 m/s: before the floor, and in it.
+TEST(NextStop, TellsWhetherItMeets) {
+  EXPECT_FALSE(
+      stop_before({0.001, kTargetGap, -100.0, -100.0, 5.0 * kTargetGap}, 0.01, kTargetGap, kShortestFlight).meets);
+  EXPECT_TRUE(
+      stop_before({1e-9, kTargetGap, -100.0, -100.0, 5.0 * kTargetGap}, 0.01, kTargetGap, kShortestFlight).meets);
+  EXPECT_TRUE(stop_before({0.0, 0.5 * kTargetGap, -100.0, -100.0}, 0.01, kTargetGap, kShortestFlight).meets);
 }
 
 // The straight motion to the end of the trial goes down at once, the bent one does not.

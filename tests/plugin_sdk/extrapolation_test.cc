@@ -48,6 +48,43 @@ TEST(Extrapolation, RaisesTheOrderByOneAResult) {
   }
 }
 
+// The first result, and then the first two, are off as none of the others: they have no part in what is found.
+TEST(Extrapolation, LeavesOutWhatIsOffAtTheBeginning) {
+  for (const int off : {1, 2}) {
+    Extrapolation extrapolation;
+    extrapolation.begin();
+    double error = 0.0;
+    for (int pieces = 1; pieces <= 6; ++pieces) {
+      const double h = 1.0 / pieces;
+      error = add(&extrapolation, {3.0 + h * (2.0 - 5.0 * h) + (pieces <= off ? 1e-3 : 0.0), -1.0 + 4.0 * h});
+    }
+    EXPECT_LT(error, 1e-13) << off;
+    EXPECT_NEAR(extrapolation.best()[0], 3.0, 1e-13) << off;
+    EXPECT_NEAR(extrapolation.best()[1], -1.0, 1e-13) << off;
+  }
+}
+
+// The last two are one, and say no more than that.
+TEST(Extrapolation, BelievesNoTwoThatAgreeByChance) {
+  Extrapolation extrapolation;
+  extrapolation.begin();
+  add(&extrapolation, {1.0});
+  add(&extrapolation, {2.0});
+  EXPECT_GT(add(&extrapolation, {2.0}), 0.4);
+}
+
+TEST(Extrapolation, KnowsWhatTendsToNothing) {
+  for (const double limit : {0.0, 1e-3}) {
+    Extrapolation extrapolation;
+    extrapolation.begin();
+    for (int pieces = 1; pieces <= 5; ++pieces) {
+      const double h = 1.0 / pieces;
+      add(&extrapolation, {limit + h * (2.0 - h) + (pieces == 1 ? 0.1 : 0.0), h});
+    }
+    EXPECT_NEAR(extrapolation.least_size(), limit, 1e-14);
+  }
+}
+
 TEST(Extrapolation, MeasuresErrorsByTheirScale) {
   Extrapolation extrapolation;
   extrapolation.begin();

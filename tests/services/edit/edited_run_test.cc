@@ -210,6 +210,14 @@ TEST(EditedRun, AMaterialIsThatOfTheImpact) {
   }
 }
 
+// It bounces with half of 2 m/s, though it pressed the ground before.
+TEST(EditedRun, WhatRestsBouncesWhereItIsThrownDown) {
+  EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" Material = \"Rubber\" }\n" +
+                      ball("A", "Position = {0, 0.1, 0}", kFalls)),
+                {"set Body.A.LinearVelocity={0,-2,0}@step=100"});
+  EXPECT_NEAR(run.end()["A"].velocity.y(), 1.0, 1e-6);
+}
+
 // The plan is that of the edited scene.
 TEST(EditedRun, ThePlanIsMadeAnew) {
   EditedRun run(scene(ball("A", "Position = {0, 1.1, 0}", kFalls)));
