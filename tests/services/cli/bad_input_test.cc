@@ -442,7 +442,8 @@ TEST(BadInput, NamesTheOptionThatWasGiven) {
       "Environment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {1, 1, 1} } } } Constraints { "
       "Constraint { Type = \"Spherical\" Id = \"H\" Body1 = \"A\" CustomProperties { BindPoint = {1, 0, 0} } } } }\n"
       "Simulator { CustomProperties { Duration = 1 } }");
-  result = run_program({"run", pendulum, "--hosting", "direct", "--set", "Simulator=Smooth"}, folder);
+  result = run_program(
+      {"run", pendulum, "--hosting", "direct", "--set", "Simulator=Smooth", "--set", "Solver=Sequential"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("and Sequential has it not; allowed: \"Direct\", \"Newton\""));
 }

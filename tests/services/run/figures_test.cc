@@ -167,7 +167,7 @@ Environment {
   Constraints { Constraint { Type = "Slider" Id = "Rail" Body2 = "Car" CustomProperties {
     BindPoint = {1, 1, 0} Axis = {0.6, 0.8, 0} Stiffness = 3e5 } } }
   KineticIntegrator = "RK4" ConstraintSolver = "Newton" })",
-                                               15);
+                                               14);
   ASSERT_EQ(report.warnings_size(), 2);
   EXPECT_THAT(report.warnings(0), AllOf(HasSubstr("joints came open"), HasSubstr("on: a body runs away")));
   EXPECT_THAT(report.warnings(1), HasSubstr("TimeStep is too long for the forces and the integrator"));
