@@ -1,15 +1,13 @@
 #include "services/run/machine_limits.h"
 
 #include <fmt/format.h>
+#include <pthread.h>
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <latch>
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <vector>
 
 #include "plugin_sdk/slots.h"
@@ -34,17 +32,24 @@ std::size_t workers_of(const kernel::EnvironmentDescription& description) {
   return count;
 }
 
+// With small stacks: addresses are asked for by themselves.
 bool has_threads(std::size_t wanted) {
-  std::vector<std::jthread> threads;
+  constexpr std::size_t kStack = 256 << 10;
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstacksize(&attributes, kStack);
   std::latch all{1};
-  bool has = true;
-  try {
-    for (std::size_t i = 0; i < wanted; ++i) threads.emplace_back([&all] { all.wait(); });
-  } catch (const std::system_error&) {
-    has = false;
-  }
+  const auto wait = [](void* latch) -> void* {
+    static_cast<std::latch*>(latch)->wait();
+    return nullptr;
+  };
+  std::vector<pthread_t> threads(wanted);
+  std::size_t count = 0;
+  while (count < wanted && pthread_create(&threads[count], &attributes, wait, &all) == 0) ++count;
   all.count_down();
-  return has;
+  for (std::size_t i = 0; i < count; ++i) pthread_join(threads[i], nullptr);
+  pthread_attr_destroy(&attributes);
+  return count == wanted;
 }
 
 // Empty: nothing is in the way.

@@ -197,6 +197,20 @@ TEST(SequentialRest, ABoxOnFourContactsRests) {
   }
 }
 
+// Corners that overlap by different amounts, as those of all that is not alone on the ground, are pushed at points which no motion
+// of two rigid bodies moves alike: the whole of them was given up for that, and swept one by one (a pole on its foot: 190 sweeps).
+TEST(SequentialRest, CornersOfDifferentDepthsComeToRestAsAWhole) {
+  SolverProblem problem = box_on_ground({0.1, 1.0, 0.1}, 3.0, 0.0, {.static_friction = 0.8, .dynamic_friction = 0.8});
+  for (std::size_t corner = 0; corner < 4; ++corner)
+    problem.contact_depth[corner] += 1e-5 * static_cast<double>(corner);
+  problem.set_trial_velocity(1, {0.002, -0.3, 0.003}, {0.004, 0.05, -0.006});
+  const SolverAnswer answer = problem.solve(contact_solver_with(200));
+  EXPECT_TRUE(answer.converged());
+  EXPECT_LE(answer.velocity(1).norm(), 1e-14);
+  EXPECT_LE(answer.turning(1).norm(), 1e-13);
+  EXPECT_LE(answer.iterations[0], 10U);
+}
+
 TEST(SequentialRest, OldOverlapGoesByTheCorrectionFactorAndNewOverlapAtOnce) {
   const double overlap = 1e-3;
   for (const double factor : {1.0, 0.2, 0.0}) {

@@ -50,7 +50,7 @@ ContactPatch ContactImpulses::whole_of(const Patch& patch, const SolverBodies& b
   const auto count = static_cast<int>(patch.end - patch.first);
   const Row* rows = &rows_[patch.first];
   if (!rows[0].has_friction) {
-    ContactPatch::Response response;
+    ContactPatch::Response response = ContactPatch::Response::Zero();
     for (int i = 0; i < count; ++i) {
       for (int j = 0; j <= i; ++j) {
         const Matrix3 world = point_response(bodies[rows[0].body1], rows[i].arm1, rows[j].arm1) +

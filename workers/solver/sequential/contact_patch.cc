@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
+#include <span>
 
 namespace gravitas {
 namespace {
@@ -24,22 +24,17 @@ void add(double share, const Rows& a, int rows, Rows* sum) {
   for (int i = 0; i < rows; ++i) (*sum)[i] += share * a[i];
 }
 
-// Orthonormal columns that span the range of W: Gram-Schmidt over its columns, the longest
-// remainder first, each projected twice.
-int range_of(const ContactPatch::Response& response, int rows, Basis* basis) {
-  std::array<Rows, ContactPatch::kRows> left;
+// Appends to the leading `rank` columns, which are orthonormal, those that span what `left` adds: Gram-Schmidt, the longest
+// remainder first, each projected twice. Returns how many there are then.
+int append_range(std::span<Rows> left, int rows, int rank, Basis* basis) {
   std::array<double, ContactPatch::kRows> squared;
-  for (int i = 0; i < rows; ++i) {
-    left[static_cast<std::size_t>(i)] = response.col(i);
-    squared[static_cast<std::size_t>(i)] = dot(response.col(i), response.col(i), rows);
-  }
+  for (std::size_t i = 0; i < left.size(); ++i) squared[i] = dot(left[i], left[i], rows);
   double first = 0.0;
-  int rank = 0;
   for (; rank < ContactPatch::kRank; ++rank) {
-    const auto end = squared.begin() + rows;
+    const auto end = squared.begin() + static_cast<std::ptrdiff_t>(left.size());
     const auto longest = static_cast<std::size_t>(std::max_element(squared.begin(), end) - squared.begin());
     const double length = std::sqrt(squared[longest]);
-    if (rank == 0) first = length;
+    if (first == 0.0) first = length;
     if (!(length > kLeast * first)) break;
     Rows& q = (*basis)[static_cast<std::size_t>(rank)];
     q = left[longest] / length;
@@ -48,7 +43,7 @@ int range_of(const ContactPatch::Response& response, int rows, Basis* basis) {
       add(-dot(other, q, rows), other, rows, &q);
     }
     q /= std::sqrt(dot(q, q, rows));
-    for (std::size_t i = 0; i < static_cast<std::size_t>(rows); ++i) {
+    for (std::size_t i = 0; i < left.size(); ++i) {
       add(-dot(q, left[i], rows), q, rows, &left[i]);
       squared[i] = dot(left[i], left[i], rows);
     }
@@ -94,37 +89,22 @@ ContactPatch ContactPatch::of_points(const std::array<Point, kPoints>& points, i
   const auto used = static_cast<std::size_t>(count);
   Vector3 centre = Vector3::Zero();
   for (std::size_t i = 0; i < used; ++i) centre += points[i].place / count;
-  // about the centre, displacements and turns move the rows by what is orthogonal
+  // about the centre, displacements and turns move the rows by what is orthogonal; of points on a line one turn moves none
   Basis basis;
+  basis.fill(Rows::Zero());
+  std::array<Rows, 3> turns;
+  turns.fill(Rows::Zero());
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
     for (std::size_t i = 0; i < used; ++i) {
       const auto row = static_cast<Eigen::Index>(3 * i);
       basis[k].segment<3>(row) = points[i].frame.row(axis).transpose() / std::sqrt(count);
-      basis[3 + k].segment<3>(row) = points[i].frame.transpose() * Vector3::Unit(axis).cross(points[i].place - centre);
+      turns[k].segment<3>(row) = points[i].frame.transpose() * Vector3::Unit(axis).cross(points[i].place - centre);
     }
   }
-  const std::array<Rows, 3> turns = {basis[3], basis[4], basis[5]};
   const int rows = 3 * count;
-  double first = 0.0;
-  int rank = 3;
-  for (; rank < kRank; ++rank) {
-    const auto place = static_cast<std::size_t>(rank);
-    std::size_t longest = place;
-    double squared = 0.0;
-    for (std::size_t k = place; k < kRank; ++k) {
-      const double own = dot(basis[k], basis[k], rows);
-      if (own > squared) squared = own, longest = k;
-    }
-    const double length = std::sqrt(squared);
-    if (rank == 3) first = length;
-    // of points on a line the turn about it moves none
-    if (!(length > kLeast * first)) break;
-    std::swap(basis[place], basis[longest]);
-    basis[place] /= length;
-    for (std::size_t k = place + 1; k < kRank; ++k)
-      add(-dot(basis[place], basis[k], rows), basis[place], rows, &basis[k]);
-  }
+  std::array<Rows, 3> left = turns;
+  const int rank = append_range(left, rows, 3, &basis);
   Square parts = Square::Zero();  // Q^T G
   parts.topLeftCorner<3, 3>() = std::sqrt(count) * Matrix3::Identity();
   for (int k = 3; k < rank; ++k)
@@ -143,7 +123,10 @@ ContactPatch ContactPatch::of_points(const std::array<Point, kPoints>& points, i
 
 ContactPatch ContactPatch::of(const Response& response, int rows) {
   Basis basis;
-  const int rank = range_of(response, rows, &basis);
+  basis.fill(Rows::Zero());
+  std::array<Rows, kRows> left;
+  for (int i = 0; i < rows; ++i) left[static_cast<std::size_t>(i)] = response.col(i);
+  const int rank = append_range(std::span(left).first(static_cast<std::size_t>(rows)), rows, 0, &basis);
   Square core = Square::Zero();
   for (int j = 0; j < rank; ++j) {
     Rows image = Rows::Zero();
