@@ -40,19 +40,19 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
   const double shortest = kShortestTurn * length_of_step(step_count_ + 1);
   if (!may_turn_far || length <= shortest) return length;
 
-  const auto turns_by = [&](std::span<const std::uint32_t> pair, double way, double within) {
-    return (spin(pair[1]) - spin(pair[0])).norm() * longest_arm(model_.bound[pair[0]], model_.bound[pair[1]]) * within >
-           way;
-  };
   const auto harmless = [&](std::span<const std::uint32_t> pair) {
     return harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]);
+  };
+  const auto turns_far = [&](std::span<const std::uint32_t> pair, double time) {
+    const double arm = longest_arm(model_.bound[pair[0]], model_.bound[pair[1]]);
+    return (spin(pair[1]) - spin(pair[0])).norm() * arm * time > harmless(pair);
   };
   const auto overlaps = [&] {
     if (!*has_found_contacts) look_up_contacts(find_contacts(bound_and_pair(*trial)));
     *has_found_contacts = true;
     for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
       const auto pair = data_.contact_body.span().subspan(2 * i, 2);
-      if (data_.contact_depth[i] > harmless(pair) && turns_by(pair, harmless(pair), length)) return true;
+      if (data_.contact_depth[i] > harmless(pair) && turns_far(pair, length)) return true;
     }
     return false;
   };
@@ -77,15 +77,13 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
     const auto has_lost_one = [&](std::span<const std::uint32_t> next) {
       for (; !touching.empty() && (next.empty() || std::ranges::lexicographical_compare(touching.first(2), next));
            touching = touching.subspan(2))
-        if (turns_by(touching, harmless(touching), now)) return true;
+        if (turns_far(touching, now)) return true;
       if (!touching.empty() && std::ranges::equal(touching.first(2), next)) touching = touching.subspan(2);
       return false;
     };
     for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
       const auto pair = data_.contact_body.span().subspan(2 * i, 2);
-      if (turns_by(pair, harmless(pair), now) && (gap_at(i, front()) < -harmless(pair) || changes_sides(i)))
-        return true;
-      if (has_lost_one(pair)) return true;
+      if ((turns_far(pair, now) && changes_sides(i)) || has_lost_one(pair)) return true;
     }
     return has_lost_one({});
   };

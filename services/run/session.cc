@@ -167,7 +167,7 @@ class Run final : private kernel::CommitListener {
     guard([&] {
       if (is_unrepeatable_) return;
       if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
-      if (keeps && recorder_->saved_step() != environment_->step_count()) save();
+      if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
     });
     // after a failure the one before
     if (!keeps || !recorder_->saved_step()) return;

@@ -32,6 +32,7 @@ using harness::run_program;
 using harness::ScratchFolder;
 using harness::shipped_scene;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string chain_of(const std::string& report_file) {
   report::v1::Report report;
@@ -129,9 +130,22 @@ TEST(Checkpoints, AFullDiskUnderTheTrajectoryStopsTheRunAtACommitThatGoesOn) {
       run_program({"run", kSample, "--hosting", "direct", "--checkpoint", kept, "--trajectory", "/dev/full"}, folder);
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("trajectory '/dev/full': No space left on device"));
+  // the last commit, though what was told of it could not be written
   EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step "));
+  EXPECT_THAT(result.err, Not(HasSubstr("holds step 0;")));
   EXPECT_EQ(chain_after({"run", kSample, "--hosting", "direct", "--resume", kept}, folder),
             chain_after({"run", kSample, "--hosting", "direct"}, folder));
+}
+
+// What fails to be written before a checkpoint is put in place does not keep the last one from it.
+TEST(Checkpoints, OutputsThatCannotBeWrittenCostNoCommit) {
+  const ScratchFolder folder;
+  const std::string kept = folder.path("kept");
+  const ProgramResult result = run_program({"run", kSample, "--hosting", "direct", "--steps", "12", "--checkpoint",
+                                            kept, "--sample-every", "100", "--trajectory", "/dev/full"},
+                                           folder);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("checkpoint '" + kept + "' holds step 12;"));
 }
 
 TEST(Checkpoints, APipeThatIsReadNoMoreStopsTheRunAtACommitThatGoesOn) {
