@@ -30,8 +30,8 @@ struct Methods {
   std::vector<std::string> overrides;
 };
 
-// A solution of Newton or Direct that stops unfinished may break a balance by more than is allowed (README), and the piles
-// take them minutes.
+// A solution of Newton or Direct that stops unfinished may break a balance by more than is allowed (WEAKNESSES.md), and
+// the piles take them minutes.
 constexpr std::size_t kMostBodiesOfAccurate = 5;
 
 const Methods kMethods[] = {
