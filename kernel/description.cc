@@ -4,7 +4,6 @@
 #include <string>
 
 #include "plugin_sdk/checks.h"
-#include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/slots.h"
 #include "plugin_sdk/solver.h"
 

@@ -17,6 +17,7 @@
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/local_bound.h"
 #include "plugin_sdk/math/pose.h"
+#include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/plugin.h"
 
 namespace gravitas::kernel {
@@ -78,7 +79,7 @@ struct BodyDescription {
   double damping = 0.0;               // 1/s
   Pose pose;                          // of the centre of mass, world
   Twist twist;                        // world
-  std::vector<double> motion;         // of a kinematic body: table of MotionCurve, of its geometry; else empty
+  MotionTable motion;                 // of a kinematic body: the way of its geometry; else empty
   std::uint32_t shape = kNone;        // row of `shapes`
   Pose geometry;                      // of the shape's frame in the body's
   LocalBound bound;

@@ -10,6 +10,8 @@
 namespace gravitas {
 namespace {
 
+constexpr std::size_t kColumns = MotionTable::kColumns;
+
 // Slope at a row between difference quotients `before` over h1 and `after` over h2: that of the parabola, or rest.
 Vector3 slope(const Vector3& before, double h1, const Vector3& after, double h2) {
   if (before.isZero(0.0) || after.isZero(0.0)) return Vector3::Zero();
@@ -37,24 +39,27 @@ std::vector<Vector3> slopes(const std::vector<Vector3>& quotients, const std::ve
 
 }  // namespace
 
-std::string MotionCurve::find_problem(std::span<const double> table) {
-  if (table.empty() || table.size() % kColumns != 0) return "it has no rows of time, position and orientation";
-  for (std::size_t row = 0; row < table.size() / kColumns; ++row) {
-    const std::span<const double> numbers = table.subspan(row * kColumns, kColumns);
+std::string MotionCurve::find_problem(const MotionTable& table) {
+  const std::span<const double> rows = table.rows;
+  if (rows.empty() || rows.size() % kColumns != 0) return "it has no rows of time, position and orientation";
+  if (!table.surface.allFinite()) return "the velocity of its surface is not finite";
+  for (std::size_t row = 0; row < rows.size() / kColumns; ++row) {
+    const std::span<const double> numbers = rows.subspan(row * kColumns, kColumns);
     const std::string which = "row " + std::to_string(row);
     if (first_not_finite(numbers) != kNoRow) return which + " has a number that is not finite";
-    if (row > 0 && !(numbers[0] > table[(row - 1) * kColumns])) return "the time of " + which + " does not ascend";
+    if (row > 0 && !(numbers[0] > rows[(row - 1) * kColumns])) return "the time of " + which + " does not ascend";
     if (first_not_unit(numbers.subspan(4, 4), 4) != kNoRow) return "the orientation of " + which + " is not unit";
   }
   return {};
 }
 
-MotionCurve::MotionCurve(std::span<const double> table, const Pose& frame_in_body) : frame_in_body_(frame_in_body) {
-  rows_.resize(table.size() / kColumns);
+MotionCurve::MotionCurve(const MotionTable& table, const Pose& frame_in_body)
+    : rows_(table.rows.size() / kColumns), surface_(table.surface), frame_in_body_(frame_in_body) {
+  const std::span<const double> numbers = table.rows;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    rows_[i].time = table[i * kColumns];
-    rows_[i].pose.position = vector_at(table.subspan(i * kColumns + 1, 3), 0);
-    rows_[i].pose.orientation = quaternion_at(table.subspan(i * kColumns + 4, 4), 0);
+    rows_[i].time = numbers[i * kColumns];
+    rows_[i].pose.position = vector_at(numbers.subspan(i * kColumns + 1, 3), 0);
+    rows_[i].pose.orientation = quaternion_at(numbers.subspan(i * kColumns + 4, 4), 0);
   }
   std::vector<double> lengths;
   std::vector<Vector3> moves, turns;
@@ -112,12 +117,15 @@ MotionCurve::State MotionCurve::frame_at(double time) const {
 MotionCurve::State MotionCurve::at(double time) const {
   State state = frame_at(time);
   const Pose body = inverse(frame_in_body_);
-  const Vector3 arm = state.pose.orientation * body.position;
+  const Vector3 arm = state.pose.orientation * body.position, surface = state.pose.orientation * surface_;
   const Vector3 &w = state.twist.angular, &a = state.change.angular;
   state.pose.position += arm;
   state.pose.orientation = state.pose.orientation * body.orientation;
   state.twist.linear += w.cross(arm);
   state.change.linear += a.cross(arm) + w.cross(w.cross(arm));
+  if (surface_.isZero(0.0)) return state;
+  state.twist.linear += surface;
+  state.change.linear += w.cross(surface);
   return state;
 }
 

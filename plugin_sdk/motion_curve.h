@@ -1,4 +1,5 @@
-// The way of a kinematic body that follows a table of poses: a curve with continuous velocities (C1) through its rows.
+// The way of a kinematic body that follows a table of poses: a curve with continuous velocities (C1) through its rows. On
+// it the body's surface may run along: a belt, whose velocity is more than its pose shows.
 //
 // Position: cubic Hermite between rows. Orientation, with s = (t - t_k)/h in a row's interval of length h,
 //
@@ -27,22 +28,29 @@
 
 namespace gravitas {
 
-class MotionCurve {
- public:
+// Poses of a frame fixed in a body, and the velocity of its surface.
+struct MotionTable {
   // Numbers of a row: time (s), position (m), orientation (w, x, y, z).
   static constexpr std::size_t kColumns = 8;
+  std::vector<double> rows;           // one after the other
+  Vector3 surface = Vector3::Zero();  // m/s, in that frame, added to the velocity of each point
 
-  // Says what is wrong with a table (rows one after the other), empty if nothing: not whole rows, none, times that do
-  // not ascend, a number that is not finite, a quaternion that is not unit.
-  static std::string find_problem(std::span<const double> table);
+  bool empty() const { return rows.empty(); }
+};
+
+class MotionCurve {
+ public:
+  // Says what is wrong with a table, empty if nothing: not whole rows, none, times that do not ascend, a number that is
+  // not finite, a quaternion that is not unit.
+  static std::string find_problem(const MotionTable& table);
 
   // The table is that of a frame X_GB^-1 fixed in the body, the curve's poses are those of the body: the geometry's
   // frame follows the table, the centre of mass goes where that takes it. Precondition: find_problem() finds none.
-  MotionCurve(std::span<const double> table, const Pose& frame_in_body);
+  MotionCurve(const MotionTable& table, const Pose& frame_in_body);
 
   struct State {
     Pose pose;     // of the body, world
-    Twist twist;   // world
+    Twist twist;   // world, that of the surface in it
     Twist change;  // m/s^2, rad/s^2; at a row that of the interval that begins there
   };
   State at(double time) const;
@@ -57,6 +65,7 @@ class MotionCurve {
   State frame_at(double time) const;
 
   std::vector<Row> rows_;
+  Vector3 surface_;
   Pose frame_in_body_;
 };
 

@@ -178,7 +178,10 @@ void EditedScene::find_motions(const kernel::Environment& now) {
         pose = compose(frame, inverse(body.geometry));
         pose.orientation.normalize();
       }
-      if (!motion.linear_velocity) twist.linear = vector_at(state.linear_velocity, row);
+      if (body.motion.surface != old.motion.surface && !body.motion.empty())
+        twist = MotionCurve(body.motion, body.geometry).at(now.time()).twist;
+      else if (!motion.linear_velocity)
+        twist.linear = vector_at(state.linear_velocity, row);
       if (!motion.angular_velocity) twist.angular = vector_at(state.angular_velocity, row);
     } else if (!body.motion.empty() && now.step_count() > 0) {
       const MotionCurve::State there = MotionCurve(body.motion, body.geometry).at(now.time());

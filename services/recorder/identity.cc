@@ -53,7 +53,7 @@ PartDigest digest_bodies(const kernel::EnvironmentDescription& d) {
     digest << body.flags << body.mass << body.inertia << body.damping << body.pose << body.twist.linear
            << body.twist.angular << body.shape << body.geometry << body.bound.kind << body.bound.centre
            << body.bound.orientation << body.bound.half_extents << body.material << body.filter_group
-           << body.filter_mask << body.motion << body.forces.size();
+           << body.filter_mask << body.motion.rows << body.motion.surface << body.forces.size();
     for (const std::uint32_t force : body.forces) digest << force;
   }
   return digest;

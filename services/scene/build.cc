@@ -156,6 +156,9 @@ void check_bodies(const Constraint& joint, const kernel::ConstraintDescription& 
   const auto is_movable = [&](std::uint32_t row) {
     return row != kNone && (context->description.bodies[row].flags & kMovable) != 0;
   };
+  const auto runs = [&](std::uint32_t row) {
+    return row != kNone && !context->description.bodies[row].motion.surface.isZero(0.0);
+  };
   std::string wrong;
   if (description.body1 == kNone && description.body2 == kNone) {
     wrong = "joins the world to the world; required: Body1 or Body2";
@@ -165,6 +168,8 @@ void check_bodies(const Constraint& joint, const kernel::ConstraintDescription& 
     wrong =
         "joins nothing that can be pushed; required: a body that is neither immovable nor "
         "kinematic";
+  } else if (runs(description.body1) || runs(description.body2)) {
+    wrong = "holds on to a surface that runs; allowed: bodies without SurfaceVelocity, and the world";
   } else {
     return;
   }

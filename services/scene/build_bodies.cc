@@ -49,6 +49,7 @@ class BodyBuilder {
     description->inertia = inertia->moments;
     set_pose(inertia->X_GB, description);
     set_motion(description);
+    set_surface(description);
     set_bound(description);
     set_material(description);
     set_forces(description);
@@ -229,7 +230,7 @@ class BodyBuilder {
       return;
     }
     std::vector<PropertyProblem> problems;
-    const bool is_table = flatten_motion(from_message(body_.motion()), &description->motion, &problems);
+    const bool is_table = flatten_motion(from_message(body_.motion()), &description->motion.rows, &problems);
     diagnostics_.add(problems, place(field), what() + ": ");
     if (!is_table) return;
     const std::string problem = MotionCurve::find_problem(description->motion);
@@ -240,6 +241,31 @@ class BodyBuilder {
     const MotionCurve::State start = MotionCurve(description->motion, description->geometry).at(0.0);
     description->pose = start.pose;
     description->twist = start.twist;
+  }
+
+  // What runs along the surface is a velocity that the pose does not follow: that of a Motion, if only one that stays.
+  void set_surface(kernel::BodyDescription* description) {
+    const Vector3 velocity = vector_of(body_.surface_velocity());
+    if (velocity.isZero(0.0)) return;
+    const int field = Body::kSurfaceVelocityFieldNumber;
+    if (solid_ == nullptr) {
+      refuse(field, "has a SurfaceVelocity and no surface; required: GeometryId");
+      return;
+    }
+    if (is_movable_ || (body_.kinematic() && !written(Body::kMotionFieldNumber))) {
+      refuse(field, "has a SurfaceVelocity and moves by itself; required: Immovable = true, or a Motion");
+      return;
+    }
+    kernel::BodyDescription& body = *description;
+    if (body.motion.empty()) {
+      const Pose X_WG = compose(body.pose, body.geometry);
+      const Vector3& x = X_WG.position;
+      const Quaternion& q = X_WG.orientation;
+      body.motion.rows = {0.0, x.x(), x.y(), x.z(), q.w(), q.x(), q.y(), q.z()};
+      body.flags |= kKinematic;
+    }
+    body.motion.surface = velocity;
+    body.twist = MotionCurve(body.motion, body.geometry).at(0.0).twist;
   }
 
   static bool flatten_motion(const PropertyValue& given, std::vector<double>* out,
@@ -260,7 +286,7 @@ class BodyBuilder {
                          row.list[1], out, problems) ||
           !flatten_value(Property::quaternion("the orientation of " + which, "world"), row.list[2], out, problems))
         return false;
-      const std::size_t end = out->size(), columns = MotionCurve::kColumns;
+      const std::size_t end = out->size(), columns = MotionTable::kColumns;
       if (i > 0 && !((*out)[end - columns] > (*out)[end - 2 * columns]))
         return refuse(row.list[0], "the time of " + which);
     }

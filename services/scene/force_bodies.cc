@@ -75,6 +75,16 @@ void float_bodies(std::uint32_t force, const TypeDeclaration& type, BuildContext
   if (splits.empty()) std::fill_n(absent_gravity(type, &forces[force].parameters), 3, 0.0);
 }
 
+// Its velocity is that of its surface: dampers would take it for their end's.
+void refuse_belt(std::uint32_t force, std::uint32_t body, BuildContext* context) {
+  if (context->description.bodies[body].motion.surface.isZero(0.0)) return;
+  const v1::Force& written = context->scene.forces().force(static_cast<int>(force));
+  context->diagnostics->error(place_of(written.location()),
+                              written.type() + " \"" + written.id() + "\" names the body \"" +
+                                  context->description.bodies[body].id +
+                                  "\", whose surface runs; allowed: bodies without SurfaceVelocity");
+}
+
 }  // namespace
 
 void flatten_force(const TypeDeclaration& type, const v1::Force& force, const IdIndex& bodies, BuildContext* context,
@@ -110,8 +120,10 @@ void complete_forces(BuildContext* context) {
     for_each_property(type, &context->description.forces[force].parameters,
                       [&](const Property& property, const double* numbers) {
                         if (property.kind != PropertyKind::kBody || std::isnan(numbers[0])) return;
-                        named.insert(static_cast<std::uint32_t>(numbers[0]));
-                        add_reaction(force, static_cast<std::uint32_t>(numbers[0]), context);
+                        const auto body = static_cast<std::uint32_t>(numbers[0]);
+                        named.insert(body);
+                        refuse_belt(force, body, context);
+                        add_reaction(force, body, context);
                       });
     if (absent_gravity(type, &context->description.forces[force].parameters) != nullptr)
       float_bodies(force, type, context);
@@ -127,8 +139,8 @@ void complete_forces(BuildContext* context) {
     // accelerations jump at the rows of a motion, with them what forces between the body and others do and, with Smooth, the
     // accelerations of what is jointed to it
     if (context->description.simulator == kernel::Simulator::kSmooth || named.contains(i))
-      for (std::size_t row = 0; row < body.motion.size(); row += MotionCurve::kColumns)
-        switches.insert(body.motion[row]);
+      for (std::size_t row = 0; row < body.motion.rows.size(); row += MotionTable::kColumns)
+        switches.insert(body.motion.rows[row]);
   }
   context->description.switches.assign(switches.begin(), switches.end());
 }

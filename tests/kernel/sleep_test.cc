@@ -291,7 +291,7 @@ TEST(Sleep, AKinematicBodyThatBeginsToMoveWakesWhatStandsOnIt) {
   table.flags = kKinematic | kHasShape;
   for (const double t : {0.0, 0.5, 1.0, 1.5, 2.0})
     for (const double number : {t, 0.0, -0.25 + (t > 1.0 ? 2.0 * (t - 1.0) : 0.0), 0.0, 1.0, 0.0, 0.0, 0.0})
-      table.motion.push_back(number);
+      table.motion.rows.push_back(number);
   builder.box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0)).box(Vector3(0.4, 0.2, 0.4), 1.0, Vector3(0, 0.7, 0));
   may_sleep(&builder).gravity(kWeight);
   Environment world(builder.description());

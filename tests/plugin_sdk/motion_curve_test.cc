@@ -12,12 +12,12 @@
 namespace gravitas {
 namespace {
 
-using CurveRow = std::array<double, MotionCurve::kColumns>;
+using CurveRow = std::array<double, MotionTable::kColumns>;
 
-std::vector<double> table(const std::vector<CurveRow>& rows) {
-  std::vector<double> numbers;
-  for (const CurveRow& row : rows) numbers.insert(numbers.end(), row.begin(), row.end());
-  return numbers;
+MotionTable table(const std::vector<CurveRow>& rows) {
+  MotionTable made;
+  for (const CurveRow& row : rows) made.rows.insert(made.rows.end(), row.begin(), row.end());
+  return made;
 }
 
 CurveRow row(double time, const Vector3& x, const Quaternion& q) {
@@ -25,7 +25,7 @@ CurveRow row(double time, const Vector3& x, const Quaternion& q) {
 }
 
 // Uneven times, turns of up to 2.5 rad about changing axes.
-std::vector<double> winding_table() {
+MotionTable winding_table() {
   std::vector<CurveRow> rows;
   const double times[] = {0.0, 0.3, 0.5, 1.2, 1.3, 2.0};
   Quaternion q = Quaternion::Identity();
@@ -43,8 +43,8 @@ double angle_between(const Quaternion& a, const Quaternion& b) {
 const Pose kOffset{Vector3(0.3, -0.2, 0.1), Quaternion(0.5, 0.5, -0.5, 0.5)};
 
 TEST(MotionCurve, GoesThroughEveryRow) {
-  const std::vector<double> rows = winding_table();
-  const MotionCurve curve(rows, {});
+  const std::vector<double> rows = winding_table().rows;
+  const MotionCurve curve({rows}, {});
   for (std::size_t i = 0; i < rows.size(); i += 8) {
     const MotionCurve::State state = curve.at(rows[i]);
     // some roundings of numbers of size 5
@@ -120,8 +120,8 @@ TEST(MotionCurve, ItsVelocitiesAndAccelerationsAreTheDerivatives) {
 }
 
 TEST(MotionCurve, IsContinuousWithItsVelocitiesAtRows) {
-  const std::vector<double> rows = winding_table();
-  const MotionCurve curve(rows, kOffset);
+  const std::vector<double> rows = winding_table().rows;
+  const MotionCurve curve({rows}, kOffset);
   for (std::size_t i = 0; i < rows.size(); i += 8) {
     const MotionCurve::State before = curve.at(std::nextafter(rows[i], -1.0)), at = curve.at(rows[i]);
     // roundings, times velocities of 50 m/s and rad/s
@@ -174,12 +174,30 @@ TEST(MotionCurve, OneRowStaysThere) {
   }
 }
 
+// Velocities are those of the poses and of what runs along, turned with the frame; the poses know nothing of it.
+TEST(MotionCurve, ASurfaceRunsInItsFrame) {
+  const MotionTable still = winding_table();
+  const MotionTable belt{still.rows, Vector3(0.5, -1.0, 2.0)};
+  const MotionCurve frame(still, {}), body(still, kOffset), carried(belt, kOffset);
+  for (double t = 0.05; t < 2.0; t += 0.1) {
+    const Quaternion turned = frame.at(t).pose.orientation;
+    EXPECT_EQ(carried.at(t).pose.position, body.at(t).pose.position);
+    EXPECT_EQ(carried.at(t).twist.angular, body.at(t).twist.angular);
+    EXPECT_LT((carried.at(t).twist.linear - body.at(t).twist.linear - turned * belt.surface).norm(), 1e-14 * 100.0)
+        << t;
+    const double d = 1e-5;
+    const Vector3 slope = (carried.at(t + d).twist.linear - carried.at(t - d).twist.linear) / (2.0 * d);
+    EXPECT_LT((slope - carried.at(t).change.linear).norm(), 1e-4) << t;
+  }
+}
+
 TEST(MotionCurve, NamesWhatIsWrongWithATable) {
   const Quaternion unit = Quaternion::Identity();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(MotionCurve::find_problem(winding_table()), "");
   EXPECT_EQ(MotionCurve::find_problem({}), "it has no rows of time, position and orientation");
-  EXPECT_EQ(MotionCurve::find_problem(std::vector<double>(9, 0.0)), "it has no rows of time, position and orientation");
+  EXPECT_EQ(MotionCurve::find_problem({std::vector<double>(9, 0.0)}),
+            "it has no rows of time, position and orientation");
   EXPECT_EQ(MotionCurve::find_problem(table({row(0, {0, 0, 0}, unit), row(0, {1, 0, 0}, unit)})),
             "the time of row 1 does not ascend");
   EXPECT_EQ(MotionCurve::find_problem(table({row(0, {0, nan, 0}, unit)})), "row 0 has a number that is not finite");

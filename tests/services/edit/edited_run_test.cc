@@ -269,6 +269,19 @@ TEST(EditedRun, ABodyThatIsMadeImmovableStaysWhereItIs) {
   EXPECT_NEAR(end.at("B").position.x(), 0.7 + 0.5 * 0.7, 0.02);
 }
 
+// A ball comes to roll at 2/7 of what the ground below runs at, and is back at rest when that stops.
+TEST(EditedRun, ASurfaceRunsAndStops) {
+  EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" Material = \"Rubber\" }\n" +
+                      ball("A", "Position = {0, 0.1, 0}", kFalls)),
+                {"set Body.Ground.SurfaceVelocity={0.7,0,0}@step=21"},
+                {"Material.Rubber.StaticFrictionCoefficient=0.5", "Material.Rubber.DynamicFrictionCoefficient=0.5"});
+  EXPECT_NEAR(run.end()["A"].velocity.x(), 0.2, 1e-9);
+  run.options.edits.push_back("set Body.Ground.SurfaceVelocity={-0.7,0,0}@step=61");
+  EXPECT_NEAR(run.end()["A"].velocity.x(), -0.2, 1e-9);
+  run.options.edits.back() = "set Body.Ground.SurfaceVelocity={0,0,0}@step=61";
+  EXPECT_NEAR(run.end()["A"].velocity.x(), 0.0, 1e-9);
+}
+
 // What the edit does not touch goes on bit for bit, warm start and all; that there was an edit is in the chain.
 TEST(EditedRun, WhatIsNotTouchedKeepsItsBits) {
   for (const char* name : {"stack", "sliding_boxes", "double_pendulum", "two_spheres_motor"}) {

@@ -281,7 +281,7 @@ TEST(BuildBodies, ABoundOfTheUnboundedIsNone) {
 TEST(BuildBodies, StartWhereTheirMotionHasThem) {
   const BodyDescription door = body(
       "GeometryId = \"Brick\" Kinematic = true Motion = {{-1, {0, 0, 0}, {1, 0, 0, 0}}, {1, {2, 4, 6}, {1, 0, 0, 0}}}");
-  EXPECT_EQ(door.motion.size(), 16U);
+  EXPECT_EQ(door.motion.rows.size(), 16U);
   expect_vector(door.pose.position, Vector3(1, 2, 3));
   expect_vector(door.twist.linear, Vector3(1, 2, 3));
 }
