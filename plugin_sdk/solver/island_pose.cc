@@ -28,6 +28,7 @@ void IslandSolver::solve_pose() {
 void IslandSolver::find_pose() {
   constexpr double kSlow = 0.3;  // of the step before
   constexpr std::size_t kStepsAlone = 3;
+  constexpr double kAboveRounding = 1e-6;  // of the pose change: towards a locked place steps halve
   settings_.is_rough = true;
   ShrinkingSteps steps;
   AndersonAcceleration acceleration;
@@ -58,7 +59,8 @@ void IslandSolver::find_pose() {
     has_pose_ = solved.has_converged && (has_ended || !is_last);
     missed_ = solved.residual;
     // the steps know how directions turn, but not inertia: bodies with a small moment end slowly, or run away
-    shrinks_slowly_ = shrinks_slowly_ || (steps.count() > kStepsAlone && change > kSlow * last_change);
+    const double least = has_reactions() ? kAboveRounding * size : 0.0;
+    shrinks_slowly_ = shrinks_slowly_ || (steps.count() > kStepsAlone && change > std::max(least, kSlow * last_change));
     last_change = change;
     // reactions leave so little to close that only where rows become dependent steps shrink slowly
     move_to_end(shrinks_slowly_ && !is_last && !has_reactions() ? accelerated(displacement_, next, &acceleration)
