@@ -109,6 +109,7 @@ void Environment::constrain(const Trusted<TrialState>&) {
   ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                     data_.trial_angular_velocity);
   // what springs of joints do came with the derivatives
+  data_.held_force.resize(3 * data_.discrepancies.mode.size());
   if (knows_reactions())
     for (std::uint32_t& mode : data_.discrepancies.mode.span()) mode |= kForcesApplied;
 }

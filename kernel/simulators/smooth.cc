@@ -30,7 +30,8 @@ void Environment::ask_reactions() {
                data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity, data_.wrench, data_.kinematic_acceleration, data_.discrepancy_body,
                joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
-               joints.upper, joints.compliance, joints.damping, joints.maximum_force, block_body, block);
+               joints.upper, joints.compliance, joints.damping, joints.maximum_force, block_body, block,
+               front().position, front().orientation, start_linear_velocity(), start_angular_velocity());
   };
   data_.block_body.resize(0), data_.block.resize(0);
   data_.discrepancy_force.resize(3 * joints.mode.size());
@@ -60,6 +61,7 @@ void Environment::join_start_velocities() {
   follow_motion(data_.time[0], data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                 data_.trial_angular_velocity);
   constrain(Validator::unchecked<Trusted<TrialState>>());
+  std::ranges::fill(data_.held_force.span(), 0.0);
   solve();
   data_.start_linear_velocity.assign(data_.solved_linear_velocity);
   data_.start_angular_velocity.assign(data_.solved_angular_velocity);

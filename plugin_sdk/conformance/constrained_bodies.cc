@@ -120,6 +120,7 @@ MessageColumns ConstrainedBodies::request() const {
   for (const BodyJoint& joint : joints) {
     add_row(&columns, "discrepancy_warm_impulse", joint.warm_impulse);
     add_row(&columns, "discrepancy_warm_correction", joint.warm_correction);
+    add_row(&columns, "discrepancy_applied_force", Vector3::Zero());
   }
   append_contacts(&columns);
   return columns;
@@ -130,6 +131,8 @@ MessageColumns ConstrainedBodies::reactions_request() const {
   append_start(&columns);
   for (std::size_t i = 0; i < bodies.size(); ++i)
     add_row(&columns, "inertia", is_pushed(i) ? bodies[i].moments : Vector3::Zero());
+  for (const char* of : {"position", "orientation", "linear_velocity", "angular_velocity"})
+    columns.f64(std::string("start_") + of) = columns.f64(of);
   append_joints(&columns);
   return columns;
 }

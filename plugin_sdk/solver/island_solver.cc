@@ -170,6 +170,7 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   for (int k = 0; k < 3; ++k) {
     const auto place = static_cast<std::size_t>(k);
     joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
+    if (has_reactions()) hold_what_bears(request_.discrepancy_applied_force()[3 * row + place], &joint.states[place]);
     joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
     const auto at = 3 * row + static_cast<std::uint32_t>(k);
     answer_.joint_correction[at] =
@@ -220,6 +221,7 @@ void IslandSolver::guess_offset(double share) {
   for (EndJoint& joint : joints_) {
     move_to_end(&joint);
     for (std::size_t k = 0; k < 3; ++k) {
+      if (slips(joint, k)) joint.states[k].mode = AxisMode::kFree;
       if (is_spring(joint.states[k])) load_spring(k, &joint);
       const JointLaw law = velocity_law_of(joint, k);
       const double impulse = answer_.joint_impulse[3 * joint.row + k];
@@ -235,6 +237,16 @@ void IslandSolver::guess_offset(double share) {
     push_at_trial(contact, direction_at(friction, contact.arm1, contact.arm2), share, &offset_);
   }
   keep_moments_of_offset();
+}
+
+bool IslandSolver::slips(const EndJoint& joint, std::size_t k) const {
+  const JointAxisState& axis = joint.states[k];
+  if (!has_reactions() || !is_drive(axis.mode) || axis.maximum_force >= kUnlimited) return false;
+  const double applied = request_.discrepancy_applied_force()[3 * joint.row + k];
+  if (std::fabs(applied) < axis.maximum_force) return false;
+  const double rate =
+      joint.directions[k].along(bodies_[joint.body1].trial_velocity, bodies_[joint.body2].trial_velocity);
+  return (rate - axis.desired_velocity) * applied < 0.0;
 }
 
 void IslandSolver::load_spring(std::size_t k, EndJoint* joint) {

@@ -73,6 +73,9 @@ class IslandSolver {
   // offset_ as the impulses of the step before make it: what rests or moves steadily is found in one round.
   void guess_offset(double share);
 
+  // True for a drive, or friction, that did all it can while the trial state was integrated, and is short of its velocity.
+  bool slips(const EndJoint& joint, std::size_t k) const;
+
   // What a spring asks of the pose change; joint_correction is all that it pushes there, until store().
   void load_spring(std::size_t k, EndJoint* joint);
 

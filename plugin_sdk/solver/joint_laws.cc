@@ -6,6 +6,9 @@
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
+
+bool is_drive(AxisMode mode) { return mode == AxisMode::kDriven || mode == AxisMode::kFriction; }
+
 namespace {
 
 bool is_limit(AxisMode mode) { return mode == AxisMode::kLimited || mode == AxisMode::kUnilateral; }
@@ -35,8 +38,6 @@ bool is_soft(AxisMode mode, double compliance) {
 }
 
 bool is_soft(const JointAxisState& a) { return is_soft(a.mode, a.compliance); }
-
-bool is_drive(AxisMode mode) { return mode == AxisMode::kDriven || mode == AxisMode::kFriction; }
 
 void set_equality(JointLaw& law, double target) {
   law.has_lower = law.has_upper = true;
@@ -100,6 +101,13 @@ JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const 
   a.error_at_start = is_radial ? start_error.norm() : direction.dot(start_error);
   a.error_at_trial = direction.dot(discrepancy.point2 - discrepancy.point1);
   return a;
+}
+
+void hold_what_bears(double force, JointAxisState* axis) {
+  if (!is_limit(axis->mode) || is_soft(*axis) || force == 0.0) return;
+  const double target = force > 0.0 ? lower_of(*axis) : axis->upper;
+  axis->mode = AxisMode::kLimited;
+  axis->lower = axis->upper = target;
 }
 
 bool is_only_point(std::span<const std::uint32_t> bodies, std::span<const std::uint32_t> modes, std::size_t row) {

@@ -92,6 +92,9 @@ struct JointAxisState {
   double error_at_trial = 0.0;  // e*
 };
 
+// True for axes of velocities alone: driven and friction.
+bool is_drive(AxisMode mode);
+
 // True for an axis whose law is a force of the state: with compliance, or driven or friction with damping.
 bool acts_as_force(const Discrepancy& discrepancy, int axis);
 
@@ -101,6 +104,10 @@ double force_of(const JointAxisState& axis, double velocity);
 // All the axes of a discrepancy with error vector `start_error` (world) at S_n.
 JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
                                 const Vector3& start_error);
+
+// A limit that bore `force` while the trial state was integrated holds like a lock: what the integrator is off by to its free
+// side is put right as well, or it would count as open in the next step.
+void hold_what_bears(double force, JointAxisState* axis);
 
 // True for a discrepancy of points that is all which holds its two bodies, among the rows next to it. Each may then be pushed
 // at its own: two points of a hinge would contradict each other by what they are open.

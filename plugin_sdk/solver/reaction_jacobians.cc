@@ -114,8 +114,9 @@ ReactionSolver::JointState ReactionSolver::state_of(const Joint& joint) {
   const Arms arms = arms_of(d, axes, joint);
   JointState state;
   for (int axis = 0; axis < 3; ++axis) {
-    if (holds_always(d, axis)) state.rows[static_cast<std::size_t>(axis)] = row_of_axis(d, axes, axis, arms, joint);
-    if (!acts_as_force(d, axis)) continue;
+    const Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
+    if (holding.holds) state.rows[static_cast<std::size_t>(axis)] = row_of_axis(d, axes, axis, arms, joint);
+    if (!acts_as_force(d, axis) && holding.push == 0.0) continue;
     const Spring spring = spring_of(d, axes, axis, arms, joint);
     add_force(spring.row.direction, spring.force, &state.one, &state.two);
   }

@@ -33,10 +33,23 @@ class ReactionSolver {
     Matrix3 inverse_inertia = Matrix3::Zero();
     Pose asked, pose;  // as the question has it, and where the joints agree
     Twist velocity, acceleration;
+    Pose start;  // S_n
+    Twist start_velocity;
 
     bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
     Vector3 velocity_at(const Vector3& arm) const { return velocity.linear + velocity.angular.cross(arm); }
     Vector3 centripetal(const Vector3& arm) const { return velocity.angular.cross(velocity.angular.cross(arm)); }
+  };
+
+  // How an axis holds, that is no spring.
+  struct Holding {
+    bool holds = false;
+    bool is_velocity = false;        // of a drive or friction, whatever the error
+    double target = 0.0;             // of the error, m or rad
+    double least = 0.0, most = 0.0;  // of its force on body 2, N or N m
+    double push = 0.0;               // that force where it does not hold: of a drive or friction that slips
+    bool is_released = false;        // asked for more than it bears
+    int returns = 0;                 // since
   };
 
   struct Joint {
@@ -44,7 +57,8 @@ class ReactionSolver {
     std::uint32_t body1, body2;
     Discrepancy discrepancy;
     bool is_only_point;         // joint_laws.h
-    std::size_t first_row = 0;  // of those that hold always
+    std::size_t first_row = 0;  // of those that hold
+    std::array<Holding, 3> holdings = {};
   };
 
   struct Row {
@@ -56,6 +70,7 @@ class ReactionSolver {
     double gamma;
     double scale;  // root of the diagonal
     double reach;  // m, the longer arm, or a rod's length; of an angular row 0
+    Holding* holding = nullptr;
   };
 
   // What the rows of a discrepancy's points share.
@@ -73,8 +88,8 @@ class ReactionSolver {
 
   // What a joint is in a state of its bodies.
   struct JointState {
-    std::array<Row, 3> rows;  // of the axes that hold always
-    Wrench one, two;          // of the springs
+    std::array<Row, 3> rows;  // of the axes that hold
+    Wrench one, two;          // of the springs, and of what slips
   };
 
   // How a body's state changes with a number.
@@ -100,6 +115,16 @@ class ReactionSolver {
   void accelerate();
   std::uint32_t row_of(std::uint32_t body) const;
   void load_joints();
+  // Which axes hold, in S_n (reaction_holdings.cc).
+  void find_holdings();
+  static Holding held_always(const Discrepancy& d, int axis);
+  Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
+  // The multipliers of the rows that hold. Returns what they are missed by.
+  double solve_held();
+  // Lets go of what bears more than it can, and holds again what closes without. False where nothing is to change.
+  bool change_holdings();
+  bool release_overloaded();
+  bool return_closing();
   void load_springs();
   Spring spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
   static void add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two);
@@ -125,8 +150,6 @@ class ReactionSolver {
 
   // Rows of all joints with the bodies where they are.
   void make_rows();
-  static double target(const Discrepancy& d, int axis);
-
   // The joint's discrepancy, carried along with its bodies: exactly but for an angular error that is no swing's,
   // twist's or component's, which is to first order.
   const Discrepancy& at_pose(const Joint& joint);
@@ -170,9 +193,10 @@ class ReactionSolver {
   const stage::SolverReactionsRequest* request_ = nullptr;
   std::vector<Body> bodies_;  // the world last
   std::vector<Joint> joints_;
-  double longest_ = 0.0;    // reach of a row
-  bool has_moved_ = false;  // bodies, from where they were asked
-  Discrepancy carried_;     // of at_pose()
+  double longest_ = 0.0;     // reach of a row
+  bool has_moved_ = false;   // bodies, from where they were asked
+  bool may_let_go_ = false;  // an axis that holds
+  Discrepancy carried_;      // of at_pose()
   std::vector<Row> rows_;
   std::vector<Spring> springs_;
   std::vector<Wrench> sprung_;  // of the springs, by body

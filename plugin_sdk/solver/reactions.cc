@@ -40,9 +40,19 @@ bool holds_always(const Discrepancy& d, int axis) {
 
 double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   request_ = &request;
-  has_moved_ = agrees_ = false;
   load_bodies();
   load_joints();
+  find_holdings();
+  double missed = solve_held();
+  while (may_let_go_ && change_holdings()) {
+    load_bodies();
+    missed = solve_held();
+  }
+  return missed;
+}
+
+double ReactionSolver::solve_held() {
+  has_moved_ = agrees_ = false;
   load_springs();
   make_rows();
   factorise(0.0);
@@ -109,6 +119,9 @@ void ReactionSolver::load_bodies() {
     Body& body = bodies_[i];
     body.asked = body.pose = {vector_at(request_->position(), i), quaternion_at(request_->orientation(), i)};
     body.velocity = {vector_at(request_->linear_velocity(), i), vector_at(request_->angular_velocity(), i)};
+    body.start = {vector_at(request_->start_position(), i), quaternion_at(request_->start_orientation(), i)};
+    body.start_velocity = {vector_at(request_->start_linear_velocity(), i),
+                           vector_at(request_->start_angular_velocity(), i)};
     if (!is_free(i)) continue;
     body.inverse_mass = request_->inverse_mass()[i];
     body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
@@ -165,11 +178,14 @@ void ReactionSolver::load_springs() {
   sprung_.assign(bodies_.size(), {});
   for (const Joint& joint : joints_) {
     const Discrepancy& d = joint.discrepancy;
-    if (!acts_as_force(d, 0) && !acts_as_force(d, 1) && !acts_as_force(d, 2)) continue;
+    const auto pushes = [&](std::size_t axis) {
+      return acts_as_force(d, static_cast<int>(axis)) || joint.holdings[axis].push != 0.0;
+    };
+    if (!pushes(0) && !pushes(1) && !pushes(2)) continue;
     const Matrix3 axes = to_rotation_matrix(d.axes);
     const Arms arms = arms_of(d, axes, joint);
     for (int axis = 0; axis < 3; ++axis) {
-      if (!acts_as_force(d, axis)) continue;
+      if (!pushes(static_cast<std::size_t>(axis))) continue;
       const Spring& spring = springs_.emplace_back(spring_of(d, axes, axis, arms, joint));
       add_force(spring.row.direction, spring.force, &sprung_[joint.body1], &sprung_[joint.body2]);
     }
@@ -179,6 +195,7 @@ void ReactionSolver::load_springs() {
 ReactionSolver::Spring ReactionSolver::spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms,
                                                  const Joint& joint) const {
   const Row row = row_of_axis(d, axes, axis, arms, joint);
+  if (!acts_as_force(d, axis)) return {row, joint.holdings[static_cast<std::size_t>(axis)].push};
   const Vector3 along = d.is_angular() ? Vector3(axes.col(axis)) : row.direction.linear;
   const JointAxisState state = joint_axis_state(d, axis, along, d.point2 - d.point1);
   return {row, force_of(state, row.direction.along(bodies_[joint.body1].velocity, bodies_[joint.body2].velocity))};
@@ -198,22 +215,20 @@ void ReactionSolver::make_rows() {
     const Matrix3 axes = to_rotation_matrix(d.axes);
     const Arms arms = arms_of(d, axes, joint);
     for (int axis = 0; axis < 3; ++axis) {
-      if (!holds_always(d, axis)) continue;
+      Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
+      if (!holding.holds) continue;
       Row row = row_of_axis(d, axes, axis, arms, joint);
+      row.holding = &holding;
       const Body &one = bodies_[joint.body1], &two = bodies_[joint.body2];
       row.direction = with_turns(row.direction, one.inverse_inertia, two.inverse_inertia);
       row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
       row.velocity_error = row.direction.along(one.velocity, two.velocity) - row.direction.linear.dot(d.velocity) -
                            (d.is_angular() ? axes.col(axis).dot(d.velocity) : 0.0);
-      row.error = axis_mode(d.modes, axis) == AxisMode::kDriven ? 0.0 : row.error - target(d, axis);
+      row.error = holding.is_velocity ? 0.0 : row.error - holding.target;
       longest_ = std::max(longest_, row.reach);
       if (row.scale > 0.0) rows_.push_back(row);
     }
   }
-}
-
-double ReactionSolver::target(const Discrepancy& d, int axis) {
-  return axis_mode(d.modes, axis) == AxisMode::kLimited ? d.lower[axis] : 0.0;
 }
 
 const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
@@ -265,7 +280,7 @@ ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Matrix3
   for (int k = 0; k < 3; ++k) {
     if (!joint.is_only_point || !holds_place(d, k)) continue;
     const Vector3 axis = axes.col(k);
-    arms.arm1 -= (axis.dot(d.point2 - d.point1) - target(d, k)) * axis;
+    arms.arm1 -= (axis.dot(d.point2 - d.point1) - joint.holdings[static_cast<std::size_t>(k)].target) * axis;
     along -= (axis.dot(along) - axis.dot(d.velocity)) * axis;
   }
   arms.bend = second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(along);

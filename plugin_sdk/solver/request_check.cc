@@ -142,6 +142,7 @@ void check_solver_request(const stage::SolverSolveRequest& request) {
   check_discrepancies(request, bodies, kForcesApplied);
   check_numbers("discrepancy_warm_impulse", request.discrepancy_warm_impulse(), request.mode().size(), 3);
   check_numbers("discrepancy_warm_correction", request.discrepancy_warm_correction(), request.mode().size(), 3);
+  check_numbers("discrepancy_applied_force", request.discrepancy_applied_force(), request.mode().size(), 3);
   check_contacts(request, bodies);
 }
 
@@ -154,6 +155,10 @@ void check_reactions_request(const stage::SolverReactionsRequest& r) {
   check_numbers("wrench", r.wrench(), bodies, 6);
   check_numbers("acceleration", r.acceleration(), bodies, 6);
   check_discrepancies(r, bodies, 0);
+  check_numbers("start_position", r.start_position(), bodies, 3);
+  check_unit("start_orientation", r.start_orientation(), bodies, 4);
+  check_numbers("start_linear_velocity", r.start_linear_velocity(), bodies, 3);
+  check_numbers("start_angular_velocity", r.start_angular_velocity(), bodies, 3);
   check_length("block_body", r.block_body(), r.block().size() / kBlockNumbers, 2);
   check_numbers("block", r.block(), r.block_body().size() / 2, kBlockNumbers);
   for (std::size_t i = 0; i < r.block_body().size(); ++i)

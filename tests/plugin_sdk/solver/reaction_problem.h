@@ -70,7 +70,11 @@ class ReactionProblem {
             column(damping),
             column(maximum_force),
             column(block_body),
-            column(block)};
+            column(block),
+            column(has_moved ? start_position : position),
+            column(has_moved ? start_orientation : orientation),
+            column(has_moved ? start_linear_velocity : linear_velocity),
+            column(has_moved ? start_angular_velocity : angular_velocity)};
   }
 
   void solve() {
@@ -105,6 +109,15 @@ class ReactionProblem {
   Vector3 force(std::size_t joint) const { return vector_at(force_, joint); }
   double residual() const { return residual_; }
 
+  // From here on the state is that of a trial, and the step began with what it was.
+  void begin_step() {
+    has_moved = true;
+    start_position = position, start_orientation = orientation;
+    start_linear_velocity = linear_velocity, start_angular_velocity = angular_velocity;
+  }
+
+  bool has_moved = false;
+  std::vector<double> start_position, start_orientation, start_linear_velocity, start_angular_velocity;
   std::vector<std::uint32_t> flags, discrepancy_body, mode, block_body;
   std::vector<double> inverse_mass, inertia, inverse_inertia, drag, position, orientation, linear_velocity,
       angular_velocity, wrench, acceleration, point1, point2, velocity, correction, axes, lower, upper, compliance,

@@ -1,0 +1,148 @@
+// Which axes hold in a state, of those that need not: closed limits, bounded drives and friction.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver/joint_laws.h"
+#include "plugin_sdk/solver/reaction_solver.h"
+
+namespace gravitas {
+namespace {
+
+constexpr double kAny = std::numeric_limits<double>::infinity();
+
+double lower_limit(const Discrepancy& d, int axis) {
+  return axis_mode(d.modes, axis) == AxisMode::kUnilateral ? 0.0 : d.lower[axis];
+}
+double upper_limit(const Discrepancy& d, int axis) {
+  return axis_mode(d.modes, axis) == AxisMode::kUnilateral ? kAny : d.upper[axis];
+}
+
+// True for an axis that holds in some states, by a force that it may not have in others.
+bool may_hold(const Discrepancy& d, int axis) {
+  const AxisMode mode = axis_mode(d.modes, axis);
+  if (mode == AxisMode::kFree || mode == AxisMode::kLocked || holds_always(d, axis) || acts_as_force(d, axis))
+    return false;
+  return is_drive(mode) == (d.maximum_force[axis] < kUnlimited);
+}
+
+}  // namespace
+
+ReactionSolver::Holding ReactionSolver::held_always(const Discrepancy& d, int axis) {
+  Holding holding;
+  holding.holds = true;
+  holding.is_velocity = is_drive(axis_mode(d.modes, axis));
+  if (axis_mode(d.modes, axis) == AxisMode::kLimited) holding.target = d.lower[axis];
+  holding.least = -kAny, holding.most = kAny;
+  return holding;
+}
+
+void ReactionSolver::find_holdings() {
+  may_let_go_ = false;
+  for (Joint& joint : joints_)
+    for (int axis = 0; axis < 3; ++axis)
+      if (holds_always(joint.discrepancy, axis))
+        joint.holdings[static_cast<std::size_t>(axis)] = held_always(joint.discrepancy, axis);
+  if (std::ranges::none_of(joints_, [](const Joint& joint) {
+        return may_hold(joint.discrepancy, 0) || may_hold(joint.discrepancy, 1) || may_hold(joint.discrepancy, 2);
+      }))
+    return;
+  const std::vector<Body> asked = bodies_;
+  for (Body& body : bodies_) body.pose = body.start, body.velocity = body.start_velocity;
+  has_moved_ = true;
+  for (Joint& joint : joints_) {
+    const Discrepancy d = at_pose(joint);
+    const Matrix3 axes = to_rotation_matrix(d.axes);
+    const Arms arms = arms_of(d, axes, joint);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!may_hold(d, axis)) continue;
+      const Row row = row_of_axis(d, axes, axis, arms, joint);
+      Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
+      holding = holding_at_start(d, axis, row);
+      may_let_go_ = may_let_go_ || holding.holds;
+    }
+  }
+  bodies_ = asked;
+  has_moved_ = false;
+}
+
+ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, int axis, const Row& row) const {
+  constexpr double kClosed = 1e-8;                       // of the reach, or rad
+  constexpr double kStill = 1e-8, kStillAtRest = 1e-10;  // of the speeds, and m/s or rad/s
+  const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
+  const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
+  const double rate = row.direction.along(one.velocity, two.velocity) - along.dot(d.velocity);
+  const double speeds = row.direction.linear.norm() * (one.velocity.linear.norm() + two.velocity.linear.norm()) +
+                        row.direction.angular1.norm() * one.velocity.angular.norm() +
+                        row.direction.angular2.norm() * two.velocity.angular.norm();
+  const double still = kStill * speeds + kStillAtRest;
+  Holding holding;
+  if (is_drive(axis_mode(d.modes, axis))) {
+    const double bound = d.maximum_force[axis];
+    holding.is_velocity = true;
+    holding.least = -bound, holding.most = bound;
+    holding.holds = std::abs(rate) <= still && bound > 0.0;
+    if (!holding.holds) holding.push = std::copysign(bound, -rate);
+    return holding;
+  }
+  const double slop = kClosed * (d.is_angular() ? 1.0 : row.reach);
+  if (row.error <= lower_limit(d, axis) + slop && rate <= still) {
+    holding.holds = true;
+    holding.target = lower_limit(d, axis), holding.most = kAny;
+  } else if (row.error >= upper_limit(d, axis) - slop && rate >= -still) {
+    holding.holds = true;
+    holding.target = upper_limit(d, axis), holding.least = -kAny;
+  }
+  return holding;
+}
+
+bool ReactionSolver::change_holdings() { return release_overloaded() || return_closing(); }
+
+bool ReactionSolver::release_overloaded() {
+  bool has_released = false;
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    Holding& holding = *rows_[i].holding;
+    const double force = multipliers_[i];
+    if (force >= holding.least && force <= holding.most) continue;
+    holding.holds = false;
+    holding.is_released = has_released = true;
+    if (holding.is_velocity) holding.push = std::clamp(force, holding.least, holding.most);
+  }
+  return has_released;
+}
+
+bool ReactionSolver::return_closing() {
+  constexpr int kMostReturns = 2;
+  constexpr double kNothing = 1e-9;  // of the accelerations
+  std::vector<Wrench> held(bodies_.size());
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    add_force(rows_[i].direction, multipliers_[i], &held[rows_[i].body1], &held[rows_[i].body2]);
+  std::vector<Twist> moving(bodies_.size());
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    moving[i] = bodies_[i].acceleration;
+    accelerate(bodies_[i], held[i], &moving[i]);
+  }
+  bool has_returned = false;
+  for (Joint& joint : joints_) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
+      if (!holding.is_released || holding.holds || holding.returns == kMostReturns) continue;
+      const Discrepancy& d = at_pose(joint);
+      const Matrix3 axes = to_rotation_matrix(d.axes);
+      const Row row = row_of_axis(d, axes, axis, arms_of(d, axes, joint), joint);
+      const double change = row.direction.along(moving[row.body1], moving[row.body2]);
+      const double nothing = kNothing * (std::abs(row.gamma) + std::abs(change));
+      // away from a limit, or against what slips
+      const double away = holding.is_velocity ? -holding.push : holding.most > 0.0 ? 1.0 : -1.0;
+      if ((row.gamma + change) * std::copysign(1.0, away) >= -nothing) continue;
+      holding.holds = has_returned = true;
+      holding.push = 0.0;
+      ++holding.returns;
+    }
+  }
+  return has_returned;
+}
+
+}  // namespace gravitas
