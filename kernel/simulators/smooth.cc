@@ -8,7 +8,8 @@
 // The integrator gets the reactions among the wrenches and need not know of joints: it integrates the index-1 form of
 // the equations and keeps its order. What that leaves of joint errors, in position and velocity, is of the size of the
 // method's own error; the solve at the end projects it away along M^-1 J^T. Springs of joints are among the reactions, so
-// that their stiffness bounds the step of an explicit method; the solve is told to leave them alone (kForcesApplied).
+// that their stiffness bounds the step of an explicit method; the solve is told to leave them alone (kForcesApplied), and what the
+// reactions had along each axis, as limits and bounded drives are there, too.
 #include <algorithm>
 
 #include "kernel/environment.h"
@@ -31,7 +32,8 @@ void Environment::ask_reactions() {
                data_.derivative_angular_velocity, data_.wrench, data_.kinematic_acceleration, data_.discrepancy_body,
                joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
                joints.upper, joints.compliance, joints.damping, joints.maximum_force, block_body, block,
-               front().position, front().orientation, start_linear_velocity(), start_angular_velocity());
+               front().position, front().orientation, start_linear_velocity(), start_angular_velocity(),
+               data_.time_step);
   };
   data_.block_body.resize(0), data_.block.resize(0);
   data_.discrepancy_force.resize(3 * joints.mode.size());

@@ -128,6 +128,7 @@ MessageColumns ConstrainedBodies::request() const {
 
 MessageColumns ConstrainedBodies::reactions_request() const {
   MessageColumns columns = empty_request(stage::Method::kSolverReactions);
+  columns.f64("time_step") = {time_step};
   append_start(&columns);
   for (std::size_t i = 0; i < bodies.size(); ++i)
     add_row(&columns, "inertia", is_pushed(i) ? bodies[i].moments : Vector3::Zero());

@@ -38,7 +38,8 @@
 // In the derivative (reactions.h) the same axes are forces of the state, e being its error less the limit:
 //   with compliance    f = -(e/c + d (J v - v_d)); of a limit while e is outside it, and never a pull back to it
 //   driven, friction   f = d (v_d - J v), for d > 0
-// both within maximum_force. Where they acted there (kForcesApplied), the axis is free at the end of the step.
+// both within maximum_force. Where they acted there (kForcesApplied), the axis is free at the end of the step. Limits, and drives
+// and friction without damping, are rows there, where they hold (reaction_holdings.cc).
 //
 // A contact's friction cone comes with its material row; a joint's discrepancy has no coefficient,
 // so its friction axes are bounded by maximum_force, each by itself. Compliance of free, driven and

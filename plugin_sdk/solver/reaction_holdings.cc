@@ -61,7 +61,7 @@ void ReactionSolver::find_holdings() {
       const Row row = row_of_axis(d, axes, axis, arms, joint);
       Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
       holding = holding_at_start(d, axis, row);
-      may_let_go_ = may_let_go_ || holding.holds;
+      may_let_go_ = may_let_go_ || holding.holds || holding.push != 0.0;
     }
   }
   bodies_ = asked;
@@ -84,7 +84,7 @@ ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, i
     holding.is_velocity = true;
     holding.least = -bound, holding.most = bound;
     holding.holds = std::abs(rate) <= still && bound > 0.0;
-    if (!holding.holds) holding.push = std::copysign(bound, -rate);
+    if (!holding.holds) holding.push = std::copysign(bound, -rate), holding.missing = std::abs(rate);
     return holding;
   }
   const double slop = kClosed * (d.is_angular() ? 1.0 : row.reach);
@@ -98,7 +98,7 @@ ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, i
   return holding;
 }
 
-bool ReactionSolver::change_holdings() { return release_overloaded() || return_closing(); }
+bool ReactionSolver::change_holdings() { return release_overloaded() || change_open(); }
 
 bool ReactionSolver::release_overloaded() {
   bool has_released = false;
@@ -113,7 +113,7 @@ bool ReactionSolver::release_overloaded() {
   return has_released;
 }
 
-bool ReactionSolver::return_closing() {
+bool ReactionSolver::change_open() {
   constexpr int kMostReturns = 2;
   constexpr double kNothing = 1e-9;  // of the accelerations
   std::vector<Wrench> held(bodies_.size());
@@ -124,25 +124,32 @@ bool ReactionSolver::return_closing() {
     moving[i] = bodies_[i].acceleration;
     accelerate(bodies_[i], held[i], &moving[i]);
   }
-  bool has_returned = false;
+  bool has_changed = false;
   for (Joint& joint : joints_) {
     for (int axis = 0; axis < 3; ++axis) {
       Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
-      if (!holding.is_released || holding.holds || holding.returns == kMostReturns) continue;
+      const bool may_return = holding.is_released && holding.returns < kMostReturns;
+      if (holding.holds || !(may_return || holding.missing > 0.0)) continue;
       const Discrepancy& d = at_pose(joint);
       const Matrix3 axes = to_rotation_matrix(d.axes);
       const Row row = row_of_axis(d, axes, axis, arms_of(d, axes, joint), joint);
       const double change = row.direction.along(moving[row.body1], moving[row.body2]);
+      if (holding.missing > 0.0) {
+        if (request_->time_step() * (row.gamma + change) * std::copysign(1.0, holding.push) < holding.missing) continue;
+        holding.push = holding.missing = 0.0;
+        has_changed = true;
+        continue;
+      }
       const double nothing = kNothing * (std::abs(row.gamma) + std::abs(change));
       // away from a limit, or against what slips
       const double away = holding.is_velocity ? -holding.push : holding.most > 0.0 ? 1.0 : -1.0;
       if ((row.gamma + change) * std::copysign(1.0, away) >= -nothing) continue;
-      holding.holds = has_returned = true;
+      holding.holds = has_changed = true;
       holding.push = 0.0;
       ++holding.returns;
     }
   }
-  return has_returned;
+  return has_changed;
 }
 
 }  // namespace gravitas

@@ -48,6 +48,7 @@ class ReactionSolver {
     double target = 0.0;             // of the error, m or rad
     double least = 0.0, most = 0.0;  // of its force on body 2, N or N m
     double push = 0.0;               // that force where it does not hold: of a drive or friction that slips
+    double missing = 0.0;            // m/s or rad/s that S_n was short of its velocity by
     bool is_released = false;        // asked for more than it bears
     int returns = 0;                 // since
   };
@@ -121,10 +122,11 @@ class ReactionSolver {
   Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
   // The multipliers of the rows that hold. Returns what they are missed by.
   double solve_held();
-  // Lets go of what bears more than it can, and holds again what closes without. False where nothing is to change.
+  // Lets go of what bears more than it can; holds again what closes without; leaves to the end of the step what reaches its
+  // velocity in it. False where nothing is to change.
   bool change_holdings();
   bool release_overloaded();
-  bool return_closing();
+  bool change_open();
   void load_springs();
   Spring spring_of(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms, const Joint& joint) const;
   static void add_force(const ConstraintDirection& direction, double force, Wrench* one, Wrench* two);

@@ -26,7 +26,15 @@
 // gradient of e^2/2c where axes turn with body 1. `reaction` and `discrepancy_force` contain it. An integrator meets it as
 // it meets any force: at its order, and an explicit one within its stability limit, h sqrt(1/(c m)) < 2.8 for RK4.
 //
-// Limits, friction and bounded drives that do not give way are left to the end of the step, so they are of first order.
+// In some states hold limits without compliance, and drives and friction with a bound and without damping, so that a rope that is
+// taut is a rod, and a bounded drive that is not overloaded one without bound (reaction_holdings.cc). A limit is a row where
+// it was closed in S_n (1e-8 of the reach, or rad) and not opening, a drive or friction where it was at its velocity there.
+// Multipliers that a row cannot have let it go: a limit is open then, a drive pushes with its bound; what closes without is held
+// again, twice at most. A drive that was not at its velocity in S_n pushes towards it, with its bound, unless that reaches it within
+// the step, which is left to the step's end.
+// So the integrator's order is that of motion while none of this changes; where it does, a step is of first order. At the
+// step's end a limit that bore something is closed like a lock, and a drive that did all it can is left alone, unless it went
+// beyond its velocity.
 //
 // Dependent rows are left out by the factorisation (profile_ldlt.h); rows that contradict each other are met as well as
 // can be (least squares), and `residual` says by how much they are missed.

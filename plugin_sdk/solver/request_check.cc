@@ -155,6 +155,8 @@ void check_reactions_request(const stage::SolverReactionsRequest& r) {
   check_numbers("wrench", r.wrench(), bodies, 6);
   check_numbers("acceleration", r.acceleration(), bodies, 6);
   check_discrepancies(r, bodies, 0);
+  if (!(r.time_step() > 0.0 && std::isfinite(r.time_step())))
+    refuse("time_step", 0, std::to_string(r.time_step()) + " is not positive");
   check_numbers("start_position", r.start_position(), bodies, 3);
   check_unit("start_orientation", r.start_orientation(), bodies, 4);
   check_numbers("start_linear_velocity", r.start_linear_velocity(), bodies, 3);

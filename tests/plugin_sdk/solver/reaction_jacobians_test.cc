@@ -137,6 +137,16 @@ void uneven_bushing(const Pose& one, const Pose& two, const std::function<void(c
   emit(sprung_component(one.orientation, turned, 1, {20.0, 2.0}));
   emit(sprung_component(one.orientation, turned, 2, {0.0, 1.0}));
 }
+// Not at its speed, so that it pushes with its bound.
+void slipping_drive(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+  ball(one, two, emit);
+  Discrepancy d;
+  d.axes = one.orientation;
+  d.modes = pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree, true);
+  d.velocity = one.orientation * Vector3(50, 0, 0);
+  d.maximum_force.x() = 70.0;
+  emit(d);
+}
 void rod(const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
   Discrepancy d;
   d.point1 = one.position + one.orientation * Vector3(0, 2, 0), d.point2 = two.position;
@@ -160,9 +170,14 @@ Mechanism links(std::uint64_t seed) {
 }
 
 TEST(ReactionJacobians, AreTheSlopesOfTheReactions) {
-  const std::vector<std::pair<std::string, decltype(Joint::describe)>> kinds = {
-      {"balls", ball},     {"hinges", hinge},     {"even shafts", even_shafts},       {"rods", rod},
-      {"springs", spring}, {"bushings", bushing}, {"uneven bushings", uneven_bushing}};
+  const std::vector<std::pair<std::string, decltype(Joint::describe)>> kinds = {{"balls", ball},
+                                                                                {"hinges", hinge},
+                                                                                {"even shafts", even_shafts},
+                                                                                {"rods", rod},
+                                                                                {"springs", spring},
+                                                                                {"bushings", bushing},
+                                                                                {"uneven bushings", uneven_bushing},
+                                                                                {"slipping drives", slipping_drive}};
   for (const auto& [name, describe] : kinds) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       Draw draw(100 + seed);

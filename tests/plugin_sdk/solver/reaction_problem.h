@@ -74,7 +74,8 @@ class ReactionProblem {
             column(has_moved ? start_position : position),
             column(has_moved ? start_orientation : orientation),
             column(has_moved ? start_linear_velocity : linear_velocity),
-            column(has_moved ? start_angular_velocity : angular_velocity)};
+            column(has_moved ? start_angular_velocity : angular_velocity),
+            {&time_step, 1}};
   }
 
   void solve() {
@@ -117,6 +118,7 @@ class ReactionProblem {
   }
 
   bool has_moved = false;
+  double time_step = 0.01;
   std::vector<double> start_position, start_orientation, start_linear_velocity, start_angular_velocity;
   std::vector<std::uint32_t> flags, discrepancy_body, mode, block_body;
   std::vector<double> inverse_mass, inertia, inverse_inertia, drag, position, orientation, linear_velocity,

@@ -188,18 +188,78 @@ TEST(Reactions, OfContradictingJointsAreACompromiseAndSaySo) {
   EXPECT_LT(problem.reaction(2).norm(), 1e-12);
 }
 
-TEST(Reactions, AreNoneOfWhatIsBoundedOrRubs) {
-  Discrepancy bounded = pin(bob_at()), rope = rod({0, 0, 0}, bob_at()), drive = pin(bob_at());
+TEST(Reactions, AreNoneOfALockWithABound) {
+  Discrepancy bounded = pin(bob_at());
   bounded.maximum_force = Vector3::Constant(1e6);
-  rope.lower.x() = 0.0;
-  drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kFriction, AxisMode::kUnilateral);
-  drive.maximum_force = Vector3::Constant(1e6);
-  for (const Discrepancy& d : {bounded, rope, drive}) {
+  Problem problem;
+  problem.add_body(2.0, bob_at(), {5, 0, 0}, {0, -1, 0});
+  problem.add_joint(kNone, 0, bounded);
+  problem.solve();
+  EXPECT_EQ(problem.reaction(0), Vector3::Zero());
+}
+
+TEST(Reactions, OfARopeThatIsTautAreARods) {
+  Problem problem = swinging();
+  problem.lower[0] = 0.0;
+  problem.solve();
+  EXPECT_LT((problem.reaction(0) + kTension * bob_at() / 3.0).norm(), 1e-13);
+  // a trial state within it is that of a rope that was taut
+  problem.begin_step();
+  problem.position[1] += 1e-4, problem.point2[1] += 1e-4;
+  problem.solve();
+  EXPECT_NEAR(problem.force(0).x(), -kTension, 1e-2);
+  // slack, or opening, where the step began; or pushed into
+  Problem slack = swinging(), opening = swinging(), pushed = swinging();
+  slack.lower[0] = opening.lower[0] = pushed.lower[0] = 0.0;
+  slack.upper[0] += 1e-6;
+  opening.linear_velocity[1] += 1e-3;
+  pushed.wrench[1] += 40.0;
+  for (Problem* loose : {&slack, &opening, &pushed}) {
+    loose->solve();
+    EXPECT_EQ(loose->reaction(0), Vector3::Zero());
+  }
+}
+
+// Along x with 3 m/s, at 20 N, under 12 N along x and what else there is.
+Problem driven(double speed, double force) {
+  Discrepancy drive;
+  drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree);
+  drive.velocity.x() = 3.0;
+  drive.maximum_force.x() = 20.0;
+  Problem problem;
+  problem.add_body(2.0, {0, 0, 0}, {speed, 0, 0}, {force, 1.0, 0});
+  problem.add_joint(kNone, 0, drive);
+  problem.solve();
+  return problem;
+}
+
+TEST(Reactions, OfABoundedDriveHoldItsVelocityWithinTheBound) {
+  EXPECT_EQ(driven(3.0, 12.0).reaction(0), Vector3(-12, 0, 0));
+  EXPECT_EQ(driven(3.0, 25.0).reaction(0), Vector3(-20, 0, 0));
+  EXPECT_EQ(driven(3.0, -25.0).reaction(0), Vector3(20, 0, 0));
+  EXPECT_EQ(driven(2.8, 12.0).reaction(0), Vector3(20, 0, 0));
+  // (12 + 20)/2 m/s^2 are more than it needs in the step of 10 ms, which is left to its end
+  EXPECT_EQ(driven(2.9, 12.0).reaction(0), Vector3(0, 0, 0));
+  EXPECT_EQ(driven(3.1, 12.0).reaction(0), Vector3(-20, 0, 0));
+}
+
+// Two bodies in a row on a stop, the first pressed on it by 10 N, the second pressed on the first or pulled off.
+TEST(Reactions, OfStopsAreThoseThatPress) {
+  const auto stop = [](double at) {
+    Discrepancy d;
+    d.modes = pack_modes(AxisMode::kUnilateral, AxisMode::kFree, AxisMode::kFree);
+    d.point1.x() = d.point2.x() = at;
+    return d;
+  };
+  for (const double pull : {-10.0, 15.0, 5.0}) {
     Problem problem;
-    problem.add_body(2.0, bob_at(), {5, 0, 0}, {0, -1, 0});
-    problem.add_joint(kNone, 0, d);
+    problem.add_body(2.0, {0, 0, 0}, {0, 0, 0}, {-10, 0, 0});
+    problem.add_body(2.0, {1, 0, 0}, {0, 0, 0}, {pull, 0, 0});
+    problem.add_joint(kNone, 0, stop(0.0));
+    problem.add_joint(0, 1, stop(1.0));
     problem.solve();
-    EXPECT_EQ(problem.reaction(0), Vector3::Zero());
+    EXPECT_NEAR(problem.force(0).x(), 10.0 + std::max(0.0, -pull), 1e-12) << pull;
+    EXPECT_NEAR(problem.force(1).x(), std::max(0.0, -pull), 1e-12) << pull;
   }
 }
 
