@@ -331,6 +331,24 @@ TEST_F(JointPair, ARopeIsSlackWithinItsLength) {
   EXPECT_NEAR(joint_error(d, Vector3(0, 3.0, 0)), 0.5, kFreedomRounding);
 }
 
+// It was refused by where its points were at the start, whatever had become of them.
+TEST_F(JointPair, ARopeThatAnEditKeepsMayHaveAnyLength) {
+  PluginUnderTest plugin("constraint_distance");
+  const std::vector<double> shorter = numbers({kPoint, kPoint + kAxis}, {kNoValue, 0.5});
+  EXPECT_NE(refused(&plugin, "Distance", shorter).find("MaximumDistance"), std::string::npos);
+  JointProblem rope(&plugin, "Distance");
+  rope.bodies = bodies_;
+  rope.is_kept = true;
+  rope.bind(shorter);
+  const Discrepancy d = rope.describe().at(0);
+  EXPECT_EQ(d.upper.x(), 0.5);
+  EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.5, kFreedomRounding);
+  EXPECT_NE(
+      plugin.refusal(stage::Method::kConstraintBind, rope.bind_request(numbers({kPoint, kPoint + kAxis}, {0.6, 0.5})))
+          .find("MinimumDistance"),
+      std::string::npos);
+}
+
 TEST_F(JointPair, ConstantVelocityLeavesEveryBendFreeAndNoTwist) {
   PluginUnderTest plugin("constraint_constant_velocity");
   for (int i = 0; i < 30; ++i) {
