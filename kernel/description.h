@@ -105,6 +105,7 @@ struct ConstraintDescription {
   std::uint32_t plugin = 0;                    // which of the constraint slot's plugins serves the type
   // Poses of its bodies in which it is bound; absent: the initial ones. A joint of a scene that was edited has others.
   std::optional<std::array<Pose, 2>> bound_at = {};
+  bool is_kept = false;  // it held its bodies before an edit
 };
 
 // How a step is made of stages (simulators/).

@@ -103,6 +103,7 @@ Model::Model(Arena* arena, const EnvironmentDescription& d)
     group.parameter_begin = Column<std::uint32_t>(arena, served.size() + 1, 0);
     group.parameter = Column<double>(arena, parameter_count(served), 0);
     group.bind_body = Column<std::uint32_t>(arena, 2 * served.size(), 0);
+    group.is_kept = Column<std::uint32_t>(arena, served.size(), 0);
     group.bind_position = Column<double>(arena, 6 * served.size(), 0);
     group.bind_orientation = Column<double>(arena, 8 * served.size(), 0);
     group.bound_begin = Column<std::uint32_t>(arena, served.size() + 1, 0);
@@ -168,6 +169,7 @@ void Model::write(const EnvironmentDescription& d) {
       group.type[i] = type_id(served[i]->type);
       group.body[2 * i] = served[i]->body1;
       group.body[2 * i + 1] = served[i]->body2;
+      group.is_kept[i] = served[i]->is_kept ? 1 : 0;
       group.row.push_back(static_cast<std::uint32_t>(served[i] - d.constraints.data()));
     }
   }

@@ -29,7 +29,7 @@ struct ConstraintGroup {
   Column<std::uint32_t> body;
   Column<std::uint32_t> parameter_begin;
   Column<double> parameter;
-  Column<std::uint32_t> bind_body;                 // 2 a joint, rows of the poses that it is bound in, or kNone
+  Column<std::uint32_t> bind_body, is_kept;  // 2 a joint: rows of the poses that it is bound in, or kNone; 1 a joint
   Column<double> bind_position, bind_orientation;  // 2 a joint
   Column<std::uint32_t> bound_begin;               // written once by Constraint.Bind
   Column<double> bound;

@@ -69,14 +69,11 @@ void Environment::bind(const ConstraintGroup& group) {
     const bool has_body = group.body[row] != kNone;
     const Pose pose = bound_at ? bound_at->at(row % 2) : has_body ? description_.bodies[group.body[row]].pose : Pose{};
     group.bind_body[row] = has_body ? row : kNone;
-    set_vector(group.bind_position.span(), row, pose.position);
-    set_quaternion(group.bind_orientation.span(), row, pose.orientation);
+    set_vector(group.bind_position.span(), row, Vector3(pose.position.array() + 0.0));  // one zero, as in the state
+    set_quaternion(group.bind_orientation.span(), row, Quaternion((pose.orientation.coeffs().array() + 0.0).matrix()));
   }
-  // one zero, as in the state
-  for (const Column<double>* column : {&group.bind_position, &group.bind_orientation})
-    for (double& value : column->span()) value += 0.0;
   const auto request = ids(group.type, group.bind_body, group.parameter_begin, group.parameter, group.bind_position,
-                           group.bind_orientation);
+                           group.bind_orientation, group.is_kept);
   const auto reply = ids(group.bound_begin, group.bound);
   const StageCall call{stage::Method::kConstraintBind, group.target, request, reply};
   ask(Stage::kConstrain, &constraint_, call, nullptr,

@@ -25,6 +25,12 @@ JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<
           pose_of(position, orientation, constraint_body[2 * joint + 1]), constraint_body[2 * joint + 1] != kNone};
 }
 
+JointBodies bodies_of(const stage::ConstraintBindRequest& request, std::size_t joint) {
+  JointBodies bodies = bodies_of(request.constraint_body(), request.position(), request.orientation(), joint);
+  bodies.is_kept = joint < request.constraint_kept().size() && request.constraint_kept()[joint] != 0;
+  return bodies;
+}
+
 JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std::size_t joint) {
   JointBodies bodies = bodies_of(request.constraint_body(), request.position(), request.orientation(), joint);
   const std::span<const double> spin = request.angular_velocity();

@@ -19,6 +19,8 @@ namespace gravitas {
 struct JointBodies {
   Pose pose1, pose2;  // of the centres of mass
   bool has_body2 = true;
+  // It held before an edit of the scene, and is bound anew in the poses in which it was first. What it holds may be elsewhere.
+  bool is_kept = false;
   // rad/s, world, and the step that came to this state, s; zero when joints are bound
   Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
   double time_step = 0.0;
@@ -42,6 +44,7 @@ class BoundWriter {
 namespace detail {
 JointBodies bodies_of(std::span<const std::uint32_t> constraint_body, std::span<const double> position,
                       std::span<const double> orientation, std::size_t joint);
+JointBodies bodies_of(const stage::ConstraintBindRequest& request, std::size_t joint);
 JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std::size_t joint);
 void push_bound(const stage::ConstraintBindReply& reply, std::span<const double> numbers);
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d);
@@ -58,7 +61,7 @@ void bind_each(const stage::ConstraintBindRequest& request, const stage::Constra
       BoundWriter writer;
       bind(request.constraint_type()[i],
            PropertyCursor(detail::slice(request.parameter(), request.parameter_begin(), i)),
-           detail::bodies_of(request.constraint_body(), request.position(), request.orientation(), i), writer);
+           detail::bodies_of(request, i), writer);
       detail::push_bound(reply, writer.numbers());
     });
     reply.bound_begin().push(reply.bound().count());

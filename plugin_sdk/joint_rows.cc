@@ -105,6 +105,17 @@ Discrepancy sprung(Discrepancy row, const JointSpring& spring) {
   return row;
 }
 
+void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out) {
+  if (properties->at_end()) return;
+  const double speed = properties->number(), torque = properties->number();
+  if (std::isnan(speed)) {
+    if (!std::isnan(torque)) throw Refusal(std::string(type) + ": MaximumTorque is given without AngularSpeed");
+    return;
+  }
+  out->number(speed);
+  out->number(std::isnan(torque) ? kUnlimited : torque);
+}
+
 Pose frame_along(const Vector3& origin, const Vector3& first) {
   const auto [second, third] = orthonormal_basis(first);
   Matrix3 axes;
@@ -154,6 +165,13 @@ Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode) {
   Discrepancy d = row_along(axis, Vector3::Zero(), angle * axis, mode);
   d.modes |= kAngularDiscrepancy;
   return d;
+}
+
+Discrepancy driven_row(const Vector3& axis, double speed, double torque) {
+  Discrepancy drive = row_about(axis, 0.0, AxisMode::kDriven);
+  drive.velocity = speed * axis;
+  drive.maximum_force.x() = torque;
+  return drive;
 }
 
 Pose hinge_frame(const Vector3& point1, const Vector3& point2, const JointBodies& bodies, std::string_view type) {

@@ -50,6 +50,13 @@ JointSpring read_spring(PropertyCursor* bound);
 // A row (its first axis) that the spring holds, as far as it does.
 Discrepancy sprung(Discrepancy row, const JointSpring& spring);
 
+// A drive about an axis, from the next two properties, AngularSpeed and MaximumTorque; a request that was recorded before a joint
+// had them may end before. Bound are its speed and torque, and nothing where there is none. Refuses a torque without a speed.
+void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out);
+// Calls emit with its row, if there is one, about a unit axis about which the bodies turn by `rate` times what is driven.
+template <typename Emit>
+void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit);
+
 // A frame with its origin at `origin` and its first axis along a unit vector (world).
 Pose frame_along(const Vector3& origin, const Vector3& first);
 
@@ -70,6 +77,9 @@ Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3&
 
 // One row about a unit axis, with the angle (rad) as its error.
 Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
+
+// The row about a unit axis that a drive keeps at a speed (rad/s) with at most a torque (N m).
+Discrepancy driven_row(const Vector3& axis, double speed, double torque);
 
 // The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi);
 // its error is counted from there.
@@ -93,6 +103,14 @@ Pose hinge_frame(const Vector3& point1, const Vector3& point2, const JointBodies
 
 // The unit axis midway between the first ones of two frames, so that drift moves both alike.
 Vector3 axis_between(const Pose& frame1, const Pose& frame2);
+
+template <typename Emit>
+void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit) {
+  if (bound->at_end()) return;
+  const double speed = bound->number(), torque = bound->number();
+  // the power is that of the torque about what is driven
+  emit(driven_row(axis, rate * speed, torque < kUnlimited * rate ? torque / rate : kUnlimited));
+}
 
 // Calls emit with the rows that keep axes of two frames across each other: the first of frame 2 across the second and
 // third of frame 1, so that frame 2 turns about it only; and its second across the third of frame 1, which leaves no turn.

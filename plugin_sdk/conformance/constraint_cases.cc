@@ -319,10 +319,19 @@ void judge_spherical(Subject& subject) {
   }
 }
 
+// Motors, and other hinges that may have a drive.
+std::vector<TypeDeclaration> driven_hinges(const PluginDeclaration& declaration) {
+  std::vector<TypeDeclaration> types;
+  for (const TypeDeclaration& type : declaration.types) {
+    const bool has_speed = std::ranges::find(type.properties, "AngularSpeed", &Property::name) != type.properties.end();
+    if (type.name == "AngularMotor" || (type.name == "Revolute" && has_speed)) types.push_back(type);
+  }
+  return types;
+}
+
 // A hinge turns about its axis, and its drive wants the set speed: with it every row has the velocity it asks for.
-void judge_motor(Subject& subject) {
+void judge_motor_of(Subject& subject, const TypeDeclaration& type) {
   Draw draw(50);
-  const TypeDeclaration& type = *find_type(subject.declaration(), "AngularMotor");
   for (const double speed : {3.0, -0.5, 0.0}) {
     Joints world = joined(type, &draw);
     const Vector3 point1 = draw.vector(1.0), point2 = point1 + draw.direction();
@@ -330,7 +339,7 @@ void judge_motor(Subject& subject) {
     world.joints[0].properties = flattened(
         type, {given("BindAxisPoint1", point1), given("BindAxisPoint2", point2), given("AngularSpeed", speed)});
     Inquiry inquiry(subject,
-                    "AngularMotor of " + number_text(speed) + " rad/s, body 2 turned by 0.7 rad, at that speed");
+                    type.name + " of " + number_text(speed) + " rad/s, body 2 turned by 0.7 rad, at that speed");
     world.bind(&inquiry);
     turn_about(point1, 0.7 * axis, &world.bodies[1]);
     JointedBody &one = world.bodies[0], &other = world.bodies[1];
@@ -354,6 +363,10 @@ void judge_motor(Subject& subject) {
   }
 }
 
+void judge_motor(Subject& subject) {
+  for (const TypeDeclaration& type : driven_hinges(subject.declaration())) judge_motor_of(subject, type);
+}
+
 }  // namespace
 
 std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
@@ -375,7 +388,7 @@ std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
                 judge_constraint_hostile)};
   if (find_type(declaration, "Spherical") != nullptr)
     cases.push_back(make_case("constraint/spherical", "Bodies turn freely about their shared point.", judge_spherical));
-  if (find_type(declaration, "AngularMotor") != nullptr)
+  if (!driven_hinges(declaration).empty())
     cases.push_back(make_case("constraint/motor", "A motor's rows want its speed about its axis, and no other motion.",
                               judge_motor));
   return cases;

@@ -26,6 +26,7 @@ MessageColumns Joints::bind_request() const {
     request.u64("constraint_type").push_back(joint.type);
     request.u32("constraint_body").push_back(joint.body1);
     request.u32("constraint_body").push_back(joint.body2);
+    request.u32("constraint_kept").push_back(0);
     std::vector<double>& all = request.f64("parameter");
     all.insert(all.end(), joint.properties.begin(), joint.properties.end());
     request.u32("parameter_begin").push_back(static_cast<std::uint32_t>(all.size()));

@@ -241,6 +241,7 @@ void EditedScene::place() {
     } else {
       const kernel::ConstraintDescription& old = before_.constraints[old_joint_[j]];
       joint.bound_at = old.bound_at ? old.bound_at : std::array{initial(old.body1), initial(old.body2)};
+      joint.is_kept = true;
     }
   }
 }

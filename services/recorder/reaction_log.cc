@@ -16,6 +16,15 @@ Vector3 at_end(const kernel::StepData& data, std::uint32_t body, const Vector3& 
       displaced(trial, vector_at(data.pose_change.span(), 2 * body), vector_at(data.pose_change.span(), 2 * body + 1)));
 }
 
+// What a drive does of an impulse along a row's axes. A damper alone is one of the joint's springs.
+std::optional<Vector3> drive_of(const Discrepancy& row, const Vector3& along) {
+  std::optional<Vector3> drive;
+  for (int k = 0; k < 3; ++k)
+    if (axis_mode(row.modes, k) == AxisMode::kDriven && row.damping[k] == 0.0)
+      drive = drive.value_or(Vector3::Zero()) + row.axes * Vector3(along[k] * Vector3::Unit(k));
+  return drive;
+}
+
 void put(const Vector3& vector, google::protobuf::RepeatedField<double>* numbers) {
   for (const double number : vector) numbers->Add(number);
 }
@@ -67,6 +76,10 @@ void ReactionLog::add_joints(const kernel::StepData& data) {
     Vector3 along = vector_at(data.discrepancy_impulse.span(), i);
     if (acts_in_derivatives) along += data.time_step[0] * vector_at(data.held_force.span(), i);
     const Vector3 impulse = row.axes * along;
+    if (const std::optional<Vector3> drive = drive_of(row, along)) {
+      std::optional<Vector3>& all = row.is_angular() ? sum.drive_turn : sum.drive_impulse;
+      all = all.value_or(Vector3::Zero()) + *drive;
+    }
     if (row.is_angular()) {
       sum.turn += impulse;
     } else {
@@ -83,6 +96,8 @@ report::v1::Reaction ReactionLog::message(const kernel::Environment& environment
   put(sum.point, reaction.mutable_point());
   put(sum.impulse / length_, reaction.mutable_force());
   put(sum.turn / length_, reaction.mutable_torque());
+  if (sum.drive_impulse) put(*sum.drive_impulse / length_, reaction.mutable_drive_force());
+  if (sum.drive_turn) put(*sum.drive_turn / length_, reaction.mutable_drive_torque());
   return reaction;
 }
 

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,9 +47,10 @@ class ReactionLog {
 
  private:
   struct Sum {
-    Vector3 point = Vector3::Zero();    // world, m
-    Vector3 impulse = Vector3::Zero();  // on the second body, N s
-    Vector3 turn = Vector3::Zero();     // about the point, N m s
+    Vector3 point = Vector3::Zero();                   // world, m
+    Vector3 impulse = Vector3::Zero();                 // on the second body, N s
+    Vector3 turn = Vector3::Zero();                    // about the point, N m s
+    std::optional<Vector3> drive_impulse, drive_turn;  // of a drive that pushes, or turns
   };
 
   void add_joints(const kernel::StepData& data);

@@ -41,23 +41,31 @@ std::optional<std::vector<double>> property_of(const TypeDeclaration& type, cons
 
 Figures::Figures(const kernel::EnvironmentDescription& description) : description_(description) { find_drives(); }
 
-// A drive is a joint whose type has an axis of two points and an angular speed, as AngularMotor does, or a direction and a
-// speed, as Slider does.
+// A drive is a joint whose type has an angular speed and an axis of two points, as AngularMotor and Revolute do, or a rolling
+// one, as Axle does; or a direction and a speed, as Slider does.
 void Figures::find_drives() {
   for (std::uint32_t i = 0; i < description_.constraints.size(); ++i) {
     const kernel::ConstraintDescription& joint = description_.constraints[i];
-    const Quaternion q = joint.bound_at         ? joint.bound_at->at(0).orientation
-                         : joint.body1 == kNone ? Quaternion::Identity()
-                                                : description_.bodies[joint.body1].pose.orientation;
+    const auto in_body = [&](std::uint32_t body, std::size_t end, const Vector3& axis) {
+      const Quaternion q = joint.bound_at  ? joint.bound_at->at(end).orientation
+                           : body == kNone ? Quaternion::Identity()
+                                           : description_.bodies[body].pose.orientation;
+      return Vector3(q.conjugate() * axis.normalized());
+    };
     const auto add = [&](const Vector3& axis, double speed, bool slides) {
-      drives_.push_back({i, q.conjugate() * axis.normalized(), speed, slides});
+      drives_.push_back({i, in_body(joint.body1, 0, axis), speed, slides});
     };
     for (const TypeDeclaration& type : description_.constraint.plugins[joint.plugin].declaration.types) {
       if (type.name != joint.type) continue;
       const auto find = [&](const char* name) { return property_of(type, joint.parameters, name); };
       const auto point1 = find("BindAxisPoint1"), point2 = find("BindAxisPoint2"), angular_speed = find("AngularSpeed");
-      if (point1 && point2 && angular_speed)
-        add(vector_at(*point2, 0) - vector_at(*point1, 0), (*angular_speed)[0], false);
+      const auto steering = find("SteeringAxis"), rolling = find("RollingAxis");
+      const bool turns = angular_speed && !std::isnan((*angular_speed)[0]);
+      if (turns && point1 && point2) add(vector_at(*point2, 0) - vector_at(*point1, 0), (*angular_speed)[0], false);
+      if (turns && steering && rolling) {
+        add(vector_at(*steering, 0), (*angular_speed)[0], false);
+        drives_.back().rolling_in_body2 = in_body(joint.body2, 1, vector_at(*rolling, 0));
+      }
       const auto axis = find("Axis"), speed = find("Speed");
       if (axis && speed && !std::isnan((*speed)[0])) add(vector_at(*axis, 0), (*speed)[0], true);
     }
@@ -70,9 +78,17 @@ double Figures::drive_speed(const Drive& drive, const kernel::StateView& state) 
   const auto of = [](std::uint32_t body, std::span<const double> column) {
     return body == kNone ? Vector3(Vector3::Zero()) : Vector3(vector_at(column, body));
   };
-  const Vector3 axis =
-      one == kNone ? drive.axis_in_body1 : Vector3(quaternion_at(state.orientation, one) * drive.axis_in_body1);
-  if (!drive.slides) return axis.dot(of(two, state.angular_velocity) - of(one, state.angular_velocity));
+  const auto turned = [&](std::uint32_t body, const Vector3& axis) {
+    return body == kNone ? axis : Vector3(quaternion_at(state.orientation, body) * axis);
+  };
+  const Vector3 axis = turned(one, drive.axis_in_body1);
+  const Vector3 turning = of(two, state.angular_velocity) - of(one, state.angular_velocity);
+  if (drive.rolling_in_body2) {
+    // what it steers by, too, is no rolling
+    const Vector3 normal = axis.cross(turned(two, *drive.rolling_in_body2));
+    return normal.cross(axis).dot(turning) / normal.squaredNorm();
+  }
+  if (!drive.slides) return axis.dot(turning);
   // both turn alike, the one that is the world not at all
   const Vector3 arm = one == kNone || two == kNone ? Vector3(Vector3::Zero())
                                                    : Vector3(of(two, state.position) - of(one, state.position));

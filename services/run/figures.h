@@ -45,7 +45,8 @@ class Figures {
     Vector3 axis_in_body1;  // unit
     double target;          // rad/s or m/s
     bool slides = false;
-    double speed = 0.0;  // in the last state
+    double speed = 0.0;                            // in the last state
+    std::optional<Vector3> rolling_in_body2 = {};  // of a wheel, which steers about the other
   };
 
   struct Runaway {

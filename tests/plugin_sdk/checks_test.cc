@@ -86,7 +86,7 @@ TEST(CheckRows, WantsEqualColumns) {
 
 // Constraint.Bind of two joints on one body: bound_begin has one row more.
 std::string check_bind(std::uint64_t bound_begin, std::uint64_t bound) {
-  return check_rows(info(stage::Method::kConstraintBind), Counts{2, 4, 3, 6, 3, 4}, Counts{bound_begin, bound});
+  return check_rows(info(stage::Method::kConstraintBind), Counts{2, 4, 3, 6, 3, 4, 2}, Counts{bound_begin, bound});
 }
 
 TEST(CheckRows, HoldsAReplyAgainstTheRowsOfItsRequest) {

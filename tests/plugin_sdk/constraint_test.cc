@@ -26,7 +26,7 @@ struct Joints {
   std::vector<std::uint32_t> body = {0, 1, kNone, 1, 1, kNone};
   std::vector<std::uint32_t> begin = {0, 2, 2, 3};
   std::vector<double> numbers = {0.5, 0.25, 8.0};
-  std::vector<std::uint32_t> intact = {1, 1, 1};
+  std::vector<std::uint32_t> intact = {1, 1, 1}, kept = {0, 1, 0};
   std::vector<double> position = {1, 2, 3, 4, 5, 6};
   std::vector<double> orientation = {1, 0, 0, 0, 0, 1, 0, 0};
   std::vector<double> angular_velocity = {0, 0, 1, 0, 0, 2};
@@ -34,8 +34,9 @@ struct Joints {
 
   template <typename Bind>
   void bind(Bind bind) {
-    const std::array<gravitas_column, 6> request = {column_of(type),    column_of(body),     column_of(begin),
-                                                    column_of(numbers), column_of(position), column_of(orientation)};
+    const std::array<gravitas_column, 7> request = {column_of(type),    column_of(body),     column_of(begin),
+                                                    column_of(numbers), column_of(position), column_of(orientation),
+                                                    column_of(kept)};
     std::array<gravitas_reply_column, 2> reply = {gravitas_reply_column{bound_begin.data(), bound_begin.size(), 0},
                                                   gravitas_reply_column{bound.data(), bound.size(), 0}};
     bind_each(stage::ConstraintBindRequest(request.data()), stage::ConstraintBindReply(reply.data()), bind);
@@ -80,6 +81,7 @@ TEST(BindEach, GivesEachJointItsTypePropertiesAndBodies) {
     while (!properties.at_end()) read.push_back(properties.number());
     first.push_back(bodies.pose1.position);
     second.push_back(bodies.pose2.position);
+    EXPECT_EQ(bodies.is_kept, type == 20);
     if (type == 10) out.vector(Vector3(1, 2, 3));
     if (type == 30) out.number(4);
   });

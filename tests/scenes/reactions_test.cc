@@ -173,21 +173,59 @@ TEST_P(Reactions, OfFourCornersSumUpToTheWeight) {
   EXPECT_LE(turn.norm(), 1e-9);
 }
 
-// A motor that turns against 2 N m at constant speed gives 2 N m, and its hinge bears the weight.
+// A motor that turns against 2 N m at constant speed gives 2 N m, and its hinge bears the weight; so do a hinge and an axle with a
+// drive of their own.
 TEST_P(Reactions, OfAMotorIsItsTorque) {
-  Watched watched(
-      scene("",
-            "Body { Id = \"Disc\" Mass = 2 PrincipalMoments = {0.1, 0.2, 0.1} Forces = { \"Down\", \"Twist\" } "
-            "}\n",
-            "Constraint { Type = \"AngularMotor\" Id = \"Motor\" Body2 = \"Disc\" CustomProperties { "
-            "BindAxisPoint1 = {0, -0.5, 0} BindAxisPoint2 = {0, 0.5, 0} AngularSpeed = 3 } }\n"),
-      solver());
-  watched.run.steps(50);
-  const auto reactions = watched.reactions();
-  ASSERT_EQ(reactions.size(), 1U);
-  EXPECT_NEAR(watched.run.body("Disc").twist.angular.y(), 3.0, 1e-9);
-  EXPECT_LE((vector_of(reactions[0].torque()) - Vector3(0, 2, 0)).norm(), 1e-8);
-  EXPECT_LE((vector_of(reactions[0].force()) - Vector3(0, 2 * kG, 0)).norm(), 1e-8);
+  const std::string hinge = "BindAxisPoint1 = {0, -0.5, 0} BindAxisPoint2 = {0, 0.5, 0}";
+  for (const std::string& joint :
+       {"AngularMotor\" CustomProperties { " + hinge, "Revolute\" CustomProperties { " + hinge,
+        "Revolute\" CustomProperties { MaximumTorque = 5 " + hinge,
+        std::string(
+            "Axle\" CustomProperties { BindPoint = {0, 0, 0} SteeringAxis = {0, 0, 1} RollingAxis = {0, 1, 0}")}) {
+    Watched watched(scene("",
+                          "Body { Id = \"Disc\" Mass = 2 PrincipalMoments = {0.1, 0.2, 0.1} Forces = { \"Down\", "
+                          "\"Twist\" } }\n",
+                          "Constraint { Id = \"Motor\" Body2 = \"Disc\" Type = \"" + joint + " AngularSpeed = 3 } }\n"),
+                    solver());
+    watched.run.steps(50);
+    const auto reactions = watched.reactions();
+    ASSERT_EQ(reactions.size(), 1U);
+    EXPECT_NEAR(watched.run.body("Disc").twist.angular.y(), 3.0, 1e-9) << joint;
+    EXPECT_LE((vector_of(reactions[0].torque()) - Vector3(0, 2, 0)).norm(), 1e-8) << joint;
+    EXPECT_LE((vector_of(reactions[0].drive_torque()) - Vector3(0, 2, 0)).norm(), 1e-8) << joint;
+    EXPECT_EQ(reactions[0].drive_force_size(), 0) << joint;
+    EXPECT_LE((vector_of(reactions[0].force()) - Vector3(0, 2 * kG, 0)).norm(), 1e-8) << joint;
+  }
+}
+
+// What a drive presses its stop with was lost in their sum, which is nothing.
+TEST_P(Reactions, OfADriveAndItsStopAreToldApart) {
+  const std::string disc = "Body { Id = \"Disc\" Mass = 2 PrincipalMoments = {0.1, 0.2, 0.1} }\n";
+  const auto joint = [](const std::string& type, const std::string& properties) {
+    return "Constraint { Id = \"J\" Body2 = \"Disc\" Type = \"" + type + "\" CustomProperties { " + properties +
+           " } }\n";
+  };
+  Watched turns(scene("", disc,
+                      joint("Revolute",
+                            "BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 1, 0} UpperLimit = 0.1 "
+                            "AngularSpeed = 3 MaximumTorque = 5")),
+                solver());
+  Watched slides(scene("", disc,
+                       joint("Slider",
+                             "BindPoint = {0, 0, 0} Axis = {1, 0, 0} LowerLimit = -0.1 Speed = -4 "
+                             "MaximumForce = 6")),
+                 solver());
+  turns.run.steps(50), slides.run.steps(50);
+  const report::v1::Reaction turn = turns.reactions().at(0), slide = slides.reactions().at(0);
+  EXPECT_LE(vector_of(turn.torque()).norm(), 1e-8);
+  EXPECT_LE((vector_of(turn.drive_torque()) - Vector3(0, 5, 0)).norm(), 1e-8);
+  EXPECT_LE(vector_of(slide.force()).norm(), 1e-8);
+  EXPECT_LE((vector_of(slide.drive_force()) - Vector3(-6, 0, 0)).norm(), 1e-8);
+  EXPECT_EQ(slide.drive_torque_size(), 0);
+  // a damper is no drive
+  Watched damped(scene("", disc, joint("Slider", "BindPoint = {0, 0, 0} Axis = {1, 0, 0} Damping = 3")), solver());
+  damped.run.steps(3);
+  EXPECT_EQ(damped.reactions().at(0).drive_force_size(), 0);
 }
 
 // Joints inside the derivative: the force is that of the last one.

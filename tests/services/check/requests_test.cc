@@ -75,6 +75,7 @@ TEST(LargeQuestion, RepeatsWhereRowsBegin) {
   MessageColumns request = conformance::empty_request(bind);
   request.u64("constraint_type") = {1, 2};
   request.u32("constraint_body") = {GRAVITAS_NONE, 0, 0, 1};
+  request.u32("constraint_kept") = {0, 1};
   request.u32("parameter_begin") = {0, 3, 5};
   request.f64("parameter") = {1, 2, 3, 4, 5};
   request.f64("position").resize(6);

@@ -244,6 +244,55 @@ TEST_F(JointPair, ASlidersWayLimitsAndDriveAreAlongItsAxis) {
   EXPECT_EQ(rank(slider.jacobian(all)), 6);
 }
 
+TEST_F(JointPair, ARevolutesDriveIsAboutItsAxis) {
+  PluginUnderTest plugin("constraint_revolute");
+  const double no = kNoValue;
+  for (const double torque : {30.0, no}) {
+    JointProblem hinge =
+        joint(&plugin, "Revolute", numbers({kPoint, kPoint + 0.4 * kAxis}, {-0.5, 2.0, 50, 2, 0.0, -0.7, torque}));
+    turn(&hinge, 1.25 * kAxis);
+    const std::vector<Discrepancy> all = hinge.describe();
+    ASSERT_EQ(all.size(), 6U);
+    const Discrepancy& drive = all[5];
+    EXPECT_EQ(drive.modes, pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree, true));
+    EXPECT_LT((to_rotation_matrix(drive.axes).col(0) - kAxis).norm(), kFreedomRounding);
+    EXPECT_LT((drive.velocity + 0.7 * kAxis).norm(), kFreedomRounding);
+    EXPECT_EQ(drive.maximum_force.x(), torque == torque ? torque : kUnlimited);
+    EXPECT_EQ(rank(hinge.jacobian(all)), 6);
+  }
+}
+
+// The drive's row sees what the wheel rolls at and not what it steers at, whatever the angle between its axes, and its power is
+// the torque times that.
+TEST_F(JointPair, AnAxlesDriveIsAboutWhatItRollsAt) {
+  PluginUnderTest plugin("constraint_axle");
+  const double no = kNoValue;
+  for (const Vector3& rolling : {kAcross, kBent})
+    for (int i = 0; i < 20; ++i) {
+      JointProblem wheel =
+          joint(&plugin, "Axle", numbers({kPoint, kAxis, rolling}, {2000, 50, -1, 1, no, no, 0.0, 0.7, 30.0}));
+      turn(&wheel, random_.uniform(-1.0, 1.0) * kAxis);
+      const Vector3 now = wheel.bodies[1].pose.orientation * (bodies_[1].pose.orientation.conjugate() * rolling);
+      const std::vector<Discrepancy> all = wheel.describe();
+      ASSERT_EQ(all.size(), 5U);
+      const Discrepancy& drive = all[4];
+      EXPECT_EQ(drive.modes, pack_modes(AxisMode::kDriven, AxisMode::kFree, AxisMode::kFree, true));
+      EXPECT_EQ(rank(wheel.jacobian(all)), 6);
+      const double rolls = random_.uniform(-3.0, 3.0), steers = random_.uniform(-3.0, 3.0);
+      wheel.bodies[1].twist.angular = rolls * now + steers * kAxis;
+      const Vector3 axis = to_rotation_matrix(drive.axes).col(0);
+      const double rate = wheel.row_velocity(drive, axis);
+      EXPECT_NEAR(rate / rolls * 0.7, drive.velocity.dot(axis), kFreedomRounding);
+      EXPECT_NEAR(drive.maximum_force.x() * rate, 30.0 * rolls, 100 * kFreedomRounding);
+      EXPECT_NEAR(axis.dot(kAxis), 0.0, kFreedomRounding);
+    }
+  EXPECT_EQ(joint(&plugin, "Axle", numbers({kPoint, kAxis, kAcross}, {no, no, no, no, no, no, 0.0, 0.7, no}))
+                .describe()
+                .at(2)
+                .maximum_force.x(),
+            kUnlimited);
+}
+
 TEST_F(JointPair, ADistancesRowIsTheRateOfTheDistance) {
   PluginUnderTest plugin("constraint_distance");
   const Vector3 other = kPoint + 1.7 * kBent;
@@ -280,6 +329,24 @@ TEST_F(JointPair, ARopeIsSlackWithinItsLength) {
   EXPECT_EQ(d.upper.x(), 2.5);
   EXPECT_EQ(joint_error(d, d.point2 - d.point1), 0.0);
   EXPECT_NEAR(joint_error(d, Vector3(0, 3.0, 0)), 0.5, kFreedomRounding);
+}
+
+// It was refused by where its points were at the start, whatever had become of them.
+TEST_F(JointPair, ARopeThatAnEditKeepsMayHaveAnyLength) {
+  PluginUnderTest plugin("constraint_distance");
+  const std::vector<double> shorter = numbers({kPoint, kPoint + kAxis}, {kNoValue, 0.5});
+  EXPECT_NE(refused(&plugin, "Distance", shorter).find("MaximumDistance"), std::string::npos);
+  JointProblem rope(&plugin, "Distance");
+  rope.bodies = bodies_;
+  rope.is_kept = true;
+  rope.bind(shorter);
+  const Discrepancy d = rope.describe().at(0);
+  EXPECT_EQ(d.upper.x(), 0.5);
+  EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.5, kFreedomRounding);
+  EXPECT_NE(
+      plugin.refusal(stage::Method::kConstraintBind, rope.bind_request(numbers({kPoint, kPoint + kAxis}, {0.6, 0.5})))
+          .find("MinimumDistance"),
+      std::string::npos);
 }
 
 TEST_F(JointPair, ConstantVelocityLeavesEveryBendFreeAndNoTwist) {
@@ -470,6 +537,13 @@ TEST_F(JointPair, ContradictionsAreRefusedWithTheField) {
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {0.1, 0.5}), "LowerLimit"},
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-0.5, -0.1}), "UpperLimit"},
       {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-4.0, 4.0}), "UpperLimit"},
+      {"constraint_revolute", "Revolute",
+       numbers({kPoint, kPoint + kAxis}, {kNoValue, kNoValue, kNoValue, kNoValue, 0.0, kNoValue, 5.0}),
+       "MaximumTorque"},
+      {"constraint_axle", "Axle",
+       numbers({kPoint, kAxis, kAcross},
+               {kNoValue, kNoValue, kNoValue, kNoValue, kNoValue, kNoValue, 0.0, kNoValue, 5.0}),
+       "MaximumTorque"},
       {"constraint_slider", "Slider", numbers({kPoint, Vector3::Zero()}, {kNoValue, kNoValue, kNoValue, kNoValue}),
        "Axis"},
       {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {1.0, -1.0, kNoValue, kNoValue}), "LowerLimit"},

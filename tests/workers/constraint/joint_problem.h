@@ -24,6 +24,7 @@ class JointProblem {
   // kNone is the world.
   std::vector<std::uint32_t> ends = {0, 1};
   bool is_intact = true;
+  bool is_kept = false;  // bound anew after an edit
 
   JointProblem(PluginUnderTest* plugin, std::string_view type) : plugin_(plugin), type_(type) {}
 
@@ -31,6 +32,7 @@ class JointProblem {
     MessageColumns request = PluginUnderTest::request_of(stage::Method::kConstraintBind);
     request.u64("constraint_type") = {type_id(type_)};
     request.u32("constraint_body") = ends;
+    request.u32("constraint_kept") = {is_kept ? 1U : 0U};
     request.u32("parameter_begin") = {0, static_cast<std::uint32_t>(properties.size())};
     request.f64("parameter") = properties;
     add_poses(&request);

@@ -57,11 +57,7 @@ class AngularMotor final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       hold_hinge(one, two, emit);
-      const Vector3 axis = axis_between(one, two);
-      Discrepancy drive = row_about(axis, 0.0, AxisMode::kDriven);
-      drive.velocity = bound.number() * axis;
-      drive.maximum_force.x() = bound.number();
-      emit(drive);
+      drive_about(axis_between(one, two), 1.0, &bound, emit);
     });
   }
 };

@@ -12,6 +12,10 @@
 // start, however the wheel rolls; asin(sin(g) sin(angle)) where s and r make an angle g. Limits are one row, active at a
 // limit; a spring and a damper, torque -k (angle - SteeringAngle) - c angle', take no freedom. With a stiff spring
 // SteeringAngle is the angle that the wheel is steered to. They can tell less than a quarter turn either way.
+//
+// Drive. The wheel turns at w2 - w1 = p r + q s, where p is what it rolls at. So d = (r - (r.s) s)/sin^2 g has d.(w2 - w1) = p
+// and d.s = 0: a torque T d does the work T p, and steers nothing, as a motor in the hub of a wheel that may steer does. It is one
+// row on the velocity about d, made unit; with speed 0 it is a brake. Where r and s are across each other d is r.
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -25,7 +29,7 @@ class Axle final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Axle",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Wheel that rolls, steers and is sprung.",
         .types = {
@@ -58,7 +62,13 @@ class Axle final : public ConstraintPlugin {
                   .at_least(-kMostSteering)
                   .at_most(kMostSteering)
                   .defaults_to({0.0})
-                  .means("Steering angle at which the spring is at rest.")}}}};
+                  .means("Steering angle at which the spring is at rest."),
+              Property::number("AngularSpeed", "rad/s")
+                  .means("Speed at which a drive rolls body 2 on body 1, right-handed about RollingAxis; no drive if "
+                         "absent."),
+              Property::number("MaximumTorque", "N*m")
+                  .at_least(0.0)
+                  .means("Largest torque of the drive; unlimited if absent.")}}}};
   }
   explicit Axle(PropertyCursor) {}
 
@@ -84,6 +94,7 @@ class Axle final : public ConstraintPlugin {
                 out.number(limits.upper);
                 write_spring(spring, &out);
                 out.number(properties.at_end() ? 0.0 : properties.number());
+                write_drive(&properties, "Axle", &out);
               });
   }
 
@@ -109,9 +120,11 @@ class Axle final : public ConstraintPlugin {
         emit(limit);
       }
       const JointSpring held = read_spring(&bound);
-      if (held.is_none()) return;
-      const Vector3 rest = exp_rotation(bound.number() * steering) * across;
-      emit(sprung(swing_row(rest, rolling, kQuarterTurn), held));
+      const double rest = bound.number();
+      if (!held.is_none()) emit(sprung(swing_row(exp_rotation(rest * steering) * across, rolling, kQuarterTurn), held));
+      if (bound.at_end()) return;
+      const Vector3 normal = swing_between(steering, rolling).axis;
+      drive_about(normal.cross(steering), steering.cross(rolling).norm(), &bound, emit);
     });
   }
 

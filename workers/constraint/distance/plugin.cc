@@ -7,6 +7,9 @@
 // not zero for any body that can be moved, so a rod takes one freedom of twelve (rank 1), a rope none while it is slack.
 // With a stiffness what is beyond the range is a stretch that a spring and a damper hold, force -k stretch - c |x2 - x1|' along
 // u, and never across the range: an elastic rope, a spring, a strut. It takes no freedom, and may start beyond the range.
+// What an edit leaves beyond the range is an error of the joint as any other: the pose change of the next step takes it out (with
+// Sequential its CorrectionFactor of it), gives nothing a velocity, and does the work that the way asks for. So a rope hoists as fast
+// as edits shorten it.
 // u turns with the points (the discrepancy is radial). Where the points meet u is undefined and any direction is taken: a
 // rope is slack there, a rod of length 0 is refused.
 #include <algorithm>
@@ -27,7 +30,7 @@ class Distance final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Distance",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Rod, rope or cable.",
         .types = {{"Distance",
@@ -40,7 +43,7 @@ class Distance final : public ConstraintPlugin {
                     Property::number("MaximumDistance", "m")
                         .at_least(0.0)
                         .means("Largest distance; absent: none, or that of the start if MinimumDistance is absent "
-                               "too."),
+                               "too. Set while it runs, what is then too long is pulled in by the next step."),
                     Property::number("Stiffness", "N/m")
                         .above(0.0)
                         .means("Spring that holds what is beyond the range; rigid if absent."),
@@ -62,8 +65,9 @@ class Distance final : public ConstraintPlugin {
                 const JointSpring spring = JointSpring::of(&properties);
                 const bool is_rigid = spring.stiffness == 0.0;
                 if (is_rigid && spring.damping > 0.0) throw Refusal("Distance: Damping is given without Stiffness");
-                // with a spring it may start beyond them
-                demand_range(least, most, is_rigid ? start : std::max(least, std::min(start, most)));
+                // with a spring it may start beyond them, and after an edit it need not be where it started
+                const bool is_judged = is_rigid && !bodies.is_kept;
+                demand_range(least, most, is_judged ? start : std::max(least, std::min(start, most)));
                 out.vector(inverse_transform_point(bodies.pose1, point1));
                 out.vector(inverse_transform_point(bodies.pose2, point2));
                 out.number(least);

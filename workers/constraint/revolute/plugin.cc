@@ -11,6 +11,8 @@
 // right-handed about point 1 -> point 2, zero at the start, known within one turn: two limits may span less than that.
 // A spring and a damper about a, torque -k (angle - RestAngle) - c angle', take no freedom. Beyond half a turn from RestAngle
 // (from the middle of the limits, where there are some) the angle, and so the spring, goes on from the other side.
+// A drive to a speed with a largest torque is one row on the velocity about a (rank 6), as in an `AngularMotor`; at a limit that it
+// drives against it stalls, and with speed 0 it is a brake.
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -22,7 +24,7 @@ class Revolute final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Revolute",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Hinge.",
         .types = {{"Revolute",
@@ -42,7 +44,13 @@ class Revolute final : public ConstraintPlugin {
                     Property::number("Damping", "N*m*s/rad").at_least(0.0).means("Torsion damper; none if absent."),
                     Property::number("RestAngle", "rad")
                         .defaults_to({0.0})
-                        .means("Angle at which the spring pushes nothing.")}}}};
+                        .means("Angle at which the spring pushes nothing."),
+                    Property::number("AngularSpeed", "rad/s")
+                        .means("Speed of body 2 relative to body 1 about the axis that a drive keeps; no drive if "
+                               "absent."),
+                    Property::number("MaximumTorque", "N*m")
+                        .at_least(0.0)
+                        .means("Largest torque of the drive; unlimited if absent.")}}}};
   }
   explicit Revolute(PropertyCursor) {}
 
@@ -64,6 +72,7 @@ class Revolute final : public ConstraintPlugin {
           out.number(limits.upper);
           write_spring(spring, &out);
           out.number(properties.at_end() ? 0.0 : properties.number());
+          write_drive(&properties, "Revolute", &out);
         });
   }
 
@@ -77,8 +86,9 @@ class Revolute final : public ConstraintPlugin {
       limits.upper = bound.number();
       if (!limits.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, limits));
       const JointSpring spring = read_spring(&bound);
-      if (!spring.is_none())
-        emit(sprung_twist_row(one.orientation, two.orientation, bodies, limits, bound.number(), spring));
+      const double rest = bound.number();
+      if (!spring.is_none()) emit(sprung_twist_row(one.orientation, two.orientation, bodies, limits, rest, spring));
+      drive_about(axis_between(one, two), 1.0, &bound, emit);
     });
   }
 };

@@ -1,0 +1,70 @@
+// Joints whose properties are set while a scene runs: ropes that hoist, drives that come and go.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/services/edit/edited_run.h"
+
+namespace gravitas::edited {
+namespace {
+
+// A crane: its rope was refused by where the load began. What an edit leaves too long is pulled in by the next step, which gives the
+// load no velocity, and the work that is done is the load's weight times its way.
+TEST(EditedJoints, ARopeHoistsWhatHangsOnIt) {
+  const std::string rope =
+      "Constraints { Constraint { Type = \"Distance\" Id = \"Rope\" Body2 = \"Load\" CustomProperties { BindPoint1 = "
+      "{0, 0, 0} BindPoint2 = {0, -2, 0} MaximumDistance = 2 } } }\n";
+  const std::string load =
+      "Body { Id = \"Load\" Mass = 100 PrincipalMoments = {1, 1, 1} KineticProperties { Position = "
+      "{0, -2, 0} } " +
+      kFalls + " }\n";
+  for (const char* solver : {"Sequential", "Newton", "Direct"}) {
+    EditedRun run(scene(load, rope), {}, {std::string("Solver=") + solver});
+    const auto set_length = [&](double length, int step) {
+      run.options.edits.push_back("set Constraint.Rope.MaximumDistance=" + std::to_string(length) +
+                                  "@step=" + std::to_string(step));
+    };
+    for (int i = 1; i <= 10; ++i) {
+      set_length(2.0 - 0.004 * i, 10 + i);
+      run.options.steps = 10 + i;
+      const Row now = run.end()["Load"];
+      ASSERT_NEAR(now.position.y(), -2.0 + 0.004 * i, 1e-9) << solver;
+      ASSERT_NEAR(now.velocity.norm(), 0.0, 1e-9) << solver;
+    }
+    set_length(1.86, 31);
+    run.options.steps = 31;
+    Row end = run.end()["Load"];
+    EXPECT_NEAR(end.position.y(), -1.86, 1e-9) << solver;
+    EXPECT_NEAR(end.velocity.norm(), 0.0, 1e-9) << solver;
+    const RunResult result = run.run();
+    EXPECT_NEAR(result.report.energy().final() - result.report.energy().initial(), 100 * 10 * 0.14, 1e-6) << solver;
+    // paid out, it falls freely until the rope is taut again
+    set_length(5.0, 41);
+    run.options.steps = 60;
+    EXPECT_NEAR(run.end()["Load"].velocity.y(), -10 * 20 * kStep, 1e-9) << solver;
+    run.options.edits.back() = "set Constraint.Rope.MinimumDistance=3@step=41";
+    EXPECT_THAT(run.fault(), ::testing::HasSubstr("Distance: MinimumDistance 3.000000 lies above MaximumDistance"));
+  }
+}
+
+// A drive comes, turns round and goes while it runs: w = T t / I in between.
+TEST(EditedJoints, ADriveIsSetWhileItRuns) {
+  const double torque = 0.4 * 2 * 0.1 * 0.1;  // 1 rad/s^2
+  for (const std::string& joint :
+       {std::string("Type = \"Revolute\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} }"),
+        std::string("Type = \"Axle\" CustomProperties { BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = "
+                    "{0, 0, 1} }")}) {
+    EditedRun run(scene(ball("A", ""), "Constraints { Constraint { Id = \"J\" Body2 = \"A\" " + joint + " } }\n"),
+                  {"set Constraint.J.AngularSpeed=10@step=11",
+                   "set Constraint.J.MaximumTorque=" + std::to_string(torque) + "@step=11"});
+    EXPECT_NEAR(run.run().report.drives(0).speed(), 0.9, 1e-9);
+    run.options.edits.emplace_back("set Constraint.J.AngularSpeed=0@step=61");
+    EXPECT_NEAR(run.run().report.drives(0).speed(), 0.5 - 0.4, 1e-9);
+    run.options.edits = {run.options.edits[1]};
+    EXPECT_THAT(run.fault(), ::testing::HasSubstr("MaximumTorque is given without AngularSpeed"));
+  }
+}
+
+}  // namespace
+}  // namespace gravitas::edited
