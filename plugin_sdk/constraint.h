@@ -19,8 +19,9 @@ namespace gravitas {
 struct JointBodies {
   Pose pose1, pose2;  // of the centres of mass
   bool has_body2 = true;
-  // rad/s, world, and the step that came to this state, s; zero when joints are bound
+  // rad/s and m/s of the centres of mass, world, and the step that came to this state, s; zero when joints are bound
   Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
+  Vector3 velocity1 = Vector3::Zero(), velocity2 = Vector3::Zero();
   double time_step = 0.0;
 
   // The centre of mass of body 2, or where that is the world of body 1: a place that is no long way from what the joint

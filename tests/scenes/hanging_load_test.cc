@@ -7,6 +7,7 @@
 #include <string>
 #include <tuple>
 
+#include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
