@@ -33,12 +33,14 @@ JointBodies bodies_of(const stage::ConstraintBindRequest& request, std::size_t j
 
 JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std::size_t joint) {
   JointBodies bodies = bodies_of(request.constraint_body(), request.position(), request.orientation(), joint);
-  const std::span<const double> spin = request.angular_velocity();
-  const auto spin_of = [&](std::uint32_t body) {
-    return body != kNone && 3 * (std::size_t{body} + 1) <= spin.size() ? vector_at(spin, body) : Vector3::Zero();
+  const auto of = [](std::span<const double> column, std::uint32_t body) {
+    return body != kNone && 3 * (std::size_t{body} + 1) <= column.size() ? vector_at(column, body) : Vector3::Zero();
   };
-  bodies.spin1 = spin_of(request.constraint_body()[2 * joint]);
-  bodies.spin2 = spin_of(request.constraint_body()[2 * joint + 1]);
+  const std::uint32_t body1 = request.constraint_body()[2 * joint], body2 = request.constraint_body()[2 * joint + 1];
+  bodies.spin1 = of(request.angular_velocity(), body1);
+  bodies.spin2 = of(request.angular_velocity(), body2);
+  bodies.velocity1 = of(request.linear_velocity(), body1);
+  bodies.velocity2 = of(request.linear_velocity(), body2);
   bodies.time_step = request.time_step();
   return bodies;
 }

@@ -21,8 +21,9 @@ struct JointBodies {
   bool has_body2 = true;
   // It held before an edit of the scene, and is bound anew in the poses in which it was first. What it holds may be elsewhere.
   bool is_kept = false;
-  // rad/s, world, and the step that came to this state, s; zero when joints are bound
+  // rad/s and m/s of the centres of mass, world, and the step that came to this state, s; zero when joints are bound
   Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
+  Vector3 velocity1 = Vector3::Zero(), velocity2 = Vector3::Zero();
   double time_step = 0.0;
 
   // The centre of mass of body 2, or where that is the world of body 1: a place that is no long way from what the joint

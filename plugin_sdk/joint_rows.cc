@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "plugin_sdk/math/rotation.h"
@@ -158,6 +159,24 @@ Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3&
   d.point1 = point1, d.point2 = point2;
   d.axes = frame_along(point1, axis).orientation;
   d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree);
+  return d;
+}
+
+Discrepancy meshing_row(const Vector3& axis, const Vector3& point, double ahead, double error, double period,
+                        const JointBodies& bodies) {
+  constexpr double kClearly = 1e-4;  // of a period
+  Discrepancy d = row_along(axis, point, point, AxisMode::kLocked);
+  const double made = bodies.time_step * jacobian_row(d, axis, bodies.pose1.position, bodies.pose2.position)
+                                             .velocity(bodies.velocity1, bodies.spin1, bodies.velocity2, bodies.spin2);
+  double nearest = std::numeric_limits<double>::infinity(), known = error;
+  for (const double share : {1.0, 0.5, 0.0}) {
+    const double expected = share * made, one = error - period * std::round((error - expected) / period);
+    const double apart = std::fabs(one - expected);
+    if (!(apart < nearest - kClearly * period)) continue;
+    nearest = apart, known = one;
+  }
+  d.point1 -= (1.0 - ahead) * known * axis;
+  d.point2 += ahead * known * axis;
   return d;
 }
 

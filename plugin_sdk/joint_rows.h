@@ -75,6 +75,14 @@ Discrepancy held_point(const Pose& frame1, const Vector3& point2, HeldAxes held,
 // One row along a unit axis through two points, x and the others free; the error is axis.(x2 - x1).
 Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3& point2, AxisMode mode);
 
+// One row along a unit axis through a point, for what meshes: its error is known but for whole periods (m), as those of teeth
+// and turns of a thread. Of error + k period that is taken which the step made, by the bodies' velocities at its end: all of
+// what they make of it in its time, or half or none, as methods put the loads of a step into its ways. `ahead` of the error is
+// by how much body 2's point is ahead of the point: speeds are right to the second order of the turns that close the error where
+// only body 1 turns, with 0, and where only body 2 does, with 1/2.
+Discrepancy meshing_row(const Vector3& axis, const Vector3& point, double ahead, double error, double period,
+                        const JointBodies& bodies);
+
 // One row about a unit axis, with the angle (rad) as its error.
 Discrepancy row_about(const Vector3& axis, double angle, AxisMode mode);
 

@@ -36,6 +36,7 @@ struct JointMotion {
   Vector3 axis;
   bool turns = true;
   bool in_body1 = true;
+  double way = 0.0;  // along the axis with a radian
 };
 
 struct JointCase {
@@ -77,6 +78,12 @@ const std::vector<JointCase>& cases() {
        4,
        4,
        {{kAcross, true, false}, {kAxis, true, true}}},
+      {"Screw",
+       "constraint_screw",
+       numbers({kPoint, kPoint + 0.4 * kAxis}, {-2.0}),
+       5,
+       5,
+       {{kAxis, true, true, -1.0 / 3.14159265358979323846}}},
       {"Axle",
        "constraint_axle",
        numbers({kPoint, kAxis, kAcross}, {kNoValue, kNoValue}),
@@ -105,7 +112,7 @@ class JointFreedoms : public testing::TestWithParam<JointCase> {
       Pose next;
       if (m.turns) {
         const Quaternion turn = exp_rotation(by * m.axis);
-        next = {kPoint - turn * kPoint, turn};
+        next = {kPoint - turn * kPoint + by * m.way * m.axis, turn};
       } else {
         next = {by * m.axis, Quaternion::Identity()};
       }
