@@ -58,8 +58,10 @@ struct SlotDescription {
   double deadline = 2.0;       // s, for one call, counted from the last mark of progress
   bool attached = false;       // a worker that somebody started by hand; see kAttachedDeadline
   std::uint32_t standbys = 1;  // workers that wait, warm, to take over from one that fails; none if direct
-  // Slots that name the same process, and are hosted alike outside of this one, share it and its standbys; deadline and
-  // standbys are those of the first.
+  static constexpr std::uint32_t kBudget = 5;
+  std::uint32_t failures = kBudget;  // at so many, each soon after the other, others take over; see slot_host.h
+  // Slots that name the same process, and are hosted alike outside of this one, share it and its standbys; deadline,
+  // standbys and failures are those of the first.
   std::string process = {};
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
   Defences defences = {};

@@ -168,7 +168,7 @@ void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attem
   if (!fault.plugin.empty()) throw StageFault(fault);
   SlotHost& host = host_of(call.target);
   // nor if its process failed in a call of another slot, which others answer by now
-  if (attempts->asked && attempts->asked != host.carrier() && ++attempts->made < SlotHost::kBudget) return;
+  if (attempts->asked && attempts->asked != host.carrier() && ++attempts->made < SlotDescription::kBudget) return;
   attempts->asked.reset();  // else its worker's end would be waited for here
   if (!description_.defences.replay) {
     name(&fault, call.target);

@@ -50,7 +50,8 @@ void SlotHost::keep_standbys() {
     ++lost_standbys_;
     return true;
   });
-  while (standbys_.size() < wanted_standbys() && lost_standbys_ < kBudget) standbys_.push_back(prepare(description_));
+  while (standbys_.size() < wanted_standbys() && lost_standbys_ < description_.failures)
+    standbys_.push_back(prepare(description_));
 }
 
 void SlotHost::drain() {
@@ -158,7 +159,7 @@ Recovery SlotHost::recover(const StageFault& fault, Attempts* attempts, bool* po
   StageFault last = fault;
   for (;;) {
     std::string rung;
-    if (attempts->rejections >= 2 || budget.failures >= kBudget) {
+    if (attempts->rejections >= 2 || budget.failures >= description_.failures) {
       const bool is_to_blame = attempts->rejections >= 2;
       rung = next_rung(fault.slot);
       *poison |= is_to_blame && rung != "previous build";

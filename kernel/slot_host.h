@@ -2,10 +2,10 @@
 //
 //   replay on a standby -> cold start -> previous good build -> declared fallback -> the environment pauses
 //
-// A host that fails kBudget times with fewer than kGoodAnswers good answers between goes to the next rung, and so does
-// a request that two incarnations died of or answered wrongly (there a deadline alone does not count, nor a death
-// before the request was read; a first death over gRPC counts once the request was written). What fails is charged to
-// the slot that was asked; the others that share the host go on with whoever comes next, all alike.
+// A host that fails SlotDescription::failures times, each fewer than kGoodAnswers good answers after the one before, goes
+// to the next rung, and so does a request that two incarnations died of or answered wrongly (no deadline counts, nor a
+// death before the request was read; over gRPC a first death counts once it was written). What fails is charged to the
+// slot that was asked; the others that share the host go on with whoever comes next, all alike.
 #pragma once
 
 #include <array>
@@ -39,7 +39,6 @@ struct Recovery {
 
 class SlotHost {
  public:
-  static constexpr std::uint32_t kBudget = 5;
   static constexpr std::uint32_t kGoodAnswers = 100;
   // Steps for which a swap is on probation.
   static constexpr std::uint32_t kProbation = 8;
@@ -53,7 +52,7 @@ class SlotHost {
   // of a host asks for both.
   void begin_start();
   void finish_start();
-  // Begins the standbys that are missing, unless kBudget of them were lost.
+  // Begins the standbys that are missing, unless as many were lost as may fail.
   void keep_standbys();
   void drain();
 

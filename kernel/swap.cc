@@ -23,13 +23,11 @@ std::string shown(const PluginChoice& plugin, const SlotDescription& host) {
 }  // namespace
 
 void StageSlot::order_swap(SwapOrder order, std::uint32_t target, bool only_compare) {
-  const std::size_t host = routes_[target].host;
   PendingSwap& swap = pending_.emplace_back();
-  swap.host = host, swap.target = target;
-  swap.only_compare = only_compare, swap.record = swaps_.size();
+  swap.host = routes_[target].host, swap.target = target, swap.only_compare = only_compare, swap.record = swaps_.size();
   SwapRecord& record = swaps_.emplace_back();
   record.slot = which_, record.step = order.step, record.only_compared = only_compare;
-  record.to = order.plugin.declaration.name;
+  record.from = description_.plugins[target].declaration.name, record.to = order.plugin.declaration.name;
   swap.order = std::move(order);
   std::ranges::stable_sort(pending_, {}, [](const PendingSwap& one) { return one.order.step; });
   needs_attention_ = true;

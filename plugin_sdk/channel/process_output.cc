@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::array<const char*, 2> kPrefix = {"stdout: ", "stderr: "};
 constexpr std::size_t kPrefixSize = 8;
+constexpr std::size_t kMostIndented = 3;
 
 // Length of the UTF-8 character that begins here; 0 if none does.
 std::size_t character_size(std::string_view text) {
@@ -61,7 +62,7 @@ void ProcessOutput::end(OutputStream stream) {
 void ProcessOutput::add_line(OutputStream stream) {
   const auto which = static_cast<std::size_t>(stream);
   auto& [text, held, dropped] = streams_[which];
-  if (stream == OutputStream::kStderr && !is_blank(text) && !last_words_.starts_with("SUMMARY: ")) last_words_ = text;
+  if (stream == OutputStream::kStderr && !is_blank(text)) note_last_words(text);
   const std::size_t cost = text.size() + kPrefixSize + sizeof(std::string);
   if (dropped > 0 || held + cost > kMostBytes / streams_.size()) {
     dropped += text.size() + 1;
@@ -72,7 +73,27 @@ void ProcessOutput::add_line(OutputStream stream) {
   text.clear();
 }
 
-std::string ProcessOutput::last_words() const { return printable(last_words_); }
+void ProcessOutput::note_last_words(const std::string& line) {
+  if (last_words_.starts_with("SUMMARY: ")) return;
+  // what was indented before leads to this line or to nothing
+  const bool was_indented = !last_words_.empty() && is_blank(last_words_.substr(0, 1));
+  if (was_indented) indented_.push_back(std::move(last_words_));
+  if (!was_indented) indented_.clear();
+  if (indented_.size() > kMostIndented) indented_.pop_front();
+  last_words_ = line;
+}
+
+std::string ProcessOutput::last_words() const {
+  const auto trimmed = [](const std::string& line) {
+    const std::size_t begin = line.find_first_not_of(" \t"), end = line.find_last_not_of(" \t\r");
+    return line.substr(begin, end + 1 - begin);
+  };
+  if (last_words_.empty()) return {};
+  std::string words;
+  if (!last_words_.starts_with("SUMMARY: "))
+    for (const std::string& line : indented_) words += trimmed(line) + " / ";
+  return printable(words + (words.empty() ? last_words_ : trimmed(last_words_)));
+}
 
 std::vector<std::string> ProcessOutput::take() {
   for (std::size_t i = 0; i < streams_.size(); ++i) {

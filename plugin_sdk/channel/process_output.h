@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,7 +30,8 @@ class ProcessOutput {
   // no room is counted: "stdout: ... and 123456 more bytes dropped". What is neither printable nor UTF-8 is a '?'.
   std::vector<std::string> take();
 
-  // The last line of standard error that is not blank, or the summary if a sanitizer wrote one. Taken or not.
+  // The last line of standard error that is not blank, or the summary if a sanitizer wrote one; behind up to three indented
+  // lines that lead to it, since these say where: `File "w.py", line 3 / f( / ^ / SyntaxError: …`. Taken or not.
   std::string last_words() const;
 
  private:
@@ -39,10 +41,12 @@ class ProcessOutput {
     std::uint64_t dropped = 0;  // since a line found no room: all of them
   };
   void add_line(OutputStream stream);
+  void note_last_words(const std::string& line);
 
   std::array<Stream, 2> streams_;
   std::vector<std::string> lines_;
   std::string last_words_;
+  std::deque<std::string> indented_;  // before them
 };
 
 }  // namespace gravitas::channel

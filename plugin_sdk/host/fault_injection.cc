@@ -102,19 +102,20 @@ std::int32_t FaultInjection::after_plugin(const stage::MethodInfo& method, const
   if (status != GRAVITAS_OK) return status;
   if (changes_reply(order_.fault())) {
     const std::string problem = change_reply(order_, method, request, reply);
-    if (!problem.empty()) return fail(problem);
+    if (!problem.empty()) note_ = kNotInjected + problem;
     for (std::size_t i = 0; i < method.reply.size(); ++i)
       if (reply[i].count > reply[i].capacity) return GRAVITAS_NEEDS_CAPACITY;
   }
   const bool needs_payload =
       is(InjectedFault::kTruncate) || (is(InjectedFault::kFlip) && order_.word("where") == "payload");
-  if (needs_payload && payload_bits(method.reply, reply) == 0)
-    return fail(std::string("the reply of ") + method.name + " has no elements to damage");
+  is_void_ = needs_payload && payload_bits(method.reply, reply) == 0;
+  if (is_void_) note_ = std::string(kNotInjected) + "the reply of " + method.name + " has no elements to damage";
   return status;
 }
 
 void FaultInjection::spoil_frame(gravitas_frame_header* header, std::span<gravitas_frame_column> columns,
                                  std::span<const stage::ColumnInfo> infos, const gravitas_reply_column* reply) const {
+  if (is_void_) return;
   const auto largest = std::ranges::max_element(columns, {}, &gravitas_frame_column::count);
   const std::uint64_t bits = payload_bits(infos, reply);
   switch (order_.fault()) {
@@ -148,6 +149,7 @@ void FaultInjection::spoil_frame(gravitas_frame_header* header, std::span<gravit
 }
 
 void FaultInjection::spoil_message(std::string* message, std::size_t columns_size) const {
+  if (is_void_) return;
   const std::uint64_t head_bits = 8 * (message->size() - columns_size), column_bits = 8 * columns_size;
   switch (order_.fault()) {
     case InjectedFault::kTruncate:

@@ -5,7 +5,7 @@
 //        --> digest --> spoil_frame() or spoil_message() --> pass(kWrite) --> sent copies() times --> pass(kReply)
 //
 // What follows the plugin is for an answer. One that only asks for room comes again with the same order; one that is
-// refused or has failed, be it for what the order asks, is sent as it is.
+// refused or has failed, be it for what the order asks, is sent as it is; so is one on which it could not be carried out.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +19,9 @@
 
 namespace gravitas::host {
 
+// How a note begins that says why the order was not carried out: there is nothing in the reply that it could be carried out on.
+inline constexpr const char* kNotInjected = "not injected: ";
+
 class FaultInjection {
  public:
   explicit FaultInjection(FaultOrder order) : order_(std::move(order)) {}
@@ -28,8 +31,9 @@ class FaultInjection {
 
   // After the plugin has ended with `status` and before anything of that is looked at. May change the reply's columns,
   // within their capacities, and the calling thread's floating-point environment. Returns the status that holds
-  // instead: GRAVITAS_FAILED with the reason in `error` if the reply has nothing that the order could be carried out
-  // on, GRAVITAS_NEEDS_CAPACITY if it needs more room. `compute_ns` is how long the plugin took.
+  // instead: GRAVITAS_FAILED with the reason in `error` if the order says so, GRAVITAS_NEEDS_CAPACITY if the reply needs
+  // more room. Where the reply has nothing that the order could be carried out on, it stays right, and note() says so.
+  // `compute_ns` is how long the plugin took.
   std::int32_t after_plugin(const stage::MethodInfo& method, const gravitas_column* request,
                             gravitas_reply_column* reply, std::int32_t status, std::uint64_t compute_ns,
                             gravitas_error* error);
@@ -53,6 +57,7 @@ class FaultInjection {
 
   FaultOrder order_;
   std::string note_;
+  bool is_void_ = false;  // there is nothing to damage
 };
 
 }  // namespace gravitas::host

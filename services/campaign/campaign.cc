@@ -22,6 +22,7 @@
 #include <system_error>
 #include <thread>
 
+#include "plugin_sdk/slots.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/page.h"
 #include "services/campaign/table.h"
@@ -217,6 +218,7 @@ class Parent {
     table.set_seed(options_.seed);
     table.set_tier(options_.draw.tier == Tier::kReal ? "real" : "simulated");
     table.set_seconds(seconds_since(start_));
+    if (!options_.out.empty()) table.set_logged(static_cast<std::uint32_t>(logged_));
     if (options_.out.empty()) return table;
     write_text_file(options_.out + "/table.txt", table_text(table), "table");
     write_text_file(options_.out + "/table.json", to_json(table, JsonForm::kPage), "table");
@@ -263,10 +265,13 @@ class Parent {
   void book(const v1::Trial& trial, const std::string& line) {
     tally_.add(trial, repeat_command(options_, trial.seed()));
     // a million simulated faults would fill a disk with what went well
-    const bool is_plain = trial.forbidden().empty() && std::ranges::all_of(trial.faults(), [](const v1::Fault& fault) {
+    const bool is_plain = trial.forbidden().empty() && trial.unprovoked().empty() &&
+                          std::ranges::all_of(trial.faults(), [](const v1::Fault& fault) {
                             return fault.outcome() == "M" || fault.outcome() == "B";
                           });
-    if (options_.draw.tier == Tier::kReal || !is_plain) log_.write(line);
+    if (options_.draw.tier == Tier::kSimulated && is_plain) return;
+    log_.write(line);
+    ++logged_;
   }
 
   void find_orphans() {
@@ -289,12 +294,23 @@ class Parent {
   const Options& options_;
   TrialLog log_;
   Tally tally_;
-  std::uint64_t next_, wanted_ = 0, batch_ = 1;
+  std::uint64_t next_, wanted_ = 0, batch_ = 1, logged_ = 0;
   // a self-test has seen enough at once
   const std::uint64_t give_up_ = options_.without.empty() ? 20 : 4;
   std::vector<std::unique_ptr<Child>> children_;
   Clock::time_point start_ = Clock::now();
 };
+
+std::vector<Scene> scenes_of(const Options& options) {
+  std::vector<Scene> scenes = load_scenes(options.scenes);
+  for (const Scene& scene : scenes)
+    if (options.draw.tier == Tier::kSimulated && !scene.commands.empty())
+      throw BadInput(
+          fmt::format("scene '{}': the worker of slot {} is a Command, which is a process of its own; allowed: --tier "
+                      "real",
+                      scene.name, slot_name(scene.commands[0])));
+  return scenes;
+}
 
 TrialOptions trial_options(const Options& options) {
   TrialOptions one;
@@ -309,13 +325,13 @@ TrialOptions trial_options(const Options& options) {
 v1::Table run(const Options& options, const std::function<bool()>& interrupted,
               const std::function<void(const Progress&)>& progress) {
   // bad input is found here, not in a child
-  load_scenes(options.scenes);
+  scenes_of(options);
   trial_options(options);
   return Parent(options).make(interrupted, progress);
 }
 
 void serve_trials(const Options& options) {
-  const std::vector<Scene> scenes = load_scenes(options.scenes);
+  const std::vector<Scene> scenes = scenes_of(options);
   const TrialOptions one = trial_options(options);
   std::uint64_t first = 0, count = 0, stride = 0;
   while (std::cin >> first >> count >> stride) {
@@ -330,7 +346,7 @@ void serve_trials(const Options& options) {
 }
 
 v1::Trial repeat_trial(const Options& options, std::uint64_t seed) {
-  const std::vector<Scene> scenes = load_scenes(options.scenes);
+  const std::vector<Scene> scenes = scenes_of(options);
   const TrialPlan plan = draw_trial(seed, scenes, options.draw);
   return run_trial(plan, scenes[plan.scene], trial_options(options));
 }

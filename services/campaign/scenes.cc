@@ -185,6 +185,16 @@ std::vector<Scene> load_scenes(const std::vector<std::string>& names, std::uint3
     scene.description.steps = steps;
     scene.description.last_time_step = scene.description.time_step;
     run_quietly(&scene, steps);
+    for (const Slot slot : scene.slots)
+      for (const kernel::PluginChoice& plugin : scene.description.slot(slot).plugins) {
+        if (!plugin.address.empty())
+          throw BadInput(fmt::format(
+              "scene '{}': the worker of slot {} is at an Address, and could not be started again; allowed: "
+              "plugins that are installed, a Library, a Command",
+              name, slot_name(slot)));
+        if (!plugin.command.empty() && std::ranges::find(scene.commands, slot) == scene.commands.end())
+          scene.commands.push_back(slot);
+      }
     if (scene.slots.empty())
       throw BadInput(fmt::format("scene '{}' needs no plugin at all: there is nothing to inject faults into", name));
     scenes.push_back(std::move(scene));

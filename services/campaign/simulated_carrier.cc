@@ -98,7 +98,7 @@ class SimulatedCarrier final : public kernel::Carrier {
   }
   bool is_too_slow(const host::FaultOrder& order) const;
   std::int32_t misbehave(const host::FaultOrder& order, const stage::MethodInfo& method, const gravitas_column* request,
-                         gravitas_reply_column* reply, std::string* text);
+                         gravitas_reply_column* reply, std::string* text, bool* is_void);
   kernel::CallResult call(OpenCall* open, const kernel::StageCall& call, kernel::Arena* arena,
                           kernel::DerivativeSource* derivatives);
   kernel::CallResult take(OpenCall* open, const kernel::StageCall& call, std::string text, kernel::Arena* arena);
@@ -152,17 +152,19 @@ bool SimulatedCarrier::is_too_slow(const host::FaultOrder& order) const {
 // What a worker does between the plugin's answer and the frame of it. Returns the status that holds.
 std::int32_t SimulatedCarrier::misbehave(const host::FaultOrder& order, const stage::MethodInfo& method,
                                          const gravitas_column* request, gravitas_reply_column* reply,
-                                         std::string* text) {
+                                         std::string* text, bool* is_void) {
   const bool is_process = order.info().group == "process";
   if (is_process && order.moment() == host::Moment::kCompute) die("computing");
   if (is_too_slow(order)) be_overdue();
   if (order.fault() == InjectedFault::kMemory) *text = "not enough memory";
   if (order.fault() == InjectedFault::kRounding) *text = "the plugin changed the floating-point environment";
-  if (host::changes_reply(order.fault())) *text = host::change_reply(order, method, request, reply);
+  std::string obstacle;
+  if (host::changes_reply(order.fault())) obstacle = host::change_reply(order, method, request, reply);
   const bool needs_payload = order.fault() == InjectedFault::kTruncate || order.fault() == InjectedFault::kFlip;
   for (std::size_t i = 0; i < method.reply.size(); ++i)
     if (text->empty() && reply[i].count > reply[i].capacity) return GRAVITAS_NEEDS_CAPACITY;
-  if (needs_payload && host::payload_bits(method.reply, reply) == 0) *text = "there is nothing to damage";
+  if (needs_payload && host::payload_bits(method.reply, reply) == 0) obstacle = "there is nothing to damage";
+  *is_void = !obstacle.empty();
   return text->empty() ? GRAVITAS_OK : GRAVITAS_FAILED;
 }
 
@@ -209,8 +211,9 @@ kernel::CallResult SimulatedCarrier::call(OpenCall* open, const kernel::StageCal
   arena->let_go();
   services.rethrow();
   if (dead_) die("while another plugin of its process was asked");
+  bool is_void = false;  // there is nothing that it could be carried out on
   if (end.status == GRAVITAS_OK && order)
-    end.status = misbehave(*order, method, request.data(), reply.data(), &end.text);
+    end.status = misbehave(*order, method, request.data(), reply.data(), &end.text, &is_void);
 
   // the frame
   gravitas_frame_header& header = open->reply.header;
@@ -229,7 +232,7 @@ kernel::CallResult SimulatedCarrier::call(OpenCall* open, const kernel::StageCal
     columns[i] = {open->rooms[i].offset, reply[i].count, open->rooms[i].capacity};
     data[i] = reply[i].data;
   }
-  const bool is_spoilt = order && end.status == GRAVITAS_OK;
+  const bool is_spoilt = order && end.status == GRAVITAS_OK && !is_void;
   std::optional<host::FaultInjection> injection;
   if (is_spoilt) {
     injection.emplace(*order);
@@ -305,8 +308,7 @@ std::vector<SimulatedHosts::FailedStart> SimulatedHosts::failed_starts() const {
   std::vector<FailedStart> failed;
   for (std::size_t i = 1; i < kSlotCount; ++i) {
     const Starts& starts = (*starts_)[i];
-    if (starts.fails > 0 && starts.made >= starts.fails)
-      failed.push_back({static_cast<Slot>(i), starts.dies ? "dies after its handshake" : "refused in the handshake"});
+    if (starts.fails > 0 && starts.made >= starts.fails) failed.push_back({static_cast<Slot>(i), starts.dies});
   }
   return failed;
 }

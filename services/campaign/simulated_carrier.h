@@ -26,7 +26,7 @@ class SimulatedHosts {
   // The starts that failed, and how.
   struct FailedStart {
     Slot slot;
-    const char* how;
+    bool dies;  // after its handshake; else refused
   };
   std::vector<FailedStart> failed_starts() const;
 

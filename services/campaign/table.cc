@@ -42,6 +42,8 @@ std::string quantile_line(const char* what, const v1::Quantiles& one) {
 void Tally::add(const v1::Trial& trial, const std::string& command) {
   ++trials_;
   unprovoked_ += static_cast<std::uint64_t>(trial.unprovoked_size());
+  for (const std::string& one : trial.unprovoked())
+    if (unexplained_.size() < kShownFailures) unexplained_.push_back(fmt::format("{}: {}", command, one));
   for (const v1::Fault& fault : trial.faults()) {
     ++injected_;
     manifested_ += fault.outcome() != "M";
@@ -79,6 +81,7 @@ v1::Table Tally::table() const {
   *table.mutable_cold_start() = quantiles(cold_start_);
   *table.mutable_swap_pause() = quantiles(swap_pause_);
   for (const std::string& failure : failures_) table.add_failures(failure);
+  for (const std::string& one : unexplained_) table.add_unexplained(one);
   return table;
 }
 
@@ -108,8 +111,13 @@ std::string table_text(const v1::Table& table) {
                         100.0 * static_cast<double>(table.not_caught()) / static_cast<double>(table.wrong_values()),
                         100.0 * kMayEscape);
   if (table.unprovoked() > 0)
-    text += fmt::format("{} failed calls besides, which no fault explains (a busy machine's deadlines)\n",
-                        table.unprovoked());
+    text += fmt::format("{} failed calls besides, which no fault explains{}\n", table.unprovoked(),
+                        table.tier() == "real" ? " (a busy machine's deadlines)" : "");
+  for (const std::string& one : table.unexplained()) text += "  " + one + "\n";
+  if (table.logged() > 0 && table.tier() != "real")
+    text += fmt::format(
+        "trials.jsonl holds {} of {} trials: those in which something was neither masked nor recovered bit for bit\n",
+        table.logged(), table.trials());
   if (table.tier() == "real") {
     text += quantile_line("noticed -> answered by a standby", table.standby());
     text += quantile_line("noticed -> answered, after a start", table.cold_start());

@@ -29,7 +29,7 @@ class Tally {
   std::uint64_t wrong_values_ = 0, not_caught_ = 0;
   std::map<std::string, v1::Row> rows_;
   std::vector<double> standby_, cold_start_, swap_pause_;
-  std::vector<std::string> failures_;
+  std::vector<std::string> failures_, unexplained_;
 };
 
 // Share of wrong values, above every tolerance, that may stay unnoticed where no re-run looks for them.

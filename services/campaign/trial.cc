@@ -18,6 +18,7 @@
 #include "services/campaign/host_trouble.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/simulated_carrier.h"
+#include "services/run/fault_desk.h"
 #include "services/run/kernel_names.h"
 #include "services/run/session.h"
 
@@ -71,6 +72,7 @@ kernel::EnvironmentDescription description_of(const TrialPlan& plan, const Scene
     one.hosting = plan.hosting;
     one.deadline = options.deadline;
     one.standbys = 1;
+    one.failures = kernel::SlotDescription::kBudget;
     one.defences = options.defences;
   }
   return plan.has_fallbacks ? with_fallbacks(std::move(description)) : description;
@@ -152,6 +154,8 @@ class Run {
   kernel::EnvironmentDescription alone_description() const;
   void forbid(std::string what) { trial_.add_forbidden(std::move(what)); }
   Injected* find(const FaultRecord& record);
+  // The start of a worker that was dead before it was asked.
+  bool is_failed_start(const FaultRecord& record);
 
   const TrialPlan& plan_;
   const Scene& scene_;
@@ -162,6 +166,7 @@ class Run {
   std::unique_ptr<Environment> neighbour_;
   std::vector<std::jthread> pauses_;
   std::vector<Injected> faults_;
+  std::vector<std::pair<SimulatedHosts::FailedStart, std::optional<FaultRecord>>> failed_starts_;
   std::set<Slot> late_;  // whose call overran its deadline though nothing had been injected
   bool is_over_ = false, has_other_plugin_ = false;
   v1::Trial trial_;
@@ -249,8 +254,9 @@ void Run::begin(std::uint32_t step) {
 
 void Run::go() {
   description_ = description_of(plan_, scene_, options_);
-  world_ = options_.tier == Tier::kReal ? std::make_unique<Environment>(description_)
-                                        : std::make_unique<Environment>(description_, hosts_.starter());
+  world_ = options_.tier == Tier::kReal
+               ? std::make_unique<Environment>(description_, with_fault_desk(kernel::start_host, &world_))
+               : std::make_unique<Environment>(description_, hosts_.starter());
   if (plan_.has_neighbour) neighbour_ = std::make_unique<Environment>(alone_description());
   CommitCount commits;
   world_->set_commit_listener(&commits);
@@ -297,7 +303,7 @@ Run::Injected* Run::find(const FaultRecord& record) {
 bool Run::is_worn_out(Slot slot) const {
   const auto failures =
       std::ranges::count(world_->faults(), slot, [](const FaultRecord& one) { return one.fault.slot; });
-  return failures >= kernel::SlotHost::kBudget && late_.contains(slot);
+  return failures >= kernel::SlotDescription::kBudget && late_.contains(slot);
 }
 
 void Run::note_fallbacks() {
@@ -359,14 +365,27 @@ void Run::judge_pause(std::uint32_t step) {
     forbid("what the pause left does not go on as the quiet run does");
 }
 
+bool Run::is_failed_start(const FaultRecord& record) {
+  if (record.fault.kind != kernel::FaultKind::kDeath || !record.fault.is_unread) return false;
+  const std::vector<Slot> shared = sharing(scene_, record.fault.slot);
+  for (auto& [start, missed] : failed_starts_)
+    if (start.dies && !missed && std::ranges::count(shared, start.slot) > 0) {
+      missed = record;
+      return true;
+    }
+  return false;
+}
+
 void Run::attribute_records() {
+  if (options_.tier == Tier::kSimulated)
+    for (const SimulatedHosts::FailedStart& start : hosts_.failed_starts()) failed_starts_.push_back({start, {}});
   for (const FaultRecord& record : world_->faults()) {
     const bool is_cold = record.recovered_by == "cold start" || record.recovered_by == "standby, still starting";
     if (record.recovery_us > 0.0 && record.recovered_by == "standby") trial_.add_standby_us(record.recovery_us);
     if (record.recovery_us > 0.0 && is_cold) trial_.add_cold_start_us(record.recovery_us);
     if (Injected* fault = find(record); fault != nullptr) {
       fault->records.push_back(record);
-    } else {
+    } else if (!is_failed_start(record)) {
       if (record.fault.kind == kernel::FaultKind::kDeadline) late_.insert(record.fault.slot);
       trial_.add_unprovoked(fmt::format("step {}, slot {}: {}: {}", record.step, slot_name(record.fault.slot),
                                         fault_kind_name(record.fault.kind), record.fault.text()));
@@ -421,14 +440,18 @@ void Run::write() {
     line->set_times(1);
     line->set_outcome("M");
   }
-  if (options_.tier == Tier::kReal) return;
-  for (const SimulatedHosts::FailedStart& start : hosts_.failed_starts()) {
+  for (const auto& [start, missed] : failed_starts_) {
     v1::Fault* line = trial_.add_faults();
     line->set_slot(slot_name(start.slot));
-    line->set_order(fmt::format("a start {}", start.how));
+    line->set_order(start.dies ? "a start dies after its handshake" : "a start refused in the handshake");
     line->set_group("start");
     line->set_times(1);
-    line->set_outcome("M");
+    // most are missed where a standby is taken, before they are asked
+    line->set_outcome(missed ? "B" : "M");
+    if (!missed) continue;
+    line->set_step(missed->step);
+    line->set_detected_by(missed->fault.detected_by);
+    line->set_recovered_by(missed->recovered_by);
   }
 }
 

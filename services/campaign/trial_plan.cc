@@ -20,7 +20,8 @@ using host::RandomNumbers;
 constexpr std::uint32_t kFewestSteps = 24;
 // Failures of a slot in one trial: its budget (slot_host.h) would call the next a broken build. In the simulated tier a
 // start may fail besides.
-constexpr std::uint32_t kMostReal = kernel::SlotHost::kBudget - 1, kMostSimulated = kernel::SlotHost::kBudget - 2;
+constexpr std::uint32_t kMostReal = kernel::SlotDescription::kBudget - 1,
+                        kMostSimulated = kernel::SlotDescription::kBudget - 2;
 
 class Draw {
  public:
@@ -161,11 +162,13 @@ void draw_value(Draw* draw, PlannedFault* fault) {
   }
 }
 
-void draw_order(Draw* draw, Tier tier, PlannedFault* fault) {
+// `is_command`: the worker commits no orders.
+void draw_order(Draw* draw, Tier tier, bool is_command, PlannedFault* fault) {
   const auto& weights = tier == Tier::kReal ? kReal : kSimulated;
   std::uint64_t at = draw->below(100);
   std::size_t group = 0;
   while (at >= weights[group].percent) at -= weights[group++].percent;
+  if (is_command) group = weights.size() - 1;
   fault->group = weights[group].group;
   switch (group) {
     case 0:
@@ -193,7 +196,7 @@ void draw_order(Draw* draw, Tier tier, PlannedFault* fault) {
       break;
     default: {
       // nobody is outside in the simulated tier
-      const std::uint64_t means = tier == Tier::kSimulated ? 99 : draw->below(100);
+      const std::uint64_t means = tier == Tier::kSimulated ? 99 : draw->below(is_command ? 70 : 100);
       fault->means = means < 32   ? Means::kKill
                      : means < 36 ? Means::kStop
                      : means < 44 ? Means::kPause
@@ -289,8 +292,12 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
              return other + 2 <= step || step + 2 <= other;
            });
   };
-  const bool has_last = draw.chance(60);
+  const auto is_command = [&](Slot slot) {
+    return std::ranges::find(scenes[plan.scene].commands, slot) != scenes[plan.scene].commands.end();
+  };
+  const bool wants_last = draw.chance(60);
   const Slot last_slot = draw.one_of(slots);
+  const bool has_last = wants_last && !is_command(last_slot);
   const std::uint32_t last_step = plan.steps - 3;
   if (has_last) taken[last_slot].push_back(last_step);
   if (has_last && last_slot == Slot::kForce) taken[Slot::kIntegrator].push_back(last_step);
@@ -301,7 +308,7 @@ TrialPlan draw_trial(std::uint64_t seed, const std::vector<Scene>& scenes, const
     // often with another in the same step: nested, or in another slot
     const bool joins = !plan.faults.empty() && draw.chance(25);
     fault.step = joins ? plan.faults.back().step : static_cast<std::uint32_t>(2 + draw.below(last_step - 4));
-    draw_order(&draw, options.tier, &fault);
+    draw_order(&draw, options.tier, is_command(fault.slot), &fault);
     if (!fault.lie.empty() && !is_alone(scenes[plan.scene], fault.slot)) continue;
     const std::vector<Slot> hit = slots_hit(fault, scenes[plan.scene]);
     if (!std::ranges::all_of(hit, [&](Slot slot) { return is_free(slot, fault.step); })) continue;

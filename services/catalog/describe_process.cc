@@ -14,6 +14,8 @@
 #include <cstring>
 #include <utility>
 
+#include "plugin_sdk/channel/process_output.h"
+
 extern char** environ;
 
 namespace gravitas {
@@ -109,8 +111,13 @@ int wait_for(pid_t pid, DescribeClock::time_point until, bool* is_in_time) {
   return status;
 }
 
-// The last line says why: what stands before it is a trace, if anything.
+// The last line says why, and indented ones before it where; without these if that is too much.
 std::string last_line(const std::string& messages) {
+  channel::ProcessOutput output;
+  output.add(channel::OutputStream::kStderr, messages);
+  output.end(channel::OutputStream::kStderr);
+  const std::string words = output.last_words();
+  if (words.size() <= kShownCharacters) return words.empty() ? "" : ": " + words;
   const std::size_t end = messages.find_last_not_of("\n ");
   if (end == std::string::npos) return "";
   const std::size_t before = messages.find_last_of('\n', end);

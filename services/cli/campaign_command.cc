@@ -137,7 +137,10 @@ void add_campaign(CLI::App* app, Action* action) {
   command->add_option("--hosting", arguments->hosting, "Of the real tier: shm, grpc or both")
       ->check(CLI::IsMember({"shm", "grpc", "both"}))
       ->capture_default_str();
-  command->add_option("--out", options.out, "Folder for trials.jsonl, table.txt, table.json and index.html");
+  command->add_option(
+      "--out", options.out,
+      "Folder for trials.jsonl, table.txt, table.json and index.html; of the simulated tier trials.jsonl holds the "
+      "trials alone in which something was neither masked nor recovered bit for bit");
   command->add_option("--per-trial", options.draw.faults_per_trial, "Faults in one run, at most")
       ->check(whole_number(1, 24))
       ->capture_default_str();

@@ -12,6 +12,7 @@
 #include "services/recorder/json.h"
 #include "services/run/fault_spec.h"
 #include "services/run/report.h"
+#include "services/run/resume_command.h"
 #include "services/run/session.h"
 #include "services/survey/instrumentation.h"
 
@@ -29,38 +30,12 @@ std::string text_of(const Progress& progress) {
                      progress.step, progress.steps, 100.0 * progress.step / progress.steps);
 }
 
-// A word as a shell reads it.
-std::string quoted(const std::string& word) {
-  const std::string plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./,:=+@%";
-  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
-// The command that goes on from a checkpoint: the scene, how far, and where plugins live, not the files it wrote.
-std::string resume_command(const RunLine& line, const std::string& checkpoint) {
-  const RunOptions& options = line.options;
-  std::string command = "gravitas run";
-  for (const std::string& scene : options.scenes) command += " " + quoted(scene);
-  if (options.duration) command += fmt::format(" --duration {}", *options.duration);
-  if (options.steps) command += fmt::format(" --steps {}", *options.steps);
-  if (options.time_step) command += fmt::format(" --dt {}", *options.time_step);
-  for (const std::string& one : options.overrides) command += " --set " + quoted(one);
-  for (const std::string& word : line.scene.hosting_words()) command += " " + quoted(word);
-  // those that were made are known there
-  for (const std::string& one : options.edits) command += " --edit " + quoted(one);
-  for (const std::string& one : options.swaps) command += " --swap " + quoted(one);
-  for (const std::string& one : options.comparisons) command += " --compare " + quoted(one);
-  for (const std::string& one : options.reruns) command += " --rerun " + quoted(one);
-  return command + " --resume " + quoted(checkpoint);
-}
-
 void print_checkpoint(const RunLine& line, const RunResult& result) {
   // it may have gone with its folder, whatever was put into it
   if (std::error_code none; !std::filesystem::is_regular_file(result.checkpoint, none)) return;
   std::cerr << fmt::format("gravitas: checkpoint '{}' holds step {}; to go on: {}\n", result.checkpoint,
-                           result.checkpoint_step, resume_command(line, result.checkpoint));
+                           result.checkpoint_step,
+                           resume_command(line.options, line.scene.hosting_words(), result.checkpoint));
 }
 
 void print_warnings(const google::protobuf::RepeatedPtrField<std::string>& warnings) {

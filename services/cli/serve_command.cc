@@ -55,6 +55,7 @@ int serve(ServeLine* line) {
         "127.0.0.1:PORT or [::1]:PORT; others with --allow-remote",
         line->listen));
   line->scene.apply();
+  line->options.hosting_words = line->scene.hosting_words();
   listen_to_interrupts();
   control::ServedRun run(line->options);
   // from here on a signal ends it in order
@@ -75,8 +76,12 @@ int serve(ServeLine* line) {
     loop.run();
     run.interrupt();
   }
+  const std::string resume = run.save_checkpoint();
   const control_api::v1::Status status = run.status();
   std::cout << control::status_page(status);
+  if (!resume.empty())
+    std::cerr << fmt::format("gravitas: checkpoint '{}' holds step {}; to go on: {}\n", status.checkpoint(),
+                             status.step(), resume);
   if (status.state() == "finished") return kDone;
   if (status.state() != "faulted") return kInterrupted;
   std::cerr << "gravitas: " << status.fault() << '\n';
@@ -104,6 +109,16 @@ void add_serve(CLI::App* app, Action* action) {
   CLI::Option* listen =
       command->add_option("--listen", line->listen, "Listen at ADDR:PORT of this machine, too; port 0: a free one");
   command->add_flag("--allow-remote", line->remote, "Let --listen take an address that others reach")->needs(listen);
+  CLI::Option* checkpoint = command->add_option(
+      "--checkpoint", line->options.run.checkpoint,
+      "Keep a checkpoint in this file (replaced as a whole) and a journal in FILE.journal, with what was changed live: "
+      "at "
+      "the start, at the end, and as --checkpoint-every says; `gravitas run --resume` goes on from it");
+  command
+      ->add_option("--checkpoint-every", line->options.run.checkpoint_every,
+                   "Steps between checkpoints, counted from t = 0")
+      ->check(whole_number(1))
+      ->needs(checkpoint);
   command->add_option("--socket", line->socket,
                       "Listen at this path instead of a private folder in $XDG_RUNTIME_DIR or /tmp");
   command->callback([=] { *action = [=] { return serve(line.get()); }; });

@@ -14,11 +14,11 @@
 #include "plugin_sdk/slots.h"
 #include "services/recorder/identity.h"
 #include "services/run/exchange_spec.h"
+#include "services/run/fault_desk.h"
 #include "services/run/fault_spec.h"
 #include "services/run/file_names.h"
-#include "services/run/kernel_names.h"
+#include "services/run/report.h"
 #include "services/scene/parser.h"
-#include "services/scene/refusal.h"
 #include "services/survey/queries.h"
 
 namespace gravitas::control {
@@ -68,10 +68,12 @@ PropertyValue parse_value(const std::string& what, const std::string& text) {
 
 ServedRun::ServedRun(const ServeOptions& options)
     : options_(options.run),
+      hosting_words_(options.hosting_words),
       speed_(options.speed),
       first_description_(load(options.run, &scene_warnings_, &catalog_, &first_scene_)),
       timer_(loop_) {
   for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
+  require_separate_files(options_, first_scene_, {});
   begin_environment();
   if (!options.is_paused && state_ == State::kPaused) go();
   thread_ = std::jthread([this] {
@@ -86,7 +88,7 @@ ServedRun::~ServedRun() {
 }
 
 kernel::HostStarter ServedRun::starter() {
-  return interruptible(capsule::recording(tape_), [this] { return is_ending_.load(); });
+  return interruptible(with_fault_desk(capsule::recording(tape_), &environment_), [this] { return is_ending_.load(); });
 }
 
 void ServedRun::begin_environment() {
@@ -119,9 +121,13 @@ void ServedRun::begin_environment() {
   warnings_ = scene_warnings_;
   fault_.clear();
   checkpoint_.clear();
+  resume_command_.clear();
+  injected_.clear();
+  poisoned_step_ = 0;
   next_collection_ = {};
   stand(environment_->total_steps() == 0 ? State::kFinished : State::kPaused);
   status_now();
+  if (!options_.checkpoint.empty()) keep_checkpoint();
 }
 
 // ---- the steps
@@ -195,12 +201,12 @@ void ServedRun::make_step() {
     if (environment_->step_count() == 0) figures_->follow(environment_.get());
     if (environment_->step() == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
-      fault_ = fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(record.fault.slot),
-                           record.fault.plugin, scene::refusal_text(description_, record.fault),
-                           fault_kind_name(record.fault.kind));
+      fault_ = pause_text(description_, record, poisoned_step_ >= record.step);
       return keep_faulted_state();
     }
     figures_->follow(environment_.get());
+    const bool is_last = environment_->step_count() >= environment_->total_steps();
+    if (recorder_->is_due(*environment_) || (is_last && recorder_->keeps())) recorder_->save(*environment_);
   } catch (const StepInterrupted&) {
     return;
   } catch (const std::exception& problem) {
@@ -216,19 +222,6 @@ void ServedRun::make_step() {
   }
   if (environment_->step_count() >= environment_->total_steps()) return stand(State::kFinished);
   if (steps_left_ && --*steps_left_ == 0) stand(State::kPaused);
-}
-
-// As a run does that pauses: what was computed is not lost with the server.
-void ServedRun::keep_faulted_state() {
-  stand(State::kFaulted);
-  with_subscriptions([&](Subscription* one) { one->source().tell_incidents(*environment_); });
-  try {
-    const std::string path = std::filesystem::absolute(paused_checkpoint(options_));
-    recorder_->save_to(path, *environment_);
-    checkpoint_ = path;
-  } catch (const std::exception& problem) {
-    fault_ += fmt::format("; no checkpoint: {}", problem.what());
-  }
 }
 
 // ---- orders
@@ -383,16 +376,18 @@ api::InjectOrdered ServedRun::inject(const api::InjectRequest& request) {
     api::InjectOrdered ordered;
     ordered.set_step(fault.step);
     try {
-      environment_->inject(std::move(fault));
+      order_fault(fault, active_, {}, &*environment_);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
     }
+    injected_.push_back(std::move(fault));
     return ordered;
   });
 }
 
 void ServedRun::on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) {
-  warnings_.push_back(keep_poisoned_call(options_, environment.step_count() + 1, poisoned));
+  poisoned_step_ = environment.step_count() + 1;
+  warnings_.push_back(keep_poisoned_call(options_, poisoned_step_, poisoned));
 }
 
 std::future<api::Captured> ServedRun::capture(const api::CaptureRequest& request) {
@@ -547,6 +542,7 @@ void ServedRun::on_inner_step(const kernel::Environment& environment, const kern
 }
 
 void ServedRun::on_commit(const kernel::Environment& environment) {
+  recorder_->on_commit(environment);
   event_source_->on_commit(environment);
   with_subscriptions([&](Subscription* one) { one->source().on_commit(environment); });
 }

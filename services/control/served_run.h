@@ -43,9 +43,10 @@ namespace gravitas::control {
 namespace api = control_api::v1;
 
 struct ServeOptions {
-  RunOptions run;      // the scene and its overrides; what writes files has no meaning here
+  RunOptions run;      // the scene and its overrides; of what writes files the checkpoint alone
   double speed = 1.0;  // simulated seconds per second of wall time; 0: as fast as possible
   bool is_paused = false;
+  std::vector<std::string> hosting_words = {};  // of the command line, for the one that goes on from a checkpoint
 };
 
 class NotNow : public std::runtime_error {
@@ -67,6 +68,10 @@ class ServedRun final : private kernel::CommitListener {
 
   // Gives up the step in hand, and makes no other one; what was committed can still be asked for. From any thread.
   void interrupt() { is_ending_ = true; }
+
+  // Brings the checkpoint that options ask for to the last commit; what goes on from it, empty if none is asked for. Throws
+  // std::system_error.
+  std::string save_checkpoint();
 
   api::Status status();
   void pause();
@@ -131,6 +136,7 @@ class ServedRun final : private kernel::CommitListener {
   // It begins, or has ended.
   void note_step(std::optional<Clock::time_point> begin);
   void make_step();
+  void keep_checkpoint();
   void keep_faulted_state();
   void close_capture();
   Clock::time_point due() const;
@@ -142,6 +148,7 @@ class ServedRun final : private kernel::CommitListener {
   // Precondition: of this order, among records of all swaps.
   static const kernel::SwapRecord& record_of(const Order& order, const std::vector<kernel::SwapRecord>& records);
   void collect_warnings();
+  void add_warning(const std::string& line);
   void attend_listener();
   void leave_aside(const std::string& why);
   // action(subscription) for those that somebody holds.
@@ -162,7 +169,10 @@ class ServedRun final : private kernel::CommitListener {
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override;
 
+  std::string command_to_resume() const;
+
   const RunOptions options_;
+  const std::vector<std::string> hosting_words_;
   std::string scene_name_;
   double speed_;
   std::vector<std::string> scene_warnings_;
@@ -197,7 +207,9 @@ class ServedRun final : private kernel::CommitListener {
   survey::Surveyor& surveyor();
   std::unique_ptr<Survey> survey_;
   State state_ = State::kPaused;
-  std::string fault_, checkpoint_;
+  std::string fault_, checkpoint_, resume_command_;
+  std::uint32_t poisoned_step_ = 0;  // the last
+  std::vector<kernel::FaultInjection> injected_;
   std::vector<Order> orders_;
   std::uint32_t forgotten_orders_ = 0;  // of before the last reset: numbers go on
   std::vector<std::string> warnings_;   // different ones

@@ -10,6 +10,7 @@
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
+#include "services/run/fault_desk.h"
 #include "services/run/file_names.h"
 #include "services/run/kernel_names.h"
 #include "services/run/report.h"
@@ -97,6 +98,7 @@ api::Status ServedRun::status_now() {
   status.set_state(state_name());
   status.set_fault(fault_);
   status.set_checkpoint(checkpoint_);
+  status.set_resume_command(resume_command_);
   status.set_time(environment_->time());
   status.set_time_step(environment_->time_step());
   status.set_step(environment_->step_count());
@@ -113,6 +115,8 @@ api::Status ServedRun::status_now() {
   keep_last(status.mutable_swaps());
   report::v1::Report report = past_;
   write_faults(*environment_, &report);
+  name_orders(injected_, description_, environment_->step_count(), state_ == State::kFinished, &report);
+  for (const std::string& warning : report.warnings()) add_warning(warning);
   status.set_fault_count(static_cast<std::uint32_t>(report.faults_size()));
   status.mutable_faults()->Swap(report.mutable_faults());
   keep_last(status.mutable_faults());
@@ -167,9 +171,12 @@ void ServedRun::collect_warnings() {
   const Clock::time_point now = Clock::now();
   if (now < next_collection_) return;
   next_collection_ = now + kCollection;
-  for (std::string& line : environment_->warnings())
-    if (warnings_.size() < kMostWarnings && std::ranges::find(warnings_, line) == warnings_.end())
-      warnings_.push_back(std::move(line));
+  for (const std::string& line : environment_->warnings()) add_warning(line);
+}
+
+void ServedRun::add_warning(const std::string& line) {
+  if (warnings_.size() < kMostWarnings && std::ranges::find(warnings_, line) == warnings_.end())
+    warnings_.push_back(line);
 }
 
 }  // namespace gravitas::control

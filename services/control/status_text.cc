@@ -57,7 +57,9 @@ std::string status_page(const api::Status& status) {
                         status.waited());
   if (!status.fault().empty()) text += fmt::format("  fault: {}\n", status.fault());
   if (!status.checkpoint().empty())
-    text += fmt::format("  checkpoint: {}; gravitas run --resume goes on from it\n", status.checkpoint());
+    text += fmt::format("  checkpoint: {}; {}\n", status.checkpoint(),
+                        status.resume_command().empty() ? "a listener decided, so nobody goes on from it"
+                                                        : "to go on: " + status.resume_command());
   text += fmt::format("  state hash {}\n  chain hash {}\n", status.state_hash(), status.chain_hash());
   text += plan_table(status.plan());
   const auto heading = [&](const char* what, std::uint32_t count) {
@@ -67,8 +69,12 @@ std::string status_page(const api::Status& status) {
   for (int i = std::max(0, status.swaps_size() - kMostListed); i < status.swaps_size(); ++i)
     text += fmt::format("  {}\n", swap_line(status.swaps(i)));
   heading("edits", status.edit_count());
-  for (int i = std::max(0, status.edits_size() - kMostListed); i < status.edits_size(); ++i)
-    text += fmt::format("  {}\n", edit_line(status.edits(i)));
+  for (int i = std::max(0, status.edits_size() - kMostListed); i < status.edits_size(); ++i) {
+    text += fmt::format("  {}", edit_line(status.edits(i)));
+    for (int k = 0; k < status.edits(i).texts_size(); ++k)
+      text += fmt::format("{}{}", k == 0 ? ": " : ", ", status.edits(i).texts(k));
+    text += '\n';
+  }
   heading("faults", status.fault_count());
   for (int i = std::max(0, status.faults_size() - kMostListed); i < status.faults_size(); ++i) {
     const report::v1::FaultRecord& fault = status.faults(i);

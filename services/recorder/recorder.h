@@ -45,6 +45,7 @@ class Recorder final : public kernel::CommitListener {
 
   // A listener decides about pairs: nobody goes on from what is kept from now on.
   void note_listener() { listener_decided_ = true; }
+  bool has_listened() const { return listener_decided_; }
 
   // The next steps must have the chain hashes of this journal.
   void expect(const std::string& journal, std::vector<JournalEntry> commits);

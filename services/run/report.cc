@@ -7,9 +7,11 @@
 #include <string_view>
 #include <vector>
 
+#include "kernel/slot_host.h"
 #include "plugin_sdk/host/fault_kinds.h"
 #include "services/run/kernel_names.h"
 #include "services/run/omissions.h"
+#include "services/scene/refusal.h"
 
 namespace gravitas {
 namespace {
@@ -35,6 +37,19 @@ bool was_injected(const kernel::FaultRecord& record) {
   const auto kind = std::ranges::find(host::fault_kinds(), record.injected, &host::FaultInfo::name);
   if (kind == host::fault_kinds().end()) return false;
   return record.fault.kind != kernel::FaultKind::kFailure || (kind->group != "values" && kind->group != "wire");
+}
+
+// Other plugins make other trajectories: whoever reads one should know.
+std::string exchange_warning(const kernel::FaultRecord& record) {
+  const std::string begin =
+      fmt::format("from step {} on slot {} is answered by ", record.step, slot_name(record.fault.slot));
+  const std::string end = fmt::format(", since {} failed: {} ({})", record.fault.plugin, record.fault.text(),
+                                      was_injected(record) ? record.injected : fault_kind_name(record.fault.kind));
+  if (const std::string names = fallback_of(record.recovered_by); !names.empty())
+    return fmt::format("{}the fallback {} instead of {}{}: the trajectory is not that of {}", begin, names,
+                       record.fault.plugin, end, record.fault.plugin);
+  if (record.recovered_by == "previous build") return begin + "the plugin from before its last swap" + end;
+  return {};
 }
 
 }  // namespace
@@ -72,6 +87,7 @@ void write_faults(const kernel::Environment& environment, report::v1::Report* re
     fault->set_detected_by(record.fault.detected_by);
     fault->set_recovered_by(record.recovered_by.empty() ? "none: paused" : record.recovered_by);
     fault->set_recovery_us(record.recovery_us);
+    if (std::string warning = exchange_warning(record); !warning.empty()) report->add_warnings(std::move(warning));
     fault->set_plugin(record.fault.plugin);
     fault->set_text(record.fault.text());
   }
@@ -81,6 +97,29 @@ void note_edit(const edit::v1::Edit& edit, report::v1::Report* report) {
   report::v1::EditRecord* record = report->add_edits();
   record->set_step(edit.step());
   record->set_changes(static_cast<std::uint32_t>(edit.changes_size()));
+  for (const edit::v1::Change& change : edit.changes())
+    record->add_texts(change.has_add()      ? "add " + change.add().name()
+                      : change.has_remove() ? "remove " + change.remove()
+                                            : "set " + change.set());
+}
+
+std::string fallback_of(const std::string& recovered_by) {
+  constexpr std::string_view kMark = "fallback ";
+  return recovered_by.starts_with(kMark) ? recovered_by.substr(kMark.size()) : "";
+}
+
+std::string pause_text(const kernel::EnvironmentDescription& description, const kernel::FaultRecord& record,
+                       bool is_poisoned) {
+  const Slot slot = record.fault.slot;
+  std::string text =
+      fmt::format("step {}: slot {}, plugin {}: {} ({})", record.step, slot_name(slot), record.fault.plugin,
+                  scene::refusal_text(description, record.fault), fault_kind_name(record.fault.kind));
+  // a request that is to blame is said to be kept
+  if (is_poisoned) return text;
+  return text + fmt::format(
+                    "; nobody else is asked, since slot {} has used up its Failures = {} (failed calls and starts, "
+                    "each with fewer than {} good answers after the one before)",
+                    slot_name(slot), description.slot(slot).failures, kernel::SlotHost::kGoodAnswers);
 }
 
 std::string edit_line(const report::v1::EditRecord& edit) {

@@ -15,12 +15,21 @@ report::v1::Plan plan_message(const kernel::Environment& environment,
 
 // Each adds its part.
 void write_stages(const kernel::Environment& environment, report::v1::Report* report);
+// With a warning where another plugin answers since.
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
 void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
 
 // "edit before step 31: 2 changes".
 std::string edit_line(const report::v1::EditRecord& edit);
+
+// Who took over, of a fault that was recovered by a fallback; else empty.
+std::string fallback_of(const std::string& recovered_by);
+
+// Why nobody could make a step: "step 20: slot solver, plugin …". `is_poisoned`: the request is to blame, else the slot has
+// used up what it may fail.
+std::string pause_text(const kernel::EnvironmentDescription& description, const kernel::FaultRecord& record,
+                       bool is_poisoned);
 
 // The environment whose swaps have been written is replaced by another: probation has passed.
 void settle_swaps(report::v1::Report* report);

@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <system_error>
 
-#include "kernel/carrier/carrier.h"
 #include "plugin_sdk/slots.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
@@ -27,16 +26,15 @@
 #include "services/recorder/trajectory.h"
 #include "services/run/edit_spec.h"
 #include "services/run/exchange_spec.h"
+#include "services/run/fault_desk.h"
 #include "services/run/fault_spec.h"
 #include "services/run/figures.h"
 #include "services/run/file_names.h"
 #include "services/run/interruptible_host.h"
-#include "services/run/kernel_names.h"
 #include "services/run/machine_limits.h"
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
-#include "services/scene/refusal.h"
 #include "services/survey/frame_file.h"
 
 namespace gravitas {
@@ -158,7 +156,8 @@ class Run final : private kernel::CommitListener {
   }
 
   kernel::HostStarter starter() {
-    return interruptible(options_.starter, [this] { return is_stepping_ && interrupted_(); });
+    return interruptible(with_fault_desk(options_.starter, &environment_),
+                         [this] { return is_stepping_ && interrupted_(); });
   }
 
   // Whatever ended the run: the last commit is kept where a checkpoint is wanted or needed.
@@ -414,7 +413,7 @@ class Run final : private kernel::CommitListener {
         if (is_due(order.step)) environment_->order_swap(order);
       for (const kernel::SwapOrder& order : comparisons_) environment_->order_swap(order, true);
       for (const kernel::FaultInjection& fault : faults_)
-        if (is_due(fault.step)) environment_->inject(fault);
+        if (is_due(fault.step)) order_fault(fault, description_, swaps_, &*environment_);
       for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);
     } catch (const std::invalid_argument& problem) {
       throw BadInput(problem.what());
@@ -437,7 +436,8 @@ class Run final : private kernel::CommitListener {
   }
 
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override {
-    warnings_.push_back(keep_poisoned_call(options_, environment.step_count() + 1, poisoned));
+    poisoned_step_ = environment.step_count() + 1;
+    warnings_.push_back(keep_poisoned_call(options_, poisoned_step_, poisoned));
   }
 
   // Where no recorder keeps a checkpoint.
@@ -474,9 +474,7 @@ class Run final : private kernel::CommitListener {
 
   void pause(const kernel::FaultRecord& record) {
     result_.outcome = RunOutcome::kPaused;
-    result_.fault = fmt::format("paused at step {}: slot {}, plugin {}: {} ({})", record.step,
-                                slot_name(record.fault.slot), record.fault.plugin,
-                                scene::refusal_text(description_, record.fault), fault_kind_name(record.fault.kind));
+    result_.fault = "paused at " + pause_text(description_, record, poisoned_step_ >= record.step);
   }
 
   void fail(const std::string& why) {
@@ -548,6 +546,7 @@ class Run final : private kernel::CommitListener {
   std::optional<survey::Surveyor> surveyor_;
   std::unique_ptr<survey::FrameFile> frames_;
   std::optional<Recorder> recorder_;
+  std::uint32_t poisoned_step_ = 0;  // the last
   double wall_seconds_ = 0.0;
 };
 
@@ -577,6 +576,7 @@ void Run::write_report() {
       report.add_event_kinds(event_kind_name(kind));
   write_past();
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
+  name_orders(faults_, description_, report.steps(), true, &report);
   if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");
   write_stages(*environment_, &report);
   figures_->write(&report);

@@ -49,6 +49,11 @@ std::string exchanges(const report::v1::Report& report) {
   std::string text;
   int survived = 0;
   const auto is_lost = [](const report::v1::FaultRecord& fault) { return fault.recovered_by().starts_with("none"); };
+  // what was ordered for a step before
+  const auto is_late = [](const report::v1::FaultRecord& fault) {
+    return !fault.ordered().empty() &&
+           (fault.ordered() + ",").find(fmt::format("@step={},", fault.step())) == std::string::npos;
+  };
   for (const report::v1::FaultRecord& fault : report.faults()) {
     // nor what came before another in a step that ended the run
     if (std::ranges::any_of(report.faults(), [&](const report::v1::FaultRecord& other) {
@@ -56,11 +61,16 @@ std::string exchanges(const report::v1::Report& report) {
         }))
       continue;
     if (++survived <= static_cast<int>(kMostNamed))
-      text += fmt::format("  survived: step {}, {} {}: {}; {} took over in {:.3g} ms\n", fault.step(), fault.slot(),
-                          fault.plugin(), fault.kind(), fault.recovered_by(), 1e-3 * fault.recovery_us());
+      text += fmt::format("  survived: step {}, {} {}: {}{}; {} took over in {:.3g} ms\n", fault.step(), fault.slot(),
+                          fault.plugin(), fault.kind(), is_late(fault) ? " (" + fault.ordered() + ")" : "",
+                          fault.recovered_by(), 1e-3 * fault.recovery_us());
   }
   if (survived > static_cast<int>(kMostNamed))
     text += fmt::format("  survived: {} more faults\n", survived - static_cast<int>(kMostNamed));
+  for (const report::v1::FaultRecord& fault : report.faults())
+    if (const std::string names = fallback_of(fault.recovered_by()); !names.empty())
+      text += fmt::format("  another plugin from step {} on: {}, {} instead of {}\n", fault.step(), fault.slot(), names,
+                          fault.plugin());
   for (const report::v1::SwapRecord& swap : report.swaps())
     text += fmt::format("  swap before step {}: {} {} -> {}, {}{}\n", swap.step(), swap.slot(), swap.from(), swap.to(),
                         swap.outcome(), swap.reason().empty() ? "" : ": " + swap.reason());

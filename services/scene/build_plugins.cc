@@ -113,6 +113,7 @@ void PluginSelection::read_hosting(const Plugin& message) {
     if (is_written(other, Plugin::kDeadlineFieldNumber)) description.deadline = other.deadline();
     // where it is not written it has the default
     if (is_written(other, Plugin::kStandbyFieldNumber)) description.standbys = other.standby();
+    if (is_written(other, Plugin::kFailuresFieldNumber)) description.failures = other.failures();
   }
   if (message.hosting() == "direct" && !process.empty())
     context_.diagnostics->error(
@@ -135,6 +136,8 @@ void PluginSelection::check_alike(const Plugin& message, const Plugin& other, co
          both_write(Plugin::kDeadlineFieldNumber) && other.deadline() != message.deadline());
   differ(Plugin::kStandbyFieldNumber, "Standby",
          both_write(Plugin::kStandbyFieldNumber) && other.standby() != message.standby());
+  differ(Plugin::kFailuresFieldNumber, "Failures",
+         both_write(Plugin::kFailuresFieldNumber) && other.failures() != message.failures());
 }
 
 void PluginSelection::check_place(const Plugin& message) const {

@@ -4,6 +4,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -97,6 +98,32 @@ TEST(SimulatedFaults, AreTheSameAgain) {
     for (campaign::v1::Fault& fault : *trial.mutable_faults()) fault.clear_recovered_by();
   }
   EXPECT_EQ(trials[0].SerializeAsString(), trials[1].SerializeAsString());
+}
+
+// A worker that is dead before it is asked is the fault of its start: a machine that is busy has no part in virtual time.
+TEST(SimulatedFaults, AFailedStartExplainsTheCallThatMissesTheWorker) {
+  const ScratchFolder folder;
+  const ProgramResult result =
+      run_program({"campaign", "--tier", "simulated", "--trial", "8706025257686048087"}, folder);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Trial trial;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(result.out, &trial).ok());
+  EXPECT_EQ(trial.unprovoked_size(), 0);
+  const campaign::v1::Fault& start = *std::ranges::find(trial.faults(), "start", &campaign::v1::Fault::group);
+  EXPECT_EQ(start.order(), "a start dies after its handshake");
+  EXPECT_EQ(start.outcome(), "B");
+}
+
+TEST(SimulatedFaults, TheLogSaysWhatItHolds) {
+  const ScratchFolder folder;
+  const std::string out = folder.path("out");
+  const Outcome outcome = campaign_of({"--tier", "simulated", "--faults", "2000", "--seed", "7", "--out", out}, folder);
+  EXPECT_EQ(outcome.table.unprovoked(), 0U);
+  const std::string log = read_file(out + "/trials.jsonl");
+  EXPECT_EQ(static_cast<std::uint64_t>(std::ranges::count(log, '\n')), outcome.table.logged());
+  EXPECT_LT(outcome.table.logged(), outcome.table.trials());
+  EXPECT_THAT(read_file(out + "/table.txt"), HasSubstr("trials.jsonl holds " + std::to_string(outcome.table.logged()) +
+                                                       " of " + std::to_string(outcome.table.trials()) + " trials"));
 }
 
 // A campaign that cannot fail would prove nothing.

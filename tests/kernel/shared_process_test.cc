@@ -117,8 +117,10 @@ TEST_P(SharedProcess, DiesInACallOfAnySlot) {
       charged.push_back(fault.fault.slot);
       EXPECT_NE(fault.recovered_by, "");
     }
-    const bool is_failure = std::string(order) != "duplicate";
-    EXPECT_EQ(charged, is_failure ? kAll : std::vector<Slot>());
+    std::vector<Slot> expected = std::string(order) != "duplicate" ? kAll : std::vector<Slot>();
+    // whose reply has no numbers
+    if (std::string(order) == "nan") std::erase(expected, Slot::kSpace);
+    EXPECT_EQ(charged, expected);
     EXPECT_EQ(processes_of(world, kAll).size(), 1U);
   }
 }
@@ -146,7 +148,7 @@ TEST_P(SharedProcess, ChargesTheSlotThatWasCalled) {
     plugin.fallback = std::make_shared<kernel::PluginChoice>(plugin);
   }
   Environment world(builder.description());
-  constexpr std::uint32_t kEach = kernel::SlotHost::kBudget - 1;
+  constexpr std::uint32_t kEach = kernel::SlotDescription::kBudget - 1;
   for (std::uint32_t i = 0; i < kEach; ++i)
     for (std::uint32_t k = 0; k < kTwo.size(); ++k) world.inject({kTwo[k], "kill", 3 + 4 * i + 2 * k});
   run_to_end(&world);

@@ -162,6 +162,30 @@ MixedRun solved_in_python(const std::string& name, std::vector<std::string> over
   return MixedRun(scene(name), std::move(overrides), Slot::kSolver);
 }
 
+// It commits no orders, so what can be comes from outside, and the rest is not taken for survived.
+TEST(PythonForce, IsKilledAndStoppedFromOutside) {
+  const std::string run =
+      in_build("/bin/gravitas run ") + kFolder + "falling_with_drag.gravitas --steps 30 --set Plugin.force.Deadline=1 ";
+  const Ended quiet = ended(run + "--json | grep chain_hash");
+  const Ended hurt =
+      ended(run + "--fault force:kill@step=5 --fault force:hang@step=12 --fault force:nan@step=20 --json");
+  EXPECT_EQ(hurt.code, 0) << hurt.words;
+  ASSERT_THAT(quiet.words, HasSubstr("chain_hash"));
+  EXPECT_THAT(hurt.words, HasSubstr(quiet.words));
+  for (const char* order : {"force:kill@step=5", "force:hang@step=12"})
+    EXPECT_THAT(hurt.words, HasSubstr(std::string("\"ordered\": \"") + order));
+  EXPECT_THAT(hurt.words, HasSubstr("fault nan of step 20 was not injected: the worker of a Command commits no orders "
+                                    "itself; allowed, since they come from outside: kill, hang, stop"));
+}
+
+TEST(PythonSolver, OrdersThatCannotComeFromOutsideAreRefused) {
+  const Ended refused = ended(in_build("/bin/gravitas run ") + kFolder + "solver.gravitas " + kScenes +
+                              "pendulum.gravitas --set Solver=PythonIslands --fault solver:nan@step=5");
+  EXPECT_EQ(refused.code, 2) << refused.words;
+  EXPECT_THAT(refused.words,
+              HasSubstr("fault nan in slot solver: the worker of a Command commits no orders itself; allowed"));
+}
+
 TEST(PythonSolver, KeepsABoxAtRest) {
   MixedRun run = solved_in_python("box_on_plane.gravitas");
   const Vector3 start = run.position("Box");

@@ -85,5 +85,16 @@ TEST(ProcessOutput, LastWordsAreTheLastOfStandardErrorThatSaysSomething) {
   EXPECT_EQ(output.last_words(), "SUMMARY: AddressSanitizer: SEGV");
 }
 
+// Of a Python worker that does not compile, where; but nothing of what was said before.
+TEST(ProcessOutput, LastWordsSayWhere) {
+  ProcessOutput output;
+  output.add(kErr,
+             "  a remark\nTraceback\n  File \"w.py\", line 1\n  File \"w.py\", line 3\n    f(\n     ^\nSyntaxError: "
+             "'(' was never closed\n");
+  EXPECT_EQ(output.last_words(), "File \"w.py\", line 3 / f( / ^ / SyntaxError: '(' was never closed");
+  output.add(kErr, "done\n");
+  EXPECT_EQ(output.last_words(), "done");
+}
+
 }  // namespace
 }  // namespace gravitas::channel

@@ -42,7 +42,8 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
   EXPECT_EQ(status.step(), 30U);
   // what was before is not forgotten, and who took over stays
   EXPECT_EQ(status.fault_count(), 1U);
-  EXPECT_THAT(status_page(status), HasSubstr("edits: 1\n  edit before step 31: 2 changes\n"));
+  EXPECT_THAT(status_page(status),
+              HasSubstr("edits: 1\n  edit before step 31: 2 changes: add " + more + ", " + move + "\n"));
   ASSERT_EQ(status.swaps_size(), 1);
   EXPECT_EQ(status.swaps(0).outcome(), "committed");
   for (const api::PlannedSlot& slot : status.plan().slots()) {

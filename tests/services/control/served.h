@@ -5,11 +5,13 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "services/control/client.h"
 #include "services/control/served_run.h"
 #include "services/control/server.h"
 #include "services/control/server_socket.h"
+#include "services/run/edit_spec.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas::harness {
@@ -56,6 +58,11 @@ struct Served {
     const api::SwapOrdered ordered = client.set_property(parse_set_request(text));
     client.step(20);
     return last_swap(ordered);
+  }
+  api::EditMade edit(const std::vector<std::string>& changes) {
+    api::EditRequest request;
+    for (const std::string& change : changes) *request.add_changes() = parse_change(change);
+    return client.edit(request);
   }
   api::ServedSwap last_swap(const api::SwapOrdered& ordered) {
     const api::Status status = client.status();

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -15,6 +16,8 @@
 #include <vector>
 
 #include "services/capsule/replay.h"
+#include "services/control/status_text.h"
+#include "tests/paths.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -26,6 +29,7 @@ using harness::refusal;
 using harness::sample;
 using harness::Served;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 api::PlannedSlot planned(const api::Status& status, const std::string& name) {
   for (const api::PlannedSlot& slot : status.plan().slots())
@@ -232,6 +236,76 @@ TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
   EXPECT_EQ(served.client.reset().state(), "paused");
   EXPECT_EQ(served.client.status().checkpoint(), "");
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+// The command goes on with what was changed live: the chain is that of a served run that nobody disturbed.
+TEST(ServedRun, AFaultedOneNamesTheCommandThatGoesOn) {
+  const CurrentFolder here;
+  const auto change = [](Served* served) {
+    served->client.step(10);
+    served->edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
+    served->client.step(10);
+    served->swap("solver=Newton");
+    served->set("Solver.Iterations=77");
+    return served->client.status().step();
+  };
+  ServeOptions options = sample();
+  options.hosting_words = {"--hosting", "shm"};
+  options.run.overrides = {"Solver.Iterations=60"};
+  Served quiet(options), faulted(options);
+  change(&quiet);
+  const std::uint32_t step = change(&faulted) + 1;
+  faulted.client.inject("integrator:kill,times=2");
+  faulted.client.swap(harness::parse_swap_request("space=Grid@step=110"));
+  quiet.client.swap(harness::parse_swap_request("space=Grid@step=110"));
+  const api::Status status = faulted.to_the_end();
+  ASSERT_EQ(status.state(), "faulted");
+  EXPECT_EQ(status.step(), step - 1);
+  ASSERT_EQ(status.edits_size(), 1);
+  ASSERT_EQ(status.edits(0).texts_size(), 1);
+  EXPECT_EQ(status.edits(0).texts(0), "set Body.Ball01.LinearVelocity={0,1,0}");
+  ASSERT_THAT(status.resume_command(), StartsWith("gravitas run /"));
+  EXPECT_THAT(status.resume_command(),
+              HasSubstr(" --set Solver.Iterations=60 --hosting shm --swap space=Grid@step=110 "));
+  EXPECT_THAT(status_page(status), HasSubstr("to go on: " + status.resume_command()));
+  const gravitas::harness::ScratchFolder folder;
+  const std::string command = in_build("/bin/") + status.resume_command() + " --json > " + folder.path("out");
+  ASSERT_EQ(std::system(command.c_str()), 0) << command;
+  EXPECT_EQ(harness::read_report(harness::read_file(folder.path("out"))).chain_hash(), quiet.to_the_end().chain_hash());
+}
+
+TEST(ServedRun, ASwapOnItsWayNamesWhomItReplaces) {
+  Served served;
+  served.client.step(3);
+  served.client.swap(harness::parse_swap_request("solver=Newton@step=50"));
+  ASSERT_EQ(served.client.status().swaps_size(), 1);
+  EXPECT_EQ(served.client.status().swaps(0).from(), "Sequential");
+}
+
+TEST(ServedRun, KeepsACheckpointThatGoesOn) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample();
+  options.run.checkpoint = folder.path("served.ck");
+  options.run.checkpoint_every = 20;
+  const auto go_on = [&] {
+    RunOptions resumed = sample("direct").run;
+    resumed.resume = options.run.checkpoint;
+    return run(
+        resumed, [] { return false; }, [](const Progress&) {});
+  };
+  Served quiet(sample()), served(options);
+  for (Served* one : {&quiet, &served}) {
+    one->client.step(10);
+    one->edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
+    one->client.step(15);
+  }
+  // of step 20, and with the journal up to 25
+  const std::string chain = quiet.to_the_end().chain_hash();
+  EXPECT_EQ(go_on().report.chain_hash(), chain);
+  EXPECT_THAT(served.run.save_checkpoint(), HasSubstr(" --resume " + options.run.checkpoint));
+  EXPECT_EQ(go_on().report.chain_hash(), chain);
+  served.client.reset();
+  EXPECT_EQ(go_on().report.chain_hash(), quiet_chain());
 }
 
 TEST(ServedRun, TheCallsOfItsNextStepsAreCaptured) {

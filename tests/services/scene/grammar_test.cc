@@ -27,10 +27,11 @@ TEST(Grammar, HasTheNamesOfTheLanguage) {
   EXPECT_THAT(names(v1::Environment::descriptor()),
               ElementsAre("Id", "Space", "CollisionFilter", "Constraints", "KineticIntegrator", "ConstraintSolver"));
   EXPECT_THAT(names(v1::Space::descriptor()), ElementsAre("Type", "Id", "CustomProperties", "Bodies"));
-  EXPECT_THAT(names(v1::Body::descriptor()),
-              ElementsAre("Type", "Id", "GeometryId", "Material", "MassDensity", "Mass", "PrincipalMoments",
-                          "CentreOfMass", "PrincipalAxes", "Immovable", "Kinematic", "Motion", "CollisionGroups",
-                          "Forces", "BoundingVolumeType", "KineticProperties", "VisualFile", "VisualTransform"));
+  EXPECT_THAT(
+      names(v1::Body::descriptor()),
+      ElementsAre("Type", "Id", "GeometryId", "Material", "MassDensity", "Mass", "PrincipalMoments", "CentreOfMass",
+                  "PrincipalAxes", "Immovable", "Kinematic", "Motion", "CollisionGroups", "Forces",
+                  "BoundingVolumeType", "KineticProperties", "VisualFile", "VisualTransform", "SurfaceVelocity"));
   EXPECT_THAT(
       names(v1::KineticProperties::descriptor()),
       ElementsAre("Position", "Orientation", "LinearVelocity", "AngularVelocity", "DampingCoefficient", "CanSleep"));
@@ -40,7 +41,7 @@ TEST(Grammar, HasTheNamesOfTheLanguage) {
   EXPECT_THAT(names(v1::Rule::descriptor()), ElementsAre("Allow", "Body", "Bodies", "Group", "Groups"));
   EXPECT_THAT(names(v1::Plugin::descriptor()),
               ElementsAre("Slot", "Name", "Hosting", "Standby", "Deadline", "Fallback", "Process", "Library", "Command",
-                          "Address", "CustomProperties"));
+                          "Address", "CustomProperties", "Failures"));
 }
 
 // Every name says what it means, and every default obeys its own rule.
