@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {

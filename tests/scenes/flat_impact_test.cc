@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {

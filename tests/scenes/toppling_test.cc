@@ -5,6 +5,7 @@
 #include <string>
 
 #include "plugin_sdk/conformance/draw.h"
+#include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
