@@ -105,7 +105,7 @@ bool ReactionSolver::release_overloaded() {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     Holding& holding = *rows_[i].holding;
     const double force = multipliers_[i];
-    if (force >= holding.least && force <= holding.most) continue;
+    if (!(force < holding.least || force > holding.most)) continue;
     holding.holds = false;
     holding.is_released = has_released = true;
     if (holding.is_velocity) holding.push = std::clamp(force, holding.least, holding.most);

@@ -55,6 +55,13 @@ double* absent_gravity(const TypeDeclaration& type, std::vector<double>* paramet
   return found;
 }
 
+void warn_of_no_gravity(std::uint32_t force, const std::string& body, BuildContext* context) {
+  const v1::Force& written = context->scene.forces().force(static_cast<int>(force));
+  context->diagnostics->warning(place_of(written.location()),
+                                written.type() + " \"" + written.id() + "\" has no Gravity, and the body \"" + body +
+                                    "\" feels no force of type Gravity either: nothing lifts it");
+}
+
 void float_bodies(std::uint32_t force, const TypeDeclaration& type, BuildContext* context) {
   std::vector<kernel::ForceDescription>& forces = context->description.forces;
   const kernel::ForceDescription written = forces[force];
@@ -63,6 +70,7 @@ void float_bodies(std::uint32_t force, const TypeDeclaration& type, BuildContext
     const auto applied = std::ranges::find(body.forces, force);
     if (applied == body.forces.end()) continue;
     const Vector3 gravity = gravity_of(body, forces);
+    if (gravity.isZero(0.0)) warn_of_no_gravity(force, body.id, context);
     auto split = std::ranges::find(splits, gravity, &std::pair<Vector3, std::uint32_t>::first);
     if (split == splits.end()) {
       const auto row = splits.empty() ? force : static_cast<std::uint32_t>(forces.size());

@@ -74,6 +74,18 @@ TEST(ForceBodies, AreRefusedWhereThereAreNone) {
       ElementsAre(HasSubstr("acts between \"A\" and itself")));
 }
 
+TEST(ForceBodies, AreNoBelts) {
+  const std::string scene = R"(
+Geometries { Geometry { Type = "Sphere" Id = "Round" CustomProperties { Radius = 1 } } }
+Forces { Force { Type = "Link" Id = "L" CustomProperties { AnchorBody = "Belt" } } }
+Environment { Space { Type = "Grid" Bodies {
+  Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = {"L"} }
+  Body { Id = "Belt" GeometryId = "Round" Immovable = true SurfaceVelocity = {1, 0, 0} }
+} } KineticIntegrator = "Euler" })";
+  EXPECT_THAT(build(scene, {}, force_catalog()).errors(),
+              ElementsAre(HasSubstr("Link \"L\" names the body \"Belt\", whose surface runs")));
+}
+
 TEST(ForceBodies, FloatInTheSumOfTheirGravity) {
   const BuiltScene scene = built_with("Force { Type = \"Lake\" Id = \"Lake\" CustomProperties { Level = 3 } }",
                                       "\"Down\", \"Lake\"", "\"Lake\", \"Side\", \"Down\"");
@@ -92,6 +104,14 @@ TEST(ForceBodies, KeepAGravityThatIsGiven) {
       "Force { Type = \"Lake\" Id = \"Lake\" CustomProperties { Gravity = {0, -1, 0} } }", "\"Down\", \"Lake\"");
   ASSERT_TRUE(scene.description.has_value());
   EXPECT_THAT(scene.description->forces[0].parameters, ElementsAre(0, -1, 0, 0));
+}
+
+TEST(ForceBodies, AreWarnedOfWhereNothingLiftsThem) {
+  const std::string lake = "Force { Type = \"Lake\" Id = \"Lake\" CustomProperties { Level = 3 } }";
+  EXPECT_THAT(
+      built_with(lake, "\"Lake\"", "\"Lake\", \"Down\"").warnings(),
+      ElementsAre(HasSubstr("Lake \"Lake\" has no Gravity, and the body \"A\" feels no force of type Gravity")));
+  EXPECT_THAT(built_with(lake, "\"Lake\", \"Down\"").warnings(), IsEmpty());
 }
 
 }  // namespace
