@@ -71,9 +71,8 @@ class Balance {
         pushes_(*pushes) {}
 
   std::string check() {
-    std::string wrong = check_bodies(Directions::kOfTrial);
-    if (!wrong.empty() && !check_bodies(Directions::kOfTrialAtOwn).empty() && !check_bodies(Directions::kOfEnd).empty())
-      return wrong;
+    std::string wrong = check_bodies();
+    if (!wrong.empty()) return wrong;
     if (wrong = check_energy(); !wrong.empty()) return wrong;
     if (is_unfinished()) return {};
     if (wrong = check_touching(); !wrong.empty()) return wrong;
@@ -82,16 +81,27 @@ class Balance {
   }
 
  private:
-  std::string check_bodies(Directions directions) {
-    pushes_.assign(bodies_, Pushes{});
-    add_contacts();
-    add_discrepancies(directions);
-    const double relative = directions == Directions::kOfEnd ? kRelativeAtEnd : kRelative;
-    for (std::size_t i = 0; i < bodies_; ++i) {
-      if ((request_.flags()[i] & kMovable) == 0 || (request_.flags()[i] & kKinematic) != 0) continue;
-      if (std::string wrong = check_body(i, relative); !wrong.empty()) return wrong;
+  // Islands may be solved in different ways, so each body is judged by itself.
+  std::string check_bodies() {
+    std::string first;
+    std::vector<std::size_t> doubtful;
+    for (std::size_t i = 0; i < bodies_; ++i)
+      if ((request_.flags()[i] & kMovable) != 0 && (request_.flags()[i] & kKinematic) == 0) doubtful.push_back(i);
+    for (const Directions directions : {Directions::kOfTrial, Directions::kOfTrialAtOwn, Directions::kOfEnd}) {
+      pushes_.assign(bodies_, Pushes{});
+      add_contacts();
+      add_discrepancies(directions);
+      const double relative = directions == Directions::kOfEnd ? kRelativeAtEnd : kRelative;
+      std::string wrong;
+      std::erase_if(doubtful, [&](std::size_t i) {
+        std::string of_body = check_body(i, relative);
+        if (wrong.empty()) wrong = of_body;
+        return of_body.empty();
+      });
+      if (doubtful.empty()) return {};
+      if (first.empty()) first = wrong;
     }
-    return {};
+    return first;
   }
 
   bool is_unfinished() const { return answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kIterations); }

@@ -240,10 +240,11 @@ void IslandSolver::guess_offset(double share) {
 }
 
 bool IslandSolver::slips(const EndJoint& joint, std::size_t k) const {
+  constexpr double kAll = 1.0 - 1e-3;  // of a bound that may change on the way
   const JointAxisState& axis = joint.states[k];
   if (!has_reactions() || !is_drive(axis.mode) || axis.maximum_force >= kUnlimited) return false;
   const double applied = request_.discrepancy_applied_force()[3 * joint.row + k];
-  if (std::fabs(applied) < axis.maximum_force) return false;
+  if (std::fabs(applied) < kAll * axis.maximum_force) return false;
   const double rate =
       joint.directions[k].along(bodies_[joint.body1].trial_velocity, bodies_[joint.body2].trial_velocity);
   return (rate - axis.desired_velocity) * applied < 0.0;
