@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <chrono>
@@ -27,7 +28,7 @@ constexpr const char* kFromOutside =
     "without "
     "arguments";
 constexpr const char* kElsewhere = "the worker at an Address is none that commits orders, and was not started here";
-// What a process that was killed may take to be gone.
+// What a process that was killed may take to be gone, and one that was stopped to stand.
 constexpr std::chrono::seconds kEndPatience{1};
 
 // A worker that knows orders: one of ours. By its program where somebody else's could be.
@@ -39,6 +40,13 @@ bool commits_orders(const kernel::PluginChoice& plugin, int process) {
   const std::filesystem::path program = std::filesystem::read_symlink(fmt::format("/proc/{}/exe", process), unreadable);
   // who is not known is asked
   return unreadable || program.filename().string().starts_with(ours);
+}
+
+// All threads of a child; true of what is no child, whose state nobody tells.
+bool has_stopped(int process) {
+  siginfo_t what{};
+  const int told = ::waitid(P_PID, static_cast<id_t>(process), &what, WSTOPPED | WEXITED | WNOWAIT | WNOHANG);
+  return told != 0 || what.si_pid == process;
 }
 
 std::string not_injected(std::string_view kind, std::uint32_t step) {
@@ -94,13 +102,20 @@ class DeskHost final : public capsule::ForwardingHost {
     if (is_elsewhere_) return complain(order, kElsewhere);
     if (!can_come_from_outside(order)) return complain(order, kFromOutside);
     if (order != "kill") {
-      if (host_->is_alive()) ::kill(host_->process_id(), SIGSTOP);
-      return;
+      if (!host_->is_alive()) return;
+      ::kill(host_->process_id(), SIGSTOP);
+      // its threads stop one after the other: until the last has, one of them may answer
+      return wait_while([&] { return !has_stopped(host_->process_id()); });
     }
     host_->kill();
     // so that it never has the request, which is then not to blame
+    wait_while([&] { return host_->is_alive(); });
+  }
+
+  template <class Condition>
+  static void wait_while(Condition&& condition) {
     const auto until = std::chrono::steady_clock::now() + kEndPatience;
-    while (host_->is_alive() && std::chrono::steady_clock::now() < until)
+    while (condition() && std::chrono::steady_clock::now() < until)
       std::this_thread::sleep_for(std::chrono::microseconds(200));
   }
 
