@@ -100,6 +100,18 @@ v1::Component solver_of(const v1::Environment& environment, kernel::Simulator si
   return solver;
 }
 
+// Joints in the derivative of a method of order 1 swing ever further.
+void warn_of_first_order(BuildContext* context) {
+  const kernel::EnvironmentDescription& d = context->description;
+  if (d.simulator != kernel::Simulator::kSmooth || d.constraints.empty() || d.integrator.plugins.empty()) return;
+  const std::string& name = d.integrator.plugins[0].declaration.name;
+  if (name != "Euler" && name != "SemiImplicitEuler") return;
+  context->diagnostics->warning(place_of(context->scene.simulator().location()),
+                                "the simulator Smooth with \"" + name +
+                                    "\", which is of order 1, gains energy at joints; better: \"DormandPrince54\", "
+                                    "\"RK4\", \"Verlet\"");
+}
+
 // The Accuracy of Smooth is the integrator's.
 void hand_on_accuracy(BuildContext* context) {
   const SimulatorProperties& properties = context->scene.simulator().custom_properties();
@@ -230,6 +242,7 @@ void build_world(BuildContext* context) {
   plugins.choose(Slot::kSolver, solver_of(environment, simulator), has_shapes || has_joints);
   plugins.choose(Slot::kIntegrator, integrator_of(environment, simulator), has_bodies);
   if (diagnostics->ok()) hand_on_accuracy(context);
+  if (diagnostics->ok()) warn_of_first_order(context);
   plugins.report_unused();
   if (diagnostics->ok()) build_materials(context);
 }

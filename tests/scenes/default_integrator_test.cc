@@ -1,6 +1,7 @@
 // The integrator and solver of a scene that names none are what its simulator needs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -58,6 +59,17 @@ Environment { Space { Bodies {
 )");
   run.to_end();
   EXPECT_NEAR(run.energy(), 0.0, 1e-7);
+}
+
+// Of order 1 they gain energy from swing to swing.
+TEST(DefaultIntegrator, IsRecommendedOverThoseOfOrderOne) {
+  for (const std::string integrator : {"Euler", "SemiImplicitEuler", "Verlet", "RK4", "DormandPrince54"}) {
+    const SceneRun run("double_pendulum.gravitas",
+                       {"Simulator=Smooth", "Solver=Direct", "Integrator=" + integrator, "Simulator.Duration=0.1"});
+    const bool is_warned = std::ranges::any_of(
+        run.warnings(), [](const std::string& one) { return one.find("gains energy at joints") != std::string::npos; });
+    EXPECT_EQ(is_warned, integrator.ends_with("Euler")) << integrator;
+  }
 }
 
 }  // namespace

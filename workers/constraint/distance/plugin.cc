@@ -33,21 +33,22 @@ class Distance final : public ConstraintPlugin {
         .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Rod, rope or cable.",
-        .types = {{"Distance",
-                   "A point of either body, kept at a distance: a rod, a rope, or both bounds of a range.",
-                   {Property::vector("BindPoint1", "m", "world").required().means("Point of body 1, at the start."),
-                    Property::vector("BindPoint2", "m", "world").required().means("Point of body 2, at the start."),
-                    Property::number("MinimumDistance", "m")
-                        .at_least(0.0)
-                        .means("Smallest distance; absent: 0, or that of the start if MaximumDistance is absent too."),
-                    Property::number("MaximumDistance", "m")
-                        .at_least(0.0)
-                        .means("Largest distance; absent: none, or that of the start if MinimumDistance is absent "
-                               "too. Set while it runs, what is then too long is pulled in by the next step."),
-                    Property::number("Stiffness", "N/m")
-                        .above(0.0)
-                        .means("Spring that holds what is beyond the range; rigid if absent."),
-                    Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")}}}};
+        .types = {
+            {"Distance",
+             "A point of either body, kept at a distance: a rod, a rope, or both bounds of a range.",
+             {Property::vector("BindPoint1", "m", "world").required().means("Point of body 1, at the start."),
+              Property::vector("BindPoint2", "m", "world").required().means("Point of body 2, at the start."),
+              Property::number("MinimumDistance", "m")
+                  .at_least(0.0)
+                  .means("Smallest distance; absent: 0, or that of the start if MaximumDistance is absent too."),
+              Property::number("MaximumDistance", "m")
+                  .at_least(0.0)
+                  .means("Largest distance, above 0; absent: none, or that of the start if MinimumDistance is absent "
+                         "too. Set while it runs, what is then too long is pulled in by the next step."),
+              Property::number("Stiffness", "N/m")
+                  .above(0.0)
+                  .means("Spring that holds what is beyond the range; rigid if absent."),
+              Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")}}}};
   }
   explicit Distance(PropertyCursor) {}
 
