@@ -108,8 +108,8 @@ const Column<double>& Environment::start_angular_velocity() const {
 void Environment::constrain(const Trusted<TrialState>&) {
   ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                     data_.trial_angular_velocity);
-  // what springs of joints do came with the derivatives
   data_.held_force.resize(3 * data_.discrepancies.mode.size());
+  // what springs of joints do came with the derivatives
   if (knows_reactions())
     for (std::uint32_t& mode : data_.discrepancies.mode.span()) mode |= kForcesApplied;
 }

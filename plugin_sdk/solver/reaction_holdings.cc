@@ -116,6 +116,12 @@ bool ReactionSolver::release_overloaded() {
 bool ReactionSolver::change_open() {
   constexpr int kMostReturns = 2;
   constexpr double kNothing = 1e-9;  // of the accelerations
+  const auto may_change = [](const Holding& one) {
+    return !one.holds && (one.missing > 0.0 || (one.is_released && one.returns < kMostReturns));
+  };
+  if (std::ranges::none_of(joints_,
+                           [&](const Joint& joint) { return std::ranges::any_of(joint.holdings, may_change); }))
+    return false;
   std::vector<Wrench> held(bodies_.size());
   for (std::size_t i = 0; i < rows_.size(); ++i)
     add_force(rows_[i].direction, multipliers_[i], &held[rows_[i].body1], &held[rows_[i].body2]);
@@ -128,8 +134,7 @@ bool ReactionSolver::change_open() {
   for (Joint& joint : joints_) {
     for (int axis = 0; axis < 3; ++axis) {
       Holding& holding = joint.holdings[static_cast<std::size_t>(axis)];
-      const bool may_return = holding.is_released && holding.returns < kMostReturns;
-      if (holding.holds || !(may_return || holding.missing > 0.0)) continue;
+      if (!may_change(holding)) continue;
       const Discrepancy& d = at_pose(joint);
       const Matrix3 axes = to_rotation_matrix(d.axes);
       const Row row = row_of_axis(d, axes, axis, arms_of(d, axes, joint), joint);

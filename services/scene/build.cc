@@ -241,8 +241,10 @@ void build_world(BuildContext* context) {
   const kernel::Simulator simulator = context->description.simulator;
   plugins.choose(Slot::kSolver, solver_of(environment, simulator), has_shapes || has_joints);
   plugins.choose(Slot::kIntegrator, integrator_of(environment, simulator), has_bodies);
-  if (diagnostics->ok()) hand_on_accuracy(context);
-  if (diagnostics->ok()) warn_of_first_order(context);
+  if (diagnostics->ok()) {
+    hand_on_accuracy(context);
+    warn_of_first_order(context);
+  }
   plugins.report_unused();
   if (diagnostics->ok()) build_materials(context);
 }

@@ -8,9 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "services/recorder/reaction_log.h"
 #include "tests/paths.h"
-#include "tests/scenes/scene_run.h"
+#include "tests/scenes/watched_run.h"
 
 namespace gravitas::gears {
 namespace {
@@ -322,26 +321,11 @@ TEST(GearsSmooth, KeepTheOrderOfTheIntegrator) {
 
 // ---- racks and screws
 
-class WatchedGears final : private kernel::CommitListener {
- public:
-  explicit WatchedGears(const std::string& text, const std::vector<std::string>& overrides = {})
-      : run(text, overrides), log_("", run.description(), 0.0) {
-    run.environment().set_commit_listener(this);
-  }
-  report::v1::Reaction of(const std::string& type) {
-    for (const report::v1::Reaction& one : log_.last(run.environment()))
-      if (one.constraint().starts_with(type)) return one;
-    throw std::runtime_error("no reaction of " + type);
-  }
-  SceneRun run;
-
- private:
-  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
-    log_.add(environment, inner);
-  }
-  void on_commit(const kernel::Environment&) override {}
-  ReactionLog log_;
-};
+report::v1::Reaction reaction_of(const std::string& type, const harness::WatchedRun& watched) {
+  for (const report::v1::Reaction& one : watched.reactions())
+    if (one.constraint().starts_with(type)) return one;
+  throw std::runtime_error("no reaction of " + type);
+}
 
 constexpr int kTeeth = 20;
 constexpr double kPitch = 0.0157, kRadius = kTeeth * kPitch / (2.0 * kPi);
@@ -350,14 +334,14 @@ TEST_P(Gears, OfARackMoveAndHoldIt) {
   for (const double side : {1.0, -1.0}) {
     // the rack stands upright beside the pinion and is lifted or let down
     const Vector3 at(0.2 * side, 0, 0);
-    WatchedGears lift(geared({{"Pinion", kCentre}, {"Rack", at, 0.0, 3.0, 0.1, "Down"}},
-                             motor("", "Pinion", kCentre, 4.0) +
-                                 link("Slider", "", "Rack", "Axis = {0, 1, 0} BindPoint = " + literal(at)) +
-                                 link("Rack", "Pinion", "Rack",
-                                      "Axis = {0, 0, 1} Direction = {0, 2, 0} Teeth = " + std::to_string(kTeeth) +
-                                          " Pitch = " + literal(kPitch)),
-                             gravity("Down", {0, -kG, 0})),
-                      solver({"Simulator.Duration=20"}));
+    harness::WatchedRun lift(geared({{"Pinion", kCentre}, {"Rack", at, 0.0, 3.0, 0.1, "Down"}},
+                                    motor("", "Pinion", kCentre, 4.0) +
+                                        link("Slider", "", "Rack", "Axis = {0, 1, 0} BindPoint = " + literal(at)) +
+                                        link("Rack", "Pinion", "Rack",
+                                             "Axis = {0, 0, 1} Direction = {0, 2, 0} Teeth = " +
+                                                 std::to_string(kTeeth) + " Pitch = " + literal(kPitch)),
+                                    gravity("Down", {0, -kG, 0})),
+                             solver({"Simulator.Duration=20"}));
     SceneRun& run = lift.run;
     Turned pinion("Pinion");
     while (!run.is_done()) {
@@ -368,20 +352,21 @@ TEST_P(Gears, OfARackMoveAndHoldIt) {
     EXPECT_NEAR(run.body("Rack").twist.linear.y(), side * kRadius * 4.0, tolerance(1e-9, 1e-4));
     EXPECT_NEAR(run.body("Rack").pose.position.y(), side * kRadius * pinion.sum(), 1e-6);
     // the weight of 3 kg
-    EXPECT_NEAR(lift.of("Rack").force(1), 3.0 * kG, tolerance(1e-6, 0.1));
-    EXPECT_NEAR(lift.of("AngularMotor").torque(2), side * 3.0 * kG * kRadius, tolerance(1e-6, 0.01));
+    EXPECT_NEAR(reaction_of("Rack", lift).force(1), 3.0 * kG, tolerance(1e-6, 0.1));
+    EXPECT_NEAR(reaction_of("AngularMotor", lift).torque(2), side * 3.0 * kG * kRadius, tolerance(1e-6, 0.01));
   }
 }
 
 // A jack: a motor turns the spindle, the nut is guided; 200 kg rise by 5 mm a turn for m g Lead/(2 pi).
 TEST_P(Gears, OfAScrewLiftForTheTorqueOfItsLead) {
   for (const double lead : {0.005, -0.005, 0.002}) {
-    WatchedGears jack(geared({{"Spindle", kCentre}, {"Nut", {0, 0, 0.2}, 0.0, 200.0, 4.0, "Down"}},
-                             motor("", "Spindle", kCentre, -6.0) +
-                                 link("Slider", "", "Nut", "Axis = {0, 0, 1} BindPoint = {0, 0, 0.2}") +
-                                 link("Screw", "Spindle", "Nut", axis_through(kCentre) + " Lead = " + literal(lead)),
-                             gravity("Down", {0, 0, -kG})),
-                      solver({"Simulator.Duration=5"}));
+    harness::WatchedRun jack(
+        geared({{"Spindle", kCentre}, {"Nut", {0, 0, 0.2}, 0.0, 200.0, 4.0, "Down"}},
+               motor("", "Spindle", kCentre, -6.0) +
+                   link("Slider", "", "Nut", "Axis = {0, 0, 1} BindPoint = {0, 0, 0.2}") +
+                   link("Screw", "Spindle", "Nut", axis_through(kCentre) + " Lead = " + literal(lead)),
+               gravity("Down", {0, 0, -kG})),
+        solver({"Simulator.Duration=5"}));
     Turned spindle("Spindle");
     while (!jack.run.is_done()) {
       jack.run.step();
@@ -390,8 +375,9 @@ TEST_P(Gears, OfAScrewLiftForTheTorqueOfItsLead) {
     const SceneRun::Motion nut = jack.run.body("Nut");
     EXPECT_NEAR(nut.twist.linear.z(), 6.0 * lead / (2.0 * kPi), tolerance(1e-9, 1e-5)) << lead;
     EXPECT_NEAR(nut.pose.position.z(), 0.2 - lead / (2.0 * kPi) * spindle.sum(), 1e-5) << lead;
-    EXPECT_NEAR(jack.of("AngularMotor").torque(2), -200.0 * kG * lead / (2.0 * kPi), tolerance(1e-6, 0.1)) << lead;
-    EXPECT_NEAR(jack.of("Screw").force(2), 200.0 * kG, tolerance(1e-6, 10.0)) << lead;
+    EXPECT_NEAR(reaction_of("AngularMotor", jack).torque(2), -200.0 * kG * lead / (2.0 * kPi), tolerance(1e-6, 0.1))
+        << lead;
+    EXPECT_NEAR(reaction_of("Screw", jack).force(2), 200.0 * kG, tolerance(1e-6, 10.0)) << lead;
   }
 }
 

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "services/recorder/reaction_log.h"
-#include "tests/scenes/scene_run.h"
+#include "tests/scenes/watched_run.h"
 
 namespace gravitas {
 namespace {
@@ -15,26 +14,7 @@ namespace {
 using harness::literal;
 using harness::SceneRun;
 using harness::set;
-
-// A run whose reactions are kept.
-class Watched final : private kernel::CommitListener {
- public:
-  explicit Watched(const std::string& text, const std::vector<std::string>& overrides = {})
-      : run(text, overrides), log_("", run.description(), 0.0) {
-    run.environment().set_commit_listener(this);
-  }
-  std::vector<report::v1::Reaction> reactions() { return log_.last(run.environment()); }
-
-  SceneRun run;
-
- private:
-  void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
-    log_.add(environment, inner);
-  }
-  void on_commit(const kernel::Environment&) override {}
-
-  ReactionLog log_;
-};
+using Watched = harness::WatchedRun;
 
 Vector3 vector_of(const google::protobuf::RepeatedField<double>& numbers) {
   return {numbers.at(0), numbers.at(1), numbers.at(2)};

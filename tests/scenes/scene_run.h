@@ -87,6 +87,7 @@ class SceneRun final : private EventListener {
   std::uint32_t count_events(EventKind kind) const;
   const std::vector<std::string>& warnings() const { return warnings_; }
   kernel::Environment& environment() { return *environment_; }
+  const kernel::Environment& environment() const { return *environment_; }
   const kernel::EnvironmentDescription& description() const { return description_; }
 
  private:
