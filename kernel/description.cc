@@ -44,7 +44,8 @@ std::string validate_joint(const EnvironmentDescription& d, const ConstraintDesc
   if (!exists(joint.body1) || !exists(joint.body2)) return who + "there is no such body";
   if (joint.body1 == joint.body2) return who + "it binds a body to itself";
   if (joint.plugin >= d.constraint.plugins.size()) return who + "no plugin serves its type";
-  if (!(joint.breaking_threshold >= 0.0) || !(joint.breaking_force >= 0.0)) return who + "negative breaking threshold";
+  for (const double most : {joint.breaking_threshold, joint.breaking_force, joint.breaking_torque})
+    if (!(most >= 0.0)) return who + "negative breaking threshold";
   return {};
 }
 

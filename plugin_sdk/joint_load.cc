@@ -1,6 +1,7 @@
 #include "plugin_sdk/joint_load.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
@@ -33,14 +34,24 @@ double gyration(const JointBody& body) {
 
 JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
   JointLoad load;
-  Vector3 sum = Vector3::Zero();
+  Vector3 sum = Vector3::Zero(), turn = Vector3::Zero();
+  std::optional<Vector3> about;
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
     const Vector3 error = error_in_axes_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next);
     load.error = std::max(load.error, joint_error(discrepancy, error));
-    if (!discrepancy.is_angular()) sum += impulse_of(joint, discrepancy, row, time_step);
+    const Vector3 impulse = impulse_of(joint, discrepancy, row, time_step);
+    if (discrepancy.is_angular()) {
+      turn += impulse;
+    } else {
+      const Vector3 point = carried(discrepancy.point1, body1.trial, body1.next);
+      if (!about) about = point;
+      sum += impulse;
+      turn += (point - *about).cross(impulse);
+    }
   }
   load.force = sum.norm() / time_step;
+  load.torque = turn.norm() / time_step;
   return load;
 }
 

@@ -28,6 +28,7 @@ struct JointRows {
 struct JointLoad {
   double error = 0.0;  // at S_{n+1}, m, or rad for angular rows
   double force = 0.0;  // norm of the sum of what pushed, N
+  double torque = 0.0;  // norm of the sum of what turned, about the joint's first point at S_{n+1}, N m
 };
 
 JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);

@@ -52,11 +52,15 @@ void Environment::update_joints() {
     while (row < columns.size() && d.constraint[row] == joint) ++row;
     const JointBody one = body(description.body1), two = body(description.body2);
     const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
-    const double h = data_.time_step[0], threshold = description.breaking_threshold, force = description.breaking_force;
+    const double h = data_.time_step[0];
+    const auto share = [](double of, double most) { return most > 0.0 ? of / most : 0.0; };
+    const double force = description.breaking_force, torque = description.breaking_torque;
+    const double threshold = description.breaking_threshold;
     const JointLoad load = joint_load(rows, one, two, h);
-    const bool is_torn = contradicts && force > 0.0 && is_pulled_apart(rows, one, two);
-    const double overload = std::max(force > 0.0 ? (is_torn ? kUnlimited : load.force) / force : 0.0,
-                                     threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0);
+    const bool is_torn = contradicts && (force > 0.0 || torque > 0.0) && is_pulled_apart(rows, one, two);
+    const double overload = std::max({share(is_torn ? kUnlimited : load.force, force),
+                                      share(is_torn ? kUnlimited : load.torque, torque),
+                                      threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0});
     if (overload > 1.0) overloaded.emplace_back(-overload, joint);
     figures_.joint_error = std::max(figures_.joint_error, load.error);
   }

@@ -113,12 +113,15 @@ void add_serve(CLI::App* app, Action* action) {
       "--checkpoint", line->options.run.checkpoint,
       "Keep a checkpoint in this file (replaced as a whole) and a journal in FILE.journal, with what was changed live: "
       "at "
-      "the start, at the end, and as --checkpoint-every says; `gravitas run --resume` goes on from it");
+      "the start, at the end, and as --checkpoint-every says; --resume, here and of `gravitas run`, goes on from it");
   command
       ->add_option("--checkpoint-every", line->options.run.checkpoint_every,
                    "Steps between checkpoints, counted from t = 0")
       ->check(whole_number(1))
       ->needs(checkpoint);
+  command->add_option("--resume", line->options.run.resume,
+                      "Go on from this checkpoint and the journal beside it, of a server or a run; --steps and "
+                      "--duration count from t = 0, and a reset begins the scene");
   command->add_option("--socket", line->socket,
                       "Listen at this path instead of a private folder in $XDG_RUNTIME_DIR or /tmp");
   command->callback([=] { *action = [=] { return serve(line.get()); }; });

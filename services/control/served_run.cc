@@ -74,7 +74,12 @@ ServedRun::ServedRun(const ServeOptions& options)
       timer_(loop_) {
   for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
   require_separate_files(options_, first_scene_, {});
-  begin_environment();
+  if (options_.resume.empty()) {
+    begin_environment(nullptr);
+  } else {
+    const Resumption resumed = last_known(options_, first_description_, &scene_warnings_);
+    begin_environment(&resumed);
+  }
   if (!options.is_paused && state_ == State::kPaused) go();
   thread_ = std::jthread([this] {
     const auto work = boost::asio::make_work_guard(loop_);
@@ -91,14 +96,20 @@ kernel::HostStarter ServedRun::starter() {
   return interruptible(with_fault_desk(capsule::recording(tape_), &environment_), [this] { return is_ending_.load(); });
 }
 
-void ServedRun::begin_environment() {
+void ServedRun::begin_environment(const Resumption* from) {
   // where the new one cannot be made the old one stays
-  auto environment = start(first_description_, starter(), &first_scene_);
+  Beginning begins{first_scene_, first_description_, slots_of(first_description_), {}};
+  if (from != nullptr) {
+    begins = restored(*from);
+  } else {
+    begins.environment = start(first_description_, starter(), &first_scene_);
+  }
   close_capture();
   survey_.reset();
-  environment_ = std::move(environment);
-  scene_ = first_scene_;
-  description_ = first_description_;
+  environment_ = std::move(begins.environment);
+  scene_ = std::move(begins.scene);
+  description_ = std::move(begins.description);
+  active_ = std::move(begins.active);
   past_.Clear();
   past_swaps_.clear();
   events_ = std::make_unique<EventLog>("", description_);
@@ -109,13 +120,20 @@ void ServedRun::begin_environment() {
     events_->write(&tally);
     return tally;
   });
+  if (from != nullptr) {
+    const recorder::v1::Checkpoint& kept = from->checkpoint;
+    recorder_->set_edits({kept.edits().begin(), kept.edits().end()});
+    recorder_->set_decisions({kept.decisions().begin(), kept.decisions().end()});
+    events_->resume(kept.tally());
+    figures_->resume(kept.tally());
+    figures_->follow(environment_.get());
+  }
   event_source_.emplace(events_.get());
   reactions_.emplace("", description_, 0.0);
   with_subscriptions([](Subscription* one) { one->source().begin_again(); });
   environment_->set_commit_listener(this);
   pair_decisions_.forget();
   if (listener_) attend_listener();
-  active_ = slots_of(description_);
   forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
   orders_.clear();
   warnings_ = scene_warnings_;
@@ -125,9 +143,9 @@ void ServedRun::begin_environment() {
   injected_.clear();
   poisoned_step_ = 0;
   next_collection_ = {};
-  stand(environment_->total_steps() == 0 ? State::kFinished : State::kPaused);
+  stand(environment_->step_count() >= environment_->total_steps() ? State::kFinished : State::kPaused);
   status_now();
-  if (!options_.checkpoint.empty()) keep_checkpoint();
+  if (!options_.checkpoint.empty()) keep_checkpoint(from != nullptr ? from->journal : JournalReading{});
 }
 
 // ---- the steps
@@ -260,7 +278,7 @@ void ServedRun::resume() {
 void ServedRun::reset() {
   between_steps([this] {
     const bool goes_on = state_ == State::kRunning && !steps_left_;
-    begin_environment();
+    begin_environment(nullptr);
     if (goes_on && state_ == State::kPaused) go();
   });
 }

@@ -5,6 +5,8 @@
 //   paused --resume--> running --pause--> paused --step(n)--> running --n steps--> paused
 //   running --last step--> finished, running --fault that nobody survives--> faulted, any --reset--> paused or running
 //
+// One that goes on from a checkpoint begins with the last step that the journal beside it knows; a reset begins the scene.
+//
 // What can never be throws BadInput, what cannot be now NotNow; both say what is allowed.
 #pragma once
 
@@ -35,6 +37,7 @@
 #include "services/recorder/recorder.h"
 #include "services/run/figures.h"
 #include "services/run/interruptible_host.h"
+#include "services/run/resumption.h"
 #include "services/run/session.h"
 #include "services/survey/instrumentation.h"
 
@@ -43,7 +46,7 @@ namespace gravitas::control {
 namespace api = control_api::v1;
 
 struct ServeOptions {
-  RunOptions run;      // the scene and its overrides; of what writes files the checkpoint alone
+  RunOptions run;      // the scene and its overrides; of files the checkpoints alone, to go on from and to keep
   double speed = 1.0;  // simulated seconds per second of wall time; 0: as fast as possible
   bool is_paused = false;
   std::vector<std::string> hosting_words = {};  // of the command line, for the one that goes on from a checkpoint
@@ -128,7 +131,17 @@ class ServedRun final : private kernel::CommitListener {
   kernel::HostStarter starter();
 
   // All of these in the stepping thread.
-  void begin_environment();
+  // What the first environment runs, or one after a reset.
+  struct Beginning {
+    scene::v1::Scene scene;
+    kernel::EnvironmentDescription description, active;
+    std::unique_ptr<kernel::Environment> environment;
+  };
+  // With null the scene begins.
+  void begin_environment(const Resumption* from);
+  Beginning restored(const Resumption& from);
+  static Resumption last_known(const RunOptions& options, const kernel::EnvironmentDescription& description,
+                               std::vector<std::string>* warnings);
   void go();
   void stand(State state);
   void schedule();
@@ -136,7 +149,7 @@ class ServedRun final : private kernel::CommitListener {
   // It begins, or has ended.
   void note_step(std::optional<Clock::time_point> begin);
   void make_step();
-  void keep_checkpoint();
+  void keep_checkpoint(const JournalReading& known);
   void keep_faulted_state();
   void close_capture();
   Clock::time_point due() const;

@@ -1,19 +1,71 @@
-// What a served run leaves, and what goes on from it.
+// What a served run goes on from, and what it leaves.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
+#include "plugin_sdk/channel/private_folder.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
+#include "services/edit/edited_scene.h"
 #include "services/run/resume_command.h"
-#include "services/run/resumption.h"
 
 namespace gravitas::control {
 
+// With the steps, edits and swaps that the journal beside the checkpoint knows, made again.
+Resumption ServedRun::last_known(const RunOptions& options, const kernel::EnvironmentDescription& description,
+                                 std::vector<std::string>* warnings) {
+  Resumption found = read_resumption(options.resume, description, warnings);
+  std::uint32_t last = found.journal.last_step;
+  for (const edit::v1::Edit& one : found.journal.edits) last = std::max(last, one.step());
+  for (const recorder::v1::Decision& one : found.journal.decisions) last = std::max(last, one.step());
+  last = std::min(last, description.steps);
+  if (last <= found.checkpoint.step()) return found;
+  const channel::PrivateFolder folder;
+  RunOptions again = options;
+  again.checkpoint = folder.path() + "/checkpoint";
+  again.checkpoint_every = 0;
+  again.duration.reset();
+  again.steps = last;
+  const RunResult result = run(
+      again, [] { return false; }, [](const Progress&) {});
+  if (result.outcome != RunOutcome::kCompleted)
+    throw BadInput(fmt::format("checkpoint '{}': steps {} to {}, which its journal knows, cannot be made again: {}",
+                               options.resume, found.checkpoint.step() + 1, last, result.fault));
+  std::vector<std::string> known;  // was told above
+  Resumption caught_up = read_resumption(again.checkpoint, description, &known);
+  caught_up.journal = std::move(found.journal);
+  return caught_up;
+}
+
+// Its edits are made, and whoever answered when it was written answers.
+ServedRun::Beginning ServedRun::restored(const Resumption& from) {
+  Beginning begins{first_scene_, first_description_, {}, {}};
+  for (edit::v1::Edit one : from.checkpoint.edits()) {
+    const EditedScene edited(options_, begins.scene, begins.description, &catalog_, &one, nullptr);
+    scene::v1::Scene scene = edited.scene();
+    kernel::EnvironmentDescription description = edited.description();
+    begins.scene = std::move(scene);
+    begins.description = std::move(description);
+  }
+  recorder::v1::Checkpoint checkpoint = from.checkpoint;
+  from_checkpoint(options_.resume, [&] {
+    Answering answering = answering_at(checkpoint, begins.description, catalog_);
+    for (auto* one : {&answering.now, &answering.begun}) apply_hosting(options_.hosting, one);
+    begins.environment = start(answering.begun, starter(), &begins.scene);
+    restore(&checkpoint, answering.now, catalog_, begins.environment.get());
+    for (const Slot slot : kSlots) begins.active.slot(slot) = answering.now.slot(slot);
+  });
+  return begins;
+}
+
 // Begins it; a reset begins it anew.
-void ServedRun::keep_checkpoint() {
+void ServedRun::keep_checkpoint(const JournalReading& known) {
   try {
-    recorder_->keep(std::filesystem::absolute(checkpoint_target(options_.checkpoint)), options_.checkpoint_every, {},
+    const std::string path = checkpoint_target(options_.checkpoint);
+    // the journal of another file starts anew
+    const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == path;
+    recorder_->keep(std::filesystem::absolute(path), options_.checkpoint_every, goes_on ? known : JournalReading{},
                     *environment_);
   } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());

@@ -75,7 +75,7 @@ PartDigest digest_joints(const kernel::EnvironmentDescription& d) {
   PartDigest digest;
   for (const kernel::ConstraintDescription& joint : d.constraints)
     digest << joint.type << joint.parameters << joint.body1 << joint.body2 << joint.breaking_threshold
-           << joint.breaking_force << joint.plugin;
+           << joint.breaking_force << joint.breaking_torque << joint.plugin;
   return digest;
 }
 

@@ -63,6 +63,7 @@ void ReactionLog::add_joints(const kernel::StepData& data) {
   const DiscrepancyColumns rows = data.discrepancies.columns();
   const bool acts_in_derivatives = description_.simulator == kernel::Simulator::kSmooth;
   std::uint32_t known = kNone;
+  bool has_point = false;  // of a row that pushes
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Discrepancy row = rows.at(i);
     const std::uint32_t joint = data.discrepancies.constraint[i];
@@ -71,7 +72,9 @@ void ReactionLog::add_joints(const kernel::StepData& data) {
     const std::uint32_t turned = body2 == kNone ? body1 : body2;
     const Vector3 point = row.is_angular() ? at_end(data, turned, vector_at(data.trial_position.span(), turned))
                                            : at_end(data, body1, row.point1);
-    if (joint != known) sum.point = point;
+    if (joint != known) has_point = false;
+    if (joint != known || (!has_point && !row.is_angular())) sum.point = point;
+    has_point = has_point || !row.is_angular();
     known = joint;
     Vector3 along = vector_at(data.discrepancy_impulse.span(), i);
     if (acts_in_derivatives) along += data.time_step[0] * vector_at(data.held_force.span(), i);

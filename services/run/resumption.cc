@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "services/recorder/checkpoint.h"
+#include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/identity.h"
 #include "services/recorder/recorder.h"
@@ -58,6 +59,27 @@ Resumption read_resumption(const std::string& path, const kernel::EnvironmentDes
                     checkpoint->step(), description.steps));
   JournalReading journal = read_journal_beside(path, digest_of(scene), checkpoint->step(), warnings);
   return {std::move(*checkpoint), std::move(journal)};
+}
+
+Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel::EnvironmentDescription& description,
+                       const Catalog& catalog) {
+  const std::vector<recorder::v1::Decision> decisions(checkpoint.decisions().begin(), checkpoint.decisions().end());
+  Answering answering{description, {}};
+  put_in_place(decisions, catalog, &answering.now);
+  answering.begun = answering.now;
+  take_back_swaps(decisions, catalog, description, &answering.begun);
+  return answering;
+}
+
+void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDescription& now, const Catalog& catalog,
+             kernel::Environment* environment) {
+  const std::vector<recorder::v1::Decision> decisions(checkpoint->decisions().begin(), checkpoint->decisions().end());
+  for (const kernel::SwapOrder& order : past_swaps(decisions, catalog, now)) environment->order_swap(order);
+  const std::string problem = environment->restore(saved_state_of(checkpoint));
+  if (!problem.empty()) throw std::runtime_error(problem);
+  for (const kernel::SwapRecord& swap : environment->swaps())
+    if (swap.state == kernel::SwapState::kRefused)
+      throw std::runtime_error(swap.to + " answered when it was made: " + swap.reason);
 }
 
 std::string checkpoint_target(const std::string& path) {

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "gravitas/recorder/v1/checkpoint.pb.h"
-#include "kernel/description.h"
+#include "kernel/environment.h"
+#include "services/catalog/catalog.h"
 #include "services/recorder/journal.h"
 #include "services/run/session.h"
 
@@ -20,6 +21,18 @@ struct Resumption {
 // end of the run. A journal that is missing is none; one that cannot be used in full is a warning.
 Resumption read_resumption(const std::string& path, const kernel::EnvironmentDescription& description,
                            std::vector<std::string>* warnings);
+
+// Who answers where a run goes on, and who begins, so that swaps that were made are made again (recorder/decision.h).
+struct Answering {
+  kernel::EnvironmentDescription now, begun;
+};
+// Of the description with the checkpoint's edits. Throws std::runtime_error where a plugin is not to be had.
+Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel::EnvironmentDescription& description,
+                       const Catalog& catalog);
+
+// Makes the swaps again in an environment that has begun so, and restores its state. Throws std::runtime_error.
+void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDescription& now, const Catalog& catalog,
+             kernel::Environment* environment);
 
 // Whatever `action` throws is what the checkpoint asks for and cannot be had: BadInput that names it.
 template <typename Action>

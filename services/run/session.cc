@@ -78,15 +78,15 @@ class Run final : private kernel::CommitListener {
     read_edits(resumed ? &*resumed : nullptr);
     read_orders();
     read_kinds();
-    kernel::EnvironmentDescription answering = description_, begun = description_;
-    if (resumed) apply_decisions(*resumed, &answering, &begun);
-    require_workers(answering);
-    environment_ = start(begun, starter(), &scene_);
-    if (!options_.instrumentation.empty()) surveyor_.emplace(answering, options_.starter);
+    Answering answering{description_, description_};
+    if (resumed) apply_decisions(*resumed, &answering);
+    require_workers(answering.now);
+    environment_ = start(answering.begun, starter(), &scene_);
+    if (!options_.instrumentation.empty()) surveyor_.emplace(answering.now, options_.starter);
     if (options_.listener) begin_listening();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
-    if (resumed) resume(&*resumed, answering);
+    if (resumed) resume(&*resumed, answering.now);
     attend();
     for (const RerunSpec& rerun : reruns_) require_rerun(rerun, *environment_);
     give_orders();
@@ -248,15 +248,8 @@ class Run final : private kernel::CommitListener {
   }
 
   void resume(Resumption* from, const kernel::EnvironmentDescription& answering) {
-    from_checkpoint(options_.resume, [&] {
-      for (const kernel::SwapOrder& order : past_swaps(decisions_, catalog_, answering))
-        environment_->order_swap(order);
-      const std::string problem = environment_->restore(saved_state_of(&from->checkpoint));
-      if (!problem.empty()) throw std::runtime_error(problem);
-      for (const kernel::SwapRecord& swap : environment_->swaps())
-        if (swap.state == kernel::SwapState::kRefused)
-          throw std::runtime_error(swap.to + " answered when it was made: " + swap.reason);
-    });
+    from_checkpoint(options_.resume,
+                    [&] { restore(&from->checkpoint, answering, catalog_, environment_.get()); });
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
     figures_->resume(resumed_tally_);
@@ -276,8 +269,7 @@ class Run final : private kernel::CommitListener {
 
   // Whoever answered when the checkpoint was made answers again; what the journal knows of later steps is ordered for
   // them. Swaps of the command line up to the checkpoint are done, or were refused.
-  void apply_decisions(const Resumption& resumed, kernel::EnvironmentDescription* answering,
-                       kernel::EnvironmentDescription* begun) {
+  void apply_decisions(const Resumption& resumed, Answering* answering) {
     const std::uint32_t step = resumed.checkpoint.step();
     for (const kernel::SwapOrder& one : swaps_)
       if (one.step <= step && std::ranges::find(resumed.checkpoint.decisions(), slot_name(one.slot),
@@ -289,9 +281,7 @@ class Run final : private kernel::CommitListener {
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
-      put_in_place(decisions_, catalog_, answering);
-      *begun = *answering;
-      take_back_swaps(decisions_, catalog_, description_, begun);
+      *answering = answering_at(resumed.checkpoint, description_, catalog_);
       for (const recorder::v1::Decision& decision : resumed.journal.decisions) {
         kernel::SwapOrder order = order_of(decision, catalog_);
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
@@ -302,7 +292,7 @@ class Run final : private kernel::CommitListener {
       }
     });
     // how far hosting may differ is for the command line to say
-    for (kernel::EnvironmentDescription* one : {answering, begun}) apply_hosting(options_.hosting, one);
+    for (auto* one : {&answering->now, &answering->begun}) apply_hosting(options_.hosting, one);
   }
 
   // Edits of the checkpoint have been made; those of the journal and the command line are to come, and are rehearsed.

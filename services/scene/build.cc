@@ -199,6 +199,7 @@ void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildCon
     description.type = joint.type();
     description.breaking_threshold = joint.breaking_threshold();
     description.breaking_force = joint.breaking_force();
+    description.breaking_torque = joint.breaking_torque();
     const TypeDeclaration* type = nullptr;
     description.plugin =
         plugins->serve(Slot::kConstraint, joint.type(), place_of(joint, Constraint::kTypeFieldNumber), &type);

@@ -57,7 +57,21 @@ TEST(JointLoad, OfAJointIsItsWorstRowAndTheSumOfItsForces) {
   const JointLoad load = joint_load(rows, one, two, 0.01);
   EXPECT_DOUBLE_EQ(load.error, 1e-3);
   EXPECT_DOUBLE_EQ(load.force, 500.0);
+  EXPECT_EQ(load.torque, 0.0);
   EXPECT_DOUBLE_EQ(opening(rows, one, two, 0.01), 4.0 * 0.01);
+}
+
+// Rows at (1, 0, 0) and (3, 0, 0), and one that turns, before them: about the first point, wherever body 1 takes it.
+TEST(JointLoad, TorqueIsAboutTheFirstPoint) {
+  const std::vector<double> point{0, 0, 0, 1, 0, 0, 3, 0, 0}, zero(9, 0.0), correction(3, 1.0);
+  const std::vector<double> axes{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, impulses{0, 0, 0.07, 0, 0.01, 0, 0, 0.02, 0};
+  const std::vector<double> unlimited(9, kUnlimited);
+  const std::uint32_t locked = pack_modes(AxisMode::kLocked, AxisMode::kLocked, AxisMode::kLocked);
+  const std::vector<std::uint32_t> modes{locked | kAngularDiscrepancy, locked, locked};
+  const DiscrepancyColumns columns{point, point, zero, correction, axes, modes, zero, zero, zero, zero, unlimited};
+  JointBody one;
+  one.next.position = Vector3(5, 0, 0);
+  EXPECT_DOUBLE_EQ(joint_load({columns, impulses, 0, 3}, one, {}, 0.01).torque, (0.07 + 2 * 0.02) / 0.01);
 }
 
 // Of two bodies with radii of gyration of 0.02 m and 0.05 m: a turn by 0.1 rad is open by 5 mm, however it is held.
