@@ -197,7 +197,7 @@ void WorkerLink::finish() {
     if (const std::string& name = plugins_[static_cast<std::size_t>(i)]; served[i].name() != name)
       problem = "it serves plugin '" + served[i].name() + "', not '" + name + "'";
   if (problem.empty()) return;
-  if (process_) process_->wait(kLastWordsMilliseconds);
+  if (process_ && process_->wait(kLastWordsMilliseconds)) problem += "; it was " + process_->ending();
   kill();
   fail_start(process_ ? problem + last_words(*process_) : problem);
 }

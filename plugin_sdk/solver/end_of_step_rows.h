@@ -36,7 +36,7 @@ struct EndJoint {
   std::array<ConstraintDirection, 3> directions;
   Vector3 arm1 = Vector3::Zero(), arm2 = Vector3::Zero();
   Vector3 errors;                  // along the axes
-  bool has_turns = false;          // two rows follow its own, for a rod that pulls
+  std::size_t turns = 0;           // rows that follow its own: two for a rod that pulls, one for a swing that is held
   std::array<double, 3> driven{};  // impulses of drives without bound by which these move the pose, N s, N m s
 
   // Of a rod, to its ends: the arms above are to its middle.

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 #include "plugin_sdk/solver/island_solver.h"
 
 namespace gravitas {
@@ -95,7 +96,7 @@ bool IslandSolver::keep_nearest(NearestPose* nearest) const {
     for (std::size_t k = 0; k < 3; ++k)
       if (joint.pose_laws[k].is_active())
         push += cone_.rows[next].multiplier * cone_.rows[next].direction.linear, ++next;
-    if (joint.has_turns) next += 2;
+    next += joint.turns;
     for (std::size_t k = 0; k < 3; ++k, ++of)
       if (joint.pose_laws[k].is_active() && !joint.discrepancy.is_angular()) *of = push.dot(joint.directions[k].linear);
   }
@@ -174,7 +175,9 @@ bool IslandSolver::follow_chords(double before) {
   for (;;) {
     place_unstiffened();
     turn_offset();
+    const std::size_t rows = cone_.rows.size();
     build_pose();
+    if (cone_.rows.size() != rows) return false;  // what pulled pushes, and resists to no turn
     const BodyMotion x0 = start_of_step();
     pose_contradiction_ = cone_.correct(bodies_, x0, representable());
     ++summary_.iterations;
@@ -282,7 +285,9 @@ void IslandSolver::build_pose() {
       row.start = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial -
                   row.direction.along(displacement_[joint.body1], displacement_[joint.body2]);
     }
+    joint.turns = 0;
     build_turns_of_rod(&joint);
+    build_turn_of_swing(&joint);
   }
   for (const EndContact& contact : contacts_) {
     ConeRow& row = cone_.rows.emplace_back();
@@ -307,8 +312,8 @@ void IslandSolver::build_pose() {
 void IslandSolver::build_turns_of_rod(EndJoint* joint) {
   const bool is_rod = joint->discrepancy.is_radial() && joint->pose_laws[0].is_active() && joint->errors[0] > 0.0;
   const double pull = -answer_.joint_correction[3 * joint->row];
-  joint->has_turns = is_rod && pull > 0.0;
-  if (!joint->has_turns) return;
+  if (!is_rod || !(pull > 0.0)) return;
+  joint->turns = 2;
   const Matrix3 &inverse1 = end_[joint->body1].stiffened, &inverse2 = end_[joint->body2].stiffened;
   const auto [first, second] = orthonormal_basis(joint->directions[0].linear);
   for (const Vector3& across : {first, second}) {
@@ -321,13 +326,37 @@ void IslandSolver::build_turns_of_rod(EndJoint* joint) {
   }
 }
 
+// A swing by the angle a resists to being turned round while it is held. With u and w the ways that its two directions go across
+// it, a grows by (u - w)^2 cot(a/2)/4 - (u + w)^2 tan(a/2)/4: held back with mu it resists to u - w with mu cot(a/2)/2, pushed on
+// to u + w with mu tan(a/2)/2. As a row with that compliance, like those of a rod.
+void IslandSolver::build_turn_of_swing(EndJoint* joint) {
+  if (!joint->discrepancy.is_swing() || !joint->pose_laws[0].is_active()) return;
+  const double push = answer_.joint_correction[3 * joint->row];
+  const double angle = joint->errors[0] + held_angle(joint->discrepancy);
+  const math::SinCos half = math::sincos(0.5 * angle), whole = math::sincos(angle);
+  if (push == 0.0 || !(half.sin > 0.0) || !(half.cos > 0.0)) return;
+  const Vector3 axis = joint->directions[0].angular2, first = joint->directions[1].angular2;
+  const Vector3 second = whole.cos * first + whole.sin * axis.cross(first);
+  joint->turns = 1;
+  ConeRow& row = cone_.rows.emplace_back();
+  row.body1 = joint->body1, row.body2 = joint->body2;
+  const Vector3 of_first = first.cross(axis);
+  row.direction.angular1 = push > 0.0 ? of_first : Vector3(-of_first);
+  row.direction.angular2 = second.cross(axis);
+  row.direction = with_turns(row.direction, end_[joint->body1].stiffened, end_[joint->body2].stiffened);
+  row.length = joint->length;
+  row.law.has_lower = row.law.has_upper = true;
+  row.law.gamma = push > 0.0 ? 2.0 * half.cos / (half.sin * push) : 2.0 * half.sin / (half.cos * -push);
+  row.start = -row.direction.along(displacement_[joint->body1], displacement_[joint->body2]);
+}
+
 void IslandSolver::keep_corrections() {
   std::size_t next = 0;
   for (const EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k)
       answer_.joint_correction[3 * joint.row + k] =
           joint.pose_laws[k].is_active() ? cone_.rows[next++].multiplier : 0.0;
-    if (joint.has_turns) next += 2;
+    next += joint.turns;
   }
   for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = cone_.rows[next++].multiplier;
 }

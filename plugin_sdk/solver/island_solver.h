@@ -158,6 +158,7 @@ class IslandSolver {
 
   void build_pose();
   void build_turns_of_rod(EndJoint* joint);
+  void build_turn_of_swing(EndJoint* joint);
 
   void keep_corrections();
 

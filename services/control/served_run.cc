@@ -134,7 +134,6 @@ void ServedRun::begin_environment(const Resumption* from) {
   environment_->set_commit_listener(this);
   pair_decisions_.forget();
   if (listener_) attend_listener();
-  forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
   orders_.clear();
   warnings_ = scene_warnings_;
   fault_.clear();
@@ -343,13 +342,15 @@ api::SwapOrdered ServedRun::set_property(const api::SetPropertyRequest& request)
   });
 }
 
-// The plugin of the slot that has the property: the one that is on its way, else the one that answers.
+// The plugin of the slot that has the property: the one that comes with the next step, else the one that answers.
 const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot slot, const std::string& property,
                                                    const std::vector<kernel::SwapRecord>& records) const {
-  for (std::size_t i = orders_.size(); i-- > 0;)
-    if (orders_[i].slot == slot && find_property(orders_[i].plugin, property) != nullptr &&
-        is_pending(record_of(orders_[i], records).state))
-      return orders_[i].plugin;
+  for (std::size_t i = orders_.size(); i-- > 0;) {
+    const kernel::SwapOrder& swap = orders_[i].swap;
+    if (swap.slot == slot && swap.step <= environment_->step_count() + 1 &&
+        find_property(swap.plugin, property) != nullptr && is_pending(record_of(orders_[i], records).state))
+      return swap.plugin;
+  }
   if (property.find('.') != std::string::npos)
     throw BadInput(
         fmt::format("{}: this changes settings of plugins, as in `set Solver.Iterations=50`; allowed for what "
@@ -367,22 +368,34 @@ const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot
 const kernel::SwapRecord& ServedRun::record_of(const Order& order, const std::vector<kernel::SwapRecord>& records) {
   std::uint32_t rank = 0;
   for (const kernel::SwapRecord& record : records)
-    if (record.slot == order.slot && record.step == order.step && rank++ == order.rank) return record;
+    if (record.slot == order.swap.slot && record.step == order.swap.step && rank++ == order.rank) return record;
   throw std::logic_error("a swap that was ordered is not known");
 }
 
+std::uint32_t ServedRun::rank_of(const kernel::SwapOrder& swap, const std::vector<Order>& orders) {
+  return static_cast<std::uint32_t>(std::ranges::count_if(
+      orders, [&](const Order& one) { return one.swap.slot == swap.slot && one.swap.step == swap.step; }));
+}
+
+std::vector<ServedRun::Order> ServedRun::pending_orders() const {
+  const std::vector<kernel::SwapRecord> records = environment_->swaps();
+  std::vector<Order> pending;
+  for (const Order& one : orders_)
+    if (is_pending(record_of(one, records).state)) pending.push_back(one);
+  return pending;
+}
+
 api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
-  Order kept{order.slot, order.step, 0, order.plugin};
-  for (const Order& other : orders_) kept.rank += other.slot == kept.slot && other.step == kept.step ? 1U : 0U;
   try {
     environment_->order_swap(order);
   } catch (const std::invalid_argument& problem) {
     throw BadInput(problem.what());
   }
-  orders_.push_back(std::move(kept));
   api::SwapOrdered ordered;
-  ordered.set_number(forgotten_orders_ + static_cast<std::uint32_t>(orders_.size()));
-  ordered.set_step(orders_.back().step);
+  ordered.set_number(++last_order_);
+  ordered.set_step(order.step);
+  const std::uint32_t rank = rank_of(order, orders_);
+  orders_.push_back({std::move(order), last_order_, rank});
   return ordered;
 }
 

@@ -107,11 +107,10 @@ class ServedRun final : private kernel::CommitListener {
  private:
   using Clock = std::chrono::steady_clock;
   enum class State : std::uint32_t { kRunning, kPaused, kFinished, kFaulted };
-  // A swap, and what to find its record by: the rank among the slot's swaps at that step.
+  // A swap, its number, and what to find its record by: the rank among the slot's swaps at that step.
   struct Order {
-    Slot slot;
-    std::uint32_t step, rank;
-    kernel::PluginChoice plugin;
+    kernel::SwapOrder swap;
+    std::uint32_t number, rank;
   };
   // Calls that are being kept.
   struct Capture {
@@ -174,7 +173,9 @@ class ServedRun final : private kernel::CommitListener {
   api::Status status_now();
   void write_plan(api::Plan* plan) const;
   std::vector<api::ServedSwap> swap_messages() const;
-  void require_settled_swaps() const;
+  // With those of before the last edit.
+  std::vector<Order> pending_orders() const;
+  static std::uint32_t rank_of(const kernel::SwapOrder& swap, const std::vector<Order>& orders);
   std::string state_name() const;
 
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override;
@@ -224,7 +225,7 @@ class ServedRun final : private kernel::CommitListener {
   std::uint32_t poisoned_step_ = 0;  // the last
   std::vector<kernel::FaultInjection> injected_;
   std::vector<Order> orders_;
-  std::uint32_t forgotten_orders_ = 0;  // of before the last reset: numbers go on
+  std::uint32_t last_order_ = 0;  // its number
   std::vector<std::string> warnings_;   // different ones
   Clock::time_point next_collection_;
 

@@ -104,13 +104,10 @@ std::string ServedRun::command_to_resume() const {
   RunOptions options = options_;
   for (std::string& scene : options.scenes) scene = std::filesystem::absolute(scene);
   // what was ordered for later
-  const std::vector<kernel::SwapRecord> records = environment_->swaps();
-  for (const Order& one : orders_) {
-    const kernel::SwapRecord& record = record_of(one, records);
-    const bool is_pending = record.state == kernel::SwapState::kPreparing || record.state == kernel::SwapState::kShadow;
-    if (is_pending && one.step > environment_->step_count() + 1)
-      options.swaps.push_back(fmt::format("{}={}@step={}", slot_name(one.slot), one.plugin.declaration.name, one.step));
-  }
+  for (const Order& one : pending_orders())
+    if (one.swap.step > environment_->step_count() + 1)
+      options.swaps.push_back(
+          fmt::format("{}={}@step={}", slot_name(one.swap.slot), one.swap.plugin.declaration.name, one.swap.step));
   return resume_command(options, hosting_words_, checkpoint_);
 }
 

@@ -6,27 +6,17 @@
 #include "plugin_sdk/near_miss.h"
 #include "services/control/served_run.h"
 #include "services/edit/edited_scene.h"
+#include "services/recorder/decision.h"
 #include "services/run/kernel_names.h"
 #include "services/run/report.h"
 
 namespace gravitas::control {
-
-// An environment takes its swaps along.
-void ServedRun::require_settled_swaps() const {
-  for (const kernel::SwapRecord& record : environment_->swaps())
-    if (record.state < kernel::SwapState::kCommitted)
-      throw NotNow(
-          fmt::format("edit: the swap of slot {} to {}, ordered for step {}, is on its way ({}); edits go on when "
-                      "it has been made",
-                      slot_name(record.slot), record.to, record.step, swap_state_name(record.state)));
-}
 
 api::EditMade ServedRun::edit(const api::EditRequest& request) {
   if (request.changes_size() == 0) throw BadInput("edit: nothing to change; allowed: changes of the scene");
   return between_steps([&] {
     const Clock::time_point begin = Clock::now();
     require_steps_left("edit");
-    require_settled_swaps();
     api::EditMade made;
     made.set_step(environment_->step_count() + 1);
     edit::v1::Edit edit;
@@ -39,6 +29,18 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
     const std::vector<std::uint32_t> woken = edited.woken(*environment_);
+    // swaps that are to come go along, the others are made
+    std::vector<Order> pending;
+    for (Order& one : pending_orders()) {
+      try {
+        next->order_swap(one.swap);
+      } catch (const std::invalid_argument& problem) {
+        throw BadInput(fmt::format("edit: a swap is ordered for step {} that could not be made then: {}", one.swap.step,
+                                   problem.what()));
+      }
+      one.rank = rank_of(one.swap, pending);
+      pending.push_back(std::move(one));
+    }
 
     // from here on it is made
     const auto tell = [&](const Event& event) {
@@ -47,17 +49,24 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     };
     for (const auto& [a, b] : parted)
       tell({EventKind::kCollisionEnd, environment_->step_count(), environment_->time(), a, b});
-    past_swaps_ = swap_messages();
+    std::vector<api::ServedSwap> swaps = swap_messages();
+    std::erase_if(swaps, [&](const api::ServedSwap& one) {
+      return std::ranges::find(pending, one.number(), &Order::number) != pending.end();
+    });
+    for (api::ServedSwap& one : swaps)
+      if (one.outcome() == swap_state_name(kernel::SwapState::kProbation))
+        one.set_outcome(swap_state_name(kernel::SwapState::kCommitted));
+    past_swaps_ = std::move(swaps);
     write_faults(*environment_, &past_);
     note_edit(edit, &past_);
-    forgotten_orders_ += static_cast<std::uint32_t>(orders_.size());
-    orders_.clear();
+    orders_ = std::move(pending);
     next_collection_ = {};
     collect_warnings();
     survey_.reset();
     for (const Slot slot : kSlots) active_.slot(slot) = begun.slot(slot);
     std::vector<recorder::v1::Decision> decisions = recorder_->decisions();
     translate_decisions(description_, edited.description(), &decisions);
+    for (recorder::v1::Decision& decision : decisions) settle(&decision);
     recorder_->set_decisions(std::move(decisions));
     scene_ = edited.scene();
     description_ = edited.description();
@@ -75,8 +84,11 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     tell(event);
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body});
-    for (const std::string& warning : edited.warnings())
-      if (std::ranges::find(scene_warnings_, warning) == scene_warnings_.end()) made.add_warnings(warning);
+    for (const std::string& warning : edited.warnings()) {
+      if (std::ranges::find(warnings_, warning) != warnings_.end()) continue;
+      made.add_warnings(warning);
+      add_warning(warning);
+    }
     made.set_pause_us(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
     return made;
   });

@@ -150,10 +150,10 @@ void ServedRun::write_plan(api::Plan* plan) const {
 std::vector<api::ServedSwap> ServedRun::swap_messages() const {
   std::vector<api::ServedSwap> swaps = past_swaps_;
   const std::vector<kernel::SwapRecord> records = environment_->swaps();
-  for (std::size_t i = 0; i < orders_.size(); ++i) {
-    const kernel::SwapRecord& record = record_of(orders_[i], records);
+  for (const Order& order : orders_) {
+    const kernel::SwapRecord& record = record_of(order, records);
     api::ServedSwap& swap = swaps.emplace_back();
-    swap.set_number(forgotten_orders_ + static_cast<std::uint32_t>(i) + 1);
+    swap.set_number(order.number);
     swap.set_slot(slot_name(record.slot));
     swap.set_step(record.step);
     swap.set_from(record.from);

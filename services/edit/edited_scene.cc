@@ -9,6 +9,7 @@
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/slots.h"
+#include "services/edit/disturbance.h"
 
 namespace gravitas {
 namespace {
@@ -71,13 +72,14 @@ std::set<std::string> impulses_in(const scene::v1::Scene& scene) {
 EditedScene::EditedScene(const RunOptions& options, const scene::v1::Scene& scene,
                          const kernel::EnvironmentDescription& before, Catalog* catalog, edit::v1::Edit* edit,
                          const kernel::Environment* now)
-    : before_(before), edit_(*edit), scene_(scene) {
+    : first_(scene), before_(before), edit_(*edit), scene_(scene) {
   read_changes(options, catalog);
   if (edit_.step() > 1) refuse_late_impulses();
   find_kept();
   if (now != nullptr) {
     find_motions(*now);
     write_places();
+    warn_of_broken(*now);
   }
   place();
 }
@@ -131,6 +133,17 @@ void EditedScene::refuse_late_impulses() const {
                         edit_.step(), id, body.id));
     }
   }
+}
+
+// Whatever is set of a joint that broke, it holds nothing.
+void EditedScene::warn_of_broken(const kernel::Environment& now) {
+  for (const edit::v1::Change& change : edit_.changes())
+    for (std::size_t j = 0; j < old_joint_.size(); ++j)
+      if (old_joint_[j] != kNone && !now.is_intact(old_joint_[j]) &&
+          change.set().starts_with("Constraint." + description_.constraints[j].id + "."))
+        warnings_.push_back(fmt::format(
+            "edit before step {}: {}: the joint is broken, and stays so; to have it again, remove it and add it",
+            edit_.step(), text_of(change)));
 }
 
 void EditedScene::find_kept() {
@@ -287,11 +300,37 @@ void translate(const std::vector<std::uint32_t>& rows, Numbers* numbers) {
 
 }  // namespace
 
+std::vector<bool> EditedScene::resting_on(const kernel::SavedState& before) const {
+  const ColumnTable state(before);
+  const std::vector<bool> disturbed =
+      find_disturbed({first_, scene_, log_, before_, description_}, state.at<std::uint32_t>("contact_body"),
+                     state.at<std::uint32_t>("intact"));
+  std::vector<bool> resting;
+  for (const std::uint32_t row : old_body_) resting.push_back(row != kNone && !disturbed[row]);
+  return resting;
+}
+
 std::vector<std::uint32_t> EditedScene::woken(const kernel::Environment& now) const {
+  const std::vector<bool> resting = resting_on(now.saved_state());
   std::vector<std::uint32_t> bodies;
   for (std::uint32_t i = 0; i < old_body_.size(); ++i)
-    if (old_body_[i] != kNone && now.is_asleep(old_body_[i])) bodies.push_back(i);
+    if (old_body_[i] != kNone && !resting[i] && now.is_asleep(old_body_[i])) bodies.push_back(i);
   return bodies;
+}
+
+// How long the bodies have rested, and under which wrench: as before, where the edit lets them and both are known.
+void EditedScene::keep_rest(const kernel::SavedState& before, std::span<std::uint32_t> rested,
+                            std::span<double> wrench) const {
+  const ColumnTable state(before);
+  const std::span<const std::uint32_t> old_rested = state.at<std::uint32_t>("rested");
+  const std::span<const double> old_wrench = state.at<double>("rest_wrench");
+  if (rested.empty() || old_rested.empty() || wrench.empty() != old_wrench.empty()) return;
+  const std::vector<bool> resting = resting_on(before);
+  for (std::size_t i = 0; i < rested.size(); ++i) {
+    if (!resting[i]) continue;
+    rested[i] = old_rested[old_body_[i]];
+    if (!wrench.empty()) std::ranges::copy(old_wrench.subspan(6UL * old_body_[i], 6), &wrench[6 * i]);
+  }
 }
 
 std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::Environment& now,
@@ -370,8 +409,11 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
   columns["discrepancy_impulse"] = old.rows<double>("discrepancy_impulse", 3, discrepancies);
   columns["discrepancy_correction"] = old.rows<double>("discrepancy_correction", 3, discrepancies);
   columns["touching"] = old.rows<std::uint32_t>("touching", 2, touching);
-  columns["rested"] = std::vector<std::uint32_t>(fresh.at<std::uint32_t>("rested").size(), 0);
-  columns["rest_wrench"] = std::vector<double>(fresh.at<double>("rest_wrench").size(), 0.0);
+  std::vector<std::uint32_t> rested(fresh.at<std::uint32_t>("rested").size(), 0);
+  std::vector<double> rest_wrench(fresh.at<double>("rest_wrench").size(), 0.0);
+  keep_rest(before, rested, rest_wrench);
+  columns["rested"] = std::move(rested);
+  columns["rest_wrench"] = std::move(rest_wrench);
   translate(body_row, &columns["contact_body"]);
   translate(body_row, &columns["touching"]);
   translate(joint_row, &columns["discrepancy_constraint"]);

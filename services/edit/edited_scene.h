@@ -9,8 +9,8 @@
 // of Position, Orientation (of its geometry's frame), LinearVelocity (of its centre of mass) and AngularVelocity; a joint
 // bound as it was, and broken if it was. Who is added is as the scene's text says, a joint bound where the bodies are
 // now, a force as of now; one that was removed and added again is new. Forces that act once act at t = 0: they cannot be
-// added later. An edit wakes all who sleep, lets integrators begin their histories again, and keeps the memory of
-// contacts between bodies that were not moved and have the same shapes. All other collisions end with it.
+// added later. An edit wakes whom it disturbs (disturbance.h), lets integrators begin their histories again, and keeps the
+// memory of contacts between bodies that were not moved and have the same shapes. All other collisions end with it.
 //
 // The chain goes on as hash(hash(chain, digest of the changes), next state): a run that makes the same edits before the same
 // steps has the same chain, in any hosting, resumed or not.
@@ -64,8 +64,13 @@ class EditedScene {
   void write_places();
   void place();
   void refuse_late_impulses() const;
+  void warn_of_broken(const kernel::Environment& now);
   bool has_stopped(std::uint32_t body) const;
+  // By row after: it was there before, and the edit lets it rest.
+  std::vector<bool> resting_on(const kernel::SavedState& before) const;
+  void keep_rest(const kernel::SavedState& before, std::span<std::uint32_t> rested, std::span<double> wrench) const;
 
+  const scene::v1::Scene first_;  // before the edit
   const kernel::EnvironmentDescription& before_;
   edit::v1::Edit& edit_;
   scene::v1::Scene scene_;

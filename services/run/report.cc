@@ -49,6 +49,8 @@ std::string exchange_warning(const kernel::FaultRecord& record) {
     return fmt::format("{}the fallback {} instead of {}{}: the trajectory is not that of {}", begin, names,
                        record.fault.plugin, end, record.fault.plugin);
   if (record.recovered_by == "previous build") return begin + "the plugin from before its last swap" + end;
+  if (record.recovered_by == "rollback")
+    return begin + "the plugin from before its last swap, which is rolled back" + end;
   return {};
 }
 

@@ -176,12 +176,16 @@ class Midpoint(Integrator):
 
     def __init__(self, settings):
         self._share = settings.Share
+        if settings.Share == 0.25:
+            sys.exit("no quarters")
 
     def integrate(self, request, reply, host):
         if request.time == 1.0:
             raise Refusal("not at one")
         if request.time == 2.0:
             raise ValueError("broken at two")
+        if request.time == 5.0:
+            sys.exit(6)
         if request.time == 4.0:
             host._last_mark -= 1.0  # as if the last mark had been a second ago
             host.mark_progress()
@@ -273,6 +277,14 @@ class Talk(unittest.TestCase):
             self.assertTrue(answer.refusal.text)
         self.ready()
 
+    def test_a_plugin_that_cannot_be_made_says_why(self):
+        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")
+        _, answer = self.hello(plugins=[control_pb2.PluginSettings(plugin="Midpoint", numbers=[0.25])])
+        sys.stderr.close()
+        sys.stderr = stderr
+        self.assertTrue(answer.HasField("refusal"), answer)
+        self.assertRegex(answer.refusal.text, r"Midpoint: it cannot be made: SystemExit: no quarters \(.*sdk_test\.py:\d+\)")
+
     def test_a_second_kernel_is_turned_away_and_a_later_one_is_served(self):
         control, _ = self.ready()
         with self.assertRaises(grpc.RpcError) as refused:
@@ -349,6 +361,13 @@ class Talk(unittest.TestCase):
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
         # with the line that raised
         self.assertRegex(outcome.text, r"ValueError: broken at two \(.*sdk_test\.py:\d+\)")
+        # an exit would end the plugin's thread alone
+        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")
+        outcome = self.reply(stream.send(self.request(time=5.0))).outcome
+        sys.stderr.close()
+        sys.stderr = stderr
+        self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
+        self.assertRegex(outcome.text, r"SystemExit: 6 \(.*sdk_test\.py:\d+\)")
         stream.send(self.request(time=3.0))
         stream.send(self.answer([1.0] * 12))
         outcome = self.reply(stream.send(self.answer([1.0] * 12))).outcome

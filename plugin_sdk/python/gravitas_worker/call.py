@@ -32,7 +32,7 @@ MARK_SECONDS = 0.02
 LARGEST_ASSET = 1 << 31
 
 
-def _place_of(failure):
+def place_of(failure):
     """The plugin's own line that raised, or led to what did, as ' (FILE:LINE)'."""
     frames = traceback.extract_tb(failure.__traceback__)
     own = [frame for frame in frames if not frame.filename.startswith((_PACKAGE, *_INSTALLED))]
@@ -167,10 +167,10 @@ class Session:
                 call.reply(None, status=Outcome.STATUS_REFUSED, text=str(refusal))
             except CallFailed as failure:
                 call.reply(None, status=failure.status, text=str(failure))
-            except Exception as failure:
+            except BaseException as failure:  # sys.exit() would end this thread alone, and nobody would know
                 traceback.print_exc()
                 call.reply(None, status=Outcome.STATUS_FAILED,
-                           text=f"{type(failure).__name__}: {failure}{_place_of(failure)}")
+                           text=f"{type(failure).__name__}: {failure}{place_of(failure)}")
             self.calls += 1
 
     def _answer(self, call, message):

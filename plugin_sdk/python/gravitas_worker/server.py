@@ -11,6 +11,7 @@ import pathlib
 import re
 import sys
 import threading
+import traceback
 from concurrent import futures
 
 import grpc
@@ -20,7 +21,7 @@ from google.protobuf.message import DecodeError
 from gravitas.control.v1 import control_pb2
 from gravitas.plugin.v1 import description_pb2
 
-from .call import CallFailed, Outcome, Sent, Session, unread_call
+from .call import CallFailed, Outcome, Sent, Session, place_of, unread_call
 from .columns import WireError, stage_methods
 from .declaration import Refusal, description_of
 
@@ -78,9 +79,11 @@ class Worker(grpc.GenericRpcHandler):
             except Refusal as why:
                 self._taken.release()
                 refusal = (_Reason.REASON_SETTINGS, f"{self._plugin.name}: {why}")
-            except Exception:
+            except BaseException as failure:
                 self._taken.release()
-                raise
+                traceback.print_exc()
+                refusal = (_Reason.REASON_SETTINGS,
+                           f"{self._plugin.name}: it cannot be made: {type(failure).__name__}: {failure}{place_of(failure)}")
         if refusal is not None:
             yield _worker_message(refusal=_Reason(reason=refusal[0], text=refusal[1]))
             return

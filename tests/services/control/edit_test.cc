@@ -1,8 +1,10 @@
 // The scene of a served run changes while it goes on: the chain is that of `gravitas run --edit`.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <map>
 #include <string>
 
 #include "services/control/status_text.h"
@@ -32,7 +34,6 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
                           "Position = {9, 9, 9} LinearVelocity = {1, 0, 0} } } }");
   const std::string move = "set Body.Ball01.LinearVelocity={0,1,0}";
   served.client.swap(parse_swap_request("solver=Sequential,hosting=direct"));
-  EXPECT_THAT(refusal([&] { edit(&served, {move}); }), HasSubstr("the swap of slot solver"));
   served.client.inject("integrator:kill@step=20");
   served.client.step(30);
   const api::EditMade made = edit(&served, {"add " + more, move});
@@ -68,6 +69,62 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
   EXPECT_EQ(served.client.status().fault_count(), 0U);
   EXPECT_EQ(served.client.status().edit_count(), 0U);
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+// One on probation is made; one of a later step goes on waiting, under its number, whatever is edited or set before it.
+TEST(ServedEdit, SwapsThatAreToComeGoAlong) {
+  Served served(harness::sample("direct"));
+  const std::string move = "set Body.Ball01.LinearVelocity={0,1,0}", push = "set Body.Ball01.LinearVelocity={1,0,0}";
+  const auto solver = [&] {
+    const api::Status status = served.client.status();
+    for (const api::PlannedSlot& slot : status.plan().slots())
+      if (slot.slot() == "solver") return slot;
+    return api::PlannedSlot();
+  };
+  const auto iterations = [&] {
+    const api::PlannedSlot slot = solver();
+    for (const api::Setting& one : slot.settings())
+      if (one.name() == "Iterations") return one.value();
+    return std::string();
+  };
+  served.client.step(10);
+  const api::SwapOrdered newton = served.client.swap(parse_swap_request("solver=Newton@step=40"));
+  edit(&served, {move});
+  served.client.step(2);
+  // of who answers now, and not of who will
+  const api::SwapOrdered set = served.client.set_property(parse_set_request("Solver.Iterations=" + iterations()));
+  EXPECT_EQ(set.number(), newton.number() + 1);
+  served.client.step(10);
+  EXPECT_EQ(solver().plugin(), "Sequential");
+  edit(&served, {push});
+  served.client.step(20);
+  EXPECT_EQ(solver().plugin(), "Newton");
+  edit(&served, {move});  // in its probation
+  std::map<std::uint32_t, std::string> ends;
+  for (const api::ServedSwap& swap : served.client.status().swaps())
+    ends[swap.number()] = fmt::format("{} -> {} {} {}", swap.from(), swap.to(), swap.step(), swap.outcome());
+  EXPECT_EQ(ends[newton.number()], "Sequential -> Newton 40 committed");
+  EXPECT_EQ(ends[set.number()], "Sequential -> Sequential 13 committed");
+  RunOptions options = harness::sample("direct").run;
+  options.edits = {move + "@step=11", push + "@step=23", move + "@step=43"};
+  options.swaps = {"solver=Newton@step=40"};
+  EXPECT_EQ(served.to_the_end().chain_hash(), run(
+                                                  options, [] { return false; }, [](const Progress&) {})
+                                                  .report.chain_hash());
+}
+
+// It stays broken, and says so.
+TEST(ServedEdit, OfAJointThatBrokeIsWarnedOf) {
+  ServeOptions options = harness::sample("direct");
+  options.run.overrides = {"Constraint.MyAngularMotor.BreakingForce=1e-6"};
+  Served served(options);
+  served.client.step(60);
+  const api::EditMade made = edit(&served, {"set Constraint.MyAngularMotor.BreakingForce=100"});
+  ASSERT_GE(made.warnings_size(), 1);
+  EXPECT_THAT(made.warnings(made.warnings_size() - 1),
+              HasSubstr("set Constraint.MyAngularMotor.BreakingForce=100: the joint is broken"));
+  // what was told is not told again
+  EXPECT_EQ(edit(&served, {"set Body.Ball01.LinearVelocity={0,1,0}"}).warnings_size(), 0);
 }
 
 TEST(ServedEdit, WhatCannotBeChangesNothing) {

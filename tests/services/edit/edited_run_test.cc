@@ -317,6 +317,61 @@ TEST(EditedRun, WhoSleepsWakesUp) {
   EXPECT_THAT(kinds, ::testing::ElementsAre("sleep", "sleep", "edit", "wake", "wake"));
 }
 
+// Two balls that fell asleep on the ground in one step, and one that flies far from them. What an edit changes wakes, with
+// whom it touches and hangs together with; all others sleep on, and those that rest fall asleep when they would have.
+TEST(EditedRun, WhomAnEditDoesNotDisturbSleepsOn) {
+  const auto happens = [](const std::vector<std::string>& edits, const std::string& rest = "",
+                          const std::string& more = "") {
+    EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" + ball("A", "Position = {0, 0.1, 0}", kFalls) +
+                            ball("B", "Position = {3, 0.1, 0}", kFalls) + ball("Far", "Position = {100, 50, 0} LinearVelocity = {0, 0, 1}"),
+                        rest),
+                  edits, {"Simulator.SleepEnergy=0.001", "Simulator.SleepTime=0.5"});
+    if (!more.empty()) run.options.edits = {"add " + run.folder.write("more.gravitas", more) + "@step=81"};
+    run.options.steps = 100;
+    run.options.events = run.folder.path("events");
+    run.options.event_kinds = std::vector<std::string>{"sleep", "wake"};
+    run.run();
+    std::vector<std::string> told;
+    std::istringstream text(harness::read_file(run.options.events));
+    for (std::string line; std::getline(text, line);) {
+      const auto after = [&](const std::string& name) {
+        const std::size_t at = line.find(name) + name.size();
+        return line.substr(at, line.find_first_of("\"],", at) - at);
+      };
+      told.push_back(after("\"kind\":\"") + " " + after("\"bodies\":[\"") + " " + after("\"step\":"));
+    }
+    return told;
+  };
+  using ::testing::ElementsAreArray;
+  const std::vector<std::string> quiet = happens({});
+  ASSERT_EQ(quiet.size(), 2U);
+  const auto and_then = [&](const std::vector<std::string>& woken) {
+    std::vector<std::string> all = quiet;
+    for (const std::string& body : woken) all.push_back("wake " + body + " 80");
+    return all;
+  };
+  for (const char* step : {"1", "20", "81"})
+    for (const char* change : {"Body.Far.LinearVelocity={0,0,2}", "Body.Far.Position={90,50,0}", "Body.Far.Mass=3"})
+      EXPECT_THAT(happens({std::string("set ") + change + "@step=" + step}), ElementsAreArray(quiet)) << change << step;
+  EXPECT_THAT(happens({"remove Body.Far@step=81"}), ElementsAreArray(quiet));
+  EXPECT_THAT(happens({"set Body.A.Mass=2@step=81"}), ElementsAreArray(and_then({"A"})));
+  EXPECT_THAT(happens({"remove Body.A@step=81"}), ElementsAreArray(quiet));
+  EXPECT_THAT(happens({"set Force.Down.Acceleration={0,-9,0}@step=81"}), ElementsAreArray(and_then({"A", "B"})));
+  EXPECT_THAT(happens({"set Material.Rubber.StaticFrictionCoefficient=0.1@step=81"}),
+              ElementsAreArray(and_then({"A", "B"})));
+  EXPECT_THAT(happens({"set Body.Ground.Material=\"Rubber\"@step=81"}), ElementsAreArray(and_then({"A", "B"})));
+  const std::string rope =
+      "Constraints { Constraint { Type = \"Distance\" Id = \"Rope\" Body1 = \"A\" Body2 = \"B\" CustomProperties { "
+      "BindPoint1 = {0, 0.1, 0} BindPoint2 = {3, 0.1, 0} MaximumDistance = 4 } } }";
+  EXPECT_THAT(happens({"set Body.A.Mass=2@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
+  EXPECT_THAT(happens({"set Constraint.Rope.MaximumDistance=5@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
+  EXPECT_THAT(happens({"remove Constraint.Rope@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
+  // no contact is looked for between what stands still
+  EXPECT_THAT(happens({}, "", "Bodies { Body { Id = \"Wall\" GeometryId = \"Unit\" Immovable = true KineticProperties { "
+                              "Position = {0.15, 0.1, 0} } } }"),
+              ElementsAreArray(and_then({"A", "B"})));
+}
+
 // A plugin that takes over binds joints where they were bound, not where the scene had the bodies.
 TEST(EditedRun, JointsAreBoundAgainWhereTheyWere) {
   BusyRun run;
