@@ -10,10 +10,6 @@
 namespace gravitas::kernel {
 namespace {
 
-// A pair touches if a contact of it carries an impulse, or its gap is below this share of the margin; where impacts are
-// located, a step that ends just before one touches nothing.
-constexpr double kTouchingShare = 1e-3, kLocatedShare = 1e-7;
-
 void copy(const Column<double>& from, const Column<double>& to) {
   // + 0.0 turns -0 into 0: the sign of a zero must not depend on which stages ran
   std::ranges::transform(from.span(), to.data(), [](double value) { return value + 0.0; });
@@ -104,9 +100,9 @@ void Environment::complete_state() {
   back().rest_wrench.assign(front().rest_wrench);
 }
 
-void Environment::end_inner_step() {
+void Environment::end_inner_step(std::span<const double> weights) {
   if (commit_listener_ != nullptr)
-    commit_listener_->on_inner_step(*this, {inner_, data_, front(), back(), inner_end_time()});
+    commit_listener_->on_inner_step(*this, {inner_, data_, front(), back(), inner_end_time(), weights});
   std::swap(front_, back_);
   if (inner_ == 0 && states_.size() > 2) std::swap(back_, start_);
   ++inner_;
@@ -159,30 +155,6 @@ void Environment::remember_joints() {
   copy_rows(merged_, 1, now, before, back().discrepancy_constraint);
   copy_rows(merged_, 3, data_.discrepancy_impulse, old.discrepancy_impulse, back().discrepancy_impulse);
   copy_rows(merged_, 3, data_.discrepancy_correction, old.discrepancy_correction, back().discrepancy_correction);
-}
-
-// Overlap of every contact at S_{n+1}, in the first step at S_0, too, and the pairs that touch.
-void Environment::find_touching() {
-  const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
-  now.resize(0);
-  const double share = locates_events() ? kLocatedShare : kTouchingShare;
-  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
-    const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
-    const double gap = gap_at(i, back());
-    const bool begins = step_count_ == 0 && data_.contact_depth[i] > 0.0;
-    figures_.penetration = std::max({figures_.penetration, -gap, begins ? -gap_at(i, front()) : 0.0});
-    const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
-    const std::uint64_t size = now.size();
-    if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;
-    now.resize(size + 2);
-    now[size] = a, now[size + 1] = b;
-  }
-  const auto key = [](const Column<std::uint32_t>& pair) {
-    return [&](std::size_t i) { return std::array{pair[2 * i], pair[2 * i + 1]}; };
-  };
-  const auto goes_on = [&](std::size_t i) { return !is_awake(before[2 * i]) && !is_awake(before[2 * i + 1]); };
-  merge_rows(now.size() / 2, key(now), sleepers_ > 0 ? before.size() / 2 : 0, key(before), goes_on, &merged_);
-  copy_rows(merged_, 2, now, before, back().touching);
 }
 
 double Environment::inner_end_time() const {

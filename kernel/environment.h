@@ -65,6 +65,8 @@ struct InnerStep {
   const State& before;   // where it began
   const State& after;    // where it ended
   double end;            // s
+  // Where it ends a part of a step that is extrapolated: those of the attempts at it (Extrapolation::weights()).
+  std::span<const double> weights;
 };
 
 // Hears of what a recorder keeps, and of what happens.
@@ -76,6 +78,8 @@ class CommitListener {
   virtual void on_poison(const Environment&, const PoisonedCall&) {}
   // An inner step ends. With number 0 those before count no longer: the step has been begun again.
   virtual void on_inner_step(const Environment&, const InnerStep&) {}
+  // Before the inner steps of such a part: one of an attempt in so many, which come in order. One in 1 is of another part.
+  virtual void on_attempt(const StepData&, std::uint32_t) {}
   // At the end of a step, when S_{n+1} is committed. What it throws comes out of step(); the commit stands.
   virtual void on_commit(const Environment& environment) = 0;
 };
@@ -178,7 +182,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void extrapolate_parts(double begin, double length);
   std::uint32_t pieces_to_accuracy(double begin, double length, bool is_before_impact, bool ends_with_impact);
   bool make_piece(double begin, double length, std::uint32_t i, std::uint32_t pieces);
-  void take_extrapolated();
+  std::span<const double> take_extrapolated();
   void find_changes(std::vector<double>* changes);
   bool lets_go() const;
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
@@ -249,7 +253,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double gap_at(std::size_t contact, const State& state) const;
   void find_touching();
   double inner_end_time() const;
-  void end_inner_step();
+  void end_inner_step(std::span<const double> weights = {});
   void finish_step();
 
   // prepare.cc: what is asked once.

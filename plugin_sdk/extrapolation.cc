@@ -47,6 +47,17 @@ double Extrapolation::add() {
   return error_[best_];
 }
 
+std::span<const double> Extrapolation::weights() {
+  weights_.assign(pieces_, 0.0);
+  for (std::size_t n = pieces_ - best_; n <= pieces_; ++n) {
+    double weight = 1.0;
+    for (std::size_t m = pieces_ - best_; m <= pieces_; ++m)
+      if (m != n) weight *= static_cast<double>(n) / (static_cast<double>(n) - static_cast<double>(m));
+    weights_[n - 1] = weight;
+  }
+  return weights_;
+}
+
 double Extrapolation::least_size() const {
   double least = kUnknownError;
   for (std::size_t k = std::min<std::size_t>(kLeast, pieces_ - 1); k < pieces_; ++k) {

@@ -29,6 +29,9 @@ class Extrapolation {
   double add();
   // That extrapolation.
   std::span<const double> best() const { return table_[best_]; }
+  // What it makes of the results in 1, 2, 3, … pieces: the sum of each times its weight, 0 of those left out. Of l to j pieces
+  // that of n is the product of n / (n - m) over the others, m. Valid until the next call.
+  std::span<const double> weights();
   // What tends to 0, how near it is in the extrapolation that leaves least of it: the largest |T_{j,k}| there.
   double least_size() const;
 
@@ -37,6 +40,7 @@ class Extrapolation {
   std::vector<double> scale_;
   std::vector<std::vector<double>> table_;  // the last row: T_{j,1} … T_{j,j}
   std::vector<double> error_;               // of each of these
+  std::vector<double> weights_;
   std::size_t pieces_ = 0, best_ = 0;
 };
 

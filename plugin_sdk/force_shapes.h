@@ -1,6 +1,7 @@
 // For authors of forces that act on a body's shape.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,11 +21,15 @@ struct BodyShape {
 // Throws Refusal for a body without shape, and for an index outside the request.
 BodyShape shape_of(const stage::ForceWrenchesRequest& request, std::uint32_t body);
 
-// Sides of the polyhedron that stands for a round shape.
+// Refuses a shape whose parameters are not so many sizes above 0.
+void require_sizes(const BodyShape& shape, std::size_t count);
+
+// Sides of the polyhedron that stands for a cone.
 inline constexpr std::uint32_t kRoundSides = 48;
 
-// Surface of a Box or ConvexPolyhedron, exactly, and of a Cylinder, Cone or Capsule, as a polyhedron of kRoundSides sides with
-// the volume of the shape, in the frame of the geometry; nothing for other types. Throws Refusal for sizes that are not above 0, and for a polyhedron that is none.
+// Surface of a Box or ConvexPolyhedron, exactly, and of a Cone, as a polyhedron of kRoundSides sides whose sections have the area of the
+// cone's, in the frame of the geometry; nothing for other types. Throws Refusal for sizes that are not above 0, and for a polyhedron
+// that is none.
 std::optional<Surface> surface_of(const BodyShape& shape);
 
 // Pose of a body's geometry in the world.

@@ -65,8 +65,7 @@ void Environment::extrapolate_parts(double begin, double length) {
     if (pieces == 0) wanted = kShorter * part, has_failed = true;
     for (std::uint32_t i = 0; i < pieces && !must_restart_; ++i) {
       if (!make_piece(from, part, i, pieces)) return;
-      if (i > 0 && i + 1 == pieces) take_extrapolated();
-      end_inner_step();
+      end_inner_step(i > 0 && i + 1 == pieces ? take_extrapolated() : std::span<const double>());
     }
     if (pieces == 0) continue;
     done = part == left ? length : done + part;
@@ -82,8 +81,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
   const std::size_t front = front_, back = back_;
   const CommitFigures figures = figures_;
   const auto go_back = [&] { front_ = front, back_ = back, figures_ = figures; };
-  extrapolation_.begin();
-  jumps_.begin();
+  extrapolation_.begin(), jumps_.begin();
   const std::uint32_t first = ends_with_impact ? 2 : 1;  // whose first inner step does not end with the impact
   const bool sees_jumps = description_.accuracy >= kSeesJumps;
   const double of_jump = sees_jumps && !is_before_impact ? kOfJump : 0.0;
@@ -98,6 +96,7 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
     for (std::uint32_t pieces = 1; pieces <= kMostPieces && enough == 0; ++pieces) {
       for (std::uint32_t i = 0; i < pieces; ++i) {
         if (!make_piece(begin, length, i, pieces) || must_restart_) return go_back(), 0;
+        if (commit_listener_ != nullptr) commit_listener_->on_attempt(data_, pieces);
         if (i == 0) put_changes(&first_changes_[pieces - 1]), pressed_by_attempts_ = pressed_;
         if (i + 1 == pieces && !ends_with_impact) put_changes(&trial_changes_);
         const std::size_t before = front_;
@@ -124,8 +123,8 @@ std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool 
 }
 
 // Of bodies that it moves. Other numbers stay: a difference of rounding alone would double from part to part. What reactions leave
-// of a velocity within rounding is none: what rests rests.
-void Environment::take_extrapolated() {
+// of a velocity within rounding is none: what rests rests. Returns the weights of the attempts.
+std::span<const double> Environment::take_extrapolated() {
   const State& end = back();
   const double nothing = std::min(kOfAccuracy * description_.accuracy, kNothing);
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
@@ -145,6 +144,7 @@ void Environment::take_extrapolated() {
   }
   figures_ = {};
   complete_state();
+  return extrapolation_.weights();
 }
 
 }  // namespace gravitas::kernel

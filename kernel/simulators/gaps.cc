@@ -1,8 +1,19 @@
-// How far apart two surfaces that meet in a trial are in another state.
+// How far apart two surfaces that meet in a trial are in another state, and which pairs touch where an inner step ends.
+#include <algorithm>
+#include <array>
+
 #include "kernel/environment.h"
 #include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/merged_rows.h"
 
 namespace gravitas::kernel {
+namespace {
+
+// A pair touches if a contact of it carries an impulse, or its gap is below this share of the margin; where impacts are
+// located, a step that ends just before one touches nothing.
+constexpr double kTouchingShare = 1e-3, kLocatedShare = 1e-7;
+
+}  // namespace
 
 double Environment::gap_at(std::size_t contact, const State& state) const {
   const Vector3 point = vector_at(data_.contact_point.span(), contact);
@@ -14,6 +25,30 @@ double Environment::gap_at(std::size_t contact, const State& state) const {
   };
   return normal.dot(carry(point - half, data_.contact_body[2 * contact + 1]) -
                     carry(point + half, data_.contact_body[2 * contact]));
+}
+
+// Overlap of every contact at S_{n+1}, in the first step at S_0, too, and the pairs that touch.
+void Environment::find_touching() {
+  const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
+  now.resize(0);
+  const double share = locates_events() ? kLocatedShare : kTouchingShare;
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
+    const double gap = gap_at(i, back());
+    const bool begins = step_count_ == 0 && data_.contact_depth[i] > 0.0;
+    figures_.penetration = std::max({figures_.penetration, -gap, begins ? -gap_at(i, front()) : 0.0});
+    const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
+    const std::uint64_t size = now.size();
+    if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;
+    now.resize(size + 2);
+    now[size] = a, now[size + 1] = b;
+  }
+  const auto key = [](const Column<std::uint32_t>& pair) {
+    return [&](std::size_t i) { return std::array{pair[2 * i], pair[2 * i + 1]}; };
+  };
+  const auto goes_on = [&](std::size_t i) { return !is_awake(before[2 * i]) && !is_awake(before[2 * i + 1]); };
+  merge_rows(now.size() / 2, key(now), sleepers_ > 0 ? before.size() / 2 : 0, key(before), goes_on, &merged_);
+  copy_rows(merged_, 2, now, before, back().touching);
 }
 
 }  // namespace gravitas::kernel

@@ -179,6 +179,9 @@ class ServedRun final : private kernel::CommitListener {
   std::string state_name() const;
 
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override;
+  void on_attempt(const kernel::StepData& data, std::uint32_t pieces) override {
+    reactions_->add_attempt(data, pieces);
+  }
   void on_commit(const kernel::Environment& environment) override;
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override;

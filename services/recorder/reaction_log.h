@@ -1,21 +1,20 @@
 // What joints and contacts did to their bodies in a step, and the file of it: JSON lines, an object per joint and contact
 // of each sampled step (Reaction of report.proto).
 //
-// Force = the solver's impulses of all inner steps of the step, over its length; so a joint's force is that of the
-// middle of a step to first order. A contact's torque likewise: of rolling and spinning friction, about its point. With
-// the simulator Smooth joints act within the derivatives: their force is that of the last one asked for in the step, and
-// the solver's impulses come on top.
+// Force = the solver's impulses of all inner steps of the step, over its length: the mean over the step to first order, and as
+// well as the state is known where inner steps are extrapolated (reaction_sums.h). A contact's torque likewise: of rolling and
+// spinning friction, about its point. With the simulator Smooth joints act within the derivatives: their force is that of the
+// last one asked for in the step, and the solver's impulses come on top.
 #pragma once
 
-#include <array>
-#include <map>
-#include <optional>
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "gravitas/report/v1/report.pb.h"
 #include "kernel/environment.h"
 #include "services/recorder/output_file.h"
+#include "services/recorder/reaction_sums.h"
 #include "services/recorder/sampling.h"
 
 namespace gravitas {
@@ -31,8 +30,9 @@ class ReactionLog {
   // Writes out what was told so far; throws as close().
   void flush() { file_.flush(); }
 
-  // What kernel::CommitListener hears of an inner step.
+  // What kernel::CommitListener hears of inner steps.
   void add(const kernel::Environment& environment, const kernel::InnerStep& inner);
+  void add_attempt(const kernel::StepData& data, std::uint32_t pieces);
 
   // The description has changed; no step of it has been made.
   void begin_again();
@@ -46,15 +46,8 @@ class ReactionLog {
   void close() { file_.close(); }
 
  private:
-  struct Sum {
-    Vector3 point = Vector3::Zero();                   // world, m
-    Vector3 impulse = Vector3::Zero();                 // on the second body, N s
-    Vector3 turn = Vector3::Zero();                    // about the point, N m s
-    std::optional<Vector3> drive_impulse, drive_turn;  // of a drive that pushes, or turns
-  };
-
-  void add_joints(const kernel::StepData& data);
-  report::v1::Reaction message(const kernel::Environment& environment, const Sum& sum) const;
+  bool acts_in_derivatives() const { return description_.simulator == kernel::Simulator::kSmooth; }
+  report::v1::Reaction message(const kernel::Environment& environment, const ReactionSum& sum) const;
 
   const kernel::EnvironmentDescription& description_;
   OutputFile file_;
@@ -62,8 +55,8 @@ class ReactionLog {
 
   std::uint32_t step_ = 0;  // that the sums are of
   double length_ = 0.0;     // s
-  std::map<std::uint32_t, Sum> joints_;
-  std::map<std::array<std::uint32_t, 3>, Sum> contacts_;  // by bodies and feature
+  ReactionSums sums_;
+  std::vector<ReactionSums> attempts_;  // at a part of it, in 1, 2, 3, … inner steps
 };
 
 }  // namespace gravitas

@@ -97,15 +97,13 @@ class Run final : private kernel::CommitListener {
   void open_files() {
     try {
       events_ = std::make_unique<EventLog>(options_.events, description_);
+      const double interval = options_.sample_every.value_or(0.0);
       if (!options_.trajectory.empty())
-        trajectory_ =
-            std::make_unique<TrajectoryWriter>(options_.trajectory, description_, options_.sample_every.value_or(0.0));
+        trajectory_ = std::make_unique<TrajectoryWriter>(options_.trajectory, description_, interval);
       if (surveyor_)
-        frames_ = std::make_unique<survey::FrameFile>(options_.instrumentation, &*surveyor_, kinds_,
-                                                      options_.sample_every.value_or(0.0));
+        frames_ = std::make_unique<survey::FrameFile>(options_.instrumentation, &*surveyor_, kinds_, interval);
       if (!options_.reactions.empty())
-        reactions_ =
-            std::make_unique<ReactionLog>(options_.reactions, description_, options_.sample_every.value_or(0.0));
+        reactions_ = std::make_unique<ReactionLog>(options_.reactions, description_, interval);
       // opened now, so that nothing is simulated for a report that cannot be written
       if (!options_.report.empty()) report_.emplace("report", options_.report);
     } catch (const std::runtime_error& error) {
@@ -415,6 +413,9 @@ class Run final : private kernel::CommitListener {
     if (reactions_) reactions_->add(environment, inner);
     if (event_source_) event_source_->on_inner_step(environment, inner);
   }
+  void on_attempt(const kernel::StepData& data, std::uint32_t pieces) override {
+    if (reactions_) reactions_->add_attempt(data, pieces);
+  }
   void on_commit(const kernel::Environment& environment) override {
     if (event_source_) event_source_->on_commit(environment);
     if (recorder_) recorder_->on_commit(environment);
@@ -424,7 +425,6 @@ class Run final : private kernel::CommitListener {
     if (surveyor_) surveyor_->follow(decision);
     if (recorder_) recorder_->on_decision(environment, decision);
   }
-
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override {
     poisoned_step_ = environment.step_count() + 1;
     warnings_.push_back(keep_poisoned_call(options_, poisoned_step_, poisoned));

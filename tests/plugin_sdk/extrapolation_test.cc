@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <vector>
 
 namespace gravitas {
@@ -61,6 +62,32 @@ TEST(Extrapolation, LeavesOutWhatIsOffAtTheBeginning) {
     EXPECT_LT(error, 1e-13) << off;
     EXPECT_NEAR(extrapolation.best()[0], 3.0, 1e-13) << off;
     EXPECT_NEAR(extrapolation.best()[1], -1.0, 1e-13) << off;
+  }
+}
+
+// With weights of what is told in 1, 2, 3, ... pieces, the first ones left out or not.
+TEST(Extrapolation, IsTheWeightedSumOfResults) {
+  for (const int off : {0, 2}) {
+    Extrapolation extrapolation;
+    extrapolation.begin();
+    std::vector<double> results;
+    for (int pieces = 1; pieces <= 6; ++pieces) {
+      const double h = 1.0 / pieces;
+      results.push_back(3.0 + h * (2.0 - 5.0 * h) + (pieces <= off ? 1e-3 : 0.0));
+      add(&extrapolation, {results.back()});
+      const std::span<const double> weights = extrapolation.weights();
+      ASSERT_EQ(weights.size(), results.size());
+      double sum = 0.0, all = 0.0, size = 0.0;
+      for (std::size_t n = 0; n < weights.size(); ++n) {
+        sum += weights[n] * results[n], all += weights[n];
+        size += std::fabs(weights[n] * results[n]);
+      }
+      // rounding of each product, in either way
+      const double bound = 4.0 * std::numeric_limits<double>::epsilon() * size;
+      EXPECT_NEAR(all, 1.0, bound);
+      EXPECT_NEAR(sum, extrapolation.best()[0], bound) << off << ' ' << pieces;
+    }
+    EXPECT_EQ(extrapolation.weights()[0] == 0.0, off > 0);
   }
 }
 

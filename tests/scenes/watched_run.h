@@ -23,6 +23,7 @@ class WatchedRun final : private kernel::CommitListener {
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override {
     log_.add(environment, inner);
   }
+  void on_attempt(const kernel::StepData& data, std::uint32_t pieces) override { log_.add_attempt(data, pieces); }
   void on_commit(const kernel::Environment&) override {}
 
   ReactionLog log_;

@@ -4,20 +4,20 @@
 //   f = -integral over such parts of rho/2 C_D (n.u)^2 n dA          torque about the centre of mass likewise.
 //
 // u varies over a face as the body turns; the parts are cut out exactly and the integrals, cubic at most, are exact on
-// polyhedra: Box, ConvexPolyhedron, and Cylinder, Cone, Capsule as polyhedra of 48 sides of the same sections. A plate held against the
-// flow has rho/2 C_D A u^2, a Sphere (closed form) rho/2 C_D (pi r^2/2) u^2. Convex bodies only: no face shades another;
-// no suction behind, no friction along faces, no lift from circulation. No potential. The seed defers "geometry-based
-// aerodynamic friction" to future work (§§ 4.2, 6.2.3).
+// polyhedra: Box, ConvexPolyhedron, and a Cone as one of 48 sides whose sections have the area of its own. Sphere, Cylinder and
+// Capsule are exact, too (round_faces.h). A plate held against the flow has rho/2 C_D A u^2, a Sphere rho/2 C_D (pi r^2/2) u^2.
+// Convex bodies only: no face shades another; no suction behind, no friction along faces, no lift from circulation. No potential.
+// The seed defers "geometry-based aerodynamic friction" to future work (§§ 4.2, 6.2.3).
 #include "plugin_sdk/plugin.h"
 
 #include <array>
-#include <numbers>
 #include <vector>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/force.h"
 #include "plugin_sdk/force_jacobians.h"
 #include "plugin_sdk/force_shapes.h"
+#include "workers/force/aerodynamic/round_faces.h"
 
 namespace gravitas {
 namespace {
@@ -34,12 +34,6 @@ struct Flow {
   double density;
   Vector3 velocity;
   double drag;
-};
-
-// The body's motion against the flow: u at a point is linear + angular x (point - centre).
-struct Slip {
-  Vector3 linear, angular;
-  Vector3 at(const Vector3& arm) const { return linear + angular.cross(arm); }
 };
 
 // Adds integral (n.u)^2 n dA and its moment over a triangle, points relative to the centre of mass.
@@ -113,7 +107,15 @@ class Aerodynamic final : public OwnStateForce {
     pose.position -= vector_at(request.position(), body);
     Wrench push;
     if (shape.type == type_id("Sphere")) {
-      push = on_ball(shape, pose.position, slip);
+      if (shape.parameters.size() != 1 || !(shape.parameters[0] > 0.0))
+        throw Refusal("a Sphere's Radius is not above 0");
+      push = on_ball(shape.parameters[0], pose.position, slip);
+    } else if (shape.type == type_id("Cylinder") || shape.type == type_id("Capsule")) {
+      require_sizes(shape, 2);
+      const Vector3 axis = pose.orientation * Vector3::UnitY();
+      push = shape.type == type_id("Capsule")
+                 ? on_capsule(shape.parameters[0], shape.parameters[1], pose.position, axis, slip)
+                 : on_cylinder(shape.parameters[0], shape.parameters[1], pose.position, axis, slip);
     } else {
       const std::optional<Surface> surface = surface_of(shape);
       if (!surface) throw Refusal("Aerodynamic knows Sphere, Box, ConvexPolyhedron, Cylinder, Cone and Capsule");
@@ -121,15 +123,6 @@ class Aerodynamic final : public OwnStateForce {
     }
     const double pressure = -0.5 * flow.density * flow.drag;
     return {.wrench = {pressure * push.force, pressure * push.torque}};
-  }
-
-  // The normals go through the centre, so that only its own velocity counts: integral of cos^3 over half a ball.
-  static Wrench on_ball(const BodyShape& shape, const Vector3& arm, const Slip& slip) {
-    if (shape.parameters.size() != 1 || !(shape.parameters[0] > 0.0)) throw Refusal("a Sphere's Radius is not above 0");
-    const double radius = shape.parameters[0];
-    const Vector3 u = slip.at(arm);
-    const Vector3 force = 0.5 * std::numbers::pi * radius * radius * u.norm() * u;
-    return {force, arm.cross(force)};
   }
 };
 

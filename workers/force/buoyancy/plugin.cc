@@ -5,9 +5,9 @@
 //   torque also -s c_A w
 //   U = rho |g| V (level - up.b)             so that f = -dU/dx, torque = -dU/dturn without drag
 //
-// Exact for Sphere, Box and ConvexPolyhedron cut by the surface (submerged.h); Cylinder, Cone and Capsule are polyhedra of 48
-// sides of the same volume, and but for the Capsule's caps of the same sections. Other shapes are refused. A floating body finds its depth and rocks back upright by itself, since b
-// moves. Region bounds the fluid: where b is outside nothing is felt, which is a jump at its sides.
+// Exact for Sphere, Box, ConvexPolyhedron, Cylinder and Capsule cut by the surface (submerged.h); a Cone is a polyhedron of 48
+// sides whose sections have the area of its own. Other shapes are refused. A floating body finds its depth and rocks back upright
+// by itself, since b moves. Region bounds the fluid: where b is outside nothing is felt, which is a jump at its sides.
 // Level is along up through the world's origin. The seed leaves buoyancy to future work (§ 6.2.3).
 #include "plugin_sdk/plugin.h"
 
@@ -112,10 +112,15 @@ class Buoyancy final : public OwnStateForce {
   }
 
   static Submerged submerged(const BodyShape& shape, const Pose& pose, const Vector3& up, double level) {
+    const std::span<const double> size = shape.parameters;
     if (shape.type == type_id("Sphere")) {
-      if (shape.parameters.size() != 1 || !(shape.parameters[0] > 0.0))
-        throw Refusal("a Sphere's Radius is not above 0");
-      return submerged_ball(pose.position, shape.parameters[0], up, level);
+      if (size.size() != 1 || !(size[0] > 0.0)) throw Refusal("a Sphere's Radius is not above 0");
+      return submerged_ball(pose.position, size[0], up, level);
+    }
+    if (shape.type == type_id("Cylinder") || shape.type == type_id("Capsule")) {
+      require_sizes(shape, 2);
+      return shape.type == type_id("Capsule") ? submerged_capsule(size[0], size[1], pose, up, level)
+                                              : submerged_cylinder(size[0], size[1], pose, up, level);
     }
     const std::optional<Surface> surface = surface_of(shape);
     if (!surface) throw Refusal("Buoyancy knows Sphere, Box, ConvexPolyhedron, Cylinder, Cone and Capsule");
