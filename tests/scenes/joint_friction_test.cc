@@ -152,11 +152,15 @@ TEST_P(JointDrives, OfBothBarsGoOnTopOfEachOther) {
     SceneRun run(scene(cross(about(1, p) + about(2, q), Vector3::UnitZ(), axis2)), with());
     run.to_end();
     const Vector3 turned = harness::turned(Vector3::UnitZ(), p * run.time()) * axis2;
-    // rows of S* in turns of 0.03 rad a step, and the cross is ahead by that of the first step
-    EXPECT_LT((spin(run) - p * Vector3::UnitZ() - q * turned).norm(), is_smooth() ? 2e-2 : 6e-2);
+    // of the second order of 0.03 rad a step with rows of S*, and of the fourth
+    const double off = is_smooth() ? 1e-8 : 1e-3;
+    // the cross of a Verlet is behind by half of the first step, in which it is set in motion
+    const double behind =
+        std::string(GetParam().simulator) == "Continuous" ? 0.5 * run.time_step() * std::fabs(p * q) : 0.0;
+    EXPECT_LT((spin(run) - p * Vector3::UnitZ() - q * turned).norm(), behind + off);
     ASSERT_EQ(run.report().drives_size(), 2);
-    EXPECT_NEAR(run.report().drives(0).speed(), p, is_smooth() ? 1e-9 : 2e-3);
-    EXPECT_NEAR(run.report().drives(1).speed(), q, is_smooth() ? 1e-9 : 2e-3);
+    EXPECT_NEAR(run.report().drives(0).speed(), p, off);
+    EXPECT_NEAR(run.report().drives(1).speed(), q, off);
   }
 }
 

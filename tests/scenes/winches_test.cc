@@ -195,6 +195,18 @@ TEST_P(Winches, PullAtNothingWhereTheyHaveNothingToHold) {
   EXPECT_LT(watched.run.body("Load").twist.linear.norm(), 1e-12);
 }
 
+TEST_P(Winches, BreakUnderMoreThanTheyBear) {
+  const Vector3 load(0.1, -1, 0);
+  for (const double share : {0.99, 1.01}) {
+    std::string hung = rope("R", "", "Load", 1, 0.1, load, held());
+    hung.insert(hung.find(" CustomProperties"), " BreakingForce = " + literal(share * 2.0 * kG));
+    SceneRun run(scene(body("Load", 2, 0.01, load), hung), with());
+    run.to_end();
+    EXPECT_EQ(run.holds("R"), share > 1.0);
+    EXPECT_EQ(run.body("Load").pose.position.y() < -2.0, share < 1.0);
+  }
+}
+
 // An elastic rope of a drum that is held: m g/k longer.
 TEST_P(Winches, AreSpringsWithAStiffness) {
   const Vector3 load(0.1, -1, 0);
