@@ -106,11 +106,13 @@ Discrepancy sprung(Discrepancy row, const JointSpring& spring) {
   return row;
 }
 
-void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out) {
+void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out, std::string_view which) {
   if (properties->at_end()) return;
   const double speed = properties->number(), torque = properties->number();
   if (std::isnan(speed)) {
-    if (!std::isnan(torque)) throw Refusal(std::string(type) + ": MaximumTorque is given without AngularSpeed");
+    if (!std::isnan(torque))
+      throw Refusal(std::string(type) + ": MaximumTorque" + std::string(which) + " is given without AngularSpeed" +
+                    std::string(which));
     return;
   }
   out->number(speed);

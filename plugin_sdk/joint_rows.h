@@ -50,9 +50,10 @@ JointSpring read_spring(PropertyCursor* bound);
 // A row (its first axis) that the spring holds, as far as it does.
 Discrepancy sprung(Discrepancy row, const JointSpring& spring);
 
-// A drive about an axis, from the next two properties, AngularSpeed and MaximumTorque; a request that was recorded before a joint
-// had them may end before. Bound are its speed and torque, and nothing where there is none. Refuses a torque without a speed.
-void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out);
+// A drive about an axis, from the next two properties, AngularSpeed and MaximumTorque, or `which` behind either; a request that was
+// recorded before a joint had them may end before. Bound are its speed and torque, and nothing where there is none. Refuses a torque
+// without a speed.
+void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out, std::string_view which = {});
 // Calls emit with its row, if there is one, about a unit axis about which the bodies turn by `rate` times what is driven.
 template <typename Emit>
 void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit);

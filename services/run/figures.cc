@@ -42,7 +42,7 @@ std::optional<std::vector<double>> property_of(const TypeDeclaration& type, cons
 Figures::Figures(const kernel::EnvironmentDescription& description) : description_(description) { find_drives(); }
 
 // A drive is a joint whose type has an angular speed and an axis of two points, as AngularMotor and Revolute do, or a rolling
-// one, as Axle does; or a direction and a speed, as Slider does.
+// one, as Axle does, or a speed about either bar of a cross, as Universal does; or a direction and a speed, as Slider does.
 void Figures::find_drives() {
   for (std::uint32_t i = 0; i < description_.constraints.size(); ++i) {
     const kernel::ConstraintDescription& joint = description_.constraints[i];
@@ -66,6 +66,14 @@ void Figures::find_drives() {
         add(vector_at(*steering, 0), (*angular_speed)[0], false);
         drives_.back().rolling_in_body2 = in_body(joint.body2, 1, vector_at(*rolling, 0));
       }
+      const auto bar1 = find("Axis1"), bar2 = find("Axis2");
+      for (const bool is_first : {true, false}) {
+        const auto about_bar = find(is_first ? "AngularSpeed1" : "AngularSpeed2");
+        if (!bar1 || !bar2 || !about_bar || std::isnan((*about_bar)[0])) continue;
+        add(vector_at(*bar1, 0), (*about_bar)[0], false);
+        drives_.back().rolling_in_body2 = in_body(joint.body2, 1, vector_at(*bar2, 0));
+        drives_.back().is_of_first = is_first;
+      }
       const auto axis = find("Axis"), speed = find("Speed");
       if (axis && speed && !std::isnan((*speed)[0])) add(vector_at(*axis, 0), (*speed)[0], true);
     }
@@ -84,9 +92,9 @@ double Figures::drive_speed(const Drive& drive, const kernel::StateView& state) 
   const Vector3 axis = turned(one, drive.axis_in_body1);
   const Vector3 turning = of(two, state.angular_velocity) - of(one, state.angular_velocity);
   if (drive.rolling_in_body2) {
-    // what it steers by, too, is no rolling
-    const Vector3 normal = axis.cross(turned(two, *drive.rolling_in_body2));
-    return normal.cross(axis).dot(turning) / normal.squaredNorm();
+    // what it turns by about the other axis is none about this
+    const Vector3 other = turned(two, *drive.rolling_in_body2), normal = axis.cross(other);
+    return (drive.is_of_first ? other.cross(normal) : normal.cross(axis)).dot(turning) / normal.squaredNorm();
   }
   if (!drive.slides) return axis.dot(turning);
   // both turn alike, the one that is the world not at all

@@ -46,7 +46,8 @@ class Figures {
     double target;          // rad/s or m/s
     bool slides = false;
     double speed = 0.0;                            // in the last state
-    std::optional<Vector3> rolling_in_body2 = {};  // of a wheel, which steers about the other
+    std::optional<Vector3> rolling_in_body2 = {};  // of a wheel, which steers about the other, or a cross
+    bool is_of_first = false;                      // of two axes
   };
 
   struct Runaway {

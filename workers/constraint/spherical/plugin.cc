@@ -15,6 +15,9 @@
 // right-handed about Axis, from the world's x as seen along it (-z for an Axis within 1e-3 of x).
 // Spring and damper: of the whole turn of body 2 against body 1 since the start, torque -k angle about its axis and -c w. They
 // take no freedom.
+// Drive: to an angular velocity of body 2 against body 1, three rows on velocities about axes that body 1 carries, those of the
+// world at the start. MaximumTorque bounds each by itself, as a discrepancy bounds its axes (joint_laws.h): up to sqrt(3) of it
+// between them. With a velocity of 0 it is the friction of the joint.
 // Twist: limited_twist_row() of plugin_sdk/joint_rows.h, undefined at a swing of 180 degrees.
 #include <cmath>
 #include <vector>
@@ -47,7 +50,7 @@ class Spherical final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Spherical",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Ball-and-socket joint.",
         .types = {
@@ -78,7 +81,14 @@ class Spherical final : public ConstraintPlugin {
                       "Spring that turns body 2 back to how it was at the start, about whatever axis; none if absent."),
               Property::number("Damping", "N*m*s/rad")
                   .at_least(0.0)
-                  .means("Damper of all its turning; none if absent.")}}}};
+                  .means("Damper of all its turning; none if absent."),
+              Property::vector("AngularVelocity", "rad/s", "world")
+                  .means(
+                      "Angular velocity of body 2 relative to body 1 that a drive keeps, in axes that body 1 carries, "
+                      "those of the world at the start; 0 for friction, no drive if absent."),
+              Property::number("MaximumTorque", "N*m")
+                  .at_least(0.0)
+                  .means("Largest torque of the drive about each of these axes; unlimited if absent.")}}}};
   }
   explicit Spherical(PropertyCursor) {}
 
@@ -93,12 +103,15 @@ class Spherical final : public ConstraintPlugin {
                 if (properties.at_end()) return;
                 const Cone cone = read_cone(&properties);
                 const JointSpring spring = JointSpring::of(&properties);
-                if (cone.limits_nothing() && spring.is_none()) return;
+                BoundWriter drive;
+                write_turning_drive(bodies, &properties, &drive);
+                if (cone.limits_nothing() && spring.is_none() && drive.numbers().empty()) return;
                 const Pose frame = cone_frame(point, cone.axis);
                 write_frame(bodies.pose1, frame, &out);
                 write_frame(bodies.pose2, frame, &out);
                 write_spring(spring, &out);
                 write_cone(cone, &out);
+                for (const double number : drive.numbers()) out.number(number);
               });
   }
 
@@ -151,6 +164,19 @@ class Spherical final : public ConstraintPlugin {
     for (const double number : cone.irregular) out->number(number);
   }
 
+  static void write_turning_drive(const JointBodies& bodies, PropertyCursor* properties, BoundWriter* out) {
+    if (properties->at_end()) return;
+    const Vector3 velocity = properties->vector();
+    const double torque = properties->number();
+    if (velocity.hasNaN()) {
+      if (!std::isnan(torque)) throw Refusal("Spherical: MaximumTorque is given without AngularVelocity");
+      return;
+    }
+    write_frame(bodies.pose1, {bodies.pose1.position, Quaternion::Identity()}, out);
+    out->vector(velocity);
+    out->number(std::isnan(torque) ? kUnlimited : torque);
+  }
+
   // Its second axis is at azimuth 0.
   static Pose cone_frame(const Vector3& point, const Vector3& axis) {
     constexpr double kAlong = 1e-3;
@@ -183,6 +209,13 @@ class Spherical final : public ConstraintPlugin {
     const std::span<const double> cone = bound.table(2);
     if (!cone.empty()) emit(cone_row(cone, one.orientation, two.orientation));
     if (!twist.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, twist));
+    if (bound.at_end()) return;
+    Discrepancy drive;
+    drive.axes = read_frame(&bound, bodies.pose1).orientation;
+    drive.modes = pack_modes(AxisMode::kDriven, AxisMode::kDriven, AxisMode::kDriven, true);
+    drive.velocity = drive.axes * bound.vector();
+    drive.maximum_force = Vector3::Constant(bound.number());
+    emit(drive);
   }
 
   static Discrepancy cone_row(std::span<const double> cone, const Quaternion& one, const Quaternion& two) {

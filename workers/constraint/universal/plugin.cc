@@ -7,6 +7,10 @@
 // turns about either bar.
 // A spring and a damper about either bar take no freedom. Their angle is that by which one bar has turned about the other
 // since the start, asin(sin(g) sin(angle)) where the bars make an angle g: within a right angle, beyond which they pull on.
+// Drives. Body 2 turns on body 1 at p a1 + q a2, with p and q what it turns about the bars. So d1 = (a1 - (a1.a2) a2)/sin^2 g has
+// d1.w = p and no part along a2: a torque T d1 does the work T p, as a motor or friction between body 1 and the cross does, and d2
+// alike between the cross and body 2. Each is one row on the velocity about its d, made unit; with a speed of 0 it is the friction
+// of a bearing, of at most its torque.
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <string>
 
@@ -20,7 +24,7 @@ class Universal final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Universal",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Hooke's joint.",
         .types = {
@@ -40,7 +44,18 @@ class Universal final : public ConstraintPlugin {
               Property::number("Stiffness2", "N*m/rad")
                   .at_least(0.0)
                   .means("Spring about Axis2, at rest at the start; none if absent."),
-              Property::number("Damping2", "N*m*s/rad").at_least(0.0).means("Damper about Axis2; none if absent.")}}}};
+              Property::number("Damping2", "N*m*s/rad").at_least(0.0).means("Damper about Axis2; none if absent."),
+              Property::number("AngularSpeed1", "rad/s")
+                  .means(
+                      "Speed of body 2 relative to body 1 about Axis1 that a drive keeps; 0 for friction, no drive if "
+                      "absent."),
+              Property::number("MaximumTorque1", "N*m")
+                  .at_least(0.0)
+                  .means("Largest torque of that drive; unlimited if absent."),
+              Property::number("AngularSpeed2", "rad/s").means("The same about Axis2."),
+              Property::number("MaximumTorque2", "N*m")
+                  .at_least(0.0)
+                  .means("Largest torque of that drive; unlimited if absent.")}}}};
   }
   explicit Universal(PropertyCursor) {}
 
@@ -56,6 +71,7 @@ class Universal final : public ConstraintPlugin {
                 write_frame(bodies.pose2, cross_frame(point, axis2, axis1), &out);
                 out.number(swing_between(axis1, axis2).angle);
                 for (int bar = 0; bar < 2; ++bar) write_spring(JointSpring::of(&properties), &out);
+                write_drives(&properties, &out);
               });
   }
 
@@ -71,7 +87,26 @@ class Universal final : public ConstraintPlugin {
       const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
       if (!spring1.is_none()) emit(sprung(swing_row(across1, axis2, kQuarterTurn), spring1));
       if (!spring2.is_none()) emit(sprung(swing_row(axis1, across2, kQuarterTurn), spring2));
+      if (bound.at_end()) return;
+      PropertyCursor drive1(bound.table(2)), drive2(bound.table(2));
+      const Vector3 normal = swing_between(axis1, axis2).axis;
+      const double sine = axis1.cross(axis2).norm();
+      drive_about(axis2.cross(normal), sine, &drive1, emit);
+      drive_about(normal.cross(axis1), sine, &drive2, emit);
     });
+  }
+
+ private:
+  // Of either bar a table of one row or none; nothing where neither has a drive.
+  static void write_drives(PropertyCursor* properties, BoundWriter* out) {
+    BoundWriter first, second;
+    write_drive(properties, "Universal", &first, "1");
+    write_drive(properties, "Universal", &second, "2");
+    if (first.numbers().empty() && second.numbers().empty()) return;
+    for (const BoundWriter* drive : {&first, &second}) {
+      out->number(drive->numbers().empty() ? 0.0 : 1.0);
+      for (const double number : drive->numbers()) out->number(number);
+    }
   }
 };
 
