@@ -19,6 +19,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
@@ -47,9 +48,10 @@ class Spherical final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Spherical",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Ball-and-socket joint.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Spherical",
              "Two bodies share a point about which they turn, freely or within a reach cone and limits of twist.",
@@ -63,7 +65,9 @@ class Spherical final : public ConstraintPlugin {
                       "An irregular cone instead: azimuth, rising within 0 ... 2 pi, and largest angle there; three "
                       "rows at least. Azimuths count right-handed about Axis from the world's x as seen along it; from "
                       "-z where Axis is along x, to 1e-3."),
-              Property::vector("Axis", "1", "world").means("Axis of cone and twist at the start, any length."),
+              Property::vector("Axis", "1", "world")
+                  .means("Axis of cone and twist at the start, any length; what coordinates are counted from, of a "
+                         "joint without limits, too."),
               Property::number("TwistLower", "rad")
                   .at_least(-kHalfTurn)
                   .at_most(0.0)
@@ -78,7 +82,16 @@ class Spherical final : public ConstraintPlugin {
                       "Spring that turns body 2 back to how it was at the start, about whatever axis; none if absent."),
               Property::number("Damping", "N*m*s/rad")
                   .at_least(0.0)
-                  .means("Damper of all its turning; none if absent.")}}}};
+                  .means("Damper of all its turning; none if absent.")},
+             {{"swing", "rad",
+               "Angle of Axis in body 2 against Axis in body 1, which ReachConeAngle bounds, 0 ... pi; of a joint with "
+               "Axis, as the others."},
+              {"azimuth", "rad",
+               "Where Axis in body 2 points round that in body 1, as azimuths of ReachCone count, above -pi up to pi; "
+               "none while both point alike."},
+              {"twist", "rad",
+               "Twist of body 2 about its axis; the turn that TwistLower and TwistUpper are compared with, without "
+               "them above -pi up to pi."}}}}};
   }
   explicit Spherical(PropertyCursor) {}
 
@@ -93,12 +106,13 @@ class Spherical final : public ConstraintPlugin {
                 if (properties.at_end()) return;
                 const Cone cone = read_cone(&properties);
                 const JointSpring spring = JointSpring::of(&properties);
-                if (cone.limits_nothing() && spring.is_none()) return;
-                const Pose frame = cone_frame(point, cone.axis);
+                if (!cone.has_axis && spring.is_none()) return;
+                const Pose frame = azimuth_frame(point, cone.axis);
                 write_frame(bodies.pose1, frame, &out);
                 write_frame(bodies.pose2, frame, &out);
                 write_spring(spring, &out);
                 write_cone(cone, &out);
+                out.number(cone.has_axis ? 1.0 : 0.0);
               });
   }
 
@@ -112,9 +126,29 @@ class Spherical final : public ConstraintPlugin {
     });
   }
 
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      for (int anchor = 0; anchor < 2; ++anchor) bound.vector();
+      if (bound.at_end()) return;
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      read_spring(&bound);
+      JointLimits twist;
+      twist.lower = bound.number();
+      twist.upper = bound.number();
+      bound.table(2);
+      if (!bound.flag()) return;
+      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+      emit(0, swing_of(axis1, axis2, bodies));
+      emit(1, azimuth_of(axis1, one.orientation * Vector3::UnitY(), axis2, bodies.spin2 - bodies.spin1));
+      emit(2, twist_of(one, two, twist, bodies));
+    });
+  }
+
  private:
   struct Cone {
     Vector3 axis = Vector3::UnitX();
+    bool has_axis = false;
     JointLimits twist;
     double angle = 0.0;  // of a regular one, else 0
     std::span<const double> irregular;
@@ -135,7 +169,8 @@ class Spherical final : public ConstraintPlugin {
       cone.angle = angle;
     }
     demand_cone(cone.irregular);
-    if (cone.limits_nothing()) return cone;
+    cone.has_axis = axis.stableNorm() > 0.0 && axis.allFinite();
+    if (cone.limits_nothing() && !cone.has_axis) return cone;
     if (axis.array().isNaN().all())
       throw Refusal("Spherical: Axis is missing, which reach cone and twist limits are measured from");
     cone.axis = unit_axis(axis, "Spherical: Axis");
@@ -149,16 +184,6 @@ class Spherical final : public ConstraintPlugin {
     out->number(is_regular ? 1.0 : static_cast<double>(cone.irregular.size() / 2));
     if (is_regular) out->number(0.0), out->number(cone.angle);
     for (const double number : cone.irregular) out->number(number);
-  }
-
-  // Its second axis is at azimuth 0.
-  static Pose cone_frame(const Vector3& point, const Vector3& axis) {
-    constexpr double kAlong = 1e-3;
-    const Vector3 across = Vector3::UnitX() - axis.x() * axis;
-    const Vector3 start = across.norm() > kAlong ? across : Vector3(axis.z() * axis - Vector3::UnitZ());
-    Matrix3 axes;
-    axes.col(0) = axis, axes.col(1) = start.normalized(), axes.col(2) = axis.cross(axes.col(1));
-    return {point, to_quaternion(axes)};
   }
 
   static void demand_cone(std::span<const double> cone) {

@@ -10,6 +10,7 @@
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <string>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -18,29 +19,35 @@ namespace {
 class Universal final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
-    return {
-        .name = "Universal",
-        .version = "1.1",
-        .slot = Slot::kConstraint,
-        .meaning = "Hooke's joint.",
-        .types = {
-            {"Universal",
-             "Two bodies share a point; an axis of the first and one of the second keep their angle.",
-             {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
-              Property::vector("Axis1", "1", "world")
-                  .required()
-                  .means("Bar of the cross that is fixed in body 1, any length."),
-              Property::vector("Axis2", "1", "world")
-                  .required()
-                  .means("Bar that is fixed in body 2; not parallel to Axis1, as a rule across it."),
-              Property::number("Stiffness1", "N*m/rad")
-                  .at_least(0.0)
-                  .means("Spring about Axis1, at rest at the start; none if absent."),
-              Property::number("Damping1", "N*m*s/rad").at_least(0.0).means("Damper about Axis1; none if absent."),
-              Property::number("Stiffness2", "N*m/rad")
-                  .at_least(0.0)
-                  .means("Spring about Axis2, at rest at the start; none if absent."),
-              Property::number("Damping2", "N*m*s/rad").at_least(0.0).means("Damper about Axis2; none if absent.")}}}};
+    return {.name = "Universal",
+            .version = "1.2",
+            .slot = Slot::kConstraint,
+            .meaning = "Hooke's joint.",
+            .capabilities = {"coordinates"},
+            .types = {
+                {"Universal",
+                 "Two bodies share a point; an axis of the first and one of the second keep their angle.",
+                 {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
+                  Property::vector("Axis1", "1", "world")
+                      .required()
+                      .means("Bar of the cross that is fixed in body 1, any length."),
+                  Property::vector("Axis2", "1", "world")
+                      .required()
+                      .means("Bar that is fixed in body 2; not parallel to Axis1, as a rule across it."),
+                  Property::number("Stiffness1", "N*m/rad")
+                      .at_least(0.0)
+                      .means("Spring about Axis1, at rest at the start; none if absent."),
+                  Property::number("Damping1", "N*m*s/rad").at_least(0.0).means("Damper about Axis1; none if absent."),
+                  Property::number("Stiffness2", "N*m/rad")
+                      .at_least(0.0)
+                      .means("Spring about Axis2, at rest at the start; none if absent."),
+                  Property::number("Damping2", "N*m*s/rad").at_least(0.0).means("Damper about Axis2; none if absent.")},
+                 {{"angle1", "rad",
+                   "Turn of the cross, and of body 2 with it, about Axis1, relative to body 1, right-handed, 0 at the "
+                   "start, above -pi up to pi."},
+                  {"angle2", "rad",
+                   "Turn of body 2 about Axis2, relative to the cross, right-handed, 0 at the start, above -pi up to "
+                   "pi."}}}}};
   }
   explicit Universal(PropertyCursor) {}
 
@@ -71,6 +78,18 @@ class Universal final : public ConstraintPlugin {
       const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
       if (!spring1.is_none()) emit(sprung(swing_row(across1, axis2, kQuarterTurn), spring1));
       if (!spring2.is_none()) emit(sprung(swing_row(axis1, across2, kQuarterTurn), spring2));
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+      const Vector3 turning = bodies.spin2 - bodies.spin1;
+      // the second axis of either frame is where the other bar was at the start
+      emit(0, azimuth_of(axis1, one.orientation * Vector3::UnitY(), axis2, turning));
+      emit(1, reversed(azimuth_of(axis2, two.orientation * Vector3::UnitY(), axis1, -turning)));
     });
   }
 };
