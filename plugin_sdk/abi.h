@@ -18,7 +18,7 @@ extern "C" {
 #endif
 
 // Counted up when a structure below changes.
-enum { GRAVITAS_ABI_VERSION = 1 };
+enum { GRAVITAS_ABI_VERSION = 2 };
 
 enum gravitas_slot {
   GRAVITAS_SLOT_SPACE = 1,
@@ -49,11 +49,19 @@ typedef struct gravitas_property {
   uint32_t reserved;
 } gravitas_property;
 
+typedef struct gravitas_coordinate {
+  const char* name;
+  const char* unit;
+  const char* meaning;
+} gravitas_coordinate;
+
 typedef struct gravitas_type {
   const char* name;
   const char* meaning;
   const gravitas_property* properties;
+  const gravitas_coordinate* coordinates;
   uint64_t property_count;
+  uint64_t coordinate_count;
 } gravitas_type;
 
 typedef struct gravitas_description {

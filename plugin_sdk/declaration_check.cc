@@ -69,6 +69,19 @@ std::string check_properties(const std::string& owner, const std::vector<Propert
 
 // ---- types and capabilities
 
+std::string check_coordinates(const TypeDeclaration& type) {
+  std::set<std::string> names;
+  for (const CoordinateDeclaration& c : type.coordinates) {
+    if (!is_scene_name(c.name))
+      return type.name + " has a coordinate '" + c.name +
+             "'; allowed: a name of letters, digits and '_', and no digit first";
+    if (!names.insert(c.name).second) return type.name + " declares the coordinate " + c.name + " twice";
+    if (c.unit.empty()) return "coordinate " + c.name + " of " + type.name + " has no unit";
+    if (c.meaning.empty()) return "coordinate " + c.name + " of " + type.name + " has no meaning";
+  }
+  return {};
+}
+
 std::string check_types(const PluginDeclaration& d) {
   const bool serves_types = d.slot == Slot::kCollision || d.slot == Slot::kConstraint || d.slot == Slot::kForce;
   if (serves_types && d.types.empty())
@@ -79,8 +92,15 @@ std::string check_types(const PluginDeclaration& d) {
     if (!names.insert(type.name).second) return "type " + type.name + " is declared twice";
     if (type.meaning.empty()) return "type " + type.name + " has no meaning";
     std::string problem = check_properties(type.name, type.properties);
+    if (problem.empty()) problem = check_coordinates(type);
     if (!problem.empty()) return problem;
   }
+  const bool has_some =
+      std::ranges::any_of(d.types, [](const TypeDeclaration& type) { return !type.coordinates.empty(); });
+  if (has_some && !has_capability(d, "coordinates"))
+    return "a type has coordinates, but the plugin does not declare the capability 'coordinates'";
+  if (!has_some && has_capability(d, "coordinates"))
+    return "it declares the capability 'coordinates', but no type has any";
   return {};
 }
 
@@ -91,7 +111,7 @@ std::vector<std::string> capabilities_of(Slot slot) {
     case Slot::kCollision:
       return {"times_of_impact", "rays", "debug_geometry"};
     case Slot::kConstraint:
-      return {};
+      return {"coordinates"};
     case Slot::kForce:
       return {"potential", "jacobians"};
     case Slot::kSolver:

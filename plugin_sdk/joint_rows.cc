@@ -126,6 +126,15 @@ Pose frame_along(const Vector3& origin, const Vector3& first) {
   return {origin, to_quaternion(axes)};
 }
 
+Pose azimuth_frame(const Vector3& origin, const Vector3& first) {
+  constexpr double kAlong = 1e-3;
+  const Vector3 across = Vector3::UnitX() - first.x() * first;
+  const Vector3 start = across.norm() > kAlong ? across : Vector3(first.z() * first - Vector3::UnitZ());
+  Matrix3 axes;
+  axes.col(0) = first, axes.col(1) = start.normalized(), axes.col(2) = first.cross(axes.col(1));
+  return {origin, to_quaternion(axes)};
+}
+
 void write_frame(const Pose& body, const Pose& frame, BoundWriter* out) {
   const Pose in_body = relative(body, frame);
   out->vector(in_body.position);

@@ -61,6 +61,10 @@ void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&&
 // A frame with its origin at `origin` and its first axis along a unit vector (world).
 Pose frame_along(const Vector3& origin, const Vector3& first);
 
+// One whose second axis is where azimuths are counted from: the world's x as seen along the first, and where that is along x,
+// to 1e-3, -z.
+Pose azimuth_frame(const Vector3& origin, const Vector3& first);
+
 // Numbers of a frame in its body, and back; the orientation is made unit.
 void write_frame(const Pose& body, const Pose& frame, BoundWriter* out);
 Pose read_frame(PropertyCursor* bound, const Pose& body);

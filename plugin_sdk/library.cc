@@ -161,6 +161,10 @@ PluginDeclaration read_declaration(const gravitas_description& plain) {
   for (std::uint64_t i = 0; i < plain.type_count; ++i) {
     const gravitas_type& type = plain.types[i];
     declaration.types.push_back({type.name, type.meaning, read_properties(type.properties, type.property_count)});
+    for (std::uint64_t k = 0; k < type.coordinate_count; ++k) {
+      const gravitas_coordinate& coordinate = type.coordinates[k];
+      declaration.types.back().coordinates.push_back({coordinate.name, coordinate.unit, coordinate.meaning});
+    }
   }
   declaration.properties = read_properties(plain.properties, plain.property_count);
   declaration.theta = plain.theta;

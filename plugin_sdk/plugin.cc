@@ -88,9 +88,18 @@ bool ConstraintPlugin::dispatch(stage::Method method, const gravitas_column* req
     bind(stage::ConstraintBindRequest(request), stage::ConstraintBindReply(reply), host);
     return true;
   }
+  if (method == stage::Method::kConstraintCoordinates) {
+    coordinates(stage::ConstraintDiscrepanciesRequest(request), stage::ConstraintCoordinatesReply(reply), host);
+    return true;
+  }
   if (method != stage::Method::kConstraintDiscrepancies) return false;
   discrepancies(stage::ConstraintDiscrepanciesRequest(request), stage::ConstraintDiscrepanciesReply(reply), host);
   return true;
+}
+
+void ConstraintPlugin::coordinates(const stage::ConstraintDiscrepanciesRequest&,
+                                   const stage::ConstraintCoordinatesReply&, Host&) {
+  throw UnknownMethod();
 }
 
 bool ForcePlugin::dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply,
@@ -146,6 +155,7 @@ namespace {
 struct PlainDescription {
   PluginDeclaration declaration;
   std::deque<std::vector<gravitas_property>> properties;
+  std::deque<std::vector<gravitas_coordinate>> coordinates;
   std::deque<std::vector<const char*>> texts;
   std::vector<gravitas_type> types;
   gravitas_description description{};
@@ -185,11 +195,14 @@ const gravitas_property* plain_properties(PlainDescription& owner, const std::ve
 
 const gravitas_description* plain_description(PluginDeclaration declaration) {
   // never freed: the library is never unloaded
-  auto& owner = *new PlainDescription{std::move(declaration), {}, {}, {}, {}};
+  auto& owner = *new PlainDescription{std::move(declaration), {}, {}, {}, {}, {}};
   const PluginDeclaration& source = owner.declaration;
   for (const TypeDeclaration& type : source.types) {
-    owner.types.push_back(
-        {type.name.c_str(), type.meaning.c_str(), plain_properties(owner, type.properties), type.properties.size()});
+    std::vector<gravitas_coordinate>& coordinates = owner.coordinates.emplace_back();
+    for (const CoordinateDeclaration& c : type.coordinates)
+      coordinates.push_back({c.name.c_str(), c.unit.c_str(), c.meaning.c_str()});
+    owner.types.push_back({type.name.c_str(), type.meaning.c_str(), plain_properties(owner, type.properties),
+                           coordinates.data(), type.properties.size(), coordinates.size()});
   }
   owner.description.name = source.name.c_str();
   owner.description.version = source.version.c_str();

@@ -47,12 +47,20 @@ enum class Slot : std::uint32_t {
 // "space", "collision", …
 const char* slot_name(Slot slot);
 
+// What a joint leaves free and can tell, such as `angle` in rad: what Constraint.Coordinates answers, by its place in the list.
+struct CoordinateDeclaration {
+  std::string name;
+  std::string unit;
+  std::string meaning;
+};
+
 // A name of the scene language that the plugin serves: a force type, a joint type, a shape. A request that names another is
 // refused.
 struct TypeDeclaration {
   std::string name;
   std::string meaning;
   std::vector<Property> properties;  // of what the scene says of one force, joint or shape; live() means nothing here
+  std::vector<CoordinateDeclaration> coordinates = {};  // of joint types
 };
 
 struct PluginDeclaration {
@@ -170,7 +178,7 @@ class CollisionPlugin {
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 
-// Both refuse joints of types that are not declared: demand_type() of joint_rows.h.
+// All refuse joints of types that are not declared: demand_type() of joint_rows.h.
 class ConstraintPlugin {
  public:
   static constexpr Slot kSlot = Slot::kConstraint;
@@ -179,6 +187,9 @@ class ConstraintPlugin {
                     Host& host) = 0;
   virtual void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
                              const stage::ConstraintDiscrepanciesReply& reply, Host& host) = 0;
+  // For joints with the capability `coordinates`, whose types declare some (plugin_sdk/joint_coordinates.h helps).
+  virtual void coordinates(const stage::ConstraintDiscrepanciesRequest& request,
+                           const stage::ConstraintCoordinatesReply& reply, Host& host);
   bool dispatch(stage::Method method, const gravitas_column* request, gravitas_reply_column* reply, Host& host);
 };
 

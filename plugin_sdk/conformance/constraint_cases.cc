@@ -3,6 +3,7 @@
 // choose, so that errors are compared by their size.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "plugin_sdk/conformance/hostile_numbers.h"
@@ -18,21 +19,6 @@ namespace {
 constexpr double kJointRounding = 1e-13;
 constexpr const char* kPointJoints[] = {"Spherical",    "Revolute",  "Rigid",
                                         "AngularMotor", "Universal", "ConstantVelocity"};
-
-// Two bodies somewhere, with a joint of a type between them.
-Joints joined(const TypeDeclaration& type, Draw* draw) {
-  Joints world;
-  for (int i = 0; i < 2; ++i) world.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
-  world.joints = {{.type = type_id(type.name), .properties = sample_values(type.properties, draw)}};
-  return world;
-}
-
-std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refusal = nullptr) {
-  constexpr const char* kKnown[] = {"Spherical", "AngularMotor"};
-  return askable_types(subject.declaration(), kKnown, refusal, [&](const TypeDeclaration& type, Draw* draw) {
-    return subject.ask(stage::Method::kConstraintBind, joined(type, draw).bind_request());
-  });
-}
 
 using Ends = std::pair<std::uint32_t, std::uint32_t>;
 
@@ -391,6 +377,7 @@ std::vector<Case> constraint_cases(const PluginDeclaration& declaration) {
   if (!driven_hinges(declaration).empty())
     cases.push_back(make_case("constraint/motor", "A motor's rows want its speed about its axis, and no other motion.",
                               judge_motor));
+  std::ranges::move(coordinate_cases(declaration), std::back_inserter(cases));
   return cases;
 }
 
@@ -421,6 +408,7 @@ std::vector<Question> constraint_questions(Subject& subject, Draw* draw) {
     questions.push_back(
         {"discrepancies of " + joints, stage::Method::kConstraintDiscrepancies, chain.describe_request(), {}});
   }
+  std::ranges::move(coordinate_questions(subject, draw), std::back_inserter(questions));
   return questions;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "plugin_sdk/conformance/sample_values.h"
+
 namespace gravitas::conformance {
 namespace {
 
@@ -97,6 +99,20 @@ double Joints::row_velocity(const DescribedJoint& described, const Vector3& axis
   const JointedBody one = end(joints[described.joint], 1), other = end(joints[described.joint], 2);
   return jacobian_row(described.discrepancy, axis, one.pose.position, other.pose.position)
       .velocity(one.twist.linear, one.twist.angular, other.twist.linear, other.twist.angular);
+}
+
+Joints joined(const TypeDeclaration& type, Draw* draw) {
+  Joints world;
+  for (int i = 0; i < 2; ++i) world.bodies.push_back({draw->pose(3.0), {draw->vector(2.0), draw->vector(2.0)}});
+  world.joints = {{.type = type_id(type.name), .properties = sample_values(type.properties, draw)}};
+  return world;
+}
+
+std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refusal) {
+  constexpr const char* kKnown[] = {"Spherical", "AngularMotor"};
+  return askable_types(subject.declaration(), kKnown, refusal, [&](const TypeDeclaration& type, Draw* draw) {
+    return subject.ask(stage::Method::kConstraintBind, joined(type, draw).bind_request());
+  });
 }
 
 double error_of(const Discrepancy& discrepancy) {

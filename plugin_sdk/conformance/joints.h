@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/conformance/inquiry.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/dynamics.h"
@@ -50,6 +51,11 @@ class Joints {
   std::vector<std::uint32_t> bound_begin_ = {0};
   std::vector<double> bound_;
 };
+
+// Two bodies somewhere, with a joint of a type between them.
+Joints joined(const TypeDeclaration& type, Draw* draw);
+// Types whose joints can be bound as sample_values() has them.
+std::vector<TypeDeclaration> joint_types_of(Subject& subject, std::string* refusal = nullptr);
 
 // Error x2 - x1 of a discrepancy as joint_error() measures it.
 double error_of(const Discrepancy& discrepancy);

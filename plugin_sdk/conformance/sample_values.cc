@@ -74,6 +74,22 @@ std::vector<double> sample_values(const std::vector<Property>& properties, Draw*
   return numbers;
 }
 
+std::vector<double> with_directions(const std::vector<Property>& properties, const std::vector<double>& values,
+                                    Draw* draw) {
+  std::vector<double> numbers = values;
+  const Matrix3 axes = to_rotation_matrix(draw->rotation());
+  int next_axis = 0;
+  std::size_t at = 0;
+  for (const Property& p : properties) {
+    const bool is_direction = p.kind == PropertyKind::kVector && p.unit == "1" && !std::isfinite(p.minimum);
+    if (is_direction && std::isnan(numbers[at]))
+      for (int k = 0; k < 3; ++k) numbers[at + static_cast<std::size_t>(k)] = axes(k, next_axis % 3);
+    if (is_direction) ++next_axis;
+    at += p.kind == PropertyKind::kTable ? 1 + static_cast<std::size_t>(numbers[at]) * p.columns : p.flat_size();
+  }
+  return numbers;
+}
+
 std::vector<double> default_settings(const PluginDeclaration& declaration) {
   Draw draw(1);
   return sample_values(declaration.properties, &draw);

@@ -20,6 +20,10 @@ namespace gravitas::conformance {
 // tables have eight rows whose first column ascends.
 std::vector<double> sample_values(const std::vector<Property>& properties, Draw* draw);
 
+// Such values with the directions that may be absent given, too: orthonormal ones.
+std::vector<double> with_directions(const std::vector<Property>& properties, const std::vector<double>& values,
+                                    Draw* draw);
+
 // The settings of a plugin that a scene says nothing about.
 std::vector<double> default_settings(const PluginDeclaration& declaration);
 

@@ -16,6 +16,8 @@ std::vector<Case> moving_collision_cases(const PluginDeclaration& declaration);
 std::vector<Case> collision_geometry_cases(const PluginDeclaration& declaration);
 std::vector<Case> space_geometry_cases(const PluginDeclaration& declaration);
 std::vector<Case> constraint_cases(const PluginDeclaration& declaration);
+// Of the optional question of slot constraint.
+std::vector<Case> coordinate_cases(const PluginDeclaration& declaration);
 std::vector<Case> force_cases(const PluginDeclaration& declaration);
 std::vector<Case> solver_cases(const PluginDeclaration& declaration);
 // Of slot solver, for those that take motion from an integrator.
@@ -33,6 +35,7 @@ std::vector<Question> moving_collision_questions(Subject& subject);
 std::vector<Question> collision_geometry_questions(const PluginDeclaration& declaration);
 std::vector<Question> space_geometry_questions(const PluginDeclaration& declaration);
 std::vector<Question> constraint_questions(Subject& subject, Draw* draw);
+std::vector<Question> coordinate_questions(Subject& subject, Draw* draw);
 std::vector<Question> force_questions(Subject& subject, Draw* draw);
 std::vector<Question> solver_questions(const PluginDeclaration& declaration, Draw* draw);
 std::vector<Question> reaction_questions(const PluginDeclaration& declaration, Draw* draw);

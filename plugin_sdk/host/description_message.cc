@@ -51,6 +51,12 @@ plugin::v1::Description to_message(const PluginDeclaration& declaration) {
     typed->set_name(type.name);
     typed->set_meaning(type.meaning);
     for (const Property& property : type.properties) write_property(property, typed->add_properties());
+    for (const CoordinateDeclaration& coordinate : type.coordinates) {
+      plugin::v1::Coordinate* one = typed->add_coordinates();
+      one->set_name(coordinate.name);
+      one->set_unit(coordinate.unit);
+      one->set_meaning(coordinate.meaning);
+    }
   }
   for (const Property& property : declaration.properties) write_property(property, message.add_properties());
   message.set_theta(declaration.theta);
@@ -68,6 +74,8 @@ PluginDeclaration from_message(const plugin::v1::Description& message) {
   for (const plugin::v1::Type& typed : message.types()) {
     TypeDeclaration type{typed.name(), typed.meaning(), {}};
     for (const plugin::v1::Property& property : typed.properties()) type.properties.push_back(read_property(property));
+    for (const plugin::v1::Coordinate& one : typed.coordinates())
+      type.coordinates.push_back({one.name(), one.unit(), one.meaning()});
     declaration.types.push_back(std::move(type));
   }
   for (const plugin::v1::Property& property : message.properties())

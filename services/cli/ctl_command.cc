@@ -20,6 +20,7 @@
 #include "services/run/edit_spec.h"
 #include "services/run/file_names.h"
 #include "services/run/session.h"
+#include "services/survey/joint_file.h"
 #include "services/survey/picture.h"
 
 namespace gravitas::cli {
@@ -195,6 +196,16 @@ int show_instrumentation(const CtlLine& line, ControlClient* client) {
   return kDone;
 }
 
+// As the file of `gravitas run --joints`.
+int show_joints(const CtlLine&, ControlClient* client) {
+  const api::Joints joints = client->joints();
+  std::cout << survey::kJointHead;
+  for (const api::JointCoordinate& one : joints.coordinates())
+    std::cout << survey::joint_row(joints.time(), one.joint(), one.name(), one.value(), one.rate());
+  for (const std::string& reason : joints.missing()) std::cerr << "gravitas: joints lacks " << reason << '\n';
+  return kDone;
+}
+
 // The lines of the file of `gravitas run --reactions`.
 int show_reactions(const CtlLine&, ControlClient* client) {
   const api::Reactions last = client->reactions();
@@ -324,6 +335,7 @@ void add_ctl(CLI::App* app, Action* action) {
       ->delimiter(',')
       ->allow_extra_args(false);
   picture->add_option("--out", line->out, "File: JSON, or a picture if its name ends in .svg");
+  add("joints", "Coordinates of the joints that hold and their rates, as CSV", "joints", show_joints);
   add("reactions", "Forces and torques of joints and contacts in the last step, as JSON lines", "reactions",
       show_reactions);
   add("watch", "Show the status until Ctrl-C, or until the server ends", "watch", watch);

@@ -78,6 +78,8 @@ void print_declaration(const InstalledPlugin& plugin) {
   for (const TypeDeclaration& type : d.types) {
     std::cout << fmt::format("  type {}: {}\n", type.name, type.meaning);
     print_properties(type.properties, [](const Property&) { return "ctl edit"; });
+    for (const CoordinateDeclaration& c : type.coordinates)
+      std::cout << fmt::format("    {:<18} {:<14} {:<8} {}\n", c.name, "coordinate", c.unit, c.meaning);
   }
 }
 

@@ -121,10 +121,11 @@ void add_run(CLI::App* app, Action* action) {
   RunOptions& options = line->options;
   command->add_option("--trajectory", options.trajectory, "Write the trajectory to this file (CSV)");
   command
-      ->add_option("--sample-every", options.sample_every,
-                   "Interval of the samples of trajectory, instrumentation and reactions, s: of each multiple the "
-                   "first end of a step "
-                   "at or after it, and the last; every step if absent")
+      ->add_option(
+          "--sample-every", options.sample_every,
+          "Interval of the samples of trajectory, instrumentation, reactions and joints, s: of each multiple the "
+          "first end of a step "
+          "at or after it, and the last; every step if absent")
       ->check(any_number("a finite number of seconds > 0"));
   command->add_option("--report", options.report, "Write the report to this file (JSON)");
   command->add_option(
@@ -132,6 +133,10 @@ void add_run(CLI::App* app, Action* action) {
       "Write the force of each joint and contact that is awake, and joints' torque, to this file (JSON "
       "lines, the mean over "
       "the step that ends with the sample, with Smooth at its end); the report then has those of the last step");
+  command->add_option("--joints", options.joints,
+                      "Write the coordinates of each joint that holds, and their rates, to this file (CSV, "
+                      "time,joint,coordinate,value,rate in m or rad), sampled like the trajectory; `gravitas describe` "
+                      "tells which there are: the angle of a hinge, zero and sign as its limits have them");
   command->add_option("--events", options.events, "Write the events to this file (JSON lines)");
   add_event_options(command, "--event-kinds", &options.event_kinds, &options.ongoing_rate);
   CLI::Option* instrumentation = command->add_option(

@@ -132,6 +132,8 @@ instrumentation::v1::Frame ControlClient::instrumentation(const api::Instrumenta
   return connection_->call(&api::Control::Stub::GetInstrumentation, request);
 }
 
+api::Joints ControlClient::joints() { return connection_->call(&api::Control::Stub::GetJoints, api::JointsRequest()); }
+
 api::Reactions ControlClient::reactions() {
   return connection_->call(&api::Control::Stub::GetReactions, api::ReactionsRequest());
 }

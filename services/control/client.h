@@ -46,6 +46,7 @@ class ControlClient {
   query::v1::Answers query(const query::v1::Batch& batch);
   instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
   api::Reactions reactions();
+  api::Joints joints();
   // `begun` is called when it listens, then `show` for each event until it returns false, or the server ends.
   void watch_events(const api::EventsRequest& request, const std::function<void()>& begun,
                     const std::function<bool(const events::v1::Event&)>& show);

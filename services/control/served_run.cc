@@ -504,6 +504,23 @@ instrumentation::v1::Frame ServedRun::instrumentation(const api::Instrumentation
   });
 }
 
+api::Joints ServedRun::joints() {
+  return between_steps([&] {
+    api::Joints joints;
+    joints.set_time(environment_->time());
+    std::vector<std::string> missing;
+    for (const survey::JointCoordinate& one : surveyor().coordinates(*environment_, &missing)) {
+      api::JointCoordinate* told = joints.add_coordinates();
+      told->set_joint(surveyor().description().constraints[one.joint].id);
+      told->set_name(one.name);
+      told->set_value(one.value);
+      told->set_rate(one.rate);
+    }
+    joints.mutable_missing()->Assign(missing.begin(), missing.end());
+    return joints;
+  });
+}
+
 api::Reactions ServedRun::reactions() {
   return between_steps([&] {
     api::Reactions reactions;

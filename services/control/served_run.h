@@ -103,6 +103,7 @@ class ServedRun final : private kernel::CommitListener {
   query::v1::Answers query(const query::v1::Batch& batch);
   instrumentation::v1::Frame instrumentation(const api::InstrumentationRequest& request);
   api::Reactions reactions();
+  api::Joints joints();
 
  private:
   using Clock = std::chrono::steady_clock;

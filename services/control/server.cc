@@ -115,6 +115,9 @@ class ControlServer::Service final : public api::Control::Service {
                                   instrumentation::v1::Frame* reply) override {
     return answered([&] { *reply = run_.instrumentation(*request); });
   }
+  grpc::Status GetJoints(grpc::ServerContext*, const api::JointsRequest*, api::Joints* reply) override {
+    return answered([&] { *reply = run_.joints(); });
+  }
   grpc::Status GetReactions(grpc::ServerContext*, const api::ReactionsRequest*, api::Reactions* reply) override {
     return answered([&] { *reply = run_.reactions(); });
   }

@@ -5,18 +5,9 @@
 #include <iterator>
 #include <utility>
 
+#include "services/recorder/csv.h"
+
 namespace gravitas {
-namespace {
-
-// Ids are written as they are unless CSV would misread them.
-std::string quoted(const std::string& id) {
-  if (id.find_first_of(",\"\n\r") == std::string::npos) return id;
-  std::string out = "\"";
-  for (const char c : id) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
-}  // namespace
 
 TrajectoryWriter::TrajectoryWriter(const std::string& path, const kernel::EnvironmentDescription& description,
                                    double interval)
@@ -32,7 +23,7 @@ void TrajectoryWriter::follow(const kernel::EnvironmentDescription& description)
   rows_.clear();
   for (std::uint32_t i = 0; i < description.bodies.size(); ++i) {
     const kernel::BodyDescription& body = description.bodies[i];
-    if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, quoted(body.id), body.geometry});
+    if ((body.flags & (kMovable | kKinematic)) != 0) rows_.push_back({i, csv_quoted(body.id), body.geometry});
   }
 }
 

@@ -44,6 +44,7 @@ std::vector<NamedFile> outputs_of(const RunOptions& options) {
           {"--report", options.report},
           {"--events", options.events},
           {"--reactions", options.reactions},
+          {"--joints", options.joints},
           {"--instrumentation", options.instrumentation},
           {"--out", options.capsule}};
 }

@@ -35,7 +35,7 @@
 #include "services/run/report.h"
 #include "services/run/resumption.h"
 #include "services/run/summary.h"
-#include "services/survey/frame_file.h"
+#include "services/survey/survey_files.h"
 
 namespace gravitas {
 
@@ -82,7 +82,8 @@ class Run final : private kernel::CommitListener {
     if (resumed) apply_decisions(*resumed, &answering);
     require_workers(answering.now);
     environment_ = start(answering.begun, starter(), &scene_);
-    if (!options_.instrumentation.empty()) surveyor_.emplace(answering.now, options_.starter);
+    if (!options_.instrumentation.empty() || !options_.joints.empty())
+      survey_.emplace(answering.now, options_.starter);
     if (options_.listener) begin_listening();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
@@ -100,8 +101,7 @@ class Run final : private kernel::CommitListener {
       const double interval = options_.sample_every.value_or(0.0);
       if (!options_.trajectory.empty())
         trajectory_ = std::make_unique<TrajectoryWriter>(options_.trajectory, description_, interval);
-      if (surveyor_)
-        frames_ = std::make_unique<survey::FrameFile>(options_.instrumentation, &*surveyor_, kinds_, interval);
+      if (survey_) survey_->open(options_.instrumentation, kinds_, options_.joints, interval);
       if (!options_.reactions.empty())
         reactions_ = std::make_unique<ReactionLog>(options_.reactions, description_, interval);
       // opened now, so that nothing is simulated for a report that cannot be written
@@ -178,10 +178,8 @@ class Run final : private kernel::CommitListener {
     });
     if (event_source_) event_source_->tell_incidents(*environment_);
     for_outputs([&](auto& output) { guard([&] { output.close(); }); });
-    if (frames_) {
-      for (const std::string& reason : frames_->missing()) warnings_.push_back("instrumentation lacks " + reason);
-      note_survey();
-    }
+    if (survey_)
+      for (const std::string& warning : survey_->warnings()) warnings_.push_back(warning);
     write_report();
     guard([&] {
       if (!report_) return;
@@ -211,21 +209,12 @@ class Run final : private kernel::CommitListener {
   void offer_sample(bool last) {
     if (trajectory_) trajectory_->offer(*environment_, last);
     if (reactions_) reactions_->offer(*environment_, last);
-    if (frames_) frames_->offer(*environment_, last);
-  }
-
-  // What failed beside the run.
-  void note_survey() {
-    for (const Slot slot : kSlots)
-      for (const kernel::FaultRecord& failed : surveyor_->slot(slot).faults())
-        warnings_.push_back(fmt::format(
-            "instrumentation: slot {}, plugin {}: {}; {}", slot_name(slot), failed.fault.plugin, failed.fault.text(),
-            failed.recovered_by.empty() ? "nobody else answered" : "asked again: " + failed.recovered_by));
+    if (survey_) survey_->offer(*environment_, last);
   }
 
   void for_outputs(auto use) {
     if (trajectory_) use(*trajectory_);
-    if (frames_) use(*frames_);
+    if (survey_) survey_->for_each(use);
     if (reactions_) use(*reactions_);
     use(*events_);
   }
@@ -356,11 +345,7 @@ class Run final : private kernel::CommitListener {
     if (event_source_) event_source_->begin_again();
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
-    if (surveyor_) {
-      note_survey();
-      surveyor_.emplace(begun, options_.starter);
-      frames_->begin_again(&*surveyor_);
-    }
+    if (survey_) survey_->begin_again(begun);
     figures_->begin_again(environment_.get());
     give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},
@@ -422,7 +407,7 @@ class Run final : private kernel::CommitListener {
   }
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override {
     put_in_force(message_of(decision), &decisions_);
-    if (surveyor_) surveyor_->follow(decision);
+    if (survey_) survey_->follow(decision);
     if (recorder_) recorder_->on_decision(environment, decision);
   }
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override {
@@ -533,8 +518,7 @@ class Run final : private kernel::CommitListener {
   EventKinds event_kinds_ = default_event_kinds();
   std::optional<EventSource> event_source_;
   std::vector<survey::Kind> kinds_;
-  std::optional<survey::Surveyor> surveyor_;
-  std::unique_ptr<survey::FrameFile> frames_;
+  std::optional<survey::SurveyFiles> survey_;
   std::optional<Recorder> recorder_;
   std::uint32_t poisoned_step_ = 0;  // the last
   double wall_seconds_ = 0.0;

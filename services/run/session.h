@@ -33,14 +33,14 @@ struct RunOptions {
   std::optional<double> time_step;     // s
   std::vector<std::string> overrides;  // PATH=VALUE
   std::vector<HostingChoice> hosting;
-  std::string trajectory, report, events, reactions;
+  std::string trajectory, report, events, reactions, joints;
   std::string capsule;  // that `starter` writes: nothing else does, and it is none of what is read
   // What is looked for, written to `events` and counted (services/events/event.h); default_event_kinds() if absent.
   std::optional<std::vector<std::string>> event_kinds;
   std::optional<double> ongoing_rate;              // Hz, of collision_ongoing; kOngoingRate if absent
   std::string instrumentation;                     // file of debug geometry (services/survey/frame_file.h)
   std::vector<std::string> instrumentation_kinds;  // all if empty
-  std::optional<double> sample_every;  // s, of trajectory, instrumentation and reactions; every step if absent
+  std::optional<double> sample_every;  // s, of trajectory, instrumentation, reactions and joints; every step if absent
   std::string checkpoint;              // file that is kept up to date; none if empty
   std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
   std::string resume;                  // checkpoint to go on from

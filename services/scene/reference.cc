@@ -95,6 +95,13 @@ void write_properties(const std::string& title, const std::string& meaning, cons
   }
 }
 
+void write_coordinates(const std::vector<CoordinateDeclaration>& coordinates, std::string* page) {
+  if (coordinates.empty()) return;
+  *page += "\n| coordinate (`--joints`) | unit | meaning |\n| --- | --- | --- |\n";
+  for (const CoordinateDeclaration& c : coordinates)
+    *page += fmt::format("| `{}` | {} | {} |\n", c.name, c.unit, cell(c.meaning));
+}
+
 }  // namespace
 
 std::string reference_page(const Catalog& catalog) {
@@ -111,7 +118,10 @@ std::string reference_page(const Catalog& catalog) {
       const PluginDeclaration& d = plugin.declaration;
       if (d.slot != slot) continue;
       if (d.types.empty() || !d.properties.empty()) write_properties(d.name, d.meaning, d.properties, &page);
-      for (const TypeDeclaration& type : d.types) write_properties(type.name, type.meaning, type.properties, &page);
+      for (const TypeDeclaration& type : d.types) {
+        write_properties(type.name, type.meaning, type.properties, &page);
+        write_coordinates(type.coordinates, &page);
+      }
     }
   }
   return page;

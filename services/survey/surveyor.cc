@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/local_bound.h"
@@ -154,18 +155,24 @@ std::vector<Contact> Surveyor::contacts(const kernel::Environment& environment) 
   return contacts;
 }
 
+MessageColumns Surveyor::request(stage::Method method, const kernel::Environment& environment,
+                                 const kernel::ConstraintGroup& group) const {
+  MessageColumns asked = request(method, environment);
+  Filler filler(method, &asked);
+  filler.put("constraint_type", view(group.type));
+  filler.put("constraint_body", view(group.body));
+  filler.put("bound_begin", view(group.bound_begin));
+  filler.put("bound", view(group.bound));
+  for (const std::uint32_t joint : group.row) asked.u32("intact").push_back(environment.is_intact(joint) ? 1 : 0);
+  return asked;
+}
+
 std::vector<Anchor> Surveyor::anchors(const kernel::Environment& environment) {
   std::vector<Anchor> anchors;
   constexpr stage::Method kAsked = stage::Method::kConstraintDiscrepancies;
   for (const kernel::ConstraintGroup& group : environment.model().constraint_groups) {
-    MessageColumns asked = request(kAsked, environment);
-    Filler filler(kAsked, &asked);
-    filler.put("constraint_type", view(group.type));
-    filler.put("constraint_body", view(group.body));
-    filler.put("bound_begin", view(group.bound_begin));
-    filler.put("bound", view(group.bound));
-    std::vector<std::uint32_t>& intact = asked.u32("intact");
-    for (const std::uint32_t joint : group.row) intact.push_back(environment.is_intact(joint) ? 1 : 0);
+    const MessageColumns asked = request(kAsked, environment, group);
+    const std::vector<std::uint32_t>& intact = asked.u32("intact");
     const auto columns = [](const MessageColumns& reply) {
       return DiscrepancyColumns{reply.f64("point1"),     reply.f64("point2"),       reply.f64("velocity"),
                                 reply.f64("correction"), reply.f64("axes"),         reply.u32("mode"),
@@ -186,6 +193,58 @@ std::vector<Anchor> Surveyor::anchors(const kernel::Environment& environment) {
   }
   std::ranges::stable_sort(anchors, {}, &Anchor::joint);
   return anchors;
+}
+
+std::vector<JointCoordinate> Surveyor::coordinates(const kernel::Environment& environment,
+                                                   std::vector<std::string>* missing) {
+  std::vector<JointCoordinate> coordinates;
+  constexpr stage::Method kAsked = stage::Method::kConstraintCoordinates;
+  for (const kernel::ConstraintGroup& group : environment.model().constraint_groups) {
+    const PluginDeclaration& plugin = slot(Slot::kConstraint).description().plugins[group.target].declaration;
+    if (!has_capability(plugin, "coordinates")) continue;
+    const MessageColumns asked = request(kAsked, environment, group);
+    const std::vector<std::uint32_t>& intact = asked.u32("intact");
+    const auto type_of = [&](std::uint32_t row) -> const TypeDeclaration& {
+      return *std::ranges::find(plugin.types, asked.u64("constraint_type")[row],
+                                [](const TypeDeclaration& one) { return type_id(one.name); });
+    };
+    const auto check = [&](const MessageColumns& reply) -> AnswerProblem {
+      std::pair<std::uint64_t, std::uint64_t> next{0, 0};
+      for (std::size_t i = 0; i < reply.u32("constraint").size(); ++i) {
+        const std::uint32_t row = reply.u32("constraint")[i], coordinate = reply.u32("coordinate")[i];
+        if (row >= intact.size() || intact[row] == 0) return {true, "constraint names no joint that holds"};
+        if (coordinate >= type_of(row).coordinates.size())
+          return {true, "coordinate names none that the joint's type declares"};
+        if (std::pair<std::uint64_t, std::uint64_t>{row, coordinate} < next)
+          return {true, "constraint and coordinate do not ascend"};
+        next = {row, coordinate + 1ULL};
+      }
+      return {};
+    };
+    const auto is_told = [](const MessageColumns& reply, std::uint32_t row) {
+      return std::ranges::binary_search(reply.u32("constraint"), row);
+    };
+    try {
+      const MessageColumns reply = slot(Slot::kConstraint).ask(kAsked, group.target, asked, check);
+      for (std::size_t i = 0; i < reply.u32("constraint").size(); ++i) {
+        const std::uint32_t row = reply.u32("constraint")[i];
+        coordinates.push_back({group.row[row], type_of(row).coordinates[reply.u32("coordinate")[i]].name,
+                               reply.f64("value")[i], reply.f64("rate")[i]});
+      }
+      for (std::uint32_t row = 0; row < intact.size(); ++row) {
+        if (intact[row] == 0 || type_of(row).coordinates.empty() || is_told(reply, row)) continue;
+        missing->push_back(
+            fmt::format("coordinates of joints of type {0} that do not say what these are counted from: see `gravitas "
+                        "describe {0}`",
+                        type_of(row).name));
+        break;
+      }
+    } catch (const NoAnswer& reason) {
+      missing->emplace_back(reason.what());
+    }
+  }
+  std::ranges::stable_sort(coordinates, {}, &JointCoordinate::joint);
+  return coordinates;
 }
 
 std::vector<AppliedForce> Surveyor::forces(const kernel::Environment& environment) {

@@ -38,6 +38,14 @@ struct AppliedForce {
   Wrench wrench;  // about the centre of mass
 };
 
+// Of a joint that holds, by the name that its type declares.
+struct JointCoordinate {
+  std::uint32_t joint = 0;
+  std::string name;
+  double value = 0.0;  // m or rad
+  double rate = 0.0;   // m/s or rad/s
+};
+
 class Surveyor {
  public:
   // `description`: that of the environments to come, as it was before the plan left anything out.
@@ -56,6 +64,8 @@ class Surveyor {
   std::vector<Contact> contacts(const kernel::Environment& environment);
   // Linear points alone: an angular error has no place.
   std::vector<Anchor> anchors(const kernel::Environment& environment);
+  // By joint, as their types declare them; joints whose plugins offer none have none. `missing` gets why some could not be had.
+  std::vector<JointCoordinate> coordinates(const kernel::Environment& environment, std::vector<std::string>* missing);
   std::vector<AppliedForce> forces(const kernel::Environment& environment);
 
   // A request with every column filled that says something about shapes and bodies; `margin` (m) widens their bounds.
@@ -66,6 +76,9 @@ class Surveyor {
 
  private:
   static Slot slot_of(stage::Method method);
+  // With the joints of a group.
+  MessageColumns request(stage::Method method, const kernel::Environment& environment,
+                         const kernel::ConstraintGroup& group) const;
 
   const kernel::EnvironmentDescription description_;
   std::array<std::unique_ptr<AskedSlot>, 6> slots_;  // by Slot

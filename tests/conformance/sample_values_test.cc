@@ -107,5 +107,24 @@ TEST(Capabilities, AreNamesAndNumbers) {
   EXPECT_EQ(capability_number(declaration, "stages", 7.0), 7.0);
 }
 
+TEST(SampleValues, DirectionsThatMayBeAbsentAreGivenAcrossEachOther) {
+  const std::vector<Property> properties = {
+      Property::number("Stiffness", "N/m"), Property::vector("Axis1", "1", "world"),
+      Property::table("Curve", 2, "1", "world"), Property::vector("Point", "m", "world"),
+      Property::vector("Axis2", "1", "world")};
+  Draw draw(3);
+  const std::vector<double> plain = sample_values(properties, &draw);
+  const std::vector<double> given = with_directions(properties, plain, &draw);
+  ASSERT_EQ(given.size(), plain.size());
+  ASSERT_EQ(given.size(), 1U + 3U + 1U + 3U + 3U);
+  EXPECT_TRUE(std::isnan(given[0]));
+  EXPECT_EQ(given[4], 0.0);
+  EXPECT_TRUE(std::isnan(given[5]));
+  const Vector3 one(given[1], given[2], given[3]), two(given[8], given[9], given[10]);
+  EXPECT_NEAR(one.norm(), 1.0, 1e-12);
+  EXPECT_NEAR(two.norm(), 1.0, 1e-12);
+  EXPECT_NEAR(one.dot(two), 0.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace gravitas::conformance

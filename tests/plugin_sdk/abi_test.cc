@@ -8,10 +8,11 @@
 
 namespace {
 
-TEST(Abi, StructuresHaveTheSizesOfVersionOne) {
-  ASSERT_EQ(GRAVITAS_ABI_VERSION, 1);
+TEST(Abi, StructuresHaveTheSizesOfVersionTwo) {
+  ASSERT_EQ(GRAVITAS_ABI_VERSION, 2);
   EXPECT_EQ(sizeof(gravitas_property), 96U);
-  EXPECT_EQ(sizeof(gravitas_type), 32U);
+  EXPECT_EQ(sizeof(gravitas_type), 48U);
+  EXPECT_EQ(sizeof(gravitas_coordinate), 24U);
   EXPECT_EQ(sizeof(gravitas_description), 88U);
   EXPECT_EQ(sizeof(gravitas_host), 32U);
   EXPECT_EQ(sizeof(gravitas_error), 512U);

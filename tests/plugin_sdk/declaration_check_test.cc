@@ -85,6 +85,28 @@ TEST(CheckDeclaration, DemandsPropertiesThatASceneCanWrite) {
   EXPECT_EQ(problem_with(Property::number("Low", "N")), "Magnet.Low has no meaning");
 }
 
+TEST(CheckDeclaration, DemandsCoordinatesThatTheCapabilityTellsOf) {
+  const auto problem = [](std::vector<std::string> capabilities, std::vector<CoordinateDeclaration> coordinates) {
+    return check_declaration({.name = "Mast",
+                              .version = "1",
+                              .slot = Slot::kConstraint,
+                              .meaning = "Stands.",
+                              .capabilities = std::move(capabilities),
+                              .types = {{"Mast", "Stands.", {}, std::move(coordinates)}}});
+  };
+  EXPECT_EQ(problem({}, {}), "");
+  EXPECT_EQ(problem({"coordinates"}, {{"angle", "rad", "An angle."}, {"way", "m", "A way."}}), "");
+  EXPECT_EQ(problem({"coordinates"}, {}), "it declares the capability 'coordinates', but no type has any");
+  EXPECT_EQ(problem({}, {{"angle", "rad", "An angle."}}),
+            "a type has coordinates, but the plugin does not declare the capability 'coordinates'");
+  EXPECT_EQ(problem({"coordinates"}, {{"an angle", "rad", "An angle."}}),
+            "Mast has a coordinate 'an angle'; allowed: a name of letters, digits and '_', and no digit first");
+  EXPECT_EQ(problem({"coordinates"}, {{"angle", "rad", "An angle."}, {"angle", "m", "A way."}}),
+            "Mast declares the coordinate angle twice");
+  EXPECT_EQ(problem({"coordinates"}, {{"angle", "", "An angle."}}), "coordinate angle of Mast has no unit");
+  EXPECT_EQ(problem({"coordinates"}, {{"angle", "rad", ""}}), "coordinate angle of Mast has no meaning");
+}
+
 TEST(CheckDeclaration, DemandsBoundsChoicesAndDefaultsThatFitTogether) {
   EXPECT_EQ(problem_with(Property::number("R", "N").at_least(5).at_most(1).required().means("R.")),
             "Magnet.R has bounds between which there is no number");

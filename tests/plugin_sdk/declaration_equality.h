@@ -42,6 +42,12 @@ inline void expect_equal(const PluginDeclaration& given, const PluginDeclaration
     EXPECT_EQ(given.types[i].name, expected.types[i].name);
     EXPECT_EQ(given.types[i].meaning, expected.types[i].meaning);
     expect_equal(given.types[i].properties, expected.types[i].properties);
+    ASSERT_EQ(given.types[i].coordinates.size(), expected.types[i].coordinates.size());
+    for (std::size_t k = 0; k < given.types[i].coordinates.size(); ++k) {
+      EXPECT_EQ(given.types[i].coordinates[k].name, expected.types[i].coordinates[k].name);
+      EXPECT_EQ(given.types[i].coordinates[k].unit, expected.types[i].coordinates[k].unit);
+      EXPECT_EQ(given.types[i].coordinates[k].meaning, expected.types[i].coordinates[k].meaning);
+    }
   }
 }
 
@@ -61,7 +67,8 @@ inline PluginDeclaration full_declaration() {
           .slot = Slot::kSolver,
           .meaning = "Uses every field.",
           .capabilities = {"potential", "owns_motion"},
-          .types = {{"Spring", "Pulls.", all}, {"Nothing", "", {}}},
+          .types = {{"Spring", "Pulls.", all, {{"length", "m", "A length."}, {"angle", "rad", "An angle."}}},
+                    {"Nothing", "", {}}},
           .properties = {all[1], all[6]},
           .theta = 0.25};
 }

@@ -134,8 +134,8 @@ TEST(PluginLibrary, RefusesAPluginWithoutATable) {
 
 TEST(PluginLibrary, RefusesAPluginForAnotherVersionOfTheInterface) {
   const std::string abi = faulty("wrong_abi_version"), layout = faulty("wrong_layout_version");
-  EXPECT_EQ(problem_of(abi), "'" + abi + "' was built for version 2.2 of the plugin interface; this is 1.2");
-  EXPECT_EQ(problem_of(layout), "'" + layout + "' was built for version 1.3 of the plugin interface; this is 1.2");
+  EXPECT_EQ(problem_of(abi), "'" + abi + "' was built for version 3.2 of the plugin interface; this is 2.2");
+  EXPECT_EQ(problem_of(layout), "'" + layout + "' was built for version 2.3 of the plugin interface; this is 2.2");
 }
 
 TEST(PluginLibrary, RefusesAPluginForOtherStageContracts) {

@@ -287,6 +287,19 @@ class ToyConstraint final : public ConstraintPlugin {
     asked += "discrepancies ";
   }
 };
+class ToldConstraint final : public ConstraintPlugin {
+  void bind(const stage::ConstraintBindRequest&, const stage::ConstraintBindReply&, Host&) override {
+    asked += "bind ";
+  }
+  void discrepancies(const stage::ConstraintDiscrepanciesRequest&, const stage::ConstraintDiscrepanciesReply&,
+                     Host&) override {
+    asked += "discrepancies ";
+  }
+  void coordinates(const stage::ConstraintDiscrepanciesRequest&, const stage::ConstraintCoordinatesReply&,
+                   Host&) override {
+    asked += "coordinates ";
+  }
+};
 class ToyForce final : public ForcePlugin {
   void wrenches(const stage::ForceWrenchesRequest&, const stage::ForceWrenchesReply&, Host&) override {
     asked += "wrenches ";
@@ -339,7 +352,8 @@ TEST(PluginSlots, EachAnswersItsOwnQuestionsOnly) {
   EXPECT_EQ(try_every_method<RaySpace>(), Answer("pairs rays debug_geometry ", 3));
   EXPECT_EQ(try_every_method<ToyCollision>(), Answer("manifolds " + none + none + none, 1));
   EXPECT_EQ(try_every_method<MovingCollision>(), Answer("manifolds times_of_impact rays debug_geometry ", 4));
-  EXPECT_EQ(try_every_method<ToyConstraint>(), Answer("bind discrepancies ", 2));
+  EXPECT_EQ(try_every_method<ToyConstraint>(), Answer("bind discrepancies " + none, 2));
+  EXPECT_EQ(try_every_method<ToldConstraint>(), Answer("bind discrepancies coordinates ", 3));
   EXPECT_EQ(try_every_method<ToyForce>(), Answer("wrenches " + none, 1));
   EXPECT_EQ(try_every_method<ToySolver>(), Answer("solve reactions " + none, 2));
   EXPECT_EQ(try_every_method<SlopedSolver>(), Answer("solve reactions reaction_jacobians ", 3));

@@ -393,6 +393,53 @@ class Talk(unittest.TestCase):
             self.assertEqual(refused.exception.code(), grpc.StatusCode.UNIMPLEMENTED)
 
 
+class Joints(unittest.TestCase):
+    """A joint whose coordinate is the x of its second body, and one that offers none."""
+
+    TYPE = ("Mast", "Stands.", [])
+
+    def test_coordinates_are_declared_and_answered_where_they_are_offered(self):
+        from gravitas_worker import Constraint
+        from gravitas_worker.call import Session
+        from gravitas_worker.declaration import description_of
+
+        class Silent(Constraint):
+            name = "Mast"
+            types = [Type(*self.TYPE)]
+
+        class Telling(Silent):
+            capabilities = ["coordinates"]
+            types = [Type(*self.TYPE, coordinates=[("height", "m", "Its height.")])]
+
+            def coordinates(self, request, reply, host):
+                holding = numpy.flatnonzero(request.intact)
+                reply.constraint, reply.coordinate = holding, numpy.zeros(len(holding))
+                reply.value = request.position[request.constraint_body[holding, 1], 0]
+                reply.rate = request.linear_velocity[request.constraint_body[holding, 1], 0]
+
+        described = description_of(Telling, "").types[0].coordinates[0]
+        self.assertEqual((described.name, described.unit, described.meaning), ("height", "m", "Its height."))
+        self.assertEqual(len(description_of(Silent, "").types[0].coordinates), 0)
+
+        request = constraint_pb2.ConstraintDiscrepanciesRequest(
+            constraint_type=[type_id("Mast")] * 2, constraint_body=[0, 1, 1, 0], bound_begin=[0, 0, 0], intact=[0, 1],
+            position=[4.5, 0, 0, 1.5, 0, 0], orientation=[1, 0, 0, 0] * 2, linear_velocity=[-2.0, 0, 0, 7.0, 0, 0],
+            angular_velocity=[0.0] * 6, call=call_pb2.Call(epoch=3))
+        method = stage_methods("constraint")["Coordinates"]
+
+        def reply_of(plugin):
+            session = Session(plugin, control_pb2.Hello(epoch=3, plugins=[control_pb2.PluginSettings(plugin="Mast")]))
+            call = session.start(method, None, method.request.parse(request.SerializeToString()))
+            reply = constraint_pb2.ConstraintCoordinatesReply.FromString(call.outgoing.get()[1])
+            session.end()
+            return reply
+
+        told = reply_of(Telling)
+        self.assertEqual((list(told.constraint), list(told.coordinate), list(told.value), list(told.rate)),
+                         ([1], [0], [4.5], [-2.0]))
+        self.assertEqual(reply_of(Silent).outcome.status, call_pb2.Outcome.STATUS_UNKNOWN_METHOD)
+
+
 class Shapes(unittest.TestCase):
     def test_an_asset_stands_in_for_a_column(self):
         messages = {name: data for name, _, _, data in golden_messages()}

@@ -326,6 +326,7 @@ TEST(StageFrames, MethodsAreNumberedAsTheyAreListed) {
   EXPECT_EQ(name(stage::Method::kCollisionDebugGeometry), "Collision.DebugGeometry");
   EXPECT_EQ(name(stage::Method::kConstraintBind), "Constraint.Bind");
   EXPECT_EQ(name(stage::Method::kConstraintDiscrepancies), "Constraint.Discrepancies");
+  EXPECT_EQ(name(stage::Method::kConstraintCoordinates), "Constraint.Coordinates");
   EXPECT_EQ(name(stage::Method::kForceWrenches), "Force.Wrenches");
   EXPECT_EQ(name(stage::Method::kIntegratorIntegrate), "Integrator.Integrate");
   EXPECT_EQ(name(stage::Method::kIntegratorDerivative), "Integrator.Derivative");

@@ -118,10 +118,14 @@ class Property:
 
 
 class Type:
-    """A name of the scene language that the plugin serves, such as a force type."""
+    """A name of the scene language that the plugin serves, such as a force type.
 
-    def __init__(self, name, meaning, properties):
+    `coordinates` of a joint type: (name, unit, meaning) of each, as Constraint.Coordinates counts them.
+    """
+
+    def __init__(self, name, meaning, properties, coordinates=()):
         self.name, self.meaning, self.properties = name, meaning, list(properties)
+        self.coordinates = list(coordinates)
         self.id = type_id(name)
 
 
@@ -147,4 +151,6 @@ def description_of(plugin, build_id):
     for served in plugin.types:
         written = message.types.add(name=served.name, meaning=served.meaning)
         written.properties.extend(item.message for item in served.properties)
+        for coordinate in served.coordinates:
+            written.coordinates.add(**dict(zip(("name", "unit", "meaning"), coordinate)))
     return message

@@ -73,7 +73,9 @@ class Collision(Plugin):
 
 
 class Constraint(Plugin):
-    slot, methods = "constraint", {"Bind": "bind", "Discrepancies": "discrepancies"}
+    # the last one is asked only of plugins that declare the capability of that name, whose types have coordinates
+    slot = "constraint"
+    methods = {"Bind": "bind", "Discrepancies": "discrepancies", "Coordinates": "coordinates"}
 
 
 class Force(Plugin):

@@ -259,7 +259,7 @@ TEST(BadInput, WhatIsReadIsNotWrittenOver) {
   const ScratchFolder folder;
   const std::string text = harness::read_file(kSample), scene = folder.write("scene.gravitas", text);
   for (const char* option :
-       {"--trajectory", "--report", "--events", "--reactions", "--instrumentation", "--checkpoint"}) {
+       {"--trajectory", "--report", "--events", "--reactions", "--joints", "--instrumentation", "--checkpoint"}) {
     const ProgramResult result =
         run_program({"run", scene, "--steps", "1", "--hosting", "direct", option, "./scene.gravitas"}, folder);
     EXPECT_EQ(result.exit_code, 2) << option;
@@ -328,7 +328,7 @@ TEST(BadInput, NoFileIsWrittenByTwoRunsAtOnce) {
   const ScratchFolder folder;
   const std::string path = folder.write("x", "of an earlier run");
   const OutputFile held("of another run", path);
-  for (const char* option : {"--trajectory", "--report", "--events", "--reactions", "--instrumentation"}) {
+  for (const char* option : {"--trajectory", "--report", "--events", "--reactions", "--joints", "--instrumentation"}) {
     const ProgramResult result = run_program({"run", kSample, "--hosting", "direct", option, path}, folder);
     EXPECT_EQ(result.exit_code, 2) << option;
     EXPECT_THAT(result.err, HasSubstr(std::string(option + 2) + " '" + path + "': another run is writing it"));
@@ -460,7 +460,8 @@ TEST(BadInput, EmptyValuesOfOptions) {
   const ScratchFolder folder;
   for (const auto& [command, options] : std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>>{
            {{"run", kSample, "--steps", "1"},
-            {"--resume", "--trajectory", "--report", "--checkpoint", "--events", "--reactions", "--instrumentation"}},
+            {"--resume", "--trajectory", "--report", "--checkpoint", "--events", "--reactions", "--joints",
+             "--instrumentation"}},
            {{"capture", kSample, "--slot", "solver"}, {"--out"}},
            {{"replay", "s.caps"}, {"--plugin", "--hosting", "--call"}},
            {{"serve", kSample, "--headless"}, {"--socket", "--listen"}},

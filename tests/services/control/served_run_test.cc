@@ -611,5 +611,22 @@ TEST(ServedRun, TellsTheReactionsOfTheLastStep) {
   EXPECT_EQ(served.client.reactions().reactions_size(), 0);
 }
 
+TEST(ServedRun, TellsTheCoordinatesOfJoints) {
+  Served served;
+  const api::Joints start = served.client.joints();
+  EXPECT_EQ(start.missing_size(), 0);
+  ASSERT_EQ(start.coordinates_size(), 1);
+  EXPECT_EQ(start.coordinates(0).joint(), "MyAngularMotor");
+  EXPECT_EQ(start.coordinates(0).name(), "angle");
+  EXPECT_NEAR(start.coordinates(0).value(), 0.0, 1e-15);
+  served.client.step(10);
+  const api::Joints now = served.client.joints();
+  EXPECT_GT(now.time(), 0.0);
+  ASSERT_EQ(now.coordinates_size(), 1);
+  EXPECT_NE(now.coordinates(0).value(), 0.0);
+  EXPECT_NE(now.coordinates(0).rate(), 0.0);
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
 }  // namespace
 }  // namespace gravitas::control

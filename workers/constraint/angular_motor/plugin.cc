@@ -9,6 +9,7 @@
 //   (a x l).(v_2 + w_2 x (m + l - x_2) - v_1 - w_1 x (m + l - x_1)) = |l|^2 a.(w_2 - w_1) + (a x l).(slip at m),
 // and m does not slip. So it is one row about a: six rows of rank 6, whatever |l|, its multiplier the torque itself,
 // bounded by MaximumTorque. Where on the axis the scene's points lie is nothing to the rows, as for a `Revolute`.
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -18,9 +19,10 @@ class AngularMotor final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "AngularMotor",
-            .version = "1.0",
+            .version = "1.1",
             .slot = Slot::kConstraint,
             .meaning = "Hinge with a drive of constant speed.",
+            .capabilities = {"coordinates"},
             .types = {{"AngularMotor",
                        "The second body turns about an axis, shared by both, at a given speed relative to the first.",
                        {Property::vector("BindAxisPoint1", "m", "world")
@@ -32,7 +34,10 @@ class AngularMotor final : public ConstraintPlugin {
                             .means("Speed of body 2 relative to body 1, right-handed about point 1 -> point 2."),
                         Property::number("MaximumTorque", "N*m")
                             .at_least(0.0)
-                            .means("Largest torque of the drive; unlimited if absent.")}}}};
+                            .means("Largest torque of the drive; unlimited if absent.")},
+                       {{"angle", "rad",
+                         "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start, "
+                         "above -pi up to pi."}}}}};
   }
   explicit AngularMotor(PropertyCursor) {}
 
@@ -58,6 +63,14 @@ class AngularMotor final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       hold_hinge(one, two, emit);
       drive_about(axis_between(one, two), 1.0, &bound, emit);
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      emit(0, twist_of(one, two, {}, bodies));
     });
   }
 };

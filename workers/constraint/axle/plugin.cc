@@ -16,8 +16,12 @@
 // Drive. The wheel turns at w2 - w1 = p r + q s, where p is what it rolls at. So d = (r - (r.s) s)/sin^2 g has d.(w2 - w1) = p
 // and d.s = 0: a torque T d does the work T p, and steers nothing, as a motor in the hub of a wheel that may steer does. It is one
 // row on the velocity about d, made unit; with speed 0 it is a brake. Where r and s are across each other d is r.
+//
+// Rolling. What the wheel has rolled is the angle about r by which it sees s turned back: its rate is p, steering is none of it.
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
 namespace {
@@ -29,9 +33,10 @@ class Axle final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Axle",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Wheel that rolls, steers and is sprung.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Axle",
              "The second body is a wheel on the first: it rolls about one axis and steers about another.",
@@ -68,7 +73,15 @@ class Axle final : public ConstraintPlugin {
                          "absent."),
               Property::number("MaximumTorque", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of the drive; unlimited if absent.")}}}};
+                  .means("Largest torque of the drive; unlimited if absent.")},
+             {{"steering", "rad",
+               "Steering angle, right-handed about SteeringAxis, 0 at the start: as limits and SteeringAngle count it, "
+               "without these about the axis, above -pi up to pi."},
+              {"suspension", "m",
+               "Way of the wheel along SteeringAxis relative to body 1, 0 at the start; of a wheel that is sprung."},
+              {"rolling", "rad",
+               "Angle by which the wheel has rolled, right-handed about RollingAxis, 0 at the start, above -pi up to "
+               "pi."}}}}};
   }
   explicit Axle(PropertyCursor) {}
 
@@ -87,13 +100,17 @@ class Axle final : public ConstraintPlugin {
                 const JointLimits limits = properties.at_end() ? JointLimits{} : steering_limits(&properties);
                 const JointSpring spring = JointSpring::of(&properties);
                 write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
-                write_frame(bodies.pose2, frame_along(point, rolling), &out);
+                const Pose wheel = frame_along(point, rolling);
+                write_frame(bodies.pose2, wheel, &out);
                 out.number(swing_between(steering, rolling).angle);
                 write_spring(suspension, &out);
                 out.number(limits.lower);
                 out.number(limits.upper);
                 write_spring(spring, &out);
                 out.number(properties.at_end() ? 0.0 : properties.number());
+                // where the wheel sees the steering axis
+                const Vector3 seen = wheel.orientation.conjugate() * steering;
+                out.number(math::atan2(seen.z(), seen.y()));
                 write_drive(&properties, "Axle", &out);
               });
   }
@@ -122,9 +139,35 @@ class Axle final : public ConstraintPlugin {
       const JointSpring held = read_spring(&bound);
       const double rest = bound.number();
       if (!held.is_none()) emit(sprung(swing_row(exp_rotation(rest * steering) * across, rolling, kQuarterTurn), held));
+      bound.number();  // of the coordinates alone
       if (bound.at_end()) return;
       const Vector3 normal = swing_between(steering, rolling).axis;
       drive_about(normal.cross(steering), steering.cross(rolling).norm(), &bound, emit);
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      bound.number();
+      const JointSpring suspension = read_spring(&bound);
+      JointLimits limits;
+      limits.lower = bound.number();
+      limits.upper = bound.number();
+      const JointSpring held = read_spring(&bound);
+      bound.number();
+      const math::SinCos start = math::sincos(bound.number());
+      const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
+      const Vector3 turning = bodies.spin2 - bodies.spin1;
+      if (limits.is_none() && held.is_none()) {
+        emit(0, azimuth_of(steering, one.orientation * Vector3::UnitY(), rolling, turning));
+      } else {
+        const Coordinate from_across = swing_of(-(one.orientation * Vector3::UnitZ()), rolling, bodies);
+        emit(0, Coordinate{from_across.value - kQuarterTurn, from_across.rate});
+      }
+      if (!suspension.is_none()) emit(1, way_along(steering, one.position, two.position, bodies));
+      emit(2, reversed(azimuth_of(rolling, two.orientation * Vector3(0.0, start.cos, start.sin), steering, -turning)));
     });
   }
 

@@ -13,7 +13,9 @@
 // axis is no lever for another; one discrepancy for the three turns, or where their springs differ one along the gradient of
 // each component. The springs are implicit (joint_laws.h): stable for every stiffness, of order one, but for `Smooth`, which has
 // the integrator's.
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
@@ -37,9 +39,10 @@ class Bushing final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Bushing",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Springs and dampers in six ways.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Bushing",
              "The second body is sprung and damped against the first, along and about three axes of it.",
@@ -51,7 +54,14 @@ class Bushing final : public ConstraintPlugin {
               along("Damping", "N*s/m", "Dampers along them."),
               along("AngularStiffness", "N*m/rad",
                     "Springs about them: against the components of the rotation vector of the turn."),
-              along("AngularDamping", "N*m*s/rad", "Dampers about them: against the rates of these.")}}}};
+              along("AngularDamping", "N*m*s/rad", "Dampers about them: against the rates of these.")},
+             {{"displacement_x", "m", "Way of the point of body 2 along the first axis, 0 at the start."},
+              {"displacement_y", "m", "Its way along the second."},
+              {"displacement_z", "m", "Its way along the third."},
+              {"rotation_x", "rad",
+               "First component of the rotation vector by which body 2 has turned against body 1."},
+              {"rotation_y", "rad", "Its second component."},
+              {"rotation_z", "rad", "Its third component."}}}}};
   }
   explicit Bushing(PropertyCursor) {}
 
@@ -92,6 +102,19 @@ class Bushing final : public ConstraintPlugin {
       for (int axis = 0; axis < 3; ++axis)
         if (const JointSpring spring = angular.on(axis); !spring.is_none())
           emit(sprung_component(one.orientation, two.orientation, axis, spring));
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      for (const std::uint32_t axis : {0U, 1U, 2U})
+        emit(axis, way_along(one.orientation * Vector3::Unit(axis), one.position, two.position, bodies));
+      const Quaternion to_axes = one.orientation.conjugate();
+      const Vector3 turn = log_rotation(to_axes * two.orientation);
+      const Vector3 rate = rotation_vector_rate(turn, to_axes * (bodies.spin2 - bodies.spin1));
+      for (const std::uint32_t axis : {0U, 1U, 2U}) emit(3 + axis, Coordinate{turn[axis], rate[axis]});
     });
   }
 

@@ -10,8 +10,10 @@
 // bends. With w1 = O1 a1, w2 = O2 a2 and no bending the row says (O2 - O1)(1 + a1.a2) = 0: equal speeds.
 // A spring and a damper against the bend, torque -k bend - c bend' about the axis across both shafts, take no freedom.
 // Undefined at a bend of 180 degrees, which is refused at the start.
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
 namespace {
@@ -20,9 +22,10 @@ class ConstantVelocity final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "ConstantVelocity",
-            .version = "1.1",
+            .version = "1.2",
             .slot = Slot::kConstraint,
             .meaning = "Joint of shafts that turn alike.",
+            .capabilities = {"coordinates"},
             .types = {{"ConstantVelocity",
                        "Two shafts share a point and turn at one speed, at any bend.",
                        {Property::vector("BindPoint", "m", "world").required().means("The shared point, at the start."),
@@ -35,7 +38,12 @@ class ConstantVelocity final : public ConstraintPlugin {
                             .means("Spring that straightens the shafts; none if absent."),
                         Property::number("BendDamping", "N*m*s/rad")
                             .at_least(0.0)
-                            .means("Damper of their bending; none if absent.")}}}};
+                            .means("Damper of their bending; none if absent.")},
+                       {{"bend", "rad", "Angle between the shafts, 0 ... pi."},
+                        {"azimuth", "rad",
+                         "Where shaft 2 points round Axis1 in body 1, right-handed about it from the world's x at the "
+                         "start as seen along it, from -z where Axis1 is along x, to 1e-3; above -pi up to pi, none "
+                         "while the shafts are straight."}}}}};
   }
   explicit ConstantVelocity(PropertyCursor) {}
 
@@ -52,6 +60,10 @@ class ConstantVelocity final : public ConstraintPlugin {
                 write_frame(bodies.pose1, frame1, &out);
                 write_frame(bodies.pose2, {point, exp_rotation(bend.angle * bend.axis) * frame1.orientation}, &out);
                 write_spring(JointSpring::of(&properties), &out);
+                // where azimuths are counted from
+                const Vector3 start = azimuth_frame(point, axis1).orientation * Vector3::UnitY();
+                const Vector3 zero = frame1.orientation.conjugate() * start;
+                out.number(math::atan2(zero.z(), zero.y()));
               });
   }
 
@@ -68,6 +80,19 @@ class ConstantVelocity final : public ConstraintPlugin {
       Discrepancy bend = turn_between(one.orientation, two.orientation);
       for (const int axis : {1, 2}) spring.yield_on(axis, &bend);
       emit(bend);
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      read_spring(&bound);
+      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+      emit(0, swing_of(axis1, axis2, bodies));
+      const math::SinCos zero = math::sincos(bound.number());
+      const Vector3 start = one.orientation * Vector3(0.0, zero.cos, zero.sin);
+      emit(1, azimuth_of(axis1, start, axis2, bodies.spin2 - bodies.spin1));
     });
   }
 };

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <string>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -30,9 +31,10 @@ class Distance final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Distance",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Rod, rope or cable.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Distance",
              "A point of either body, kept at a distance: a rod, a rope, or both bounds of a range.",
@@ -48,7 +50,8 @@ class Distance final : public ConstraintPlugin {
               Property::number("Stiffness", "N/m")
                   .above(0.0)
                   .means("Spring that holds what is beyond the range; rigid if absent."),
-              Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")}}}};
+              Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")},
+             {{"length", "m", "Distance between the points."}}}}};
   }
   explicit Distance(PropertyCursor) {}
 
@@ -93,6 +96,15 @@ class Distance final : public ConstraintPlugin {
       if (spring.stiffness > 0.0) d.compliance.x() = 1.0 / spring.stiffness;
       d.damping.x() = spring.damping;
       emit(d);
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Vector3 point1 = transform_point(bodies.pose1, bound.vector());
+      const Vector3 point2 = transform_point(bodies.pose2, bound.vector());
+      emit(0, distance_between(point1, point2, bodies));
     });
   }
 

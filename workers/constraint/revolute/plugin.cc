@@ -13,6 +13,7 @@
 // (from the middle of the limits, where there are some) the angle, and so the spring, goes on from the other side.
 // A drive to a speed with a largest torque is one row on the velocity about a (rank 6), as in an `AngularMotor`; at a limit that it
 // drives against it stalls, and with speed 0 it is a brake.
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -24,9 +25,10 @@ class Revolute final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Revolute",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Hinge.",
+        .capabilities = {"coordinates"},
         .types = {{"Revolute",
                    "Two bodies share an axis about which they turn, freely or within limits.",
                    {Property::vector("BindAxisPoint1", "m", "world")
@@ -50,7 +52,10 @@ class Revolute final : public ConstraintPlugin {
                                "absent."),
                     Property::number("MaximumTorque", "N*m")
                         .at_least(0.0)
-                        .means("Largest torque of the drive; unlimited if absent.")}}}};
+                        .means("Largest torque of the drive; unlimited if absent.")},
+                   {{"angle", "rad",
+                     "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start; the "
+                     "turn that limits are compared with, without them above -pi up to pi."}}}}};
   }
   explicit Revolute(PropertyCursor) {}
 
@@ -89,6 +94,17 @@ class Revolute final : public ConstraintPlugin {
       const double rest = bound.number();
       if (!spring.is_none()) emit(sprung_twist_row(one.orientation, two.orientation, bodies, limits, rest, spring));
       drive_about(axis_between(one, two), 1.0, &bound, emit);
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      JointLimits limits;
+      limits.lower = bound.number();
+      limits.upper = bound.number();
+      emit(0, twist_of(one, two, limits, bodies));
     });
   }
 };

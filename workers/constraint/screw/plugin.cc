@@ -19,6 +19,7 @@
 // Refused: points that name no axis, a Lead of 0.
 #include <cmath>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -30,9 +31,10 @@ class Screw final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Screw",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Nut on a threaded spindle.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Screw",
              "The second body is a nut on the first: it keeps to an axis and moves along it as it turns.",
@@ -43,7 +45,11 @@ class Screw final : public ConstraintPlugin {
               Property::number("Lead", "m")
                   .required()
                   .means("Way of body 2 toward point 2 with a turn, right-handed about point 1 -> point 2, relative "
-                         "to body 1; negative for a left-handed thread, not 0.")}}}};
+                         "to body 1; negative for a left-handed thread, not 0.")},
+             {{"displacement", "m", "Way of body 2 toward point 2, relative to body 1, 0 at the start."},
+              {"angle", "rad",
+               "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start, above -pi "
+               "up to pi."}}}}};
   }
   explicit Screw(PropertyCursor) {}
 
@@ -78,6 +84,15 @@ class Screw final : public ConstraintPlugin {
       const double error = share * (axis.dot(way) - hand * tangent.dot(way) - radius * tilt - lead * turn);
       emit(meshing_row(share * (axis - hand * tangent), two.position + radius * normal, 0.0, error,
                        share * kWholeTurn * radius, bodies));
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      emit(0, way_along(one.orientation * Vector3::UnitX(), one.position, two.position, bodies));
+      emit(1, twist_of(one, two, {}, bodies));
     });
   }
 };

@@ -11,6 +11,7 @@
 // -k (way - RestPosition) - c way', take no freedom.
 #include <cmath>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -21,9 +22,10 @@ class Slider final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Slider",
-        .version = "1.1",
+        .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Straight guide.",
+        .capabilities = {"coordinates"},
         .types = {{"Slider",
                    "The second body slides along an axis of the first and does not turn against it.",
                    {Property::vector("BindPoint", "m", "world").required().means("A point of the guide."),
@@ -41,7 +43,8 @@ class Slider final : public ConstraintPlugin {
                     Property::number("Damping", "N*s/m").at_least(0.0).means("Damper along the axis; none if absent."),
                     Property::number("RestPosition", "m")
                         .defaults_to({0.0})
-                        .means("Way at which the spring pushes nothing.")}}}};
+                        .means("Way at which the spring pushes nothing.")},
+                   {{"displacement", "m", "Way of body 2 along the axis, relative to body 1, 0 at the start."}}}}};
   }
   explicit Slider(PropertyCursor) {}
 
@@ -97,6 +100,14 @@ class Slider final : public ConstraintPlugin {
       if (spring.is_none()) return;
       const Vector3 rest = one.position + bound.number() * axis;
       emit(sprung(row_along(axis, rest, two.position, AxisMode::kFree), spring));
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      emit(0, way_along(one.orientation * Vector3::UnitX(), one.position, two.position, bodies));
     });
   }
 };

@@ -22,6 +22,7 @@
 #include <cmath>
 #include <vector>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
@@ -53,6 +54,7 @@ class Spherical final : public ConstraintPlugin {
         .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Ball-and-socket joint.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Spherical",
              "Two bodies share a point about which they turn, freely or within a reach cone and limits of twist.",
@@ -66,7 +68,9 @@ class Spherical final : public ConstraintPlugin {
                       "An irregular cone instead: azimuth, rising within 0 ... 2 pi, and largest angle there; three "
                       "rows at least. Azimuths count right-handed about Axis from the world's x as seen along it; from "
                       "-z where Axis is along x, to 1e-3."),
-              Property::vector("Axis", "1", "world").means("Axis of cone and twist at the start, any length."),
+              Property::vector("Axis", "1", "world")
+                  .means("Axis of cone and twist at the start, any length; what coordinates are counted from, of a "
+                         "joint without limits, too."),
               Property::number("TwistLower", "rad")
                   .at_least(-kHalfTurn)
                   .at_most(0.0)
@@ -88,7 +92,16 @@ class Spherical final : public ConstraintPlugin {
                       "those of the world at the start; 0 for friction, no drive if absent."),
               Property::number("MaximumTorque", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of the drive about each of these axes; unlimited if absent.")}}}};
+                  .means("Largest torque of the drive about each of these axes; unlimited if absent.")},
+             {{"swing", "rad",
+               "Angle of Axis in body 2 against Axis in body 1, which ReachConeAngle bounds, 0 ... pi; of a joint with "
+               "Axis, as the others."},
+              {"azimuth", "rad",
+               "Where Axis in body 2 points round that in body 1, as azimuths of ReachCone count, above -pi up to pi; "
+               "none while both point alike."},
+              {"twist", "rad",
+               "Twist of body 2 about its axis; the turn that TwistLower and TwistUpper are compared with, without "
+               "them above -pi up to pi."}}}}};
   }
   explicit Spherical(PropertyCursor) {}
 
@@ -105,12 +118,13 @@ class Spherical final : public ConstraintPlugin {
                 const JointSpring spring = JointSpring::of(&properties);
                 BoundWriter drive;
                 write_turning_drive(bodies, &properties, &drive);
-                if (cone.limits_nothing() && spring.is_none() && drive.numbers().empty()) return;
-                const Pose frame = cone_frame(point, cone.axis);
+                if (!cone.has_axis && spring.is_none() && drive.numbers().empty()) return;
+                const Pose frame = azimuth_frame(point, cone.axis);
                 write_frame(bodies.pose1, frame, &out);
                 write_frame(bodies.pose2, frame, &out);
                 write_spring(spring, &out);
                 write_cone(cone, &out);
+                out.number(cone.has_axis ? 1.0 : 0.0);
                 for (const double number : drive.numbers()) out.number(number);
               });
   }
@@ -125,9 +139,29 @@ class Spherical final : public ConstraintPlugin {
     });
   }
 
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      for (int anchor = 0; anchor < 2; ++anchor) bound.vector();
+      if (bound.at_end()) return;
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      read_spring(&bound);
+      JointLimits twist;
+      twist.lower = bound.number();
+      twist.upper = bound.number();
+      bound.table(2);
+      if (!bound.flag()) return;
+      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+      emit(0, swing_of(axis1, axis2, bodies));
+      emit(1, azimuth_of(axis1, one.orientation * Vector3::UnitY(), axis2, bodies.spin2 - bodies.spin1));
+      emit(2, twist_of(one, two, twist, bodies));
+    });
+  }
+
  private:
   struct Cone {
     Vector3 axis = Vector3::UnitX();
+    bool has_axis = false;
     JointLimits twist;
     double angle = 0.0;  // of a regular one, else 0
     std::span<const double> irregular;
@@ -148,7 +182,8 @@ class Spherical final : public ConstraintPlugin {
       cone.angle = angle;
     }
     demand_cone(cone.irregular);
-    if (cone.limits_nothing()) return cone;
+    cone.has_axis = axis.stableNorm() > 0.0 && axis.allFinite();
+    if (cone.limits_nothing() && !cone.has_axis) return cone;
     if (axis.array().isNaN().all())
       throw Refusal("Spherical: Axis is missing, which reach cone and twist limits are measured from");
     cone.axis = unit_axis(axis, "Spherical: Axis");
@@ -177,16 +212,6 @@ class Spherical final : public ConstraintPlugin {
     out->number(std::isnan(torque) ? kUnlimited : torque);
   }
 
-  // Its second axis is at azimuth 0.
-  static Pose cone_frame(const Vector3& point, const Vector3& axis) {
-    constexpr double kAlong = 1e-3;
-    const Vector3 across = Vector3::UnitX() - axis.x() * axis;
-    const Vector3 start = across.norm() > kAlong ? across : Vector3(axis.z() * axis - Vector3::UnitZ());
-    Matrix3 axes;
-    axes.col(0) = axis, axes.col(1) = start.normalized(), axes.col(2) = axis.cross(axes.col(1));
-    return {point, to_quaternion(axes)};
-  }
-
   static void demand_cone(std::span<const double> cone) {
     if (cone.empty()) return;
     if (cone.size() < 6) throw Refusal("Spherical: ReachCone has fewer than three rows");
@@ -209,6 +234,7 @@ class Spherical final : public ConstraintPlugin {
     const std::span<const double> cone = bound.table(2);
     if (!cone.empty()) emit(cone_row(cone, one.orientation, two.orientation));
     if (!twist.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, twist));
+    bound.flag();  // has an axis
     if (bound.at_end()) return;
     Discrepancy drive;
     drive.axes = read_frame(&bound, bodies.pose1).orientation;

@@ -14,6 +14,7 @@
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
 #include <string>
 
+#include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -27,6 +28,7 @@ class Universal final : public ConstraintPlugin {
         .version = "1.2",
         .slot = Slot::kConstraint,
         .meaning = "Hooke's joint.",
+        .capabilities = {"coordinates"},
         .types = {
             {"Universal",
              "Two bodies share a point; an axis of the first and one of the second keep their angle.",
@@ -55,7 +57,13 @@ class Universal final : public ConstraintPlugin {
               Property::number("AngularSpeed2", "rad/s").means("The same about Axis2."),
               Property::number("MaximumTorque2", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of that drive; unlimited if absent.")}}}};
+                  .means("Largest torque of that drive; unlimited if absent.")},
+             {{"angle1", "rad",
+               "Turn of the cross, and of body 2 with it, about Axis1, relative to body 1, right-handed, 0 at the "
+               "start, above -pi up to pi."},
+              {"angle2", "rad",
+               "Turn of body 2 about Axis2, relative to the cross, right-handed, 0 at the start, above -pi up to "
+               "pi."}}}}};
   }
   explicit Universal(PropertyCursor) {}
 
@@ -93,6 +101,18 @@ class Universal final : public ConstraintPlugin {
       const double sine = axis1.cross(axis2).norm();
       drive_about(axis2.cross(normal), sine, &drive1, emit);
       drive_about(normal.cross(axis1), sine, &drive2, emit);
+    });
+  }
+
+  void coordinates(const stage::ConstraintDiscrepanciesRequest& request, const stage::ConstraintCoordinatesReply& reply,
+                   Host&) override {
+    measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
+      const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
+      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+      const Vector3 turning = bodies.spin2 - bodies.spin1;
+      // the second axis of either frame is where the other bar was at the start
+      emit(0, azimuth_of(axis1, one.orientation * Vector3::UnitY(), axis2, turning));
+      emit(1, reversed(azimuth_of(axis2, two.orientation * Vector3::UnitY(), axis1, -turning)));
     });
   }
 
