@@ -122,6 +122,39 @@ TEST(Capsule, APluginThatServesOtherTypesCannotTakeThePlace) {
   }
 }
 
+// A slot may have several plugins, each with types of its own: what is not for the plugin in question is left out.
+TEST(Capsule, CallsOfOtherTypesAreLeftOut) {
+  const ScratchFolder folder;
+  const std::string file = capture("force", folder);
+  const std::string gravity = in_build("/lib/gravitas/force_gravity.so"),
+                    basic = in_build("/lib/gravitas/force_basic.so");
+  const auto count_of = [](const std::string& text, const std::string& words) {
+    const std::size_t at = text.find(words);
+    EXPECT_NE(at, std::string::npos) << text;
+    const std::size_t line = at == std::string::npos ? 0 : text.rfind('\n', at) + 1;
+    return at == std::string::npos ? 0 : std::stoi(text.substr(line));
+  };
+  const ProgramResult all = run_program({"replay", file}, folder);
+  const int calls = count_of(all.out, " calls: ");
+  int asked = 0;
+  for (const auto& [plugin, missing] :
+       std::vector<std::pair<std::string, std::string>>{{gravity, "'Basic'"}, {basic, "'Gravity'"}}) {
+    const ProgramResult one = run_program({"replay", file, "--plugin", plugin}, folder);
+    EXPECT_EQ(one.exit_code, 0) << one.out << one.err;
+    EXPECT_THAT(one.out, HasSubstr(", 0 different"));
+    EXPECT_THAT(one.out, HasSubstr(" calls left out, as '" + plugin +
+                                   "' cannot take the place: it does not serve the type " + missing));
+    EXPECT_EQ(count_of(one.out, " calls: ") + count_of(one.out, " calls left out"), calls);
+    asked += count_of(one.out, " calls: ");
+    const ProgramResult same = run_program({"bisect", file, plugin, plugin}, folder);
+    EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+    EXPECT_EQ(count_of(same.out, " calls answered alike"), count_of(one.out, " calls: "));
+  }
+  EXPECT_EQ(asked, calls);
+  // nobody serves what both serve
+  EXPECT_EQ(run_program({"bisect", file, gravity, basic}, folder).exit_code, 2);
+}
+
 // Problems of a run, solved alone: each says how it ended, by the solver that had it and by another one.
 TEST(Capsule, OfASolverSaysHowEachProblemEnded) {
   const ScratchFolder folder;
