@@ -1,6 +1,7 @@
 #include "services/capsule/replay.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,8 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "kernel/fault.h"
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/solver.h"
+#include "services/capsule/answer_verdict.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
 #include "services/check/answer_text.h"
@@ -37,13 +41,16 @@ class Asked {
  public:
   Asked(const check::Examinee& examinee, const ReplayOptions& options, std::uint32_t threads)
       : examinee_(examinee),
+        with_physics_(options.with_physics),
         subject_(examinee_, examinee_.is_command() ? kernel::Hosting::kGrpc : options.hosting,
                  {.deadline = options.deadline, .cap = 10.0 * options.deadline}, threads, &faults_) {}
 
+  // What a run would not go on with is a fault, too.
   Answer ask(const v1::CapsuleCall& call, bool is_poison);
 
  private:
   const check::Examinee examinee_;
+  const bool with_physics_;
   std::uint32_t faults_ = 0;
   check::CarrierSubject subject_;
 };
@@ -63,12 +70,35 @@ bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRe
          same(was.angular_velocity(), asked.angular_velocity()) && was.with_jacobian() == asked.with_jacobian();
 }
 
+// Why a run would not go on with this; empty: it would.
+std::string failure_of(const v1::CapsuleCall& call, const MessageColumns& request, const Answer& answer,
+                       const WrenchRange& told, bool with_physics) {
+  if (!answer.fault.empty()) return answer.fault;
+  if (answer.status == GRAVITAS_REFUSED) return "it refused: " + answer.text;
+  // who knows no Jacobians is not asked for them
+  if (answer.status == GRAVITAS_UNKNOWN_METHOD) return {};
+  if (answer.status != GRAVITAS_OK) return "it failed: " + answer.text;
+  return verdict_on(method_of(call), request, answer, told, with_physics || call.breaks_law());
+}
+
 Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
   const stage::MethodInfo& method = *method_named(call.method());
   const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
   int asked = 0;
+  WrenchRange told;
   const auto answer = [&](const stage::IntegratorDerivativeRequest& trial) -> conformance::DerivativeAnswer {
-    if (is_poison) return std::vector<double>(2 * trial.position().size());
+    const double now = trial.time();
+    for (const std::span<const double> column :
+         {std::span<const double>(&now, 1), trial.position(), trial.orientation(), trial.linear_velocity(),
+          trial.angular_velocity()})
+      if (first_not_finite(column) != kNoRow)
+        throw kernel::StageFault(kernel::FaultKind::kBadNumbers, "numbers",
+                                 "its answer is wrong: it asked for a derivative in a state that is not finite");
+    if (is_poison) {
+      const std::vector<double> nothing(2 * trial.position().size());
+      told.add(nothing);
+      return nothing;
+    }
     if (asked >= call.derivatives_size())
       throw OtherDerivative(fmt::format("it asks for more than {} derivatives", call.derivatives_size()));
     const v1::CapsuleDerivative& recorded = call.derivatives(asked);
@@ -76,21 +106,30 @@ Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
     if (!is_same(columns_of(recorded.trial(), derivative.request), trial))
       throw OtherDerivative(fmt::format("derivative {} is asked at another state", asked));
     const MessageColumns all = columns_of(recorded.answer(), derivative.reply);
+    told.add(all.f64("wrench"));
     return {all.f64("wrench"), all.u32("jacobian_body"), all.f64("jacobian")};
   };
-  Answer came = subject_.ask(method_of(call), columns_of(call.request(), method.request), answer);
+  const MessageColumns request = columns_of(call.request(), method.request);
+  Answer came = subject_.ask(method_of(call), request, answer);
   if (!is_poison && came.ok() && asked < call.derivatives_size())
     throw OtherDerivative(fmt::format("it asks for {} of {} derivatives", asked, call.derivatives_size()));
+  came.fault = failure_of(call, request, came, told, with_physics_);
   return came;
 }
 
-Answer recorded_answer(const v1::CapsuleCall& call) {
+Answer recorded_answer(const v1::CapsuleCall& call, bool with_physics) {
   const stage::MethodInfo& method = *method_named(call.method());
   const bool has_answer = call.fault().empty() && call.status() == GRAVITAS_OK;
-  return {.status = call.status(),
-          .text = call.text(),
-          .fault = call.fault(),
-          .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
+  Answer answer{.status = call.status(),
+                .text = call.text(),
+                .fault = call.fault(),
+                .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
+  WrenchRange told;
+  const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
+  for (const v1::CapsuleDerivative& one : call.derivatives())
+    told.add(columns_of(one.answer(), derivative.reply).f64("wrench"));
+  answer.fault = failure_of(call, columns_of(call.request(), method.request), answer, told, with_physics);
+  return answer;
 }
 
 void add_solution(const v1::CapsuleCall& call, std::uint32_t number, const Answer& answer,
@@ -138,15 +177,15 @@ std::string type_text(std::uint64_t id, Slot slot, const std::string& own_librar
   return fmt::format("of id {:016x}", id);
 }
 
-// It serves every type that the call is about.
-void demand_types(const v1::CapsuleCall& call, const check::Examinee& examinee, const std::string& own_library) {
-  const PluginDeclaration& declaration = examinee.declaration;
-  for (const std::uint64_t id : types_of(call, declaration.slot)) {
-    const auto is_it = [&](const TypeDeclaration& type) { return type_id(type.name) == id; };
-    if (std::ranges::none_of(declaration.types, is_it))
-      throw BadInput(fmt::format("'{}' cannot take the place: it does not serve the type {}", examinee.argument,
-                                 type_text(id, declaration.slot, own_library)));
-  }
+// The first of the types that a call is about which a plugin does not serve.
+std::optional<std::uint64_t> unserved_type(const v1::CapsuleCall& call, const PluginDeclaration& declaration) {
+  const std::vector<std::uint64_t> types = types_of(call, declaration.slot);
+  const auto is_served = [&](std::uint64_t id) {
+    return std::ranges::any_of(declaration.types,
+                               [&](const TypeDeclaration& type) { return type_id(type.name) == id; });
+  };
+  const auto found = std::ranges::find_if_not(types, is_served);
+  return found == types.end() ? std::nullopt : std::optional(*found);
 }
 
 // Asks the plugins of a capsule.
@@ -163,18 +202,41 @@ class Player {
     return asked->ask(call, capsule_.header().poison());
   }
 
+  // True if it does not serve a type that the call is about: a slot may have several plugins, each with types of its own.
+  bool must_leave_out(const v1::CapsuleCall& call, const std::string& substitute) {
+    const check::Examinee& examinee = substitute_named(substitute);
+    const std::optional<std::uint64_t> type = unserved_type(call, examinee.declaration);
+    if (!type) return false;
+    std::string& why = unserved_[{substitute, *type}];
+    if (!why.empty()) return true;
+    why = fmt::format("'{}' cannot take the place: it does not serve the type {}", substitute,
+                      type_text(*type, examinee.declaration.slot, capsule_.plugins()[call.plugin()].library()));
+    report_->add_left_out_because(why);
+    return true;
+  }
+
  private:
+  const check::Examinee& substitute_named(const std::string& argument) {
+    const auto known = substitutes_.find(argument);
+    return known != substitutes_.end() ? known->second
+                                       : substitutes_.emplace(argument, of_slot(argument)).first->second;
+  }
+
+  check::Examinee of_slot(const std::string& argument) const {
+    check::Examinee examinee = usable(argument);
+    if (slot_name(examinee.declaration.slot) != capsule_.header().slot())
+      throw BadInput(fmt::format("'{}' is of slot {}, the capsule of slot {}", examinee.argument,
+                                 slot_name(examinee.declaration.slot), capsule_.header().slot()));
+    return examinee;
+  }
+
   std::unique_ptr<Asked> start(const v1::CapsuleCall& call, const std::optional<std::string>& substitute) {
     const v1::CapsulePlugin& plugin = capsule_.plugins()[call.plugin()];
     const std::string own = plugin.command().empty() ? plugin.library() : plugin.command();
     if (!substitute && own.empty())
       throw BadInput(
           fmt::format("plugin {} was somebody else's worker; --plugin says who takes its place", plugin.name()));
-    check::Examinee examinee = usable(substitute.value_or(own));
-    if (slot_name(examinee.declaration.slot) != capsule_.header().slot())
-      throw BadInput(fmt::format("'{}' is of slot {}, the capsule of slot {}", examinee.argument,
-                                 slot_name(examinee.declaration.slot), capsule_.header().slot()));
-    if (substitute) demand_types(call, examinee, plugin.library());
+    check::Examinee examinee = substitute ? substitute_named(*substitute) : of_slot(own);
     // what the run had set holds for a plugin of the same properties
     if (examinee.declaration.name == plugin.name() &&
         examinee.settings.size() == static_cast<std::size_t>(plugin.settings_size()))
@@ -188,8 +250,17 @@ class Player {
   const Reader& capsule_;
   const ReplayOptions& options_;
   report::v1::ReplayReport* report_;
+  std::map<std::string, check::Examinee> substitutes_;
+  std::map<std::pair<std::string, std::uint64_t>, std::string> unserved_;  // why calls are left out
   std::map<std::pair<std::uint32_t, std::optional<std::string>>, std::unique_ptr<Asked>> asked_;
 };
+
+// The request of a poisoned capsule without what answers its derivatives.
+bool lacks_wrenches(const v1::CapsuleCall& call, const v1::CapsuleHeader& header) {
+  if (!header.poison() || method_of(call) != stage::Method::kIntegratorIntegrate) return false;
+  const stage::MethodInfo& method = stage::method_info(stage::Method::kIntegratorIntegrate);
+  return columns_of(call.request(), method.request).u32("wrench_is_constant")[0] == 0;
+}
 
 void note_first(const v1::CapsuleCall& call, std::uint32_t number, const std::string& text,
                 report::v1::ReplayReport* report) {
@@ -201,18 +272,25 @@ void note_first(const v1::CapsuleCall& call, std::uint32_t number, const std::st
   first.set_text(text);
 }
 
-// Calls `judge` with each chosen call and its number, until it or `progress` says false.
+// Calls `judge` with each chosen call and its number, until it or `progress` says false. Throws BadInput if all must be left out.
 void for_each_call(Reader* capsule, const ReplayOptions& options, report::v1::ReplayReport* report,
                    const std::function<bool(std::uint32_t)>& progress,
+                   const std::function<bool(const v1::CapsuleCall&)>& must_leave_out,
                    const std::function<bool(const v1::CapsuleCall&, std::uint32_t)>& judge) {
   const auto start = std::chrono::steady_clock::now();
   v1::CapsuleCall call;
   bool goes_on = true;
   for (std::uint32_t number = 1; goes_on && capsule->next(&call); ++number) {
     if (options.only != 0 && number != options.only) continue;
+    if (must_leave_out(call)) {
+      report->set_left_out(report->left_out() + 1);
+      continue;
+    }
     report->set_calls(report->calls() + 1);
     goes_on = judge(call, number) && progress(number);
   }
+  if (goes_on && report->calls() == 0 && report->left_out() > 0)
+    throw BadInput(fmt::format("{}", fmt::join(report->left_out_because(), "; ")));
   if (goes_on && options.only != 0 && report->calls() == 0)
     throw BadInput(fmt::format("--call {}: '{}' has no such call", options.only, options.file));
   report->set_note(capsule->note());
@@ -226,34 +304,45 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
   report::v1::ReplayReport report;
   report.set_capsule(options.file);
   Player player(capsule, options, &report);
-  for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
-    const Answer was = recorded_answer(call);
-    std::string text;
-    bool has_failed = false;
-    for (std::uint32_t i = 0; i < options.times && text.empty() && !has_failed; ++i) {
-      try {
-        const Answer came = player.ask(call, options.plugin);
-        has_failed = !came.fault.empty();
-        if (i == 0 && came.ok() && method_of(call) == stage::Method::kSolverSolve)
-          add_solution(call, number, came, &report);
-        if (was.fault.empty() || has_failed)
-          text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
-      } catch (const OtherDerivative& other) {
-        text = other.what();
-      }
-    }
-    if (!was.fault.empty() && has_failed) {
-      report.set_failed_again(report.failed_again() + 1);
-    } else if (!was.fault.empty() && text.empty()) {
-      report.set_answered_now(report.answered_now() + 1);
-    } else if (text.empty()) {
-      report.set_same(report.same() + 1);
-    } else {
-      report.set_different(report.different() + 1);
-    }
-    if (!text.empty()) note_first(call, number, text, &report);
-    return true;
-  });
+  const auto must_leave_out = [&](const v1::CapsuleCall& call) {
+    return options.plugin && player.must_leave_out(call, *options.plugin);
+  };
+  for_each_call(
+      &capsule, options, &report, progress, must_leave_out, [&](const v1::CapsuleCall& call, std::uint32_t number) {
+        const Answer was = recorded_answer(call, options.with_physics);
+        std::string text;
+        bool has_failed = false;
+        for (std::uint32_t i = 0; i < options.times && text.empty() && !has_failed; ++i) {
+          try {
+            const Answer came = player.ask(call, options.plugin);
+            has_failed = !came.fault.empty();
+            if (i == 0 && came.ok() && method_of(call) == stage::Method::kSolverSolve)
+              add_solution(call, number, came, &report);
+            if (was.fault.empty() || has_failed)
+              text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
+          } catch (const OtherDerivative& other) {
+            text = other.what();
+          }
+        }
+        if (text.empty() && lacks_wrenches(call, capsule.header())) {
+          report.set_remark("what the integrator was told in the run is not kept: it is told wrenches of zero");
+          if (call.breaks_law()) {
+            report.set_not_judged(report.not_judged() + 1);
+            return true;
+          }
+        }
+        if (!was.fault.empty() && has_failed) {
+          report.set_failed_again(report.failed_again() + 1);
+        } else if (!was.fault.empty() && text.empty()) {
+          report.set_answered_now(report.answered_now() + 1);
+        } else if (text.empty()) {
+          report.set_same(report.same() + 1);
+        } else {
+          report.set_different(report.different() + 1);
+        }
+        if (!text.empty()) note_first(call, number, text, &report);
+        return true;
+      });
   return report;
 }
 
@@ -270,16 +359,25 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
       return Answer{.status = GRAVITAS_OK, .text = {}, .fault = problem.what(), .columns = {}};
     }
   };
-  for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
-    const std::string text = check::difference(method_of(call), ask(call, *options.plugin), ask(call, other));
-    if (text.empty()) {
-      report.set_same(report.same() + 1);
-      return true;
-    }
-    report.set_different(1);
-    note_first(call, number, text, &report);
-    return false;
-  });
+  const auto must_leave_out = [&](const v1::CapsuleCall& call) {
+    return player.must_leave_out(call, *options.plugin) || player.must_leave_out(call, other);
+  };
+  for_each_call(&capsule, options, &report, progress, must_leave_out,
+                [&](const v1::CapsuleCall& call, std::uint32_t number) {
+                  const Answer a = ask(call, *options.plugin);
+                  const std::string text = check::difference(method_of(call), a, ask(call, other));
+                  if (!text.empty()) {
+                    report.set_different(1);
+                    report.clear_first();  // a difference is what is looked for
+                    note_first(call, number, text, &report);
+                  } else if (!a.fault.empty()) {
+                    report.set_failed_again(report.failed_again() + 1);
+                    note_first(call, number, a.fault, &report);
+                  } else {
+                    report.set_same(report.same() + 1);
+                  }
+                  return text.empty();
+                });
   return report;
 }
 
