@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
 namespace {
@@ -156,6 +157,18 @@ Vector3 moments_of(const Vector3& inverse_moments) {
   for (int k = 0; k < 3; ++k)
     if (inverse_moments[k] > 0.0) moments[k] = 1.0 / inverse_moments[k];
   return moments;
+}
+
+TurnOfSwing turn_of_swing(const Vector3& axis, const Vector3& first, double angle, double push) {
+  TurnOfSwing turn;
+  const math::SinCos half = math::sincos(0.5 * angle), whole = math::sincos(angle);
+  if (!(half.sin > 0.0) || !(half.cos > 0.0)) return turn;
+  const Vector3 second = whole.cos * first + whole.sin * axis.cross(first);
+  const Vector3 of_first = first.cross(axis);
+  turn.direction.angular1 = push > 0.0 ? of_first : Vector3(-of_first);
+  turn.direction.angular2 = second.cross(axis);
+  turn.stiffness = push > 0.0 ? 0.5 * push * half.sin / half.cos : -0.5 * push * half.cos / half.sin;
+  return turn;
 }
 
 Matrix3 geometric_stiffness(const Vector3& arm, const Vector3& push) {

@@ -88,6 +88,16 @@ inline ConstraintDirection with_turns(ConstraintDirection d, const Matrix3& inve
 void move_joint(const SolverBody& one, const SolverBody& two, const EndBody& end1, const EndBody& end2,
                 const Vector3& turn, EndJoint* joint);
 
+// A swing by the angle a resists to being turned round while it is held. With u and w the ways that its two directions go across
+// it, a grows by (u - w)^2 cot(a/2)/4 - (u + w)^2 tan(a/2)/4: held back with mu it resists to u - w with mu cot(a/2)/2, pushed on
+// to u + w with mu tan(a/2)/2. The row of that way, and its stiffness; 0: none.
+struct TurnOfSwing {
+  ConstraintDirection direction;
+  double stiffness = 0.0;
+};
+// About `axis` from `first`, both unit, world; `push` is the multiplier of the angle's row.
+TurnOfSwing turn_of_swing(const Vector3& axis, const Vector3& first, double angle, double push);
+
 // The contact's cone, with rows from `first` on.
 ConeContact cone_contact(const EndContact& contact, std::uint32_t first, bool has_turning);
 

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "plugin_sdk/math/rotation.h"
-#include "plugin_sdk/math/transcendental.h"
 #include "plugin_sdk/solver/island_solver.h"
 
 namespace gravitas {
@@ -326,27 +325,20 @@ void IslandSolver::build_turns_of_rod(EndJoint* joint) {
   }
 }
 
-// A swing by the angle a resists to being turned round while it is held. With u and w the ways that its two directions go across
-// it, a grows by (u - w)^2 cot(a/2)/4 - (u + w)^2 tan(a/2)/4: held back with mu it resists to u - w with mu cot(a/2)/2, pushed on
-// to u + w with mu tan(a/2)/2. As a row with that compliance, like those of a rod.
+// As a row with that compliance, like those of a rod.
 void IslandSolver::build_turn_of_swing(EndJoint* joint) {
   if (!joint->discrepancy.is_swing() || !joint->pose_laws[0].is_active()) return;
-  const double push = answer_.joint_correction[3 * joint->row];
-  const double angle = joint->errors[0] + held_angle(joint->discrepancy);
-  const math::SinCos half = math::sincos(0.5 * angle), whole = math::sincos(angle);
-  if (push == 0.0 || !(half.sin > 0.0) || !(half.cos > 0.0)) return;
-  const Vector3 axis = joint->directions[0].angular2, first = joint->directions[1].angular2;
-  const Vector3 second = whole.cos * first + whole.sin * axis.cross(first);
+  const TurnOfSwing turn =
+      turn_of_swing(joint->directions[0].angular2, joint->directions[1].angular2,
+                    joint->errors[0] + held_angle(joint->discrepancy), answer_.joint_correction[3 * joint->row]);
+  if (!(turn.stiffness > 0.0)) return;
   joint->turns = 1;
   ConeRow& row = cone_.rows.emplace_back();
   row.body1 = joint->body1, row.body2 = joint->body2;
-  const Vector3 of_first = first.cross(axis);
-  row.direction.angular1 = push > 0.0 ? of_first : Vector3(-of_first);
-  row.direction.angular2 = second.cross(axis);
-  row.direction = with_turns(row.direction, end_[joint->body1].stiffened, end_[joint->body2].stiffened);
+  row.direction = with_turns(turn.direction, end_[joint->body1].stiffened, end_[joint->body2].stiffened);
   row.length = joint->length;
   row.law.has_lower = row.law.has_upper = true;
-  row.law.gamma = push > 0.0 ? 2.0 * half.cos / (half.sin * push) : 2.0 * half.sin / (half.cos * -push);
+  row.law.gamma = 1.0 / turn.stiffness;
   row.start = -row.direction.along(displacement_[joint->body1], displacement_[joint->body2]);
 }
 

@@ -65,6 +65,7 @@ JointEnd end_of(const Discrepancy& discrepancy, const RelaxationDiscrepancy& at_
   JointEnd end;
   end.is_linear = !discrepancy.is_angular();
   end.is_radial = discrepancy.is_radial();
+  if (discrepancy.is_swing()) end.angle = joint.errors[0] + held_angle(discrepancy);
   end.arm1 = discrepancy.is_radial() ? joint.own_arm1() : joint.arm1;
   end.arm2 = discrepancy.is_radial() ? joint.own_arm2() : joint.arm2;
   for (std::size_t k = 0; k < 3; ++k) {

@@ -29,6 +29,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <cstdint>
 #include <vector>
 
@@ -61,6 +62,7 @@ struct JointEnd {
   Vector3 arm1, arm2;     // where it pushes its bodies
   bool is_linear = true;  // it has arms
   bool is_radial = false;
+  std::optional<double> angle = {};  // of a swing
 };
 JointEnd end_of(const Discrepancy& discrepancy, const RelaxationDiscrepancy& at_trial, const SolverBodies& turned,
                 const BodyMotion& displacement);

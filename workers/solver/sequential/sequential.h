@@ -97,6 +97,7 @@
 #include <vector>
 
 #include "plugin_sdk/solver/elimination_order.h"
+#include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/equal_springs.h"
 #include "plugin_sdk/solver/reply.h"
 #include "plugin_sdk/solver/stalled_drives.h"
@@ -193,6 +194,8 @@ class SequentialSolver {
   double largest_change(const BodyMotion& from) const;
   void build_at_end(const stage::SolverSolveRequest& request, bool is_stiff);
   void add_turns_of_rod(std::size_t row);
+  void add_turn_of_swing(std::size_t row);
+  TurnOfSwing turn_of_swing(std::size_t row) const;
   double pull_of_rod(std::size_t row) const;
   void end_unstiffened(const stage::SolverSolveRequest& request);
   void shorten_pose(const stage::SolverSolveRequest& request);

@@ -60,6 +60,11 @@ double SequentialSolver::measure_stiffness() {
   stiffness_.assign(bodies_.count() + 1, Matrix3::Zero());
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
+    if (const TurnOfSwing turn = turn_of_swing(i); turn.stiffness > 0.0) {
+      const ConstraintDirection row =
+          with_turns(turn.direction, turned_[d.body1].inverse_inertia, turned_[d.body2].inverse_inertia);
+      most = std::max(most, turn.stiffness * row.product(row, 0.0));
+    }
     if (!ends_[i].is_linear || touches(d)) continue;
     Vector3 push = Vector3::Zero();
     for (std::size_t k = 0; k < 3; ++k) push += pushed_[3 * i + k] * ends_[i].directions[k].linear;
@@ -104,6 +109,26 @@ void SequentialSolver::add_turns_of_rod(std::size_t i) {
         d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
     ++axis;
   }
+}
+
+// What a swing that is held resists with to being turned round (end_of_step_rows.h), as such a row.
+void SequentialSolver::add_turn_of_swing(std::size_t i) {
+  RelaxationDiscrepancy& d = posed_[i];
+  const TurnOfSwing turn = turn_of_swing(i);
+  if (!(turn.stiffness > 0.0)) return;
+  d.directions[1] =
+      with_turns(turn.direction, stiffened_[d.body1].inverse_inertia, stiffened_[d.body2].inverse_inertia);
+  JointLaw& law = posed_laws_[3 * i + 1] = JointLaw{};
+  law.has_lower = law.has_upper = true;
+  law.gamma = 1.0 / turn.stiffness;
+  law.lower_target = law.upper_target =
+      d.directions[1].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
+}
+
+TurnOfSwing SequentialSolver::turn_of_swing(std::size_t i) const {
+  const JointEnd& end = ends_[i];
+  if (!end.angle || !pose_laws_[3 * i].is_active() || pushed_[3 * i] == 0.0) return {};
+  return gravitas::turn_of_swing(end.directions[0].angular2, end.directions[1].angular2, *end.angle, pushed_[3 * i]);
 }
 
 // By which a rod holds its bodies together; 0: it is none, or presses.
@@ -238,7 +263,7 @@ void SequentialSolver::build_at_end(const stage::SolverSolveRequest& request, bo
       const double along = d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
       posed_laws_[3 * i + axis].shift(along - (ends_[i].errors[axis] - d.axes[axis].error_at_trial));
     }
-    if (is_stiff) add_turns_of_rod(i);
+    if (is_stiff) add_turns_of_rod(i), add_turn_of_swing(i);
   }
   pose_joints_.store(pushed_);
   pose_joints_.build(bodies, posed_, posed_laws_, pushed_);
