@@ -20,8 +20,6 @@ void require(const AnswerProblem& problem) {
   throw StageFault(FaultKind::kBadStructure, "structure", "its answer is wrong: " + problem.text);
 }
 
-void require_structure(const std::string& problem) { require({true, problem}); }
-
 // Throws if the check of the physics has found something.
 void require_physics(const std::string& problem) {
   if (!problem.empty()) throw StageFault(FaultKind::kBadPhysics, "physics", "its answer breaks a law: " + problem);
@@ -36,7 +34,7 @@ void Validator::check_structure_and_finiteness(const StageCall& call) const {
   for (std::size_t i = 0; i < call.request.size(); ++i) request[i] = arena_.count(call.request[i]);
   for (std::size_t i = 0; i < call.reply.size(); ++i) reply[i] = arena_.count(call.reply[i]);
   const stage::MethodInfo& method = call.info();
-  require_structure(rows_.check(call.method, {request.data(), call.request.size()}, {reply.data(), call.reply.size()}));
+  require({true, rows_.check(call.method, {request.data(), call.request.size()}, {reply.data(), call.reply.size()})});
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     if (method.reply[i].type != stage::ElementType::kF64) continue;
     const std::size_t index = first_not_finite({reinterpret_cast<const double*>(arena_.data(call.reply[i])), reply[i]});
@@ -47,9 +45,7 @@ void Validator::check_structure_and_finiteness(const StageCall& call) const {
 
 Trusted<Wrenches> Validator::wrenches(const Untrusted<StageCall>& answer, const ForceAnswer& columns) const {
   check_structure_and_finiteness(answer.value_);
-  for (std::size_t i = 0; i < columns.flags.size(); ++i)
-    if (columns.flags[i] > (kConstantWrench | kHasPotential))
-      require_structure(at_row("flags", i) + " has unknown bits");
+  require(check_wrench_flags(columns.flags.span()));
   return Trusted<Wrenches>({});
 }
 
@@ -121,9 +117,7 @@ Trusted<Contacts> Validator::contacts(const Untrusted<StageCall>& answer, const 
 
 Trusted<Bound> Validator::bound(const Untrusted<StageCall>& answer, const ConstraintGroup& group) const {
   check_structure_and_finiteness(answer.value_);
-  const std::span<const std::uint32_t> begin = group.bound_begin.span();
-  if (begin.front() != 0 || begin.back() != group.bound.size() || !std::ranges::is_sorted(begin))
-    require_structure("bound_begin does not cut up bound");
+  require(check_bound_begin(group.bound_begin.span(), group.bound.size()));
   return Trusted<Bound>({});
 }
 

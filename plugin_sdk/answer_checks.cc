@@ -70,6 +70,17 @@ AnswerProblem check_block_rows(const char* column, std::span<const std::uint32_t
                        " names a body that does not exist");
 }
 
+AnswerProblem check_wrench_flags(std::span<const std::uint32_t> flags) {
+  for (std::size_t i = 0; i < flags.size(); ++i)
+    if (flags[i] > (kConstantWrench | kHasPotential)) return bad_structure("flags", i, " has unknown bits");
+  return {};
+}
+
+AnswerProblem check_bound_begin(std::span<const std::uint32_t> begin, std::uint64_t numbers) {
+  if (begin.front() == 0 && begin.back() == numbers && std::ranges::is_sorted(begin)) return {};
+  return {true, "bound_begin does not cut up bound"};
+}
+
 AnswerProblem check_impact_rows(std::span<const std::uint32_t> pair, std::span<const double> fraction,
                                 std::span<const double> normal, std::uint64_t pairs) {
   for (std::size_t i = 0; i < pair.size(); ++i) {

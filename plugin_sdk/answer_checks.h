@@ -39,6 +39,12 @@ AnswerProblem check_contact_rows(std::span<const std::uint32_t> pair, std::span<
 AnswerProblem check_block_rows(const char* column, std::span<const std::uint32_t> block_body, std::uint64_t bodies,
                                std::uint64_t most);
 
+// Flags of body.h that a force may give its wrenches.
+AnswerProblem check_wrench_flags(std::span<const std::uint32_t> flags);
+
+// Where each joint's part of `numbers` bound numbers begins, and where the last ends.
+AnswerProblem check_bound_begin(std::span<const std::uint32_t> begin, std::uint64_t numbers);
+
 // Discrepancies of joints that are intact (1), in the order of the joints; known modes, correction in 0 … 1, lower <=
 // upper, nothing negative that cannot be, unit axes.
 AnswerProblem check_discrepancy_rows(std::span<const std::uint32_t> constraint, std::span<const std::uint32_t> intact,

@@ -10,8 +10,11 @@
 #include <utility>
 #include <vector>
 
+#include "kernel/fault.h"
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/solver.h"
+#include "services/capsule/answer_verdict.h"
 #include "services/capsule/capsule.h"
 #include "services/catalog/catalog.h"
 #include "services/check/answer_text.h"
@@ -37,13 +40,16 @@ class Asked {
  public:
   Asked(const check::Examinee& examinee, const ReplayOptions& options, std::uint32_t threads)
       : examinee_(examinee),
+        with_physics_(options.with_physics),
         subject_(examinee_, examinee_.is_command() ? kernel::Hosting::kGrpc : options.hosting,
                  {.deadline = options.deadline, .cap = 10.0 * options.deadline}, threads, &faults_) {}
 
+  // What a run would not go on with is a fault, too.
   Answer ask(const v1::CapsuleCall& call, bool is_poison);
 
  private:
   const check::Examinee examinee_;
+  const bool with_physics_;
   std::uint32_t faults_ = 0;
   check::CarrierSubject subject_;
 };
@@ -63,12 +69,35 @@ bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRe
          same(was.angular_velocity(), asked.angular_velocity()) && was.with_jacobian() == asked.with_jacobian();
 }
 
+// Why a run would not go on with this; empty: it would.
+std::string failure_of(const v1::CapsuleCall& call, const MessageColumns& request, const Answer& answer,
+                       const WrenchRange& told, bool with_physics) {
+  if (!answer.fault.empty()) return answer.fault;
+  if (answer.status == GRAVITAS_REFUSED) return "it refused: " + answer.text;
+  // who knows no Jacobians is not asked for them
+  if (answer.status == GRAVITAS_UNKNOWN_METHOD) return {};
+  if (answer.status != GRAVITAS_OK) return "it failed: " + answer.text;
+  return verdict_on(method_of(call), request, answer, told, with_physics || call.breaks_law());
+}
+
 Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
   const stage::MethodInfo& method = *method_named(call.method());
   const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
   int asked = 0;
+  WrenchRange told;
   const auto answer = [&](const stage::IntegratorDerivativeRequest& trial) -> conformance::DerivativeAnswer {
-    if (is_poison) return std::vector<double>(2 * trial.position().size());
+    const double now = trial.time();
+    for (const std::span<const double> column :
+         {std::span<const double>(&now, 1), trial.position(), trial.orientation(), trial.linear_velocity(),
+          trial.angular_velocity()})
+      if (first_not_finite(column) != kNoRow)
+        throw kernel::StageFault(kernel::FaultKind::kBadNumbers, "numbers",
+                                 "its answer is wrong: it asked for a derivative in a state that is not finite");
+    if (is_poison) {
+      const std::vector<double> nothing(2 * trial.position().size());
+      told.add(nothing);
+      return nothing;
+    }
     if (asked >= call.derivatives_size())
       throw OtherDerivative(fmt::format("it asks for more than {} derivatives", call.derivatives_size()));
     const v1::CapsuleDerivative& recorded = call.derivatives(asked);
@@ -76,21 +105,30 @@ Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
     if (!is_same(columns_of(recorded.trial(), derivative.request), trial))
       throw OtherDerivative(fmt::format("derivative {} is asked at another state", asked));
     const MessageColumns all = columns_of(recorded.answer(), derivative.reply);
+    told.add(all.f64("wrench"));
     return {all.f64("wrench"), all.u32("jacobian_body"), all.f64("jacobian")};
   };
-  Answer came = subject_.ask(method_of(call), columns_of(call.request(), method.request), answer);
+  const MessageColumns request = columns_of(call.request(), method.request);
+  Answer came = subject_.ask(method_of(call), request, answer);
   if (!is_poison && came.ok() && asked < call.derivatives_size())
     throw OtherDerivative(fmt::format("it asks for {} of {} derivatives", asked, call.derivatives_size()));
+  came.fault = failure_of(call, request, came, told, with_physics_);
   return came;
 }
 
-Answer recorded_answer(const v1::CapsuleCall& call) {
+Answer recorded_answer(const v1::CapsuleCall& call, bool with_physics) {
   const stage::MethodInfo& method = *method_named(call.method());
   const bool has_answer = call.fault().empty() && call.status() == GRAVITAS_OK;
-  return {.status = call.status(),
-          .text = call.text(),
-          .fault = call.fault(),
-          .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
+  Answer answer{.status = call.status(),
+                .text = call.text(),
+                .fault = call.fault(),
+                .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
+  WrenchRange told;
+  const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
+  for (const v1::CapsuleDerivative& one : call.derivatives())
+    told.add(columns_of(one.answer(), derivative.reply).f64("wrench"));
+  answer.fault = failure_of(call, columns_of(call.request(), method.request), answer, told, with_physics);
+  return answer;
 }
 
 void add_solution(const v1::CapsuleCall& call, std::uint32_t number, const Answer& answer,
@@ -191,6 +229,13 @@ class Player {
   std::map<std::pair<std::uint32_t, std::optional<std::string>>, std::unique_ptr<Asked>> asked_;
 };
 
+// The request of a poisoned capsule without what answers its derivatives.
+bool lacks_wrenches(const v1::CapsuleCall& call, const v1::CapsuleHeader& header) {
+  if (!header.poison() || method_of(call) != stage::Method::kIntegratorIntegrate) return false;
+  const stage::MethodInfo& method = stage::method_info(stage::Method::kIntegratorIntegrate);
+  return columns_of(call.request(), method.request).u32("wrench_is_constant")[0] == 0;
+}
+
 void note_first(const v1::CapsuleCall& call, std::uint32_t number, const std::string& text,
                 report::v1::ReplayReport* report) {
   if (report->has_first()) return;
@@ -227,7 +272,7 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
   report.set_capsule(options.file);
   Player player(capsule, options, &report);
   for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
-    const Answer was = recorded_answer(call);
+    const Answer was = recorded_answer(call, options.with_physics);
     std::string text;
     bool has_failed = false;
     for (std::uint32_t i = 0; i < options.times && text.empty() && !has_failed; ++i) {
@@ -240,6 +285,13 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
           text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
       } catch (const OtherDerivative& other) {
         text = other.what();
+      }
+    }
+    if (text.empty() && lacks_wrenches(call, capsule.header())) {
+      report.set_remark("what the integrator was told in the run is not kept: it is told wrenches of zero");
+      if (call.breaks_law()) {
+        report.set_not_judged(report.not_judged() + 1);
+        return true;
       }
     }
     if (!was.fault.empty() && has_failed) {
@@ -271,14 +323,19 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
     }
   };
   for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
-    const std::string text = check::difference(method_of(call), ask(call, *options.plugin), ask(call, other));
-    if (text.empty()) {
+    const Answer a = ask(call, *options.plugin);
+    const std::string text = check::difference(method_of(call), a, ask(call, other));
+    if (!text.empty()) {
+      report.set_different(1);
+      report.clear_first();  // a difference is what is looked for
+      note_first(call, number, text, &report);
+    } else if (!a.fault.empty()) {
+      report.set_failed_again(report.failed_again() + 1);
+      note_first(call, number, a.fault, &report);
+    } else {
       report.set_same(report.same() + 1);
-      return true;
     }
-    report.set_different(1);
-    note_first(call, number, text, &report);
-    return false;
+    return text.empty();
   });
   return report;
 }

@@ -19,6 +19,9 @@ struct ReplayOptions {
   double deadline = 2.0;    // s
   std::uint32_t only = 0;   // that call, from 1; 0: all
   std::uint32_t times = 1;  // each call so often, for a profiler
+  // Answers are held against laws of physics, too, as in a run with CheckPhysicsEvery; a request that was kept because
+  // its answer broke one is in any case.
+  bool with_physics = false;
 };
 
 // Against what was answered in the run. `progress` gets the number of calls so far and may end it by returning false.

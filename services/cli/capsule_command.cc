@@ -86,6 +86,7 @@ struct ReplayLine {
 
 void print_first(const report::v1::ReplayReport& report) {
   if (!report.note().empty()) std::cerr << fmt::format("capsule '{}': {}\n", report.capsule(), report.note());
+  if (!report.remark().empty()) std::cout << report.remark() << '\n';
   if (!report.has_first()) return;
   const report::v1::ReplayFinding& first = report.first();
   std::cout << fmt::format("first: call {} ({}, step {}): {}\n", first.call(), first.method(), first.step(),
@@ -135,11 +136,14 @@ int replay(ReplayLine* line) {
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed again", report.failed_again());
     if (report.answered_now() > 0)
       std::cout << fmt::format(", {} failed then and are answered now", report.answered_now());
+    if (report.not_judged() > 0)
+      std::cout << fmt::format(", {} broke a law of physics then, which is not judged now", report.not_judged());
     std::cout << '\n';
     print_first(report);
   }
   if (interrupted()) return kInterrupted;
-  return verdict(report, report.different() + report.failed_again());
+  const int code = verdict(report, report.different() + report.failed_again());
+  return code == kDone && report.not_judged() > 0 ? kBadInput : code;
 }
 
 int bisect(ReplayLine* line) {
@@ -154,12 +158,13 @@ int bisect(ReplayLine* line) {
   if (line->json) {
     std::cout << to_json(report, JsonForm::kPage);
   } else {
-    std::cout << fmt::format("{} calls answered alike{}\n", report.same(),
-                             report.different() == 0 ? "" : ", then a difference");
+    std::cout << fmt::format("{} calls answered alike", report.same());
+    if (report.failed_again() > 0) std::cout << fmt::format(", {} failed alike", report.failed_again());
+    std::cout << (report.different() == 0 ? "\n" : ", then a difference\n");
     print_first(report);
   }
   if (interrupted()) return kInterrupted;
-  return verdict(report, report.different());
+  return verdict(report, report.different() + report.failed_again());
 }
 
 void add_replay_options(CLI::App* command, ReplayLine* line) {
@@ -170,6 +175,10 @@ void add_replay_options(CLI::App* command, ReplayLine* line) {
       "a profiler [shm]");
   command->add_option("--deadline", line->options.deadline, "Of a call, s [2]")->check(positive_seconds());
   command->add_option("--call", line->options.only, "That call alone, counted from 1")->check(whole_number(1));
+  command->add_flag(
+      "--physics", line->options.with_physics,
+      "Hold answers against laws of physics, too, as a run with CheckPhysicsEvery does; a request that was "
+      "kept because its answer broke one is without that");
   command->add_flag("--json", line->json, "Print JSON");
 }
 
@@ -199,7 +208,10 @@ void add_replay(CLI::App* app, Action* action) {
       "         gravitas replay solver.capsule --plugin Newton --json\n"
       "Of a solver it says how each problem ended: iterations, residual, why it stopped. The file is described in "
       "schemas/gravitas/recorder/v1/capsule.proto.\n"
-      "Exits with 4 if an answer differs from the run's, or if there is none; else with 2 if the file is damaged.");
+      "Answers are checked as in a run: what it would not use has failed. "
+      "Exits with 4 if an answer differs from the run's, is one that a run would not use, or if there is none; else "
+      "with "
+      "2 if the file is damaged, or does not hold what it takes to judge the answer.");
   add_replay_options(command, line.get());
   command->add_option("--plugin", line->plugin,
                       "A library, a command or the name of an installed plugin, instead of the one that answered");
@@ -214,7 +226,7 @@ void add_bisect(CLI::App* app, Action* action) {
       app->add_subcommand("bisect", "Find the first call of a capsule that two plugins answer differently");
   command->footer(
       "Example: gravitas bisect solver.capsule before/solver_mine.so after/solver_mine.so\n"
-      "Exits with 4 if there is one.");
+      "Exits with 4 if there is one, or if both fail at a call alike: a run would not use their answer.");
   add_replay_options(command, line.get());
   command->add_option("A", line->plugin, "A library, a command or the name of an installed plugin")->required();
   command->add_option("B", line->other, "Another")->required();

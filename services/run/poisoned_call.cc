@@ -26,6 +26,7 @@ std::string keep_poisoned_call(const RunOptions& options, std::uint32_t step, co
   recorder::v1::CapsuleCall call = capsule::begin_call(poisoned.call, poisoned.arena);
   call.set_step(step);
   call.set_fault(poisoned.fault.text());
+  call.set_breaks_law(poisoned.fault.kind == kernel::FaultKind::kBadPhysics);
   const std::string path = fmt::format("{}.{}.step{}.capsule", std::filesystem::path(options.scenes[0]).stem().string(),
                                        header.slot(), step);
   try {

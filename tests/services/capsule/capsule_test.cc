@@ -1,7 +1,5 @@
 // A plugin's calls, kept and asked again alone: the same bytes on every carrier, the first difference found, the request
 // that a run ended at fails again.
-#include "services/capsule/capsule.h"
-
 #include <gmock/gmock.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
@@ -16,6 +14,7 @@
 
 #include "gravitas/report/v1/replay.pb.h"
 #include "plugin_sdk/solver.h"
+#include "services/capsule/capsule.h"
 #include "services/run/session.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
@@ -150,26 +149,130 @@ TEST(Capsule, OfASolverSaysHowEachProblemEnded) {
   EXPECT_EQ(integrator.out.find("stopped"), std::string::npos);
 }
 
+// The capsule of the request at which a run of a faulty plugin pauses, and what it says of it.
+struct KeptRequest {
+  std::string file, words;
+  ~KeptRequest() { std::filesystem::remove(file); }
+};
+
+KeptRequest kept_request(const std::string& slot, const std::string& library, const std::string& name,
+                         const ScratchFolder& folder, const std::string& scene = shipped_scene("two_spheres_motor"),
+                         const std::vector<std::string>& more = {}) {
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"" + slot + "\" Library = \"" +
+                                           in_build("/lib/gravitas-faulty/" + library + ".so") + "\" } }");
+  std::vector<std::string> words = {"run", scene, plugins, "--checkpoint", folder.path("checkpoint")};
+  if (!name.empty()) words.insert(words.end(), {"--set", name});
+  words.insert(words.end(), more.begin(), more.end());
+  const ProgramResult run = run_program(words, folder);
+  EXPECT_EQ(run.exit_code, 3) << run.err;
+  const std::size_t at = run.err.find("gravitas replay ");
+  EXPECT_NE(at, std::string::npos) << run.err;
+  if (at == std::string::npos) return {};
+  return {run.err.substr(at + 16, run.err.find('\n', at) - at - 16), run.err};
+}
+
 // It fails at the state of one step, whoever asks: the run pauses, and the request is kept.
 TEST(Capsule, APoisonedRequestIsKeptAndFailsAgainAlone) {
   const ScratchFolder folder;
-  const std::string plugins =
-      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Library = \"" +
-                                           in_build("/lib/gravitas-faulty/integrator_poisoned.so") + "\" } }");
-  const ProgramResult run = run_program({"run", shipped_scene("two_spheres_motor"), plugins, "--set",
-                                         "Integrator=Poisoned", "--checkpoint", folder.path("checkpoint")},
-                                        folder);
-  ASSERT_EQ(run.exit_code, 3) << run.err;
-  const std::size_t name = run.err.find("gravitas replay ");
-  ASSERT_NE(name, std::string::npos) << run.err;
-  const std::string file = run.err.substr(name + 16, run.err.find('\n', name) - name - 16);
-  const ProgramResult again = run_program({"replay", file}, folder);
+  const KeptRequest kept = kept_request("integrator", "integrator_poisoned", "Integrator=Poisoned", folder);
+  const ProgramResult again = run_program({"replay", kept.file}, folder);
   EXPECT_EQ(again.exit_code, 4) << again.err;
   EXPECT_THAT(again.out, HasSubstr("1 calls: 0 same, 0 different, 1 failed again"));
-  const ProgramResult sound = run_program({"replay", file, "--plugin", "SemiImplicitEuler"}, folder);
+  const ProgramResult sound = run_program({"replay", kept.file, "--plugin", "SemiImplicitEuler"}, folder);
   EXPECT_EQ(sound.exit_code, 0) << sound.err;
   EXPECT_THAT(sound.out, HasSubstr("1 failed then and are answered now"));
-  std::filesystem::remove(file);
+}
+
+// An answer that came, and that a run would not use, is a failure, and in the run's words.
+struct UnusableAnswer {
+  const char *slot, *library, *name, *sound;
+  const char* words;  // of run and replay alike
+  const char* every;  // CheckPhysicsEvery
+};
+
+class RefusedAnswer : public ::testing::TestWithParam<UnusableAnswer> {};
+
+TEST_P(RefusedAnswer, FailsAgainAlone) {
+  const UnusableAnswer& one = GetParam();
+  const ScratchFolder folder;
+  const KeptRequest kept = kept_request(one.slot, one.library, one.name, folder, shipped_scene("stack"),
+                                        {"--set", std::string("Simulator.CheckPhysicsEvery=") + one.every});
+  EXPECT_THAT(kept.words, HasSubstr(one.words));
+  const ProgramResult again = run_program({"replay", kept.file}, folder);
+  EXPECT_EQ(again.exit_code, 4) << again.out << again.err;
+  EXPECT_THAT(again.out, HasSubstr("1 calls: 0 same, 0 different, 1 failed again"));
+  EXPECT_THAT(again.out, HasSubstr(one.words));
+  const ProgramResult sound = run_program({"replay", kept.file, "--plugin", one.sound}, folder);
+  EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;
+  EXPECT_THAT(sound.out, HasSubstr("1 failed then and are answered now"));
+
+  const std::string library = in_build("/lib/gravitas-faulty/") + one.library + ".so";
+  const ProgramResult alike = run_program({"bisect", kept.file, library, library}, folder);
+  EXPECT_EQ(alike.exit_code, 4) << alike.out << alike.err;
+  EXPECT_THAT(alike.out, HasSubstr("0 calls answered alike, 1 failed alike\n"));
+  EXPECT_THAT(alike.out, HasSubstr(one.words));
+  const ProgramResult other = run_program({"bisect", kept.file, library, one.sound}, folder);
+  EXPECT_EQ(other.exit_code, 4) << other.out << other.err;
+  EXPECT_THAT(other.out, HasSubstr(one.words));
+  EXPECT_THAT(other.out, HasSubstr(", then OK"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, RefusedAnswer,
+                         ::testing::Values(UnusableAnswer{"space", "space_unsorted", "Space=Unsorted", "DynamicBVH",
+                                                          "its answer is wrong: pair of row ", "0"},
+                                           UnusableAnswer{"solver", "solver_sticky", "Solver=Sticky", "Sequential",
+                                                          "pulls the bodies together", "0"},
+                                           UnusableAnswer{"solver", "solver_gains_energy", "Solver=GainsEnergy",
+                                                          "Sequential", "its answer breaks a law: ", "1"}),
+                         [](const auto& one) { return std::string(one.param.library); });
+
+// Joints are asked by the plugin of their type alone.
+TEST(Capsule, ARefusedJointFailsAgainAlone) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write("joint.gravitas", R"(
+    Geometries { Geometry { Type = "Sphere" Id = "Round" CustomProperties { Radius = 0.1 } } }
+    Environment {
+      Space { Bodies { Body { Id = "Ball" GeometryId = "Round" KineticProperties { Position = {1, 0, 0} } } } }
+      Constraints { Constraint { Type = "TwiceCorrected" Id = "Joint" Body1 = "Ball" CustomProperties { BindPoint = {0, 0, 0} } } }
+    })");
+  const KeptRequest kept = kept_request("constraint", "constraint_corrects_twice", "", folder, scene);
+  constexpr const char* kWords = "its answer is wrong: correction of row 0 is outside 0 … 1";
+  EXPECT_THAT(kept.words, HasSubstr(kWords));
+  const ProgramResult again = run_program({"replay", kept.file}, folder);
+  EXPECT_EQ(again.exit_code, 4) << again.out << again.err;
+  EXPECT_THAT(again.out, HasSubstr(kWords));
+}
+
+// A poisoned request of an integrator holds no derivatives: whether it obeys laws then is said to be unknown.
+TEST(Capsule, PhysicsThatCannotBeJudgedIsNotCured) {
+  const ScratchFolder folder;
+  const KeptRequest kept =
+      kept_request("integrator", "integrator_drifts", "Integrator=Drifting", folder,
+                   in_source("/tests/determinism/callbacks.gravitas"), {"--set", "Simulator.CheckPhysicsEvery=1"});
+  EXPECT_EQ(run_program({"replay", kept.file}, folder).exit_code, 4);
+  const ProgramResult sound = run_program({"replay", kept.file, "--plugin", "SemiImplicitEuler"}, folder);
+  EXPECT_EQ(sound.exit_code, 2) << sound.out << sound.err;
+  EXPECT_THAT(sound.out, HasSubstr("0 same, 0 different, 1 broke a law of physics then, which is not judged now"));
+}
+
+// What a run records of an answer that it refuses is an answer like others: it fails when it is judged.
+TEST(Capsule, RefusedAnswersOfACaptureFailAgain) {
+  const ScratchFolder folder;
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Library = \"" +
+                                           in_build("/lib/gravitas-faulty/solver_gains_energy.so") + "\" } }");
+  const std::string file = folder.path("energy.capsule");
+  const ProgramResult captured = run_program({"capture", shipped_scene("stack"), plugins, "--set", "Solver=GainsEnergy",
+                                              "--slot", "solver", "--out", file, "--calls", "1"},
+                                             folder);
+  ASSERT_EQ(captured.exit_code, 0) << captured.err;
+  const ProgramResult plain = run_program({"replay", file}, folder);
+  EXPECT_EQ(plain.exit_code, 0) << plain.out;
+  EXPECT_THAT(plain.out, HasSubstr("1 same, 0 different\n"));
+  const ProgramResult judged = run_program({"replay", file, "--physics"}, folder);
+  EXPECT_EQ(judged.exit_code, 4) << judged.out;
+  EXPECT_THAT(judged.out, HasSubstr("its answer breaks a law: kinetic energy grows"));
 }
 
 TEST(Capsule, BytesOfAnyKindAreReadWithoutHarm) {
