@@ -3,6 +3,8 @@
 #include <grpcpp/server_posix.h>
 #include <unistd.h>
 
+#include <functional>
+#include <string>
 #include <utility>
 
 #include "plugin_sdk/channel/address.h"
@@ -20,6 +22,13 @@ namespace {
 
 // Complaints between two heartbeats beyond this number are dropped.
 constexpr std::size_t kMostComplaints = 16;
+
+template <typename Plugins, typename Name>
+std::string names_of(const Plugins& plugins, Name name) {
+  std::string names;
+  for (const auto& one : plugins) names += (names.empty() ? "'" : ", '") + std::invoke(name, one) + "'";
+  return names.empty() ? "no plugin" : names;
+}
 
 }  // namespace
 
@@ -39,7 +48,9 @@ Admission ControlService::judge(const Hello& hello) const {
   if (hello.floating_point().mxcsr() != mxcsr_)
     return {Refusal::REASON_FLOATING_POINT, "floating-point arithmetic is set differently in kernel and worker"};
   if (hello.plugins_size() != static_cast<int>(plugins_.size()))
-    return {Refusal::REASON_SETTINGS, "the kernel expects another number of plugins in this worker"};
+    return {Refusal::REASON_SETTINGS, "this worker serves " + names_of(plugins_, &plugin::v1::Description::name) +
+                                          ", the kernel expects all plugins of the slot, in this order: " +
+                                          names_of(hello.plugins(), &control::v1::PluginSettings::plugin)};
   // a library that could not be loaded has no name: `admit` says what is wrong with it
   for (int i = 0; i < hello.plugins_size(); ++i) {
     const std::string& name = plugins_[static_cast<std::size_t>(i)].name();

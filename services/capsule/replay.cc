@@ -1,6 +1,7 @@
 #include "services/capsule/replay.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -176,15 +177,15 @@ std::string type_text(std::uint64_t id, Slot slot, const std::string& own_librar
   return fmt::format("of id {:016x}", id);
 }
 
-// It serves every type that the call is about.
-void demand_types(const v1::CapsuleCall& call, const check::Examinee& examinee, const std::string& own_library) {
-  const PluginDeclaration& declaration = examinee.declaration;
-  for (const std::uint64_t id : types_of(call, declaration.slot)) {
-    const auto is_it = [&](const TypeDeclaration& type) { return type_id(type.name) == id; };
-    if (std::ranges::none_of(declaration.types, is_it))
-      throw BadInput(fmt::format("'{}' cannot take the place: it does not serve the type {}", examinee.argument,
-                                 type_text(id, declaration.slot, own_library)));
-  }
+// The first of the types that a call is about which a plugin does not serve.
+std::optional<std::uint64_t> unserved_type(const v1::CapsuleCall& call, const PluginDeclaration& declaration) {
+  const std::vector<std::uint64_t> types = types_of(call, declaration.slot);
+  const auto is_served = [&](std::uint64_t id) {
+    return std::ranges::any_of(declaration.types,
+                               [&](const TypeDeclaration& type) { return type_id(type.name) == id; });
+  };
+  const auto found = std::ranges::find_if_not(types, is_served);
+  return found == types.end() ? std::nullopt : std::optional(*found);
 }
 
 // Asks the plugins of a capsule.
@@ -201,18 +202,41 @@ class Player {
     return asked->ask(call, capsule_.header().poison());
   }
 
+  // True if it does not serve a type that the call is about: a slot may have several plugins, each with types of its own.
+  bool must_leave_out(const v1::CapsuleCall& call, const std::string& substitute) {
+    const check::Examinee& examinee = substitute_named(substitute);
+    const std::optional<std::uint64_t> type = unserved_type(call, examinee.declaration);
+    if (!type) return false;
+    std::string& why = unserved_[{substitute, *type}];
+    if (!why.empty()) return true;
+    why = fmt::format("'{}' cannot take the place: it does not serve the type {}", substitute,
+                      type_text(*type, examinee.declaration.slot, capsule_.plugins()[call.plugin()].library()));
+    report_->add_left_out_because(why);
+    return true;
+  }
+
  private:
+  const check::Examinee& substitute_named(const std::string& argument) {
+    const auto known = substitutes_.find(argument);
+    return known != substitutes_.end() ? known->second
+                                       : substitutes_.emplace(argument, of_slot(argument)).first->second;
+  }
+
+  check::Examinee of_slot(const std::string& argument) const {
+    check::Examinee examinee = usable(argument);
+    if (slot_name(examinee.declaration.slot) != capsule_.header().slot())
+      throw BadInput(fmt::format("'{}' is of slot {}, the capsule of slot {}", examinee.argument,
+                                 slot_name(examinee.declaration.slot), capsule_.header().slot()));
+    return examinee;
+  }
+
   std::unique_ptr<Asked> start(const v1::CapsuleCall& call, const std::optional<std::string>& substitute) {
     const v1::CapsulePlugin& plugin = capsule_.plugins()[call.plugin()];
     const std::string own = plugin.command().empty() ? plugin.library() : plugin.command();
     if (!substitute && own.empty())
       throw BadInput(
           fmt::format("plugin {} was somebody else's worker; --plugin says who takes its place", plugin.name()));
-    check::Examinee examinee = usable(substitute.value_or(own));
-    if (slot_name(examinee.declaration.slot) != capsule_.header().slot())
-      throw BadInput(fmt::format("'{}' is of slot {}, the capsule of slot {}", examinee.argument,
-                                 slot_name(examinee.declaration.slot), capsule_.header().slot()));
-    if (substitute) demand_types(call, examinee, plugin.library());
+    check::Examinee examinee = substitute ? substitute_named(*substitute) : of_slot(own);
     // what the run had set holds for a plugin of the same properties
     if (examinee.declaration.name == plugin.name() &&
         examinee.settings.size() == static_cast<std::size_t>(plugin.settings_size()))
@@ -226,6 +250,8 @@ class Player {
   const Reader& capsule_;
   const ReplayOptions& options_;
   report::v1::ReplayReport* report_;
+  std::map<std::string, check::Examinee> substitutes_;
+  std::map<std::pair<std::string, std::uint64_t>, std::string> unserved_;  // why calls are left out
   std::map<std::pair<std::uint32_t, std::optional<std::string>>, std::unique_ptr<Asked>> asked_;
 };
 
@@ -246,18 +272,25 @@ void note_first(const v1::CapsuleCall& call, std::uint32_t number, const std::st
   first.set_text(text);
 }
 
-// Calls `judge` with each chosen call and its number, until it or `progress` says false.
+// Calls `judge` with each chosen call and its number, until it or `progress` says false. Throws BadInput if all must be left out.
 void for_each_call(Reader* capsule, const ReplayOptions& options, report::v1::ReplayReport* report,
                    const std::function<bool(std::uint32_t)>& progress,
+                   const std::function<bool(const v1::CapsuleCall&)>& must_leave_out,
                    const std::function<bool(const v1::CapsuleCall&, std::uint32_t)>& judge) {
   const auto start = std::chrono::steady_clock::now();
   v1::CapsuleCall call;
   bool goes_on = true;
   for (std::uint32_t number = 1; goes_on && capsule->next(&call); ++number) {
     if (options.only != 0 && number != options.only) continue;
+    if (must_leave_out(call)) {
+      report->set_left_out(report->left_out() + 1);
+      continue;
+    }
     report->set_calls(report->calls() + 1);
     goes_on = judge(call, number) && progress(number);
   }
+  if (goes_on && report->calls() == 0 && report->left_out() > 0)
+    throw BadInput(fmt::format("{}", fmt::join(report->left_out_because(), "; ")));
   if (goes_on && options.only != 0 && report->calls() == 0)
     throw BadInput(fmt::format("--call {}: '{}' has no such call", options.only, options.file));
   report->set_note(capsule->note());
@@ -271,41 +304,45 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
   report::v1::ReplayReport report;
   report.set_capsule(options.file);
   Player player(capsule, options, &report);
-  for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
-    const Answer was = recorded_answer(call, options.with_physics);
-    std::string text;
-    bool has_failed = false;
-    for (std::uint32_t i = 0; i < options.times && text.empty() && !has_failed; ++i) {
-      try {
-        const Answer came = player.ask(call, options.plugin);
-        has_failed = !came.fault.empty();
-        if (i == 0 && came.ok() && method_of(call) == stage::Method::kSolverSolve)
-          add_solution(call, number, came, &report);
-        if (was.fault.empty() || has_failed)
-          text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
-      } catch (const OtherDerivative& other) {
-        text = other.what();
-      }
-    }
-    if (text.empty() && lacks_wrenches(call, capsule.header())) {
-      report.set_remark("what the integrator was told in the run is not kept: it is told wrenches of zero");
-      if (call.breaks_law()) {
-        report.set_not_judged(report.not_judged() + 1);
+  const auto must_leave_out = [&](const v1::CapsuleCall& call) {
+    return options.plugin && player.must_leave_out(call, *options.plugin);
+  };
+  for_each_call(
+      &capsule, options, &report, progress, must_leave_out, [&](const v1::CapsuleCall& call, std::uint32_t number) {
+        const Answer was = recorded_answer(call, options.with_physics);
+        std::string text;
+        bool has_failed = false;
+        for (std::uint32_t i = 0; i < options.times && text.empty() && !has_failed; ++i) {
+          try {
+            const Answer came = player.ask(call, options.plugin);
+            has_failed = !came.fault.empty();
+            if (i == 0 && came.ok() && method_of(call) == stage::Method::kSolverSolve)
+              add_solution(call, number, came, &report);
+            if (was.fault.empty() || has_failed)
+              text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
+          } catch (const OtherDerivative& other) {
+            text = other.what();
+          }
+        }
+        if (text.empty() && lacks_wrenches(call, capsule.header())) {
+          report.set_remark("what the integrator was told in the run is not kept: it is told wrenches of zero");
+          if (call.breaks_law()) {
+            report.set_not_judged(report.not_judged() + 1);
+            return true;
+          }
+        }
+        if (!was.fault.empty() && has_failed) {
+          report.set_failed_again(report.failed_again() + 1);
+        } else if (!was.fault.empty() && text.empty()) {
+          report.set_answered_now(report.answered_now() + 1);
+        } else if (text.empty()) {
+          report.set_same(report.same() + 1);
+        } else {
+          report.set_different(report.different() + 1);
+        }
+        if (!text.empty()) note_first(call, number, text, &report);
         return true;
-      }
-    }
-    if (!was.fault.empty() && has_failed) {
-      report.set_failed_again(report.failed_again() + 1);
-    } else if (!was.fault.empty() && text.empty()) {
-      report.set_answered_now(report.answered_now() + 1);
-    } else if (text.empty()) {
-      report.set_same(report.same() + 1);
-    } else {
-      report.set_different(report.different() + 1);
-    }
-    if (!text.empty()) note_first(call, number, text, &report);
-    return true;
-  });
+      });
   return report;
 }
 
@@ -322,21 +359,25 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
       return Answer{.status = GRAVITAS_OK, .text = {}, .fault = problem.what(), .columns = {}};
     }
   };
-  for_each_call(&capsule, options, &report, progress, [&](const v1::CapsuleCall& call, std::uint32_t number) {
-    const Answer a = ask(call, *options.plugin);
-    const std::string text = check::difference(method_of(call), a, ask(call, other));
-    if (!text.empty()) {
-      report.set_different(1);
-      report.clear_first();  // a difference is what is looked for
-      note_first(call, number, text, &report);
-    } else if (!a.fault.empty()) {
-      report.set_failed_again(report.failed_again() + 1);
-      note_first(call, number, a.fault, &report);
-    } else {
-      report.set_same(report.same() + 1);
-    }
-    return text.empty();
-  });
+  const auto must_leave_out = [&](const v1::CapsuleCall& call) {
+    return player.must_leave_out(call, *options.plugin) || player.must_leave_out(call, other);
+  };
+  for_each_call(&capsule, options, &report, progress, must_leave_out,
+                [&](const v1::CapsuleCall& call, std::uint32_t number) {
+                  const Answer a = ask(call, *options.plugin);
+                  const std::string text = check::difference(method_of(call), a, ask(call, other));
+                  if (!text.empty()) {
+                    report.set_different(1);
+                    report.clear_first();  // a difference is what is looked for
+                    note_first(call, number, text, &report);
+                  } else if (!a.fault.empty()) {
+                    report.set_failed_again(report.failed_again() + 1);
+                    note_first(call, number, a.fault, &report);
+                  } else {
+                    report.set_same(report.same() + 1);
+                  }
+                  return text.empty();
+                });
   return report;
 }
 

@@ -1,5 +1,6 @@
 // `gravitas capture`, `gravitas replay` and `gravitas bisect`: a plugin's calls, kept and asked again.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <iostream>
@@ -86,6 +87,9 @@ struct ReplayLine {
 
 void print_first(const report::v1::ReplayReport& report) {
   if (!report.note().empty()) std::cerr << fmt::format("capsule '{}': {}\n", report.capsule(), report.note());
+  if (report.left_out() > 0)
+    std::cout << fmt::format("{} calls left out, as {}\n", report.left_out(),
+                             fmt::join(report.left_out_because(), "; "));
   if (!report.remark().empty()) std::cout << report.remark() << '\n';
   if (!report.has_first()) return;
   const report::v1::ReplayFinding& first = report.first();

@@ -83,9 +83,11 @@ void SceneOptions::add_to(CLI::App* command) {
            "direct, shm or grpc, for all slots, or for one, which counts more: solver=direct; SLOT=grpc:ADDRESS: a "
            "worker of this machine "
            "that listens");
-  add_list(command, "--attach", &attached_,
-           "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "
-           "SLOT=ADDRESS, where `gravitas-worker --listen ADDRESS LIBRARY` listens");
+  add_list(
+      command, "--attach", &attached_,
+      "A worker that you started (under a debugger, a sanitizer) answers in a slot, without deadlines: "
+      "SLOT=ADDRESS, where `gravitas-worker --listen ADDRESS LIBRARY...` listens, with all plugins of the slot in the "
+      "order of `gravitas plan`");
   command->add_option("--threads", run_->threads, "Threads of each host")->check(whole_number(1, 1024));
   command->add_flag("--no-sandbox", no_sandbox_, "Let worker processes do what they like: for debuggers");
 }

@@ -1,5 +1,7 @@
 // A plugin's calls, kept and asked again alone: the same bytes on every carrier, the first difference found, the request
 // that a run ended at fails again.
+#include "services/capsule/capsule.h"
+
 #include <gmock/gmock.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
@@ -14,7 +16,6 @@
 
 #include "gravitas/report/v1/replay.pb.h"
 #include "plugin_sdk/solver.h"
-#include "services/capsule/capsule.h"
 #include "services/run/session.h"
 #include "tests/paths.h"
 #include "tests/services/cli/program.h"
@@ -119,6 +120,38 @@ TEST(Capsule, APluginThatServesOtherTypesCannotTakeThePlace) {
     EXPECT_EQ(result.exit_code, 2) << result.out;
     EXPECT_THAT(result.err, ::testing::ContainsRegex("cannot take the place: it does not serve the type '[A-Z]"));
   }
+}
+
+// A slot may have several plugins, each with types of its own: what is not for the plugin in question is left out.
+TEST(Capsule, CallsOfOtherTypesAreLeftOut) {
+  const ScratchFolder folder;
+  const std::string file = capture("force", folder);
+  const std::string gravity = in_build("/lib/gravitas/force_gravity.so"),
+                    basic = in_build("/lib/gravitas/force_basic.so");
+  // the number before these words
+  const auto count = [](const std::string& text, const std::string& words) {
+    const std::size_t at = text.find(words);
+    EXPECT_NE(at, std::string::npos) << text;
+    return at == std::string::npos ? 0 : std::stoi(text.substr(text.rfind('\n', at) + 1));
+  };
+  const int calls = count(run_program({"replay", file}, folder).out, " calls: ");
+  int asked = 0;
+  for (const auto& [plugin, missing] :
+       std::vector<std::pair<std::string, std::string>>{{gravity, "'Basic'"}, {basic, "'Gravity'"}}) {
+    const ProgramResult one = run_program({"replay", file, "--plugin", plugin}, folder);
+    EXPECT_EQ(one.exit_code, 0) << one.out << one.err;
+    EXPECT_THAT(one.out, HasSubstr(", 0 different"));
+    EXPECT_THAT(one.out, HasSubstr(" calls left out, as '" + plugin +
+                                   "' cannot take the place: it does not serve the type " + missing));
+    EXPECT_EQ(count(one.out, " calls: ") + count(one.out, " calls left out"), calls);
+    asked += count(one.out, " calls: ");
+    const ProgramResult same = run_program({"bisect", file, plugin, plugin}, folder);
+    EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
+    EXPECT_EQ(count(same.out, " calls answered alike"), count(one.out, " calls: "));
+  }
+  EXPECT_EQ(asked, calls);
+  // no call is for both
+  EXPECT_EQ(run_program({"bisect", file, gravity, basic}, folder).exit_code, 2);
 }
 
 // Problems of a run, solved alone: each says how it ended, by the solver that had it and by another one.
