@@ -88,6 +88,9 @@ const Wrong kWrong[] = {
      {"constraint/rows", "constraint/frames", "constraint/spherical"},
      "growth (m/s) of the joint error"},
     {"constraint_far_points", {"constraint/ways"}, "growth (m/s) of the joint error"},
+    {"constraint_swapped_points", {"constraint/rows"}, "growth (m/s) of the joint error"},
+    {"constraint_backward_stop", {"constraint/rows"}, "growth (m/s) of the joint error"},
+    {"constraint_no_force", {"constraint/rows"}, "with a maximum_force of 0"},
     // the second: its type lacks properties that the scene language gives it
     {"force_wrong_torque", {"force/basic", "force/basic-table"}, "torque is"},
     // with what its refusal says
