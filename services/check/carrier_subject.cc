@@ -161,6 +161,7 @@ std::string CarrierSubject::last_call() const {
 Answer CarrierSubject::ask(stage::Method method, const MessageColumns& request, const DerivativeFunction& derivative) {
   if (patience_.ends && patience_.ends()) throw Interrupted();
   last_method_ = method;
+  was_late_ = false;
   last_request_ = std::make_unique<MessageColumns>(request);
   Derivatives derivatives(this, derivative);
   const bool asks_back = static_cast<std::size_t>(method) == kIntegrate && derivative;
@@ -173,6 +174,7 @@ Answer CarrierSubject::ask(stage::Method method, const MessageColumns& request, 
   } catch (const kernel::StageFault& fault) {
     arm(0.0);
     const std::lock_guard lock(mutex_);
+    was_late_ = capped_ || fault.kind == kernel::FaultKind::kDeadline;
     count_fault(std::exchange(capped_, false)
                     ? fmt::format("no answer within {:g} s, whatever its marks of progress", patience_.cap)
                     : fault.text());

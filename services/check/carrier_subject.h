@@ -54,6 +54,8 @@ class CarrierSubject final : public conformance::Subject {
   // How often there was no answer, and why the last time.
   std::uint32_t faults() const { return faults_; }
   const std::string& last_fault() const { return last_fault_; }
+  // The last question was not answered, as its time was up.
+  bool was_late() const { return was_late_; }
   // The last call in words; empty before the first.
   std::string last_call() const;
 
@@ -81,6 +83,7 @@ class CarrierSubject final : public conformance::Subject {
 
   std::uint32_t faults_ = 0;
   std::string last_fault_;
+  bool was_late_ = false;
   stage::Method last_method_{};
   std::unique_ptr<MessageColumns> last_request_;
 

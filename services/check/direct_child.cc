@@ -126,14 +126,16 @@ std::string compare_direct(Examination& examination) {
   const int status = child.end();
   const std::size_t answered = text.find(kFound), same = std::min(answered, text.size());
   std::string found = answered == std::string::npos ? "" : text.substr(answered + 1);
-  if (found.empty() && !is_in_time) found = "no answer in time";
+  const bool is_late = found.empty() && !is_in_time;
+  if (is_late) found = "no answer in time";
   if (found.empty() && same < expected.size())
     found = WIFSIGNALED(status) ? fmt::format("its process ended with signal {}", strsignal(WTERMSIG(status)))
                                 : fmt::format("its process ended with exit code {}", WEXITSTATUS(status));
   if (found.empty()) return {};
   const Question& question = examination.questions()[std::min(same, expected.size() - 1)];
   examination.blamed_call = call_text(question.method, question.request);
-  return fmt::format("'{}' hosted direct: {}", question.name, found);
+  if (is_late) ++examination.late_answers;
+  return fmt::format("{}'{}' hosted direct: {}", is_late ? "too slow to be judged: " : "", question.name, found);
 }
 
 }  // namespace gravitas::check

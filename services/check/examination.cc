@@ -95,7 +95,10 @@ bool Run::is_chosen(const CheckCase& one) const {
 std::string Run::premise_of(Level level) const {
   if (level != Level::kHandshake && is_unusable_) return "it cannot be started as what it says it is (C0)";
   const bool compares = level == Level::kWire || level == Level::kState;
-  if (compares && of(Level::kPurity).failed() > 0) return "it compares answers, and those do not repeat (C2)";
+  const std::uint32_t impure = of(Level::kPurity).failed();
+  if (compares && impure > 0)
+    return impure > examination_.late_answers ? "it compares answers, and those do not repeat (C2)"
+                                              : "it compares answers, and some do not come in time (C2)";
   return {};
 }
 

@@ -65,6 +65,8 @@ class Examination {
   std::string blamed_call;
   std::function<void(const Progress&)> on_progress;
   Progress now;
+  // Cases of purity at which an answer did not come in time, which is no other answer.
+  std::uint32_t late_answers = 0;
   // Processes that died or hung in a call so far.
   std::uint32_t faults = 0;
 

@@ -23,9 +23,16 @@ std::string compare(Examination& examination, CarrierSubject* subject, const std
   const std::vector<Answer>& expected = examination.answers();
   for (const std::size_t i : order) {
     const Question& question = examination.questions()[i];
-    const std::string differs = difference(question.method, expected[i], subject->ask(question));
+    const Answer came = subject->ask(question);
+    const std::string differs = difference(question.method, expected[i], came);
     if (differs.empty()) continue;
     examination.blamed_call = call_text(question.method, question.request);
+    if (subject->was_late()) {
+      ++examination.late_answers;
+      return fmt::format("too slow to be judged: '{}' {}: {}; its limit here is {:g} s, {:g} s whatever it marks{}",
+                         question.name, where, came.fault, examination.patience.deadline, examination.patience.cap,
+                         examination.options.quick ? " (--quick sets them, without it there is more)" : "");
+    }
     return fmt::format("'{}' {}: {}", question.name, where, differs);
   }
   return {};

@@ -1,5 +1,6 @@
 // The verdicts of `gravitas check`: every plugin of the tree conforms, every one that misbehaves on purpose fails at the
 // level that stands beside it. No plugin is named here.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -142,6 +143,16 @@ TEST(CheckOfDirectHosting, TellsWhatDependsOnIt) {
   EXPECT_NE(report.findings(0).text().find("hosted direct: number 0 of column error_estimate was 1, then 0"),
             std::string::npos)
       << report.findings(0).text();
+}
+
+TEST(CheckOfPurity, AnAnswerThatDoesNotComeInTimeIsNoOtherAnswer) {
+  const auto report = check_library(kFaulty + "/slow_with_threads.so", {.quick = true, .level = {}, .only_case = {}});
+  ASSERT_GE(report.findings_size(), 1) << report.DebugString();
+  EXPECT_EQ(report.findings(0).case_(), "purity/threads");
+  EXPECT_THAT(report.findings(0).text(), testing::StartsWith("too slow to be judged: "));
+  EXPECT_THAT(report.findings(0).text(), testing::HasSubstr("its limit here is 1 s, 2 s whatever it marks (--quick"));
+  for (const report::v1::CheckLevel& level : report.levels())
+    EXPECT_THAT(level.why(), testing::Not(testing::HasSubstr("do not repeat"))) << level.level();
 }
 
 // A command is judged as a library is, over the one carrier that it has.

@@ -128,14 +128,13 @@ TEST(Capsule, CallsOfOtherTypesAreLeftOut) {
   const std::string file = capture("force", folder);
   const std::string gravity = in_build("/lib/gravitas/force_gravity.so"),
                     basic = in_build("/lib/gravitas/force_basic.so");
-  const auto count_of = [](const std::string& text, const std::string& words) {
+  // the number before these words
+  const auto count = [](const std::string& text, const std::string& words) {
     const std::size_t at = text.find(words);
     EXPECT_NE(at, std::string::npos) << text;
-    const std::size_t line = at == std::string::npos ? 0 : text.rfind('\n', at) + 1;
-    return at == std::string::npos ? 0 : std::stoi(text.substr(line));
+    return at == std::string::npos ? 0 : std::stoi(text.substr(text.rfind('\n', at) + 1));
   };
-  const ProgramResult all = run_program({"replay", file}, folder);
-  const int calls = count_of(all.out, " calls: ");
+  const int calls = count(run_program({"replay", file}, folder).out, " calls: ");
   int asked = 0;
   for (const auto& [plugin, missing] :
        std::vector<std::pair<std::string, std::string>>{{gravity, "'Basic'"}, {basic, "'Gravity'"}}) {
@@ -144,14 +143,14 @@ TEST(Capsule, CallsOfOtherTypesAreLeftOut) {
     EXPECT_THAT(one.out, HasSubstr(", 0 different"));
     EXPECT_THAT(one.out, HasSubstr(" calls left out, as '" + plugin +
                                    "' cannot take the place: it does not serve the type " + missing));
-    EXPECT_EQ(count_of(one.out, " calls: ") + count_of(one.out, " calls left out"), calls);
-    asked += count_of(one.out, " calls: ");
+    EXPECT_EQ(count(one.out, " calls: ") + count(one.out, " calls left out"), calls);
+    asked += count(one.out, " calls: ");
     const ProgramResult same = run_program({"bisect", file, plugin, plugin}, folder);
     EXPECT_EQ(same.exit_code, 0) << same.out << same.err;
-    EXPECT_EQ(count_of(same.out, " calls answered alike"), count_of(one.out, " calls: "));
+    EXPECT_EQ(count(same.out, " calls answered alike"), count(one.out, " calls: "));
   }
   EXPECT_EQ(asked, calls);
-  // nobody serves what both serve
+  // no call is for both
   EXPECT_EQ(run_program({"bisect", file, gravity, basic}, folder).exit_code, 2);
 }
 
@@ -219,16 +218,16 @@ TEST(Capsule, APoisonedRequestIsKeptAndFailsAgainAlone) {
 }
 
 // An answer that came, and that a run would not use, is a failure, and in the run's words.
-struct Refused {
+struct UnusableAnswer {
   const char *slot, *library, *name, *sound;
   const char* words;  // of run and replay alike
   const char* every;  // CheckPhysicsEvery
 };
 
-class RefusedAnswer : public ::testing::TestWithParam<Refused> {};
+class RefusedAnswer : public ::testing::TestWithParam<UnusableAnswer> {};
 
 TEST_P(RefusedAnswer, FailsAgainAlone) {
-  const Refused& one = GetParam();
+  const UnusableAnswer& one = GetParam();
   const ScratchFolder folder;
   const KeptRequest kept = kept_request(one.slot, one.library, one.name, folder, shipped_scene("stack"),
                                         {"--set", std::string("Simulator.CheckPhysicsEvery=") + one.every});
@@ -253,12 +252,12 @@ TEST_P(RefusedAnswer, FailsAgainAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, RefusedAnswer,
-                         ::testing::Values(Refused{"space", "space_unsorted", "Space=Unsorted", "DynamicBVH",
-                                                   "its answer is wrong: pair of row ", "0"},
-                                           Refused{"solver", "solver_sticky", "Solver=Sticky", "Sequential",
-                                                   "pulls the bodies together", "0"},
-                                           Refused{"solver", "solver_gains_energy", "Solver=GainsEnergy", "Sequential",
-                                                   "its answer breaks a law: ", "1"}),
+                         ::testing::Values(UnusableAnswer{"space", "space_unsorted", "Space=Unsorted", "DynamicBVH",
+                                                          "its answer is wrong: pair of row ", "0"},
+                                           UnusableAnswer{"solver", "solver_sticky", "Solver=Sticky", "Sequential",
+                                                          "pulls the bodies together", "0"},
+                                           UnusableAnswer{"solver", "solver_gains_energy", "Solver=GainsEnergy",
+                                                          "Sequential", "its answer breaks a law: ", "1"}),
                          [](const auto& one) { return std::string(one.param.library); });
 
 // Joints are asked by the plugin of their type alone.
@@ -294,99 +293,95 @@ TEST(Capsule, PhysicsThatCannotBeJudgedIsNotCured) {
 TEST(Capsule, RefusedAnswersOfACaptureFailAgain) {
   const ScratchFolder folder;
   const std::string plugins =
-      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = "solver" Library = "" +
-                                           in_build("/lib/gravitas-faulty/solver_gains_energy.so") + ""
-}
-}
-");
-    const std::string file = folder.path("energy.capsule");
-const ProgramResult captured = run_program({"capture", shipped_scene("stack"), plugins, "--set", "Solver=GainsEnergy",
-                                            "--slot", "solver", "--out", file, "--calls", "1"},
-                                           folder);
-ASSERT_EQ(captured.exit_code, 0) << captured.err;
-const ProgramResult plain = run_program({"replay", file}, folder);
-EXPECT_EQ(plain.exit_code, 0) << plain.out;
-  EXPECT_THAT(plain.out, HasSubstr("1 same, 0 different
-"));
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Library = \"" +
+                                           in_build("/lib/gravitas-faulty/solver_gains_energy.so") + "\" } }");
+  const std::string file = folder.path("energy.capsule");
+  const ProgramResult captured = run_program({"capture", shipped_scene("stack"), plugins, "--set", "Solver=GainsEnergy",
+                                              "--slot", "solver", "--out", file, "--calls", "1"},
+                                             folder);
+  ASSERT_EQ(captured.exit_code, 0) << captured.err;
+  const ProgramResult plain = run_program({"replay", file}, folder);
+  EXPECT_EQ(plain.exit_code, 0) << plain.out;
+  EXPECT_THAT(plain.out, HasSubstr("1 same, 0 different\n"));
   const ProgramResult judged = run_program({"replay", file, "--physics"}, folder);
   EXPECT_EQ(judged.exit_code, 4) << judged.out;
   EXPECT_THAT(judged.out, HasSubstr("its answer breaks a law: kinetic energy grows"));
-  }
+}
 
-  TEST(Capsule, BytesOfAnyKindAreReadWithoutHarm) {
-    const ScratchFolder folder;
-    const std::string file = capture("solver", folder);
-    std::ifstream in(file, std::ios::binary);
-    const std::string whole((std::istreambuf_iterator<char>(in)), {});
-    std::uint64_t state = 7;
-    const auto draw = [&](std::size_t below) {
-      state = state * 6364136223846793005U + 1442695040888963407U;
-      return static_cast<std::size_t>((state >> 33) % below);
-    };
-    for (int i = 0; i < 300; ++i) {
-      std::string bytes = whole.substr(0, i % 3 == 0 ? draw(whole.size()) : whole.size());
-      if (i % 3 != 0)
-        bytes[draw(i % 3 == 1 ? bytes.size() : std::min<std::size_t>(200, bytes.size()))] ^=
-            static_cast<char>(1 + draw(255));
-      const std::string damaged = folder.write("damaged.capsule", bytes);
-      try {
-        capsule::Reader reader(damaged);
-        recorder::v1::CapsuleCall call;
-        std::size_t calls = 0;
-        while (reader.next(&call)) ++calls;
-        EXPECT_LE(calls, 12U);
-        // a cut between two records is none
-        EXPECT_TRUE(!reader.note().empty() || i % 3 == 0);
-      } catch (const BadInput& refusal) {
-        EXPECT_THAT(refusal.what(), HasSubstr("damaged.capsule"));
-      }
+TEST(Capsule, BytesOfAnyKindAreReadWithoutHarm) {
+  const ScratchFolder folder;
+  const std::string file = capture("solver", folder);
+  std::ifstream in(file, std::ios::binary);
+  const std::string whole((std::istreambuf_iterator<char>(in)), {});
+  std::uint64_t state = 7;
+  const auto draw = [&](std::size_t below) {
+    state = state * 6364136223846793005U + 1442695040888963407U;
+    return static_cast<std::size_t>((state >> 33) % below);
+  };
+  for (int i = 0; i < 300; ++i) {
+    std::string bytes = whole.substr(0, i % 3 == 0 ? draw(whole.size()) : whole.size());
+    if (i % 3 != 0)
+      bytes[draw(i % 3 == 1 ? bytes.size() : std::min<std::size_t>(200, bytes.size()))] ^=
+          static_cast<char>(1 + draw(255));
+    const std::string damaged = folder.write("damaged.capsule", bytes);
+    try {
+      capsule::Reader reader(damaged);
+      recorder::v1::CapsuleCall call;
+      std::size_t calls = 0;
+      while (reader.next(&call)) ++calls;
+      EXPECT_LE(calls, 12U);
+      // a cut between two records is none
+      EXPECT_TRUE(!reader.note().empty() || i % 3 == 0);
+    } catch (const BadInput& refusal) {
+      EXPECT_THAT(refusal.what(), HasSubstr("damaged.capsule"));
     }
   }
+}
 
-  // What cannot be read shows nothing of the plugin.
-  TEST(Capsule, ADamagedOneIsBadInput) {
-    const ScratchFolder folder;
-    const std::string whole = harness::read_file(capture("solver", folder));
-    for (const std::size_t size : {whole.size() - 10, whole.size() / 2}) {
-      const std::string cut = folder.write("cut.capsule", whole.substr(0, size));
-      for (const std::vector<std::string>& words :
-           {std::vector<std::string>{"replay", cut}, {"bisect", cut, "Sequential", "Sequential"}}) {
-        const ProgramResult result = run_program(words, folder);
-        EXPECT_EQ(result.exit_code, 2) << result.out;
-        EXPECT_THAT(result.err, HasSubstr("it is cut short"));
-      }
-    }
-  }
-
-  TEST(Capsule, RefusalsSayWhatIsAllowed) {
-    const ScratchFolder folder;
-    const std::string scene = shipped_scene("two_spheres_motor"), out = folder.path("x.capsule");
-    const auto expect = [&](const std::vector<std::string>& words, const std::string& text) {
+// What cannot be read shows nothing of the plugin.
+TEST(Capsule, ADamagedOneIsBadInput) {
+  const ScratchFolder folder;
+  const std::string whole = harness::read_file(capture("solver", folder));
+  for (const std::size_t size : {whole.size() - 10, whole.size() / 2}) {
+    const std::string cut = folder.write("cut.capsule", whole.substr(0, size));
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"replay", cut}, {"bisect", cut, "Sequential", "Sequential"}}) {
       const ProgramResult result = run_program(words, folder);
-      EXPECT_EQ(result.exit_code, 2);
-      EXPECT_THAT(result.err, HasSubstr(text));
-    };
-    expect({"capture", scene, "--slot", "motor", "--out", out}, "space, collision, constraint, force, solver");
-    expect({"capture", scene, "--slot", "solver", "--out", folder.path("no/x")}, "No such file");
-    expect({"replay", folder.path("missing")}, "No such file");
-    expect({"replay", scene}, "is no capsule");
-    const std::string pipe = folder.path("pipe");
-    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-    expect({"replay", pipe}, "it is not an ordinary file");
-    const std::string file = capture("solver", folder);
-    expect({"replay", file, "--call", "999"}, "has no such call");
-    // what is there is not lost to a run that records nothing
-    const std::string whole = harness::read_file(file);
-    expect({"capture", scene, "--slot", "solver", "--out", file, "--steps", "5", "--from-step", "10"},
-           "ended after step 5");
-    expect({"capture", scene, "--slot", "solver", "--out", file, "--set", "Solver.Iterations=0"}, "Iterations");
-    EXPECT_EQ(harness::read_file(file), whole);
-    // a check of nothing is none
-    std::uint32_t header = 0;
-    std::memcpy(&header, &whole[24], sizeof header);
-    expect({"replay", folder.write("empty", whole.substr(0, 24 + 4 + header + 8))}, "it holds no calls");
-    expect({"bisect", file, "Sequential", "Nobody"}, "Nobody");
+      EXPECT_EQ(result.exit_code, 2) << result.out;
+      EXPECT_THAT(result.err, HasSubstr("it is cut short"));
+    }
   }
+}
 
-  }  // namespace
-  }  // namespace gravitas
+TEST(Capsule, RefusalsSayWhatIsAllowed) {
+  const ScratchFolder folder;
+  const std::string scene = shipped_scene("two_spheres_motor"), out = folder.path("x.capsule");
+  const auto expect = [&](const std::vector<std::string>& words, const std::string& text) {
+    const ProgramResult result = run_program(words, folder);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(text));
+  };
+  expect({"capture", scene, "--slot", "motor", "--out", out}, "space, collision, constraint, force, solver");
+  expect({"capture", scene, "--slot", "solver", "--out", folder.path("no/x")}, "No such file");
+  expect({"replay", folder.path("missing")}, "No such file");
+  expect({"replay", scene}, "is no capsule");
+  const std::string pipe = folder.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  expect({"replay", pipe}, "it is not an ordinary file");
+  const std::string file = capture("solver", folder);
+  expect({"replay", file, "--call", "999"}, "has no such call");
+  // what is there is not lost to a run that records nothing
+  const std::string whole = harness::read_file(file);
+  expect({"capture", scene, "--slot", "solver", "--out", file, "--steps", "5", "--from-step", "10"},
+         "ended after step 5");
+  expect({"capture", scene, "--slot", "solver", "--out", file, "--set", "Solver.Iterations=0"}, "Iterations");
+  EXPECT_EQ(harness::read_file(file), whole);
+  // a check of nothing is none
+  std::uint32_t header = 0;
+  std::memcpy(&header, &whole[24], sizeof header);
+  expect({"replay", folder.write("empty", whole.substr(0, 24 + 4 + header + 8))}, "it holds no calls");
+  expect({"bisect", file, "Sequential", "Nobody"}, "Nobody");
+}
+
+}  // namespace
+}  // namespace gravitas
