@@ -113,7 +113,8 @@ void add_serve(CLI::App* app, Action* action) {
       "--checkpoint", line->options.run.checkpoint,
       "Keep a checkpoint in this file (replaced as a whole) and a journal in FILE.journal, with what was changed live: "
       "at "
-      "the start, at the end, and as --checkpoint-every says; --resume, here and of `gravitas run`, goes on from it");
+      "the start, at the end, and as --checkpoint-every says; --resume, here and of `gravitas run`, goes on from it. A "
+      "reset begins it anew");
   command
       ->add_option("--checkpoint-every", line->options.run.checkpoint_every,
                    "Steps between checkpoints, counted from t = 0")

@@ -29,8 +29,8 @@
 #pragma once
 
 #include <array>
-#include <optional>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "plugin_sdk/solver/bodies.h"
