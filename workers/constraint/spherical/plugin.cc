@@ -64,10 +64,10 @@ class Spherical final : public ConstraintPlugin {
                   .at_most(kHalfTurn)
                   .means("Largest angle of Axis in body 2 against Axis in body 1; none if absent."),
               Property::table("ReachCone", 2, "rad", "world")
-                  .means(
-                      "An irregular cone instead: azimuth, rising within 0 ... 2 pi, and largest angle there; three "
-                      "rows at least, linear in the azimuth between them. Azimuths count right-handed about Axis from the "
-                      "world's x as seen along it; from -z where Axis is along x, to 1e-3."),
+                  .means("An irregular cone instead: azimuth, rising within 0 ... 2 pi, and largest angle there; three "
+                         "rows at least, linear in the azimuth between them. Azimuths count right-handed about Axis "
+                         "from the "
+                         "world's x as seen along it; from -z where Axis is along x, to 1e-3."),
               Property::vector("Axis", "1", "world")
                   .means("Axis of cone and twist at the start, any length; what coordinates are counted from, of a "
                          "joint without limits, too."),
