@@ -101,10 +101,10 @@ struct ConstraintDescription {
   std::string id;
   std::string type;
   std::vector<double> parameters;
-  std::uint32_t body1 = kNone, body2 = kNone;  // kNone: the world
-  double breaking_threshold = 0.0;             // joint error, m; 0: never
+  std::uint32_t body1 = kNone, body2 = kNone;          // kNone: the world
+  double breaking_threshold = 0.0;                     // joint error, m; 0: never
   double breaking_force = 0.0, breaking_torque = 0.0;  // N, N m; 0: never
-  std::uint32_t plugin = 0;                    // which of the constraint slot's plugins serves the type
+  std::uint32_t plugin = 0;                            // which of the constraint slot's plugins serves the type
   // Poses of its bodies in which it is bound; absent: the initial ones. A joint of a scene that was edited has others.
   std::optional<std::array<Pose, 2>> bound_at = {};
   bool is_kept = false;  // it held its bodies before an edit

@@ -26,8 +26,8 @@ struct JointRows {
 };
 
 struct JointLoad {
-  double error = 0.0;  // at S_{n+1}, m, or rad for angular rows
-  double force = 0.0;  // norm of the sum of what pushed, N
+  double error = 0.0;   // at S_{n+1}, m, or rad for angular rows
+  double force = 0.0;   // norm of the sum of what pushed, N
   double torque = 0.0;  // norm of the sum of what turned, about the joint's first point at S_{n+1}, N m
 };
 

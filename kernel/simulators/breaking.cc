@@ -58,9 +58,9 @@ void Environment::update_joints() {
     const double threshold = description.breaking_threshold;
     const JointLoad load = joint_load(rows, one, two, h);
     const bool is_torn = contradicts && (force > 0.0 || torque > 0.0) && is_pulled_apart(rows, one, two);
-    const double overload = std::max({share(is_torn ? kUnlimited : load.force, force),
-                                      share(is_torn ? kUnlimited : load.torque, torque),
-                                      threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0});
+    const double overload =
+        std::max({share(is_torn ? kUnlimited : load.force, force), share(is_torn ? kUnlimited : load.torque, torque),
+                  threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0});
     if (overload > 1.0) overloaded.emplace_back(-overload, joint);
     figures_.joint_error = std::max(figures_.joint_error, load.error);
   }

@@ -229,8 +229,8 @@ class ServedRun final : private kernel::CommitListener {
   std::uint32_t poisoned_step_ = 0;  // the last
   std::vector<kernel::FaultInjection> injected_;
   std::vector<Order> orders_;
-  std::uint32_t last_order_ = 0;  // its number
-  std::vector<std::string> warnings_;   // different ones
+  std::uint32_t last_order_ = 0;       // its number
+  std::vector<std::string> warnings_;  // different ones
   Clock::time_point next_collection_;
 
   std::optional<std::uint32_t> steps_left_;  // of a step order

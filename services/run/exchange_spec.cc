@@ -114,9 +114,10 @@ kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDe
   const InstalledPlugin* plugin =
       is_path ? catalog->add_library(spec.plugin, &problem) : catalog->find_plugin(spec.slot, spec.plugin);
   if (plugin == nullptr && is_path)
-    throw BadInput(fmt::format("{}: it cannot be used: {}; allowed: the name of a plugin that is installed or that the "
-                               "scene names, or the path of a library",
-                               spec.text, problem));
+    throw BadInput(
+        fmt::format("{}: it cannot be used: {}; allowed: the name of a plugin that is installed or that the "
+                    "scene names, or the path of a library",
+                    spec.text, problem));
   if (plugin == nullptr) {
     throw BadInput(fmt::format("{}: no {} plugin '{}' is installed; {}, or the path of a library", spec.text,
                                slot_name(spec.slot), spec.plugin,

@@ -82,8 +82,7 @@ class Run final : private kernel::CommitListener {
     if (resumed) apply_decisions(*resumed, &answering);
     require_workers(answering.now);
     environment_ = start(answering.begun, starter(), &scene_);
-    if (!options_.instrumentation.empty() || !options_.joints.empty())
-      survey_.emplace(answering.now, options_.starter);
+    if (!options_.instrumentation.empty() || !options_.joints.empty()) survey_.emplace(answering.now, options_.starter);
     if (options_.listener) begin_listening();
     figures_ = std::make_unique<Figures>(description_);
     guard([&] { figures_->follow(environment_.get()); });
@@ -235,8 +234,7 @@ class Run final : private kernel::CommitListener {
   }
 
   void resume(Resumption* from, const kernel::EnvironmentDescription& answering) {
-    from_checkpoint(options_.resume,
-                    [&] { restore(&from->checkpoint, answering, catalog_, environment_.get()); });
+    from_checkpoint(options_.resume, [&] { restore(&from->checkpoint, answering, catalog_, environment_.get()); });
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
     figures_->resume(resumed_tally_);

@@ -369,9 +369,11 @@ TEST(ChainOfCones, StaysClosedAndGainsNoEnergy) {
 TEST(ConeOfABody, HoldsWithSmooth) {
   const std::string text =
       "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = 0.01 Duration = 0.5 } }\n"
-      "Environment { Space { Bodies { Body { Id = \"B\" Mass = 1 PrincipalMoments = {0.04, 0.08, 0.1} KineticProperties "
+      "Environment { Space { Bodies { Body { Id = \"B\" Mass = 1 PrincipalMoments = {0.04, 0.08, 0.1} "
+      "KineticProperties "
       "{ Position = {-0.6, 0, 0.3} LinearVelocity = {-0.9, -5.4, -1.8} AngularVelocity = {2, -3, 8} } } } }\n"
-      "Constraints { Constraint { Type = \"Spherical\" Id = \"J\" Body2 = \"B\" CustomProperties { BindPoint = {0, 0, 0} "
+      "Constraints { Constraint { Type = \"Spherical\" Id = \"J\" Body2 = \"B\" CustomProperties { BindPoint = {0, 0, "
+      "0} "
       "Axis = {0, 1, 0} ReachConeAngle = 0.3 } } } }\n";
   for (const std::string solver : {"Newton", "Direct"})
     for (const double per_second : {30.0, 60.0, 90.0, 120.0, 240.0}) {

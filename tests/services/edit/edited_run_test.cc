@@ -322,8 +322,9 @@ TEST(EditedRun, WhoSleepsWakesUp) {
 TEST(EditedRun, WhomAnEditDoesNotDisturbSleepsOn) {
   const auto happens = [](const std::vector<std::string>& edits, const std::string& rest = "",
                           const std::string& more = "") {
-    EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" + ball("A", "Position = {0, 0.1, 0}", kFalls) +
-                            ball("B", "Position = {3, 0.1, 0}", kFalls) + ball("Far", "Position = {100, 50, 0} LinearVelocity = {0, 0, 1}"),
+    EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" +
+                            ball("A", "Position = {0, 0.1, 0}", kFalls) + ball("B", "Position = {3, 0.1, 0}", kFalls) +
+                            ball("Far", "Position = {100, 50, 0} LinearVelocity = {0, 0, 1}"),
                         rest),
                   edits, {"Simulator.SleepEnergy=0.001", "Simulator.SleepTime=0.5"});
     if (!more.empty()) run.options.edits = {"add " + run.folder.write("more.gravitas", more) + "@step=81"};
@@ -367,8 +368,9 @@ TEST(EditedRun, WhomAnEditDoesNotDisturbSleepsOn) {
   EXPECT_THAT(happens({"set Constraint.Rope.MaximumDistance=5@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
   EXPECT_THAT(happens({"remove Constraint.Rope@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
   // no contact is looked for between what stands still
-  EXPECT_THAT(happens({}, "", "Bodies { Body { Id = \"Wall\" GeometryId = \"Unit\" Immovable = true KineticProperties { "
-                              "Position = {0.15, 0.1, 0} } } }"),
+  EXPECT_THAT(happens({}, "",
+                      "Bodies { Body { Id = \"Wall\" GeometryId = \"Unit\" Immovable = true KineticProperties { "
+                      "Position = {0.15, 0.1, 0} } } }"),
               ElementsAreArray(and_then({"A", "B"})));
 }
 
