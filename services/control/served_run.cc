@@ -1,4 +1,5 @@
-// How a served run steps, and what is done between its steps. What it tells about itself: served_run_status.cc.
+// How a served run steps, and what is done between its steps. What it tells about itself: served_run_status.cc; who decides about
+// pairs: served_run_listener.cc.
 #include "services/control/served_run.h"
 
 #include <fmt/format.h>
@@ -546,40 +547,6 @@ std::shared_ptr<Subscription> ServedRun::subscribe(const api::EventsRequest& req
     subscriptions_.push_back(subscription);
     return subscription;
   });
-}
-
-void ServedRun::listen(std::shared_ptr<RemoteListener> listener, double deadline) {
-  const double seconds = deadline == 0.0 ? kListenerDeadline : deadline;
-  if (!(seconds > 0.0 && seconds <= 60.0))
-    throw BadInput(fmt::format("a deadline of {:g} s; allowed: more than 0, up to 60", deadline));
-  between_steps([&] {
-    if (listener_) throw NotNow("another client decides about pairs");
-    listener_ = std::move(listener);
-    pair_decisions_.listen(listener_, seconds);
-    attend_listener();
-  });
-}
-
-void ServedRun::end_listening(const std::shared_ptr<RemoteListener>& listener) {
-  between_steps([&] {
-    if (listener_ != listener) return;
-    pair_decisions_.leave();
-    listener_.reset();
-  });
-}
-
-void ServedRun::attend_listener() {
-  environment_->set_pair_arbiter(&pair_decisions_);
-  recorder_->note_listener();
-}
-
-void ServedRun::leave_aside(const std::string& why) {
-  warnings_.push_back(why);
-  Event event{EventKind::kListener, environment_->step_count() + 1, environment_->time()};
-  event.text = why;
-  with_subscriptions([&](Subscription* one) { one->tell(event); });
-  listener_->dismiss(why);
-  listener_.reset();
 }
 
 void ServedRun::on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) {
