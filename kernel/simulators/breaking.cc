@@ -1,7 +1,7 @@
-// Joints that break. One that would bear more than its BreakingForce, or come open beyond its BreakingThreshold, bears nothing
-// in the inner step that would ask for it, which is solved again without it: with its impulse, a thread would stop a truck.
-// The most overloaded is the first to go, since that may relieve others; of joints that contradict each other the weakest. Where
-// many break, more go at once.
+// Joints that break. One that would bear more than its BreakingForce or its BreakingTorque, or come open beyond its
+// BreakingThreshold, bears nothing in the inner step that would ask for it, which is solved again without it: with its
+// impulse, a thread would stop a truck. The most overloaded is the first to go, since that may relieve others; of joints
+// that contradict each other the weakest. Where many break, more go at once.
 #include <algorithm>
 #include <optional>
 #include <utility>

@@ -72,6 +72,14 @@ bool is_measured(const Discrepancy& d, int axis) {
   return d.is_radial() || d.is_swing() ? axis == 0 && error > 1e-3 : error < kJointRounding;
 }
 
+// Along an axis, from its limit where there is one, which may move as the error does.
+double off(const Discrepancy& d, const Matrix3& axes, int axis) {
+  const double error = axes.col(axis).dot(d.point2 - d.point1);
+  if (axis_mode(d.modes, axis) != AxisMode::kLimited) return error;
+  if (d.upper[axis] < kUnlimited) return error - d.upper[axis];
+  return d.lower[axis] > -kUnlimited ? error - d.lower[axis] : error;
+}
+
 // For small moves from where joints hold the error a.(x2 - x1) grows along each axis as its row says, J v t: a wrong sign
 // is no small thing, as solvers then drive the joint open. Summed up over the axes, since a joint may choose others the next time.
 void compare_growth(Joints world, const std::vector<DescribedJoint>& before, Inquiry* inquiry) {
@@ -100,9 +108,7 @@ void compare_growth(Joints world, const std::vector<DescribedJoint>& before, Inq
     Vector3 growth = Vector3::Zero();
     for (int k = 0; k < 3; ++k) {
       if (!is_measured(was, k)) continue;
-      const double grown =
-          axes_after.col(k).dot(is.point2 - is.point1) - axes_before.col(k).dot(was.point2 - was.point1);
-      growth += grown / kTime * axes_after.col(k);
+      growth += (off(is, axes_after, k) - off(was, axes_before, k)) / kTime * axes_after.col(k);
     }
     // the next order, and rounding of points over the time
     inquiry->expect_near("growth (m/s) of the joint error of discrepancy " + std::to_string(i), growth, rates[i],

@@ -1,5 +1,5 @@
-// How a served run steps, and what is done between its steps. What it tells about itself: served_run_status.cc; who decides about
-// pairs: served_run_listener.cc.
+// How a served run steps, and what is done between its steps. What it tells about itself: served_run_status.cc; who
+// decides about pairs: served_run_listener.cc.
 #include "services/control/served_run.h"
 
 #include <fmt/format.h>

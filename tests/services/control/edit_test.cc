@@ -101,7 +101,8 @@ TEST(ServedEdit, SwapsThatAreToComeGoAlong) {
   EXPECT_EQ(solver().plugin(), "Newton");
   edit(&served, {move});  // in its probation
   std::map<std::uint32_t, std::string> ends;
-  for (const api::ServedSwap& swap : served.client.status().swaps())
+  const api::Status status = served.client.status();
+  for (const api::ServedSwap& swap : status.swaps())
     ends[swap.number()] = fmt::format("{} -> {} {} {}", swap.from(), swap.to(), swap.step(), swap.outcome());
   EXPECT_EQ(ends[newton.number()], "Sequential -> Newton 40 committed");
   EXPECT_EQ(ends[set.number()], "Sequential -> Sequential 13 committed");

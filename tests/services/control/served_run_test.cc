@@ -8,7 +8,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <future>
 #include <memory>
 #include <optional>
@@ -307,86 +306,6 @@ TEST(ServedRun, KeepsACheckpointThatGoesOn) {
   EXPECT_EQ(go_on().report.chain_hash(), chain);
   served.client.reset();
   EXPECT_EQ(go_on().report.chain_hash(), quiet_chain());
-}
-
-// From a checkpoint of step 20 and a journal up to 23 or more, in the middle of a swap's probation, with the edit before it.
-TEST(ServedRun, GoesOnFromACheckpoint) {
-  const gravitas::harness::ScratchFolder folder;
-  ServeOptions options = sample();
-  options.run.checkpoint = folder.path("served.ck");
-  options.run.checkpoint_every = 20;
-  const auto begin = [](Served* one) {
-    one->client.step(10);
-    one->edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
-    one->client.step(5);
-    one->client.swap(harness::parse_swap_request("solver=Newton@step=18"));
-    one->client.step(7);
-    one->edit({"set Body.Ball01.Position={0,3,0}"});
-    one->client.step(5);
-  };
-  const auto end = [](Served* one) {
-    one->client.step(1);
-    one->client.swap(harness::parse_swap_request("solver=Direct"));
-    one->client.step(40);
-    one->edit({"set Body.Ball01.LinearVelocity={1,0,0}"});
-    return one->to_the_end().chain_hash();
-  };
-  Served quiet(sample());
-  begin(&quiet);
-  const std::string middle = quiet.client.status().chain_hash(), chain = end(&quiet);
-  {
-    Served served(options);
-    begin(&served);
-  }
-  const std::string kept = harness::read_file(options.run.checkpoint);
-  const std::string journal = harness::read_file(options.run.checkpoint + ".journal");
-  for (const bool keeps : {false, true})
-    for (const char* hosting : {"shm", "direct"}) {
-      std::ofstream(options.run.checkpoint) << kept;
-      std::ofstream(options.run.checkpoint + ".journal") << journal;
-      ServeOptions again = sample(hosting);
-      again.run.resume = options.run.checkpoint;
-      if (keeps) again.run.checkpoint = options.run.checkpoint;
-      {
-        Served resumed(again);
-        api::Status status = resumed.client.status();
-        // edits are in the journal at once, commits before long
-        EXPECT_GE(status.step(), 23U) << hosting;
-        if (status.step() < 27U) status = resumed.client.step(27U - status.step());
-        EXPECT_EQ(status.state(), "paused");
-        EXPECT_EQ(status.chain_hash(), middle);
-        EXPECT_EQ(end(&resumed), chain) << hosting;
-        EXPECT_EQ(resumed.client.status().state(), "finished");
-      }
-      // what it kept itself goes on to the same end; the one that kept nothing changed nothing
-      Served twice(again);
-      if (keeps) {
-        EXPECT_EQ(twice.client.status().chain_hash(), chain);
-      } else {
-        if (twice.client.status().step() < 27U) twice.client.step(27U - twice.client.status().step());
-        EXPECT_EQ(end(&twice), chain);
-      }
-      twice.client.reset();
-      EXPECT_EQ(twice.client.status().step(), 0U);
-      EXPECT_EQ(twice.to_the_end().chain_hash(), quiet_chain());
-    }
-}
-
-TEST(ServedRun, DoesNotGoOnFromWhatIsNoCheckpointOfItsScene) {
-  const gravitas::harness::ScratchFolder folder;
-  ServeOptions options = sample("direct");
-  options.run.resume = folder.path("none");
-  EXPECT_THROW(ServedRun{options}, BadInput);
-  std::ofstream(options.run.resume) << "text";
-  EXPECT_THROW(ServedRun{options}, BadInput);
-  options.run.checkpoint = folder.path("other.ck");
-  options.run.resume.clear();
-  options.run.overrides = {"Force.NormalGravity.Acceleration={0,-4,0}"};
-  { Served other(options); }
-  std::swap(options.run.resume, options.run.checkpoint);
-  { Served same(options); }
-  options.run.overrides.clear();
-  EXPECT_THROW(ServedRun{options}, BadInput);
 }
 
 TEST(ServedRun, TheCallsOfItsNextStepsAreCaptured) {

@@ -35,8 +35,8 @@ TEST(Grammar, HasTheNamesOfTheLanguage) {
   EXPECT_THAT(
       names(v1::KineticProperties::descriptor()),
       ElementsAre("Position", "Orientation", "LinearVelocity", "AngularVelocity", "DampingCoefficient", "CanSleep"));
-  EXPECT_THAT(names(v1::Constraint::descriptor()),
-              ElementsAre("Type", "Id", "Body1", "Body2", "BreakingThreshold", "BreakingForce", "CustomProperties"));
+  EXPECT_THAT(names(v1::Constraint::descriptor()), ElementsAre("Type", "Id", "Body1", "Body2", "BreakingThreshold",
+                                                               "BreakingForce", "BreakingTorque", "CustomProperties"));
   EXPECT_THAT(names(v1::CollisionFilter::descriptor()), ElementsAre("DefaultAllow", "Rules", "Exceptions"));
   EXPECT_THAT(names(v1::Rule::descriptor()), ElementsAre("Allow", "Body", "Bodies", "Group", "Groups"));
   EXPECT_THAT(names(v1::Plugin::descriptor()),

@@ -12,15 +12,15 @@
 namespace gravitas::test {
 namespace {
 
-constexpr double kRadius = 0.2;
+constexpr double kDrumRadius = 0.2;
 
 class OnADrum : public testing::Test {
  protected:
   // About z through the origin, which is where the drum is; of the end of a rope.
   static std::vector<double> properties(const Vector3& end, double slack = 0.0, bool is_taut = false) {
     const double absent = std::nan("");
-    return {0,      0,      2,      kRadius, end.x(), end.y(), end.z(),
-            absent, absent, absent, slack,   absent,  absent,  is_taut ? 1.0 : 0.0};
+    return {0,      0,      2,      kDrumRadius, end.x(), end.y(), end.z(),
+            absent, absent, absent, slack,       absent,  absent,  is_taut ? 1.0 : 0.0};
   }
   static void turn(double angle, Pose* pose) { pose->orientation = exp_rotation(angle * Vector3::UnitZ()); }
   // What is too long, along the row.
@@ -35,19 +35,19 @@ TEST_F(OnADrum, ARopeRunsOnInvolutes) {
   for (int i = 0; i < 40; ++i) {
     const double length = random_.uniform(0.1, 2.0), unwound = random_.uniform(-9.0, 9.0),
                  round = random_.uniform(-3.0, 3.0), off = random_.uniform(-0.1, 0.1);
-    const double now = length + kRadius * (round + unwound);
+    const double now = length + kDrumRadius * (round + unwound);
     if (now < 0.05) continue;
     JointProblem joint(&plugin_, "Winch");
-    joint.bodies[1].pose.position = Vector3(kRadius, -length, 0);
+    joint.bodies[1].pose.position = Vector3(kDrumRadius, -length, 0);
     joint.bind(properties(joint.bodies[1].pose.position));
     // unwound by the drum, which turns back, and by the load, which goes round
     turn(-unwound, &joint.bodies[0].pose);
     const Vector3 normal(std::cos(round), std::sin(round), 0), along = normal.cross(Vector3::UnitZ());
-    joint.bodies[1].pose.position = kRadius * normal + (now + off) * along;
+    joint.bodies[1].pose.position = kDrumRadius * normal + (now + off) * along;
     const std::vector<Discrepancy> all = joint.describe();
     ASSERT_EQ(all.size(), 1U);
     EXPECT_NEAR(error(all[0]), off, 1e-13);
-    EXPECT_LT((all[0].point1 - kRadius * normal).norm(), 1e-13);
+    EXPECT_LT((all[0].point1 - kDrumRadius * normal).norm(), 1e-13);
     EXPECT_LT((all[0].axes * Vector3::UnitX() - along).norm(), 1e-13);
   }
 }
@@ -58,7 +58,7 @@ TEST_F(OnADrum, RowsAreTheRatesOfTheErrors) {
   for (int i = 0; i < 60; ++i) {
     JointProblem joint(&plugin_, "Winch");
     const Vector3 start = random_.vector(0.6);
-    if (std::fabs(std::hypot(start.x(), start.y()) - kRadius) < 0.03 || std::hypot(start.x(), start.y()) < 0.03)
+    if (std::fabs(std::hypot(start.x(), start.y()) - kDrumRadius) < 0.03 || std::hypot(start.x(), start.y()) < 0.03)
       continue;
     joint.bodies[1].pose.position = start;
     joint.bind(properties(start + Vector3(0, 0, 1e-3), 0.0, true));
@@ -78,8 +78,8 @@ TEST_F(OnADrum, RowsAreTheRatesOfTheErrors) {
 }
 
 TEST_F(OnADrum, TheStepTellsTheTurn) {
-  constexpr double kTurn = 2.0 * std::numbers::pi * kRadius;
-  const Vector3 end(kRadius, -3, 0);
+  constexpr double kTurn = 2.0 * std::numbers::pi * kDrumRadius;
+  const Vector3 end(kDrumRadius, -3, 0);
   for (const bool is_taut : {false, true})
     for (const double off : {0.05, -0.5, -0.85 * kTurn}) {
       JointProblem joint(&plugin_, "Winch");
@@ -105,9 +105,9 @@ TEST_F(OnADrum, TheStepTellsTheTurn) {
 TEST_F(OnADrum, AnEndWithinTheDrumIsNoFault) {
   for (const double far : {1.0, 1.0 - 1e-12, 0.5, 0.0}) {
     JointProblem joint(&plugin_, "Winch");
-    joint.bodies[1].pose.position = Vector3(kRadius, -1, 0);
+    joint.bodies[1].pose.position = Vector3(kDrumRadius, -1, 0);
     joint.bind(properties(joint.bodies[1].pose.position));
-    joint.bodies[1].pose.position = Vector3(far * kRadius, 0, 0);
+    joint.bodies[1].pose.position = Vector3(far * kDrumRadius, 0, 0);
     const std::vector<Discrepancy> all = joint.describe();
     ASSERT_EQ(all.size(), far > 0.0 ? 1U : 0U);
     if (far == 0.0) continue;
