@@ -148,6 +148,7 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // With the next step the island of a body is awake, if it sleeps. To be given again after a resume before that.
   void wake(std::uint32_t body) { wake_orders_.push_back(body); }
+  std::span<const std::uint32_t> wake_orders() const { return wake_orders_; }
   bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
 
   // At most one; null: nobody.

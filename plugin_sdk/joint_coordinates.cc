@@ -49,7 +49,8 @@ std::optional<Coordinate> twist_of(const Pose& frame1, const Pose& frame2, const
   if (!(bend > kAgainst)) return std::nullopt;
   const double rate = (bodies.spin2 - bodies.spin1).dot(one + two) / bend;
   const double twist = twist_between(frame1.orientation, frame2.orientation);
-  return Coordinate{limits.is_none() ? within_half_turn(twist) : limits.turn(twist, bodies.time_step * rate), rate};
+  // where it is: no step is to be foretold
+  return Coordinate{limits.is_none() ? within_half_turn(twist) : limits.turn(twist, 0.0), rate};
 }
 
 Coordinate swing_of(const Vector3& first, const Vector3& second, const JointBodies& bodies) {
@@ -77,7 +78,7 @@ std::optional<Coordinate> reversed(const std::optional<Coordinate>& angle) {
 
 double within_half_turn(double angle) {
   const double within = angle - kWholeTurn * std::round(angle / kWholeTurn);
-  return within > -kHalfTurn ? within : kHalfTurn;
+  return within <= -kHalfTurn ? kHalfTurn : within;
 }
 
 }  // namespace gravitas

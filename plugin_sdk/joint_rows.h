@@ -119,7 +119,7 @@ Vector3 axis_between(const Pose& frame1, const Pose& frame2);
 
 template <typename Emit>
 void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit) {
-  if (bound->at_end()) return;
+  if (bound->at_end() || !(rate > 0.0)) return;
   const double speed = bound->number(), torque = bound->number();
   // the power is that of the torque about what is driven
   emit(driven_row(axis, rate * speed, torque < kUnlimited * rate ? torque / rate : kUnlimited));

@@ -14,6 +14,7 @@
 namespace gravitas::kernel {
 namespace {
 
+constexpr double kTorn = 1e150;    // N or N m, what one bears that is pulled apart: over whatever bound finite
 constexpr std::size_t kToOne = 8;  // joints that have broken in the step, to one more that goes with the next
 
 }  // namespace
@@ -59,7 +60,7 @@ void Environment::update_joints() {
     const JointLoad load = joint_load(rows, one, two, h);
     const bool is_torn = contradicts && (force > 0.0 || torque > 0.0) && is_pulled_apart(rows, one, two);
     const double overload =
-        std::max({share(is_torn ? kUnlimited : load.force, force), share(is_torn ? kUnlimited : load.torque, torque),
+        std::max({share(is_torn ? kTorn : load.force, force), share(is_torn ? kTorn : load.torque, torque),
                   threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0});
     if (overload > 1.0) overloaded.emplace_back(-overload, joint);
     figures_.joint_error = std::max(figures_.joint_error, load.error);

@@ -59,6 +59,7 @@ void for_each_told(Subject& subject, std::uint64_t seed, const Judge& judge) {
   Draw draw(seed);
   for (const TypeDeclaration& type : joint_types_of(subject)) {
     if (type.coordinates.empty()) continue;
+    std::size_t rows = 0;
     for (const bool has_more : {false, true}) {
       for (int repeat = 0; repeat < 5; ++repeat) {
         Joints world = joined(type, &draw);
@@ -68,9 +69,11 @@ void for_each_told(Subject& subject, std::uint64_t seed, const Judge& judge) {
         Inquiry inquiry(subject, "coordinates of " + type.name + ", its bodies moved");
         world.bind(&inquiry);
         world.bodies[1].pose = displaced(world.bodies[1].pose, draw.vector(0.3), draw.vector(0.5));
+        rows += told(world, &inquiry).size();
         judge(type, world, &draw, &inquiry);
       }
     }
+    Inquiry(subject, "coordinates of " + type.name).expect(rows > 0, "tells none of those that it declares");
   }
 }
 

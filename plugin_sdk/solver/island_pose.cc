@@ -174,9 +174,10 @@ bool IslandSolver::follow_chords(double before) {
   for (;;) {
     place_unstiffened();
     turn_offset();
-    const std::size_t rows = cone_.rows.size();
+    std::vector<std::size_t> turns;
+    for (const EndJoint& joint : joints_) turns.push_back(joint.turns);
     build_pose();
-    if (cone_.rows.size() != rows) return false;  // what pulled pushes, and resists to no turn
+    if (!std::ranges::equal(joints_, turns, {}, &EndJoint::turns)) return false;  // other rows than have factors
     const BodyMotion x0 = start_of_step();
     pose_contradiction_ = cone_.correct(bodies_, x0, representable());
     ++summary_.iterations;

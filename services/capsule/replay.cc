@@ -324,9 +324,9 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
             text = other.what();
           }
         }
-        if (text.empty() && lacks_wrenches(call, capsule.header())) {
+        if (lacks_wrenches(call, capsule.header())) {
           report.set_remark("what the integrator was told in the run is not kept: it is told wrenches of zero");
-          if (call.breaks_law()) {
+          if (text.empty() && call.breaks_law()) {
             report.set_not_judged(report.not_judged() + 1);
             return true;
           }

@@ -95,6 +95,8 @@ bool Run::is_chosen(const CheckCase& one) const {
 std::string Run::premise_of(Level level) const {
   if (level != Level::kHandshake && is_unusable_) return "it cannot be started as what it says it is (C0)";
   const bool compares = level == Level::kWire || level == Level::kState;
+  if (compares && examination_.is_mute())
+    return "it compares answers, and the ordinary questions are not answered (C2)";
   const std::uint32_t impure = of(Level::kPurity).failed();
   if (compares && impure > 0)
     return impure > examination_.late_answers ? "it compares answers, and those do not repeat (C2)"

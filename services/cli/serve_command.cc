@@ -122,7 +122,8 @@ void add_serve(CLI::App* app, Action* action) {
       ->needs(checkpoint);
   command->add_option("--resume", line->options.run.resume,
                       "Go on from this checkpoint and the journal beside it, of a server or a run; --steps and "
-                      "--duration count from t = 0, and a reset begins the scene");
+                      "--duration count from t = 0, and a reset begins the scene; a library that was swapped in by "
+                      "its path must be installed, or named by the scene");
   command->add_option("--socket", line->socket,
                       "Listen at this path instead of a private folder in $XDG_RUNTIME_DIR or /tmp");
   command->callback([=] { *action = [=] { return serve(line.get()); }; });

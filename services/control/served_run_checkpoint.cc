@@ -17,8 +17,15 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
                                  std::vector<std::string>* warnings) {
   Resumption found = read_resumption(options.resume, description, warnings);
   std::uint32_t last = found.journal.last_step;
-  for (const edit::v1::Edit& one : found.journal.edits) last = std::max(last, one.step());
-  for (const recorder::v1::Decision& one : found.journal.decisions) last = std::max(last, one.step());
+  // the checkpoint has what was changed before a step that was not made
+  const auto count = [](const auto& all, std::uint32_t step) {
+    return std::ranges::count_if(all, [&](const auto& one) { return one.step() == step; });
+  };
+  for (const edit::v1::Edit& one : found.journal.edits)
+    if (count(found.checkpoint.edits(), one.step()) < count(found.journal.edits, one.step()))
+      last = std::max(last, one.step());
+  for (const recorder::v1::Decision& one : found.journal.decisions)
+    if (count(found.checkpoint.decisions(), one.step()) == 0) last = std::max(last, one.step());
   last = std::min(last, description.steps);
   if (last <= found.checkpoint.step()) return found;
   const channel::PrivateFolder folder;
@@ -30,8 +37,10 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
   const RunResult result = run(
       again, [] { return false; }, [](const Progress&) {});
   if (result.outcome != RunOutcome::kCompleted)
-    throw BadInput(fmt::format("checkpoint '{}': steps {} to {}, which its journal knows, cannot be made again: {}",
-                               options.resume, found.checkpoint.step() + 1, last, result.fault));
+    throw BadInput(
+        fmt::format("checkpoint '{}': steps {} to {}, which its journal knows, cannot be made again: {}; `gravitas run "
+                    "--resume` pauses there",
+                    options.resume, found.checkpoint.step() + 1, last, result.fault));
   std::vector<std::string> known;  // was told above
   Resumption caught_up = read_resumption(again.checkpoint, description, &known);
   caught_up.journal = std::move(found.journal);

@@ -28,7 +28,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
-    const std::vector<std::uint32_t> woken = edited.woken(*environment_);
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next);
     // swaps that are to come go along, the others are made
     std::vector<Order> pending;
     for (Order& one : pending_orders()) {

@@ -27,9 +27,20 @@ Ids changed(const Elements& before, const Elements& after) {
   return ids;
 }
 
+// As built: a compound has in it what it names.
+Ids changed_shapes(const std::vector<kernel::ShapeDescription>& before,
+                   const std::vector<kernel::ShapeDescription>& after) {
+  Ids ids;
+  for (const kernel::ShapeDescription& one : after) {
+    const auto old = std::ranges::find(before, one.id, &kernel::ShapeDescription::id);
+    if (old == before.end() || old->type != one.type || old->parameters != one.parameters) ids.insert(one.id);
+  }
+  return ids;
+}
+
 struct ChangedBodies {
   Ids all;
-  Ids placed;  // of these who may now be where nothing was: new, moved, or of another shape
+  Ids placed;  // of these who may now meet others: new, moved, of another shape, or in other groups
 };
 
 ChangedBodies changed_bodies(const EditedParts& parts) {
@@ -39,16 +50,18 @@ ChangedBodies changed_bodies(const EditedParts& parts) {
     bodies.all.insert(id);
     if (motion.position || motion.orientation) bodies.placed.insert(id);
   }
-  const Ids shapes = changed(parts.before.geometries().geometry(), parts.after.geometries().geometry());
+  const Ids shapes = changed_shapes(parts.described.shapes, parts.next.shapes);
   const Ids surfaces = changed(parts.before.materials().material(), parts.after.materials().material());
   const Ids forces = changed(parts.before.forces().force(), parts.after.forces().force());
-  std::map<std::string, std::string> shape_before;
-  for (const scene::v1::Body& body : before.space().bodies().body()) shape_before[body.id()] = body.geometry_id();
+  std::map<std::string, const scene::v1::Body*> body_before;
+  for (const scene::v1::Body& body : before.space().bodies().body()) body_before[body.id()] = &body;
   for (const scene::v1::Body& body : after.space().bodies().body()) {
     const bool is_pushed = std::ranges::any_of(body.forces(), [&](const auto& id) { return forces.contains(id); });
     if (is_pushed || surfaces.contains(body.material())) bodies.all.insert(body.id());
-    if (shapes.contains(body.geometry_id()) || shape_before[body.id()] != body.geometry_id())
-      bodies.placed.insert(body.id());
+    const auto old = body_before.find(body.id());
+    const bool meets_others = old == body_before.end() || old->second->geometry_id() != body.geometry_id() ||
+                              !std::ranges::equal(old->second->collision_groups(), body.collision_groups());
+    if (meets_others || shapes.contains(body.geometry_id())) bodies.placed.insert(body.id());
   }
   bodies.all.insert(bodies.placed.begin(), bodies.placed.end());
 
@@ -74,19 +87,18 @@ std::vector<bool> find_disturbed(const EditedParts& parts, std::span<const std::
   for (std::uint32_t i = 0; i < bodies.size(); ++i) disturbed[i] = changes.all.contains(bodies[i].id);
   const std::vector<bool> is_changed = disturbed;
   BodyUnion islands(bodies.size());
-  for (std::size_t i = 0; i + 1 < contact_body.size(); i += 2) {
-    const std::uint32_t a = contact_body[i], b = contact_body[i + 1];
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    if (a == kNone || b == kNone) return;
     if (is_movable(a) && is_movable(b)) {
       islands.join(a, b);
     } else {
       const std::uint32_t moves = is_movable(a) ? a : b;
       disturbed[moves] = disturbed[moves] || is_changed[a] || is_changed[b];
     }
-  }
-  for (std::size_t j = 0; j < intact.size(); ++j) {
-    const std::uint32_t a = parts.described.constraints[j].body1, b = parts.described.constraints[j].body2;
-    if (intact[j] != 0 && a != kNone && b != kNone && is_movable(a) && is_movable(b)) islands.join(a, b);
-  }
+  };
+  for (std::size_t i = 0; i + 1 < contact_body.size(); i += 2) join(contact_body[i], contact_body[i + 1]);
+  for (std::size_t j = 0; j < intact.size(); ++j)
+    if (intact[j] != 0) join(parts.described.constraints[j].body1, parts.described.constraints[j].body2);
   std::set<std::uint32_t> roots;
   for (std::uint32_t i = 0; i < bodies.size(); ++i)
     if (disturbed[i]) roots.insert(islands.root(i));

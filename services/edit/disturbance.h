@@ -1,4 +1,4 @@
-// Whom an edit disturbs: the bodies that it changes, by themselves or by their shape, surface, forces or joints, who touches
+// Whom an edit disturbs: the bodies that it sets or changes, by themselves or by their shape, surface, forces or joints, who touches
 // them, and who hangs together with those by contacts and joints. All others go on resting as they did.
 #pragma once
 

@@ -310,11 +310,10 @@ std::vector<bool> EditedScene::resting_on(const kernel::SavedState& before) cons
   return resting;
 }
 
-std::vector<std::uint32_t> EditedScene::woken(const kernel::Environment& now) const {
-  const std::vector<bool> resting = resting_on(now.saved_state());
+std::vector<std::uint32_t> EditedScene::woken(const kernel::Environment& now, const kernel::Environment& next) const {
   std::vector<std::uint32_t> bodies;
   for (std::uint32_t i = 0; i < old_body_.size(); ++i)
-    if (old_body_[i] != kNone && !resting[i] && now.is_asleep(old_body_[i])) bodies.push_back(i);
+    if (old_body_[i] != kNone && now.is_asleep(old_body_[i]) && !next.is_asleep(i)) bodies.push_back(i);
   return bodies;
 }
 
@@ -324,7 +323,7 @@ void EditedScene::keep_rest(const kernel::SavedState& before, std::span<std::uin
   const ColumnTable state(before);
   const std::span<const std::uint32_t> old_rested = state.at<std::uint32_t>("rested");
   const std::span<const double> old_wrench = state.at<double>("rest_wrench");
-  if (rested.empty() || old_rested.empty() || wrench.empty() != old_wrench.empty()) return;
+  if (rested.empty() || old_rested.empty() || (!wrench.empty() && old_wrench.empty())) return;
   const std::vector<bool> resting = resting_on(before);
   for (std::size_t i = 0; i < rested.size(); ++i) {
     if (!resting[i]) continue;
@@ -426,6 +425,8 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
         columns.at(column.name));
   if (const std::string problem = next->restore(saved); !problem.empty())
     throw std::logic_error("the edited scene does not take the state: " + problem);
+  for (const std::uint32_t body : now.wake_orders())
+    if (body_row[body] != kNone) next->wake(body_row[body]);
 
   std::vector<std::array<std::uint32_t, 2>> parted;
   for (std::size_t i = 0; i < touched.size() / 2; ++i)

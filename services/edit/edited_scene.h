@@ -49,8 +49,8 @@ class EditedScene {
   std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& begun,
                                              const kernel::HostStarter& starter = kernel::start_host) const;
 
-  // Bodies that slept, and whom the edit wakes.
-  std::vector<std::uint32_t> woken(const kernel::Environment& now) const;
+  // Bodies that slept in `now` and are awake in `next`, which has the state.
+  std::vector<std::uint32_t> woken(const kernel::Environment& now, const kernel::Environment& next) const;
 
   // Returns the pairs of bodies (rows of before) whose collision ends with the edit. Precondition: `next` runs
   // description(), whoever answers there. Throws std::logic_error if it does not take the state.

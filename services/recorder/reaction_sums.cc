@@ -209,12 +209,14 @@ void extrapolate_reactions(std::span<const ReactionSums> attempts, std::span<con
   for (const auto& [key, best] : found) {
     const ReactionSum& finest = attempts.back().at(key);
     if (is_left[group_of(finest)]) continue;
-    ReactionSum& sum = sums->at(key);
+    const auto told = sums->find(key);
+    if (told == sums->end()) continue;  // who answers now does not repeat the attempt
+    ReactionSum& sum = told->second;
     sum.point = best.point;
     sum.impulse += best.impulse - finest.impulse;
     sum.turn += best.turn - finest.turn;
-    if (finest.drive_impulse) *sum.drive_impulse += *best.drive_impulse - *finest.drive_impulse;
-    if (finest.drive_turn) *sum.drive_turn += *best.drive_turn - *finest.drive_turn;
+    if (finest.drive_impulse && sum.drive_impulse) *sum.drive_impulse += *best.drive_impulse - *finest.drive_impulse;
+    if (finest.drive_turn && sum.drive_turn) *sum.drive_turn += *best.drive_turn - *finest.drive_turn;
   }
 }
 

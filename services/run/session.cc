@@ -320,7 +320,7 @@ class Run final : private kernel::CommitListener {
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
-    const std::vector<std::uint32_t> woken = edited.woken(*environment_);
+    const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
     for (const auto& [a, b] : parted)

@@ -24,7 +24,7 @@ void SurveyFiles::begin_again(const kernel::EnvironmentDescription& description)
 }
 
 void SurveyFiles::note_faults(std::vector<std::string>* warnings) {
-  const char* const what = frames_ ? "instrumentation" : "joints";
+  const char* const what = !joints_ ? "instrumentation" : !frames_ ? "joints" : "instrumentation and joints";
   for (const Slot slot : kSlots)
     for (const kernel::FaultRecord& failed : surveyor_->slot(slot).faults())
       warnings->push_back(

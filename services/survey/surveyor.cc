@@ -233,11 +233,11 @@ std::vector<JointCoordinate> Surveyor::coordinates(const kernel::Environment& en
       }
       for (std::uint32_t row = 0; row < intact.size(); ++row) {
         if (intact[row] == 0 || type_of(row).coordinates.empty() || is_told(reply, row)) continue;
-        missing->push_back(
-            fmt::format("coordinates of joints of type {0} that do not say what these are counted from: see `gravitas "
-                        "describe {0}`",
-                        type_of(row).name));
-        break;
+        std::string why = fmt::format(
+            "coordinates of joints of type {0} that do not say what these are counted from: see `gravitas "
+            "describe {0}`",
+            type_of(row).name);
+        if (std::ranges::find(*missing, why) == missing->end()) missing->push_back(std::move(why));
       }
     } catch (const NoAnswer& reason) {
       missing->emplace_back(reason.what());

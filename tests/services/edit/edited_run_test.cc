@@ -374,6 +374,32 @@ TEST(EditedRun, WhomAnEditDoesNotDisturbSleepsOn) {
               ElementsAreArray(and_then({"A", "B"})));
 }
 
+// It hangs by a joint from a body that does not move, and falls with it when that may; it rests on a compound, of which a part
+// is made smaller.
+TEST(EditedRun, WhatHoldsASleeperWakesItWhenItChanges) {
+  const std::vector<std::string> sleep = {"Simulator.SleepEnergy=0.001", "Simulator.SleepTime=0.5"};
+  const std::string rope =
+      "Constraints { Constraint { Type = \"Spherical\" Id = \"Hang\" Body1 = \"A\" Body2 = \"B\" CustomProperties { "
+      "BindPoint = {0, 5, 0} } } }";
+  EditedRun hung(
+      scene(ball("A", "Position = {0, 5, 0}", kFalls + " Immovable = true") + ball("B", "Position = {0, 4, 0}", kFalls),
+            rope),
+      {"set Body.A.Immovable=false@step=81"}, sleep);
+  const std::map<std::string, Row> end = hung.end();
+  for (const char* id : {"A", "B"}) EXPECT_NEAR(end.at(id).velocity.y(), -10 * 20 * kStep, 1e-9) << id;
+
+  EditedRun laid(scene("Body { Id = \"Table\" GeometryId = \"Both\" Immovable = true }\n" +
+                       ball("A", "Position = {0, 0.6, 0}", kFalls)),
+                 {"set Geometry.Part.HalfExtents={1,0.1,1}@step=81"}, sleep);
+  const std::string parts = laid.folder.write(
+      "parts.gravitas",
+      "Geometries { Geometry { Type = \"Box\" Id = \"Part\" CustomProperties { HalfExtents = {1, 0.5, 1} } }\n"
+      "Geometry { Type = \"Compound\" Id = \"Both\" CustomProperties { Children = {{\"Part\", {0, 0, 0}, {1, 0, 0, "
+      "0}}} } } }\n");
+  laid.options.scenes.push_back(parts);
+  EXPECT_NEAR(laid.end().at("A").velocity.y(), -10 * 20 * kStep, 1e-9);
+}
+
 // A plugin that takes over binds joints where they were bound, not where the scene had the bodies.
 TEST(EditedRun, JointsAreBoundAgainWhereTheyWere) {
   BusyRun run;

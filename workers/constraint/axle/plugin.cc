@@ -139,6 +139,7 @@ class Axle final : public ConstraintPlugin {
       const JointSpring held = read_spring(&bound);
       const double rest = bound.number();
       if (!held.is_none()) emit(sprung(swing_row(exp_rotation(rest * steering) * across, rolling, kQuarterTurn), held));
+      if (bound.at_end()) return;
       bound.number();  // of the coordinates alone
       if (bound.at_end()) return;
       const Vector3 normal = swing_between(steering, rolling).axis;

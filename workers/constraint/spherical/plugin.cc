@@ -234,6 +234,7 @@ class Spherical final : public ConstraintPlugin {
     const std::span<const double> cone = bound.table(2);
     if (!cone.empty()) emit(cone_row(cone, one.orientation, two.orientation));
     if (!twist.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, twist));
+    if (bound.at_end()) return;
     bound.flag();  // has an axis
     if (bound.at_end()) return;
     Discrepancy drive;

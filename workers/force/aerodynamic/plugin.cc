@@ -74,7 +74,7 @@ class Aerodynamic final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {.name = "Aerodynamic",
-            .version = "1.0",
+            .version = "1.1",
             .slot = Slot::kForce,
             .meaning = "Pressure of a flow on the faces that look into it.",
             .capabilities = {"jacobians"},

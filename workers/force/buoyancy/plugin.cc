@@ -58,7 +58,7 @@ class Buoyancy final : public OwnStateForce {
  public:
   static PluginDeclaration declaration() {
     return {.name = "Buoyancy",
-            .version = "1.1",
+            .version = "1.2",
             .slot = Slot::kForce,
             .meaning = "Lift and drag of a fluid on the submerged part of a body.",
             .capabilities = {"potential", "jacobians"},

@@ -60,7 +60,7 @@ double SequentialSolver::measure_stiffness() {
   stiffness_.assign(bodies_.count() + 1, Matrix3::Zero());
   for (std::size_t i = 0; i < discrepancies_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i];
-    if (const TurnOfSwing turn = turn_of_swing(i); turn.stiffness > 0.0) {
+    if (const TurnOfSwing turn = turn_of_swing(i); turn.stiffness > 0.0 && !touches(d)) {
       const ConstraintDirection row =
           with_turns(turn.direction, turned_[d.body1].inverse_inertia, turned_[d.body2].inverse_inertia);
       most = std::max(most, turn.stiffness * row.product(row, 0.0));
