@@ -78,8 +78,8 @@ std::string ControlSession::greet(const Hello& hello) {
   KernelMessage greeting;
   *greeting.mutable_hello() = hello;
   WorkerMessage answer;
-  if (!stream_->Write(greeting) || !stream_->Read(&answer))
-    return "it closed the control stream during the handshake: it ended, or serves another run";
+  closed_early_ = !stream_->Write(greeting) || !stream_->Read(&answer);
+  if (closed_early_) return "it closed the control stream during the handshake: it ended, or serves another run";
   if (answer.has_refusal()) return answer.refusal().text();
   if (!answer.has_welcome()) return "it answered the greeting with something else";
   welcome_ = answer.welcome();

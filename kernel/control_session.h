@@ -25,6 +25,8 @@ class ControlSession {
   std::string wait_until_ready(std::chrono::milliseconds time);
 
   const control::v1::Welcome& welcome() const { return welcome_; }
+  // It did not answer the greeting. Valid once it has been waited for.
+  bool closed_early() const { return closed_early_; }
 
   // False when the last heartbeat has been waiting for its answer for long, or the stream has ended.
   bool answers_heartbeats() const;
@@ -51,7 +53,7 @@ class ControlSession {
   std::atomic<std::int64_t> unanswered_since_{kAnswered};  // steady clock, ns
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool greeted_ = false;
+  bool closed_early_ = false, greeted_ = false;
   bool draining_ = false;
   bool stopping_ = false;
   std::vector<std::string> faults_;

@@ -197,7 +197,8 @@ void WorkerLink::finish() {
     if (const std::string& name = plugins_[static_cast<std::size_t>(i)]; served[i].name() != name)
       problem = "it serves plugin '" + served[i].name() + "', not '" + name + "'";
   if (problem.empty()) return;
-  if (process_ && process_->wait(kLastWordsMilliseconds)) problem += "; it was " + process_->ending();
+  const bool has_ended = process_ && process_->wait(kLastWordsMilliseconds);
+  if (has_ended && control_->closed_early()) problem += "; it was " + process_->ending();
   kill();
   fail_start(process_ ? problem + last_words(*process_) : problem);
 }

@@ -70,10 +70,14 @@ void add_check(CLI::App* app, Action* action) {
       ->add_option("PLUGIN", arguments->plugin,
                    "A plugin library, a command that starts a worker, or the name of an installed plugin")
       ->required();
-  command->add_flag(
+  CLI::Option* quick = command->add_flag(
       "--quick", arguments->options.quick,
       "Few calls, and the short cases only: some two seconds. Of a plugin whose calls are slow what 20 s (a "
       "command: 60 s) do not suffice for is not judged");
+  command
+      ->add_option("--quick-limit", arguments->options.quick_limit, "With --quick: these seconds instead of 20 or 60")
+      ->check(any_number("a finite number of seconds > 0"))
+      ->needs(quick);
   CLI::Option* level = command->add_option("--level", arguments->options.level, "Judge this level only: C0 to C5")
                            ->check(CLI::IsMember({"C0", "C1", "C2", "C3", "C4", "C5"}));
   command->add_option("--case", arguments->options.only_case, "Judge this case only, as a finding names it")
