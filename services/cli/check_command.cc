@@ -76,7 +76,7 @@ void add_check(CLI::App* app, Action* action) {
       "command: 60 s) do not suffice for is not judged");
   command
       ->add_option("--quick-limit", arguments->options.quick_limit, "With --quick: these seconds instead of 20 or 60")
-      ->check(any_number("a finite number of seconds > 0"))
+      ->check(seconds_between(1e-3, 1e6))
       ->needs(quick);
   CLI::Option* level = command->add_option("--level", arguments->options.level, "Judge this level only: C0 to C5")
                            ->check(CLI::IsMember({"C0", "C1", "C2", "C3", "C4", "C5"}));
