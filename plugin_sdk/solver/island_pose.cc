@@ -307,39 +307,34 @@ void IslandSolver::build_pose() {
   }
 }
 
-// A rod that pulls with mu resists to being turned: across it, with mu/length. As rows with that compliance, beside the
-// rod's, whose multipliers vanish where the steps end.
+// A rod that pulls with mu resists to being turned: across it, with mu/length.
 void IslandSolver::build_turns_of_rod(EndJoint* joint) {
   const bool is_rod = joint->discrepancy.is_radial() && joint->pose_laws[0].is_active() && joint->errors[0] > 0.0;
   const double pull = -answer_.joint_correction[3 * joint->row];
   if (!is_rod || !(pull > 0.0)) return;
-  joint->turns = 2;
-  const Matrix3 &inverse1 = end_[joint->body1].stiffened, &inverse2 = end_[joint->body2].stiffened;
   const auto [first, second] = orthonormal_basis(joint->directions[0].linear);
-  for (const Vector3& across : {first, second}) {
-    ConeRow& row = cone_.rows.emplace_back();
-    row.body1 = joint->body1, row.body2 = joint->body2;
-    row.direction = with_turns(direction_at(across, joint->own_arm1(), joint->own_arm2()), inverse1, inverse2);
-    row.law.has_lower = row.law.has_upper = true;
-    row.law.gamma = joint->errors[0] / pull;
-    row.start = -row.direction.along(displacement_[joint->body1], displacement_[joint->body2]);
-  }
+  for (const Vector3& across : {first, second})
+    add_turn(direction_at(across, joint->own_arm1(), joint->own_arm2()), joint->errors[0] / pull, joint);
 }
 
-// As a row with that compliance, like those of a rod.
 void IslandSolver::build_turn_of_swing(EndJoint* joint) {
   if (!joint->discrepancy.is_swing() || !joint->pose_laws[0].is_active()) return;
   const TurnOfSwing turn =
       turn_of_swing(joint->directions[0].angular2, joint->directions[1].angular2,
                     joint->errors[0] + held_angle(joint->discrepancy), answer_.joint_correction[3 * joint->row]);
-  if (!(turn.stiffness > 0.0)) return;
-  joint->turns = 1;
+  if (turn.stiffness > 0.0) add_turn(turn.direction, 1.0 / turn.stiffness, joint);
+}
+
+// What a row that is held resists with to being turned: a row with that compliance, beside it, whose multiplier vanishes where the
+// steps end.
+void IslandSolver::add_turn(const ConstraintDirection& direction, double compliance, EndJoint* joint) {
+  ++joint->turns;
   ConeRow& row = cone_.rows.emplace_back();
   row.body1 = joint->body1, row.body2 = joint->body2;
-  row.direction = with_turns(turn.direction, end_[joint->body1].stiffened, end_[joint->body2].stiffened);
+  row.direction = with_turns(direction, end_[joint->body1].stiffened, end_[joint->body2].stiffened);
   row.length = joint->length;
   row.law.has_lower = row.law.has_upper = true;
-  row.law.gamma = 1.0 / turn.stiffness;
+  row.law.gamma = compliance;
   row.start = -row.direction.along(displacement_[joint->body1], displacement_[joint->body2]);
 }
 

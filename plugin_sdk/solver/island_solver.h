@@ -159,6 +159,7 @@ class IslandSolver {
   void build_pose();
   void build_turns_of_rod(EndJoint* joint);
   void build_turn_of_swing(EndJoint* joint);
+  void add_turn(const ConstraintDirection& direction, double compliance, EndJoint* joint);
 
   void keep_corrections();
 

@@ -70,7 +70,7 @@ class EditedScene {
   std::vector<bool> resting_on(const kernel::SavedState& before) const;
   void keep_rest(const kernel::SavedState& before, std::span<std::uint32_t> rested, std::span<double> wrench) const;
 
-  const scene::v1::Scene first_;  // before the edit
+  const scene::v1::Scene& first_;  // before the edit
   const kernel::EnvironmentDescription& before_;
   edit::v1::Edit& edit_;
   scene::v1::Scene scene_;

@@ -24,14 +24,14 @@ void ReactionLog::add(const kernel::Environment& environment, const kernel::Inne
     sums_.clear();
   }
   length_ += inner.data.time_step[0];
-  add_reactions(inner.data, acts_in_derivatives(), &sums_);
+  add_reactions(inner.data, acts_in_derivatives(), false, &sums_);
   if (!inner.weights.empty()) extrapolate_reactions(attempts_, inner.weights, inner.data.flags.span(), &sums_);
 }
 
 void ReactionLog::add_attempt(const kernel::StepData& data, std::uint32_t pieces) {
   if (pieces == 1) attempts_.clear();
   attempts_.resize(pieces);
-  add_reactions(data, acts_in_derivatives(), &attempts_.back());
+  add_reactions(data, acts_in_derivatives(), true, &attempts_.back());
 }
 
 report::v1::Reaction ReactionLog::message(const kernel::Environment& environment, const ReactionSum& sum) const {

@@ -60,7 +60,7 @@ void add_bounds(const Discrepancy& row, const Vector3& along, double time_step, 
   }
 }
 
-void add_joints(const kernel::StepData& data, bool acts_in_derivatives, ReactionSums* sums) {
+void add_joints(const kernel::StepData& data, bool acts_in_derivatives, bool has_bounds, ReactionSums* sums) {
   const DiscrepancyColumns rows = data.discrepancies.columns();
   const double h = data.time_step[0];
   for (std::size_t i = 0; i < rows.size();) {
@@ -85,7 +85,7 @@ void add_joints(const kernel::StepData& data, bool acts_in_derivatives, Reaction
         std::optional<Vector3>& all = row.is_angular() ? sum.drive_turn : sum.drive_impulse;
         all = all.value_or(Vector3::Zero()) + *drive;
       }
-      add_bounds(row, along, h, &bounds);
+      if (has_bounds) add_bounds(row, along, h, &bounds);
       if (row.is_angular()) {
         sum.turn += impulse;
       } else {
@@ -96,7 +96,7 @@ void add_joints(const kernel::StepData& data, bool acts_in_derivatives, Reaction
   }
 }
 
-void add_contacts(const kernel::StepData& data, ReactionSums* sums) {
+void add_contacts(const kernel::StepData& data, bool has_bounds, ReactionSums* sums) {
   for (std::size_t i = 0; i < data.contact_key.size(); ++i) {
     const Vector3 impulse = vector_at(data.contact_impulse.span(), i), turn = vector_at(data.contact_turning.span(), i);
     if (impulse.isZero(0.0)) continue;
@@ -107,6 +107,7 @@ void add_contacts(const kernel::StepData& data, ReactionSums* sums) {
     sum.point = vector_at(data.contact_point.span(), i);
     sum.impulse += impulse;
     sum.turn += turn;
+    if (!has_bounds) continue;
     const double* material = &data.contact_material[kMaterialColumns * i];
     const Vector3 normal = vector_at(data.contact_normal.span(), i);
     const double pressed = normal.dot(impulse), spin = normal.dot(turn);
@@ -173,9 +174,9 @@ bool keeps_bounds(const ReactionSum& sum, const ReactionSum& finest) {
 
 }  // namespace
 
-void add_reactions(const kernel::StepData& data, bool acts_in_derivatives, ReactionSums* sums) {
-  add_joints(data, acts_in_derivatives, sums);
-  add_contacts(data, sums);
+void add_reactions(const kernel::StepData& data, bool acts_in_derivatives, bool has_bounds, ReactionSums* sums) {
+  add_joints(data, acts_in_derivatives, has_bounds, sums);
+  add_contacts(data, has_bounds, sums);
 }
 
 void extrapolate_reactions(std::span<const ReactionSums> attempts, std::span<const double> weights,

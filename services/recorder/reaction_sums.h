@@ -46,8 +46,8 @@ struct ReactionSum {
 
 using ReactionSums = std::map<ReactionKey, ReactionSum>;
 
-// With what acted in the inner step that has been made.
-void add_reactions(const kernel::StepData& data, bool acts_in_derivatives, ReactionSums* sums);
+// With what acted in the inner step that has been made. Bounds are those of attempts, which are to keep them.
+void add_reactions(const kernel::StepData& data, bool acts_in_derivatives, bool has_bounds, ReactionSums* sums);
 
 // `sums` have the finest attempt, the last, among others: puts what the attempts tend to in its place.
 void extrapolate_reactions(std::span<const ReactionSums> attempts, std::span<const double> weights,

@@ -195,6 +195,7 @@ class SequentialSolver {
   void build_at_end(const stage::SolverSolveRequest& request, bool is_stiff);
   void add_turns_of_rod(std::size_t row);
   void add_turn_of_swing(std::size_t row);
+  void add_turn(std::size_t row, std::size_t axis, const ConstraintDirection& direction, double compliance);
   TurnOfSwing turn_of_swing(std::size_t row) const;
   double pull_of_rod(std::size_t row) const;
   void end_unstiffened(const stage::SolverSolveRequest& request);

@@ -91,38 +91,32 @@ void SequentialSolver::stiffen(const stage::SolverSolveRequest& request) {
   }
 }
 
-// A rod that pulls with mu resists to being turned: across it, with mu/length, as rows with that compliance, whose multipliers
-// vanish where the steps end.
+// A rod that pulls with mu resists to being turned: across it, with mu/length.
 void SequentialSolver::add_turns_of_rod(std::size_t i) {
-  RelaxationDiscrepancy& d = posed_[i];
   const double pull = pull_of_rod(i);
   if (!(pull > 0.0)) return;
   const auto [first, second] = orthonormal_basis(ends_[i].directions[0].linear);
   std::size_t axis = 1;
-  for (const Vector3& across : {first, second}) {
-    d.directions[axis] = with_turns(direction_at(across, ends_[i].arm1, ends_[i].arm2),
-                                    stiffened_[d.body1].inverse_inertia, stiffened_[d.body2].inverse_inertia);
-    JointLaw& law = posed_laws_[3 * i + axis] = JointLaw{};
-    law.has_lower = law.has_upper = true;
-    law.gamma = ends_[i].errors[0] / pull;
-    law.lower_target = law.upper_target =
-        d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
-    ++axis;
-  }
+  for (const Vector3& across : {first, second})
+    add_turn(i, axis++, direction_at(across, ends_[i].arm1, ends_[i].arm2), ends_[i].errors[0] / pull);
 }
 
-// What a swing that is held resists with to being turned round (end_of_step_rows.h), as such a row.
 void SequentialSolver::add_turn_of_swing(std::size_t i) {
-  RelaxationDiscrepancy& d = posed_[i];
   const TurnOfSwing turn = turn_of_swing(i);
-  if (!(turn.stiffness > 0.0)) return;
-  d.directions[1] =
-      with_turns(turn.direction, stiffened_[d.body1].inverse_inertia, stiffened_[d.body2].inverse_inertia);
-  JointLaw& law = posed_laws_[3 * i + 1] = JointLaw{};
+  if (turn.stiffness > 0.0) add_turn(i, 1, turn.direction, 1.0 / turn.stiffness);
+}
+
+// What a row that is held resists with to being turned: along an axis that is free, as a row with that compliance, whose
+// multiplier vanishes where the steps end.
+void SequentialSolver::add_turn(std::size_t i, std::size_t axis, const ConstraintDirection& direction,
+                                double compliance) {
+  RelaxationDiscrepancy& d = posed_[i];
+  d.directions[axis] = with_turns(direction, stiffened_[d.body1].inverse_inertia, stiffened_[d.body2].inverse_inertia);
+  JointLaw& law = posed_laws_[3 * i + axis] = JointLaw{};
   law.has_lower = law.has_upper = true;
-  law.gamma = 1.0 / turn.stiffness;
+  law.gamma = compliance;
   law.lower_target = law.upper_target =
-      d.directions[1].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
+      d.directions[axis].along(solution_.displacement[d.body1], solution_.displacement[d.body2]);
 }
 
 TurnOfSwing SequentialSolver::turn_of_swing(std::size_t i) const {
