@@ -229,7 +229,7 @@ TEST(RoundAerodynamic, ResistsTurning) {
 TEST(RoundAerodynamic, IsTheSumOverItsFaces) {
   PluginUnderTest force("force_aerodynamic");
   conformance::Draw random(4);
-  constexpr int kGrid = 300;
+  constexpr int kGrid = 100;
   for (int i = 0; i < 24; ++i) {
     ForcedBody body;
     body.pose.orientation = random.rotation();
