@@ -131,6 +131,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   // is impossible: the plan leaves the slot out, or the plugin does not serve what the scene needs of it.
   // To compare is to ask both for the rest of the run; swap records show how the answers differ.
   void order_swap(const SwapOrder& order, bool compares = false);
+  // See StageSlot::call_off_swap().
+  bool call_off_swap(Slot slot, std::uint32_t step, std::uint32_t rank) {
+    return slot_of(slot).call_off_swap(step, rank);
+  }
   std::vector<SwapRecord> swaps() const;
   // Throws std::invalid_argument if the slot is left out or hosted in this process.
   void inject(FaultInjection fault);

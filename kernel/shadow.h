@@ -29,6 +29,10 @@ class Shadow {
     put_back(call, arena);
   }
 
+  void add_times(std::uint64_t first_ns, std::uint64_t second_ns) {
+    result_.first_ns += first_ns, result_.second_ns += second_ns;
+  }
+
   bool last_differed() const { return last_differed_; }
   const Comparison& result() const { return result_; }
 

@@ -90,7 +90,7 @@ class StageSlot {
         auto checked = check(Untrusted<StageCall>(call), &times);
         if (attempts.made > 0) note_recovery(attempts);
         host_of(call.target).count_good_answer(which_);
-        if (is_watched_) watch(call, arena, derivatives, [&] { check(Untrusted<StageCall>(call), nullptr); });
+        if (is_watched_) watch(call, times, arena, derivatives, [&] { check(Untrusted<StageCall>(call), nullptr); });
         return checked;
       } catch (StageFault& fault) {
         recover(std::move(fault), call, &attempts);
@@ -111,6 +111,8 @@ class StageSlot {
 
   // Begins a swap of the plugin in row `target`; see swap.h. With `only_compare` it never cuts over.
   void order_swap(SwapOrder order, std::uint32_t target, bool only_compare = false);
+  // Before it cuts over; false if it has, or was refused. Of those ordered for that step, the one of that rank, from 0.
+  bool call_off_swap(std::uint32_t step, std::uint32_t rank);
   // All so far, in the order they were asked for.
   std::vector<SwapRecord> swaps() const;
   // In every so many steps another process is asked the same, and must give the same bytes; 0: never.
@@ -156,9 +158,10 @@ class StageSlot {
   void adopt(const SlotHost& host, const std::string& why, bool by_us);
   void let_all_adopt(const SlotHost& host, const std::string& why);
 
-  void watch(const StageCall& call, Arena* arena, DerivativeSource* derivatives, const std::function<void()>& recheck);
-  bool watch_swap(PendingSwap* swap, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
-                  const std::function<void()>& recheck);
+  void watch(const StageCall& call, const CallTimes& times, Arena* arena, DerivativeSource* derivatives,
+             const std::function<void()>& recheck);
+  bool watch_swap(PendingSwap* swap, const StageCall& call, const CallTimes& first, Arena* arena,
+                  DerivativeSource* derivatives, const std::function<void()>& recheck);
   void rerun(const StageCall& call, Arena* arena, DerivativeSource* derivatives, const std::function<void()>& recheck);
 
   Slot which_;

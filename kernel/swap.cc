@@ -35,6 +35,18 @@ void StageSlot::order_swap(SwapOrder order, std::uint32_t target, bool only_comp
   if (step_ == 0) prepare_swaps();
 }
 
+bool StageSlot::call_off_swap(std::uint32_t step, std::uint32_t rank) {
+  std::size_t record = 0;
+  while (record < swaps_.size() && (swaps_[record].step != step || rank-- > 0)) ++record;
+  const auto swap = std::ranges::find(pending_, record, &PendingSwap::record);
+  if (swap == pending_.end()) return false;
+  hosts_[swap->host]->retire(std::move(swap->spare));
+  refuse(&*swap, "called off");
+  pending_.erase(swap);
+  update_watch();
+  return true;
+}
+
 std::vector<SwapRecord> StageSlot::swaps() const {
   std::vector<SwapRecord> records = swaps_;
   for (const PendingSwap& swap : pending_) records[swap.record].shadow = swap.shadow.result();
@@ -168,29 +180,30 @@ void StageSlot::update_watch() {
   for (PendingSwap& swap : pending_) is_watched_ |= swap.is_in_shadow = is_in_shadow(swap);
 }
 
-void StageSlot::watch(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
+void StageSlot::watch(const StageCall& call, const CallTimes& times, Arena* arena, DerivativeSource* derivatives,
                       const std::function<void()>& recheck) {
   for (auto swap = pending_.begin(); swap != pending_.end();) {
-    const bool is_lost =
-        swap->is_in_shadow && swap->target == call.target && !watch_swap(&*swap, call, arena, derivatives, recheck);
+    const bool is_lost = swap->is_in_shadow && swap->target == call.target &&
+                         !watch_swap(&*swap, call, times, arena, derivatives, recheck);
     swap = is_lost ? pending_.erase(swap) : swap + 1;
   }
   if (rerun_.every > 0 && step_ % rerun_.every == 0) rerun(call, arena, derivatives, recheck);
 }
 
 // False if the swap is refused.
-bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, Arena* arena, DerivativeSource* derivatives,
-                           const std::function<void()>& recheck) {
+bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, const CallTimes& first, Arena* arena,
+                           DerivativeSource* derivatives, const std::function<void()>& recheck) {
   StageCall routed = call;
   routed.target = routes_[call.target].target;
   routed.deadline_ns = swap->only_compare ? 0 : std::max(kShadowNs, kShadowFactor * slow_calls_.longest());
   try {
+    CallTimes second;
     swap->shadow.compare(call, arena, [&] {
-      CallTimes times;
       if (derivatives != nullptr) derivatives->begin_attempt(false);
-      call_with_room(swap->candidate.get(), routed, arena, derivatives, &times);
+      call_with_room(swap->candidate.get(), routed, arena, derivatives, &second);
       recheck();
     });
+    swap->shadow.add_times(first.compute, second.compute);
     return true;
   } catch (const StageFault& fault) {
     if (!fault.plugin.empty()) throw;

@@ -32,7 +32,7 @@ using control::ControlClient;
 struct CtlLine {
   std::string socket;
   bool json = false, no_wait = false;
-  std::uint32_t steps = 1, captured_steps = 100;
+  std::uint32_t steps = 1, captured_steps = 100, number = 0;
   std::string text;  // what a swap, a setting, a fault or a slot is
   std::string out;
   QueryText query;
@@ -110,6 +110,26 @@ int follow_swap(const CtlLine& line, ControlClient* client, const api::SwapOrder
 
 int swap(const CtlLine& line, ControlClient* client) {
   return follow_swap(line, client, client->swap(control::parse_swap_request(line.text)));
+}
+
+int compare(const CtlLine& line, ControlClient* client) {
+  const api::SwapOrdered ordered = client->swap(control::parse_swap_request(line.text, true));
+  if (line.json) {
+    std::cout << to_json(ordered, JsonForm::kPage);
+  } else {
+    std::cout << fmt::format(
+        "ordered: comparison {}, from step {} on; gravitas ctl status shows how the answers differ, gravitas ctl "
+        "call-off {} "
+        "ends it\n",
+        ordered.number(), ordered.step(), ordered.number());
+  }
+  return kDone;
+}
+
+int call_off(const CtlLine& line, ControlClient* client) {
+  const api::ServedSwap swap = client->call_off(line.number);
+  std::cout << (line.json ? to_json(swap, JsonForm::kPage) : control::swap_line(swap) + "\n");
+  return kDone;
 }
 
 int set_property(const CtlLine& line, ControlClient* client) {
@@ -291,6 +311,13 @@ void add_ctl(CLI::App* app, Action* action) {
             "swap solver=Sequential@step=500,hosting=grpc", swap, "SPEC",
             "SLOT=PLUGIN[@step=N][,hosting=direct|shm|grpc]: before step N, or the next")
       ->add_flag("--no-wait", line->no_wait, no_wait);
+  add_order("compare",
+            "Ask another plugin the same from now on, and compare its answers and its time; it never takes over",
+            "compare solver=Newton", compare, "SPEC", "SLOT=PLUGIN[,hosting=direct|shm|grpc]");
+  add("call-off", "Call a swap off that has not cut over, or end a comparison", "call-off 3", call_off)
+      ->add_option("NUMBER", line->number, "As `gravitas ctl status` lists it")
+      ->required()
+      ->check(whole_number(1));
   add_order("set", "Change a live property of a plugin", "set Solver.Iterations=50", set_property, "SPEC",
             "Slot.Property=VALUE")
       ->add_flag("--no-wait", line->no_wait, no_wait);

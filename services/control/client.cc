@@ -95,6 +95,12 @@ api::SwapOrdered ControlClient::swap(const api::SwapRequest& request) {
   return connection_->call(&api::Control::Stub::Swap, request);
 }
 
+api::ServedSwap ControlClient::call_off(std::uint32_t number) {
+  api::CallOffRequest request;
+  request.set_number(number);
+  return connection_->call(&api::Control::Stub::CallOff, request);
+}
+
 api::SwapOrdered ControlClient::set_property(const api::SetPropertyRequest& request) {
   return connection_->call(&api::Control::Stub::SetProperty, request);
 }
@@ -186,13 +192,14 @@ void ControlClient::decide_pairs(
 
 // ---- what a person writes
 
-api::SwapRequest parse_swap_request(const std::string& text) {
-  const SwapSpec spec = parse_swap_order(text);
+api::SwapRequest parse_swap_request(const std::string& text, bool compares) {
+  const SwapSpec spec = compares ? parse_compare("compare", text) : parse_swap_order(text);
   const bool is_path = spec.plugin.find('/') != std::string::npos || spec.plugin.ends_with(".so");
   api::SwapRequest request;
   request.set_slot(slot_name(spec.slot));
   request.set_plugin(is_path ? std::filesystem::absolute(spec.plugin).lexically_normal().string() : spec.plugin);
   request.set_step(spec.step);
+  request.set_compares(compares);
   if (spec.hosting) request.set_hosting(kernel::hosting_name(*spec.hosting));
   return request;
 }

@@ -36,6 +36,7 @@ class ControlClient {
   api::Status step(std::uint32_t steps);
   api::Status reset();
   api::SwapOrdered swap(const api::SwapRequest& request);
+  api::ServedSwap call_off(std::uint32_t number);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
   api::EditMade edit(const api::EditRequest& request);
   api::Status wake(const std::string& body);
@@ -64,7 +65,7 @@ class ControlClient {
 
 // Reads `SLOT=PLUGIN[@step=N][,hosting=MODE]`, a relative path of a library made absolute, and
 // `Slot.Property=VALUE`. Throw BadInput; names of plugins and properties are for the server to judge.
-api::SwapRequest parse_swap_request(const std::string& text);
+api::SwapRequest parse_swap_request(const std::string& text, bool compares = false);
 api::SetPropertyRequest parse_set_request(const std::string& text);
 
 // Waits, while the run goes on, until the swap of that number is committed, rolled back or refused, and returns it as

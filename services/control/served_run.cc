@@ -3,6 +3,7 @@
 #include "services/control/served_run.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -297,12 +298,12 @@ std::future<void> ServedRun::step(std::uint32_t steps) {
 
 api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   SwapSpec spec;
-  const std::string word = request.slot() + "=" + request.plugin();
-  spec.text = "swap " + word;
-  spec.slot = parse_slot("swap", word, request.slot());
+  const std::string word = request.slot() + "=" + request.plugin(), verb = request.compares() ? "compare" : "swap";
+  spec.text = verb + " " + word;
+  spec.slot = parse_slot(verb, word, request.slot());
   spec.plugin = request.plugin();
   if (spec.plugin.empty()) throw BadInput(spec.text + ": allowed: the name of a plugin, or the path of a library");
-  if (!request.hosting().empty()) spec.hosting = parse_hosting_mode("swap", word, request.hosting());
+  if (!request.hosting().empty()) spec.hosting = parse_hosting_mode(verb, word, request.hosting());
   // the settings of the moment, else those of the scene
   const auto [active, scenes] = between_steps([this] { return std::pair(active_, slots_of(description_)); });
   const bool is_active = std::ranges::any_of(active.slot(spec.slot).plugins, [&](const kernel::PluginChoice& one) {
@@ -313,7 +314,24 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   kernel::SwapOrder found = resolve_swap(spec, is_active ? active : scenes, &catalog);
   return between_steps([&] {
     found.step = next_step(spec.text, request.step());
-    return order(std::move(found));
+    return order(std::move(found), request.compares());
+  });
+}
+
+api::ServedSwap ServedRun::call_off(const api::CallOffRequest& request) {
+  return between_steps([&] {
+    const auto found = std::ranges::find(orders_, request.number(), &Order::number);
+    if (found != orders_.end() && environment_->call_off_swap(found->swap.slot, found->swap.step, found->rank))
+      return swap_message(*found, environment_->swaps());
+    std::vector<std::uint32_t> pending;
+    for (const Order& one : pending_orders()) pending.push_back(one.number);
+    const std::string what = fmt::format("call-off {}: ", request.number());
+    const std::string allowed = pending.empty() ? std::string("none is on its way, and nothing is compared")
+                                                : fmt::format("allowed: {}", fmt::join(pending, ", "));
+    for (const api::ServedSwap& one : swap_messages())
+      if (one.number() == request.number())
+        throw NotNow(fmt::format("{}this swap is {} already; {}", what, one.outcome(), allowed));
+    throw BadInput(fmt::format("{}no swap has that number; {}", what, allowed));
   });
 }
 
@@ -348,7 +366,7 @@ const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot
                                                    const std::vector<kernel::SwapRecord>& records) const {
   for (std::size_t i = orders_.size(); i-- > 0;) {
     const kernel::SwapOrder& swap = orders_[i].swap;
-    if (swap.slot == slot && swap.step <= environment_->step_count() + 1 &&
+    if (!orders_[i].compares && swap.slot == slot && swap.step <= environment_->step_count() + 1 &&
         find_property(swap.plugin, property) != nullptr && is_pending(record_of(orders_[i], records).state))
       return swap.plugin;
   }
@@ -386,9 +404,9 @@ std::vector<ServedRun::Order> ServedRun::pending_orders() const {
   return pending;
 }
 
-api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
+api::SwapOrdered ServedRun::order(kernel::SwapOrder order, bool compares) {
   try {
-    environment_->order_swap(order);
+    environment_->order_swap(order, compares);
   } catch (const std::invalid_argument& problem) {
     throw BadInput(problem.what());
   }
@@ -396,7 +414,7 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order) {
   ordered.set_number(++last_order_);
   ordered.set_step(order.step);
   const std::uint32_t rank = rank_of(order, orders_);
-  orders_.push_back({std::move(order), last_order_, rank});
+  orders_.push_back({std::move(order), last_order_, rank, compares});
   return ordered;
 }
 

@@ -84,6 +84,7 @@ class ServedRun final : private kernel::CommitListener {
   std::future<void> step(std::uint32_t steps);
 
   api::SwapOrdered swap(const api::SwapRequest& request);
+  api::ServedSwap call_off(const api::CallOffRequest& request);
   api::SwapOrdered set_property(const api::SetPropertyRequest& request);
   api::EditMade edit(const api::EditRequest& request);
   void wake(const api::WakeRequest& request);
@@ -108,10 +109,11 @@ class ServedRun final : private kernel::CommitListener {
  private:
   using Clock = std::chrono::steady_clock;
   enum class State : std::uint32_t { kRunning, kPaused, kFinished, kFaulted };
-  // A swap, its number, and what to find its record by: the rank among the slot's swaps at that step.
+  // A swap or a comparison, its number, and what to find its record by: the rank among those of the slot at that step.
   struct Order {
     kernel::SwapOrder swap;
     std::uint32_t number, rank;
+    bool compares;
   };
   // Calls that are being kept.
   struct Capture {
@@ -155,7 +157,7 @@ class ServedRun final : private kernel::CommitListener {
   Clock::time_point due() const;
   void require_steps_left(const std::string& what) const;
   std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
-  api::SwapOrdered order(kernel::SwapOrder order);
+  api::SwapOrdered order(kernel::SwapOrder order, bool compares = false);
   const kernel::PluginChoice& choice_with(const std::string& what, Slot slot, const std::string& property,
                                           const std::vector<kernel::SwapRecord>& records) const;
   // Precondition: of this order, among records of all swaps.
@@ -174,6 +176,7 @@ class ServedRun final : private kernel::CommitListener {
   api::Status status_now();
   void write_plan(api::Plan* plan) const;
   std::vector<api::ServedSwap> swap_messages() const;
+  api::ServedSwap swap_message(const Order& order, const std::vector<kernel::SwapRecord>& records) const;
   // With those of before the last edit.
   std::vector<Order> pending_orders() const;
   static std::uint32_t rank_of(const kernel::SwapOrder& swap, const std::vector<Order>& orders);

@@ -114,7 +114,9 @@ std::string ServedRun::command_to_resume() const {
   for (std::string& scene : options.scenes) scene = std::filesystem::absolute(scene);
   // what was ordered for later
   for (const Order& one : pending_orders())
-    if (one.swap.step > environment_->step_count() + 1)
+    if (one.compares)
+      options.comparisons.push_back(fmt::format("{}={}", slot_name(one.swap.slot), one.swap.plugin.declaration.name));
+    else if (one.swap.step > environment_->step_count() + 1)
       options.swaps.push_back(
           fmt::format("{}={}@step={}", slot_name(one.swap.slot), one.swap.plugin.declaration.name, one.swap.step));
   return resume_command(options, hosting_words_, checkpoint_);

@@ -33,7 +33,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     std::vector<Order> pending;
     for (Order& one : pending_orders()) {
       try {
-        next->order_swap(one.swap);
+        next->order_swap(one.swap, one.compares);
       } catch (const std::invalid_argument& problem) {
         throw BadInput(fmt::format("edit: a swap is ordered for step {} that could not be made then: {}", one.swap.step,
                                    problem.what()));

@@ -150,20 +150,25 @@ void ServedRun::write_plan(api::Plan* plan) const {
 std::vector<api::ServedSwap> ServedRun::swap_messages() const {
   std::vector<api::ServedSwap> swaps = past_swaps_;
   const std::vector<kernel::SwapRecord> records = environment_->swaps();
-  for (const Order& order : orders_) {
-    const kernel::SwapRecord& record = record_of(order, records);
-    api::ServedSwap& swap = swaps.emplace_back();
-    swap.set_number(order.number);
-    swap.set_slot(slot_name(record.slot));
-    swap.set_step(record.step);
-    swap.set_from(record.from);
-    swap.set_to(record.to);
-    swap.set_outcome(swap_state_name(record.state));
-    swap.set_reason(record.reason);
-    swap.set_pause_us(record.pause_us);
-    swap.set_wait_us(record.wait_us);
-  }
+  for (const Order& order : orders_) swaps.push_back(swap_message(order, records));
   return swaps;
+}
+
+api::ServedSwap ServedRun::swap_message(const Order& order, const std::vector<kernel::SwapRecord>& records) const {
+  const kernel::SwapRecord& record = record_of(order, records);
+  api::ServedSwap swap;
+  swap.set_number(order.number);
+  swap.set_slot(slot_name(record.slot));
+  swap.set_step(record.step);
+  swap.set_from(record.from);
+  swap.set_to(record.to);
+  swap.set_outcome(swap_state_name(record.state));
+  swap.set_reason(record.reason);
+  swap.set_pause_us(record.pause_us);
+  swap.set_wait_us(record.wait_us);
+  swap.set_compares(order.compares);
+  write_comparison(record.shadow, *environment_, swap.mutable_shadow());
+  return swap;
 }
 
 // Now and then: what is counted over a while is one line then.

@@ -83,6 +83,9 @@ class ControlServer::Service final : public api::Control::Service {
   grpc::Status Swap(grpc::ServerContext*, const api::SwapRequest* request, api::SwapOrdered* reply) override {
     return answered([&] { *reply = run_.swap(*request); });
   }
+  grpc::Status CallOff(grpc::ServerContext*, const api::CallOffRequest* request, api::ServedSwap* reply) override {
+    return answered([&] { *reply = run_.call_off(*request); });
+  }
   grpc::Status SetProperty(grpc::ServerContext*, const api::SetPropertyRequest* request,
                            api::SwapOrdered* reply) override {
     return answered([&] { *reply = run_.set_property(*request); });

@@ -32,6 +32,18 @@ std::string plan_table(const api::Plan& plan) {
   return text;
 }
 
+// Of a comparison: a line for each quantity in which answers differed.
+std::string differences(const api::ServedSwap& swap) {
+  std::string text;
+  if (!swap.compares()) return text;
+  for (const report::v1::Disagreement& one : swap.shadow().disagreements())
+    text += fmt::format(
+        "      {}: {:.3g} {} apart at most{}{}\n", one.quantity(), one.largest(), one.unit(),
+        one.body().empty() ? "" : ", of " + one.body(),
+        one.other_counts() == 0 ? "" : fmt::format("; {} times another number of rows", one.other_counts()));
+  return text;
+}
+
 }  // namespace
 
 std::string status_line(const api::Status& status) {
@@ -42,6 +54,13 @@ std::string status_line(const api::Status& status) {
 }
 
 std::string swap_line(const api::ServedSwap& swap) {
+  if (swap.compares()) {
+    const std::string state = !swap.reason().empty()      ? "ended"
+                              : swap.shadow().calls() > 0 ? "comparing"
+                                                          : swap.outcome();
+    return fmt::format("{}: {} {} beside {}, from step {} on: {}{}", state, swap.slot(), swap.to(), swap.from(),
+                       swap.step(), comparison_text(swap.shadow()), swap.reason().empty() ? "" : "; " + swap.reason());
+  }
   std::string text =
       fmt::format("{}: {} {} -> {}, before step {}", swap.outcome(), swap.slot(), swap.from(), swap.to(), swap.step());
   if (swap.pause_us() > 0.0)
@@ -67,7 +86,8 @@ std::string status_page(const api::Status& status) {
   };
   heading("swaps", status.swap_count());
   for (int i = std::max(0, status.swaps_size() - kMostListed); i < status.swaps_size(); ++i)
-    text += fmt::format("  {}\n", swap_line(status.swaps(i)));
+    text +=
+        fmt::format("  {} {}\n{}", status.swaps(i).number(), swap_line(status.swaps(i)), differences(status.swaps(i)));
   heading("edits", status.edit_count());
   for (int i = std::max(0, status.edits_size() - kMostListed); i < status.edits_size(); ++i) {
     text += fmt::format("  {}", edit_line(status.edits(i)));

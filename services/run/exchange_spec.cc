@@ -93,7 +93,9 @@ SwapSpec parse_swap(const std::string& text) { return parse("--swap", text, Step
 
 SwapSpec parse_swap_order(const std::string& text) { return parse("swap", text, StepWord::kOptional); }
 
-SwapSpec parse_compare(const std::string& text) { return parse("--compare", text, StepWord::kNone); }
+SwapSpec parse_compare(const std::string& option, const std::string& text) {
+  return parse(option, text, StepWord::kNone);
+}
 
 RerunSpec parse_rerun(const std::string& text) {
   const std::size_t equals = text.find('=');

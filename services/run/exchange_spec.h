@@ -24,7 +24,7 @@ SwapSpec parse_swap(const std::string& text);
 // The same in an order to a run that goes on: without `@step=N` before the next step, which is 0 here.
 SwapSpec parse_swap_order(const std::string& text);
 // `SLOT=PLUGIN[,hosting=…]`: it is asked the same as the slot's plugin, and compared.
-SwapSpec parse_compare(const std::string& text);
+SwapSpec parse_compare(const std::string& option, const std::string& text);
 
 struct RerunSpec {
   Slot slot = Slot::kSolver;

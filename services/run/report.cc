@@ -16,22 +16,6 @@
 namespace gravitas {
 namespace {
 
-void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to) {
-  to->set_calls(from.calls);
-  to->set_differing_calls(from.differing_calls);
-  for (const Disagreement& one : from.disagreements) {
-    report::v1::Disagreement* disagreement = to->add_disagreements();
-    disagreement->set_quantity(fmt::format("{} {}", stage::method_info(one.method).name, one.column->name));
-    disagreement->set_largest(one.largest);
-    disagreement->set_row(one.largest_row);
-    disagreement->set_unit(one.column->unit);
-    if (std::string_view(one.column->rows) == "body" && one.largest_row < environment.model().body_count)
-      disagreement->set_body(environment.model().body_id[one.largest_row]);
-    disagreement->set_rows(one.rows);
-    disagreement->set_other_counts(one.other_counts);
-  }
-}
-
 // A worker that cannot change its reply as it was ordered to says that it failed.
 bool was_injected(const kernel::FaultRecord& record) {
   const auto kind = std::ranges::find(host::fault_kinds(), record.injected, &host::FaultInfo::name);
@@ -126,6 +110,30 @@ std::string pause_text(const kernel::EnvironmentDescription& description, const 
 
 std::string edit_line(const report::v1::EditRecord& edit) {
   return fmt::format("edit before step {}: {} change{}", edit.step(), edit.changes(), edit.changes() == 1 ? "" : "s");
+}
+
+void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to) {
+  to->set_calls(from.calls);
+  to->set_differing_calls(from.differing_calls);
+  const double per_call = from.calls == 0 ? 0.0 : 1e-3 / static_cast<double>(from.calls);
+  to->set_from_us(per_call * static_cast<double>(from.first_ns));
+  to->set_to_us(per_call * static_cast<double>(from.second_ns));
+  for (const Disagreement& one : from.disagreements) {
+    report::v1::Disagreement* disagreement = to->add_disagreements();
+    disagreement->set_quantity(fmt::format("{} {}", stage::method_info(one.method).name, one.column->name));
+    disagreement->set_largest(one.largest);
+    disagreement->set_row(one.largest_row);
+    disagreement->set_unit(one.column->unit);
+    if (std::string_view(one.column->rows) == "body" && one.largest_row < environment.model().body_count)
+      disagreement->set_body(environment.model().body_id[one.largest_row]);
+    disagreement->set_rows(one.rows);
+    disagreement->set_other_counts(one.other_counts);
+  }
+}
+
+std::string comparison_text(const report::v1::Comparison& comparison) {
+  return fmt::format("{} of {} answers differ; {:.3g} us and {:.3g} us a call", comparison.differing_calls(),
+                     comparison.calls(), comparison.from_us(), comparison.to_us());
 }
 
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {

@@ -18,10 +18,14 @@ void write_stages(const kernel::Environment& environment, report::v1::Report* re
 // With a warning where another plugin answers since.
 void write_faults(const kernel::Environment& environment, report::v1::Report* report);
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report);
+void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to);
 void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
 
 // "edit before step 31: 2 changes".
 std::string edit_line(const report::v1::EditRecord& edit);
+
+// "3 of 100 answers differ; 12.3 us and 45.6 us a call".
+std::string comparison_text(const report::v1::Comparison& comparison);
 
 // Who took over, of a fault that was recovered by a fallback; else empty.
 std::string fallback_of(const std::string& recovered_by);

@@ -246,7 +246,7 @@ class Run final : private kernel::CommitListener {
     for (const std::string& text : options_.swaps)
       swaps_.push_back(resolve_swap(parse_swap(text), description_, &catalog_));
     for (const std::string& text : options_.comparisons)
-      comparisons_.push_back(resolve_swap(parse_compare(text), description_, &catalog_));
+      comparisons_.push_back(resolve_swap(parse_compare("--compare", text), description_, &catalog_));
     for (const std::string& text : options_.faults) faults_.push_back(parse_fault(text));
     for (const kernel::FaultInjection& fault : faults_) require_worker(fault, swaps_);
     for (const std::string& text : options_.reruns) reruns_.push_back(parse_rerun(text));

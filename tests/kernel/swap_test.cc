@@ -195,6 +195,32 @@ TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
   EXPECT_TRUE(world.faults().empty());
 }
 
+TEST_P(Swapped, WhatIsCalledOffLeavesNoTraceAndTheNextComesAllTheSame) {
+  Environment world(builder().description());
+  kernel::PluginChoice weaker = plugin_of(Slot::kSolver);
+  weaker.settings = {1.0, 0.5, 0.0, 1.0, 0.0, 1.0};
+  for (const kernel::PluginChoice& one : {weaker, plugin_of(Slot::kSolver)})
+    world.order_swap({Slot::kSolver, one, std::nullopt, 10});
+  world.order_swap({Slot::kIntegrator, other(Slot::kIntegrator, plugin_path("integrator_euler")), std::nullopt, 0},
+                   true);
+  for (int i = 0; i < 6; ++i) world.step();
+  EXPECT_FALSE(world.call_off_swap(Slot::kSolver, 10, 2));
+  EXPECT_FALSE(world.call_off_swap(Slot::kSolver, 9, 0));
+  EXPECT_TRUE(world.call_off_swap(Slot::kSolver, 10, 0));
+  EXPECT_FALSE(world.call_off_swap(Slot::kSolver, 10, 0)) << "twice";
+  EXPECT_TRUE(world.call_off_swap(Slot::kIntegrator, 0, 0));
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
+  EXPECT_FALSE(world.call_off_swap(Slot::kSolver, 10, 1)) << "it has cut over";
+  const std::vector<kernel::SwapRecord> swaps = world.swaps();
+  ASSERT_EQ(swaps.size(), 3U);
+  EXPECT_EQ(swaps[0].shadow.calls, 6U);
+  EXPECT_EQ(swaps[0].reason, "called off");
+  EXPECT_EQ(swaps[1].state, SwapState::kRefused);
+  EXPECT_EQ(swaps[1].reason, "called off");
+  EXPECT_EQ(swaps[2].state, SwapState::kCommitted) << swaps[2].reason;
+}
+
 TEST(Swap, WhatCannotTakeThePlaceIsRefusedAtOnce) {
   Environment world(busy_world(Hosting::kDirect).description());
   const auto why = [&](Slot slot, const kernel::PluginChoice& plugin) -> std::string {

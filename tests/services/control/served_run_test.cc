@@ -274,6 +274,46 @@ TEST(ServedRun, AFaultedOneNamesTheCommandThatGoesOn) {
   EXPECT_EQ(harness::read_report(harness::read_file(folder.path("out"))).chain_hash(), quiet.to_the_end().chain_hash());
 }
 
+TEST(ServedRun, ASwapThatIsCalledOffNeverComes) {
+  Served quiet, served;
+  const std::uint32_t late = served.client.swap(parse_swap_request("solver=Newton@step=50")).number();
+  served.client.step(10);
+  served.edit({"set Body.Ball01.Id=Ball01"});  // it goes along
+  quiet.client.step(10);
+  quiet.edit({"set Body.Ball01.Id=Ball01"});
+  const api::ServedSwap off = served.client.call_off(late);
+  EXPECT_EQ(off.outcome(), "refused");
+  EXPECT_EQ(off.reason(), "called off");
+  EXPECT_THAT(refusal([&] { served.client.call_off(late); }), HasSubstr("refused already; none is on its way"));
+  EXPECT_THAT(refusal([&] { served.client.call_off(7); }), HasSubstr("no swap has that number"));
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet.to_the_end().chain_hash());
+}
+
+TEST(ServedRun, AnotherPluginIsComparedAndLeavesNoTrace) {
+  Served quiet, served;
+  const auto compare = [&](const std::string& text) {
+    return served.client.swap(parse_swap_request(text, true)).number();
+  };
+  const std::uint32_t same = compare("solver=Sequential"), other = compare("solver=Newton");
+  EXPECT_THAT(refusal([&] { compare("solver=Newtn"); }), HasSubstr("compare solver=Newtn: no solver plugin"));
+  served.client.step(30);
+  EXPECT_EQ(served.client.call_off(same).shadow().calls(), 30U);
+  const api::Status status = served.to_the_end();
+  EXPECT_EQ(status.chain_hash(), quiet.to_the_end().chain_hash());
+  ASSERT_EQ(status.swaps_size(), 2);
+  EXPECT_TRUE(status.swaps(0).compares());
+  EXPECT_EQ(status.swaps(0).shadow().differing_calls(), 0U);
+  EXPECT_GT(status.swaps(0).shadow().from_us(), 0.0);
+  EXPECT_GT(status.swaps(0).shadow().to_us(), 0.0);
+  EXPECT_EQ(status.swaps(1).number(), other);
+  EXPECT_EQ(status.swaps(1).shadow().calls(), kSteps);
+  EXPECT_GT(status.swaps(1).shadow().differing_calls(), 0U);
+  EXPECT_THAT(status_page(status),
+              HasSubstr("  1 ended: solver Sequential beside Sequential, from step 1 on: 0 of 30 "));
+  EXPECT_THAT(status_page(status), HasSubstr("  2 comparing: solver Newton beside Sequential, from step 1 on: "));
+  EXPECT_THAT(status_page(status), HasSubstr("      Solver.Solve linear_velocity: "));
+}
+
 TEST(ServedRun, ASwapOnItsWayNamesWhomItReplaces) {
   Served served;
   served.client.step(3);
