@@ -23,7 +23,7 @@ struct Disagreement {
 class Comparison {
  public:
   std::uint64_t calls = 0;
-  std::uint64_t differing_calls = 0;  // whose answers were not the same bytes
+  std::uint64_t differing_calls = 0;          // whose answers were not the same bytes
   std::uint64_t first_ns = 0, second_ns = 0;  // in which each of the two worked, where that is known
   std::vector<Disagreement> disagreements;
 
