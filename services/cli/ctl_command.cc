@@ -198,7 +198,7 @@ int show_instrumentation(const CtlLine& line, ControlClient* client) {
   for (const std::string& reason : frame.missing()) std::cerr << "gravitas ctl: missing: " << reason << '\n';
   const api::Status status = client->status();
   std::vector<NamedFile> files;
-  for (const std::string& file : status.files()) files.push_back({"a file of the scene,", file});
+  for (const std::string& file : status.files()) files.push_back({"a file of the run,", file});
   require_separate(files, {{"--out", line.out}});
   const bool is_picture = line.out.ends_with(".svg");
   const std::string text = is_picture ? survey::picture(frame, status.scene()) : to_json(frame, JsonForm::kLine);

@@ -57,10 +57,16 @@ int serve(ServeLine* line) {
   line->scene.apply();
   line->options.hosting_words = line->scene.hosting_words();
   listen_to_interrupts();
+  let_writes_fail();
   control::ServedRun run(line->options);
   // from here on a signal ends it in order
   boost::asio::io_context loop;
-  boost::asio::signal_set signals(loop, SIGINT, SIGTERM, SIGHUP);
+  boost::asio::signal_set signals(loop, SIGINT, SIGTERM);
+  // ignored under nohup
+  if (std::signal(SIGHUP, SIG_DFL) == SIG_IGN)
+    std::signal(SIGHUP, SIG_IGN);
+  else
+    signals.add(SIGHUP);
   signals.async_wait([&](const boost::system::error_code&, int) {
     // the second one ends the program
     signals.clear();
@@ -76,12 +82,12 @@ int serve(ServeLine* line) {
     loop.run();
     run.interrupt();
   }
-  const std::string resume = run.save_checkpoint();
+  const std::optional<control::ServedRun::Saved> saved = run.save_checkpoint();
   const control_api::v1::Status status = run.status();
   std::cout << control::status_page(status);
-  if (!resume.empty())
+  if (saved && !saved->go_on_by.empty())
     std::cerr << fmt::format("gravitas: checkpoint '{}' holds step {}; to go on: {}\n", status.checkpoint(),
-                             status.step(), resume);
+                             saved->step, saved->go_on_by);
   if (status.state() == "finished") return kDone;
   if (status.state() != "faulted") return kInterrupted;
   std::cerr << "gravitas: " << status.fault() << '\n';

@@ -126,6 +126,7 @@ void ServedRun::begin_environment(const Resumption* from) {
     const recorder::v1::Checkpoint& kept = from->checkpoint;
     recorder_->set_edits({kept.edits().begin(), kept.edits().end()});
     recorder_->set_decisions({kept.decisions().begin(), kept.decisions().end()});
+    for (const edit::v1::Edit& one : kept.edits()) note_edit(one, &past_);
     events_->resume(kept.tally());
     figures_->resume(kept.tally());
     figures_->follow(environment_.get());
@@ -306,15 +307,17 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   if (!request.hosting().empty()) spec.hosting = parse_hosting_mode(verb, word, request.hosting());
   // the settings of the moment, else those of the scene
   const auto [active, scenes] = between_steps([this] { return std::pair(active_, slots_of(description_)); });
-  const bool is_active = std::ranges::any_of(active.slot(spec.slot).plugins, [&](const kernel::PluginChoice& one) {
-    return one.declaration.name == spec.plugin;
-  });
   // a library is asked in a process, which the steps do not wait for; the copy keeps its name from staying known
   Catalog catalog = catalog_;
-  kernel::SwapOrder found = resolve_swap(spec, is_active ? active : scenes, &catalog);
+  kernel::SwapOrder found = resolve_swap(spec, scenes, &catalog);
+  for (const kernel::PluginChoice& one : active.slot(spec.slot).plugins)
+    if (one.declaration.name == found.plugin.declaration.name &&
+        std::ranges::equal(one.declaration.properties, found.plugin.declaration.properties, {}, &Property::name,
+                           &Property::name))
+      found.plugin.settings = one.settings;
   return between_steps([&] {
     found.step = next_step(spec.text, request.step());
-    return order(std::move(found), request.compares());
+    return order(std::move(found), request.compares() ? OrderKind::kComparison : OrderKind::kSwap);
   });
 }
 
@@ -357,7 +360,7 @@ api::SwapOrdered ServedRun::set_property(const api::SetPropertyRequest& request)
     const auto place = settings.begin() + static_cast<std::ptrdiff_t>(begin);
     settings.insert(settings.erase(place, place + static_cast<std::ptrdiff_t>(size)), numbers.begin(), numbers.end());
     exchange.step = next_step(what, 0);
-    return order(std::move(exchange));
+    return order(std::move(exchange), OrderKind::kSetting);
   });
 }
 
@@ -366,7 +369,7 @@ const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot
                                                    const std::vector<kernel::SwapRecord>& records) const {
   for (std::size_t i = orders_.size(); i-- > 0;) {
     const kernel::SwapOrder& swap = orders_[i].swap;
-    if (!orders_[i].compares && swap.slot == slot && swap.step <= environment_->step_count() + 1 &&
+    if (!orders_[i].compares() && swap.slot == slot && swap.step <= environment_->step_count() + 1 &&
         find_property(swap.plugin, property) != nullptr && is_pending(record_of(orders_[i], records).state))
       return swap.plugin;
   }
@@ -404,9 +407,9 @@ std::vector<ServedRun::Order> ServedRun::pending_orders() const {
   return pending;
 }
 
-api::SwapOrdered ServedRun::order(kernel::SwapOrder order, bool compares) {
+api::SwapOrdered ServedRun::order(kernel::SwapOrder order, OrderKind kind) {
   try {
-    environment_->order_swap(order, compares);
+    environment_->order_swap(order, kind == OrderKind::kComparison);
   } catch (const std::invalid_argument& problem) {
     throw BadInput(problem.what());
   }
@@ -414,7 +417,7 @@ api::SwapOrdered ServedRun::order(kernel::SwapOrder order, bool compares) {
   ordered.set_number(++last_order_);
   ordered.set_step(order.step);
   const std::uint32_t rank = rank_of(order, orders_);
-  orders_.push_back({std::move(order), last_order_, rank, compares});
+  orders_.push_back({std::move(order), kind, last_order_, rank});
   return ordered;
 }
 
@@ -446,8 +449,9 @@ std::future<api::Captured> ServedRun::capture(const api::CaptureRequest& request
   if (request.steps() == 0) throw BadInput(what + ": allowed: a number of steps from 1");
   if (!request.path().starts_with('/')) throw BadInput(what + ": allowed: an absolute path for the capsule");
   return between_steps([&] {
-    for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
-      require_separate(files_of(*scene), {{"--out", request.path()}});
+    RunOptions files = options_;
+    files.capsule = request.path();
+    for (const scene::v1::Scene* scene : {&first_scene_, &scene_}) require_separate_files(files, *scene, {});
     require_steps_left("capture");
     if (capture_) throw NotNow(what + ": another capture is being made");
     for (const kernel::LeftOut& left_out : environment_->plan().left_out)

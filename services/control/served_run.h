@@ -72,9 +72,12 @@ class ServedRun final : private kernel::CommitListener {
   // Gives up the step in hand, and makes no other one; what was committed can still be asked for. From any thread.
   void interrupt() { is_ending_ = true; }
 
-  // Brings the checkpoint that options ask for to the last commit; what goes on from it, empty if none is asked for. Throws
-  // std::system_error.
-  std::string save_checkpoint();
+  struct Saved {
+    std::uint32_t step;    // that the checkpoint holds
+    std::string go_on_by;  // a command; empty if there is none
+  };
+  // Brings the checkpoint that options ask for to the last commit, if they do. Throws std::system_error.
+  std::optional<Saved> save_checkpoint();
 
   api::Status status();
   void pause();
@@ -109,11 +112,14 @@ class ServedRun final : private kernel::CommitListener {
  private:
   using Clock = std::chrono::steady_clock;
   enum class State : std::uint32_t { kRunning, kPaused, kFinished, kFaulted };
-  // A swap or a comparison, its number, and what to find its record by: the rank among those of the slot at that step.
+  // A setting is changed by a swap of the plugin for itself.
+  enum class OrderKind : std::uint32_t { kSwap, kSetting, kComparison };
+  // Its number, and what to find its record by: the rank among those of the slot at that step.
   struct Order {
     kernel::SwapOrder swap;
+    OrderKind kind;
     std::uint32_t number, rank;
-    bool compares;
+    bool compares() const { return kind == OrderKind::kComparison; }
   };
   // Calls that are being kept.
   struct Capture {
@@ -157,7 +163,7 @@ class ServedRun final : private kernel::CommitListener {
   Clock::time_point due() const;
   void require_steps_left(const std::string& what) const;
   std::uint32_t next_step(const std::string& what, std::uint32_t wanted) const;
-  api::SwapOrdered order(kernel::SwapOrder order, bool compares = false);
+  api::SwapOrdered order(kernel::SwapOrder order, OrderKind kind);
   const kernel::PluginChoice& choice_with(const std::string& what, Slot slot, const std::string& property,
                                           const std::vector<kernel::SwapRecord>& records) const;
   // Precondition: of this order, among records of all swaps.
@@ -190,7 +196,7 @@ class ServedRun final : private kernel::CommitListener {
   void on_decision(const kernel::Environment& environment, const kernel::Decision& decision) override;
   void on_poison(const kernel::Environment& environment, const kernel::PoisonedCall& poisoned) override;
 
-  std::string command_to_resume() const;
+  std::string command_to_resume();
 
   const RunOptions options_;
   const std::vector<std::string> hosting_words_;

@@ -17,15 +17,12 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
                                  std::vector<std::string>* warnings) {
   Resumption found = read_resumption(options.resume, description, warnings);
   std::uint32_t last = found.journal.last_step;
-  // the checkpoint has what was changed before a step that was not made
-  const auto count = [](const auto& all, std::uint32_t step) {
-    return std::ranges::count_if(all, [&](const auto& one) { return one.step() == step; });
-  };
-  for (const edit::v1::Edit& one : found.journal.edits)
-    if (count(found.checkpoint.edits(), one.step()) < count(found.journal.edits, one.step()))
-      last = std::max(last, one.step());
+  for (const edit::v1::Edit& one : found.journal.edits) last = std::max(last, one.step());
+  // the checkpoint has those for a step that was not made
   for (const recorder::v1::Decision& one : found.journal.decisions)
-    if (count(found.checkpoint.decisions(), one.step()) == 0) last = std::max(last, one.step());
+    if (std::ranges::find(found.checkpoint.decisions(), one.step(), &recorder::v1::Decision::step) ==
+        found.checkpoint.decisions().end())
+      last = std::max(last, one.step());
   last = std::min(last, description.steps);
   if (last <= found.checkpoint.step()) return found;
   const channel::PrivateFolder folder;
@@ -81,12 +78,13 @@ void ServedRun::keep_checkpoint(const JournalReading& known) {
   }
 }
 
-std::string ServedRun::save_checkpoint() {
-  return between_steps([this]() -> std::string {
+std::optional<ServedRun::Saved> ServedRun::save_checkpoint() {
+  return between_steps([this]() -> std::optional<Saved> {
     if (!recorder_->keeps()) return {};
     if (recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
     checkpoint_ = recorder_->path();
-    return resume_command_ = command_to_resume();
+    resume_command_ = command_to_resume();
+    return Saved{recorder_->saved_step().value(), resume_command_};
   });
 }
 
@@ -99,7 +97,10 @@ void ServedRun::keep_faulted_state() {
     const std::string path =
         keeps ? recorder_->path() : std::filesystem::absolute(paused_checkpoint(options_)).string();
     if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
-    if (!keeps) recorder_->save_to(path, *environment_);
+    if (!keeps) {
+      recorder_->save_to(path, *environment_);
+      remove_other_journal(options_, path);
+    }
     checkpoint_ = path;
     resume_command_ = command_to_resume();
   } catch (const std::exception& problem) {
@@ -108,17 +109,25 @@ void ServedRun::keep_faulted_state() {
 }
 
 // From wherever it is typed; empty: nobody can know what a listener would decide.
-std::string ServedRun::command_to_resume() const {
+std::string ServedRun::command_to_resume() {
   if (recorder_->has_listened()) return {};
   RunOptions options = options_;
   for (std::string& scene : options.scenes) scene = std::filesystem::absolute(scene);
   // what was ordered for later
-  for (const Order& one : pending_orders())
-    if (one.compares)
-      options.comparisons.push_back(fmt::format("{}={}", slot_name(one.swap.slot), one.swap.plugin.declaration.name));
-    else if (one.swap.step > environment_->step_count() + 1)
-      options.swaps.push_back(
-          fmt::format("{}={}@step={}", slot_name(one.swap.slot), one.swap.plugin.declaration.name, one.swap.step));
+  for (const Order& one : pending_orders()) {
+    const auto& [slot, plugin, hosting, step] = one.swap;
+    if (one.kind == OrderKind::kSetting) {
+      add_warning(fmt::format("what was set of {} for step {} is not part of the command that goes on",
+                              plugin.declaration.name, step));
+      continue;
+    }
+    const InstalledPlugin* known = catalog_.find_plugin(slot, plugin.declaration.name);
+    const bool has_name = known != nullptr && known->library == plugin.library;
+    std::string word = fmt::format("{}={}", slot_name(slot), has_name ? plugin.declaration.name : plugin.library);
+    if (one.kind == OrderKind::kSwap) word += fmt::format("@step={}", step);
+    if (hosting) word += fmt::format(",hosting={}", kernel::hosting_name(*hosting));
+    (one.kind == OrderKind::kSwap ? options.swaps : options.comparisons).push_back(word);
+  }
   return resume_command(options, hosting_words_, checkpoint_);
 }
 

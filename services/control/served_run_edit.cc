@@ -22,7 +22,8 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     edit::v1::Edit edit;
     edit.set_step(made.step());
     *edit.mutable_changes() = request.changes();
-    const EditedScene edited(options_, scene_, description_, &catalog_, &edit, &*environment_);
+    Catalog catalog = catalog_;  // which other threads read; the scene's libraries are added again
+    const EditedScene edited(options_, scene_, description_, &catalog, &edit, &*environment_);
     kernel::EnvironmentDescription begun = edited.description(), active = description_;
     for (const Slot slot : kSlots) active.slot(slot) = active_.slot(slot);
     keep_who_answers(description_, active, &begun);
@@ -33,13 +34,21 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     std::vector<Order> pending;
     for (Order& one : pending_orders()) {
       try {
-        next->order_swap(one.swap, one.compares);
+        next->order_swap(one.swap, one.compares());
       } catch (const std::invalid_argument& problem) {
         throw BadInput(fmt::format("edit: a swap is ordered for step {} that could not be made then: {}", one.swap.step,
                                    problem.what()));
       }
       one.rank = rank_of(one.swap, pending);
       pending.push_back(std::move(one));
+    }
+    for (const kernel::FaultInjection& fault : injected_) {
+      if (fault.step <= environment_->step_count()) continue;
+      try {
+        next->inject(fault);
+      } catch (const std::invalid_argument&) {
+        // status says of it then that it was not committed
+      }
     }
 
     // from here on it is made

@@ -90,8 +90,8 @@ api::Status ServedRun::status_now() {
   api::Status status;
   status.set_scene(scene_name_);
   std::set<std::string> files;
-  for (const scene::v1::Scene* scene : {&first_scene_, &scene_})
-    for (const NamedFile& file : files_of(*scene))
+  for (const std::vector<NamedFile>& some : {files_of(first_scene_), files_of(scene_), checkpoints_of(options_)})
+    for (const NamedFile& file : some)
       if (std::error_code none; std::filesystem::exists(file.path, none))
         files.insert(std::filesystem::absolute(file.path).string());
   status.mutable_files()->Assign(files.begin(), files.end());
@@ -166,7 +166,7 @@ api::ServedSwap ServedRun::swap_message(const Order& order, const std::vector<ke
   swap.set_reason(record.reason);
   swap.set_pause_us(record.pause_us);
   swap.set_wait_us(record.wait_us);
-  swap.set_compares(order.compares);
+  swap.set_compares(order.compares());
   write_comparison(record.shadow, *environment_, swap.mutable_shadow());
   return swap;
 }

@@ -4,30 +4,25 @@
 
 #include <algorithm>
 
+#include "services/recorder/journal.h"
+
 namespace gravitas {
-namespace {
-
-bool is_same(const edit::v1::Edit& a, const edit::v1::Edit& b) {
-  return a.step() == b.step() && std::ranges::equal(a.changes(), b.changes(), {}, &edit::v1::Change::SerializeAsString,
-                                                    &edit::v1::Change::SerializeAsString);
-}
-
-}  // namespace
 
 void EditSchedule::leave_out_past(std::uint32_t step, const std::vector<edit::v1::Edit>& journal) {
   // one may have been made before a step that was not
   const std::uint32_t done = made_.empty() ? step : std::max(step, made_.back().step());
   for (const edit::v1::Edit& one : to_come_)
     if (one.step() <= done &&
-        !std::ranges::any_of(made_, [&](const edit::v1::Edit& made) { return is_same(made, one); }))
+        !std::ranges::any_of(made_, [&](const edit::v1::Edit& made) { return is_same_edit(made, one); }))
       throw BadInput(
           fmt::format("--edit before step {}: the run that the checkpoint of step {} belongs to was not edited so; "
                       "allowed: what it was edited by, and later edits",
                       one.step(), step));
-  for (const edit::v1::Edit& one : journal)
-    if (std::ranges::find(to_come_, one.step(), &edit::v1::Edit::step) == to_come_.end()) to_come_.push_back(one);
   std::erase_if(to_come_, [&](const edit::v1::Edit& one) { return one.step() <= done; });
-  std::ranges::sort(to_come_, {}, &edit::v1::Edit::step);
+  const std::vector<edit::v1::Edit> ordered = to_come_;
+  for (const edit::v1::Edit& one : journal)
+    if (std::ranges::find(ordered, one.step(), &edit::v1::Edit::step) == ordered.end()) to_come_.push_back(one);
+  std::ranges::stable_sort(to_come_, {}, &edit::v1::Edit::step);
 }
 
 void EditSchedule::rehearse(const RunOptions& options, scene::v1::Scene scene,

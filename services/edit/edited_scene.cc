@@ -67,6 +67,11 @@ std::set<std::string> impulses_in(const scene::v1::Scene& scene) {
   return ids;
 }
 
+scene::SetMotion motion_set_of(const scene::ChangeLog& log, const std::string& body) {
+  const auto set = log.motions.find(body);
+  return set == log.motions.end() ? scene::SetMotion{} : set->second;
+}
+
 }  // namespace
 
 EditedScene::EditedScene(const RunOptions& options, const scene::v1::Scene& scene,
@@ -76,6 +81,7 @@ EditedScene::EditedScene(const RunOptions& options, const scene::v1::Scene& scen
   read_changes(options, catalog);
   if (edit_.step() > 1) refuse_late_impulses();
   find_kept();
+  keep_stopped();
   if (now != nullptr) {
     find_motions(*now);
     write_places();
@@ -117,15 +123,15 @@ std::unique_ptr<kernel::Environment> EditedScene::start(const kernel::Environmen
 }
 
 void EditedScene::refuse_late_impulses() const {
-  const std::set<std::string> impulses = impulses_in(scene_);
+  const std::set<std::string> impulses = impulses_in(scene_), acted_at_start = impulses_in(first_);
   const auto rows = rows_of(before_.bodies);
   for (const kernel::BodyDescription& body : description_.bodies) {
     const std::uint32_t row = log_.new_bodies.contains(body.id) ? kNone : find_row(rows, body.id);
     for (const std::uint32_t force : body.forces) {
       const std::string& id = description_.forces[force].id;
-      const bool acted = row != kNone && std::ranges::any_of(before_.bodies[row].forces, [&](std::uint32_t one) {
-                           return before_.forces[one].id == id;
-                         });
+      const bool acted = row != kNone && acted_at_start.contains(id) &&
+                         std::ranges::any_of(before_.bodies[row].forces,
+                                             [&](std::uint32_t one) { return before_.forces[one].id == id; });
       if (impulses.contains(id) && !acted)
         throw BadInput(
             fmt::format("edit before step {}: the force '{}' on '{}' is Instantaneous and would act at t = 0; "
@@ -171,6 +177,28 @@ bool EditedScene::has_stopped(std::uint32_t body) const {
          (description_.bodies[body].flags & kCarried) == 0;
 }
 
+// Whom an earlier edit stopped does not go back to where the scene's text has it.
+void EditedScene::keep_stopped() {
+  for (std::uint32_t i = 0; i < description_.bodies.size(); ++i) {
+    const std::uint32_t row = old_body_[i];
+    if (row != kNone && ((description_.bodies[i].flags | before_.bodies[row].flags) & kCarried) == 0)
+      description_.bodies[i].pose = moved(before_.bodies[row].pose, i);
+  }
+}
+
+Pose EditedScene::moved(Pose pose, std::uint32_t body) const {
+  const kernel::BodyDescription &next = description_.bodies[body], &old = before_.bodies[old_body_[body]];
+  const scene::SetMotion motion = motion_set_of(log_, next.id);
+  if (!motion.position && !motion.orientation && is_same(old.geometry, next.geometry)) return pose;
+  Pose frame = compose(pose, old.geometry);
+  const Pose wanted = compose(next.pose, next.geometry);
+  if (motion.position) frame.position = wanted.position;
+  if (motion.orientation) frame.orientation = wanted.orientation;
+  pose = compose(frame, inverse(next.geometry));
+  pose.orientation.normalize();
+  return pose;
+}
+
 void EditedScene::find_motions(const kernel::Environment& now) {
   const kernel::StateView state = now.state();
   for (std::uint32_t i = 0; i < description_.bodies.size(); ++i) {
@@ -179,18 +207,9 @@ void EditedScene::find_motions(const kernel::Environment& now) {
     Twist twist = body.twist;
     const std::uint32_t row = old_body_[i];
     if (row != kNone && ((body.flags & kCarried) != 0 || has_stopped(i)) && now.step_count() > 0) {
-      const auto set = log_.motions.find(body.id);
-      const scene::SetMotion motion = set == log_.motions.end() ? scene::SetMotion{} : set->second;
+      const scene::SetMotion motion = motion_set_of(log_, body.id);
       const kernel::BodyDescription& old = before_.bodies[row];
-      pose = {vector_at(state.position, row), quaternion_at(state.orientation, row)};
-      if (motion.position || motion.orientation || !is_same(old.geometry, body.geometry)) {
-        Pose frame = compose(pose, old.geometry);
-        const Pose wanted = compose(body.pose, body.geometry);
-        if (motion.position) frame.position = wanted.position;
-        if (motion.orientation) frame.orientation = wanted.orientation;
-        pose = compose(frame, inverse(body.geometry));
-        pose.orientation.normalize();
-      }
+      pose = moved({vector_at(state.position, row), quaternion_at(state.orientation, row)}, i);
       if (body.motion.surface != old.motion.surface && !body.motion.empty())
         twist = MotionCurve(body.motion, body.geometry).at(now.time()).twist;
       else if (!motion.linear_velocity)

@@ -60,6 +60,9 @@ class EditedScene {
   std::string named(const std::string& problem) const;
   void read_changes(const RunOptions& options, Catalog* catalog);
   void find_kept();
+  void keep_stopped();
+  // Of a body that went on in this pose: where the edit has it.
+  Pose moved(Pose pose, std::uint32_t body) const;
   void find_motions(const kernel::Environment& now);
   void write_places();
   void place();

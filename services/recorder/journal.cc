@@ -86,6 +86,11 @@ bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uin
 
 }  // namespace
 
+bool is_same_edit(const edit::v1::Edit& a, const edit::v1::Edit& b) {
+  return a.step() == b.step() && std::ranges::equal(a.changes(), b.changes(), {}, &edit::v1::Change::SerializeAsString,
+                                                    &edit::v1::Change::SerializeAsString);
+}
+
 JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, std::uint32_t after) {
   JournalReading reading;
   JournalHeader header;
@@ -125,7 +130,7 @@ JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, s
 }
 
 JournalWriter::JournalWriter(const std::string& path, const Hash& run, const JournalReading& known)
-    : path_(path), check_(known.check), last_step_(known.last_step) {
+    : path_(path), check_(known.check), last_step_(known.last_step), known_edits_(known.edits) {
   file_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
   const auto fail = [&] {
     const std::system_error error(errno, std::generic_category(), "journal '" + path_ + "'");
@@ -133,7 +138,8 @@ JournalWriter::JournalWriter(const std::string& path, const Hash& run, const Jou
     throw error;
   };
   if (file_ < 0) fail();
-  if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
+  // where the file system has no locks there is none
+  if (flock(file_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     close(file_);
     throw std::runtime_error("journal '" + path_ + "': another run is writing it");
   }
@@ -164,7 +170,10 @@ void JournalWriter::append(const JournalEntry& commit) {
 
 void JournalWriter::append(const recorder::v1::Decision& decision) { put_message(kDecision, decision); }
 
-void JournalWriter::append(const edit::v1::Edit& edit) { put_message(kEdit, edit); }
+void JournalWriter::append(const edit::v1::Edit& edit) {
+  if (known_edits_.empty() || !is_same_edit(known_edits_.front(), edit)) return put_message(kEdit, edit);
+  known_edits_.erase(known_edits_.begin());
+}
 
 void JournalWriter::put_message(std::uint8_t kind, const google::protobuf::Message& message) {
   const std::string payload = message.SerializeAsString();

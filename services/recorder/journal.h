@@ -41,6 +41,9 @@ struct JournalReading {
   std::string note;                               // what was left aside and why; empty: nothing
 };
 
+// The same changes before the same step, wherever bodies were.
+bool is_same_edit(const edit::v1::Edit& a, const edit::v1::Edit& b);
+
 // Reads any bytes. `after`: the step that is already known.
 JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, std::uint32_t after);
 
@@ -58,6 +61,7 @@ class JournalWriter {
   void append(const JournalEntry& commit);
   // Written at once.
   void append(const recorder::v1::Decision& decision);
+  // One that the journal knows and that is made again is not written again.
   void append(const edit::v1::Edit& edit);
   void flush();
 
@@ -71,6 +75,7 @@ class JournalWriter {
   int file_ = -1;
   std::uint64_t check_ = 0;
   std::uint32_t last_step_;
+  std::vector<edit::v1::Edit> known_edits_;  // not made again so far
   std::vector<std::byte> buffer_;
   Clock::time_point last_flush_ = Clock::now();
 };

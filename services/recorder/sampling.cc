@@ -11,10 +11,11 @@ constexpr double kTimeTolerance = 1e-9;
 bool Sampling::is_due(const kernel::Environment& environment, bool last) {
   const double time = environment.time();
   const double tolerance = kTimeTolerance * environment.time_step();
-  const bool due = interval_ <= 0.0 || time >= static_cast<double>(next_sample_) * interval_ - tolerance;
+  const bool is_each = interval_ <= 0.5 * environment.time_step();
+  const bool due = is_each || time >= static_cast<double>(next_sample_) * interval_ - tolerance;
   if (!due && !last) return false;
   if (last_taken_ == environment.step_count()) return false;
-  while (interval_ > 0.0 && static_cast<double>(next_sample_) * interval_ - tolerance <= time) ++next_sample_;
+  while (!is_each && static_cast<double>(next_sample_) * interval_ - tolerance <= time) ++next_sample_;
   last_taken_ = environment.step_count();
   return true;
 }

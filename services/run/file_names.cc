@@ -54,7 +54,18 @@ std::vector<NamedFile> kept_by(const RunOptions& options) {
   return {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
 }
 
+std::vector<NamedFile> resumed_by(const RunOptions& options) {
+  return {{"--resume", options.resume}, {"the journal of --resume", journal(options.resume)}};
+}
+
 }  // namespace
+
+std::vector<NamedFile> checkpoints_of(const RunOptions& options) {
+  std::vector<NamedFile> files = kept_by(options);
+  for (NamedFile& file : resumed_by(options)) files.push_back(std::move(file));
+  std::erase_if(files, [](const NamedFile& file) { return file.path.empty(); });
+  return files;
+}
 
 std::vector<NamedFile> files_of(const scene::v1::Scene& scene) {
   std::vector<NamedFile> files;
@@ -81,8 +92,7 @@ void require_separate_files(const RunOptions& options, const scene::v1::Scene& s
                             const std::vector<edit::v1::Edit>& edits) {
   std::vector<NamedFile> inputs = files_of(scene);
   const std::vector<NamedFile> kept = kept_by(options);
-  const std::vector<NamedFile> resumed = {{"--resume", options.resume},
-                                          {"the journal of --resume", journal(options.resume)}};
+  const std::vector<NamedFile> resumed = resumed_by(options);
   for (const edit::v1::Edit& edit : edits)
     for (const edit::v1::Change& change : edit.changes())
       if (change.has_add()) inputs.push_back({"--edit add", change.add().name()});

@@ -58,6 +58,11 @@ Resumption read_resumption(const std::string& path, const kernel::EnvironmentDes
                     "count from t = 0",
                     checkpoint->step(), description.steps));
   JournalReading journal = read_journal_beside(path, digest_of(scene), checkpoint->step(), warnings);
+  // the checkpoint has those before a step that was not made
+  for (const edit::v1::Edit& made : checkpoint->edits()) {
+    const auto known = std::ranges::find_if(journal.edits, [&](const auto& one) { return is_same_edit(made, one); });
+    if (known != journal.edits.end()) journal.edits.erase(known);
+  }
   return {std::move(*checkpoint), std::move(journal)};
 }
 
@@ -80,6 +85,12 @@ void restore(recorder::v1::Checkpoint* checkpoint, const kernel::EnvironmentDesc
   for (const kernel::SwapRecord& swap : environment->swaps())
     if (swap.state == kernel::SwapState::kRefused)
       throw std::runtime_error(swap.to + " answered when it was made: " + swap.reason);
+}
+
+void remove_other_journal(const RunOptions& options, const std::string& checkpoint) {
+  std::error_code none;
+  if (options.resume.empty() || !fs::equivalent(options.resume, checkpoint, none))
+    fs::remove(journal_of(checkpoint), none);
 }
 
 std::string checkpoint_target(const std::string& path) {

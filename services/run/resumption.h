@@ -14,7 +14,7 @@ namespace gravitas {
 
 struct Resumption {
   recorder::v1::Checkpoint checkpoint;
-  JournalReading journal;  // of the steps after the checkpoint
+  JournalReading journal;  // of what came after the checkpoint
 };
 
 // Throws BadInput if the file cannot be read, is no checkpoint, is one of another build or scene, or lies beyond the
@@ -43,6 +43,10 @@ void from_checkpoint(const std::string& path, Action&& action) {
     throw BadInput("checkpoint '" + path + "': " + problem.what());
   }
 }
+
+// Where a run that keeps no checkpoint has left one: a journal beside it is that of another run, unless this one goes on from
+// there, and is removed.
+void remove_other_journal(const RunOptions& options, const std::string& checkpoint);
 
 // The file itself where `path` is a symbolic link to one. Throws BadInput if there is something else than an ordinary
 // file, which a checkpoint must not replace.

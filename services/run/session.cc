@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <filesystem>
 #include <system_error>
@@ -125,7 +126,7 @@ class Run final : private kernel::CommitListener {
       while (result_.outcome == RunOutcome::kCompleted && !is_done()) {
         if (interrupted_()) {
           result_.outcome = RunOutcome::kInterrupted;
-        } else if (!make_due_edit()) {
+        } else if (!make_due_edits()) {
           break;
         } else if (make_step()) {
           figures_->follow(environment_.get());
@@ -264,6 +265,7 @@ class Run final : private kernel::CommitListener {
                         "then, or not ordered",
                         slot_name(one.slot), one.step, step));
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
+    const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };  // absent ones are NaN
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
       *answering = answering_at(resumed.checkpoint, description_, catalog_);
@@ -271,7 +273,8 @@ class Run final : private kernel::CommitListener {
         kernel::SwapOrder order = order_of(decision, catalog_);
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
           return one.slot == order.slot && one.step == order.step &&
-                 one.plugin.declaration.name == order.plugin.declaration.name;
+                 one.plugin.declaration.name == order.plugin.declaration.name &&
+                 std::ranges::equal(one.plugin.settings, order.plugin.settings, {}, bits, bits);
         });
         if (!is_ordered) swaps_.push_back(std::move(order));
       }
@@ -299,17 +302,18 @@ class Run final : private kernel::CommitListener {
     description_ = edited.description();
   }
 
-  // False if an edit could not be made, which ends the run.
-  bool make_due_edit() {
-    std::optional<edit::v1::Edit> edit = edits_.take_due(environment_->step_count() + 1);
-    if (!edit) return true;
-    try {
-      make(&*edit);
-    } catch (const BadInput& problem) {
-      fail(problem.what());
-      result_.is_bad_input = true;
+  // False if one could not be made, which ends the run.
+  bool make_due_edits() {
+    while (std::optional<edit::v1::Edit> edit = edits_.take_due(environment_->step_count() + 1)) {
+      try {
+        make(&*edit);
+      } catch (const BadInput& problem) {
+        fail(problem.what());
+        result_.is_bad_input = true;
+      }
+      if (result_.outcome != RunOutcome::kCompleted) return false;
     }
-    return result_.outcome == RunOutcome::kCompleted;
+    return true;
   }
 
   // Another environment goes on; what this one has to tell is told now.
@@ -421,6 +425,7 @@ class Run final : private kernel::CommitListener {
     if (options_.listener) recorder.note_listener();
     recorder.set_decisions(decisions_);
     recorder.save_to(path, *environment_);
+    if (checkpoint_path_.empty()) remove_other_journal(options_, path);
     result_.checkpoint = path;
     result_.checkpoint_step = environment_->step_count();
   }

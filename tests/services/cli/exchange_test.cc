@@ -186,7 +186,9 @@ TEST(Exchange, APauseRemembersWhoAnswered) {
     return read_report(read_file(report)).chain_hash();
   };
   const std::string whole = go({"--swap", "integrator=SemiImplicitEuler@step=40"}, 0);
+  const std::string journal = folder.write("two_spheres_motor.paused.checkpoint.journal", "of another run");
   go({"--swap", "integrator=SemiImplicitEuler@step=40", "--fault", "solver:kill@step=80,times=100"}, 3);
+  EXPECT_FALSE(std::filesystem::exists(journal));
   EXPECT_EQ(go({"--resume", folder.path("two_spheres_motor.paused.checkpoint")}, 0), whole);
 }
 

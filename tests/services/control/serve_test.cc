@@ -61,6 +61,7 @@ class Served {
     EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(result.out, &status).ok()) << result.out;
     return status;
   }
+  void send(int number) const { kill(process_, number); }
   ProgramResult end(int number) {
     kill(process_, number);
     const ProgramResult result = harness::finish_program(process_, folder_);
@@ -223,6 +224,16 @@ TEST(Serve, WatchShowsLinesAndEndsWithTheServer) {
   EXPECT_THAT(result.out, ::testing::StartsWith("step "));
   EXPECT_THAT(result.out, HasSubstr("running"));
   EXPECT_THAT(result.err, HasSubstr("the server has ended"));
+}
+
+TEST(Serve, UnderNohupItOutlivesItsTerminal) {
+  const sighandler_t before = signal(SIGHUP, SIG_IGN);
+  Served served({"--duration", "3600", "--paused"});
+  signal(SIGHUP, before);
+  served.send(SIGHUP);
+  EXPECT_EQ(served.ctl({"step", "3"}).exit_code, 0);
+  EXPECT_EQ(served.status().step(), 3U);
+  EXPECT_EQ(served.end(SIGTERM).exit_code, 130);
 }
 
 TEST(Serve, CtlReachesItAtAnAddressAndCapturesCalls) {

@@ -342,7 +342,7 @@ TEST(ServedRun, KeepsACheckpointThatGoesOn) {
   // of step 20, and with the journal up to 25
   const std::string chain = quiet.to_the_end().chain_hash();
   EXPECT_EQ(go_on().report.chain_hash(), chain);
-  EXPECT_THAT(served.run.save_checkpoint(), HasSubstr(" --resume " + options.run.checkpoint));
+  EXPECT_THAT(served.run.save_checkpoint().value().go_on_by, HasSubstr(" --resume " + options.run.checkpoint));
   EXPECT_EQ(go_on().report.chain_hash(), chain);
   served.client.reset();
   EXPECT_EQ(go_on().report.chain_hash(), quiet_chain());

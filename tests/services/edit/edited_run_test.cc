@@ -194,6 +194,10 @@ TEST(EditedRun, ABodyThatIsMadeImmovableStaysWhereItIs) {
   EXPECT_FALSE(end.contains("A"));
   EXPECT_NEAR(end.at("B").velocity.x(), 0.5, 1e-12);
   EXPECT_NEAR(end.at("B").position.x(), 0.7 + 0.5 * 0.7, 0.02);
+  // whatever is edited after
+  run.options.edits.push_back("set Body.B.Mass=3@step=61");
+  run.options.edits.push_back("set Body.A.Orientation={0,1,0,0}@step=62");
+  EXPECT_NEAR(run.end().at("B").position.x(), end.at("B").position.x(), 1e-12);
 }
 
 // A ball comes to roll at 2/7 of what the ground below runs at, and is back at rest when that stops.
@@ -552,6 +556,14 @@ TEST(EditedRun, WhatCannotBeIsSaidBeforeTheRunBegins) {
   // before the first step it may act once
   run.options.edits = {"add " + push + "@step=1"};
   EXPECT_NEAR(run.end()["P"].velocity.x(), 0.5, 1e-12);
+  // nor does a force that acts all the time become one
+  const std::string pull = run.folder.write("pull",
+                                            "Forces { Force { Type = \"Basic\" Id = \"Pull\" CustomProperties { Force "
+                                            "= {1, 0, 0} } } }\n"
+                                            "Bodies { " +
+                                                ball("Q", "Position = {0, 9, 0}", "Forces = { \"Pull\" }") + " }");
+  run.options.edits = {"add " + pull + "@step=1", "set Force.Pull.Instantaneous=true@step=20"};
+  EXPECT_THAT(run.refusal(), HasSubstr("would act at t = 0"));
   // all changes before a step are one: the joint goes first
   run.options.edits = {"remove Constraint.Hang@step=5", "remove Body.A@step=5"};
   EXPECT_EQ(run.end().size(), 1U);

@@ -132,6 +132,7 @@ TEST(Trajectory, SamplesAreTheFirstBoundariesAtOrAfterTheInterval) {
               ElementsAre(Eq(0.0), Eq(3 * 0.1), Eq(6 * 0.1), Eq(9 * 0.1), Eq(10 * 0.1)));
   // shorter than a step: every step, once
   EXPECT_EQ(sample_times(trajectory_of(folder, 0.01)).size(), 11U);
+  EXPECT_EQ(sample_times(trajectory_of(folder, 1e-300)).size(), 11U);
   // longer than the run
   EXPECT_THAT(sample_times(trajectory_of(folder, 50.0)), ElementsAre(Eq(0.0), Eq(10 * 0.1)));
 }

@@ -1,0 +1,133 @@
+// What was ordered of a served run outlives edits, crashes and the server: several orders before one step, too.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/paths.h"
+#include "tests/services/control/served.h"
+
+namespace gravitas::control {
+namespace {
+
+using harness::parse_set_request;
+using harness::parse_swap_request;
+using harness::refusal;
+using harness::sample;
+using harness::Served;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string resumed_end(const std::string& checkpoint, std::vector<std::string>* warnings) {
+  RunOptions resumed = sample("direct").run;
+  resumed.resume = checkpoint;
+  const RunResult result = run(
+      resumed, [] { return false; }, [](const Progress&) {});
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  warnings->assign(result.report.warnings().begin(), result.report.warnings().end());
+  return result.report.chain_hash();
+}
+
+// The checkpoint is of step 0, so that the journal alone knows them; it knows them once, however often they are made again.
+TEST(ServedOrders, SeveralBeforeOneStepAreMadeAgain) {
+  const auto begin = [](Served* one) {
+    one->client.step(10);
+    one->edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
+    one->edit({"set Body.Ball02.LinearVelocity={0,0,1}"});
+    one->client.step(10);
+    one->client.set_property(parse_set_request("Solver.Iterations=3"));
+    one->client.set_property(parse_set_request("Solver.RelaxationFactor=0.9"));
+    one->client.step(20);
+  };
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample();
+  options.run.checkpoint = folder.path("served.ck");
+  Served quiet(sample());
+  begin(&quiet);
+  const std::string middle = quiet.client.status().chain_hash(), chain = quiet.to_the_end().chain_hash();
+  {
+    Served served(options);
+    begin(&served);
+    EXPECT_EQ(served.client.status().chain_hash(), middle);
+  }
+  std::vector<std::string> warnings;
+  EXPECT_EQ(resumed_end(options.run.checkpoint, &warnings), chain);
+  ServeOptions again = sample("direct");
+  again.run.resume = again.run.checkpoint = options.run.checkpoint;
+  for (int i = 0; i < 2; ++i) {
+    Served resumed(again);
+    EXPECT_EQ(resumed.client.status().edit_count(), 2U);
+    if (i == 1) {
+      EXPECT_EQ(resumed.to_the_end().chain_hash(), chain);
+    }
+  }
+  EXPECT_EQ(resumed_end(options.run.checkpoint, &warnings), chain);
+}
+
+TEST(ServedOrders, AFaultForLaterOutlivesAnEdit) {
+  Served served;
+  served.client.inject("solver:kill@step=30");
+  served.client.step(10);
+  served.edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
+  served.client.step(20);
+  const api::Status status = served.client.status();
+  ASSERT_EQ(status.fault_count(), 1U);
+  EXPECT_EQ(status.faults(0).step(), 30U);
+  EXPECT_THAT(status.last_warning(), Not(HasSubstr("solver")));
+}
+
+// A library that was built anew has the settings of the moment.
+TEST(ServedOrders, ASwapByPathKeepsWhatWasSet) {
+  Served served(sample("direct"));
+  served.set("Solver.Iterations=7");
+  served.swap("solver=" + in_build("/lib/gravitas/solver_sequential.so"));
+  std::string settings;
+  const api::Status status = served.client.status();
+  for (const api::PlannedSlot& slot : status.plan().slots())
+    for (const api::Setting& setting : slot.settings())
+      if (slot.slot() == "solver") settings += setting.name() + "=" + setting.value() + " ";
+  EXPECT_THAT(settings, HasSubstr("Iterations=7 "));
+}
+
+TEST(ServedOrders, TheCommandThatGoesOnHasThem) {
+  const gravitas::harness::ScratchFolder folder;
+  const std::string built = folder.path("solver.so");
+  std::filesystem::copy_file(in_build("/lib/gravitas/solver_newton.so"), built);
+  ServeOptions options = sample();
+  options.run.checkpoint = folder.path("served.ck");
+  Served served(options);
+  served.client.step(10);
+  served.client.swap(parse_swap_request("space=Grid,hosting=direct"));
+  served.client.swap(parse_swap_request("solver=" + built + "@step=40"));
+  served.client.swap(parse_swap_request("integrator=Euler", true));
+  const std::optional<ServedRun::Saved> saved = served.run.save_checkpoint();
+  ASSERT_TRUE(saved);
+  EXPECT_EQ(saved->step, 10U);
+  EXPECT_THAT(saved->go_on_by, HasSubstr(" --swap space=Grid@step=11,hosting=direct "));
+  EXPECT_THAT(saved->go_on_by, HasSubstr(" --swap solver=" + built + "@step=40 "));
+  EXPECT_THAT(saved->go_on_by, HasSubstr(" --compare integrator=Euler "));
+  EXPECT_THAT(served.client.status().last_warning(), Not(HasSubstr("what was set")));
+  served.client.set_property(parse_set_request("Solver.Iterations=7"));
+  EXPECT_THAT(served.run.save_checkpoint()->go_on_by, Not(HasSubstr("Iterations")));
+  EXPECT_THAT(served.client.status().last_warning(),
+              HasSubstr("what was set of Sequential for step 11 is not part of"));
+}
+
+TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  Served served(options);
+  api::CaptureRequest request;
+  request.set_slot("solver");
+  request.set_steps(5);
+  request.set_path(options.run.checkpoint);
+  EXPECT_THAT(refusal([&] { served.client.capture(request, [] { return false; }); }),
+              HasSubstr("it is the same file as --checkpoint"));
+  EXPECT_THAT(served.client.status().files(), ::testing::Contains(options.run.checkpoint));
+}
+
+}  // namespace
+}  // namespace gravitas::control
