@@ -4,8 +4,7 @@
 //
 //   Continuous   asks the collision slot for times of impact on the way from S_n to S*; event_location.h says where to
 //                stop. Pairs that touch at the start are the solver's: what they run into next is found at S* (turns.cc).
-//   Bisection    (§ 1.4) halves trials until one ends just after a contact closes. It sees contacts at S* alone: what
-//                passes through within a trial is missed. Pairs that touch and do not fly up are the solver's, too.
+//   Bisection    (§ 1.4) halves trials until one ends just after a contact closes (halving.cc).
 //
 // Both also end inner steps where surfaces stop sliding on each other (slides.cc), up to some number in a step. A Zeno
 // sequence ends where flights are shorter than kShortestFlight of the step, or after kMostInnerSteps (of Bisection, with some 45
@@ -13,6 +12,7 @@
 #include <algorithm>
 
 #include "kernel/environment.h"
+#include "kernel/simulators/pairs.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/event_location.h"
 
@@ -24,15 +24,7 @@ constexpr std::size_t kMostSlides = 8, kMostSlidesOfPair = 4;    // whose ends a
 constexpr double kShortestFlight = 1e-6;                         // of the step
 constexpr double kTargetShare = 1e-8;                            // of the margin: gap at which a pair has met
 constexpr double kSlopOfArm = 2e-9, kSlopOfCoordinates = 4e-15;  // twice the gaps that solvers take for none
-constexpr double kLead = 0.9999;   // of the way to an impact is one step, the rest another
-constexpr double kFinest = 1e-13;  // of the step: how closely a halving ends
-
-// Is the pair the next one of these? Both ascend, so that those before it are dropped.
-bool starts_with(std::span<const std::uint32_t> pair, std::span<const std::uint32_t>* touching) {
-  while (!touching->empty() && std::ranges::lexicographical_compare(touching->first(2), pair))
-    *touching = touching->subspan(2);
-  return !touching->empty() && std::ranges::equal(touching->first(2), pair);
-}
+constexpr double kFinest = 1e-13;  // of the step: its shortest part
 
 }  // namespace
 
@@ -113,38 +105,6 @@ Encounter Environment::encounter(std::size_t impact) const {
   const double slop = kSlopOfArm * arm + kSlopOfCoordinates * point.cwiseAbs().maxCoeff();
   return {fraction, -data_.impact_depth[impact], speed(start_linear_velocity(), start_angular_velocity()),
           speed(data_.trial_linear_velocity, data_.trial_angular_velocity), slop};
-}
-
-double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {
-  const double nothing = kTargetShare * margin_;
-  const auto start_speed = [&](std::size_t contact) {
-    const auto velocity = [&](std::uint32_t body) {
-      const Vector3 arm = vector_at(data_.contact_point.span(), contact) - vector_at(data_.trial_position.span(), body);
-      return Vector3(vector_at(start_linear_velocity().span(), body) +
-                     vector_at(start_angular_velocity().span(), body).cross(arm));
-    };
-    const std::uint32_t* pair = &data_.contact_body[2 * contact];
-    return vector_at(data_.contact_normal.span(), contact).dot(velocity(pair[1]) - velocity(pair[0]));
-  };
-  const auto closes = [&](const Trusted<TrialState>& at) {
-    look_up_contacts(find_contacts(bound_and_pair(at)));
-    std::span<const std::uint32_t> touching = front().touching.span();
-    for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
-      // what rolls or slides on is the solver's, what flies up is not
-      const bool goes_on = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touching) &&
-                           start_speed(i) * data_.time_step[0] <= nothing;
-      if (!goes_on && data_.contact_depth[i] > nothing && gap_at(i, front()) > nothing) return true;
-    }
-    return false;
-  };
-  if (!closes(trial)) return length;
-  double clear = 0.0, closed = length;
-  while (closed - clear > kFinest * length) {
-    const double middle = 0.5 * (clear + closed);
-    begin_inner_step(begin, middle);
-    (closes(integrate()) ? closed : clear) = middle;
-  }
-  return is_near || clear == 0.0 ? closed : kLead * clear;
 }
 
 }  // namespace gravitas::kernel
