@@ -16,6 +16,7 @@ struct Encounter {
   double end_speed = 0.0;    // at its end
   double slop = 0.0;         // gap at which a solver may take the pair for closed, m
   bool is_touching = false;  // since the step before: what closes it is the solver's
+  double left_gap = 0.0;     // that the solver left a touching pair with, m: lower flights are its roundings
 };
 
 struct NextStop {
@@ -27,8 +28,9 @@ struct NextStop {
 // The longest inner step, up to `length` (that of the trial), that an encounter allows.
 //
 // A pair that starts closed and parts, to come back within the trial, is followed to the top of its flight, and so is one
-// that the straight motion lets meet before; flights shorter than `shortest_flight`, or lower than the target gap, are
-// none: the pair rests. One that starts so near that the collision slot calls it met, but no nearer than target_gap, flies on
+// that the straight motion lets meet before; flights shorter than `shortest_flight`, or lower than the target gap or
+// what the solver left open, are none: the pair rests. One that starts so near that the collision slot calls it met, but no nearer
+// than target_gap, flies on
 // until it is. One that comes from afar is met where the trial, taken for the straight motion between its ends, deviates from
 // it by less than half the target (by |a| t (length - t) / 2 at the time t). Until then trials are shortened to twice the time
 // of the meeting, and steps end before it, each squaring the distance. The step that meets is short, as friction acts from its

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "kernel/environment.h"
+#include "kernel/simulators/pairs.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/merged_rows.h"
 
@@ -32,12 +33,16 @@ void Environment::find_touching() {
   const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
   now.resize(0);
   const double share = locates_events() ? kLocatedShare : kTouchingShare;
+  std::span<const std::uint32_t> touched = before.span();
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
     const double gap = gap_at(i, back());
     const bool begins = step_count_ == 0 && data_.contact_depth[i] > 0.0;
     figures_.penetration = std::max({figures_.penetration, -gap, begins ? -gap_at(i, front()) : 0.0});
-    const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
+    // what touched, and opened no further in a very short inner step, is no flight
+    const bool goes_on = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touched) &&
+                         gap <= kTouchingShare * margin_ && gap - gap_at(i, front()) <= share * margin_;
+    const bool touches = gap <= share * margin_ || goes_on || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
     const std::uint64_t size = now.size();
     if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;
     now.resize(size + 2);

@@ -24,7 +24,7 @@ constexpr std::size_t kMostSlides = 8, kMostSlidesOfPair = 4;    // whose ends a
 constexpr double kShortestFlight = 1e-6;                         // of the step
 constexpr double kTargetShare = 1e-8;                            // of the margin: gap at which a pair has met
 constexpr double kSlopOfArm = 2e-9, kSlopOfCoordinates = 4e-15;  // twice the gaps that solvers take for none
-constexpr double kFinest = 1e-13;  // of the step: its shortest part
+constexpr double kFinest = 1e-13;                                // of the step: its shortest part
 
 }  // namespace
 
@@ -74,7 +74,10 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
       const auto pair = data_.pair.span().subspan(2 * data_.impact_pair[k], 2);
       Encounter met = encounter(k);
       // the solver has them, whatever gap it left
-      if (starts_with(pair, &touching)) met.fraction = met.gap = 0.0, met.is_touching = true;
+      if (starts_with(pair, &touching)) {
+        met.left_gap = met.gap - 0.5 * (met.start_speed + met.end_speed) * met.fraction * left;
+        met.fraction = met.gap = 0.0, met.is_touching = true;
+      }
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;
     }

@@ -1,0 +1,61 @@
+// What touches all the time is told to meet once, wherever steps are cut: solvers leave gaps of the second order of a step's turn,
+// which are no flights.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
+using harness::turned;
+
+// A slender capsule that leans by `lean` (rad) from the vertical, its foot at x, on a ground and beside a wall at x = 0.
+std::string leaning(double x, double lean, double friction) {
+  const Vector3 up(std::sin(lean), std::cos(lean), 0.0);
+  return R"(
+Geometries { Geometry { Type = "Capsule" Id = "Rod" CustomProperties { Radius = 0.02 Height = 2 } }
+             Geometry { Type = "Halfspace" Id = "Plane" CustomProperties { } } }
+Materials { Material { Id = "M" StaticFrictionCoefficient = )" +
+         literal(friction) + R"( } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -9.81, 0} } } }
+Simulator { CustomProperties { Duration = 0.5 } }
+Environment { Space { Bodies {
+  Body { Id = "Ground" GeometryId = "Plane" Material = "M" }
+  Body { Id = "Wall" GeometryId = "Plane" Material = "M" KineticProperties { Orientation = )" +
+         literal(turned(Vector3::UnitZ(), -0.5 * kPi)) + R"( } }
+  Body { Id = "Rod" GeometryId = "Rod" Material = "M" Mass = 1 Forces = {"Down"} KineticProperties { Position = )" +
+         literal(Vector3(x, 0.02, 0.0) + up) + " Orientation = " + literal(turned(Vector3::UnitZ(), -lean)) + R"( } }
+} } }
+)";
+}
+
+void expect_to_meet(const std::string& scene, std::uint32_t times, const std::string& simulator, double time_step) {
+  for (const char* solver : {"Newton", "Sequential", "Direct"}) {
+    SceneRun run(scene,
+                 {"Simulator=" + simulator, std::string("Solver=") + solver, set("Simulator.TimeStep", time_step)});
+    run.to_end();
+    EXPECT_EQ(run.count_events(EventKind::kCollisionStart), times) << simulator << solver << time_step;
+    EXPECT_EQ(run.count_events(EventKind::kCollisionEnd), 0U) << simulator << solver << time_step;
+  }
+}
+
+// It slides down the wall, which lets it go at two thirds of its height alone: after 0.65 s.
+TEST(LastingContact, ALadderThatSlidesDownAWall) {
+  const std::string scene = leaning(0.02 + 2.0 * std::sin(0.3), -0.3, 0.0);
+  for (const double time_step : {1.0 / 60.0, 1.0 / 240.0, 1e-3}) expect_to_meet(scene, 2, "Continuous", time_step);
+  expect_to_meet(scene, 2, "Bisection", 1.0 / 240.0);
+}
+
+TEST(LastingContact, APencilThatFallsAboutItsFoot) {
+  const std::string scene = leaning(3.0, 0.1, 0.6);
+  for (const double time_step : {1.0 / 60.0, 1.0 / 240.0, 1e-3}) expect_to_meet(scene, 1, "Continuous", time_step);
+}
+
+}  // namespace
+}  // namespace gravitas
