@@ -343,7 +343,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   Pose pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const;
   bool has_contacts() const { return collision_.is_running(); }
   bool has_reactions() const { return solver_.is_running(); }
-  // By instantaneous impulses, or where joints do not allow what the scene or an edit gave bodies.
+  bool is_struck() const;  // by instantaneous impulses, which act at t = 0 alone
+  // By those, or where joints do not allow what the scene or an edit gave bodies.
   bool may_jump_at_start() const;
   // Velocities at the start of the step, after that.
   const Column<double>& start_linear_velocity() const;
