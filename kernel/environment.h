@@ -200,7 +200,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::pair<double, std::uint32_t> largest_turn_by_loads() const;
   bool makes_step_finer();
   std::string why_turned_far(double turn, std::uint32_t body) const;
-  // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
+  // sleep.cc, wake.cc: who is left out of a step, who is woken, and who falls asleep with it.
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();
   void find_sleepers();
