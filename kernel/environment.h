@@ -155,8 +155,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::span<const std::uint32_t> wake_orders() const { return wake_orders_; }
   bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
 
-  // At most one; null: nobody.
-  void set_commit_listener(CommitListener* listener) { commit_listener_ = listener; }
+  // At most one; null: nobody. It is told at once of decisions that were made when there was none, but for swaps, which
+  // who ordered them knows.
+  void set_commit_listener(CommitListener* listener);
   // At most one; null: the scene's own rules hold. What it decides is part of what determines the trajectory.
   void set_pair_arbiter(PairArbiter* arbiter) { arbiter_ = arbiter; }
 
@@ -403,6 +404,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::optional<FaultRecord> fault_;
   std::vector<FaultRecord> faults_;
   CommitListener* commit_listener_ = nullptr;
+  std::vector<std::pair<Decision, SlotDescription>> untold_;  // decisions, with the host, which may be let go
   PairArbiter* arbiter_ = nullptr;
   // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.
   std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};
