@@ -147,10 +147,14 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
 void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
                                std::function<void()> on_end) {
   if (!with_descriptors) watch_ = std::make_shared<channel::EndWatch>();
-  int control[2], descriptors[2] = {-1, -1};
+  int control[2] = {-1, -1}, descriptors[2] = {-1, -1};
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, control) != 0 ||
-      (with_descriptors && socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, descriptors) != 0))
-    fail_start(std::string("no sockets: ") + std::strerror(errno));
+      (with_descriptors && socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, descriptors) != 0)) {
+    const int problem = errno;
+    for (const int end : control)
+      if (end >= 0) close(end);
+    fail_start(std::string("no sockets: ") + std::strerror(problem));
+  }
   descriptor_socket_ = descriptors[0];
   channel_ = worker_channel(control[0]);
 
