@@ -155,8 +155,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::span<const std::uint32_t> wake_orders() const { return wake_orders_; }
   bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
 
-  // At most one; null: nobody.
-  void set_commit_listener(CommitListener* listener) { commit_listener_ = listener; }
+  // At most one; null: nobody. It is told at once of decisions that were made when there was none, but for swaps, which
+  // who ordered them knows.
+  void set_commit_listener(CommitListener* listener);
   // At most one; null: the scene's own rules hold. What it decides is part of what determines the trajectory.
   void set_pair_arbiter(PairArbiter* arbiter) { arbiter_ = arbiter; }
 
@@ -201,7 +202,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::pair<double, std::uint32_t> largest_turn_by_loads() const;
   bool makes_step_finer();
   std::string why_turned_far(double turn, std::uint32_t body) const;
-  // sleep.cc: who is left out of a step, who is woken, and who falls asleep with it.
+  // sleep.cc, wake.cc: who is left out of a step, who is woken, and who falls asleep with it.
   bool can_sleep() const { return description_.sleep.energy > 0.0; }
   void remember_wrenches();
   void find_sleepers();
@@ -344,7 +345,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   Pose pose_of(const Column<double>& position, const Column<double>& orientation, std::uint32_t body) const;
   bool has_contacts() const { return collision_.is_running(); }
   bool has_reactions() const { return solver_.is_running(); }
-  // By instantaneous impulses, or where joints do not allow what the scene or an edit gave bodies.
+  bool is_struck() const;  // by instantaneous impulses, which act at t = 0 alone
+  // By those, or where joints do not allow what the scene or an edit gave bodies.
   bool may_jump_at_start() const;
   // Velocities at the start of the step, after that.
   const Column<double>& start_linear_velocity() const;
@@ -403,6 +405,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::optional<FaultRecord> fault_;
   std::vector<FaultRecord> faults_;
   CommitListener* commit_listener_ = nullptr;
+  std::vector<std::pair<Decision, SlotDescription>> untold_;  // decisions, with the host, which may be let go
   PairArbiter* arbiter_ = nullptr;
   // Longest direct call beyond the slot's deadline, per stage: nothing can interrupt it, so it is reported.
   std::array<std::uint64_t, static_cast<std::size_t>(Stage::kCount)> overrun_ns_{};

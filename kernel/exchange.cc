@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 #include "kernel/environment.h"
 #include "plugin_sdk/stand_in.h"
@@ -143,8 +144,19 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   }
 }
 
+void Environment::set_commit_listener(CommitListener* listener) {
+  commit_listener_ = listener;
+  if (listener == nullptr) return;
+  for (const auto& [decision, host] : std::exchange(untold_, {}))
+    on_decision({decision.slot, decision.target, decision.step, decision.why, &host, decision.plugin});
+}
+
 void Environment::on_decision(const Decision& decision) {
-  if (commit_listener_ != nullptr) commit_listener_->on_decision(*this, decision);
+  Decision one = decision;
+  // what was asked between two steps changes the next
+  one.step = std::max(one.step, step_count_ + 1);
+  if (commit_listener_ != nullptr) return commit_listener_->on_decision(*this, one);
+  if (one.why != "swap") untold_.emplace_back(one, *one.host);
 }
 
 void Environment::on_poison(const StageCall& call, const PluginChoice& plugin, const StageFault& fault) {

@@ -152,10 +152,17 @@ void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* d
     routed.fault = order_;
     if (--due->times == 0) armed_.erase(due);
   }
+  Carrier* carrier = hosts_[route.host]->carrier().get();
+  if (carrier == nullptr) {
+    // the ladder ended in a call before
+    StageFault fault(FaultKind::kHandshake, "start", "nobody is left to ask");
+    name(&fault, call.target);
+    throw StageFault(fault);
+  }
   if (derivatives != nullptr) derivatives->begin_attempt(true);
   // whom a nested call of the same process takes away must outlast this one
   if (derivatives != nullptr) attempts->asked = hosts_[route.host]->carrier();
-  call_with_room(hosts_[route.host]->carrier().get(), routed, arena, derivatives, times);
+  call_with_room(carrier, routed, arena, derivatives, times);
 }
 
 void StageSlot::name(StageFault* fault, std::uint32_t target) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -77,7 +78,11 @@ void SlotHost::retire(std::shared_ptr<Carrier> carrier) {
 void SlotHost::retire(std::unique_ptr<Spare> spare) {
   if (!spare) return;
   spare->give_up();
-  retired_.push_back(std::async(std::launch::async, [spare = std::move(spare)]() mutable { spare.reset(); }));
+  try {
+    retired_.push_back(std::async(std::launch::async, [spare = std::move(spare)]() mutable { spare.reset(); }));
+  } catch (const std::system_error&) {
+    // as above
+  }
 }
 
 std::vector<std::string> SlotHost::take_complaints() {
@@ -102,7 +107,11 @@ std::string SlotHost::take_host() {
     carrier_->kill();
     retire(std::move(carrier_));
   }
-  carrier_ = start_(description_, threads_, {});
+  try {
+    carrier_ = start_(description_, threads_, {});
+  } catch (const std::system_error& lacking) {
+    throw StageFault(FaultKind::kHandshake, "start", lacking.what());
+  }
   return description_.hosting == Hosting::kDirect ? "new instance" : "cold start";
 }
 

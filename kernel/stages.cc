@@ -48,10 +48,11 @@ Pose Environment::pose_of(const Column<double>& position, const Column<double>& 
 }
 
 Trusted<TrialState> Environment::integrate() {
-  const auto request = ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, data_.inverse_mass,
-                           model_.inertia, data_.inverse_inertia, model_.damping, data_.wrench, front().position,
-                           front().orientation, start_linear_velocity(), start_angular_velocity(), front().plugin_state,
-                           front().state_changed, data_.jacobian_blocks);
+  const Column<double>& wrench = data_.wrench_is_constant[0] != 0 ? data_.wrench : data_.no_wrench;
+  const auto request =
+      ids(data_.time, data_.time_step, data_.wrench_is_constant, data_.flags, data_.inverse_mass, model_.inertia,
+          data_.inverse_inertia, model_.damping, wrench, front().position, front().orientation, start_linear_velocity(),
+          start_angular_velocity(), front().plugin_state, front().state_changed, data_.jacobian_blocks);
   const auto reply = ids(data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                          data_.trial_angular_velocity, data_.error_estimate, data_.next_plugin_state);
   const StageCall call{stage::Method::kIntegratorIntegrate, 0, request, reply};

@@ -1,5 +1,5 @@
-// The truth about an environment between two steps: exactly what a checkpoint saves. There are two of them; a
-// step reads the one and writes the other, and commit swaps them.
+// The truth about an environment between two steps: exactly what a checkpoint saves. There are two to four
+// of them (environment.h); a step reads one and writes another, and commit swaps them.
 #pragma once
 
 #include <cstdint>

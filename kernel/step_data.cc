@@ -82,7 +82,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
     answer.potential = Column<double>(arena, rows, 0);
     answer.flags = Column<std::uint32_t>(arena, rows, 0);
   }
-  wrench = bodies(6), impulse = bodies_if(has_forces, 6), start_wrench = bodies_if(has_reactions, 6);
+  wrench = bodies(6), no_wrench = bodies(6), impulse = bodies_if(has_forces, 6),
+  start_wrench = bodies_if(has_reactions, 6);
 
   kinematic_acceleration = bodies_if(is_smooth, 6), reaction = bodies_if(is_smooth, 6);
   wrench_with_reactions = bodies_if(is_smooth, 6);

@@ -53,6 +53,7 @@ struct StepData {
   // Stage::kForce: answers per group; sum per body (6); impulses per body (6), asked once.
   std::vector<ForceAnswer> force_answers;
   Column<double> wrench, impulse;
+  Column<double> no_wrench;  // zeros, for who is to ask for derivatives
   // How many blocks there may be, what a plugin answers, and all of them, where they are asked for.
   Column<std::uint32_t> jacobian_blocks, block_body, jacobian_body;
   Column<double> block, jacobian;

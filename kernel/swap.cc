@@ -182,11 +182,13 @@ void StageSlot::update_watch() {
 
 void StageSlot::watch(const StageCall& call, const CallTimes& times, Arena* arena, DerivativeSource* derivatives,
                       const std::function<void()>& recheck) {
+  const std::size_t before = pending_.size();
   for (auto swap = pending_.begin(); swap != pending_.end();) {
     const bool is_lost = swap->is_in_shadow && swap->target == call.target &&
                          !watch_swap(&*swap, call, times, arena, derivatives, recheck);
     swap = is_lost ? pending_.erase(swap) : swap + 1;
   }
+  if (pending_.size() < before) update_watch();
   if (rerun_.every > 0 && step_ % rerun_.every == 0) rerun(call, arena, derivatives, recheck);
 }
 
@@ -221,52 +223,67 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, const CallT
   }
 }
 
-// The same request to another process of the same plugins: of two that differ one is wrong, and a third says which.
+// The same request to another process of the same plugins: of two that differ one is wrong, and a third says which. Whom a
+// nested call lets take over makes the step again: then answers differ for a good reason, and who was asked here for
+// comparison, which is ours meanwhile, may have the plugins of before.
 void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* derivatives,
                       const std::function<void()>& recheck) {
-  const std::size_t host = routes_[call.target].host;
+  const std::size_t place = routes_[call.target].host;
+  SlotHost& host = *hosts_[place];
   StageCall routed = call;
   routed.target = routes_[call.target].target;
-  // whether another host gave other bytes
-  const auto differs = [&](std::unique_ptr<Carrier>* carrier) {
+  const auto revisions = [&] {
+    std::uint32_t sum = 0;
+    for (const StageSlot* slot : slots_)
+      for (const std::shared_ptr<SlotHost>& one : slot->hosts_) sum += one->revision();
+    return sum;
+  };
+  const std::uint32_t revision = host.revision(), revisions_before = revisions();
+  rerun_.checkers.resize(hosts_.size());
+  std::unique_ptr<Carrier> checker = std::move(rerun_.checkers[place]);
+  // whether it gave other bytes
+  const auto differs = [&] {
     Shadow shadow;
     shadow.compare(call, arena, [&] {
       CallTimes times;
       if (derivatives != nullptr) derivatives->begin_attempt(false);
-      call_with_room(carrier->get(), routed, arena, derivatives, &times);
+      call_with_room(checker.get(), routed, arena, derivatives, &times);
       recheck();
     });
     return shadow.last_differed();
   };
-  rerun_.checkers.resize(hosts_.size());
-  std::unique_ptr<Carrier>& checker = rerun_.checkers[host];
   // `unknown` is what holds where nobody else can be asked
-  const auto is_doubted = [&](std::unique_ptr<Carrier>* carrier, bool unknown) {
-    for (int tries = 0; !*carrier && tries < 2; ++tries) {
+  const auto is_doubted = [&](bool unknown) {
+    for (int tries = 0; !checker && tries < 2; ++tries) {
       try {
-        *carrier = hosts_[host]->prepare(hosts_[host]->description())->take();
+        checker = host.prepare(host.description())->take();
       } catch (const StageFault& fault) {
         complaints_.push_back("no other process for a re-run: " + fault.text());
       }
     }
-    if (!*carrier) return unknown;
+    if (!checker) return unknown;
     try {
-      return differs(carrier);
+      return differs();
     } catch (const StageFault& fault) {
       if (!fault.plugin.empty()) throw;
-      (*carrier)->kill();
-      hosts_[host]->retire(std::move(*carrier));
+      checker->kill();
+      host.retire(std::move(checker));
       return true;
     }
   };
-  if (!is_doubted(&checker, false)) return;
-  std::unique_ptr<Carrier> third;
-  const bool is_outvoted = is_doubted(&third, true);
+  const auto keep = [&] {
+    if (host.revision() != revision) return host.retire(std::move(checker));
+    rerun_.checkers[place] = std::move(checker);
+  };
+  if (!is_doubted(false)) return keep();
   if (checker) {
     checker->kill();
-    hosts_[host]->retire(std::move(checker));
+    host.retire(std::move(checker));
   }
-  checker = std::move(third);
+  if (revisions() != revisions_before) return;
+  const bool is_outvoted = is_doubted(true);
+  keep();
+  if (revisions() != revisions_before) return;
   if (is_outvoted)
     throw StageFault(FaultKind::kDisagreement, "re-run", "two other processes answered the same request otherwise");
   complaints_.emplace_back("another process answered the same request otherwise; a third agreed with the first");

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstring>
 #include <exception>
+#include <string>
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/fault.h"
@@ -98,6 +99,9 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
   if (result.status != GRAVITAS_OK) result.text = error.text;
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     const bool fits = reply[i].count <= reply[i].capacity;
+    if (!fits && result.status == GRAVITAS_OK)
+      throw StageFault(FaultKind::kBadFrame, "wire",
+                       std::string("its answer has column ") + call.info().reply[i].name + " longer than its room");
     if (fits || result.status == GRAVITAS_NEEDS_CAPACITY) arena->set_count(call.reply[i], reply[i].count);
   }
   return result;

@@ -46,7 +46,7 @@ std::vector<std::string> worker_words() {
 // How long a worker that failed to start may take to have ended, so that its last words can be told.
 constexpr int kLastWordsMilliseconds = 100;
 
-std::string last_words(const WorkerProcess& process) {
+std::string last_words(const channel::WorkerProcess& process) {
   const std::string words = process.last_words();
   return words.empty() ? words : "; its last words: " + words;
 }
@@ -55,10 +55,10 @@ std::atomic<std::uint64_t> last_epoch{0};
 
 [[noreturn]] void fail_start(const std::string& why) { throw StageFault(FaultKind::kHandshake, "handshake", why); }
 
-std::shared_ptr<WorkerProcess> spawn(const std::vector<std::string>& arguments, const std::vector<int>& descriptors,
-                                     std::function<void()> on_end) {
+std::shared_ptr<channel::WorkerProcess> spawn(const std::vector<std::string>& arguments,
+                                              const std::vector<int>& descriptors, std::function<void()> on_end) {
   try {
-    return Supervisor::instance().spawn(arguments, descriptors, std::move(on_end));
+    return channel::Supervisor::instance().spawn(arguments, descriptors, std::move(on_end));
   } catch (const std::system_error& error) {
     fail_start("cannot start '" + arguments[0] + "': " + error.what());
   }
@@ -147,10 +147,14 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
 void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
                                std::function<void()> on_end) {
   if (!with_descriptors) watch_ = std::make_shared<channel::EndWatch>();
-  int control[2], descriptors[2] = {-1, -1};
+  int control[2] = {-1, -1}, descriptors[2] = {-1, -1};
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, control) != 0 ||
-      (with_descriptors && socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, descriptors) != 0))
-    fail_start(std::string("no sockets: ") + std::strerror(errno));
+      (with_descriptors && socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, descriptors) != 0)) {
+    const int problem = errno;
+    for (const int end : control)
+      if (end >= 0) close(end);
+    fail_start(std::string("no sockets: ") + std::strerror(problem));
+  }
   descriptor_socket_ = descriptors[0];
   channel_ = worker_channel(control[0]);
 

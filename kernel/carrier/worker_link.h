@@ -16,8 +16,8 @@
 #include "kernel/control_session.h"
 #include "kernel/description.h"
 #include "kernel/fault.h"
-#include "kernel/supervisor.h"
 #include "plugin_sdk/channel/mailboxes.h"
+#include "plugin_sdk/channel/supervisor.h"
 
 namespace gravitas::kernel {
 
@@ -29,7 +29,7 @@ inline constexpr std::uint64_t kDeadlineCap = 10;
 // A command of somebody's own, started with `--listen unix:PATH` on a socket in a folder that only we can enter and
 // that is gone afterwards; it ends with us. Waits until it listens. Throws StageFault.
 struct ListeningCommand {
-  std::shared_ptr<WorkerProcess> process;
+  std::shared_ptr<channel::WorkerProcess> process;
   int descriptor;  // connected
 };
 ListeningCommand start_listening_command(const std::string& command, std::chrono::milliseconds limit,
@@ -95,7 +95,7 @@ class WorkerLink {
   int descriptor_socket_ = -1;
   bool is_dying_ = false;
   std::shared_ptr<channel::EndWatch> watch_;
-  std::shared_ptr<WorkerProcess> process_;
+  std::shared_ptr<channel::WorkerProcess> process_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<ControlSession> control_;
 };

@@ -8,6 +8,7 @@
 // (loads.cc), cut where a force jumps, and whatever a simulator makes of each. A force is asked as it is between the jump
 // before and the next, whatever the time.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -74,14 +75,12 @@ void Environment::begin_inner_step(double begin, double length) {
   broken_.clear();
   data_.wrench_is_constant[0] = wrench_is_constant_ && !knows_reactions() ? 1 : 0;
   start_wrench_known_ = false;
-  if (!wrench_is_constant_) {
-    // no trace of earlier steps: a step must be the same after a restore
-    std::ranges::fill(data_.wrench.span(), 0.0);
-    std::ranges::fill(data_.start_wrench.span(), 0.0);
-  }
+  // no trace of earlier steps: a step must be the same after a restore
+  if (!wrench_is_constant_) std::ranges::fill(data_.start_wrench.span(), 0.0);
   if (!may_jump_at_start()) return;
+  static constexpr std::array<double, 6> kNoImpulse{};
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    const double* impulse = &data_.impulse[6 * i];
+    const double* impulse = is_struck() ? &data_.impulse[6 * i] : kNoImpulse.data();
     const Twist twist =
         after_impulse({vector_at(front().linear_velocity.span(), i), vector_at(front().angular_velocity.span(), i)},
                       quaternion_at(front().orientation.span(), i), model_.inverse_mass[i],
@@ -93,9 +92,9 @@ void Environment::begin_inner_step(double begin, double length) {
   if (knows_reactions()) join_start_velocities();
 }
 
-bool Environment::may_jump_at_start() const {
-  return (has_impulses_ && data_.time[0] == 0.0) || (knows_reactions() && is_anew_ && inner_ == 0);
-}
+bool Environment::is_struck() const { return has_impulses_ && data_.time[0] == 0.0; }
+
+bool Environment::may_jump_at_start() const { return is_struck() || (knows_reactions() && is_anew_ && inner_ == 0); }
 
 const Column<double>& Environment::start_linear_velocity() const {
   return may_jump_at_start() ? data_.start_linear_velocity : front().linear_velocity;
@@ -108,7 +107,12 @@ const Column<double>& Environment::start_angular_velocity() const {
 void Environment::constrain(const Trusted<TrialState>&) {
   ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                     data_.trial_angular_velocity);
-  data_.held_force.resize(3 * data_.discrepancies.mode.size());
+  const std::size_t forces = 3 * data_.discrepancies.mode.size();
+  if (data_.held_force.size() != forces) {
+    // those of other rows say nothing of these
+    data_.held_force.resize(forces);
+    std::ranges::fill(data_.held_force.span(), 0.0);
+  }
   // what springs of joints do came with the derivatives
   if (knows_reactions())
     for (std::uint32_t& mode : data_.discrepancies.mode.span()) mode |= kForcesApplied;

@@ -20,10 +20,8 @@ constexpr std::size_t kToOne = 8;  // joints that have broken in the step, to on
 }  // namespace
 
 bool Environment::write_what_joints_bear(const Trusted<TrialState>& trial, std::optional<Trusted<Solution>> solution) {
-  const CommitFigures figures = figures_;
   while (solution) {
     const std::size_t before = broken_.size();
-    figures_ = figures;
     write_solution(*solution);
     if (broken_.size() == before) return true;
     solution = react(knows_reactions() ? integrate() : trial, true);

@@ -3,8 +3,8 @@
 // that what comes near is found. Forces that are not constant are asked for it, too: that is how a change is seen.
 //
 //   at the step's start        those asleep, but for islands that the user or another plugin wakes
-//   when contacts at S* are    islands that something moving touches, leaves or holds by a joint, or whose forces have
-//   known                      changed, are awake; the step is made again from S_n
+//   when contacts at S* are    some are woken (wake.cc); the step is made again from S_n
+//   known
 //   after the last inner step  islands that have rested long enough fall asleep: velocities 0, poses as they are
 //
 // A step in which nothing moves is that of the clock alone. plugin_sdk/activity.h has the rule.
@@ -81,41 +81,6 @@ void Environment::leave_out_sleepers() {
     data_.pair[kept++] = b;
   }
   data_.pair.resize(kept);
-}
-
-void Environment::look_for_pushes() {
-  for (std::uint32_t i = 0; i < model_.body_count; ++i)
-    if (data_.flags[i] != model_.flags[i] &&
-        activity_.is_pushed(model_.mass[i], vector_at(model_.inertia.span(), i), data_.wrench.span().subspan(6 * i, 6),
-                            front().rest_wrench.span().subspan(6 * i, 6)))
-      pushed_.push_back(i);
-}
-
-// With contacts at S* in place. True if somebody has been woken, and the step is to be made again.
-bool Environment::wakes_sleepers() {
-  const std::uint32_t before = sleepers_;
-  for (const std::uint32_t body : data_.contact_body.span()) wake_island(body);
-  const Connections connected = connections();
-  for (const std::span<const std::uint32_t> pairs : {connected.contacts, connected.joints}) {
-    for (std::size_t i = 0; i < pairs.size(); i += 2) {
-      const std::uint32_t a = pairs[i], b = pairs[i + 1];
-      if (is_carrying(b)) wake_island(a);
-      if (is_carrying(a)) wake_island(b);
-    }
-  }
-  for (const std::uint32_t body : pushed_) wake_island(body);
-  must_restart_ |= sleepers_ < before;
-  return must_restart_;
-}
-
-void Environment::wake_island(std::uint32_t body) {
-  if (!can_sleep() || body == kNone || data_.flags[body] == model_.flags[body]) return;
-  is_idle_ = false;
-  const auto sleeps = [&](std::uint32_t i) { return data_.flags[i] != model_.flags[i]; };
-  for (const std::uint32_t one : activity_.sleepers_with(body, model_.body_count, connections(), sleeps)) {
-    let_sleep(one, false);
-    --sleepers_;
-  }
 }
 
 Connections Environment::connections() {

@@ -49,10 +49,10 @@ double widest_opening(const State& start, const StepData& data, const Model& mod
 
 Trusted<Pairs> Environment::bound_and_pair(const Trusted<TrialState>& trial) {
   // How far apart bodies still get contacts: what is pushed out of one must not end in another, and nothing is pushed much
-  // further than the longest way of the step. Where impacts are located, nothing is pushed.
+  // further than the longest way of the step, that of what pushes included. Where impacts are located, nothing is pushed.
   double longest = 0.0;
   for (std::uint32_t i = 0; i < model_.body_count && !locates_events(); ++i) {
-    if (!is_awake(i)) continue;
+    if (!is_awake(i) && !is_carrying(i)) continue;
     const Vector3 moved = vector_at(data_.trial_position.span(), i) - vector_at(front().position.span(), i);
     const double turned = data_.time_step[0] * vector_at(data_.trial_angular_velocity.span(), i).norm();
     longest = std::max(longest, moved.norm() + turned * model_.bound[i].reach);

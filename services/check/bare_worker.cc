@@ -44,7 +44,7 @@ void BareWorker::start_library(const std::string& library) {
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
     throw std::system_error(errno, std::generic_category(), "socketpair");
   process_ =
-      kernel::Supervisor::instance().spawn({kernel::worker_program(), "--control-fd", "3", library}, {ends[1]}, {});
+      channel::Supervisor::instance().spawn({kernel::worker_program(), "--control-fd", "3", library}, {ends[1]}, {});
   close(ends[1]);
   channel_ = kernel::worker_channel(ends[0]);
 }

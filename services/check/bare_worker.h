@@ -7,7 +7,7 @@
 #include <string>
 
 #include "gravitas/control/v1/control.pb.h"
-#include "kernel/supervisor.h"
+#include "plugin_sdk/channel/supervisor.h"
 #include "services/check/examinee.h"
 
 namespace gravitas::check {
@@ -39,7 +39,7 @@ class BareWorker {
   void start_library(const std::string& library);
   void start_command(const std::string& command, double seconds);
 
-  std::shared_ptr<kernel::WorkerProcess> process_;
+  std::shared_ptr<channel::WorkerProcess> process_;
   std::shared_ptr<grpc::Channel> channel_;
 };
 

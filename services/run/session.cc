@@ -342,12 +342,12 @@ class Run final : private kernel::CommitListener {
       recorder_->set_decisions(decisions_);
       recorder_->note_edit(*edit);
     }
-    attend();
     if (pair_decisions_) pair_decisions_->forget();
     if (event_source_) event_source_->begin_again();
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
     if (survey_) survey_->begin_again(begun);
+    attend();
     figures_->begin_again(environment_.get());
     give_orders();
     tell({EventKind::kEdit, environment_->step_count(), environment_->time()},

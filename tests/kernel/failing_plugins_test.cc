@@ -117,6 +117,9 @@ const Expected kWrong[] = {
     {"integrator_long", FaultKind::kBadStructure, "structure", "position has 200000 rows"},
 };
 
+// Where it is a library of this process.
+const Expected kOverfull[] = {{"integrator_overfull", FaultKind::kBadFrame, "wire", "longer than its room"}};
+
 // Where messages have the room they need the worker notices it, elsewhere the kernel.
 const Expected kGreedy[] = {{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}};
 const Expected kGreedyInMessages[] = {{"integrator_wants_room", FaultKind::kFailure, "status", "room for"}};
@@ -140,6 +143,7 @@ TEST_P(InProcess, IsReplacedUntilTheBudgetIsSpent) {
 
 INSTANTIATE_TEST_SUITE_P(Wrong, InProcess, ::testing::ValuesIn(kWrong), name_of);
 INSTANTIATE_TEST_SUITE_P(Greedy, InProcess, ::testing::ValuesIn(kGreedy), name_of);
+INSTANTIATE_TEST_SUITE_P(Overfull, InProcess, ::testing::ValuesIn(kOverfull), name_of);
 
 TEST(FailingPlugins, PairsOutOfOrderAreRefused) {
   WorldBuilder builder = ball_on_ground(Hosting::kDirect);

@@ -3,8 +3,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -25,7 +29,9 @@ using kernel::SlotDescription;
 using kernel::StageFault;
 using kernel::StepOutcome;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 constexpr std::uint32_t kLadderSteps = 12, kManySteps = 20'000;
 
@@ -34,7 +40,8 @@ enum class Fate {
   kDiesAtFourthCall,
   kDiesOfItsFirstCall,
   kDiesUnread,  // before it looks at its first request
-  kDoesNotStart
+  kDoesNotStart,
+  kLacksThreads  // to start
 };
 
 [[noreturn]] void die(bool is_unread) {
@@ -64,19 +71,21 @@ class Mortal final : public Carrier {
   int calls_ = 0;
 };
 
-// The solver's hosts meet these fates in the order of their starts, and serve after that; all others serve.
+// The hosts of a slot meet these fates in the order of their starts, and serve after that; all others serve.
 class Ladder : public ::testing::Test {
  protected:
   // Standbys are started side by side with the run, so their order holds where a slot has one.
-  kernel::HostStarter starter(std::vector<Fate> fates) {
-    return [this, fates = std::move(fates)](const SlotDescription& slot, std::uint32_t threads, std::stop_token) {
+  kernel::HostStarter starter(std::vector<Fate> fates, Slot of = Slot::kSolver) {
+    starts_ = 0;
+    return [this, of, fates = std::move(fates)](const SlotDescription& slot, std::uint32_t threads, std::stop_token) {
       Fate fate = Fate::kServes;
-      if (slot.plugins[0].declaration.slot == Slot::kSolver) {
+      if (slot.plugins[0].declaration.slot == of) {
         const std::lock_guard lock(mutex_);
         if (starts_ < fates.size()) fate = fates[starts_];
         ++starts_;
       }
       if (fate == Fate::kDoesNotStart) throw StageFault(FaultKind::kHandshake, "test", "it does not start");
+      if (fate == Fate::kLacksThreads) throw std::system_error(EAGAIN, std::generic_category(), "thread");
       return std::make_unique<Mortal>(kernel::make_direct_carrier(slot.plugins, threads), slot.hosting, fate);
     };
   }
@@ -141,13 +150,158 @@ TEST_F(Ladder, AFallbackWhoseWorkerDiesUnreadIsAskedAgain) {
   EXPECT_EQ(world.faults().size(), 3U);
 }
 
-// Counts the verdicts.
+TEST_F(Ladder, AColdStartForWhichThereIsNoThreadIsTriedAgain) {
+  Environment world(Ladder::world(0).description(),
+                    starter({Fate::kDiesAtFourthCall, Fate::kLacksThreads, Fate::kServes}));
+  run(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_EQ(world.faults().size(), 1U);
+}
+
+// Counts the verdicts, and keeps who answers from when on.
 class PoisonWitness final : public kernel::CommitListener {
  public:
   void on_poison(const Environment&, const kernel::PoisonedCall&) override { ++verdicts; }
+  void on_decision(const Environment&, const kernel::Decision& decision) override {
+    decisions.push_back(decision.why + " at " + std::to_string(decision.step) + ": " +
+                        decision.plugin->declaration.name + ", " + kernel::hosting_name(decision.host->hosting));
+  }
   void on_commit(const Environment&) override {}
   int verdicts = 0;
+  std::vector<std::string> decisions;
 };
+
+// Forces are asked before anybody can listen, and those that are constant are let go.
+TEST_F(Ladder, AFallbackThatTakesOverAtTheStartIsToldToWhoListensLater) {
+  for (const bool is_constant : {false, true}) {
+    WorldBuilder builder(Hosting::kSharedMemory);
+    builder.steps(kLadderSteps, 0.01).sphere(0.5, 1.0, Vector3::Zero());
+    if (is_constant) {
+      builder.gravity(Vector3(0, -9.81, 0));
+    } else {
+      builder.force("Drag", "force_drag", {0.1, 0.5});
+    }
+    SlotDescription& force = builder.description().force;
+    force.standbys = 0;
+    kernel::PluginChoice other = force.plugins[0];
+    other.declaration.name = "Other";
+    force.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(other);
+    Environment world(builder.description(),
+                      starter({Fate::kDiesOfItsFirstCall, Fate::kDiesOfItsFirstCall, Fate::kServes}, Slot::kForce));
+    PoisonWitness witness, late;
+    world.set_commit_listener(&witness);
+    EXPECT_THAT(witness.decisions, ElementsAre("fallback Other at 1: Other, shm"));
+    run(&world);
+    world.set_commit_listener(&late);
+    EXPECT_EQ(witness.decisions.size(), 1U);
+    EXPECT_THAT(late.decisions, IsEmpty());
+  }
+}
+
+// Between two steps it is the next one that others make.
+TEST_F(Ladder, AFallbackThatTakesOverBetweenStepsMakesTheNext) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(kLadderSteps, 0.01).sphere(0.5, 1.0, Vector3::Zero()).force("Drag", "force_drag", {0.1, 0.5});
+  SlotDescription& force = builder.description().force;
+  force.standbys = 0;
+  force.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(force.plugins[0]);
+  Environment world(builder.description(),
+                    starter({Fate::kDiesAtFourthCall, Fate::kDiesOfItsFirstCall, Fate::kServes}, Slot::kForce));
+  PoisonWitness witness;
+  world.set_commit_listener(&witness);
+  // asked at the start and once in each step
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  world.potential_energy();
+  EXPECT_THAT(witness.decisions, ElementsAre("fallback Drag at 3: Drag, shm"));
+}
+
+TEST_F(Ladder, WhoIsAskedAfterItsEndSaysSo) {
+  WorldBuilder builder = world(0);
+  builder.description().force.standbys = 0;
+  std::vector<Fate> fates(100, Fate::kDoesNotStart);
+  fates[0] = Fate::kDiesAtFourthCall;
+  Environment world(builder.description(), starter(fates, Slot::kForce));
+  while (world.step() == StepOutcome::kCommitted && world.step_count() < kLadderSteps) {
+  }
+  ASSERT_TRUE(world.fault());
+  const std::size_t faults = world.faults().size();
+  try {
+    world.potential_energy();
+    FAIL();
+  } catch (const StageFault& fault) {
+    EXPECT_EQ(fault.text(), "nobody is left to ask");
+    EXPECT_EQ(fault.slot, Slot::kForce);
+  }
+  EXPECT_EQ(world.faults().size(), faults);
+}
+
+// A question about nothing is asked of who is compared with others, and of nobody once the other one is refused.
+TEST_F(Ladder, AComparisonThatIsRefusedLeavesNothingBehind) {
+  WorldBuilder builder(Hosting::kDirect);
+  builder.steps(kLadderSteps, 0.01).sphere(0.5, 1.0, Vector3::Zero()).sphere(0.5, 1.0, Vector3(9, 0, 0));
+  Environment world(builder.description(), starter({Fate::kServes, Fate::kDiesOfItsFirstCall}));
+  world.order_swap({Slot::kSolver, builder.description().solver.plugins[0], std::nullopt, 1}, true);
+  run(&world);
+  ASSERT_EQ(world.swaps().size(), 1U);
+  EXPECT_EQ(world.swaps()[0].state, kernel::SwapState::kRefused);
+  EXPECT_EQ(world.stage_time(kernel::Stage::kSolve).count(), 1U);
+}
+
+struct Rerun {
+  int starts = 0;
+  bool is_open = false;     // the second host is being asked
+  bool was_let_go = false;  // meanwhile
+};
+
+// Hosts of two slots that share a process. The first and the third die when the integrator of the second asks for forces.
+class Checked final : public Carrier {
+ public:
+  Checked(std::unique_ptr<Carrier> plugins, Rerun* rerun)
+      : plugins_(std::move(plugins)), rerun_(*rerun), number_(rerun->starts++) {}
+  kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
+                          kernel::DerivativeSource* derivatives) override {
+    if (rerun_.is_open && (number_ == 0 || number_ == 2)) die(false);
+    if (number_ != 1) return plugins_->call(call, arena, derivatives);
+    rerun_.is_open = true;
+    kernel::CallResult result = plugins_->call(call, arena, derivatives);
+    rerun_.is_open = false;
+    return result;
+  }
+  void drain() override { rerun_.was_let_go |= number_ == 1 && rerun_.is_open; }
+  int process_id() const override { return getpid(); }
+  Hosting hosting() const override { return Hosting::kSharedMemory; }
+
+ private:
+  std::unique_ptr<Carrier> plugins_;
+  Rerun& rerun_;
+  int number_;
+};
+
+TEST_F(Ladder, WhoIsAskedForComparisonOutlastsAFallbackInItsCall) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(kLadderSteps, 0.01).integrator("integrator_rk4");
+  builder.sphere(0.5, 1.0, Vector3::Zero(), Vector3(3, 2, 1)).force("Drag", "force_drag", {0.1, 0.5});
+  Environment quiet(builder.description(), starter({}));
+  run(&quiet);
+  for (const Slot slot : {Slot::kForce, Slot::kIntegrator}) {
+    builder.description().slot(slot).process = "one";
+    builder.description().slot(slot).standbys = 0;
+  }
+  kernel::PluginChoice& drag = builder.description().force.plugins[0];
+  drag.fallback = std::make_shared<kernel::PluginChoice>(drag);
+  Rerun rerun;
+  Environment world(builder.description(), [&](const SlotDescription& slot, std::uint32_t threads, std::stop_token) {
+    return std::make_unique<Checked>(kernel::make_direct_carrier(slot.plugins, threads), &rerun);
+  });
+  world.set_rerun_every(Slot::kIntegrator, 1);
+  run(&world);
+  EXPECT_FALSE(rerun.was_let_go);
+  EXPECT_EQ(rerun.starts, 5);  // the last one is asked for comparison from then on
+  EXPECT_EQ(world.faults().size(), 2U);
+  EXPECT_EQ(world.faults().back().recovered_by, "fallback Drag");
+  EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
+  EXPECT_THAT(world.warnings(), IsEmpty());
+}
 
 TEST_F(Ladder, PoisonStaysPoisonWhenTheFallbackDoesNotStart) {
   WorldBuilder builder = world(0);

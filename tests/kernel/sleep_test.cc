@@ -381,6 +381,24 @@ TEST(Sleep, ARestoreInItsMiddleChangesNoBit) {
   }
 }
 
+// An integrator that asks what would act at other velocities, to learn what a force depends on, does not push by that.
+TEST(Sleep, AQuestionAboutOtherVelocitiesWakesNobody) {
+  WorldBuilder builder;
+  builder.steps(150, kTimeStep).ground().box(Vector3(0.5, 0.25, 0.5), 2.0, Vector3(0, 0.25, 0));
+  builder.plugin(Slot::kIntegrator, plugin_path("integrator_symplectic_splitting"), {4});
+  builder.force("Drag", "force_drag", {0.1, 0.0});
+  may_sleep(&builder).gravity(kWeight);
+  Environment world(builder.description());
+  SleepListener listener;
+  EventSource listener_source(&listener);
+  world.set_commit_listener(&listener_source);
+  run(&world, 150);
+  EXPECT_TRUE(world.is_asleep(1));
+  EXPECT_THAT(listener.bodies(EventKind::kSleep), ElementsAre(1));
+  EXPECT_THAT(listener.bodies(EventKind::kWake), IsEmpty());
+  EXPECT_EQ(world.stage_time(Stage::kIntegrate).count(), 150U);  // no step is made again
+}
+
 // A push on a box that begins after a second: one that friction holds, and one that it does not.
 TEST(Sleep, AForceThatChangesWakes) {
   for (const double push : {5.0, 30.0}) {

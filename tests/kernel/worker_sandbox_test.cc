@@ -15,7 +15,7 @@
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
 #include "kernel/fault.h"
-#include "kernel/supervisor.h"
+#include "plugin_sdk/channel/supervisor.h"
 #include "tests/kernel/one_call.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/sanitized.h"
@@ -175,7 +175,7 @@ TEST(WorkerSandbox, AWorkerWhoseKernelIsGoneAlreadyEnds) {
   int ends[2];
   ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends), 0);
   close(ends[0]);
-  const auto worker = kernel::Supervisor::instance().spawn(
+  const auto worker = channel::Supervisor::instance().spawn(
       {kernel::worker_program(), "--control-fd", "3", faulty_plugin_path("integrator_nan")}, {ends[1]}, {});
   close(ends[1]);
   EXPECT_TRUE(worker->wait(60'000));

@@ -1,4 +1,4 @@
-#include "kernel/supervisor.h"
+#include "plugin_sdk/channel/supervisor.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -11,7 +11,7 @@
 #include <system_error>
 #include <vector>
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 namespace {
 
 using ::testing::ElementsAre;
@@ -117,14 +117,14 @@ TEST(Supervisor, AFloodIsReadAndCountedAndNotKept) {
     std::uint64_t held = 0;
     const std::vector<std::string> lines = process->take_output();
     for (const std::string& line : lines) held += line.size();
-    EXPECT_LT(held, 2 * channel::ProcessOutput::kMostBytes);
+    EXPECT_LT(held, 2 * ProcessOutput::kMostBytes);
     EXPECT_EQ(process->last_words(), "survived");
     // what was kept and what was dropped is all of it, but for line ends and prefixes
     ASSERT_FALSE(lines.empty());
     const std::string note = lines.back();
     ASSERT_TRUE(note.starts_with("stdout: ... and ") && note.ends_with(" more bytes dropped")) << note;
     const std::uint64_t dropped = std::stoull(note.substr(16));
-    EXPECT_GT(dropped, kFlood - 2 * channel::ProcessOutput::kMostBytes);
+    EXPECT_GT(dropped, kFlood - 2 * ProcessOutput::kMostBytes);
   }
 }
 
@@ -159,4 +159,4 @@ TEST(Supervisor, ADyingProcessInAFloodIsNoticed) {
 }
 
 }  // namespace
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

@@ -15,7 +15,7 @@
 
 #include "plugin_sdk/channel/process_output.h"
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 
 class WorkerProcess {
  public:
@@ -50,7 +50,7 @@ class WorkerProcess {
   mutable std::condition_variable reaped_;
   std::atomic<bool> ended_{false};
   std::string ending_;
-  channel::ProcessOutput output_;
+  ProcessOutput output_;
   std::function<void()> on_end_;
 };
 
@@ -85,4 +85,4 @@ class Supervisor {
   std::unique_ptr<Shared> shared_;
 };
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel

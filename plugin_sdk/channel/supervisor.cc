@@ -1,4 +1,4 @@
-#include "kernel/supervisor.h"
+#include "plugin_sdk/channel/supervisor.h"
 
 #include <signal.h>
 #include <sys/epoll.h>
@@ -20,7 +20,7 @@
 
 #include "plugin_sdk/channel/spawn.h"
 
-namespace gravitas::kernel {
+namespace gravitas::channel {
 namespace {
 
 // Read at a time: what a pipe holds.
@@ -51,7 +51,7 @@ ssize_t WorkerProcess::read_output(std::size_t stream) {
   static thread_local std::array<char, kPipeSize> bytes;
   const std::lock_guard lock(mutex_);
   const ssize_t got = read(output_pipes_[stream], bytes.data(), bytes.size());
-  if (got > 0) output_.add(static_cast<channel::OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
+  if (got > 0) output_.add(static_cast<OutputStream>(stream), {bytes.data(), static_cast<std::size_t>(got)});
   return got;
 }
 
@@ -59,7 +59,7 @@ void WorkerProcess::catch_up() {
   for (std::size_t stream = 0; stream < output_pipes_.size(); ++stream) {
     read_output(stream);
     const std::lock_guard lock(mutex_);
-    output_.end(static_cast<channel::OutputStream>(stream));
+    output_.end(static_cast<OutputStream>(stream));
   }
 }
 
@@ -165,11 +165,11 @@ void Supervisor::execute(Order* order) {
   order->done = true;
   std::array<int, 2> theirs = {-1, -1};
   for (std::size_t i = 0; i < 2 && order->problem == 0; ++i)
-    if (!channel::make_output_pipe(&process->output_pipes_[i], &theirs[i])) order->problem = errno;
+    if (!make_output_pipe(&process->output_pipes_[i], &theirs[i])) order->problem = errno;
   if (order->problem == 0) {
     std::vector<int> descriptors = {theirs[0], theirs[1]};
     descriptors.insert(descriptors.end(), order->descriptors.begin(), order->descriptors.end());
-    order->problem = channel::spawn_process(order->arguments, descriptors, &process->process_id_);
+    order->problem = spawn_process(order->arguments, descriptors, &process->process_id_);
   }
   for (const int end : theirs)
     if (end >= 0) close(end);
@@ -201,11 +201,11 @@ void Supervisor::close_output(WorkerProcess* process, std::size_t stream) {
   forget(pipe);
   const std::lock_guard lock(process->mutex_);
   close(std::exchange(pipe, -1));
-  process->output_.end(static_cast<channel::OutputStream>(stream));
+  process->output_.end(static_cast<OutputStream>(stream));
 }
 
 void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {
-  std::string ending = channel::take_ending(process->pidfd_);
+  std::string ending = take_ending(process->pidfd_);
   if (ending.empty()) return;
   forget(process->pidfd_);
   for (std::size_t stream = 0; stream < process->output_pipes_.size(); ++stream) {
@@ -226,4 +226,4 @@ void Supervisor::reap(const std::shared_ptr<WorkerProcess>& process) {
   if (on_end) on_end();
 }
 
-}  // namespace gravitas::kernel
+}  // namespace gravitas::channel
