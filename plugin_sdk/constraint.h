@@ -21,7 +21,8 @@ struct JointBodies {
   bool has_body2 = true;
   // It held before an edit of the scene, and is bound anew in the poses in which it was first. What it holds may be elsewhere.
   bool is_kept = false;
-  // rad/s and m/s of the centres of mass, world, and the step that came to this state, s; zero when joints are bound
+  // rad/s and m/s of the centres of mass, world, and the step that came or leads to this state (in stages of Smooth the whole of
+  // it), s; zero when joints are bound
   Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
   Vector3 velocity1 = Vector3::Zero(), velocity2 = Vector3::Zero();
   double time_step = 0.0;

@@ -20,12 +20,11 @@ Discrepancy row_of(const Twisting& twisting, AxisMode mode) {
   return d;
 }
 
-double limited_twist(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
-                     const JointLimits& limits) {
+// What the twist of the frames changed by in the step.
+double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies) {
   const Vector3 one = first_axis(frame1), two = first_axis(frame2);
   const double bend = 1.0 + one.dot(two);
-  const double way = bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
-  return limits.turn(twist_between(frame1, frame2), way);
+  return bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
 }
 
 }  // namespace
@@ -56,7 +55,6 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 
 double JointLimits::turn(double angle, double way) const {
   constexpr double kPast = 0.02, kOfWay = 0.5, kMostPast = 1.0;  // rad, that a step may begin beyond a limit by
-  constexpr double kRests = 1e-9, kMoves = 1e-2;                 // rad; of how far it is beyond
   if (is_none()) return angle;
   const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
   // the way is known to first order, or to half of it where a method turns by other spins than those at the end
@@ -67,13 +65,19 @@ double JointLimits::turn(double angle, double way) const {
   const auto nearest = [&](double any) { return any - kWholeTurn * std::round((any - middle) / kWholeTurn); };
   const double seen = nearest(angle), begun = seen - way, known = nearest(begun);
   if (!(known >= lower - past && known <= upper + past)) return seen;
-  const double turned = seen + (known - begun);
+  return seen + (known - begun);
+}
+
+double JointLimits::limited_turn(double angle, double way) const {
+  constexpr double kRests = 1e-9, kMoves = 1e-2;  // rad; of how far it is beyond
+  const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
+  const double turned = turn(angle, way), begun = turned - way;
   // what moves out of a single limit, or through it from behind, needs no push; what rests on it is beyond it by rounding
   const auto moves_out = [](double beyond, double out) {
     return beyond > kRests && out > kMoves * beyond && out < beyond;
   };
-  if (!has_lower && moves_out(known - upper, -way)) return turned - kWholeTurn;
-  if (!has_upper && moves_out(lower - known, way)) return turned + kWholeTurn;
+  if (!has_lower && moves_out(begun - upper, -way)) return turned - kWholeTurn;
+  if (!has_upper && moves_out(lower - begun, way)) return turned + kWholeTurn;
   return turned;
 }
 
@@ -262,7 +266,8 @@ Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMo
 
 Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                               const JointLimits& limits) {
-  const Twisting twisting = {first_axis(frame1), first_axis(frame2), limited_twist(frame1, frame2, bodies, limits)};
+  const double twist = limits.limited_turn(twist_between(frame1, frame2), twisted_way(frame1, frame2, bodies));
+  const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist};
   Discrepancy d = row_of(twisting, AxisMode::kLimited);
   const double scale = twisting.cosine();
   d.lower.x() = limits.lower > -kUnlimited ? scale * limits.lower : -kUnlimited;
@@ -272,7 +277,8 @@ Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2
 
 Discrepancy sprung_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                              const JointLimits& limits, double rest, const JointSpring& spring) {
-  Twisting twisting = {first_axis(frame1), first_axis(frame2), limited_twist(frame1, frame2, bodies, limits) - rest};
+  const double twist = limits.turn(twist_between(frame1, frame2), twisted_way(frame1, frame2, bodies));
+  Twisting twisting = {first_axis(frame1), first_axis(frame2), twist - rest};
   if (limits.is_none()) twisting.angle -= kWholeTurn * std::round(twisting.angle / kWholeTurn);
   return sprung(row_of(twisting, AxisMode::kFree), spring);
 }

@@ -29,9 +29,10 @@ struct JointLimits {
   // The turn that is meant by an angle, among angle + k 2 pi; `way`: what the step turned by to get there. Without limits the
   // one within pi. With two the nearest to their middle, with one the nearest to half a turn on its free side; but where the step
   // began within the limits in another, that: what a step turns beyond a limit is beyond it, however little is between the two.
-  // A single limit is met again once a turn: what comes from behind it passes. What began beyond it by 0.02 rad or half of the
-  // way, which is known to first order, or moves back by no more than rounding, is on it.
   double turn(double angle, double way) const;
+  // That turn as the limits see it. A single limit is met again once a turn: what comes from behind it passes. What began beyond
+  // it by 0.02 rad or half of the way, which is known to first order, or moves back by no more than rounding, is on it.
+  double limited_turn(double angle, double way) const;
 };
 
 // A spring and a damper on an axis, which yields as they let it (compliance, joint_laws.h): of torque or force -(k e + c e'),
@@ -154,7 +155,7 @@ Discrepancy twist_row(const Quaternion& frame1, const Quaternion& frame2, AxisMo
 // A spring against the twist's way from `rest`, known within half a turn of the middle of the limits, else of rest.
 Discrepancy sprung_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                              const JointLimits& limits, double rest, const JointSpring& spring);
-// The same row with limits of the twist, which is the turn that JointLimits::turn() tells.
+// The same row with limits of the twist, which is the turn that JointLimits::limited_turn() tells.
 Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies,
                               const JointLimits& limits);
 

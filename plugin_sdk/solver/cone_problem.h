@@ -25,7 +25,7 @@
 //                   states stay. Rows that depend on each other (four contacts under a box) are borne by 1e-7 to 1e-10
 //                   added to the diagonal of the step's matrix, not of the equation: the answer is one of those that are
 //                   right. Where seven steps do not halve the residual, some follow from the best place that are kept only
-//                   where they shorten it, with up to 1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
+//                   where they shorten it, with up to 0.1 on the diagonal (Levenberg 1944, Marquardt 1963); then all start
 //                   anew, from the guesses of cone_path.h, and every third time from sweeps, until three guesses near the
 //                   tolerance have not halved the residual: up to 8 times of it then counts as rounding. More than 192 rows
 //                   are swept before the first step, as long as 256 sweeps will do. With friction in more than 96 rows

@@ -275,6 +275,7 @@ void ConeProblem::solve_sliding() {
 
 // Symmetric, and a contact's rows meet only those of its two bodies: a stack costs what a band costs.
 void ConeProblem::solve_sticking() {
+  if (coupled_.empty()) return;
   if (coupled_ != factored_ || proximal_ != factored_proximal_) {
     std::vector<std::size_t> first(coupled_.size());
     for (std::size_t a = 0; a < coupled_.size(); ++a)

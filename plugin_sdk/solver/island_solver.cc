@@ -158,6 +158,8 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   joint.body1 = place_of(request_.discrepancy_body()[2 * row]);
   joint.body2 = place_of(request_.discrepancy_body()[2 * row + 1]);
   joint.discrepancy = columns.at(row);
+  if (has_reactions() && request_.discrepancy_applied_force()[3 * row] != 0.0)
+    add_turns(turns_to_limit(joint.discrepancy), &joint.discrepancy);
   const Discrepancy& d = joint.discrepancy;
   joint.axes = to_rotation_matrix(d.axes);
   joint.is_only_point = is_only_point(request_.discrepancy_body(), request_.mode(), row);

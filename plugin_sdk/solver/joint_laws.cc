@@ -2,6 +2,7 @@
 #include "plugin_sdk/solver/joint_laws.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -101,6 +102,24 @@ JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const 
   a.error_at_start = is_radial ? start_error.norm() : direction.dot(start_error);
   a.error_at_trial = direction.dot(discrepancy.point2 - discrepancy.point1);
   return a;
+}
+
+double turns_to_limit(const Discrepancy& discrepancy) {
+  const double lower = discrepancy.lower.x(), upper = discrepancy.upper.x();
+  const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
+  if (!discrepancy.is_twist() || axis_mode(discrepancy.modes, 0) != AxisMode::kLimited || has_lower == has_upper)
+    return 0.0;
+  const Twisting twisting = twisting_of(discrepancy);
+  if (!(twisting.cosine() > 0.0)) return 0.0;
+  const double limit = (has_lower ? lower : upper) / twisting.cosine();
+  return kWholeTurn * std::round((limit - twisting.angle) / kWholeTurn);
+}
+
+void add_turns(double turns, Discrepancy* twist) {
+  if (turns == 0.0) return;
+  Twisting twisting = twisting_of(*twist);
+  twisting.angle += turns;
+  set_twisting(twisting, twist);
 }
 
 void hold_what_bears(double force, JointAxisState* axis) {

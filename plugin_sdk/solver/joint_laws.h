@@ -106,6 +106,11 @@ double force_of(const JointAxisState& axis, double velocity);
 JointAxisState joint_axis_state(const Discrepancy& discrepancy, int axis, const Vector3& direction,
                                 const Vector3& start_error);
 
+// Turns (rad) that bring a twist next to its single limit; 0 where it has none. Such a limit is met again once a turn, and what
+// passes it is told as a turn less (JointLimits::limited_turn()), which states between those of steps may look like.
+double turns_to_limit(const Discrepancy& discrepancy);
+void add_turns(double turns, Discrepancy* twist);
+
 // A limit that bore `force` while the trial state was integrated holds like a lock: what the integrator is off by to its free
 // side is put right as well, or it would count as open in the next step.
 void hold_what_bears(double force, JointAxisState* axis);

@@ -12,6 +12,7 @@ namespace gravitas {
 namespace {
 
 constexpr double kAny = std::numeric_limits<double>::infinity();
+constexpr double kAtLimit = 1e-8;  // of the reach, or rad
 
 double lower_limit(const Discrepancy& d, int axis) {
   return axis_mode(d.modes, axis) == AxisMode::kUnilateral ? 0.0 : d.lower[axis];
@@ -34,7 +35,7 @@ ReactionSolver::Holding ReactionSolver::held_always(const Discrepancy& d, int ax
   Holding holding;
   holding.holds = true;
   holding.is_velocity = is_drive(axis_mode(d.modes, axis));
-  if (axis_mode(d.modes, axis) == AxisMode::kLimited) holding.target = d.lower[axis];
+  if (axis_mode(d.modes, axis) == AxisMode::kLimited) holding.limit = &Discrepancy::lower;
   holding.least = -kAny, holding.most = kAny;
   return holding;
 }
@@ -53,6 +54,7 @@ void ReactionSolver::find_holdings() {
   for (Body& body : bodies_) body.pose = body.start, body.velocity = body.start_velocity;
   has_moved_ = true;
   for (Joint& joint : joints_) {
+    if (joint.discrepancy.is_twist()) turn_to_limit(&joint);
     const Discrepancy d = at_pose(joint);
     const Matrix3 axes = to_rotation_matrix(d.axes);
     const Arms arms = arms_of(d, axes, joint);
@@ -68,8 +70,16 @@ void ReactionSolver::find_holdings() {
   has_moved_ = false;
 }
 
+void ReactionSolver::turn_to_limit(Joint* joint) {
+  const Discrepancy start = at_pose(*joint);
+  const Twisting twisting = twisting_of(start);
+  const double turns = turns_to_limit(start), error = (twisting.angle + turns) * twisting.cosine();
+  if (turns == 0.0 || !may_hold(start, 0)) return;
+  if (std::fabs(error - start.lower.x()) <= kAtLimit || std::fabs(error - start.upper.x()) <= kAtLimit)
+    add_turns(turns, &joint->discrepancy);
+}
+
 ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, int axis, const Row& row) const {
-  constexpr double kClosed = 1e-8;                       // of the reach, or rad
   constexpr double kStill = 1e-8, kStillAtRest = 1e-10;  // of the speeds, and m/s or rad/s
   const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
   const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
@@ -87,13 +97,14 @@ ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, i
     if (!holding.holds) holding.push = std::copysign(bound, -rate), holding.missing = std::abs(rate);
     return holding;
   }
-  const double slop = kClosed * (d.is_angular() ? 1.0 : row.reach);
+  const double slop = kAtLimit * (d.is_angular() ? 1.0 : row.reach);
   if (row.error <= lower_limit(d, axis) + slop && rate <= still) {
     holding.holds = true;
-    holding.target = lower_limit(d, axis), holding.most = kAny;
+    if (axis_mode(d.modes, axis) != AxisMode::kUnilateral) holding.limit = &Discrepancy::lower;
+    holding.most = kAny;
   } else if (row.error >= upper_limit(d, axis) - slop && rate >= -still) {
     holding.holds = true;
-    holding.target = upper_limit(d, axis), holding.least = -kAny;
+    holding.limit = &Discrepancy::upper, holding.least = -kAny;
   }
   return holding;
 }

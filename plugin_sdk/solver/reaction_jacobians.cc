@@ -25,7 +25,8 @@ Wrench slope(const Wrench& from, const Wrench& to, double by) {
 
 template <typename Use>
 void ReactionSolver::for_rows_of(const Joint& joint, Use&& use) const {
-  for (std::size_t r = joint.first_row; r < rows_.size() && rows_[r].place < joint.place + 3; ++r)
+  // joints follow each other in any order: places of the next one may be less
+  for (std::size_t r = joint.first_row; r < rows_.size() && rows_[r].place - joint.place < 3; ++r)
     use(r, rows_[r].place - joint.place);
 }
 

@@ -44,13 +44,17 @@ class ReactionSolver {
   // How an axis holds, that is no spring.
   struct Holding {
     bool holds = false;
-    bool is_velocity = false;        // of a drive or friction, whatever the error
-    double target = 0.0;             // of the error, m or rad
+    bool is_velocity = false;  // of a drive or friction, whatever the error
+    // That the error is at; none: it is at 0.
+    Vector3 Discrepancy::*limit = nullptr;
     double least = 0.0, most = 0.0;  // of its force on body 2, N or N m
     double push = 0.0;               // that force where it does not hold: of a drive or friction that slips
     double missing = 0.0;            // m/s or rad/s that S_n was short of its velocity by
     bool is_released = false;        // asked for more than it bears
     int returns = 0;                 // since
+
+    // Of the error, m or rad.
+    double target(const Discrepancy& d, int axis) const { return limit == nullptr ? 0.0 : (d.*limit)[axis]; }
   };
 
   struct Joint {
@@ -118,6 +122,8 @@ class ReactionSolver {
   void load_joints();
   // Which axes hold, in S_n (reaction_holdings.cc).
   void find_holdings();
+  // A twist that began at its single limit is told by the turns that lead there.
+  void turn_to_limit(Joint* joint);
   static Holding held_always(const Discrepancy& d, int axis);
   Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
   // The multipliers of the rows that hold. Returns what they are missed by.

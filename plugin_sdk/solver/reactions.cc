@@ -224,7 +224,7 @@ void ReactionSolver::make_rows() {
       row.scale = std::sqrt(row.direction.product(row.direction, one.inverse_mass + two.inverse_mass));
       row.velocity_error = row.direction.along(one.velocity, two.velocity) - row.direction.linear.dot(d.velocity) -
                            (d.is_angular() ? axes.col(axis).dot(d.velocity) : 0.0);
-      row.error = holding.is_velocity ? 0.0 : row.error - holding.target;
+      row.error = holding.is_velocity ? 0.0 : row.error - holding.target(d, axis);
       longest_ = std::max(longest_, row.reach);
       if (row.scale > 0.0) rows_.push_back(row);
     }
@@ -246,7 +246,13 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
   const Quaternion turn1 = one.pose.orientation * one.asked.orientation.conjugate();
   d.velocity = turn1 * d.velocity;
   if (d.is_twist()) {
-    set_twisting(twisting_of(d).turned(turn1, two.pose.orientation * two.asked.orientation.conjugate()), &d);
+    const Twisting asked = twisting_of(d);
+    const Twisting now = asked.turned(turn1, two.pose.orientation * two.asked.orientation.conjugate());
+    set_twisting(now, &d);
+    // its error and its limits are twists times the cosine
+    const double grown = asked.cosine() > 0.0 ? now.cosine() / asked.cosine() : 1.0;
+    for (double* limit : {&d.lower.x(), &d.upper.x()})
+      if (std::fabs(*limit) < kUnlimited) *limit *= grown;
     return d;
   }
   if (d.is_component()) {
@@ -280,7 +286,7 @@ ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Matrix3
   for (int k = 0; k < 3; ++k) {
     if (!joint.is_only_point || !holds_place(d, k)) continue;
     const Vector3 axis = axes.col(k);
-    arms.arm1 -= (axis.dot(d.point2 - d.point1) - joint.holdings[static_cast<std::size_t>(k)].target) * axis;
+    arms.arm1 -= (axis.dot(d.point2 - d.point1) - joint.holdings[static_cast<std::size_t>(k)].target(d, k)) * axis;
     along -= (axis.dot(along) - axis.dot(d.velocity)) * axis;
   }
   arms.bend = second.centripetal(arms.arm2) - first.centripetal(arms.arm1) - 2.0 * first.velocity.angular.cross(along);

@@ -82,6 +82,27 @@ TEST(SmoothHolding, ABoundThatIsNotReachedChangesNothing) {
   }
 }
 
+// Its weight, beside the axis, presses a shaft that swings to and fro on the limit of its twist. Limits count as twist times the
+// cosine of half the bend, which is another one in each stage; a single one is met again once a turn.
+TEST(SmoothHolding, ATwistAtItsLimitHoldsWhileTheBendChanges) {
+  for (const std::string limits : {"TwistUpper = 0.05", "TwistLower = -1 TwistUpper = 0.05"}) {
+    const std::string scene = held_scene(held_body("Position = {0.5, -0.5, 0.2}"),
+                                         "Constraint { Type = \"Spherical\" Id = \"S\" Body2 = \"A\" "
+                                         "CustomProperties { BindPoint = {0, 0, 0} Axis = {1, -1, 0} " +
+                                             limits + " } }");
+    std::vector<double> lost;
+    for (const double h : {0.02, 0.01}) {
+      SceneRun run(scene, {set("Integrator", std::string("RK4")), set("Simulator.TimeStep", h)});
+      while (run.time() < 0.2 - 0.5 * h) run.step();
+      const double closed = run.energy();
+      while (run.time() < 0.4 - 0.5 * h) run.step();
+      lost.push_back(std::fabs(run.energy() - closed));
+    }
+    EXPECT_LT(lost[1], 1e-7) << limits;
+    EXPECT_GT(lost[0] / lost[1], 12.0) << limits;
+  }
+}
+
 std::string slider(const std::string& drive) {
   return "Constraint { Type = \"Slider\" Id = \"S\" Body2 = \"A\" CustomProperties { BindPoint = {0, 0, 0} "
          "Axis = {0, 1, 0} " +

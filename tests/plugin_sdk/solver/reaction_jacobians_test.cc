@@ -227,6 +227,26 @@ TEST(ReactionJacobians, NearASingularConfigurationAreThoseOnTheJoints) {
   expect_slopes(bobs, "bobs", 1e-6);
 }
 
+// Joints that are told from both ends of a chain in turn are taken in an order of their own (elimination_order.h), in which
+// places among the multipliers rise and fall.
+TEST(ReactionJacobians, AreThoseOfJointsInAnyOrder) {
+  constexpr int kLinks = 45;
+  Draw draw(7);
+  Mechanism chain;
+  const Vector3 turning = draw.vector(1.0);
+  for (int i = 0; i < kLinks; ++i) {
+    chain.poses.push_back({Vector3(i + 0.5, 0, 0) + draw.vector(0.2), draw.rotation()});
+    chain.twists.push_back({turning.cross(chain.poses.back().position), turning});
+    chain.masses.push_back(draw.uniform(0.5, 2.0));
+    chain.wrenches.push_back({draw.vector(20.0), draw.vector(5.0)});
+  }
+  for (const int first : {0, 1})
+    for (int i = first; i < kLinks; i += 2)
+      chain.join(i == 0 ? kNone : static_cast<std::uint32_t>(i - 1), static_cast<std::uint32_t>(i),
+                 {Vector3(i, 0, 0), draw.rotation()}, hinge);
+  expect_slopes(chain, "hinges");
+}
+
 // Blocks for all that joints and forces connect, and for nobody else.
 TEST(ReactionJacobians, AreOfThoseWhomJointsAndForcesConnect) {
   Mechanism made = links(3);

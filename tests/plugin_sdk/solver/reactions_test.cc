@@ -415,6 +415,59 @@ TEST(Reactions, OfACamberAreTheGyroscopicCouple) {
   EXPECT_LT((problem.torque(0) - Vector3((1.0 + 3.0 - 2.0) * 1.5 * 4.0, 0, 0)).norm(), 1e-13);
 }
 
+// A twist that was closed when the step began holds in a trial state in which the joint is bent otherwise, as a lock does.
+TEST(Reactions, OfATwistAtItsLimitHoldWhileTheBendChanges) {
+  constexpr double kLimit = 0.4;
+  JointLimits limits;
+  limits.upper = kLimit;
+  const auto frame_at = [&](double bend) {
+    return Quaternion(exp_rotation(bend * Vector3::UnitZ()) * exp_rotation(kLimit * Vector3::UnitX()));
+  };
+  for (const double bend : {0.5, 0.9}) {
+    const Quaternion now = frame_at(bend);
+    Problem held, limited;
+    for (Problem* problem : {&held, &limited}) {
+      problem->add_body(1.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+      set_vector(problem->wrench, 1, Vector3(3, 1, 0));
+      set_quaternion(problem->orientation, 0, frame_at(0.7));
+      problem->begin_step();
+      set_quaternion(problem->orientation, 0, now);
+    }
+    double scale = 0.0;
+    held.add_joint(kNone, 0, twist_row(Quaternion::Identity(), now, AxisMode::kLocked, &scale));
+    limited.add_joint(kNone, 0, limited_twist_row(Quaternion::Identity(), now, JointBodies{}, limits));
+    held.solve(), limited.solve();
+    EXPECT_LT(held.force(0).x(), -1.0) << bend;
+    EXPECT_NEAR(limited.force(0).x(), held.force(0).x(), 1e-13) << bend;
+  }
+}
+
+// A stage that is beyond a single limit and comes back looks like what passes it a turn later.
+TEST(Reactions, OfATwistAtItsLimitHoldWhicheverTurnIsTold) {
+  JointLimits limits;
+  limits.upper = 0.4;
+  const Quaternion start = exp_rotation(limits.upper * Vector3::UnitX()),
+                   now = exp_rotation((limits.upper + 1e-5) * Vector3::UnitX());
+  JointBodies bodies;
+  bodies.time_step = 0.01;
+  bodies.spin2 = -5e-6 / bodies.time_step * Vector3::UnitX();
+  const Discrepancy told = limited_twist_row(Quaternion::Identity(), now, bodies, limits);
+  EXPECT_LT((told.point2 - told.point1).dot(Vector3::UnitX()), -5.0);
+  Problem problem;
+  problem.add_body(1.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 0});
+  set_vector(problem.wrench, 1, Vector3(3, 0, 0));
+  set_quaternion(problem.orientation, 0, start);
+  problem.begin_step();
+  set_quaternion(problem.orientation, 0, now);
+  problem.add_joint(kNone, 0, told);
+  problem.solve();
+  EXPECT_NEAR(problem.force(0).x(), -3.0, 1e-13);
+  // what leaves it when the step begins is free
+  problem.start_angular_velocity[0] = -1e-3;
+  problem.solve();
+  EXPECT_EQ(problem.force(0).x(), 0.0);
+}
+
 TEST(Reactions, RefuseARequestThatIsImpossible) {
   Problem problem = swinging();
   problem.wrench[1] = std::numeric_limits<double>::quiet_NaN();

@@ -107,21 +107,25 @@ TEST_F(Meshing, TellsByTheVelocityWhichTeethMeet) {
 // Bevel wheels turn about axes that meet, and both about anything.
 TEST_F(Meshing, KnowsTheArcOfBevelWheels) {
   PluginUnderTest plugin("constraint_gear");
-  for (const TeethOf& teeth : {TeethOf{20, 20, false}, TeethOf{15, 40, false}, TeethOf{40, 15, false}}) {
-    for (int i = 0; i < 20; ++i) {
+  for (const TeethOf& teeth : {TeethOf{20, 20, false}, TeethOf{15, 40, false}, TeethOf{40, 15, false},
+                               TeethOf{12, 48, true}, TeethOf{48, 12, true}}) {
+    // the wheels are on this side of a mesh whose ring is body 2
+    const double second = teeth.is_internal ? -teeth.two : teeth.two, side = teeth.one + second < 0.0 ? -1.0 : 1.0;
+    int made = 0;
+    for (int i = 0; i < 40; ++i) {
       JointProblem joint(&plugin, "Gear");
       for (JointedBody& body : joint.bodies) body.pose = random_.pose(2.0);
       const Vector3 apex = random_.vector(1.0), axis1 = random_.direction(), axis2 = random_.direction();
       // wheels of a cone length of 0.7 m, whose axes may be given either way
-      const Vector3 line = teeth.two * axis1 + teeth.one * axis2, pitch = 0.7 * line.normalized();
+      const Vector3 line = second * axis1 + teeth.one * axis2, pitch = side * 0.7 * line.normalized();
       if (pitch.dot(axis1) < 0.05 || pitch.dot(axis2) < 0.05 || axis1.cross(axis2).norm() < 0.2) continue;
       std::vector<double> properties = flat({i % 2 == 0 ? axis1 : Vector3(-axis1)});
-      append({teeth.one, teeth.two, 0.0}, &properties);
+      append({teeth.one, teeth.two, teeth.is_internal ? 1.0 : 0.0}, &properties);
       append(flat({apex + pitch.dot(axis1) * axis1, apex + pitch.dot(axis2) * axis2, 3.0 * axis2}), &properties);
       joint.bind(properties);
       const double one = random_.uniform(-9.0, 9.0), off = random_.uniform(-0.02, 0.02);
       turn(apex, one * axis1, &joint.bodies[0].pose);
-      turn(apex, (off - teeth.one / teeth.two * one) * axis2, &joint.bodies[1].pose);
+      turn(apex, (off - teeth.one / second * one) * axis2, &joint.bodies[1].pose);
       const Vector3 carry = random_.vector(2.0), about = random_.vector(1.0);
       for (JointedBody& body : joint.bodies) turn(about, carry, &body.pose);
       const Discrepancy d = joint.describe().at(0);
@@ -130,7 +134,9 @@ TEST_F(Meshing, KnowsTheArcOfBevelWheels) {
       EXPECT_NEAR(std::fabs(error_along(d)), std::fabs(radius * off), kMeshRounding);
       EXPECT_LT((place(d, teeth.one, teeth.two) - (about + exp_rotation(carry) * (apex + pitch - about))).norm(),
                 kMeshRounding);
+      ++made;
     }
+    EXPECT_GT(made, 4) << teeth.one << ":" << teeth.two;
   }
 }
 

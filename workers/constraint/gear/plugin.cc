@@ -16,7 +16,7 @@
 //
 // Bevel wheels, on axes k1 and k2 from where they meet, O, to the wheels, at an angle of sine s: beta is the angle, about k1, of
 // k2 as body 1 sees it, gamma that about k2 of k1 as body 2 does, P = O + L u, u along N2 k1 + N1 k2, L such that P is next to
-// the wheels' centres. With t = k1 x k2/s and O1, O2 what of the bodies is at O,
+// the wheels' centres, negative where body 2 is a ring. With t = k1 x k2/s and O1, O2 what of the bodies is at O,
 //   e = t.(O2 - O1) + (N1 beta + N2 gamma) L s/|N2 k1 + N1 k2|,    e' = t.(v2(P) - v1(P))    where O1 = O2 and e = 0.
 //
 // Freedoms. One row of rank 1: along t at P. Its multiplier is the force between the teeth along their common tangent, on body
@@ -102,7 +102,7 @@ class Gear final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       const double n1 = bound.number(), n2 = bound.number(), length = bound.number();
       const Vector3 apart = two.position - one.position;
-      if (length > 0.0)
+      if (length != 0.0)
         emit_bevel(one, two, n1, n2, length, bodies, emit);
       else
         emit_row(axis_between(one, two).cross(apart), one.position + n1 / (n1 + n2) * apart, ahead(n1, n2), 0.0,
@@ -116,7 +116,7 @@ class Gear final : public ConstraintPlugin {
   static constexpr double kMeet = 1e-6;        // of the way between the points
 
   // Frames of the bodies, their first axes those of the wheels, their second what the angles are counted from; and of bevel
-  // wheels the way from where their axes meet to the mesh, else 0.
+  // wheels the way from where their axes meet to the mesh, along N2 k1 + N1 k2, else 0.
   struct Mesh {
     Pose one, two;
     double length = 0.0;
@@ -140,12 +140,14 @@ class Gear final : public ConstraintPlugin {
     const Vector3 way1 = point1 - meet, way2 = point2 - meet;
     if (axis1.dot(way1) < 0.0) axis1 = -axis1;
     if (axis2.dot(way2) < 0.0) axis2 = -axis2;
-    const Vector3 pitch = (n2 * axis1 + n1 * axis2).normalized();
+    // seen from where the axes meet the wheels are on this side, those of a ring around body 1 on the other
+    const double side = n1 + n2 < 0.0 ? -1.0 : 1.0;
+    const Vector3 pitch = side * (n2 * axis1 + n1 * axis2).normalized();
     const double cosine1 = pitch.dot(axis1), cosine2 = pitch.dot(axis2);
     const double length = pitch.dot(way1 + way2) / (cosine1 * cosine1 + cosine2 * cosine2);
     if (!(length > kLeastOfWay * line.norm()))
       throw Refusal("Gear: BindAxisPoint1 and BindAxisPoint2 must lie away from where the axes meet, at the mesh");
-    return {cross_frame(meet, axis1, axis2), cross_frame(meet, axis2, axis1), length};
+    return {cross_frame(meet, axis1, axis2), cross_frame(meet, axis2, axis1), side * length};
   }
 
   template <class Emit>

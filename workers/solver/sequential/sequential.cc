@@ -78,6 +78,7 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
 
 void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
   begin(request);
+  moved_.clear();
   solve_pose(request);
   find_closed();
   build_velocity(request);
@@ -187,7 +188,6 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
       touching_.push_back(pair_of(request.contact_body()[2 * i], request.contact_body()[2 * i + 1]));
   std::ranges::sort(touching_);
   velocity_shift_.assign(pose_laws_.size(), 0.0);
-  moved_.clear();
   shifted_pose_ = shifted_velocity_ = 0.0;
   trial_velocity_.clear();
   for (std::uint32_t i = 0; i <= bodies_.count(); ++i) trial_velocity_.push_back(bodies_[i].trial_velocity);

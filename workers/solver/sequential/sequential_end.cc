@@ -67,7 +67,9 @@ double SequentialSolver::measure_stiffness() {
     }
     if (!ends_[i].is_linear || touches(d)) continue;
     Vector3 push = Vector3::Zero();
-    for (std::size_t k = 0; k < 3; ++k) push += pushed_[3 * i + k] * ends_[i].directions[k].linear;
+    // but for what stands on free axes (add_turn())
+    for (std::size_t k = 0; k < 3; ++k)
+      if (pose_laws_[3 * i + k].is_active()) push += pushed_[3 * i + k] * ends_[i].directions[k].linear;
     stiffness_[d.body1] += geometric_stiffness(ends_[i].arm1, -push);
     stiffness_[d.body2] += geometric_stiffness(ends_[i].arm2, push);
     if (const double pull = pull_of_rod(i); pull > 0.0)
