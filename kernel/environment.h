@@ -194,7 +194,6 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool hides_jump(double begin, double length, std::uint32_t first, std::uint32_t pieces, double error);
   // The inner step that ends at the next event, of at most `length`, for which S* is in place.
   NextStop first_impact(const Trusted<TrialState>& trial, double begin, double length);
-  bool arrives_anew(std::size_t contact) const;
   double bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near);
   double shorten_turns(Trusted<TrialState>* trial, double begin, double length, bool* has_found_contacts);  // turns.cc
   double first_limit(double begin, double length, bool* passes);                                            // limits.cc

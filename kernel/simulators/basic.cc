@@ -8,8 +8,8 @@
 // (loads.cc), cut where a force jumps, and whatever a simulator makes of each. A force is asked as it is between the jump
 // before and the next, whatever the time.
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <array>
 #include <limits>
 
 #include "kernel/environment.h"
@@ -125,26 +125,11 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
   if (constraint_.is_running()) constrain(trial);
   // What pressed before does not arrive, and has nothing to bounce with: it came no nearer then, and what turning makes of that
   // since is less the shorter the step. Under a fast rim, whose points come down faster than they would fall, it is more than
-  // what solvers take for rest. What comes faster than all that is another place of the same two surfaces (the far end of a rod).
+  // what solvers take for rest.
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
-    if (!vector_at(data_.contact_warm_impulse.span(), i).isZero(0.0) && !arrives_anew(i))
+    if (!vector_at(data_.contact_warm_impulse.span(), i).isZero(0.0))
       data_.contact_material[kMaterialColumns * i + kRestitution] = 0.0;
   return solve();
-}
-
-bool Environment::arrives_anew(std::size_t contact) const {
-  double start = 0.0, end = 0.0, turned = 0.0;  // relative velocities along the normal; what turning makes of one
-  for (std::size_t side = 0; side < 2; ++side) {
-    const std::uint32_t body = data_.contact_body[2 * contact + side];
-    const Vector3 normal = (side == 0 ? -1.0 : 1.0) * vector_at(data_.contact_normal.span(), contact);
-    const Vector3 arm = vector_at(data_.contact_point.span(), contact) - vector_at(data_.trial_position.span(), body);
-    const Vector3 spin = vector_at(start_angular_velocity().span(), body);
-    start += normal.dot(vector_at(start_linear_velocity().span(), body) + spin.cross(arm));
-    end += normal.dot(vector_at(data_.trial_linear_velocity.span(), body) +
-                      vector_at(data_.trial_angular_velocity.span(), body).cross(arm));
-    turned += spin.squaredNorm() * arm.norm() * data_.time_step[0];
-  }
-  return -start > 2.0 * (turned + std::fabs(end - start));
 }
 
 }  // namespace gravitas::kernel
