@@ -8,8 +8,8 @@
 // (loads.cc), cut where a force jumps, and whatever a simulator makes of each. A force is asked as it is between the jump
 // before and the next, whatever the time.
 #include <algorithm>
-#include <cmath>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "kernel/environment.h"

@@ -1,7 +1,9 @@
 // Which axes hold in a state, of those that need not: closed limits, bounded drives and friction.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "plugin_sdk/math/rotation.h"
@@ -50,9 +52,7 @@ void ReactionSolver::find_holdings() {
         return may_hold(joint.discrepancy, 0) || may_hold(joint.discrepancy, 1) || may_hold(joint.discrepancy, 2);
       }))
     return;
-  const std::vector<Body> asked = bodies_;
-  for (Body& body : bodies_) body.pose = body.start, body.velocity = body.start_velocity;
-  has_moved_ = true;
+  go_to_start();
   for (Joint& joint : joints_) {
     if (joint.discrepancy.is_twist()) turn_to_limit(&joint);
     const Discrepancy d = at_pose(joint);
@@ -66,8 +66,66 @@ void ReactionSolver::find_holdings() {
       may_let_go_ = may_let_go_ || holding.holds || holding.push != 0.0;
     }
   }
-  bodies_ = asked;
-  has_moved_ = false;
+  load_bodies();
+}
+
+bool ReactionSolver::is_closed_limit(const Joint& joint, std::size_t axis) {
+  const Holding& holding = joint.holdings[axis];
+  return holding.holds && !holding.is_velocity && !holds_always(joint.discrepancy, static_cast<int>(axis));
+}
+
+// Without memory of the states before, each finds it anew.
+void ReactionSolver::let_go_from_start() {
+  const auto has_closed = [](const Joint& joint) {
+    return is_closed_limit(joint, 0) || is_closed_limit(joint, 1) || is_closed_limit(joint, 2);
+  };
+  if (std::ranges::none_of(joints_, has_closed)) return;
+  std::vector<std::array<Holding, 3>> closed;
+  for (const Joint& joint : joints_) closed.push_back(joint.holdings);
+  do {
+    load_bodies();
+    go_to_start();
+    solve_held();
+  } while (change_holdings());
+  load_bodies();
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    Joint& joint = joints_[i];
+    std::swap(joint.holdings, closed[i]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (is_closed_limit(joint, axis) && !closed[i][axis].holds) joint.holdings[axis] = Holding{};
+  }
+}
+
+void ReactionSolver::let_go_opened() {
+  for (Joint& joint : joints_) {
+    const Discrepancy& d = joint.discrepancy;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!is_closed_limit(joint, axis)) continue;
+      const Matrix3 axes = to_rotation_matrix(d.axes);
+      const Row row = row_of_axis(d, axes, static_cast<int>(axis), arms_of(d, axes, joint), joint);
+      const Holding& holding = joint.holdings[axis];
+      const double beyond = row.error - holding.target(d, static_cast<int>(axis));
+      const double gap = holding.most > 0.0 ? beyond : -beyond;
+      if (gap > strayed(row)) joint.holdings[axis] = Holding{};
+    }
+  }
+}
+
+// By no velocity of the state: what is let go of changes these, and would be held again and let go without end.
+double ReactionSolver::strayed(const Row& row) const {
+  constexpr double kOfSquare = 0.75;  // a third stage of RK4 on a circle is off by half
+  double turn = 0.0;
+  for (const std::uint32_t i : {row.body1, row.body2}) {
+    const Body& body = bodies_[i];
+    const Quaternion since = shorter_arc(body.pose.orientation * body.start.orientation.conjugate());
+    double turned = log_rotation(since).norm(), turning = body.start_velocity.angular.norm();
+    if (row.reach > 0.0) {
+      turned += (body.pose.position - body.start.position).norm() / row.reach;
+      turning += body.start_velocity.linear.norm() / row.reach;
+    }
+    turn = std::max({turn, turned, request_->time_step() * turning});
+  }
+  return kOfSquare * turn * turn * (row.reach > 0.0 ? row.reach : 1.0);
 }
 
 void ReactionSolver::turn_to_limit(Joint* joint) {

@@ -114,6 +114,8 @@ class ReactionSolver {
   static constexpr double kMargin = 100.0, kMostMargin = 1e9;
 
   void load_bodies();
+  // As S_n has them.
+  void go_to_start();
   bool is_free(std::size_t body) const;
 
   // What forces, springs, the gyroscopic term and drag make of the bodies.
@@ -124,6 +126,13 @@ class ReactionSolver {
   void find_holdings();
   // A twist that began at its single limit is told by the turns that lead there.
   void turn_to_limit(Joint* joint);
+  // Lets go of limits that open in S_n, and of those that have opened since.
+  void let_go_from_start();
+  void let_go_opened();
+  // Is it a limit that holds now, of those that need not?
+  static bool is_closed_limit(const Joint& joint, std::size_t axis);
+  // By how much the row may be off in a state that an integrator tries: the second order of what turns in the step, m or rad.
+  double strayed(const Row& row) const;
   static Holding held_always(const Discrepancy& d, int axis);
   Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
   // The multipliers of the rows that hold. Returns what they are missed by.

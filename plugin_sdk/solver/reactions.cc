@@ -43,6 +43,7 @@ double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
   load_bodies();
   load_joints();
   find_holdings();
+  if (may_let_go_) let_go_from_start(), let_go_opened();
   double missed = solve_held();
   while (may_let_go_ && change_holdings()) {
     load_bodies();
@@ -52,7 +53,7 @@ double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
 }
 
 double ReactionSolver::solve_held() {
-  has_moved_ = agrees_ = false;
+  agrees_ = false;
   load_springs();
   make_rows();
   factorise(0.0);
@@ -115,6 +116,7 @@ void ReactionSolver::write(double residual, const stage::SolverReactionsReply& r
 void ReactionSolver::load_bodies() {
   const std::size_t count = request_->flags().size();
   bodies_.assign(count + 1, {});
+  has_moved_ = false;
   for (std::size_t i = 0; i < count; ++i) {
     Body& body = bodies_[i];
     body.asked = body.pose = {vector_at(request_->position(), i), quaternion_at(request_->orientation(), i)};
@@ -126,6 +128,16 @@ void ReactionSolver::load_bodies() {
     body.inverse_mass = request_->inverse_mass()[i];
     body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
   }
+}
+
+void ReactionSolver::go_to_start() {
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+    Body& body = bodies_[i];
+    body.pose = body.start, body.velocity = body.start_velocity;
+    if (is_free(i))
+      body.inverse_inertia = world_inverse_inertia(body.pose.orientation, vector_at(request_->inverse_inertia(), i));
+  }
+  has_moved_ = true;
 }
 
 bool ReactionSolver::is_free(std::size_t body) const {
@@ -177,7 +189,7 @@ void ReactionSolver::load_springs() {
   springs_.clear();
   sprung_.assign(bodies_.size(), {});
   for (const Joint& joint : joints_) {
-    const Discrepancy& d = joint.discrepancy;
+    const Discrepancy& d = at_pose(joint);
     const auto pushes = [&](std::size_t axis) {
       return acts_as_force(d, static_cast<int>(axis)) || joint.holdings[axis].push != 0.0;
     };

@@ -8,10 +8,13 @@
 // Freedoms. One point, fixed in both bodies, stays one point: three locked rows, rank 3. The cone is one one-sided row
 // along its normal, the twist one limited row: rank 4 at the cone, 5 where the twist is at its limit too; swing along the
 // cone stays free. (As printed, (2.87) locks swing and return: rank 5.)
-// Cone. With t the direction of a2 across a1, n = a1 x t, e = dA2/dphi = cos(phi) t - sin(phi) a1 and the relative turning
-// w, phi' = w.n and sin(phi) psi' = -w.e, so phi - c(psi) has the rate w.(n + c' e/sin(phi)). The row is that direction made
-// unit, with sin(c) for sin(phi), which is the same at the cone and finite at the axis. Of an irregular cone c is linear
-// between its points, round once; a regular one's row is that of a swing, exact for turns of any size. Azimuths count
+// Cone. A row of a swing (kSwingDiscrepancy), exact for turns of any size. Of an irregular cone c is linear between its points,
+// round once, and the row is that of the regular cone that touches and bends as it does where a2 is: with t the direction of
+// a2 across a1, u = a1 x t, s = sin(c) and e = cos(c) t - s a1, the edge p = cos(c) a1 + s t goes along c' e + s u, inward of
+// it is n = (c' u - s e)/q, q^2 = s^2 + c'^2, and its curvature on the sphere is cot(r) = cos(c) (s^2 + 2 c'^2)/q^3; so the
+// touching cone has the angle r about cos(r) p + sin(r) n. On the edge value, rate and second derivative are those of the
+// irregular cone itself; what turns far round it in a step is off by the third power of that. A second row is that of the piece
+// behind the nearer corner, as it is there; it holds where the corner points outwards. Azimuths count
 // right-handed about Axis, from the world's x as seen along it (-z for an Axis within 1e-3 of x).
 // Spring and damper: of the whole turn of body 2 against body 1 since the start, torque -k angle about its axis and -c w. They
 // take no freedom.
@@ -30,20 +33,37 @@
 namespace gravitas {
 namespace {
 
-// c and dc/dpsi of a cone of points (azimuth, angle).
-struct ConePoint {
-  double angle, slope;
+// A piece of the edge of an irregular cone, of points (azimuth, angle): c and dc/dpsi, linear between two of them.
+struct ConePiece {
+  double begin, end;  // azimuths
+  double angle;       // where it begins
+  double slope;
+
+  double reach(double azimuth) const { return angle + slope * (azimuth - begin); }
 };
-ConePoint cone_at(std::span<const double> cone, double azimuth) {
-  const std::size_t count = cone.size() / 2;
-  std::size_t next = 0;
-  while (next < count && cone[2 * next] <= azimuth) ++next;
-  const std::size_t last = next == 0 ? count - 1 : next - 1;
-  const double from = cone[2 * last] - (next == 0 ? kWholeTurn : 0.0);
-  const double to = next == count ? cone[0] + kWholeTurn : cone[2 * next];
-  const double end = cone[2 * (next == count ? 0 : next) + 1];
-  const double slope = (end - cone[2 * last + 1]) / (to - from);
-  return {cone[2 * last + 1] + slope * (azimuth - from), slope};
+ConePiece piece_of(std::span<const double> cone, std::size_t last) {
+  const std::size_t count = cone.size() / 2, next = last + 1 == count ? 0 : last + 1;
+  const double begin = cone[2 * last], end = cone[2 * next] + (next == 0 ? kWholeTurn : 0.0);
+  const double angle = cone[2 * last + 1];
+  return {begin, end, angle, (cone[2 * next + 1] - angle) / (end - begin)};
+}
+
+// The regular cone that touches an irregular one at a point of its edge, in the direction `across` the axis there, and bends as
+// it does: the unit axis and the angle of its circle.
+struct RegularCone {
+  Vector3 axis;
+  double angle;
+};
+RegularCone osculating_cone(double reach, double slope, const Vector3& axis, const Vector3& across) {
+  if (slope == 0.0) return {axis, reach};
+  const math::SinCos at = math::sincos(reach);
+  const double square = at.sin * at.sin + slope * slope, speed = std::sqrt(square);
+  const Vector3 point = at.cos * axis + at.sin * across;
+  const Vector3 away = at.cos * across - at.sin * axis;
+  const Vector3 inward = (slope * axis.cross(across) - at.sin * away) / speed;
+  const double angle = math::atan2(square * speed, at.cos * (square + slope * slope));
+  const math::SinCos radius = math::sincos(angle);
+  return {radius.cos * point + radius.sin * inward, angle};
 }
 
 class Spherical final : public ConstraintPlugin {
@@ -232,7 +252,7 @@ class Spherical final : public ConstraintPlugin {
     twist.lower = bound.number();
     twist.upper = bound.number();
     const std::span<const double> cone = bound.table(2);
-    if (!cone.empty()) emit(cone_row(cone, one.orientation, two.orientation));
+    if (!cone.empty()) emit_cone(cone, one.orientation, two.orientation, emit);
     if (!twist.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, twist));
     if (bound.at_end()) return;
     bound.flag();  // has an axis
@@ -245,26 +265,35 @@ class Spherical final : public ConstraintPlugin {
     emit(drive);
   }
 
-  static Discrepancy cone_row(std::span<const double> cone, const Quaternion& one, const Quaternion& two) {
-    const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
-    if (cone.size() == 2) {
-      Discrepancy row = swing_row(a1, a2, cone[1], AxisMode::kLimited);
-      row.lower.x() = -kUnlimited;
-      return row;
-    }
-    const Swing swing = swing_between(a1, a2);
-    const Vector3 across = swing.axis.cross(a1);
-    double azimuth = math::atan2((one * Vector3::UnitZ()).dot(across), (one * Vector3::UnitY()).dot(across));
-    if (azimuth < 0.0) azimuth += kWholeTurn;
-    const ConePoint reach = cone_at(cone, azimuth);
-    const math::SinCos swung = math::sincos(swing.angle);
-    const Vector3 outward = swung.cos * across - swung.sin * a1;
-    const double steepness = reach.slope == 0.0 ? 0.0 : reach.slope / math::sin(reach.angle);
-    const Vector3 normal = swing.axis + steepness * outward;
-    const double length = normal.norm();
-    Discrepancy row = row_about(normal / length, (swing.angle - reach.angle) / length, AxisMode::kLimited);
+  static Discrepancy cone_row(const RegularCone& cone, const Vector3& axis2) {
+    Discrepancy row = swing_row(cone.axis, axis2, cone.angle, AxisMode::kLimited);
     row.lower.x() = -kUnlimited;
     return row;
+  }
+
+  template <typename Emit>
+  static void emit_cone(std::span<const double> cone, const Quaternion& one, const Quaternion& two, Emit&& emit) {
+    const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
+    if (cone.size() == 2) return emit(cone_row({a1, cone[1]}, a2));
+    const Vector3 from = one * Vector3::UnitY(), to = one * Vector3::UnitZ();
+    const Vector3 across = swing_between(a1, a2).axis.cross(a1);
+    double azimuth = math::atan2(to.dot(across), from.dot(across));
+    if (azimuth < 0.0) azimuth += kWholeTurn;
+    if (azimuth < cone[0]) azimuth += kWholeTurn;
+    const std::size_t count = cone.size() / 2;
+    std::size_t last = 0;
+    while (last + 1 < count && cone[2 * last + 2] <= azimuth) ++last;
+    const ConePiece here = piece_of(cone, last);
+    emit(cone_row(osculating_cone(here.reach(azimuth), here.slope, a1, across), a2));
+    // at a corner outwards the piece behind it, too
+    const bool is_past = azimuth - here.begin < here.end - azimuth;
+    const ConePiece next = piece_of(cone, is_past ? (last + count - 1) % count : (last + 1) % count);
+    const double corner = is_past ? here.begin : here.end;
+    const math::SinCos at = math::sincos(corner);
+    Discrepancy beside = cone_row(osculating_cone(here.reach(corner), next.slope, a1, at.cos * from + at.sin * to), a2);
+    const bool is_outward = is_past ? next.slope > here.slope : next.slope < here.slope;
+    if (!is_outward) beside.upper.x() = kUnlimited;
+    emit(beside);
   }
 };
 
