@@ -5,12 +5,10 @@
 #include <utility>
 
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/checks.h"
 
 namespace gravitas::kernel {
 namespace {
-
-// More rounds than any honest plugin needs: each at least doubles the room.
-constexpr int kCapacityRounds = 64;
 
 bool is_same_plugin(const PluginChoice& a, const PluginChoice& b) {
   return a.library == b.library && a.command == b.command && a.address == b.address && a.settings == b.settings;

@@ -14,6 +14,10 @@ namespace gravitas {
 // Largest deviation of a squared norm from 1 that passes as unit: some roundings of a renormalised quaternion.
 inline constexpr double kUnitTolerance = 1e-9;
 
+// How often a plugin is asked again because it wants more room: more rounds than any honest one needs, since each at least
+// doubles it.
+inline constexpr int kCapacityRounds = 64;
+
 inline constexpr std::size_t kNoRow = ~std::size_t{0};
 
 // Index of the first number that is not finite, or kNoRow.

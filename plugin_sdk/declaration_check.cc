@@ -1,6 +1,7 @@
 #include "plugin_sdk/declaration_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <string_view>
 #include <vector>
@@ -43,10 +44,15 @@ std::string check_default(const Property& p) {
   return problem.empty() ? "" : "has a default that it does not allow: " + problem;
 }
 
+bool has_number_between_bounds(const Property& p) {
+  if (p.minimum == HUGE_VAL || p.maximum == -HUGE_VAL) return false;
+  return p.exclusive_minimum ? p.minimum < p.maximum : p.minimum <= p.maximum;
+}
+
 std::string check_property(const Property& p) {
   if (p.kind < PropertyKind::kNumber || p.kind > PropertyKind::kBody) return "is of no kind that exists";
   if (p.meaning.empty()) return "has no meaning";
-  if (!(p.minimum <= p.maximum)) return "has bounds between which there is no number";
+  if (!has_number_between_bounds(p)) return "has bounds between which there is no number";
   if (p.kind == PropertyKind::kChoice && p.choices.empty()) return "is a choice between nothing";
   if (const std::string* twice = first_repeated(p.choices)) return "has the choice '" + *twice + "' twice";
   if (p.kind == PropertyKind::kTable && p.columns == 0) return "is a table without columns";

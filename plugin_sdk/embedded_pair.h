@@ -138,6 +138,7 @@ class EmbeddedPair : public IntegratorPlugin {
   // (dense_step.h).
   static double passing_inner_step(const stage::IntegratorIntegrateRequest& request, double inner, double left) {
     if (inner < 2.0 * left) return next_inner_step(inner, left);
+    if (request.damping().empty()) return 0.5 * inner;
     const double most = std::ranges::max(request.damping()), half = 0.5 * inner;
     return most * half <= 1.0 ? half : std::min(half, std::max(left, 1.0 / most));
   }

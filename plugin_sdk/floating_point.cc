@@ -6,6 +6,12 @@ namespace gravitas {
 
 void set_floating_point_control(std::uint32_t control) { _mm_setcsr(control & ~kFloatingPointExceptions); }
 
+bool restore_floating_point_control(std::uint32_t control) {
+  if (floating_point_control() == control) return false;
+  set_floating_point_control(control);
+  return true;
+}
+
 std::string c_library() { return std::string("glibc ") + gnu_get_libc_version(); }
 
 std::vector<std::string> cpu_features() {

@@ -16,6 +16,8 @@ inline constexpr std::uint32_t kFloatingPointExceptions = 0x3F;
 // denormals-are-zero, exception masks.
 inline std::uint32_t floating_point_control() { return _mm_getcsr() & ~kFloatingPointExceptions; }
 void set_floating_point_control(std::uint32_t control);
+// Sets it to what it was before something that must not change it; true if that did.
+bool restore_floating_point_control(std::uint32_t control);
 
 // The C library and its version.
 std::string c_library();

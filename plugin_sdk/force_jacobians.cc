@@ -6,14 +6,24 @@
 #include <vector>
 
 #include "plugin_sdk/body.h"
-#include "plugin_sdk/message_columns.h"
+#include "plugin_sdk/column_vector.h"
 
 namespace gravitas {
 namespace {
 
 constexpr double kStep = 1e-6;
 
-std::vector<double> numbers_of(std::span<const double> column) { return {column.begin(), column.end()}; }
+ColumnVector<double> numbers_of(std::span<const double> column) { return {column.begin(), column.end()}; }
+
+template <typename T>
+gravitas_reply_column room_of(ColumnVector<T>& numbers) {
+  return {numbers.data(), numbers.size(), 0};
+}
+
+struct Wrenches {
+  ColumnVector<double> wrench, impulse, potential;
+  ColumnVector<std::uint32_t> flags;
+};
 
 // The bodies of a request, moved.
 class MovedBodies {
@@ -46,7 +56,7 @@ class MovedBodies {
     return (at + by) - (at - by);
   }
 
-  MessageColumns wrenches(ForcePlugin& force, Host& host) const {
+  Wrenches wrenches(ForcePlugin& force, Host& host) const {
     using Request = stage::ForceWrenchesRequest;
     std::array<gravitas_column, Request::kColumnCount> columns;
     std::copy_n(request_.plain(), columns.size(), columns.begin());
@@ -54,10 +64,11 @@ class MovedBodies {
     columns[Request::kLinearVelocity].data = linear_velocity_.data();
     columns[Request::kAngularVelocity].data = angular_velocity_.data();
     const std::size_t rows = request_.application().size() / 2;
-    MessageColumns answer(stage::method_info(stage::Method::kForceWrenches).reply);
-    answer.f64("wrench").resize(6 * rows), answer.f64("impulse").resize(6 * rows);
-    answer.f64("potential").resize(rows), answer.u32("flags").resize(rows);
-    std::vector<gravitas_reply_column> rooms = answer.rooms();
+    Wrenches answer;
+    answer.wrench.resize(6 * rows), answer.impulse.resize(6 * rows);
+    answer.potential.resize(rows), answer.flags.resize(rows);
+    std::array<gravitas_reply_column, stage::ForceWrenchesReply::kColumnCount> rooms = {
+        room_of(answer.wrench), room_of(answer.impulse), room_of(answer.potential), room_of(answer.flags)};
     force.wrenches(Request(columns.data()), stage::ForceWrenchesReply(rooms.data()), host);
     return answer;
   }
@@ -69,8 +80,8 @@ class MovedBodies {
                                            request_.angular_velocity()};
     return all[k / 3];
   }
-  std::vector<double>& moved(std::size_t k) {
-    std::vector<double>* const all[] = {&position_, &orientation_, &linear_velocity_, &angular_velocity_};
+  ColumnVector<double>& moved(std::size_t k) {
+    ColumnVector<double>* const all[] = {&position_, &orientation_, &linear_velocity_, &angular_velocity_};
     return *all[k / 3];
   }
   double step(std::size_t k, std::size_t body) const {
@@ -79,7 +90,7 @@ class MovedBodies {
   }
 
   const stage::ForceWrenchesRequest& request_;
-  std::vector<double> position_, orientation_, linear_velocity_, angular_velocity_;
+  ColumnVector<double> position_, orientation_, linear_velocity_, angular_velocity_;
 };
 
 }  // namespace
@@ -97,19 +108,18 @@ void push_block(const stage::ForceJacobiansReply& reply, std::uint32_t body, std
 void difference_own_states(ForcePlugin& force, const stage::ForceWrenchesRequest& request,
                            const stage::ForceJacobiansReply& reply, Host& host) {
   MovedBodies bodies(request);
-  const MessageColumns here = bodies.wrenches(force, host);
-  const std::vector<std::uint32_t>& flags = here.u32("flags");
+  const ColumnVector<std::uint32_t> flags = bodies.wrenches(force, host).flags;
   std::vector<JacobianBlock> blocks(flags.size(), JacobianBlock::Zero());
   for (std::size_t k = 0; k < 12; ++k) {
     bodies.move(k, 1.0);
-    const MessageColumns after = bodies.wrenches(force, host);
+    const Wrenches after = bodies.wrenches(force, host);
     bodies.move(k, -1.0);
-    const MessageColumns before = bodies.wrenches(force, host);
+    const Wrenches before = bodies.wrenches(force, host);
     bodies.put_back(k);
     for (std::size_t i = 0; i < blocks.size(); ++i)
       for (std::size_t row = 0; row < 6; ++row)
         blocks[i](static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(k)) =
-            (after.f64("wrench")[6 * i + row] - before.f64("wrench")[6 * i + row]) /
+            (after.wrench[6 * i + row] - before.wrench[6 * i + row]) /
             bodies.width(k, request.application()[2 * i + 1]);
   }
   for (std::size_t i = 0; i < blocks.size(); ++i)

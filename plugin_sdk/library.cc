@@ -15,6 +15,7 @@
 
 #include "plugin_sdk/channel/digest.h"
 #include "plugin_sdk/floating_point.h"
+#include "plugin_sdk/printable.h"
 
 namespace gravitas {
 namespace {
@@ -52,16 +53,22 @@ int private_copy(const std::string& path) {
   return copy;
 }
 
+std::vector<std::string> printable_texts(const char* const* texts, std::uint64_t count) {
+  std::vector<std::string> all;
+  for (std::uint64_t i = 0; i < count; ++i) all.push_back(printable(texts[i]));
+  return all;
+}
+
 std::vector<Property> read_properties(const gravitas_property* plain, std::uint64_t count) {
   std::vector<Property> properties;
   for (std::uint64_t i = 0; i < count; ++i) {
     const gravitas_property& p = plain[i];
     Property property;
-    property.name = p.name;
+    property.name = printable(p.name);
     property.kind = static_cast<PropertyKind>(p.kind);
-    property.unit = p.unit;
-    property.frame = p.frame;
-    property.meaning = p.meaning;
+    property.unit = printable(p.unit);
+    property.frame = printable(p.frame);
+    property.meaning = printable(p.meaning);
     property.minimum = p.minimum;
     property.maximum = p.maximum;
     property.exclusive_minimum = p.exclusive_minimum != 0;
@@ -69,7 +76,7 @@ std::vector<Property> read_properties(const gravitas_property* plain, std::uint6
     property.is_live = p.live != 0;
     property.columns = p.columns;
     property.default_numbers.assign(p.default_numbers, p.default_numbers + p.default_count);
-    property.choices.assign(p.choices, p.choices + p.choice_count);
+    property.choices = printable_texts(p.choices, p.choice_count);
     properties.push_back(std::move(property));
   }
   return properties;
@@ -121,7 +128,7 @@ PluginLibrary checked(void* handle, const std::string& path, std::string* proble
     void* instance = nullptr;
     gravitas_error error{};
     if (table->create(nullptr, 0, &instance, &error) != GRAVITAS_OK) {
-      *problem = "'" + path + "' does not say what it is: its declaration failed: " + error.text;
+      *problem = "'" + path + "' does not say what it is: its declaration failed: " + error_text(error);
       return {};
     }
   }
@@ -140,9 +147,7 @@ PluginLibrary checked(void* handle, const std::string& path, std::string* proble
 // is back after this.
 PluginLibrary checked(void* handle, std::uint32_t control, const std::string& path, std::string* problem) {
   PluginLibrary library = checked(handle, path, problem);
-  if (floating_point_control() == control) return library;
-  set_floating_point_control(control);
-  if (library.table == nullptr) return library;
+  if (!restore_floating_point_control(control) || library.table == nullptr) return library;
   *problem = "'" + path +
              "' changes the floating-point environment of the process that loads it: it was probably linked with "
              "-ffast-math or -Ofast; link it without";
@@ -153,17 +158,19 @@ PluginLibrary checked(void* handle, std::uint32_t control, const std::string& pa
 
 PluginDeclaration read_declaration(const gravitas_description& plain) {
   PluginDeclaration declaration;
-  declaration.name = plain.name;
-  declaration.version = plain.version;
-  declaration.meaning = plain.meaning;
+  declaration.name = printable(plain.name);
+  declaration.version = printable(plain.version);
+  declaration.meaning = printable(plain.meaning);
   declaration.slot = static_cast<Slot>(plain.slot);
-  declaration.capabilities.assign(plain.capabilities, plain.capabilities + plain.capability_count);
+  declaration.capabilities = printable_texts(plain.capabilities, plain.capability_count);
   for (std::uint64_t i = 0; i < plain.type_count; ++i) {
     const gravitas_type& type = plain.types[i];
-    declaration.types.push_back({type.name, type.meaning, read_properties(type.properties, type.property_count)});
+    declaration.types.push_back(
+        {printable(type.name), printable(type.meaning), read_properties(type.properties, type.property_count)});
     for (std::uint64_t k = 0; k < type.coordinate_count; ++k) {
       const gravitas_coordinate& coordinate = type.coordinates[k];
-      declaration.types.back().coordinates.push_back({coordinate.name, coordinate.unit, coordinate.meaning});
+      declaration.types.back().coordinates.push_back(
+          {printable(coordinate.name), printable(coordinate.unit), printable(coordinate.meaning)});
     }
   }
   declaration.properties = read_properties(plain.properties, plain.property_count);
@@ -197,6 +204,27 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
   PluginLibrary library = checked(handle, control, path, problem);
   if (library.table != nullptr) loaded.emplace(content, library);
   return library;
+}
+
+std::string error_text(const gravitas_error& error) {
+  return printable({error.text, strnlen(error.text, sizeof error.text)});
+}
+
+std::string create_instance(const PluginLibrary& library, std::span<const double> settings, void** instance) {
+  const std::uint32_t control = floating_point_control();
+  gravitas_error error{};
+  const std::int32_t status = library.table->create(settings.data(), settings.size(), instance, &error);
+  const bool is_changed = restore_floating_point_control(control);
+  if (status != GRAVITAS_OK) return error.text[0] == '\0' ? "it failed without a reason" : error_text(error);
+  if (!is_changed) return {};
+  destroy_instance(library, *instance);
+  return "its constructor changed the floating-point environment";
+}
+
+void destroy_instance(const PluginLibrary& library, void* instance) {
+  const std::uint32_t control = floating_point_control();
+  library.table->destroy(instance);
+  restore_floating_point_control(control);
 }
 
 PluginLibrary look_into_plugin_library(const std::string& path, std::string* problem) {

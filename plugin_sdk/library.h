@@ -1,6 +1,7 @@
 // Loading a plugin library.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "plugin_sdk/plugin.h"
@@ -26,7 +27,17 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
 // any of the files may be replaced.
 PluginLibrary look_into_plugin_library(const std::string& path, std::string* problem);
 
-// The plain declaration of a table as C++ values.
+// Makes an instance of the library's plugin, with the numbers of its settings. Empty, or why there is none: it refused or
+// failed, or its constructor changed the floating-point environment (which is restored), on which all later calls in this
+// thread would depend.
+std::string create_instance(const PluginLibrary& library, std::span<const double> settings, void** instance);
+// Leaves the floating-point environment as it is, whatever the destructor does.
+void destroy_instance(const PluginLibrary& library, void* instance);
+
+// What a plugin says went wrong. It may have written any bytes: a message takes UTF-8 only.
+std::string error_text(const gravitas_error& error);
+
+// The plain declaration of a table as C++ values, its texts printable.
 PluginDeclaration read_declaration(const gravitas_description& description);
 
 }  // namespace gravitas

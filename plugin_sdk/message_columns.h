@@ -23,7 +23,7 @@ class MessageColumns {
   MessageColumns() = default;
   explicit MessageColumns(std::span<const stage::ColumnInfo> infos);
 
-  // A column by its name; std::logic_error if there is none of that name and type.
+  // A column by its name; std::logic_error if there is none of that name, std::bad_variant_access if it is of another type.
   std::vector<double>& f64(std::string_view name);
   std::vector<std::uint32_t>& u32(std::string_view name);
   std::vector<std::uint64_t>& u64(std::string_view name);
@@ -31,7 +31,7 @@ class MessageColumns {
   const std::vector<std::uint32_t>& u32(std::string_view name) const;
   const std::vector<std::uint64_t>& u64(std::string_view name) const;
 
-  // For reading; valid until a column changes.
+  // For reading; valid until a column changes. Not aligned as a host aligns columns (column_vector.h).
   std::vector<gravitas_column> plain() const;
   // For filling, with the present sizes as room.
   std::vector<gravitas_reply_column> rooms();

@@ -224,8 +224,14 @@ void demand_settings(const PluginDeclaration& declaration, const double* setting
 }
 
 void set_error(gravitas_error* error, const char* text) {
-  std::strncpy(error->text, text, sizeof error->text - 1);
-  error->text[sizeof error->text - 1] = '\0';
+  std::size_t size = strnlen(text, sizeof error->text);
+  if (size == sizeof error->text) {
+    // cut before a whole character: bytes 10xxxxxx continue one
+    --size;
+    while (size > 0 && (static_cast<unsigned char>(text[size]) & 0xC0U) == 0x80U) --size;
+  }
+  std::memcpy(error->text, text, size);
+  error->text[size] = '\0';
 }
 
 bool needs_capacity(stage::Method method, const gravitas_reply_column* reply) {

@@ -21,6 +21,7 @@ bool takes(const Property& p, double number) {
   if (p.kind == PropertyKind::kFlag) return number == 0.0 || number == 1.0;
   if (p.kind == PropertyKind::kChoice && (number < 0.0 || number >= static_cast<double>(p.choices.size())))
     return false;
+  if (p.kind == PropertyKind::kBody && !(number >= 0.0 && number < GRAVITAS_NONE)) return false;
   const bool is_whole =
       p.kind == PropertyKind::kInteger || p.kind == PropertyKind::kChoice || p.kind == PropertyKind::kBody;
   return !is_whole || number == std::floor(number);
@@ -346,7 +347,8 @@ std::string check_flattened(const std::vector<Property>& declared, std::span<con
     }
     const std::span<const double> values = numbers.subspan(first, size - first);
     numbers = numbers.subspan(size);
-    const bool may_be_absent = !p.is_required && p.default_numbers.empty();
+    // a table that is absent has no rows
+    const bool may_be_absent = p.kind != PropertyKind::kTable && !p.is_required && p.default_numbers.empty();
     if (may_be_absent && std::ranges::all_of(values, [](double number) { return std::isnan(number); })) continue;
     for (const double number : values)
       if (!takes(p, number)) return p.name + " = " + number_text(number) + "; allowed: " + allowed_values(p);

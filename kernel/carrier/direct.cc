@@ -44,17 +44,17 @@ DirectCarrier::DirectCarrier(const std::vector<PluginChoice>& plugins, std::uint
     std::string problem;
     PluginLibrary library = load_plugin_library(plugin.library, &problem);
     if (library.table == nullptr) throw StageFault(FaultKind::kHandshake, "handshake", problem);
-    gravitas_error error{};
     void* instance = nullptr;
-    if (library.table->create(plugin.settings.data(), plugin.settings.size(), &instance, &error) != GRAVITAS_OK)
-      throw StageFault(FaultKind::kHandshake, "handshake", plugin.declaration.name + ": " + error.text);
+    problem = create_instance(library, plugin.settings, &instance);
+    if (!problem.empty())
+      throw StageFault(FaultKind::kHandshake, "handshake", plugin.declaration.name + ": " + problem);
     instances_.push_back(instance);
     libraries_.push_back(std::move(library));
   }
 }
 
 DirectCarrier::~DirectCarrier() {
-  for (std::size_t i = 0; i < instances_.size(); ++i) libraries_[i].table->destroy(instances_[i]);
+  for (std::size_t i = 0; i < instances_.size(); ++i) destroy_instance(libraries_[i], instances_[i]);
 }
 
 CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSource* derivatives) {
@@ -90,13 +90,12 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
                 std::min(reply[i].count, reply[i].capacity) * stage::element_size(call.info().reply[i].type));
   arena->let_go();
   if (open.nested_fault) std::rethrow_exception(open.nested_fault);
-  if (floating_point_control() != control) {
-    set_floating_point_control(control);
+  if (restore_floating_point_control(control)) {
     result.status = GRAVITAS_FAILED;
     result.text = "the plugin changed the floating-point environment";
     return result;
   }
-  if (result.status != GRAVITAS_OK) result.text = error.text;
+  if (result.status != GRAVITAS_OK) result.text = error_text(error);
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     const bool fits = reply[i].count <= reply[i].capacity;
     if (!fits && result.status == GRAVITAS_OK)

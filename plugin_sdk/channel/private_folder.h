@@ -1,6 +1,7 @@
 // A folder that only this user can enter, for sockets; gone, with what is in it, at the end of the object.
 #pragma once
 
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -10,7 +11,12 @@ namespace gravitas::channel {
 
 class PrivateFolder {
  public:
-  PrivateFolder() : path_((std::filesystem::temp_directory_path() / "gravitas-XXXXXX").string()) {
+  PrivateFolder() {
+    std::error_code error;
+    const std::filesystem::path place = std::filesystem::temp_directory_path(error);
+    errno = error.value();
+    if (error) return;
+    path_ = (place / "gravitas-XXXXXX").string();
     if (mkdtemp(path_.data()) == nullptr) path_.clear();
   }
   ~PrivateFolder() {

@@ -1,10 +1,14 @@
 #include "plugin_sdk/conformance/library_subject.h"
 
+#include <algorithm>
+#include <cstring>
 #include <stdexcept>
 
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/column_vector.h"
 #include "plugin_sdk/conformance/inquiry.h"
 #include "plugin_sdk/conformance/sample_values.h"
+#include "plugin_sdk/floating_point.h"
 
 namespace gravitas::conformance {
 namespace {
@@ -63,34 +67,53 @@ LibrarySubject::LibrarySubject(const std::string& path, const std::optional<std:
   library_ = load_plugin_library(path, &problem);
   if (library_.table == nullptr) throw std::runtime_error(problem);
   const std::vector<double> numbers = settings ? *settings : default_settings(library_.declaration);
-  gravitas_error error{};
-  if (library_.table->create(numbers.data(), numbers.size(), &instance_, &error) != GRAVITAS_OK)
-    throw std::runtime_error(path + " refuses its settings: " + error.text);
+  problem = create_instance(library_, numbers, &instance_);
+  if (!problem.empty()) throw std::runtime_error(path + " cannot be made: " + problem);
 }
 
-LibrarySubject::~LibrarySubject() { library_.table->destroy(instance_); }
+LibrarySubject::~LibrarySubject() { destroy_instance(library_, instance_); }
 
 Answer LibrarySubject::ask(stage::Method method, const MessageColumns& request, const DerivativeFunction& derivative) {
   Call call{&threads_, &derivative};
   const gravitas_host host = host_of(&call);
-  const std::vector<gravitas_column> columns = request.plain();
+  const stage::MethodInfo& info = stage::method_info(method);
+  std::vector<gravitas_column> columns = request.plain();
+  std::vector<ColumnVector<std::byte>> asked, filled(info.reply.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const std::byte* bytes = static_cast<const std::byte*>(columns[i].data);
+    asked.emplace_back(bytes, bytes + columns[i].count * stage::element_size(info.request[i].type));
+    columns[i].data = asked.back().data();
+  }
+  std::vector<gravitas_reply_column> rooms = known_room(method, request.counts());
   Answer answer{.status = GRAVITAS_OK, .text = {}, .fault = {}, .columns = empty_reply(method)};
-  answer.columns.resize(known_room(method, request.counts()));
   for (int round = 0; round < kMostRounds; ++round) {
-    std::vector<gravitas_reply_column> rooms = answer.columns.rooms();
+    for (std::size_t i = 0; i < rooms.size(); ++i) {
+      filled[i].assign(rooms[i].count * stage::element_size(info.reply[i].type), std::byte{0});
+      rooms[i] = {filled[i].data(), rooms[i].count, 0};
+    }
+    const std::uint32_t control = floating_point_control();
     gravitas_error error{};
     answer.status = library_.table->call(instance_, static_cast<std::uint32_t>(method), columns.data(), rooms.data(),
                                          &host, &error);
-    answer.text = error.text;
+    answer.text = error_text(error);
+    if (restore_floating_point_control(control)) {
+      answer.fault = "it changed the floating-point environment";
+      return answer;
+    }
     if (answer.status != GRAVITAS_OK && answer.status != GRAVITAS_NEEDS_CAPACITY) return answer;
     for (const gravitas_reply_column& room : rooms) {
       if (room.count <= kMostColumnElements) continue;
       answer.fault = "it wants room for " + std::to_string(room.count) + " elements";
       return answer;
     }
-    answer.columns.resize(rooms);
     if (answer.status != GRAVITAS_OK) continue;
-    const std::string problem = check_rows(stage::method_info(method), request.counts(), answer.columns.counts());
+    answer.columns.resize(rooms);
+    const std::vector<gravitas_reply_column> came = answer.columns.rooms();
+    for (std::size_t i = 0; i < came.size(); ++i) {
+      const std::uint64_t elements = std::min(rooms[i].count, rooms[i].capacity);
+      if (elements > 0) std::memcpy(came[i].data, filled[i].data(), elements * stage::element_size(info.reply[i].type));
+    }
+    const std::string problem = check_rows(info, request.counts(), answer.columns.counts());
     if (!problem.empty()) answer.fault = "its answer is wrong: " + problem;
     return answer;
   }

@@ -18,7 +18,7 @@ namespace gravitas::conformance {
 
 class LibrarySubject final : public Subject {
  public:
-  // Throws std::runtime_error if the library cannot be loaded, or refuses its settings. Settings are the flattened
+  // Throws std::runtime_error if the library cannot be loaded, or no instance made of it. Settings are the flattened
   // properties of the plugin itself; without them those of a scene that says nothing.
   explicit LibrarySubject(const std::string& path, const std::optional<std::vector<double>>& settings = {},
                           std::uint32_t threads = 1);

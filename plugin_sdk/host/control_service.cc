@@ -10,6 +10,7 @@
 #include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/host/handshake_lie.h"
+#include "plugin_sdk/printable.h"
 
 namespace gravitas::host {
 
@@ -108,7 +109,7 @@ grpc::Status ControlService::serve_kernel(grpc::ServerReaderWriter<WorkerMessage
   if (!admission.text.empty()) {
     WorkerMessage answer;
     answer.mutable_refusal()->set_reason(admission.reason);
-    answer.mutable_refusal()->set_text(admission.text);
+    answer.mutable_refusal()->set_text(printable(admission.text));
     stream->Write(answer);
     // the process may end with the session: not before the kernel, which cancels then, has read why
     while (stream->Read(&message)) {

@@ -14,6 +14,7 @@
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/host/description_message.h"
 #include "plugin_sdk/library.h"
+#include "plugin_sdk/printable.h"
 
 namespace gravitas::host {
 namespace {
@@ -57,10 +58,10 @@ bool read_all(int descriptor, void* data, std::size_t size, std::uint64_t until)
   dup2(STDERR_FILENO, STDOUT_FILENO);
   for (std::size_t i = first; i < libraries.size(); ++i) {
     Entry entry;
-    entry.set_library(libraries[i]);
+    entry.set_library(printable(libraries[i]));
     std::string problem;
     const PluginLibrary library = look_into_plugin_library(libraries[i], &problem);
-    entry.set_problem(problem);
+    entry.set_problem(printable(problem));
     if (library.table != nullptr) *entry.mutable_description() = to_message(library.declaration);
     const std::string bytes = entry.SerializeAsString();
     const auto size = static_cast<std::uint32_t>(bytes.size());
@@ -74,19 +75,29 @@ std::string how_it_ended(int status) {
   return "ended with exit code " + std::to_string(WEXITSTATUS(status));
 }
 
+void add_problem(plugin::v1::Catalog* catalog, const std::string& library, const std::string& what) {
+  Entry* failed = catalog->add_entries();
+  failed->set_library(printable(library));
+  failed->set_problem(printable("'" + library + "' " + what));
+}
+
 }  // namespace
 
 plugin::v1::Catalog describe_libraries(const std::vector<std::string>& libraries, double seconds) {
   plugin::v1::Catalog catalog;
   std::size_t next = 0;
   while (next < libraries.size()) {
-    int pipe_ends[2];
-    if (pipe(pipe_ends) != 0) break;
-    const pid_t child = fork();
+    int pipe_ends[2] = {-1, -1};
+    const pid_t child = pipe(pipe_ends) == 0 ? fork() : -1;
+    if (child < 0) {
+      add_problem(&catalog, libraries[next++], std::string("was not looked into: ") + std::strerror(errno));
+      for (const int end : pipe_ends) close(end);
+      continue;
+    }
     if (child == 0) describe_in_child(libraries, next, pipe_ends[1]);
     close(pipe_ends[1]);
     bool in_time = true;
-    while (child > 0 && next < libraries.size()) {
+    while (next < libraries.size()) {
       const std::uint64_t until = channel::now_ns() + static_cast<std::uint64_t>(seconds * 1e9);
       std::uint32_t size = 0;
       std::string bytes;
@@ -104,17 +115,12 @@ plugin::v1::Catalog describe_libraries(const std::vector<std::string>& libraries
       ++next;
     }
     close(pipe_ends[0]);
-    if (child > 0) kill(child, SIGKILL);
+    kill(child, SIGKILL);
     int status = 0;
-    if (child > 0) waitpid(child, &status, 0);
-    if (next < libraries.size()) {
-      Entry* failed = catalog.add_entries();
-      failed->set_library(libraries[next]);
-      failed->set_problem("'" + libraries[next] + "' " +
-                          (in_time ? how_it_ended(status) : std::string("was not ready in time")) +
-                          " while it was loaded");
-      ++next;
-    }
+    waitpid(child, &status, 0);
+    if (next < libraries.size())
+      add_problem(&catalog, libraries[next++],
+                  (in_time ? how_it_ended(status) : "was not ready in time") + " while it was loaded");
   }
   return catalog;
 }

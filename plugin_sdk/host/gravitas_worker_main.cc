@@ -139,6 +139,8 @@ class Handshake {
   const control::v1::Hello* wait() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return hello_ != nullptr || stopping.load(); });
+    // the end of a kernel before that was refused without a greeting here
+    if (hello_ != nullptr) stopping = false;
     return hello_;
   }
   void answer(host::Admission admission) {

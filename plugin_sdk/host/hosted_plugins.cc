@@ -21,16 +21,15 @@ std::string uneven_rows(stage::Method method, const gravitas_column* request) {
 }  // namespace
 
 HostedPlugins::~HostedPlugins() {
-  for (std::size_t i = 0; i < instances_.size(); ++i) libraries_[i].table->destroy(instances_[i]);
+  for (std::size_t i = 0; i < instances_.size(); ++i) destroy_instance(libraries_[i], instances_[i]);
 }
 
 std::string HostedPlugins::create(const std::vector<std::vector<double>>& settings, std::uint32_t threads) {
   threads_ = std::make_unique<ThreadPool>(threads);
   for (std::size_t i = 0; i < libraries_.size(); ++i) {
-    gravitas_error error{};
     void* instance = nullptr;
-    if (libraries_[i].table->create(settings[i].data(), settings[i].size(), &instance, &error) != GRAVITAS_OK)
-      return libraries_[i].declaration.name + ": " + error.text;
+    const std::string problem = create_instance(libraries_[i], settings[i], &instance);
+    if (!problem.empty()) return libraries_[i].declaration.name + ": " + problem;
     instances_.push_back(instance);
   }
   return {};
@@ -70,13 +69,11 @@ CallEnd HostedPlugins::call(std::uint32_t target, stage::Method method, const gr
     end.compute_ns = channel::now_ns() - start;
     end.text = fault->note();
   }
-  if (floating_point_control() != control) {
-    set_floating_point_control(control);
+  if (restore_floating_point_control(control)) {
     end.status = GRAVITAS_FAILED;
     end.text = "the plugin changed the floating-point environment";
   } else if (end.status != GRAVITAS_OK) {
-    error.text[sizeof error.text - 1] = '\0';
-    end.text = error.text;
+    end.text = error_text(error);
   }
   return end;
 }

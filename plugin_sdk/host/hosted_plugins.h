@@ -35,7 +35,7 @@ class HostedPlugins {
   HostedPlugins(const HostedPlugins&) = delete;
   HostedPlugins& operator=(const HostedPlugins&) = delete;
 
-  // Creates the instances; `settings` has the numbers of each. Empty, or why a plugin refused.
+  // Creates the instances; `settings` has the numbers of each. Empty, or why there is none of a plugin.
   std::string create(const std::vector<std::vector<double>>& settings, std::uint32_t threads);
 
   std::size_t count() const { return instances_.size(); }

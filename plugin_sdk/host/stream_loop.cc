@@ -1,7 +1,5 @@
 #include "plugin_sdk/host/stream_loop.h"
 
-#include <xxhash.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/checks.h"
 #include "plugin_sdk/host/fault_injection.h"
 #include "schemas/wire/byte_buffer.h"
 
@@ -53,17 +52,12 @@ struct StreamLoop::Stream {
   std::array<gravitas_reply_column, GRAVITAS_MAX_COLUMNS> reply{};
 };
 
-std::byte* StreamLoop::Room::data() {
-  const std::uintptr_t beyond = reinterpret_cast<std::uintptr_t>(bytes.data()) % GRAVITAS_COLUMN_ALIGNMENT;
-  return bytes.data() + (beyond == 0 ? 0 : GRAVITAS_COLUMN_ALIGNMENT - beyond);
-}
-
 void* StreamLoop::Room::reserve(std::uint64_t elements) {
   if (elements > capacity || bytes.empty()) {
-    capacity = std::max(elements, 2 * capacity);
-    bytes.resize(capacity * 8 + GRAVITAS_COLUMN_ALIGNMENT);
+    capacity = std::max({elements, 2 * capacity, std::uint64_t{1}});
+    bytes.resize(capacity * 8);
   }
-  return data();
+  return bytes.data();
 }
 
 // What the plugin reaches of the stream while its call is open.
@@ -239,22 +233,6 @@ void StreamLoop::handle_arrived(const Stream* asking) {
   }
 }
 
-std::string StreamLoop::take_asset(std::span<const std::byte> bytes) {
-  stage::v1::AssetChunk chunk;
-  if (!chunk.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return "an asset that cannot be read";
-  std::vector<std::byte>& asset = assets_[chunk.hash()];
-  if (chunk.size() > wire::kMostElements * 8 || chunk.offset() != asset.size() ||
-      chunk.data().size() > chunk.size() - asset.size())
-    return "a part of an asset that does not follow the part before it";
-  const auto data = std::as_bytes(std::span(chunk.data()));
-  asset.insert(asset.end(), data.begin(), data.end());
-  if (asset.size() == chunk.size() && XXH3_64bits(asset.data(), asset.size()) != chunk.hash()) {
-    assets_.erase(chunk.hash());
-    return "an asset whose content does not fit its hash";
-  }
-  return {};
-}
-
 // Copies the columns out of the message; empty, or what is wrong with it.
 std::string StreamLoop::read_request(Stream* stream, const wire::ColumnsReader& reader, Call* call) {
   if (!reader.header().has ||
@@ -266,7 +244,7 @@ std::string StreamLoop::read_request(Stream* stream, const wire::ColumnsReader& 
   for (std::size_t i = 0; i < method.request.size(); ++i) {
     if (std::ranges::find(call->kept(), i + 1) != call->kept().end()) {
       Room& room = stream->request_rooms[i];
-      if (room.bytes.empty() || stream->columns[i].data != room.data() || call->digest() == 0)
+      if (room.bytes.empty() || stream->columns[i].data != room.bytes.data() || call->digest() == 0)
         return "a column kept that was not sent before";
       continue;
     }
@@ -275,11 +253,11 @@ std::string StreamLoop::read_request(Stream* stream, const wire::ColumnsReader& 
     stream->columns[i] = {room, reader.count(i)};
   }
   for (const stage::v1::AssetUse& use : call->assets()) {
-    const auto asset = assets_.find(use.hash());
-    if (use.column() == 0 || use.column() > method.request.size() || asset == assets_.end())
+    const ColumnVector<std::byte>* asset = assets_.find(use.hash());
+    if (use.column() == 0 || use.column() > method.request.size() || asset == nullptr)
       return "a column whose asset was not sent";
     const ColumnInfo& info = method.request[use.column() - 1];
-    stream->columns[use.column() - 1] = {asset->second.data(), asset->second.size() / stage::element_size(info.type)};
+    stream->columns[use.column() - 1] = {asset->data(), asset->size() / stage::element_size(info.type)};
   }
   if (call->digest() != 0 &&
       call->digest() != wire::columns_digest(method.request, std::span(stream->columns).first(method.request.size())))
@@ -293,7 +271,7 @@ void StreamLoop::handle(Stream* stream) {
   Call call;
   std::string problem = reader.parse(message.bytes());
   if (problem.empty() && reader.asset().has) {
-    problem = take_asset(reader.asset().bytes);
+    problem = assets_.take(reader.asset().bytes);
     if (problem.empty()) {
       read(stream);
       return;
@@ -320,8 +298,8 @@ void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault)
   if (taken_ != nullptr) taken_->fetch_add(1, std::memory_order_relaxed);
   if (call.attempt() > 0) services.say_taken();
   if (fault != nullptr) fault->pass(Moment::kRead);
-  CallEnd end;
-  do {
+  CallEnd end{GRAVITAS_NEEDS_CAPACITY, "", 0};
+  for (int round = 0; round < kCapacityRounds && end.status == GRAVITAS_NEEDS_CAPACITY; ++round) {
     for (std::size_t i = 0; i < method.reply.size(); ++i) {
       Room& room = stream->reply_rooms[i];
       void* data = room.reserve(std::max(stream->reply[i].count, kFirstRoom));
@@ -335,7 +313,8 @@ void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault)
                  method.reply[i].name;
       stream->reply[i].count = 0;
     }
-  } while (end.status == GRAVITAS_NEEDS_CAPACITY);
+  }
+  if (end.status == GRAVITAS_NEEDS_CAPACITY) end = {GRAVITAS_FAILED, "it asks for more room again and again", 0};
 
   if (end.status != GRAVITAS_OK) {
     for (gravitas_reply_column& column : stream->reply) column.count = 0;

@@ -12,13 +12,14 @@
 
 #include <atomic>
 #include <deque>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
 #include "gravitas/stage/v1/call.pb.h"
+#include "plugin_sdk/column_vector.h"
+#include "plugin_sdk/host/asset_store.h"
 #include "plugin_sdk/host/hosted_plugins.h"
 #include "schemas/wire/columns.h"
 
@@ -39,11 +40,10 @@ class StreamLoop {
   struct Stream;
   struct Operation;
   struct OpenCall;
-  // The elements of a message's columns, aligned, kept from call to call.
+  // The elements of a message's columns, kept from call to call.
   struct Room {
-    std::vector<std::byte> bytes;
+    ColumnVector<std::byte> bytes;
     std::uint64_t capacity = 0;
-    std::byte* data();
     void* reserve(std::uint64_t elements);
   };
 
@@ -54,7 +54,6 @@ class StreamLoop {
   // The messages that have come, but for those on the stream that waits for a derivative's answer.
   void handle_arrived(const Stream* asking);
   void handle(Stream* stream);
-  std::string take_asset(std::span<const std::byte> bytes);
   std::string read_request(Stream* stream, const wire::ColumnsReader& reader, stage::v1::Call* call);
   void answer(Stream* stream, const stage::v1::Call& call, FaultInjection* fault);
   void write_outcome(Stream* stream, const stage::v1::Call& call, std::int32_t status, const std::string& text);
@@ -67,7 +66,7 @@ class StreamLoop {
   std::vector<std::unique_ptr<Stream>> streams_;
   Stream* accepting_ = nullptr;
   std::deque<Stream*> readable_;
-  std::map<std::uint64_t, std::vector<std::byte>> assets_;  // by hash
+  AssetStore assets_;
   std::uint64_t epoch_ = 0;
   std::atomic<std::uint64_t>* calls_ = nullptr;
   std::atomic<std::uint64_t>* taken_ = nullptr;

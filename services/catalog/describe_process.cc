@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "plugin_sdk/channel/process_output.h"
+#include "plugin_sdk/printable.h"
 
 extern char** environ;
 
@@ -122,7 +123,7 @@ std::string last_line(const std::string& messages) {
   if (end == std::string::npos) return "";
   const std::size_t before = messages.find_last_of('\n', end);
   const std::size_t begin = before == std::string::npos ? 0 : before + 1;
-  return ": " + messages.substr(begin, std::min(end + 1 - begin, kShownCharacters));
+  return ": " + printable(messages.substr(begin, std::min(end + 1 - begin, kShownCharacters)));
 }
 
 // `what` stands for the program in messages. `was_killed`: by a signal. Libraries are each looked at in a process of their own,

@@ -83,6 +83,9 @@ std::vector<double> forbidden_values(const Property& p) {
   if (p.kind == PropertyKind::kInteger) values.push_back(std::max(p.minimum, 0.0) + 0.5);
   if (p.kind == PropertyKind::kFlag) values.push_back(2.0);
   if (p.kind == PropertyKind::kChoice) values.push_back(static_cast<double>(p.choices.size()));
+  if (p.kind == PropertyKind::kBody) values.push_back(-1.0);
+  // beside three numbers of any size: not unit
+  if (p.kind == PropertyKind::kQuaternion) values.push_back(2.0);
   return values;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "plugin_sdk/conformance/free_bodies.h"
+#include "plugin_sdk/floating_point.h"
 #include "tests/paths.h"
 
 namespace gravitas::conformance {
@@ -72,6 +73,13 @@ TEST(LibrarySubject, AnAnswerOfTheWrongLengthIsAFault) {
 
 TEST(LibrarySubject, AnAppetiteWithoutEndIsAFault) {
   EXPECT_THAT(third_answer("integrator_wants_room").fault, HasSubstr("room"));
+}
+
+TEST(LibrarySubject, WhatChangesTheFloatingPointEnvironmentIsAFault) {
+  const std::uint32_t control = floating_point_control();
+  EXPECT_EQ(third_answer("integrator_flush_to_zero").fault, "it changed the floating-point environment");
+  EXPECT_THROW(LibrarySubject(faulty("flushes_to_zero_when_made")), std::runtime_error);
+  EXPECT_EQ(floating_point_control(), control);
 }
 
 TEST(LibrarySubject, AFailureIsAStatus) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/floating_point.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/paths.h"
 
@@ -109,6 +110,7 @@ const Expected kFatal[] = {
 // Answers wrongly, which is noticed on any hosting.
 const Expected kWrong[] = {
     {"integrator_throws", FaultKind::kFailure, "status", "out of ideas"},
+    {"integrator_speaks_latin_1", FaultKind::kFailure, "status", "zu k?hl: ????"},
     {"integrator_flush_to_zero", FaultKind::kFailure, "status", "floating-point"},
     {"integrator_nan", FaultKind::kBadNumbers, "numbers", "position of row 1 is not finite"},
     {"integrator_not_unit", FaultKind::kBadNumbers, "numbers", "orientation of row 0"},
@@ -121,8 +123,12 @@ const Expected kWrong[] = {
 const Expected kOverfull[] = {{"integrator_overfull", FaultKind::kBadFrame, "wire", "longer than its room"}};
 
 // Where messages have the room they need the worker notices it, elsewhere the kernel.
-const Expected kGreedy[] = {{"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"}};
-const Expected kGreedyInMessages[] = {{"integrator_wants_room", FaultKind::kFailure, "status", "room for"}};
+const Expected kGreedy[] = {
+    {"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"},
+    {"integrator_wants_more_room", FaultKind::kBadStructure, "structure", "more room again and again"}};
+const Expected kGreedyInMessages[] = {
+    {"integrator_wants_room", FaultKind::kFailure, "status", "room for"},
+    {"integrator_wants_more_room", FaultKind::kFailure, "status", "more room again and again"}};
 
 std::string name_of(const ::testing::TestParamInfo<Expected>& one) { return one.param.library; }
 
@@ -190,6 +196,23 @@ TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
       EXPECT_EQ(fault.slot, Slot::kSolver);
       EXPECT_NE(fault.text().find("README.md"), std::string::npos) << fault.text();
     }
+  }
+}
+
+TEST(FailingPlugins, OneWhoseConstructorChangesFloatingPointArithmeticIsNamedAtTheStart) {
+  const std::uint32_t control = floating_point_control();
+  for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc}) {
+    WorldBuilder builder = ball_on_ground(hosting);
+    builder.plugin(Slot::kIntegrator, faulty_plugin_path("flushes_to_zero_when_made"));
+    try {
+      Environment world(builder.description());
+      ADD_FAILURE() << "it started";
+    } catch (const kernel::StageFault& fault) {
+      EXPECT_EQ(fault.kind, FaultKind::kHandshake);
+      EXPECT_EQ(fault.slot, Slot::kIntegrator);
+      EXPECT_THAT(fault.text(), ::testing::HasSubstr("Faulty: its constructor changed the floating-point environment"));
+    }
+    EXPECT_EQ(floating_point_control(), control);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -110,6 +111,11 @@ TEST(CheckDeclaration, DemandsCoordinatesThatTheCapabilityTellsOf) {
 TEST(CheckDeclaration, DemandsBoundsChoicesAndDefaultsThatFitTogether) {
   EXPECT_EQ(problem_with(Property::number("R", "N").at_least(5).at_most(1).required().means("R.")),
             "Magnet.R has bounds between which there is no number");
+  EXPECT_EQ(problem_with(Property::number("R", "N").above(1).at_most(1).required().means("R.")),
+            "Magnet.R has bounds between which there is no number");
+  EXPECT_EQ(problem_with(Property::number("R", "N").at_least(HUGE_VAL).required().means("R.")),
+            "Magnet.R has bounds between which there is no number");
+  EXPECT_EQ(problem_with(Property::number("R", "N").at_least(1).at_most(1).required().means("R.")), "");
   EXPECT_EQ(problem_with(Property::number("R", "N").required().defaults_to({1}).means("R.")),
             "Magnet.R is required and has a default");
   EXPECT_THAT(problem_with(Property::number("R", "N").at_least(0).defaults_to({-5}).means("R.")),

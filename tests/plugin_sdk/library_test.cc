@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -173,6 +174,62 @@ TEST(PluginLibrary, LoadsEqualContentOnceAndKeepsNoMoreForTheSecondTime) {
   const auto before = open_files();
   for (int i = 0; i < 100; ++i) ASSERT_EQ(load_plugin_library(kHello, &problem).table, first.table);
   EXPECT_EQ(open_files(), before);
+}
+
+constexpr std::uint32_t kFlushing = 0x8040;
+int instances = 0;
+
+// A library whose functions are these.
+PluginLibrary library_of(decltype(gravitas_plugin_table::create) create,
+                         decltype(gravitas_plugin_table::destroy) destroy) {
+  static gravitas_plugin_table table;
+  table.create = create;
+  table.destroy = destroy;
+  PluginLibrary library;
+  library.table = &table;
+  return library;
+}
+
+std::int32_t make_flushing(const double*, std::uint64_t, void** instance, gravitas_error*) {
+  set_floating_point_control(floating_point_control() | kFlushing);
+  *instance = &++instances;
+  return GRAVITAS_OK;
+}
+std::int32_t refuse_flushing(const double*, std::uint64_t, void**, gravitas_error* error) {
+  set_floating_point_control(floating_point_control() | kFlushing);
+  std::memset(error->text, 0xff, sizeof error->text);
+  return GRAVITAS_REFUSED;
+}
+void end_flushing(void*) {
+  set_floating_point_control(floating_point_control() | kFlushing);
+  --instances;
+}
+
+TEST(PluginInstance, ThatChangesTheFloatingPointEnvironmentIsNotMade) {
+  const std::uint32_t control = floating_point_control();
+  void* instance = nullptr;
+  EXPECT_EQ(create_instance(library_of(make_flushing, end_flushing), {}, &instance),
+            "its constructor changed the floating-point environment");
+  EXPECT_EQ(floating_point_control(), control);
+  EXPECT_EQ(instances, 0);
+}
+
+TEST(PluginInstance, SaysWhyItIsRefusedInWordsThatAMessageTakes) {
+  const std::uint32_t control = floating_point_control();
+  void* instance = nullptr;
+  EXPECT_EQ(create_instance(library_of(refuse_flushing, end_flushing), {}, &instance), std::string(512, '?'));
+  EXPECT_EQ(floating_point_control(), control);
+  gravitas_error error{};
+  std::strcpy(error.text, "zu k\xfchl");
+  EXPECT_EQ(error_text(error), "zu k?hl");
+}
+
+TEST(PluginInstance, LeavesTheFloatingPointEnvironmentWhenItGoes) {
+  const std::uint32_t control = floating_point_control();
+  instances = 1;
+  destroy_instance(library_of(make_flushing, end_flushing), &instances);
+  EXPECT_EQ(instances, 0);
+  EXPECT_EQ(floating_point_control(), control);
 }
 
 }  // namespace

@@ -370,5 +370,17 @@ TEST(PluginSlots, HaveTheNamesOfTheirFolders) {
   EXPECT_STREQ(slot_name(static_cast<Slot>(99)), "unknown");
 }
 
+TEST(SetError, CutsALongTextBeforeAWholeCharacter) {
+  gravitas_error error{};
+  std::string text;
+  for (int i = 0; i < 300; ++i) text += "\xc3\xa4";
+  detail::set_error(&error, text.c_str());
+  EXPECT_EQ(error.text, text.substr(0, 510));
+  detail::set_error(&error, ("x" + text).c_str());
+  EXPECT_EQ(error.text, "x" + text.substr(0, 510));
+  detail::set_error(&error, std::string(511, 'y').c_str());
+  EXPECT_EQ(error.text, std::string(511, 'y'));
+}
+
 }  // namespace
 }  // namespace gravitas

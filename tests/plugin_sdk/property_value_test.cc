@@ -258,5 +258,21 @@ TEST(CheckFlattened, TakesWhatFlattenMakes) {
   EXPECT_EQ(check_flattened(declared, {}), "fewer numbers than the properties take");
 }
 
+// Rows that are there are not absent, whatever is in them.
+TEST(CheckFlattened, TakesNoTableOfNaN) {
+  const std::vector<Property> declared = {Property::table("Points", 2, "m", "world")};
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(check_flattened(declared, {{1.0, kNone, kNone}}), "Points = nan; allowed: a list of rows of 2 numbers");
+  EXPECT_EQ(check_flattened(declared, {{0.0}}), "");
+}
+
+TEST(CheckFlattened, TakesTheRowOfABodyOrNone) {
+  const std::vector<Property> declared = {Property::body("Carrier")};
+  EXPECT_EQ(check_flattened(declared, {{0.0}}), "");
+  EXPECT_EQ(check_flattened(declared, {{std::numeric_limits<double>::quiet_NaN()}}), "");
+  for (const double number : {-1.0, 0.5, 4294967295.0, 1e300})
+    EXPECT_NE(check_flattened(declared, {{number}}), "") << number;
+}
+
 }  // namespace
 }  // namespace gravitas

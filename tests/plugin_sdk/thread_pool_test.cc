@@ -3,17 +3,23 @@
 #include "plugin_sdk/thread_pool.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "plugin_sdk/floating_point.h"
+#include "tests/sanitized.h"
 
 namespace gravitas {
 namespace {
@@ -130,6 +136,72 @@ TEST(ThreadPool, ThrowsThatOfTheFirstChunk) {
       ASSERT_EQ(text, "0") << threads << " threads";
     }
   }
+}
+
+constexpr std::uint32_t kFlushing = 0x8040;
+
+// The control of each thread in a chunk of its own: each waits until all have begun one.
+std::vector<std::uint32_t> controls_of_all(ThreadPool* pool, std::uint32_t threads) {
+  std::vector<std::uint32_t> controls(threads);
+  std::atomic<std::uint32_t> begun{0};
+  run(pool, threads * ThreadPool::kChunk, [&](std::uint64_t begin, std::uint64_t) {
+    controls[begin / ThreadPool::kChunk] = floating_point_control();
+    ++begun;
+    while (begun < threads) std::this_thread::yield();
+  });
+  return controls;
+}
+
+// A plugin that flushes to zero around its first parallel_for must not leave threads behind that flush.
+TEST(ThreadPool, EveryChunkBeginsWithTheCallersFloatingPointControl) {
+  const std::uint32_t control = floating_point_control(), flushing = control | kFlushing;
+  for (std::uint32_t threads = 2; threads <= kMostThreads; ++threads) {
+    ThreadPool pool(threads);
+    set_floating_point_control(flushing);
+    EXPECT_EQ(controls_of_all(&pool, threads), std::vector<std::uint32_t>(threads, flushing));
+    EXPECT_EQ(floating_point_control(), flushing);
+    set_floating_point_control(control);
+    EXPECT_EQ(controls_of_all(&pool, threads), std::vector<std::uint32_t>(threads, control)) << threads << " threads";
+  }
+}
+
+// Hosts look at the caller's.
+TEST(ThreadPool, AControlThatAChunkLeavesChangedIsTheCallersWithAnyNumberOfThreads) {
+  const std::uint32_t control = floating_point_control(), flushing = control | kFlushing;
+  for (std::uint32_t threads = 1; threads <= kMostThreads; ++threads) {
+    ThreadPool pool(threads);
+    for (const std::uint64_t culprit : {0U, 700U, 1999U}) {
+      std::atomic<int> spoiled{0};
+      run(&pool, 2000, [&](std::uint64_t begin, std::uint64_t end) {
+        if (floating_point_control() != control) ++spoiled;
+        if (begin <= culprit && culprit < end) set_floating_point_control(flushing);
+      });
+      EXPECT_EQ(floating_point_control(), flushing) << threads << " threads, item " << culprit;
+      set_floating_point_control(control);
+      EXPECT_EQ(spoiled, 0) << threads << " threads, item " << culprit;
+    }
+    EXPECT_EQ(controls_of_all(&pool, threads), std::vector<std::uint32_t>(threads, control));
+  }
+}
+
+// Address space for a few stacks is left: of a thousand threads most cannot be started.
+TEST(ThreadPool, GoesOnWithTheThreadsThatCouldBeStarted) {
+  if (harness::kSanitized) GTEST_SKIP() << "a sanitizer ends the process for want of memory";
+  std::uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_AS, &before), 0);
+  rlimit few = before;
+  few.rlim_cur = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + (std::uint64_t{64} << 20);
+  ASSERT_EQ(setrlimit(RLIMIT_AS, &few), 0);
+  std::atomic<std::uint64_t> visited{0};
+  {
+    ThreadPool pool(1000);
+    for (int round = 0; round < 3; ++round)
+      run(&pool, 1000, [&](std::uint64_t begin, std::uint64_t end) { visited += end - begin; });
+  }
+  ASSERT_EQ(setrlimit(RLIMIT_AS, &before), 0);
+  EXPECT_EQ(visited, 3000U);
 }
 
 TEST(ThreadPool, ManyRoundsOfWorkAreAllDone) {

@@ -153,6 +153,19 @@ class Declarations(unittest.TestCase):
             with self.assertRaises(Refusal):
                 Values(self.PROPERTIES, numpy.array(numbers))
 
+    def test_turns_are_unit_and_bodies_have_rows(self):
+        properties = [Property.quaternion("Turn", "world"), Property.body("Carrier")]
+        nan = float("nan")
+        values = Values(properties, numpy.array([0.6, 0, 0.8, 0, 7]))
+        self.assertEqual((values.Turn.tolist(), values.Carrier), ([0.6, 0, 0.8, 0], 7))
+        absent = Values(properties, numpy.full(5, nan))
+        self.assertEqual((absent.Turn, absent.Carrier), (None, None))
+        for numbers, name in (([2, 0, 0, 0, 0], "Turn"), ([0, 0, 0, 0, 0], "Turn"), ([1e200, 0, 0, 0, 0], "Turn"),
+                              ([1, 0, 0, 0, -1], "Carrier"), ([1, 0, 0, 0, 0.5], "Carrier"),
+                              ([1, 0, 0, 0, 0xFFFFFFFF], "Carrier")):
+            with self.assertRaisesRegex(Refusal, name):
+                Values(properties, numpy.array(numbers, float))
+
     def test_type_ids_are_fnv_1a(self):
         self.assertEqual(type_id(""), 0xCBF29CE484222325)
         self.assertEqual(type_id("a"), 0xAF63DC4C8601EC8C)
@@ -184,6 +197,8 @@ class Midpoint(Integrator):
             raise Refusal("not at one")
         if request.time == 2.0:
             raise ValueError("broken at two")
+        if request.time == 6.0:
+            raise Refusal("no file pl\udcfcgin")  # as os.fsdecode() gives names that are no UTF-8
         if request.time == 5.0:
             sys.exit(6)
         if request.time == 4.0:
@@ -311,6 +326,11 @@ class Talk(unittest.TestCase):
         self.assertEqual(list(end.position), [1.0] * 6)
         self.assertEqual(list(end.linear_velocity), [2.0] * 6)
         self.assertEqual(end.error_estimate, 0.25)
+
+    def test_a_reason_that_no_message_takes_is_told_with_question_marks(self):
+        _, stream = self.ready()
+        outcome = self.reply(stream.send(self.request(time=6.0))).outcome
+        self.assertEqual((outcome.status, outcome.text), (call_pb2.Outcome.STATUS_REFUSED, "no file pl?gin"))
 
     def test_a_derivative_that_cannot_be_had_ends_the_call(self):
         _, stream = self.ready()

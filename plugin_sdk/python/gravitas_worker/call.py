@@ -39,6 +39,11 @@ def place_of(failure):
     return f" ({own[-1].filename}:{own[-1].lineno})" if own else ""
 
 
+def encodable(text):
+    """The same with a '?' for what no message takes, as of a file's name that is no UTF-8."""
+    return text.encode(errors="replace").decode()
+
+
 class CallFailed(Exception):
     """A call that cannot be made or ended, with the status of its outcome."""
 
@@ -104,6 +109,7 @@ class Call(Host):
         return wrench
 
     def _send(self, kind, columns, outcome, derivative=None):
+        outcome["text"] = encodable(outcome.get("text", ""))
         head = Outcome(epoch=self.head.epoch, sequence=self.head.sequence, **outcome).SerializeToString()
         self.outgoing.put((kind, self.method.reply.serialize(columns, head, derivative)))
 

@@ -13,6 +13,10 @@ from gravitas.plugin.v1 import description_pb2
 
 _KINDS = description_pb2.Property
 
+# Largest deviation of a quaternion's squared norm from 1.
+UNIT_TOLERANCE = 1e-9
+NONE = 0xFFFFFFFF  # a body that is not one: the world in a joint, no shape of a body
+
 
 class Refusal(Exception):
     """The request, or a setting, is impossible, and why."""
@@ -87,12 +91,15 @@ class Property:
                 return None, self.size
             raise Refusal(f"{self.name} is not a number")
         self._check_bounds(value)
+        if kind == _KINDS.KIND_QUATERNION and not abs(sum(x * x for x in value.tolist()) - 1.0) <= UNIT_TOLERANCE:
+            raise Refusal(f"{self.name} is no unit quaternion")
         if kind in (_KINDS.KIND_VECTOR, _KINDS.KIND_QUATERNION):
             return value, self.size
         number = float(value[0])
         if kind == _KINDS.KIND_NUMBER:
             return number, 1
-        largest = {_KINDS.KIND_FLAG: 1, _KINDS.KIND_CHOICE: len(self.message.choices) - 1}.get(kind)
+        largest = {_KINDS.KIND_FLAG: 1, _KINDS.KIND_CHOICE: len(self.message.choices) - 1,
+                   _KINDS.KIND_BODY: NONE - 1}.get(kind)
         if not number.is_integer() or (largest is not None and not 0 <= number <= largest):
             allowed = "a whole number" if largest is None else f"a whole number from 0 to {largest}"
             raise Refusal(f"{self.name} is {number:g}; allowed: {allowed}")

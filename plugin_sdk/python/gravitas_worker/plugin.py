@@ -12,9 +12,7 @@ import numpy
 
 from gravitas.plugin.v1 import description_pb2
 
-from .declaration import Refusal, Values
-
-NONE = 0xFFFFFFFF  # a body that is not one: the world in a joint, no shape of a body
+from .declaration import NONE, Refusal, Values
 
 # Bits of the `flags` column of bodies.
 MOVABLE, KINEMATIC, UNBOUNDED, HAS_SHAPE, CAN_SLEEP = 1, 2, 4, 8, 16

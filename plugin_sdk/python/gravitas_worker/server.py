@@ -21,7 +21,7 @@ from google.protobuf.message import DecodeError
 from gravitas.control.v1 import control_pb2
 from gravitas.plugin.v1 import description_pb2
 
-from .call import CallFailed, Outcome, Sent, Session, place_of, unread_call
+from .call import CallFailed, Outcome, Sent, Session, encodable, place_of, unread_call
 from .columns import WireError, stage_methods
 from .declaration import Refusal, description_of
 
@@ -85,7 +85,7 @@ class Worker(grpc.GenericRpcHandler):
                 refusal = (_Reason.REASON_SETTINGS,
                            f"{self._plugin.name}: it cannot be made: {type(failure).__name__}: {failure}{place_of(failure)}")
         if refusal is not None:
-            yield _worker_message(refusal=_Reason(reason=refusal[0], text=refusal[1]))
+            yield _worker_message(refusal=_Reason(reason=refusal[0], text=encodable(refusal[1])))
             return
         try:
             yield from self._serve_kernel(hello, requests)

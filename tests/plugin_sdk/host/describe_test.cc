@@ -7,9 +7,11 @@
 #include <sys/wait.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/channel/private_folder.h"
 #include "plugin_sdk/host/description_message.h"
 #include "schemas/stage_frames.h"
 #include "tests/paths.h"
@@ -78,6 +80,24 @@ TEST(DescribeLibraries, ALibraryThatHangsHoldsNoOtherUp) {
   ASSERT_EQ(catalog.entries_size(), 3);
   EXPECT_EQ(catalog.entries(0).description().name(), "Hello");
   EXPECT_EQ(catalog.entries(1).problem(), "'" + hanging + "' was not ready in time while it was loaded");
+  EXPECT_EQ(catalog.entries(2).description().name(), "Basic");
+}
+
+// What describes them is a message, which takes UTF-8 only.
+TEST(DescribeLibraries, OneInAFolderWhoseNameIsNoUtf8HurtsNoOther) {
+  const channel::PrivateFolder place;
+  const std::string folder = place.path() + "/pl\xfcgins";
+  std::filesystem::create_directory(folder);
+  std::filesystem::copy_file(good("hello"), folder + "/hello.so");
+  const plugin::v1::Catalog made =
+      describe_libraries({folder + "/hello.so", folder + "/no.so", good("space_basic")}, kLongSeconds);
+  plugin::v1::Catalog catalog;
+  ASSERT_TRUE(catalog.ParseFromString(made.SerializeAsString()));
+  ASSERT_EQ(catalog.entries_size(), 3);
+  EXPECT_EQ(catalog.entries(0).library(), place.path() + "/pl?gins/hello.so");
+  EXPECT_EQ(catalog.entries(0).problem(), "");
+  EXPECT_EQ(catalog.entries(0).description().name(), "Hello");
+  EXPECT_THAT(catalog.entries(1).problem(), HasSubstr("/pl?gins/no.so"));
   EXPECT_EQ(catalog.entries(2).description().name(), "Basic");
 }
 

@@ -1,0 +1,28 @@
+// Switches the processor to flush-to-zero in its constructor, and so for all calls that follow in that thread.
+#include <immintrin.h>
+
+#include "tests/faulty/faulty_integrator.h"
+
+namespace {
+
+using namespace gravitas;
+
+class Flushing final : public IntegratorPlugin {
+ public:
+  static PluginDeclaration declaration() {
+    return {.name = "Faulty",
+            .version = "1.0",
+            .slot = Slot::kIntegrator,
+            .meaning = "Misbehaves on purpose.",
+            .theta = 1.0};
+  }
+  explicit Flushing(PropertyCursor) { _mm_setcsr(_mm_getcsr() | 0x8040); }
+
+  void integrate(const faulty::Request& request, const faulty::Reply& reply, Host&) override {
+    faulty::stand_still(request, reply);
+  }
+};
+
+}  // namespace
+
+GRAVITAS_PLUGIN(Flushing)
