@@ -3,7 +3,7 @@
 #include <array>
 
 #include "kernel/environment.h"
-#include "kernel/simulators/pairs.h"
+#include "kernel/simulators/location.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/merged_rows.h"
 

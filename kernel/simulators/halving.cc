@@ -7,19 +7,17 @@
 #include <vector>
 
 #include "kernel/environment.h"
-#include "kernel/simulators/pairs.h"
+#include "kernel/simulators/location.h"
 
 namespace gravitas::kernel {
 namespace {
 
-constexpr double kNoGap = 1e-8;        // of the margin: gap or overlap that is none
-constexpr double kLead = 0.9999;       // of the way to an impact is one step, the rest another
-constexpr double kFinestHalf = 1e-13;  // of the step: how closely a halving ends
+constexpr double kLead = 0.9999;  // of the way to an impact is one step, the rest another
 
 }  // namespace
 
 double Environment::bisect(const Trusted<TrialState>& trial, double begin, double length, bool is_near) {
-  const double nothing = kNoGap * margin_;
+  const double nothing = kTargetShare * margin_;
   const auto start_speed = [&](std::size_t contact) {
     const auto velocity = [&](std::uint32_t body) {
       const Vector3 arm = vector_at(data_.contact_point.span(), contact) - vector_at(data_.trial_position.span(), body);
@@ -54,7 +52,7 @@ double Environment::bisect(const Trusted<TrialState>& trial, double begin, doubl
     }
     if (doubtful.empty()) return false;
     if (!knows_overlapping) {
-      find_contacts_at(try_step(kFinestHalf * length));
+      find_contacts_at(try_step(kFinest * length));
       for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
         if (data_.contact_depth[i] > nothing)
           overlapping.insert(overlapping.end(), contact_pair(i).begin(), contact_pair(i).end());
@@ -67,7 +65,7 @@ double Environment::bisect(const Trusted<TrialState>& trial, double begin, doubl
   };
   if (!closes(trial)) return length;
   double clear = 0.0, closed = length;
-  while (closed - clear > kFinestHalf * length) {
+  while (closed - clear > kFinest * length) {
     const double middle = 0.5 * (clear + closed);
     (closes(try_step(middle)) ? closed : clear) = middle;
   }

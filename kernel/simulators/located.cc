@@ -12,7 +12,7 @@
 #include <algorithm>
 
 #include "kernel/environment.h"
-#include "kernel/simulators/pairs.h"
+#include "kernel/simulators/location.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/event_location.h"
 
@@ -22,9 +22,7 @@ namespace {
 constexpr int kMostInnerSteps = 10'000, kMostBisections = 200, kMostTrials = 200;
 constexpr std::size_t kMostSlides = 8, kMostSlidesOfPair = 4;    // whose ends are met in a step
 constexpr double kShortestFlight = 1e-6;                         // of the step
-constexpr double kTargetShare = 1e-8;                            // of the margin: gap at which a pair has met
 constexpr double kSlopOfArm = 2e-9, kSlopOfCoordinates = 4e-15;  // twice the gaps that solvers take for none
-constexpr double kFinest = 1e-13;                                // of the step: its shortest part
 
 }  // namespace
 

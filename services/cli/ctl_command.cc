@@ -118,9 +118,8 @@ int compare(const CtlLine& line, ControlClient* client) {
     std::cout << to_json(ordered, JsonForm::kPage);
   } else {
     std::cout << fmt::format(
-        "ordered: comparison {}, from step {} on; gravitas ctl status shows how the answers differ, gravitas ctl "
-        "call-off {} "
-        "ends it\n",
+        "ordered: comparison {}, from step {} on; gravitas ctl status shows how the answers differ, "
+        "gravitas ctl call-off {} ends it\n",
         ordered.number(), ordered.step(), ordered.number());
   }
   return kDone;

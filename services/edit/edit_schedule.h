@@ -14,7 +14,8 @@ class EditSchedule {
   // Of the command line, ascending.
   void plan(std::vector<edit::v1::Edit> edits) { to_come_ = std::move(edits); }
   // A run begins after that step, in the scene of the edits made: what is planned up to there is past, and what a journal
-  // knows of later ones is planned, where the command line has none for that step. Throws BadInput for what is planned up to there and was not made.
+  // knows of later ones is planned, where the command line has none for that step. Throws BadInput for what is planned up to
+  // there and was not made.
   void leave_out_past(std::uint32_t step, const std::vector<edit::v1::Edit>& journal);
   // Throws BadInput if one of those to come cannot be, as far as that can be said before.
   void rehearse(const RunOptions& options, scene::v1::Scene scene, kernel::EnvironmentDescription description,

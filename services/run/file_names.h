@@ -17,11 +17,11 @@ struct NamedFile {
 // What a scene was read from: its files, and the meshes that they name.
 std::vector<NamedFile> files_of(const scene::v1::Scene& scene);
 
-// Throws BadInput if an output is the same file as an input or as another output, by whatever names. Files that are not
-// ordinary ones (devices, pipes) may be named twice.
 // Of --checkpoint and --resume, with their journals.
 std::vector<NamedFile> checkpoints_of(const RunOptions& options);
 
+// Throws BadInput if an output is the same file as an input or as another output, by whatever names. Files that are not
+// ordinary ones (devices, pipes) may be named twice.
 void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);
 
 // Of a run of a scene: files_of() it, those of edits, and what it is resumed from, which the checkpoint alone

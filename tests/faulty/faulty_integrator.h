@@ -14,17 +14,16 @@ inline void stand_still(const Request& request, const Reply& reply) {
   for_each_body(request, reply, [](std::size_t, const BodyState& state) { return state; });
 }
 
+inline PluginDeclaration declaration() {
+  return {
+      .name = "Faulty", .version = "1.0", .slot = Slot::kIntegrator, .meaning = "Misbehaves on purpose.", .theta = 1.0};
+}
+
 // `kMisbehave` is called as misbehave(request, reply, host) from the third call on; if it returns, its answer stands.
 template <auto kMisbehave>
 class FaultyIntegrator final : public IntegratorPlugin {
  public:
-  static PluginDeclaration declaration() {
-    return {.name = "Faulty",
-            .version = "1.0",
-            .slot = Slot::kIntegrator,
-            .meaning = "Misbehaves on purpose.",
-            .theta = 1.0};
-  }
+  static PluginDeclaration declaration() { return faulty::declaration(); }
   explicit FaultyIntegrator(PropertyCursor) {}
 
   void integrate(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,

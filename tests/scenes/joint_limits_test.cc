@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -326,23 +327,33 @@ TEST_F(LimitedChain, StaysClosedWithNewtonAndDirect) {
   }
 }
 
-// Links of 0.2 m that hang out level from the world by ball joints with narrow cones, and fall down and across: while its cone
-// holds it a swing resists to being turned round by many times the inertia of its links. What did not know that came open by
-// 0.2 to 3 m, at 1/240 s, too, and gained energy.
-std::string chain_of_cones(int links) {
+// Links of 0.2 m in a row from the world on, joined by balls with these limits. `motion`: what a link has beside its place, whose
+// middle is so far from the world.
+std::string links_in_a_row(int links, const std::string& inertia, const std::function<std::string(double)>& motion,
+                           const std::string& limits, const Vector3& gravity) {
   std::string bodies, joints;
   for (int i = 0; i < links; ++i) {
     const std::string id = "L" + std::to_string(i), last = i == 0 ? "" : "L" + std::to_string(i - 1);
-    bodies += "Body { Id = \"" + id + "\" Mass = 1 PrincipalMoments = {0.004, 0.003, 0.004} Forces = { \"G\" } " +
-              "KineticProperties { Position = " + literal(Vector3(0.1 + 0.2 * i, 0, 0)) + " } }\n";
+    const double middle = 0.1 + 0.2 * i;
+    bodies += "Body { Id = \"" + id + "\" " + inertia +
+              " Forces = { \"G\" } KineticProperties { Position = " + literal(Vector3(middle, 0, 0)) + motion(middle) +
+              " } }\n";
     joints += "Constraint { Type = \"Spherical\" Id = \"J" + std::to_string(i) + "\" Body1 = \"" + last +
               "\" Body2 = \"" + id + "\" CustomProperties { BindPoint = " + literal(Vector3(0.2 * i, 0, 0)) +
-              " Axis = {1, 0, 0} ReachConeAngle = 0.3 TwistLower = -0.1 TwistUpper = 0.1 } }\n";
+              " Axis = {1, 0, 0} " + limits + " } }\n";
   }
-  return "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 2} } } }\n"
-         "Simulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = 1 } }\n"
+  return "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = " + literal(gravity) +
+         " } } }\nSimulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = 1 } }\n"
          "Environment { Space { Bodies {\n" +
          bodies + "} }\nConstraints {\n" + joints + "} }\n";
+}
+
+// They hang out level by narrow cones, and fall down and across: while its cone holds it a swing resists to being turned round by
+// many times the inertia of its links. What did not know that came open by 0.2 to 3 m, at 1/240 s, too, and gained energy.
+std::string chain_of_cones(int links) {
+  return links_in_a_row(links, "Mass = 1 PrincipalMoments = {0.004, 0.003, 0.004}",
+                        [](double) { return std::string(); }, "ReachConeAngle = 0.3 TwistLower = -0.1 TwistUpper = 0.1",
+                        {0, -9.81, 2});
 }
 
 TEST(ChainOfCones, StaysClosedAndGainsNoEnergy) {
@@ -386,25 +397,14 @@ TEST(ConeOfABody, HoldsWithSmooth) {
     }
 }
 
-// Links of 0.2 m in a row that turn about its end as one, and fall.
+// They turn about the end of the row as one, and fall.
 std::string whip(int links, const std::string& cone, double speed = 5.0,
                  const Vector3& moments = {8e-5, 7.5e-4, 7.5e-4}) {
-  std::string bodies, joints;
-  for (int i = 0; i < links; ++i) {
-    const std::string id = "L" + std::to_string(i), last = i == 0 ? "" : "L" + std::to_string(i - 1);
-    const double middle = 0.1 + 0.2 * i;
-    bodies += "Body { Id = \"" + id + "\" Mass = 0.2 PrincipalMoments = " + literal(moments) +
-              " Forces = { \"G\" } KineticProperties { Position = " + literal(Vector3(middle, 0, 0)) +
-              " LinearVelocity = " + literal(Vector3(0, 0, -speed * middle)) +
-              " AngularVelocity = " + literal(Vector3(0, speed, 0)) + " } }\n";
-    joints += "Constraint { Type = \"Spherical\" Id = \"J" + std::to_string(i) + "\" Body1 = \"" + last +
-              "\" Body2 = \"" + id + "\" CustomProperties { BindPoint = " + literal(Vector3(0.2 * i, 0, 0)) +
-              " Axis = {1, 0, 0} " + cone + " } }\n";
-  }
-  return "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
-         "Simulator { CustomProperties { TimeStep = 0.0166666666666666 Duration = 1 } }\n"
-         "Environment { Space { Bodies {\n" +
-         bodies + "} }\nConstraints {\n" + joints + "} }\n";
+  const auto motion = [&](double middle) {
+    return " LinearVelocity = " + literal(Vector3(0, 0, -speed * middle)) +
+           " AngularVelocity = " + literal(Vector3(0, speed, 0));
+  };
+  return links_in_a_row(links, "Mass = 0.2 PrincipalMoments = " + literal(moments), motion, cone, {0, -9.81, 0});
 }
 
 // A cone of equal angles is a regular one. Its links came open by 6 m, and gained energy.

@@ -9,13 +9,7 @@ using namespace gravitas;
 
 class Flushing final : public IntegratorPlugin {
  public:
-  static PluginDeclaration declaration() {
-    return {.name = "Faulty",
-            .version = "1.0",
-            .slot = Slot::kIntegrator,
-            .meaning = "Misbehaves on purpose.",
-            .theta = 1.0};
-  }
+  static PluginDeclaration declaration() { return faulty::declaration(); }
   explicit Flushing(PropertyCursor) { _mm_setcsr(_mm_getcsr() | 0x8040); }
 
   void integrate(const faulty::Request& request, const faulty::Reply& reply, Host&) override {

@@ -12,8 +12,8 @@
 // Known failures: Coulomb friction with large coefficients at long arms (Painlevé) may have no solution or several; then
 // `stop_reason` and `residual` say so. Random heaps that slide and turn under up to 10,000 times their mass are all solved
 // (1600 of 1600; 1599 of 1600 with rolling and spinning friction), under a million times 395 of 400; walls of some 50 bricks
-// that fall apart are left at 1e-6 to 1e-8 m/s. Irregular reach cones are closed to second order in the correction's turn, all
-// else to rounding.
+// that fall apart are left at 1e-6 to 1e-8 m/s. Irregular reach cones are closed to the third order of what turns round them in
+// the step, all else to rounding.
 #include "plugin_sdk/solver/end_of_step.h"
 #include "plugin_sdk/solver/reactions.h"
 
