@@ -66,26 +66,27 @@ void Environment::write_trial(const Trusted<TrialState>&) {
 void Environment::write_solution(const Trusted<Solution>&) {
   copy(data_.solved_linear_velocity, back().linear_velocity);
   copy(data_.solved_angular_velocity, back().angular_velocity);
-  back().position.assign(data_.trial_position);
-  back().orientation.assign(data_.trial_orientation);
+  copy(data_.trial_position, back().position);
+  copy(data_.trial_orientation, back().orientation);
+  const double *solved_linear = data_.solved_linear_velocity.data(), *linear = data_.trial_linear_velocity.data();
+  const double *solved_angular = data_.solved_angular_velocity.data(), *angular = data_.trial_angular_velocity.data();
+  const double* const changes = data_.pose_change.data();
+  const std::uint32_t *const flags = data_.flags.data(), *const flags_before = model_.flags.data();
+  std::uint32_t* const state_changed = back().state_changed.data();
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    const double* change = &data_.pose_change[6 * i];
-    const bool moved = std::any_of(change, change + 6, [](double number) { return number != 0.0; });
+    const double* const change = changes + 6 * i;
+    bool moved = false, differs = flags[i] != flags_before[i];
+    for (int k = 0; k < 6; ++k) moved |= change[k] != 0.0;
+    for (std::uint32_t k = 3 * i; k < 3 * i + 3; ++k)
+      differs |= (solved_linear[k] != linear[k]) | (solved_angular[k] != angular[k]);
     if (moved) {
-      const Pose pose = displaced(pose_of(data_.trial_position, data_.trial_orientation, i),
+      const Pose pose = displaced(pose_of(back().position, back().orientation, i),
                                   Vector3(change[0], change[1], change[2]), Vector3(change[3], change[4], change[5]));
       set_vector(back().position.span(), i, pose.position);
-      set_quaternion(back().orientation.span(), i, pose.orientation);
+      set_quaternion(back().orientation.span(), i, Quaternion((pose.orientation.coeffs().array() + 0.0).matrix()));
     }
-    const auto differs = [&](const Column<double>& a, const Column<double>& b) {
-      return !std::equal(&a[3 * i], &a[3 * i] + 3, &b[3 * i]);
-    };
-    back().state_changed[i] = moved || differs(data_.solved_linear_velocity, data_.trial_linear_velocity) ||
-                              differs(data_.solved_angular_velocity, data_.trial_angular_velocity) ||
-                              data_.flags[i] != model_.flags[i];
+    state_changed[i] = moved | differs;
   }
-  copy(back().position, back().position);
-  copy(back().orientation, back().orientation);
   back().plugin_state.assign(data_.next_plugin_state);
   figures_ = {};
   remember_contacts();

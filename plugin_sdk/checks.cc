@@ -11,6 +11,7 @@ namespace {
 
 constexpr std::uint64_t kUnknownRows = ~0ULL;
 constexpr std::size_t kMaxRowWords = 64;
+constexpr std::size_t kFewNumbers = 8;  // in a plain loop sooner than by vectors
 
 // Rows of each word of a method, as the columns looked at so far have them.
 using RowCounts = std::array<std::uint64_t, kMaxRowWords>;
@@ -43,6 +44,11 @@ std::string misfit(const stage::ColumnInfo& column, std::uint64_t count, const R
 
 std::size_t first_not_finite(std::span<const double> numbers) {
   // zero times a finite number is zero, times any other NaN: one look at the sum, several numbers at a time
+  if (numbers.size() <= kFewNumbers) {
+    double sum = 0.0;
+    for (const double number : numbers) sum += 0.0 * number;
+    if (sum == 0.0) return kNoRow;
+  }
   const Eigen::Map<const Eigen::ArrayXd> column(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
   if ((0.0 * column).sum() == 0.0) return kNoRow;
   for (std::size_t i = 0; i < numbers.size(); ++i)

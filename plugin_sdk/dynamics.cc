@@ -16,13 +16,6 @@ Vector3 angular_acceleration(const Quaternion& q, const Vector3& w, const Vector
   return q * inverse_inertia.cwiseProduct(torque_body - w_body.cross(momentum_body));
 }
 
-Pose displaced(const Pose& pose, const Vector3& translation, const Vector3& rotation) {
-  Pose moved = pose;
-  if (!translation.isZero(0.0)) moved.position += translation;
-  if (!rotation.isZero(0.0)) moved.orientation = rotate_by(pose.orientation, rotation);
-  return moved;
-}
-
 Twist after_impulse(const Twist& twist, const Quaternion& q, double inverse_mass, const Vector3& inverse_inertia,
                     const Vector3& impulse, const Vector3& angular_impulse) {
   const Vector3 turn_body = inverse_inertia.cwiseProduct(q.conjugate() * angular_impulse);
@@ -44,12 +37,6 @@ Bounds box_bounds(const Pose& body, const Vector3& centre, const Quaternion& box
   const Matrix3 axes = (body.orientation * box_orientation).toRotationMatrix();
   const Vector3 reach = axes.cwiseAbs() * half_extents;
   const Vector3 middle = transform_point(body, centre);
-  return {middle - reach, middle + reach};
-}
-
-Bounds sphere_bounds(const Pose& body, const Vector3& centre, double radius) {
-  const Vector3 middle = transform_point(body, centre);
-  const Vector3 reach = Vector3::Constant(radius);
   return {middle - reach, middle + reach};
 }
 

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "plugin_sdk/math/pose.h"
+#include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/types.h"
 
 namespace gravitas {
@@ -39,7 +40,12 @@ Vector3 angular_acceleration(const Quaternion& q, const Vector3& w, const Vector
 
 // Pose after a translation and a rotation vector (world): (x + d, exp(r) q), the orientation renormalised. What is
 // moved by exactly zero, position or orientation, is returned as it is, bit for bit.
-Pose displaced(const Pose& pose, const Vector3& translation, const Vector3& rotation);
+inline Pose displaced(const Pose& pose, const Vector3& translation, const Vector3& rotation) {
+  Pose moved = pose;
+  if (!translation.isZero(0.0)) moved.position += translation;
+  if (!rotation.isZero(0.0)) moved.orientation = rotate_by(pose.orientation, rotation);
+  return moved;
+}
 
 // Momentum change of a wrench's impulse: velocities after an impulse (N s) and angular impulse (N m s).
 Twist after_impulse(const Twist& twist, const Quaternion& q, double inverse_mass, const Vector3& inverse_inertia,
@@ -59,6 +65,10 @@ struct Bounds {
 };
 Bounds box_bounds(const Pose& body, const Vector3& centre, const Quaternion& box_orientation,
                   const Vector3& half_extents);
-Bounds sphere_bounds(const Pose& body, const Vector3& centre, double radius);
+inline Bounds sphere_bounds(const Pose& body, const Vector3& centre, double radius) {
+  const Vector3 middle = centre.isZero(0.0) ? body.position : transform_point(body, centre);
+  const Vector3 reach = Vector3::Constant(radius);
+  return {middle - reach, middle + reach};
+}
 
 }  // namespace gravitas

@@ -1,5 +1,6 @@
 #include "plugin_sdk/integrator.h"
 
+#include <algorithm>
 #include <string>
 
 #include "plugin_sdk/checks.h"
@@ -113,9 +114,9 @@ Acceleration Derivatives::acceleration(std::size_t body, const BodyState& state,
                                vector_at(request_.inverse_inertia(), body), torque)};
 }
 
-Acceleration Derivatives::kick(std::size_t body, const Quaternion& orientation,
-                               std::span<const double> wrenches) const {
-  return acceleration(body, {{Vector3::Zero(), orientation}, {}}, wrenches);
+Vector3 Derivatives::angular_kick(std::size_t body, const Quaternion& orientation, const Vector3& torque) const {
+  return angular_acceleration(orientation, Vector3::Zero(), vector_at(request_.inertia(), body),
+                              vector_at(request_.inverse_inertia(), body), torque);
 }
 
 bool Derivatives::has_gyroscopic_term(std::size_t body) const {
@@ -123,7 +124,7 @@ bool Derivatives::has_gyroscopic_term(std::size_t body) const {
   return moments.minCoeff() < moments.maxCoeff() && vector_at(request_.inverse_inertia(), body).minCoeff() > 0.0;
 }
 
-Turning Derivatives::turned_freely(std::size_t body, const Turning& start, double time) const {
+Turning Derivatives::turned(std::size_t body, const Turning& start, double time) const {
   if (has_gyroscopic_term(body))
     return gravitas::turned_freely(start, vector_at(request_.inertia(), body),
                                    vector_at(request_.inverse_inertia(), body), time);
@@ -140,20 +141,6 @@ Vector3 Derivatives::carried(std::size_t body, const Vector3& angular_velocity, 
 }
 
 BodyState Derivatives::start(std::size_t body) const { return detail::state_at(request_, body); }
-
-Twist accelerated(const Twist& twist, const Acceleration& acceleration, double damping, double time_step) {
-  const double slowed = damping_factor(damping, time_step);
-  return {slowed * (twist.linear + time_step * acceleration.linear),
-          slowed * (twist.angular + time_step * acceleration.angular)};
-}
-
-double damping_factor(double damping, double time_step) {
-  return damping == 0.0 ? 1.0 : math::exp(-damping * time_step);
-}
-
-double damped_time(double damping, double time_step) {
-  return damping == 0.0 ? time_step : -math::expm1(-damping * time_step) / damping;
-}
 
 double damped_distance(double damping, double time_step) {
   const double share = damping * time_step;
@@ -183,17 +170,17 @@ bool StateColumns::resize(const stage::IntegratorIntegrateReply& reply, std::siz
          angular_velocity.size() == 3 * bodies;
 }
 
-void StateColumns::set(std::size_t body, const BodyState& state) const {
-  const Vector3 &x = state.pose.position, &v = state.twist.linear, &w = state.twist.angular;
-  const Quaternion& q = state.pose.orientation;
-  if (!x.allFinite() || !q.coeffs().allFinite() || !v.allFinite() || !w.allFinite())
+void StateColumns::require_finite() const {
+  std::size_t body = kNoRow;
+  const auto look = [&](std::span<const double> column, std::size_t components) {
+    const std::size_t index = first_not_finite(column);
+    if (index != kNoRow) body = std::min(body, index / components);
+  };
+  look(position, 3), look(orientation, 4), look(linear_velocity, 3), look(angular_velocity, 3);
+  if (body != kNoRow)
     throw Refusal(
         "body " + std::to_string(body) +
         " comes to a state that is not finite: its state, forces, inertia, damping or the time step overflow");
-  set_vector(position, body, x);
-  set_quaternion(orientation, body, q);
-  set_vector(linear_velocity, body, v);
-  set_vector(angular_velocity, body, w);
 }
 
 BodyState keep_moving(const BodyState& state, double time_step) {

@@ -7,6 +7,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/free_rotor.h"
+#include "plugin_sdk/math/transcendental.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
@@ -51,10 +52,16 @@ class Derivatives {
   Acceleration acceleration(std::size_t body, const BodyState& state, std::span<const double> wrenches) const;
 
   // That without the gyroscopic term, f/m and I_w^-1 tau, for methods that leave that term to the two below.
-  Acceleration kick(std::size_t body, const Quaternion& orientation, std::span<const double> wrenches) const;
+  Acceleration kick(std::size_t body, const Quaternion& orientation, std::span<const double> wrenches) const {
+    const Vector3 linear = request_.inverse_mass()[body] * vector_at(wrenches, 2 * body);
+    const Vector3 torque = vector_at(wrenches, 2 * body + 1);
+    return {linear, torque.isZero(0.0) ? Vector3::Zero() : angular_kick(body, orientation, torque)};
+  }
   // Attitude and angular velocity of one body after `time` (s) in which nothing turns it: exp(t w) q where its moments are
   // equal or some are infinite, else the exact free rotor (free_rotor.h).
-  Turning turned_freely(std::size_t body, const Turning& start, double time) const;
+  Turning turned_freely(std::size_t body, const Turning& start, double time) const {
+    return start.angular_velocity.isZero(0.0) ? start : turned(body, start, time);
+  }
   // The angular velocity at another attitude that has the same angular momentum.
   Vector3 carried(std::size_t body, const Vector3& angular_velocity, const Quaternion& from,
                   const Quaternion& to) const;
@@ -63,6 +70,8 @@ class Derivatives {
   std::size_t size() const { return request_.flags().size(); }
 
  private:
+  Vector3 angular_kick(std::size_t body, const Quaternion& orientation, const Vector3& torque) const;
+  Turning turned(std::size_t body, const Turning& start, double time) const;
   bool has_gyroscopic_term(std::size_t body) const;
   void require_finite(std::span<const double> column, std::size_t components, const char* what) const;
   void require_finite(const TrialColumns& trial) const;
@@ -81,14 +90,22 @@ template <typename Move>
 void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage::IntegratorIntegrateReply& reply,
                    Move&& move);
 
-// Velocities after `time_step` of constant acceleration, slowed by damping: e^(-c h) (v + h a), e^(-c h) (w + h alpha).
-Twist accelerated(const Twist& twist, const Acceleration& acceleration, double damping, double time_step);
-
 // Factor by which damping slows a body in time h: exp(-c h) for any c >= 0, never a change of sign.
-double damping_factor(double damping, double time_step);
+inline double damping_factor(double damping, double time_step) {
+  return damping == 0.0 ? 1.0 : math::exp(-damping * time_step);
+}
+
+// Velocities after `time_step` of constant acceleration, slowed by damping: e^(-c h) (v + h a), e^(-c h) (w + h alpha).
+inline Twist accelerated(const Twist& twist, const Acceleration& acceleration, double damping, double time_step) {
+  const double slowed = damping_factor(damping, time_step);
+  return {slowed * (twist.linear + time_step * acceleration.linear),
+          slowed * (twist.angular + time_step * acceleration.angular)};
+}
 
 // The time (s) in which an undamped body goes as far as a damped one in h: (1 - exp(-c h)) / c.
-double damped_time(double damping, double time_step);
+inline double damped_time(double damping, double time_step) {
+  return damping == 0.0 ? time_step : -math::expm1(-damping * time_step) / damping;
+}
 
 // The distance (s^2) per acceleration that a damped body goes from rest in h: (h - (1 - exp(-c h)) / c) / c, h^2/2 without
 // damping.
@@ -114,8 +131,14 @@ struct StateColumns {
 
   // Has it room for all bodies? If not, the counts of the reply tell the host how much it takes.
   bool resize(const stage::IntegratorIntegrateReply& reply, std::size_t bodies);
-  // Throws Refusal for a state that is not finite.
-  void set(std::size_t body, const BodyState& state) const;
+  void set(std::size_t body, const BodyState& state) const {
+    set_vector(position, body, state.pose.position);
+    set_quaternion(orientation, body, state.pose.orientation);
+    set_vector(linear_velocity, body, state.twist.linear);
+    set_vector(angular_velocity, body, state.twist.angular);
+  }
+  // Throws Refusal, naming the first body, for a state that is not finite.
+  void require_finite() const;
 };
 
 BodyState keep_moving(const BodyState& state, double time_step);
@@ -135,6 +158,7 @@ void for_each_body(const stage::IntegratorIntegrateRequest& request, const stage
     }
     columns.set(body, state);
   }
+  columns.require_finite();
   reply.error_estimate().set(0.0);
 }
 

@@ -35,8 +35,4 @@ Bounds swept_bounds(const LocalBound& bound, const Pose& from, const Pose& to, c
                  radius * std::min(2.0, 0.125 * rotation.squaredNorm()));
 }
 
-Bounds widened(const Bounds& bounds, double margin) {
-  return {bounds.lower - Vector3::Constant(margin), bounds.upper + Vector3::Constant(margin)};
-}
-
 }  // namespace gravitas

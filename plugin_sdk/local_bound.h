@@ -38,6 +38,8 @@ Bounds bounds_of(const LocalBound& bound, const Pose& body);
 Bounds swept_bounds(const LocalBound& bound, const Pose& from, const Pose& to, const Vector3& rotation);
 
 // The same, wider by `margin` (m) on all sides.
-Bounds widened(const Bounds& bounds, double margin);
+inline Bounds widened(const Bounds& bounds, double margin) {
+  return {bounds.lower - Vector3::Constant(margin), bounds.upper + Vector3::Constant(margin)};
+}
 
 }  // namespace gravitas
