@@ -15,9 +15,10 @@ std::size_t character_size(std::string_view text) {
   if (first < 0xc2 || first > 0xf4 || text.size() < size) return 0;
   for (std::size_t i = 1; i < size; ++i)
     if ((byte(i) & 0xc0) != 0x80) return 0;
-  // overlong forms, surrogates, beyond the last character
-  const bool is_wrong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) > 0x9f) ||
-                        (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) > 0x8f);
+  // controls, overlong forms, surrogates, beyond the last character
+  const bool is_wrong = (first == 0xc2 && byte(1) < 0xa0) || (first == 0xe0 && byte(1) < 0xa0) ||
+                        (first == 0xed && byte(1) > 0x9f) || (first == 0xf0 && byte(1) < 0x90) ||
+                        (first == 0xf4 && byte(1) > 0x8f);
   return is_wrong ? 0 : size;
 }
 

@@ -391,6 +391,7 @@ void ReactionSolver::agree_with_joints() {
   constexpr int kRounds = 12;
   constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
   const std::vector<Body> asked = bodies_;
+  const bool asked_elsewhere = has_moved_;  // at the step's start
   const double far = largest_turn();
   double turn = far, margin = kMargin;
   bool is_factored = margin * turn * turn < factor_.least_pivot();
@@ -416,7 +417,7 @@ void ReactionSolver::agree_with_joints() {
   const bool is_stuck = turn > std::max(kRounding, kQuick * far);
   if (turn > kNearEnough || is_stuck) {
     bodies_ = asked;
-    has_moved_ = false;
+    has_moved_ = asked_elsewhere;
     turn = far;
     make_rows();
   }

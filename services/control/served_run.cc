@@ -32,41 +32,13 @@ constexpr std::chrono::milliseconds kRateWindow{500};
 
 double seconds(std::chrono::steady_clock::duration duration) { return std::chrono::duration<double>(duration).count(); }
 
-kernel::EnvironmentDescription slots_of(const kernel::EnvironmentDescription& whole) {
+}  // namespace
+
+kernel::EnvironmentDescription ServedRun::slots_of(const kernel::EnvironmentDescription& whole) {
   kernel::EnvironmentDescription slots;
   for (const Slot slot : kSlots) slots.slot(slot) = whole.slot(slot);
   return slots;
 }
-
-bool is_pending(kernel::SwapState state) {
-  return state == kernel::SwapState::kPreparing || state == kernel::SwapState::kShadow;
-}
-
-// Where the numbers of a property begin among the flattened ones, and how many they are.
-std::pair<std::size_t, std::size_t> place_of(const kernel::PluginChoice& plugin, const Property& wanted) {
-  std::size_t begin = 0;
-  for (const Property& property : plugin.declaration.properties) {
-    const std::size_t size = flat_size_of(property, std::span(plugin.settings).subspan(begin));
-    if (&property == &wanted) return {begin, size};
-    begin += size;
-  }
-  throw std::logic_error("a property of another plugin");
-}
-
-const Property* find_property(const kernel::PluginChoice& plugin, const std::string& name) {
-  const auto found = std::ranges::find(plugin.declaration.properties, name, &Property::name);
-  return found == plugin.declaration.properties.end() ? nullptr : &*found;
-}
-
-PropertyValue parse_value(const std::string& what, const std::string& text) {
-  try {
-    return scene::bare_value(text);
-  } catch (const scene::SyntaxError& error) {
-    throw BadInput(fmt::format("{}: {}", what, error.text));
-  }
-}
-
-}  // namespace
 
 ServedRun::ServedRun(const ServeOptions& options)
     : options_(options.run),
@@ -189,7 +161,7 @@ void ServedRun::schedule() {
 
 void ServedRun::on_turn() {
   is_scheduled_ = false;
-  if (state_ != State::kRunning) return;
+  if (state_ != State::kRunning || is_ending_) return;
   const bool is_paced = speed_ > 0.0 && !steps_left_;
   const Clock::time_point now = Clock::now();
   // a timer that was cancelled comes early
@@ -219,6 +191,7 @@ void ServedRun::make_step() {
   try {
     // the initial state, too
     if (environment_->step_count() == 0) figures_->follow(environment_.get());
+    const bool wakes = !environment_->wake_orders().empty();  // which no journal knows
     if (environment_->step() == kernel::StepOutcome::kPaused) {
       const kernel::FaultRecord& record = *environment_->fault();
       fault_ = pause_text(description_, record, poisoned_step_ >= record.step);
@@ -226,7 +199,7 @@ void ServedRun::make_step() {
     }
     figures_->follow(environment_.get());
     const bool is_last = environment_->step_count() >= environment_->total_steps();
-    if (recorder_->is_due(*environment_) || (is_last && recorder_->keeps())) recorder_->save(*environment_);
+    if (recorder_->is_due(*environment_) || ((is_last || wakes) && recorder_->keeps())) recorder_->save(*environment_);
   } catch (const StepInterrupted&) {
     return;
   } catch (const std::exception& problem) {
@@ -295,130 +268,6 @@ std::future<void> ServedRun::step(std::uint32_t steps) {
     go();
     return step_order_.get_future();
   });
-}
-
-api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
-  SwapSpec spec;
-  const std::string word = request.slot() + "=" + request.plugin(), verb = request.compares() ? "compare" : "swap";
-  spec.text = verb + " " + word;
-  spec.slot = parse_slot(verb, word, request.slot());
-  spec.plugin = request.plugin();
-  if (spec.plugin.empty()) throw BadInput(spec.text + ": allowed: the name of a plugin, or the path of a library");
-  if (!request.hosting().empty()) spec.hosting = parse_hosting_mode(verb, word, request.hosting());
-  // the settings of the moment, else those of the scene
-  const auto [active, scenes] = between_steps([this] { return std::pair(active_, slots_of(description_)); });
-  // a library is asked in a process, which the steps do not wait for; the copy keeps its name from staying known
-  Catalog catalog = catalog_;
-  kernel::SwapOrder found = resolve_swap(spec, scenes, &catalog);
-  for (const kernel::PluginChoice& one : active.slot(spec.slot).plugins)
-    if (one.declaration.name == found.plugin.declaration.name &&
-        std::ranges::equal(one.declaration.properties, found.plugin.declaration.properties, {}, &Property::name,
-                           &Property::name))
-      found.plugin.settings = one.settings;
-  return between_steps([&] {
-    found.step = next_step(spec.text, request.step());
-    return order(std::move(found), request.compares() ? OrderKind::kComparison : OrderKind::kSwap);
-  });
-}
-
-api::ServedSwap ServedRun::call_off(const api::CallOffRequest& request) {
-  return between_steps([&] {
-    const auto found = std::ranges::find(orders_, request.number(), &Order::number);
-    if (found != orders_.end() && environment_->call_off_swap(found->swap.slot, found->swap.step, found->rank))
-      return swap_message(*found, environment_->swaps());
-    std::vector<std::uint32_t> pending;
-    for (const Order& one : pending_orders()) pending.push_back(one.number);
-    const std::string what = fmt::format("call-off {}: ", request.number());
-    const std::string allowed = pending.empty() ? std::string("none is on its way, and nothing is compared")
-                                                : fmt::format("allowed: {}", fmt::join(pending, ", "));
-    for (const api::ServedSwap& one : swap_messages())
-      if (one.number() == request.number())
-        throw NotNow(fmt::format("{}this swap is {} already; {}", what, one.outcome(), allowed));
-    throw BadInput(fmt::format("{}no swap has that number; {}", what, allowed));
-  });
-}
-
-api::SwapOrdered ServedRun::set_property(const api::SetPropertyRequest& request) {
-  const std::string word = request.slot() + "." + request.property() + "=" + request.value();
-  const std::string what = "set " + word;
-  std::string name = request.slot();
-  if (!name.empty()) name[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
-  const Slot slot = parse_slot("set", word, name);
-  const PropertyValue value = parse_value(what, request.value());
-  return between_steps([&] {
-    kernel::SwapOrder exchange;
-    exchange.slot = slot;
-    exchange.plugin = choice_with(what, slot, request.property(), environment_->swaps());
-    const Property& property = *find_property(exchange.plugin, request.property());
-    if (!property.is_live)
-      throw BadInput(what + ": it cannot be changed while the run goes on; start it with --set " + word);
-    std::vector<double> numbers;
-    std::vector<PropertyProblem> problems;
-    if (!flatten_value(property, value, &numbers, &problems)) throw BadInput(what + ": " + problems.at(0).text);
-    std::vector<double>& settings = exchange.plugin.settings;
-    const auto [begin, size] = place_of(exchange.plugin, property);
-    const auto place = settings.begin() + static_cast<std::ptrdiff_t>(begin);
-    settings.insert(settings.erase(place, place + static_cast<std::ptrdiff_t>(size)), numbers.begin(), numbers.end());
-    exchange.step = next_step(what, 0);
-    return order(std::move(exchange), OrderKind::kSetting);
-  });
-}
-
-// The plugin of the slot that has the property: the one that comes with the next step, else the one that answers.
-const kernel::PluginChoice& ServedRun::choice_with(const std::string& what, Slot slot, const std::string& property,
-                                                   const std::vector<kernel::SwapRecord>& records) const {
-  for (std::size_t i = orders_.size(); i-- > 0;) {
-    const kernel::SwapOrder& swap = orders_[i].swap;
-    if (!orders_[i].compares() && swap.slot == slot && swap.step <= environment_->step_count() + 1 &&
-        find_property(swap.plugin, property) != nullptr && is_pending(record_of(orders_[i], records).state))
-      return swap.plugin;
-  }
-  if (property.find('.') != std::string::npos)
-    throw BadInput(
-        fmt::format("{}: this changes settings of plugins, as in `set Solver.Iterations=50`; allowed for what "
-                    "the scene says of a single force, joint or shape: gravitas ctl edit 'set PATH=VALUE'",
-                    what));
-  std::vector<std::string> names;
-  for (const kernel::PluginChoice& plugin : active_.slot(slot).plugins) {
-    if (find_property(plugin, property) != nullptr) return plugin;
-    for (const Property& other : plugin.declaration.properties) names.push_back(other.name);
-  }
-  throw BadInput(fmt::format("{}: no plugin of slot {} has a property '{}'; {}", what, slot_name(slot), property,
-                             allowed_names(property, names)));
-}
-
-const kernel::SwapRecord& ServedRun::record_of(const Order& order, const std::vector<kernel::SwapRecord>& records) {
-  std::uint32_t rank = 0;
-  for (const kernel::SwapRecord& record : records)
-    if (record.slot == order.swap.slot && record.step == order.swap.step && rank++ == order.rank) return record;
-  throw std::logic_error("a swap that was ordered is not known");
-}
-
-std::uint32_t ServedRun::rank_of(const kernel::SwapOrder& swap, const std::vector<Order>& orders) {
-  return static_cast<std::uint32_t>(std::ranges::count_if(
-      orders, [&](const Order& one) { return one.swap.slot == swap.slot && one.swap.step == swap.step; }));
-}
-
-std::vector<ServedRun::Order> ServedRun::pending_orders() const {
-  const std::vector<kernel::SwapRecord> records = environment_->swaps();
-  std::vector<Order> pending;
-  for (const Order& one : orders_)
-    if (is_pending(record_of(one, records).state)) pending.push_back(one);
-  return pending;
-}
-
-api::SwapOrdered ServedRun::order(kernel::SwapOrder order, OrderKind kind) {
-  try {
-    environment_->order_swap(order, kind == OrderKind::kComparison);
-  } catch (const std::invalid_argument& problem) {
-    throw BadInput(problem.what());
-  }
-  api::SwapOrdered ordered;
-  ordered.set_number(++last_order_);
-  ordered.set_step(order.step);
-  const std::uint32_t rank = rank_of(order, orders_);
-  orders_.push_back({std::move(order), kind, last_order_, rank});
-  return ordered;
 }
 
 api::InjectOrdered ServedRun::inject(const api::InjectRequest& request) {

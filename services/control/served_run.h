@@ -150,6 +150,7 @@ class ServedRun final : private kernel::CommitListener {
   Beginning restored(const Resumption& from);
   static Resumption last_known(const RunOptions& options, const kernel::EnvironmentDescription& description,
                                std::vector<std::string>* warnings);
+  static kernel::EnvironmentDescription slots_of(const kernel::EnvironmentDescription& whole);
   void go();
   void stand(State state);
   void schedule();

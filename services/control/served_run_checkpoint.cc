@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <filesystem>
 
 #include "plugin_sdk/channel/private_folder.h"
@@ -24,6 +25,11 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
         found.checkpoint.decisions().end())
       last = std::max(last, one.step());
   last = std::min(last, description.steps);
+  // nothing is kept of a shortened last step
+  if (last == description.steps && description.last_time_step != description.time_step) {
+    --last;
+    warnings->push_back("the last step is shorter than the others: what was ordered for it is to be ordered again");
+  }
   if (last <= found.checkpoint.step()) return found;
   const channel::PrivateFolder folder;
   RunOptions again = options;
@@ -127,7 +133,16 @@ std::string ServedRun::command_to_resume() {
     if (one.kind == OrderKind::kSwap) word += fmt::format("@step={}", step);
     if (hosting) word += fmt::format(",hosting={}", kernel::hosting_name(*hosting));
     (one.kind == OrderKind::kSwap ? options.swaps : options.comparisons).push_back(word);
+    const std::vector<kernel::PluginChoice>& own = description_.slot(slot).plugins;
+    const auto same = std::ranges::find(own, plugin.declaration.name,
+                                        [](const kernel::PluginChoice& choice) { return choice.declaration.name; });
+    const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };  // absent ones are NaN
+    if (same != own.end() && !std::ranges::equal(same->settings, plugin.settings, {}, bits, bits))
+      add_warning(fmt::format("settings of {} for step {} are not part of the command that goes on: it has the scene's",
+                              plugin.declaration.name, step));
   }
+  if (!environment_->wake_orders().empty())
+    add_warning("whom to wake before the next step is not part of the command that goes on");
   return resume_command(options, hosting_words_, checkpoint_);
 }
 

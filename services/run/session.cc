@@ -264,7 +264,14 @@ class Run final : private kernel::CommitListener {
             fmt::format("--swap {} at step {}: the checkpoint of step {} knows of none there: it was refused "
                         "then, or not ordered",
                         slot_name(one.slot), one.step, step));
-    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step; });
+    // one of a step that was not made is in the checkpoint already
+    const auto is_restored = [&](const kernel::SwapOrder& one) {
+      return std::ranges::any_of(resumed.checkpoint.decisions(), [&](const recorder::v1::Decision& decision) {
+        return is_swap(decision) && decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
+               decision.plugin() == one.plugin.declaration.name;
+      });
+    };
+    std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step || is_restored(one); });
     const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };  // absent ones are NaN
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
@@ -276,7 +283,7 @@ class Run final : private kernel::CommitListener {
                  one.plugin.declaration.name == order.plugin.declaration.name &&
                  std::ranges::equal(one.plugin.settings, order.plugin.settings, {}, bits, bits);
         });
-        if (!is_ordered) swaps_.push_back(std::move(order));
+        if (!is_ordered && !is_restored(order)) swaps_.push_back(std::move(order));
       }
     });
     // how far hosting may differ is for the command line to say

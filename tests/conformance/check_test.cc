@@ -84,8 +84,6 @@ class QuickCheckOfTheTree : public ::testing::TestWithParam<std::string> {};
 TEST_P(QuickCheckOfTheTree, Conforms) {
   const auto report = check_library(kPlugins + "/" + GetParam() + ".so", {.quick = true, .level = {}, .only_case = {}});
   EXPECT_TRUE(report.conforms()) << report.DebugString();
-  // two seconds on an idle machine
-  EXPECT_LT(report.seconds(), 20.0);
 }
 
 class CheckOfTheTree : public ::testing::TestWithParam<std::string> {};
@@ -102,7 +100,6 @@ class CheckOfFaults : public ::testing::TestWithParam<std::string> {};
 TEST_P(CheckOfFaults, FailsAtItsLevelInAQuickCheck) {
   const auto report = check_library(kFaulty + "/" + GetParam() + ".so", {.quick = true, .level = {}, .only_case = {}});
   expect_failure(report, level_of(GetParam()));
-  EXPECT_LT(report.seconds(), 20.0);
 }
 
 class CheckOfSlowFaults : public ::testing::TestWithParam<std::string> {};

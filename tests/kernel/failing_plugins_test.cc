@@ -74,7 +74,7 @@ void expect_failures_in_worker(Hosting hosting, const Expected& expected) {
   WorldBuilder builder = ball_on_ground(hosting);
   builder.plugin(Slot::kIntegrator, faulty_plugin_path(expected.library));
   // short only where it is waited for: a busy machine is slow, and a sanitizer's last words are
-  builder.description().integrator.deadline = expected.kind == FaultKind::kDeadline ? 0.1 : 10.0;
+  builder.description().integrator.deadline = expected.kind == FaultKind::kDeadline ? 0.5 : 10.0;
   expect_failures_and_pause(builder, expected);
 }
 

@@ -94,7 +94,7 @@ TEST_P(Handshake, TakesAnotherBuildAndSaysSo) {
 
 Hash chain_without_lies() {
   Environment quiet(busy_world(Hosting::kDirect).steps(kMeetingSteps, 1.0 / 120.0).description());
-  while (quiet.step_count() < kMeetingSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
+  for (std::uint32_t step = 0; step < kMeetingSteps; ++step) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
   return quiet.chain_hash();
 }
 

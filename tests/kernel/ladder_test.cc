@@ -96,7 +96,7 @@ class Ladder : public ::testing::Test {
   }
   static Hash quiet_chain() {
     Environment quiet(busy_world(Hosting::kDirect).steps(kLadderSteps, 0.01).description());
-    while (quiet.step_count() < kLadderSteps) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
+    for (std::uint32_t step = 0; step < kLadderSteps; ++step) EXPECT_EQ(quiet.step(), StepOutcome::kCommitted);
     return quiet.chain_hash();
   }
   static void run(Environment* world) {

@@ -36,24 +36,24 @@ Vector3 position_of(const kernel::StateView& state, std::size_t body) { return v
 }  // namespace
 
 std::vector<MotionMethod> fixed_step_methods() {
-  return {{"Euler", "integrator_euler", {}, 1, 1},
-          {"SemiImplicitEuler", "integrator_semi_implicit_euler", {}, 1, 1},
-          {"Verlet", "integrator_verlet", {}, 2, 0},
-          {"BasicVerlet", "integrator_basic_verlet", {}, 2, 0},
-          {"ImplicitMidpoint", "integrator_implicit_midpoint", {}, 2, 2},
-          {"RK4", "integrator_rk4", {}, 4, 4},
-          {"RKMK4", "integrator_rkmk4", {}, 4, 4},
-          {"SymplecticSplitting 2", "integrator_symplectic_splitting", {2}, 2, 0},
-          {"SymplecticSplitting 4", "integrator_symplectic_splitting", {4}, 4, 0},
-          {"SymplecticSplitting 6", "integrator_symplectic_splitting", {6}, 6, 0}};
+  return {{"Euler", "integrator_euler", {}, 1},
+          {"SemiImplicitEuler", "integrator_semi_implicit_euler", {}, 1},
+          {"Verlet", "integrator_verlet", {}, 2},
+          {"BasicVerlet", "integrator_basic_verlet", {}, 2},
+          {"ImplicitMidpoint", "integrator_implicit_midpoint", {}, 2},
+          {"RK4", "integrator_rk4", {}, 4},
+          {"RKMK4", "integrator_rkmk4", {}, 4},
+          {"SymplecticSplitting 2", "integrator_symplectic_splitting", {2}, 2},
+          {"SymplecticSplitting 4", "integrator_symplectic_splitting", {4}, 4},
+          {"SymplecticSplitting 6", "integrator_symplectic_splitting", {6}, 6}};
 }
 
 // At an accuracy of 1, which any step meets, inner steps are those asked for.
 std::vector<MotionMethod> adaptive_methods(double accuracy) {
-  return {{"DormandPrince54", "integrator_dormand_prince54", {accuracy, accuracy < 1.0 ? 1.0 : 0.0}, 5, 5},
-          {"DormandPrince853", "integrator_dormand_prince853", {accuracy}, 8, 8},
-          {"Rosenbrock", "integrator_rosenbrock", {accuracy}, 4, 0},
-          {"Radau", "integrator_radau", {accuracy}, 5, 0}};
+  return {{"DormandPrince54", "integrator_dormand_prince54", {accuracy, accuracy < 1.0 ? 1.0 : 0.0}, 5},
+          {"DormandPrince853", "integrator_dormand_prince853", {accuracy}, 8},
+          {"Rosenbrock", "integrator_rosenbrock", {accuracy}, 4},
+          {"Radau", "integrator_radau", {accuracy}, 5}};
 }
 
 MotionProblem tumbling_box() {

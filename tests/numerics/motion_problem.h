@@ -16,8 +16,7 @@ struct MotionMethod {
   std::string name;     // "SymplecticSplitting 4"
   std::string library;  // "integrator_symplectic_splitting"
   std::vector<double> settings;
-  double order = 0.0;        // of its theory, on smooth problems
-  double joint_order = 0.0;  // on jointed ones with the simulator Smooth; 0: not claimed
+  double order = 0.0;  // of its theory, on smooth problems
 };
 
 // All shipped integrators; adaptive ones at an accuracy.

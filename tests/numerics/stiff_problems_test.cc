@@ -200,7 +200,8 @@ struct End {
 
 End end_of(const WorldBuilder& builder) {
   Environment world(builder.description());
-  while (world.step_count() < world.total_steps()) EXPECT_EQ(world.step(), kernel::StepOutcome::kCommitted);
+  for (std::uint32_t step = 0; step < world.total_steps(); ++step)
+    EXPECT_EQ(world.step(), kernel::StepOutcome::kCommitted);
   const std::span<const double> position = world.state().position;
   return {{position.begin(), position.end()}, world.stage_time(kernel::Stage::kForce).count()};
 }

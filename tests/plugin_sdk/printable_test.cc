@@ -16,6 +16,7 @@ TEST(Printable, LeavesWhatIsUtf8) {
 
 TEST(Printable, ShowsEveryOtherByteAsAQuestionMark) {
   EXPECT_EQ(printable("k\xfchl"), "k?hl");
+  EXPECT_EQ(printable("\xc2\x9b[2J"), "??[2J");  // a control, which some terminals obey
   EXPECT_EQ(printable("cut: \xe2\x82"), "cut: ??");
   EXPECT_EQ(printable(std::string("\0\r\x7f\x1b[1m", 7)), "????[1m");
   // overlong, a surrogate, beyond the last character

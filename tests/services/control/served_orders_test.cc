@@ -66,6 +66,18 @@ TEST(ServedOrders, SeveralBeforeOneStepAreMadeAgain) {
   EXPECT_EQ(resumed_end(options.run.checkpoint, &warnings), chain);
 }
 
+// A swap to the plugin that answers brings what was set for the same step.
+TEST(ServedOrders, ASwapKeepsWhatWasSetBeforeIt) {
+  const auto end = [](bool swaps) {
+    Served served;
+    served.client.step(10);
+    served.client.set_property(parse_set_request("Solver.Iterations=3"));
+    if (swaps) served.client.swap(parse_swap_request("solver=Sequential"));
+    return served.to_the_end().chain_hash();
+  };
+  EXPECT_EQ(end(true), end(false));
+}
+
 TEST(ServedOrders, AFaultForLaterOutlivesAnEdit) {
   Served served;
   served.client.inject("solver:kill@step=30");

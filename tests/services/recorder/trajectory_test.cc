@@ -55,7 +55,10 @@ std::vector<std::string> trajectory_of(const ScratchFolder& folder, double inter
   TrajectoryWriter writer(folder.path("out.csv"), description, interval);
   writer.offer(*environment, false);
   while (environment->step_count() < environment->total_steps()) {
-    EXPECT_EQ(environment->step(), kernel::StepOutcome::kCommitted);
+    if (environment->step() != kernel::StepOutcome::kCommitted) {
+      ADD_FAILURE() << environment->fault()->fault.text();
+      break;
+    }
     writer.offer(*environment, environment->step_count() == environment->total_steps());
   }
   // an end that was offered before is not written again

@@ -24,7 +24,8 @@ using Edge = std::vector<EdgePoint>;
 
 // With corners outwards at the greater angles, and one whose first azimuth is beyond half a turn.
 const std::vector<Edge> kEdges = {{{0.3, 0.4}, {1.8, 0.7}, {3.5, 0.35}, {5.0, 2.6}},
-                                  {{4.0, 0.4}, {4.9, 0.7}, {5.6, 0.35}, {6.2, 0.6}}};
+                                  {{4.0, 0.4}, {4.9, 0.7}, {5.6, 0.35}, {6.2, 0.6}},
+                                  {{0.0, 0.08}, {2.1, 0.45}, {4.2, 0.9}}};
 
 class ReachCone : public testing::TestWithParam<Edge> {
  protected:
@@ -90,6 +91,24 @@ TEST_P(ReachCone, BothPiecesHoldAtACornerOutwards) {
       EXPECT_EQ(all[1].upper.x(), 0.0) << corner.azimuth;
       EXPECT_EQ(all[2].upper.x(), corner.angle > 0.5 ? 0.0 : kUnlimited) << corner.azimuth;
     }
+}
+
+// A row of another piece is of no account where that piece is not: what lies inside the edge is free, however narrow it is there.
+TEST_P(ReachCone, WhatLiesInsideIsFree) {
+  const Edge& edge = GetParam();
+  for (std::size_t i = 0; i < edge.size(); ++i) {
+    const bool is_last = i + 1 == edge.size();
+    const EdgePoint from = edge[i], to = edge[is_last ? 0 : i + 1];
+    const double width = to.azimuth - from.azimuth + (is_last ? kRound : 0.0);
+    for (double share = 0.02; share < 1.0; share += 0.04) {
+      const double angle = from.angle + share * (to.angle - from.angle);
+      const std::vector<Discrepancy> all = turned_to(from.azimuth + share * width, 0.99 * angle).describe();
+      for (std::size_t row = 1; row < all.size(); ++row)
+        if (all[row].upper.x() == 0.0) {
+          EXPECT_LT(error(all[row]), 0.0) << i << ", " << share << ", row " << row;
+        }
+    }
+  }
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 // it is n = (c' u - s e)/q, q^2 = s^2 + c'^2, and its curvature on the sphere is cot(r) = cos(c) (s^2 + 2 c'^2)/q^3; so the
 // touching cone has the angle r about cos(r) p + sin(r) n. On the edge value, rate and second derivative are those of the
 // irregular cone itself; what turns far round it in a step is off by the third power of that. A second row is that of the piece
-// behind the nearer corner, as it is there; it holds where the corner points outwards. Azimuths count
+// behind the nearer corner, carried on to where a2 is; it holds where the corner points outwards. Azimuths count
 // right-handed about Axis, from the world's x as seen along it (-z for an Axis within 1e-3 of x).
 // Spring and damper: of the whole turn of body 2 against body 1 since the start, torque -k angle about its axis and -c w. They
 // take no freedom.
@@ -289,10 +289,14 @@ class Spherical final : public ConstraintPlugin {
     const bool is_past = azimuth - here.begin < here.end - azimuth;
     const ConePiece next = piece_of(cone, is_past ? (last + count - 1) % count : (last + 1) % count);
     const double corner = is_past ? here.begin : here.end;
-    const math::SinCos at = math::sincos(corner);
-    Discrepancy beside = cone_row(osculating_cone(here.reach(corner), next.slope, a1, at.cos * from + at.sin * to), a2);
     const bool is_outward = is_past ? next.slope > here.slope : next.slope < here.slope;
-    if (!is_outward) beside.upper.x() = kUnlimited;
+    // carried on to where a2 is, which is at the edge or beyond: it bounds nothing that the piece allows
+    const double beyond = here.reach(corner) + next.slope * (azimuth - corner);
+    const bool bounds = is_outward && beyond < kHalfTurn;
+    Discrepancy beside = cone_row(bounds ? osculating_cone(beyond, next.slope, a1, across)
+                                         : osculating_cone(here.reach(azimuth), here.slope, a1, across),
+                                  a2);
+    if (!bounds) beside.upper.x() = kUnlimited;
     emit(beside);
   }
 };
