@@ -21,6 +21,9 @@ class OutputFile {
   bool is_open() const { return file_ != nullptr; }
   const std::string& path() const { return path_; }
 
+  // Removes the file if it was made for nothing: it is new, and nobody began it.
+  void discard();
+
   // Empties the file, once; so does what writes or closes it. Throws std::system_error.
   void begin();
   // Needs an open file. Throws std::system_error (a full disk).
@@ -36,6 +39,7 @@ class OutputFile {
 
   std::string what_, path_;
   bool is_old_ = false;  // it holds what stood there
+  bool is_new_ = false;  // there was none, and it has not begun
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, &std::fclose};
 };
 

@@ -398,6 +398,11 @@ TEST(Capsule, RefusalsSayWhatIsAllowed) {
   };
   expect({"capture", scene, "--slot", "motor", "--out", out}, "space, collision, constraint, force, solver");
   expect({"capture", scene, "--slot", "solver", "--out", folder.path("no/x")}, "No such file");
+  // nothing is left of a capture without a call
+  expect({"capture", scene, "--slot", "solver", "--out", out, "--set", "Solver.Iterations=0"}, "Iterations");
+  expect({"capture", scene, "--slot", "solver", "--out", out, "--steps", "5", "--from-step", "10"},
+         "ended after step 5");
+  EXPECT_FALSE(std::filesystem::exists(out));
   expect({"replay", folder.path("missing")}, "No such file");
   expect({"replay", scene}, "is no capsule");
   const std::string pipe = folder.path("pipe");
