@@ -30,11 +30,13 @@ class OutputFile {
   void write(std::string_view text);
   // What was written is the file's, whatever becomes of this process. Throws std::system_error.
   void flush();
-  // Writes out everything; throws std::system_error if that fails. Does nothing the second time.
+  // Writes out everything; throws std::system_error if that fails, or if the name is no longer that of the file that was
+  // written: somebody removed it, or put another into its place. Does nothing the second time.
   void close();
 
  private:
   [[noreturn]] void fail() const;
+  bool has_lost_its_name() const;
   std::string named() const { return what_ + " '" + path_ + "'"; }
 
   std::string what_, path_;
