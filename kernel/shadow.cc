@@ -30,7 +30,7 @@ void Shadow::note(const StageCall& call, const Arena& arena) {
                  arena.count(call.reply[i]) * stage::element_size(call.info().reply[i].type)};
   }
   last_differed_ =
-      result_.add(call.method, std::span(first).first(kept_.size()), std::span(second).first(kept_.size()));
+      result_.add(call.method, std::span(first).first(kept_.size()), std::span(second).first(kept_.size())).has_value();
 }
 
 }  // namespace gravitas::kernel

@@ -34,6 +34,17 @@ AnswerProblem check_unit(std::span<const double> column, std::size_t components,
 
 }  // namespace
 
+std::string too_long(const stage::ColumnInfo& column, std::uint64_t count, std::uint64_t capacity) {
+  return std::string("column ") + column.name + " is longer than its room: answered " + std::to_string(count) +
+         " numbers, room for " + std::to_string(capacity);
+}
+
+std::string overfull_column(std::span<const stage::ColumnInfo> infos, const gravitas_reply_column* reply) {
+  for (std::size_t i = 0; i < infos.size(); ++i)
+    if (reply[i].count > reply[i].capacity) return too_long(infos[i], reply[i].count, reply[i].capacity);
+  return {};
+}
+
 AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> flags) {
   for (std::size_t i = 0; i < pair.size() / 2; ++i) {
     const std::uint32_t a = pair[2 * i], b = pair[2 * i + 1];

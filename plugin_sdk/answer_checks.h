@@ -9,8 +9,10 @@
 #include <span>
 #include <string>
 
+#include "plugin_sdk/abi.h"
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/physics_checks.h"
+#include "schemas/stage_frames.h"
 
 namespace gravitas {
 
@@ -18,6 +20,12 @@ struct AnswerProblem {
   bool is_structure = false;  // ids, order, uniqueness; else a number
   std::string text;
 };
+
+// "column position is longer than its room: answered 600 numbers, room for 300".
+std::string too_long(const stage::ColumnInfo& column, std::uint64_t count, std::uint64_t capacity);
+
+// The same of the first column of a reply that is, before anything of it is read; empty: all fit.
+std::string overfull_column(std::span<const stage::ColumnInfo> infos, const gravitas_reply_column* reply);
 
 // Pairs (a, b): a < b, both with a shape, one movable (flags of body.h), ascending, each once.
 AnswerProblem check_pairs(std::span<const std::uint32_t> pair, std::span<const std::uint32_t> flags);

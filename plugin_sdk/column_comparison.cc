@@ -3,26 +3,23 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace gravitas {
 namespace {
 
-double number_at(const std::byte* data, stage::ElementType type, std::uint64_t index) {
+double real_at(std::span<const std::byte> column, std::uint64_t k) {
   double number = 0.0;
-  std::uint32_t narrow = 0;
-  std::uint64_t wide = 0;
-  switch (type) {
-    case stage::ElementType::kF64:
-      std::memcpy(&number, data + 8 * index, 8);
-      return number;
-    case stage::ElementType::kU32:
-      std::memcpy(&narrow, data + 4 * index, 4);
-      return narrow;
-    case stage::ElementType::kU64:
-      std::memcpy(&wide, data + 8 * index, 8);
-      break;
-  }
-  return static_cast<double>(wide);
+  std::memcpy(&number, column.data() + sizeof number * k, sizeof number);
+  return number;
+}
+
+// Of those that are finite.
+double largest_magnitude(std::span<const std::byte> column) {
+  double largest = 0.0;
+  for (std::uint64_t k = 0; k < column.size() / 8; ++k)
+    if (const double size = std::abs(real_at(column, k)); std::isfinite(size)) largest = std::max(largest, size);
+  return largest;
 }
 
 }  // namespace
@@ -34,36 +31,72 @@ Disagreement& Comparison::of(stage::Method method, const stage::ColumnInfo* colu
   return disagreements.emplace_back(Disagreement{method, column});
 }
 
-bool Comparison::add(stage::Method method, std::span<const std::span<const std::byte>> first,
-                     std::span<const std::span<const std::byte>> second) {
+double& Comparison::magnitude_of(const stage::ColumnInfo* column) {
+  const auto found = std::ranges::find(magnitudes_, column, [](const auto& one) { return one.first; });
+  return found != magnitudes_.end() ? found->second : magnitudes_.emplace_back(column, 0.0).second;
+}
+
+void Comparison::count_in(std::span<const stage::ColumnInfo> infos, Columns columns) {
+  for (std::size_t i = 0; i < infos.size(); ++i) {
+    if (infos[i].type != stage::ElementType::kF64) continue;
+    double& magnitude = magnitude_of(&infos[i]);
+    magnitude = std::max(magnitude, largest_magnitude(columns[i]));
+  }
+}
+
+std::optional<std::uint64_t> Comparison::compare(std::span<const std::byte> first, std::span<const std::byte> second,
+                                                 Disagreement* disagreement) {
+  const stage::ColumnInfo& info = *disagreement->column;
+  const bool is_real = info.type == stage::ElementType::kF64;
+  const std::size_t size = stage::element_size(info.type);
+  double magnitude = 0.0;
+  if (is_real) {
+    double& known = magnitude_of(&info);
+    magnitude = known = std::max({known, largest_magnitude(first), largest_magnitude(second)});
+  }
+  std::optional<std::uint64_t> too_far;
+  std::uint64_t last_row = ~std::uint64_t{0};
+  for (std::uint64_t k = 0; k < first.size() / size; ++k) {
+    if (std::ranges::equal(first.subspan(k * size, size), second.subspan(k * size, size))) continue;
+    const std::uint64_t row = k / info.components;
+    if (std::exchange(last_row, row) != row) ++disagreement->rows;
+    double difference = is_real ? std::abs(real_at(second, k) - real_at(first, k)) : 1.0;
+    // of what is no number, too
+    if (!std::isfinite(difference)) difference = std::numeric_limits<double>::infinity();
+    if (!too_far && (tolerance == 0.0 || !is_real || difference > tolerance * magnitude)) too_far = k;
+    if (is_real && difference > 0.0) disagreement->relative = std::max(disagreement->relative, difference / magnitude);
+    if (difference <= disagreement->largest) continue;
+    disagreement->largest = difference;
+    disagreement->largest_row = row;
+  }
+  return too_far;
+}
+
+std::optional<FirstDifference> Comparison::add(stage::Method method, Columns first, Columns second) {
   ++calls;
-  bool differs = false;
+  std::optional<FirstDifference> found;
   for (std::size_t i = 0; i < first.size(); ++i) {
     if (std::ranges::equal(first[i], second[i])) continue;
-    differs = true;
     const stage::ColumnInfo& info = stage::method_info(method).reply[i];
     Disagreement& disagreement = of(method, &info);
+    std::optional<FirstDifference> here;
     if (first[i].size() != second[i].size()) {
       ++disagreement.other_counts;
-      continue;
+      here = FirstDifference{&info, std::nullopt};
+    } else if (const auto number = compare(first[i], second[i], &disagreement)) {
+      here = FirstDifference{&info, number};
     }
-    const std::size_t row_size = info.components * stage::element_size(info.type);
-    for (std::uint64_t row = 0; row < first[i].size() / row_size; ++row) {
-      if (std::ranges::equal(first[i].subspan(row * row_size, row_size), second[i].subspan(row * row_size, row_size)))
-        continue;
-      ++disagreement.rows;
-      for (std::uint64_t k = row * info.components; k < (row + 1) * info.components; ++k) {
-        const double difference =
-            std::abs(number_at(second[i].data(), info.type, k) - number_at(first[i].data(), info.type, k));
-        const double counted = info.type == stage::ElementType::kF64 ? difference : std::min(difference, 1.0);
-        if (counted <= disagreement.largest) continue;
-        disagreement.largest = counted;
-        disagreement.largest_row = row;
-      }
-    }
+    const bool tells_of_work = tolerance > 0.0 && info.rows_index == stage::kScalar;
+    if (!found && !tells_of_work) found = here;
   }
-  if (differs) ++differing_calls;
-  return differs;
+  if (found) ++differing_calls;
+  return found;
+}
+
+bool Comparison::is_alike(const stage::ColumnInfo& column, std::span<const std::byte> first,
+                          std::span<const std::byte> second) {
+  Disagreement unused{{}, &column};
+  return first.size() == second.size() && !compare(first, second, &unused);
 }
 
 }  // namespace gravitas

@@ -54,6 +54,13 @@ std::vector<gravitas_column> MessageColumns::plain() const {
   return columns;
 }
 
+std::vector<std::span<const std::byte>> MessageColumns::column_bytes() const {
+  std::vector<std::span<const std::byte>> columns;
+  for (const Numbers& numbers : columns_)
+    std::visit([&](const auto& v) { columns.push_back(std::as_bytes(std::span(v))); }, numbers);
+  return columns;
+}
+
 std::vector<gravitas_reply_column> MessageColumns::rooms() {
   std::vector<gravitas_reply_column> columns;
   for (Numbers& numbers : columns_) {

@@ -33,6 +33,7 @@ class MessageColumns {
 
   // For reading; valid until a column changes. Not aligned as a host aligns columns (column_vector.h).
   std::vector<gravitas_column> plain() const;
+  std::vector<std::span<const std::byte>> column_bytes() const;
   // For filling, with the present sizes as room.
   std::vector<gravitas_reply_column> rooms();
   void resize(std::span<const gravitas_reply_column> counts);

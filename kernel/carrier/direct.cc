@@ -9,6 +9,7 @@
 
 #include "kernel/carrier/carrier.h"
 #include "kernel/fault.h"
+#include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/library.h"
 #include "plugin_sdk/thread_pool.h"
@@ -96,11 +97,11 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
     return result;
   }
   if (result.status != GRAVITAS_OK) result.text = error_text(error);
+  const std::string overfull = overfull_column(call.info().reply, reply.data());
+  if (!overfull.empty() && result.status == GRAVITAS_OK)
+    throw StageFault(FaultKind::kBadFrame, "wire", "its answer is wrong: " + overfull);
   for (std::size_t i = 0; i < call.reply.size(); ++i) {
     const bool fits = reply[i].count <= reply[i].capacity;
-    if (!fits && result.status == GRAVITAS_OK)
-      throw StageFault(FaultKind::kBadFrame, "wire",
-                       std::string("its answer has column ") + call.info().reply[i].name + " longer than its room");
     if (fits || result.status == GRAVITAS_NEEDS_CAPACITY) arena->set_count(call.reply[i], reply[i].count);
   }
   return result;

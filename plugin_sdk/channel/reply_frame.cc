@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 
+#include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/channel/mailbox.h"
 
 namespace gravitas::channel {
@@ -17,8 +18,7 @@ std::string read_reply_frame(const gravitas_frame_header& header, std::span<cons
     if (columns[i].offset != rooms[i].offset || columns[i].capacity != rooms[i].capacity)
       return std::string("column ") + infos[i].name + " lies outside its room";
     if (!complete) continue;
-    if (columns[i].count > rooms[i].capacity)
-      return std::string("column ") + infos[i].name + " is longer than its room";
+    if (columns[i].count > rooms[i].capacity) return too_long(infos[i], columns[i].count, rooms[i].capacity);
     std::memcpy(targets[i], response + rooms[i].offset, columns[i].count * stage::element_size(infos[i].type));
     data[i] = targets[i];
   }

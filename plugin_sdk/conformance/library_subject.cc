@@ -4,6 +4,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/column_vector.h"
 #include "plugin_sdk/conformance/inquiry.h"
@@ -107,6 +108,10 @@ Answer LibrarySubject::ask(stage::Method method, const MessageColumns& request, 
       return answer;
     }
     if (answer.status != GRAVITAS_OK) continue;
+    if (const std::string overfull = overfull_column(info.reply, rooms.data()); !overfull.empty()) {
+      answer.fault = "its answer is wrong: " + overfull;
+      return answer;
+    }
     answer.columns.resize(rooms);
     const std::vector<gravitas_reply_column> came = answer.columns.rooms();
     for (std::size_t i = 0; i < came.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <optional>
 
+#include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/host/fault_injection.h"
 
 namespace gravitas::host {
@@ -196,9 +197,11 @@ void MailboxLoop::write_reply(const OpenCall& call, std::int32_t status, const c
     mine_->columns[i] = {call.room[i], call.reply[i].count, call.reply[i].capacity};
   std::array<const void*, GRAVITAS_MAX_COLUMNS> data{};
   for (std::size_t i = 0; i < call.reply_columns; ++i) data[i] = call.reply[i].data;
-  header.digest =
-      channel::frame_digest(header, std::span(mine_->columns).first(call.reply_columns),
-                            stage::kMethods[header.method].reply, status == GRAVITAS_OK ? data.data() : nullptr);
+  const std::span<const stage::ColumnInfo> infos = stage::kMethods[header.method].reply;
+  // what is longer than its room is not there to be read; the kernel refuses it by its count
+  const bool has_data = status == GRAVITAS_OK && overfull_column(infos, call.reply.data()).empty();
+  header.digest = channel::frame_digest(header, std::span(mine_->columns).first(call.reply_columns), infos,
+                                        has_data ? data.data() : nullptr);
   const std::size_t length = strnlen(text, sizeof mine_->text - 1);
   std::memcpy(mine_->text, text, length);
   mine_->text[length] = '\0';

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "plugin_sdk/answer_checks.h"
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/host/fault_injection.h"
@@ -315,6 +316,10 @@ void StreamLoop::answer(Stream* stream, const Call& call, FaultInjection* fault)
     }
   }
   if (end.status == GRAVITAS_NEEDS_CAPACITY) end = {GRAVITAS_FAILED, "it asks for more room again and again", 0};
+  // what is longer than its room is not there to be sent
+  if (const std::string overfull = overfull_column(method.reply, stream->reply.data());
+      end.status == GRAVITAS_OK && !overfull.empty())
+    end = {GRAVITAS_FAILED, "its answer is wrong: " + overfull, end.compute_ns};
 
   if (end.status != GRAVITAS_OK) {
     for (gravitas_reply_column& column : stream->reply) column.count = 0;

@@ -27,9 +27,13 @@ namespace gravitas::capsule {
 // Writes while hosts are asked, from whatever thread.
 class Writer {
  public:
-  // Throws as OutputFile does.
+  // Throws as OutputFile does. What ends without a call leaves no new file.
   Writer(const std::string& path, const recorder::v1::CapsuleHeader& header,
          OutputFile::Allowed allowed = OutputFile::Allowed::kAny);
+
+  ~Writer() { file_.discard(); }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
 
   // Index of the plugin in the capsule.
   std::uint32_t add_plugin(const kernel::PluginChoice& plugin);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <map>
 #include <memory>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "kernel/fault.h"
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/column_comparison.h"
 #include "plugin_sdk/solver.h"
 #include "services/capsule/answer_verdict.h"
 #include "services/capsule/capsule.h"
@@ -21,6 +21,7 @@
 #include "services/check/answer_text.h"
 #include "services/check/carrier_subject.h"
 #include "services/check/describe.h"
+#include "services/run/report.h"
 #include "services/run/session.h"
 
 namespace gravitas::capsule {
@@ -39,8 +40,9 @@ class OtherDerivative : public std::runtime_error {
 // One plugin of the capsule, or the one that takes its place.
 class Asked {
  public:
-  Asked(const check::Examinee& examinee, const ReplayOptions& options, std::uint32_t threads)
+  Asked(const check::Examinee& examinee, const ReplayOptions& options, std::uint32_t threads, Comparison* comparison)
       : examinee_(examinee),
+        comparison_(comparison),
         with_physics_(options.with_physics),
         subject_(examinee_, examinee_.is_command() ? kernel::Hosting::kGrpc : options.hosting,
                  {.deadline = options.deadline, .cap = 10.0 * options.deadline}, threads, &faults_) {}
@@ -50,6 +52,7 @@ class Asked {
 
  private:
   const check::Examinee examinee_;
+  Comparison* const comparison_;
   const bool with_physics_;
   std::uint32_t faults_ = 0;
   check::CarrierSubject subject_;
@@ -59,15 +62,17 @@ stage::Method method_of(const v1::CapsuleCall& call) {
   return static_cast<stage::Method>(method_named(call.method()) - stage::kMethods);
 }
 
-bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRequest& asked) {
-  const auto same = [](std::span<const double> a, std::span<const double> b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+const stage::MethodInfo& derivative_info() { return stage::method_info(stage::Method::kIntegratorDerivative); }
+
+bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRequest& asked, Comparison* comparison) {
+  const auto same = [&](const char* name, std::span<const double> numbers) {
+    const auto column = std::ranges::find(derivative_info().request, std::string_view(name), &stage::ColumnInfo::name);
+    return comparison->is_alike(*column, std::as_bytes(std::span(recorded.f64(name))), std::as_bytes(numbers));
   };
-  const std::vector<gravitas_column> plain = recorded.plain();
-  const stage::IntegratorDerivativeRequest was(plain.data());
-  return was.time() == asked.time() && same(was.position(), asked.position()) &&
-         same(was.orientation(), asked.orientation()) && same(was.linear_velocity(), asked.linear_velocity()) &&
-         same(was.angular_velocity(), asked.angular_velocity()) && was.with_jacobian() == asked.with_jacobian();
+  const double time = asked.time();
+  return same("time", {&time, 1}) && same("position", asked.position()) && same("orientation", asked.orientation()) &&
+         same("linear_velocity", asked.linear_velocity()) && same("angular_velocity", asked.angular_velocity()) &&
+         recorded.u32("with_jacobian")[0] == asked.with_jacobian();
 }
 
 // Why a run would not go on with this; empty: it would.
@@ -83,7 +88,7 @@ std::string failure_of(const v1::CapsuleCall& call, const MessageColumns& reques
 
 Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
   const stage::MethodInfo& method = *method_named(call.method());
-  const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
+  const stage::MethodInfo& derivative = derivative_info();
   int asked = 0;
   WrenchRange told;
   const auto answer = [&](const stage::IntegratorDerivativeRequest& trial) -> conformance::DerivativeAnswer {
@@ -103,7 +108,7 @@ Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
       throw OtherDerivative(fmt::format("it asks for more than {} derivatives", call.derivatives_size()));
     const v1::CapsuleDerivative& recorded = call.derivatives(asked);
     ++asked;
-    if (!is_same(columns_of(recorded.trial(), derivative.request), trial))
+    if (!is_same(columns_of(recorded.trial(), derivative.request), trial, comparison_))
       throw OtherDerivative(fmt::format("derivative {} is asked at another state", asked));
     const MessageColumns all = columns_of(recorded.answer(), derivative.reply);
     told.add(all.f64("wrench"));
@@ -125,9 +130,8 @@ Answer recorded_answer(const v1::CapsuleCall& call, bool with_physics) {
                 .fault = call.fault(),
                 .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
   WrenchRange told;
-  const stage::MethodInfo& derivative = stage::method_info(stage::Method::kIntegratorDerivative);
   for (const v1::CapsuleDerivative& one : call.derivatives())
-    told.add(columns_of(one.answer(), derivative.reply).f64("wrench"));
+    told.add(columns_of(one.answer(), derivative_info().reply).f64("wrench"));
   answer.fault = failure_of(call, columns_of(call.request(), method.request), answer, told, with_physics);
   return answer;
 }
@@ -191,8 +195,8 @@ std::optional<std::uint64_t> unserved_type(const v1::CapsuleCall& call, const Pl
 // Asks the plugins of a capsule.
 class Player {
  public:
-  Player(const Reader& capsule, const ReplayOptions& options, report::v1::ReplayReport* report)
-      : capsule_(capsule), options_(options), report_(report) {}
+  Player(const Reader& capsule, const ReplayOptions& options, Comparison* comparison, report::v1::ReplayReport* report)
+      : capsule_(capsule), options_(options), comparison_(comparison), report_(report) {}
 
   // `substitute`: instead of the capsule's own.
   Answer ask(const v1::CapsuleCall& call, const std::optional<std::string>& substitute) {
@@ -244,11 +248,12 @@ class Player {
     const std::string name = fmt::format("{} {} ({})", examinee.declaration.name, examinee.declaration.version,
                                          examinee.is_command() ? examinee.command : examinee.library);
     if (std::ranges::find(report_->plugins(), name) == report_->plugins().end()) report_->add_plugins(name);
-    return std::make_unique<Asked>(examinee, options_, capsule_.header().threads());
+    return std::make_unique<Asked>(examinee, options_, capsule_.header().threads(), comparison_);
   }
 
   const Reader& capsule_;
   const ReplayOptions& options_;
+  Comparison* const comparison_;
   report::v1::ReplayReport* report_;
   std::map<std::string, check::Examinee> substitutes_;
   std::map<std::pair<std::string, std::uint64_t>, std::string> unserved_;  // why calls are left out
@@ -270,6 +275,28 @@ void note_first(const v1::CapsuleCall& call, std::uint32_t number, const std::st
   first.set_step(call.step());
   first.set_method(call.method());
   first.set_text(text);
+}
+
+// What differences are relative to: what was answered in the run, whichever calls are chosen.
+Comparison comparison_in(const ReplayOptions& options, const std::function<bool(std::uint32_t)>& progress) {
+  Comparison comparison;
+  comparison.tolerance = options.tolerance;
+  Reader capsule(options.file);
+  const auto count_in = [&](const ColumnBytes& bytes, std::span<const stage::ColumnInfo> infos) {
+    comparison.count_in(infos, columns_of(bytes, infos).column_bytes());
+  };
+  v1::CapsuleCall call;
+  for (std::uint32_t number = 1; capsule.next(&call) && progress(number); ++number) {
+    if (call.fault().empty() && call.status() == GRAVITAS_OK)
+      count_in(call.reply(), method_named(call.method())->reply);
+    for (const v1::CapsuleDerivative& one : call.derivatives()) count_in(one.trial(), derivative_info().request);
+  }
+  return comparison;
+}
+
+void write_differences(const Comparison& comparison, report::v1::ReplayReport* report) {
+  report->set_tolerance(comparison.tolerance);
+  for (const Disagreement& one : comparison.disagreements) write_disagreement(one, report->add_disagreements());
 }
 
 // Calls `judge` with each chosen call and its number, until it or `progress` says false. Throws BadInput if all must be left out.
@@ -303,7 +330,8 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
   Reader capsule(options.file);
   report::v1::ReplayReport report;
   report.set_capsule(options.file);
-  Player player(capsule, options, &report);
+  Comparison comparison = comparison_in(options, progress);
+  Player player(capsule, options, &comparison, &report);
   const auto must_leave_out = [&](const v1::CapsuleCall& call) {
     return options.plugin && player.must_leave_out(call, *options.plugin);
   };
@@ -319,7 +347,7 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
             if (i == 0 && came.ok() && method_of(call) == stage::Method::kSolverSolve)
               add_solution(call, number, came, &report);
             if (was.fault.empty() || has_failed)
-              text = was.fault.empty() ? check::difference(method_of(call), was, came) : came.fault;
+              text = was.fault.empty() ? check::difference(method_of(call), was, came, &comparison) : came.fault;
           } catch (const OtherDerivative& other) {
             text = other.what();
           }
@@ -343,6 +371,7 @@ report::v1::ReplayReport replay(const ReplayOptions& options, const std::functio
         if (!text.empty()) note_first(call, number, text, &report);
         return true;
       });
+  write_differences(comparison, &report);
   return report;
 }
 
@@ -351,7 +380,8 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
   Reader capsule(options.file);
   report::v1::ReplayReport report;
   report.set_capsule(options.file);
-  Player player(capsule, options, &report);
+  Comparison comparison = comparison_in(options, progress);
+  Player player(capsule, options, &comparison, &report);
   const auto ask = [&](const v1::CapsuleCall& call, const std::string& plugin) {
     try {
       return player.ask(call, plugin);
@@ -365,7 +395,7 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
   for_each_call(&capsule, options, &report, progress, must_leave_out,
                 [&](const v1::CapsuleCall& call, std::uint32_t number) {
                   const Answer a = ask(call, *options.plugin);
-                  const std::string text = check::difference(method_of(call), a, ask(call, other));
+                  const std::string text = check::difference(method_of(call), a, ask(call, other), &comparison);
                   if (!text.empty()) {
                     report.set_different(1);
                     report.clear_first();  // a difference is what is looked for
@@ -378,6 +408,7 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
                   }
                   return text.empty();
                 });
+  write_differences(comparison, &report);
   return report;
 }
 

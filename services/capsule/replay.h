@@ -1,4 +1,4 @@
-// Asks plugins again what a capsule holds, each call alone, and compares the answers to the byte.
+// Asks plugins again what a capsule holds, each call alone, and compares the answers.
 #pragma once
 
 #include <functional>
@@ -19,6 +19,7 @@ struct ReplayOptions {
   double deadline = 2.0;    // s
   std::uint32_t only = 0;   // that call, from 1; 0: all
   std::uint32_t times = 1;  // each call so often, for a profiler
+  double tolerance = 0.0;   // answers so close are the same: Comparison::tolerance
   // Answers are held against laws of physics, too, as in a run with CheckPhysicsEvery; a request that was kept because
   // its answer broke one is in any case.
   bool with_physics = false;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 
 #include "plugin_sdk/property_value.h"
 
@@ -42,24 +41,23 @@ std::string outcome_text(const conformance::Answer& answer) {
 }
 
 std::string difference(stage::Method method, const conformance::Answer& first, const conformance::Answer& second) {
+  Comparison comparison;
+  return difference(method, first, second, &comparison);
+}
+
+std::string difference(stage::Method method, const conformance::Answer& first, const conformance::Answer& second,
+                       Comparison* comparison) {
   if (first.fault != second.fault || first.status != second.status)
     return fmt::format("first {}, then {}", outcome_text(first), outcome_text(second));
   if (!first.ok()) return {};
-  const std::span<const stage::ColumnInfo> infos = stage::method_info(method).reply;
-  const std::vector<gravitas_column> a = first.columns.plain(), b = second.columns.plain();
-  for (std::size_t i = 0; i < infos.size(); ++i) {
-    if (a[i].count != b[i].count)
-      return fmt::format("column {} had {} numbers, then {}", infos[i].name, a[i].count, b[i].count);
-    const std::size_t size = stage::element_size(infos[i].type);
-    for (std::uint64_t k = 0; k < a[i].count; ++k) {
-      if (std::memcmp(static_cast<const char*>(a[i].data) + k * size, static_cast<const char*>(b[i].data) + k * size,
-                      size) == 0)
-        continue;
-      return fmt::format("number {} of column {} was {}, then {}", k, infos[i].name,
-                         element_text(infos[i], a[i].data, k), element_text(infos[i], b[i].data, k));
-    }
-  }
-  return {};
+  const auto found = comparison->add(method, first.columns.column_bytes(), second.columns.column_bytes());
+  if (!found) return {};
+  const stage::ColumnInfo& info = *found->column;
+  const std::size_t i = found->column - stage::method_info(method).reply.data();
+  const gravitas_column a = first.columns.plain()[i], b = second.columns.plain()[i];
+  if (!found->number) return fmt::format("column {} had {} numbers, then {}", info.name, a.count, b.count);
+  return fmt::format("number {} of column {} was {}, then {}", *found->number, info.name,
+                     element_text(info, a.data, *found->number), element_text(info, b.data, *found->number));
 }
 
 }  // namespace gravitas::check

@@ -16,6 +16,7 @@
 #include "services/cli/terminal.h"
 #include "services/recorder/json.h"
 #include "services/run/exchange_spec.h"
+#include "services/run/report.h"
 #include "services/run/session.h"
 
 namespace gravitas::cli {
@@ -85,16 +86,23 @@ struct ReplayLine {
   bool json = false;
 };
 
-void print_first(const report::v1::ReplayReport& report) {
+// " to within 1e-09", or nothing: bit for bit.
+std::string closeness(const report::v1::ReplayReport& report) {
+  return report.tolerance() == 0.0 ? std::string() : fmt::format(" to within {:g}", report.tolerance());
+}
+
+// The first call that differs, and how far all answers are apart.
+void print_findings(const report::v1::ReplayReport& report) {
   if (!report.note().empty()) std::cerr << fmt::format("capsule '{}': {}\n", report.capsule(), report.note());
   if (report.left_out() > 0)
     std::cout << fmt::format("{} calls left out, as {}\n", report.left_out(),
                              fmt::join(report.left_out_because(), "; "));
   if (!report.remark().empty()) std::cout << report.remark() << '\n';
-  if (!report.has_first()) return;
-  const report::v1::ReplayFinding& first = report.first();
-  std::cout << fmt::format("first: call {} ({}, step {}): {}\n", first.call(), first.method(), first.step(),
-                           first.text());
+  if (report.has_first())
+    std::cout << fmt::format("first: call {} ({}, step {}): {}\n", report.first().call(), report.first().method(),
+                             report.first().step(), report.first().text());
+  for (const report::v1::Disagreement& one : report.disagreements())
+    std::cout << fmt::format("  {}\n", disagreement_text(one));
 }
 
 std::function<bool(std::uint32_t)> progress_of(StatusLine* line) {
@@ -136,14 +144,15 @@ int replay(ReplayLine* line) {
   } else {
     for (const std::string& plugin : report.plugins()) std::cout << plugin << '\n';
     print_solutions(report);
-    std::cout << fmt::format("{} calls: {} same, {} different", report.calls(), report.same(), report.different());
+    std::cout << fmt::format("{} calls: {} same{}, {} different", report.calls(), report.same(), closeness(report),
+                             report.different());
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed again", report.failed_again());
     if (report.answered_now() > 0)
       std::cout << fmt::format(", {} failed then and are answered now", report.answered_now());
     if (report.not_judged() > 0)
       std::cout << fmt::format(", {} broke a law of physics then, which is not judged now", report.not_judged());
     std::cout << '\n';
-    print_first(report);
+    print_findings(report);
   }
   if (interrupted()) return kInterrupted;
   const int code = verdict(report, report.different() + report.failed_again());
@@ -162,10 +171,10 @@ int bisect(ReplayLine* line) {
   if (line->json) {
     std::cout << to_json(report, JsonForm::kPage);
   } else {
-    std::cout << fmt::format("{} calls answered alike", report.same());
+    std::cout << fmt::format("{} calls answered alike{}", report.same(), closeness(report));
     if (report.failed_again() > 0) std::cout << fmt::format(", {} failed alike", report.failed_again());
     std::cout << (report.different() == 0 ? "\n" : ", then a difference\n");
-    print_first(report);
+    print_findings(report);
   }
   if (interrupted()) return kInterrupted;
   return verdict(report, report.different() + report.failed_again());
@@ -179,6 +188,12 @@ void add_replay_options(CLI::App* command, ReplayLine* line) {
       "a profiler [shm]");
   command->add_option("--deadline", line->options.deadline, "Of a call, s [2]")->check(positive_seconds());
   command->add_option("--call", line->options.only, "That call alone, counted from 1")->check(whole_number(1));
+  command
+      ->add_option("--tolerance", line->options.tolerance,
+                   "Answers so close are the same: each real number to that part of the largest magnitude of its "
+                   "column in the capsule, integers to the bit; what solvers and integrators say of their work "
+                   "(iterations, residual) is no difference then. 0: bit for bit [0]")
+      ->check(number_from_zero());
   command->add_flag(
       "--physics", line->options.with_physics,
       "Hold answers against laws of physics, too, as a run with CheckPhysicsEvery does; a request that was "
@@ -209,7 +224,9 @@ void add_replay(CLI::App* app, Action* action) {
   command->footer(
       "Example: gravitas replay solver.capsule --plugin build/mine/solver_mine.so\n"
       "         gdb --args gravitas replay solver.capsule --hosting direct --call 17\n"
-      "         gravitas replay solver.capsule --plugin Newton --json\n"
+      "         gravitas replay solver.capsule --plugin Newton --tolerance 1e-6\n"
+      "Of each column that is not the same bytes everywhere it tells how far the answers are apart at most, and in "
+      "which row. "
       "Of a solver it says how each problem ended: iterations, residual, why it stopped. The file is described in "
       "schemas/gravitas/recorder/v1/capsule.proto.\n"
       "Answers are checked as in a run: what it would not use has failed. "
@@ -230,6 +247,7 @@ void add_bisect(CLI::App* app, Action* action) {
       app->add_subcommand("bisect", "Find the first call of a capsule that two plugins answer differently");
   command->footer(
       "Example: gravitas bisect solver.capsule before/solver_mine.so after/solver_mine.so\n"
+      "         gravitas bisect solver.capsule before/solver_mine.so after/solver_mine.so --tolerance 1e-12\n"
       "Exits with 4 if there is one, or if both fail at a call alike: a run would not use their answer.");
   add_replay_options(command, line.get());
   command->add_option("A", line->plugin, "A library, a command or the name of an installed plugin")->required();

@@ -1,5 +1,6 @@
 // gravitas: one program, sub-commands. Results go to standard output, everything else to standard error.
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -51,6 +52,19 @@ void raise_descriptor_limit() {
   setrlimit(RLIMIT_NOFILE, &limit);
 }
 
+// Threads get stacks of the soft limit that stood when their program began, and so do workers: where it is too low it is
+// raised, and this program begun again. Why that cannot be; empty: it is high enough.
+std::string too_small_stack(char** argv) {
+  constexpr rlim_t kNeeded = rlim_t{512} << 10, kUsual = rlim_t{8} << 20;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= kNeeded) return {};
+  const rlim_t before = limit.rlim_cur;
+  limit.rlim_cur = std::min(kUsual, limit.rlim_max);
+  if (limit.rlim_cur >= kNeeded && setrlimit(RLIMIT_STACK, &limit) == 0) execv("/proc/self/exe", argv);
+  return "it needs a stack of at least " + std::to_string(kNeeded >> 10) + " KB, and Linux allows this program " +
+         std::to_string(before >> 10) + " (ulimit -s)";
+}
+
 // `code`, unless what was printed is lost.
 int exit_code(int code) {
   if (std::cout.flush() && std::fflush(stdout) == 0) return code;
@@ -70,8 +84,8 @@ std::string option_without_value(const std::vector<std::string>& words) {
 
 int main(int argc, char** argv) {
   using namespace gravitas;
-  const std::string missing = missing_cpu_features();
-  if (!missing.empty()) {
+  for (const std::string& missing : {missing_cpu_features(), too_small_stack(argv)}) {
+    if (missing.empty()) continue;
     std::cerr << "gravitas: " << missing << '\n';
     return cli::kOurFault;
   }

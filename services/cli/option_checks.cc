@@ -43,6 +43,15 @@ CLI::Validator any_number(const std::string& allowed) {
       allowed);
 }
 
+CLI::Validator number_from_zero() {
+  return check_of(
+      [](const std::string& text) {
+        double number = 0.0;
+        return is_read(text, &number) && std::isfinite(number) && number >= 0.0;
+      },
+      "a finite number >= 0");
+}
+
 CLI::Validator seconds_between(double least, double most) {
   return check_of(
       [=](const std::string& text) {

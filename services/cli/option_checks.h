@@ -14,6 +14,9 @@ CLI::Validator whole_number(std::uint64_t least, std::uint64_t most = std::numer
 // A number; `allowed` says of what, and which: "a number of seconds > 0". Its range is for the command to judge.
 CLI::Validator any_number(const std::string& allowed);
 
+// A finite number that is not negative.
+CLI::Validator number_from_zero();
+
 // A number of seconds from `least` to `most`.
 CLI::Validator seconds_between(double least, double most);
 

@@ -37,10 +37,7 @@ std::string differences(const api::ServedSwap& swap) {
   std::string text;
   if (!swap.compares()) return text;
   for (const report::v1::Disagreement& one : swap.shadow().disagreements())
-    text += fmt::format(
-        "      {}: {:.3g} {} apart at most{}{}\n", one.quantity(), one.largest(), one.unit(),
-        one.body().empty() ? "" : ", of " + one.body(),
-        one.other_counts() == 0 ? "" : fmt::format("; {} times another number of rows", one.other_counts()));
+    text += fmt::format("      {}\n", disagreement_text(one));
   return text;
 }
 

@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "plugin_sdk/local_bound.h"
 #include "plugin_sdk/solver/islands.h"
 
 namespace gravitas {
@@ -73,6 +74,28 @@ ChangedBodies changed_bodies(const EditedParts& parts) {
   return bodies;
 }
 
+// Bodies that may move and whose bounds meet, where the edit leaves them, those of `placed` bodies that may not.
+Ids met_in_place(const EditedParts& parts, const Ids& placed) {
+  const std::vector<kernel::BodyDescription>& bodies = parts.next.bodies;
+  std::vector<LocalBound> all;
+  for (const kernel::BodyDescription& body : bodies) all.push_back(body.bound);
+  const double margin = contact_margin(all);
+  std::vector<Bounds> supports;
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    if ((bodies[i].flags & kMovable) == 0 && bodies[i].shape != kNone && placed.contains(bodies[i].id))
+      supports.push_back(widened(bounds_of(bodies[i].bound, parts.places[i]), margin));
+  Ids met;
+  for (std::size_t i = 0; i < bodies.size() && !supports.empty(); ++i) {
+    if ((bodies[i].flags & kMovable) == 0 || bodies[i].shape == kNone) continue;
+    const Bounds own = bounds_of(bodies[i].bound, parts.places[i]);
+    const auto meets = [&](const Bounds& other) {
+      return (own.lower.array() <= other.upper.array()).all() && (other.lower.array() <= own.upper.array()).all();
+    };
+    if (std::ranges::any_of(supports, meets)) met.insert(bodies[i].id);
+  }
+  return met;
+}
+
 }  // namespace
 
 std::vector<bool> find_disturbed(const EditedParts& parts, std::span<const std::uint32_t> contact_body,
@@ -80,9 +103,7 @@ std::vector<bool> find_disturbed(const EditedParts& parts, std::span<const std::
   const std::vector<kernel::BodyDescription>& bodies = parts.described.bodies;
   const ChangedBodies changes = changed_bodies(parts);
   const auto is_movable = [&](std::uint32_t body) { return (bodies[body].flags & kMovable) != 0; };
-  // what moves is found by what it meets
-  for (const kernel::BodyDescription& body : parts.next.bodies)
-    if (changes.placed.contains(body.id) && (body.flags & kMovable) == 0) return std::vector<bool>(bodies.size(), true);
+  const Ids met = met_in_place(parts, changes.placed);
   std::vector<bool> disturbed(bodies.size());
   for (std::uint32_t i = 0; i < bodies.size(); ++i) disturbed[i] = changes.all.contains(bodies[i].id);
   const std::vector<bool> is_changed = disturbed;
@@ -96,6 +117,7 @@ std::vector<bool> find_disturbed(const EditedParts& parts, std::span<const std::
       disturbed[moves] = disturbed[moves] || is_changed[a] || is_changed[b];
     }
   };
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) disturbed[i] = disturbed[i] || met.contains(bodies[i].id);
   for (std::size_t i = 0; i + 1 < contact_body.size(); i += 2) join(contact_body[i], contact_body[i + 1]);
   for (std::size_t j = 0; j < intact.size(); ++j)
     if (intact[j] != 0) join(parts.described.constraints[j].body1, parts.described.constraints[j].body2);

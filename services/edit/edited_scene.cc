@@ -322,7 +322,7 @@ void translate(const std::vector<std::uint32_t>& rows, Numbers* numbers) {
 std::vector<bool> EditedScene::resting_on(const kernel::SavedState& before) const {
   const ColumnTable state(before);
   const std::vector<bool> disturbed =
-      find_disturbed({first_, scene_, log_, before_, description_}, state.at<std::uint32_t>("contact_body"),
+      find_disturbed({first_, scene_, log_, before_, description_, pose_}, state.at<std::uint32_t>("contact_body"),
                      state.at<std::uint32_t>("intact"));
   std::vector<bool> resting;
   for (const std::uint32_t row : old_body_) resting.push_back(row != kNone && !disturbed[row]);

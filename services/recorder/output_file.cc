@@ -16,7 +16,10 @@ OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
     : what_(std::move(what)), path_(std::move(path)) {
   if (path_.empty()) return;
   const bool is_any = allowed == Allowed::kAny;
-  const int handle = open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (is_any ? 0 : O_NONBLOCK), 0666);
+  const int flags = O_WRONLY | O_CREAT | O_CLOEXEC | (is_any ? 0 : O_NONBLOCK);
+  int handle = open(path_.c_str(), flags | O_EXCL, 0666);
+  is_new_ = handle >= 0;
+  if (!is_new_ && errno == EEXIST) handle = open(path_.c_str(), flags, 0666);
   // ENXIO: a pipe that nobody reads
   struct stat about = {};
   if (handle < 0 ? errno != ENXIO || is_any : fstat(handle, &about) != 0) fail();
@@ -29,7 +32,12 @@ OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
     throw std::runtime_error(named() + ": another run is writing it");
 }
 
+void OutputFile::discard() {
+  if (std::exchange(is_new_, false)) unlink(path_.c_str());
+}
+
 void OutputFile::begin() {
+  is_new_ = false;
   if (std::exchange(is_old_, false) && ftruncate(fileno(file_.get()), 0) != 0) fail();
 }
 
@@ -42,9 +50,21 @@ void OutputFile::flush() {
   if (file_ && std::fflush(file_.get()) != 0) fail();
 }
 
+bool OutputFile::has_lost_its_name() const {
+  struct stat written = {}, there = {};
+  if (fstat(fileno(file_.get()), &written) != 0 || !S_ISREG(written.st_mode)) return false;
+  if (stat(path_.c_str(), &there) != 0) return errno == ENOENT || errno == ENOTDIR;
+  return there.st_dev != written.st_dev || there.st_ino != written.st_ino;
+}
+
 void OutputFile::close() {
   begin();
-  if (file_ && std::fclose(file_.release()) != 0) fail();
+  if (!file_) return;
+  const bool is_lost = has_lost_its_name();
+  if (std::fclose(file_.release()) != 0) fail();
+  if (is_lost)
+    throw std::system_error(ENOENT, std::generic_category(),
+                            named() + " was removed or replaced while it was being written");
 }
 
 void OutputFile::fail() const { throw std::system_error(errno, std::generic_category(), named()); }

@@ -112,6 +112,16 @@ std::string edit_line(const report::v1::EditRecord& edit) {
   return fmt::format("edit before step {}: {} change{}", edit.step(), edit.changes(), edit.changes() == 1 ? "" : "s");
 }
 
+void write_disagreement(const Disagreement& from, report::v1::Disagreement* to) {
+  to->set_quantity(fmt::format("{} {}", stage::method_info(from.method).name, from.column->name));
+  to->set_largest(from.largest);
+  to->set_relative(from.relative);
+  to->set_row(from.largest_row);
+  to->set_unit(from.column->unit);
+  to->set_rows(from.rows);
+  to->set_other_counts(from.other_counts);
+}
+
 void write_comparison(const Comparison& from, const kernel::Environment& environment, report::v1::Comparison* to) {
   to->set_calls(from.calls);
   to->set_differing_calls(from.differing_calls);
@@ -120,20 +130,29 @@ void write_comparison(const Comparison& from, const kernel::Environment& environ
   to->set_to_us(per_call * static_cast<double>(from.second_ns));
   for (const Disagreement& one : from.disagreements) {
     report::v1::Disagreement* disagreement = to->add_disagreements();
-    disagreement->set_quantity(fmt::format("{} {}", stage::method_info(one.method).name, one.column->name));
-    disagreement->set_largest(one.largest);
-    disagreement->set_row(one.largest_row);
-    disagreement->set_unit(one.column->unit);
+    write_disagreement(one, disagreement);
     if (std::string_view(one.column->rows) == "body" && one.largest_row < environment.model().body_count)
       disagreement->set_body(environment.model().body_id[one.largest_row]);
-    disagreement->set_rows(one.rows);
-    disagreement->set_other_counts(one.other_counts);
   }
 }
 
 std::string comparison_text(const report::v1::Comparison& comparison) {
   return fmt::format("{} of {} answers differ; {:.3g} us and {:.3g} us a call", comparison.differing_calls(),
                      comparison.calls(), comparison.from_us(), comparison.to_us());
+}
+
+std::string disagreement_text(const report::v1::Disagreement& disagreement) {
+  const auto& one = disagreement;
+  const std::string row = fmt::format("row {}{}", one.row(), one.body().empty() ? "" : ", " + one.body());
+  std::string apart;
+  if (one.relative() > 0.0)
+    apart = fmt::format("{:.3g}{} apart at most, {:.3g} of the largest ({})", one.largest(),
+                        one.unit() == "1" ? "" : " " + one.unit(), one.relative(), row);
+  else if (one.rows() > 0)
+    apart = fmt::format("{} rows differ ({})", one.rows(), row);
+  if (one.other_counts() > 0)
+    apart += fmt::format("{}{} times another number of rows", apart.empty() ? "" : "; ", one.other_counts());
+  return one.quantity() + ": " + apart;
 }
 
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {

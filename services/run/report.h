@@ -24,8 +24,14 @@ void note_edit(const edit::v1::Edit& edit, report::v1::Report* report);
 // "edit before step 31: 2 changes".
 std::string edit_line(const report::v1::EditRecord& edit);
 
+// Without the body.
+void write_disagreement(const Disagreement& from, report::v1::Disagreement* to);
+
 // "3 of 100 answers differ; 12.3 us and 45.6 us a call".
 std::string comparison_text(const report::v1::Comparison& comparison);
+
+// "Solver.Solve linear_velocity: 0.00123 m/s apart at most, 4.5e-06 of the largest (row 7, Ball)".
+std::string disagreement_text(const report::v1::Disagreement& disagreement);
 
 // Who took over, of a fault that was recovered by a fallback; else empty.
 std::string fallback_of(const std::string& recovered_by);

@@ -119,13 +119,17 @@ const Expected kWrong[] = {
     {"integrator_long", FaultKind::kBadStructure, "structure", "position has 200000 rows"},
 };
 
-// Where it is a library of this process.
-const Expected kOverfull[] = {{"integrator_overfull", FaultKind::kBadFrame, "wire", "longer than its room"}};
+// Says that all is well with an answer that its room cannot hold: nobody reads beyond it.
+const Expected kOverfull[] = {{"integrator_overfull", FaultKind::kBadFrame, "wire",
+                               "column plugin_state is longer than its room: answered 200000 numbers, room for "}};
 
 // Where messages have the room they need the worker notices it, elsewhere the kernel.
 const Expected kGreedy[] = {
     {"integrator_wants_room", FaultKind::kBadStructure, "structure", "room for"},
     {"integrator_wants_more_room", FaultKind::kBadStructure, "structure", "more room again and again"}};
+const Expected kOverfullInMessages[] = {
+    {"integrator_overfull", FaultKind::kFailure, "status",
+     "column plugin_state is longer than its room: answered 200000 numbers, room for "}};
 const Expected kGreedyInMessages[] = {
     {"integrator_wants_room", FaultKind::kFailure, "status", "room for"},
     {"integrator_wants_more_room", FaultKind::kFailure, "status", "more room again and again"}};
@@ -135,9 +139,11 @@ std::string name_of(const ::testing::TestParamInfo<Expected>& one) { return one.
 INSTANTIATE_TEST_SUITE_P(Fatal, InWorker, ::testing::ValuesIn(kFatal), name_of);
 INSTANTIATE_TEST_SUITE_P(Wrong, InWorker, ::testing::ValuesIn(kWrong), name_of);
 INSTANTIATE_TEST_SUITE_P(Greedy, InWorker, ::testing::ValuesIn(kGreedy), name_of);
+INSTANTIATE_TEST_SUITE_P(Overfull, InWorker, ::testing::ValuesIn(kOverfull), name_of);
 INSTANTIATE_TEST_SUITE_P(Fatal, InGrpcWorker, ::testing::ValuesIn(kFatal), name_of);
 INSTANTIATE_TEST_SUITE_P(Wrong, InGrpcWorker, ::testing::ValuesIn(kWrong), name_of);
 INSTANTIATE_TEST_SUITE_P(Greedy, InGrpcWorker, ::testing::ValuesIn(kGreedyInMessages), name_of);
+INSTANTIATE_TEST_SUITE_P(Overfull, InGrpcWorker, ::testing::ValuesIn(kOverfullInMessages), name_of);
 
 class InProcess : public ::testing::TestWithParam<Expected> {};
 

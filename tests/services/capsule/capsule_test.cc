@@ -2,11 +2,13 @@
 // that a run ended at fails again.
 #include "services/capsule/capsule.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -97,6 +99,42 @@ TEST(Capsule, BisectFindsTheFirstCallThatTwoPluginsAnswerDifferently) {
   const ProgramResult other = run_program({"bisect", file, "SemiImplicitEuler", "Euler"}, folder);
   EXPECT_EQ(other.exit_code, 4) << other.err;
   EXPECT_THAT(other.out, HasSubstr("first: call 1 (Integrator.Integrate, step 1)"));
+}
+
+// What is told of the differences is what tells them: a tolerance of the largest lets all pass, half of it does not.
+TEST(Capsule, AToleranceLetsDifferencesPassThatAreTold) {
+  const ScratchFolder folder;
+  const std::string file = folder.path("stack.capsule");
+  ASSERT_EQ(run_program({"capture", shipped_scene("stack"), "--slot", "solver", "--out", file, "--steps", "12"}, folder)
+                .exit_code,
+            0);
+  const auto asked = [&](const std::vector<std::string>& words, int exit_code) {
+    std::vector<std::string> all = {"replay", file, "--plugin", "Newton", "--json"};
+    all.insert(all.end(), words.begin(), words.end());
+    const ProgramResult result = run_program(all, folder);
+    EXPECT_EQ(result.exit_code, exit_code) << result.out << result.err;
+    report::v1::ReplayReport report;
+    EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(result.out, &report).ok());
+    return report;
+  };
+  const report::v1::ReplayReport bitwise = asked({}, 4);
+  double largest = 0.0;
+  for (const report::v1::Disagreement& one : bitwise.disagreements())
+    if (!one.quantity().ends_with(" residual")) largest = std::max(largest, one.relative());
+  EXPECT_GT(largest, 0.0);
+  const auto text = [](double number) { return fmt::format("{:.17g}", number); };
+  const report::v1::ReplayReport wide = asked({"--tolerance", text(largest * (1 + 1e-12))}, 0);
+  EXPECT_EQ(wide.same(), wide.calls());
+  EXPECT_EQ(wide.disagreements_size(), bitwise.disagreements_size()) << "told all the same";
+  EXPECT_GT(asked({"--tolerance", text(largest / 2)}, 4).different(), 0U);
+  EXPECT_EQ(asked({"--tolerance", "0"}, 4).different(), bitwise.different());
+
+  const ProgramResult alike = run_program({"bisect", file, "Sequential", "Newton", "--tolerance", "2"}, folder);
+  EXPECT_EQ(alike.exit_code, 0) << alike.out << alike.err;
+  EXPECT_THAT(alike.out, HasSubstr("12 calls answered alike to within 2\n  Solver.Solve "));
+  EXPECT_THAT(alike.out, ::testing::ContainsRegex("apart at most, [0-9.e-]+ of the largest \\(row [0-9]+\\)\n"));
+  for (const char* bad : {"-1", "nan", "inf", "x"})
+    EXPECT_EQ(run_program({"bisect", file, "Sequential", "Newton", "--tolerance", bad}, folder).exit_code, 2) << bad;
 }
 
 TEST(Capsule, AnotherPluginIsComparedWithTheOneThatAnswered) {
@@ -363,6 +401,11 @@ TEST(Capsule, RefusalsSayWhatIsAllowed) {
   };
   expect({"capture", scene, "--slot", "motor", "--out", out}, "space, collision, constraint, force, solver");
   expect({"capture", scene, "--slot", "solver", "--out", folder.path("no/x")}, "No such file");
+  // nothing is left of a capture without a call
+  expect({"capture", scene, "--slot", "solver", "--out", out, "--set", "Solver.Iterations=0"}, "Iterations");
+  expect({"capture", scene, "--slot", "solver", "--out", out, "--steps", "5", "--from-step", "10"},
+         "ended after step 5");
+  EXPECT_FALSE(std::filesystem::exists(out));
   expect({"replay", folder.path("missing")}, "No such file");
   expect({"replay", scene}, "is no capsule");
   const std::string pipe = folder.path("pipe");

@@ -348,5 +348,21 @@ TEST(Run, KnowsHowWorkersEndedUnderAParentThatIgnoresThem) {
   EXPECT_THAT(result.out, HasSubstr("was killed by signal 9 (Killed)"));
 }
 
+// A low soft limit is raised, as far as the hard one lets it be.
+TEST(Run, ASmallStackIsRaisedOrRefused) {
+  const ScratchFolder folder;
+  const auto run = [&](const std::string& limit, const std::string& hosting) {
+    const std::string command = "ulimit " + limit + " -s 64; " + in_build("/bin/gravitas") + " run " +
+                                shipped_scene("stack") + " --steps 5 --quiet --hosting " + hosting +
+                                " > /dev/null 2> " + folder.path("told");
+    return WEXITSTATUS(std::system(command.c_str()));
+  };
+  for (const char* hosting : {"direct", "shm"})
+    EXPECT_EQ(run("-S", hosting), 0) << hosting << harness::read_file(folder.path("told"));
+  EXPECT_EQ(run("", "direct"), 1);
+  EXPECT_THAT(harness::read_file(folder.path("told")),
+              HasSubstr("it needs a stack of at least 512 KB, and Linux allows this program 64 (ulimit -s)"));
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -325,8 +325,8 @@ TEST(EditedRun, WhoSleepsWakesUp) {
 // whom it touches and hangs together with; all others sleep on, and those that rest fall asleep when they would have.
 TEST(EditedRun, WhomAnEditDoesNotDisturbSleepsOn) {
   const auto happens = [](const std::vector<std::string>& edits, const std::string& rest = "",
-                          const std::string& more = "") {
-    EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" +
+                          const std::string& more = "", const std::string& bodies = "") {
+    EditedRun run(scene(bodies + "Body { Id = \"Ground\" GeometryId = \"Flat\" }\n" +
                             ball("A", "Position = {0, 0.1, 0}", kFalls) + ball("B", "Position = {3, 0.1, 0}", kFalls) +
                             ball("Far", "Position = {100, 50, 0} LinearVelocity = {0, 0, 1}"),
                         rest),
@@ -371,11 +371,24 @@ TEST(EditedRun, WhomAnEditDoesNotDisturbSleepsOn) {
   EXPECT_THAT(happens({"set Body.A.Mass=2@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
   EXPECT_THAT(happens({"set Constraint.Rope.MaximumDistance=5@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
   EXPECT_THAT(happens({"remove Constraint.Rope@step=81"}, rope), ElementsAreArray(and_then({"A", "B"})));
-  // no contact is looked for between what stands still
-  EXPECT_THAT(happens({}, "",
-                      "Bodies { Body { Id = \"Wall\" GeometryId = \"Unit\" Immovable = true KineticProperties { "
-                      "Position = {0.15, 0.1, 0} } } }"),
-              ElementsAreArray(and_then({"A", "B"})));
+  // no contact is looked for between what stands still: who is where it is put wakes
+  const auto wall = [](const std::string& position) {
+    return "Bodies { Body { Id = \"Wall\" GeometryId = \"Unit\" Immovable = true KineticProperties { Position = " +
+           position + " } } }";
+  };
+  EXPECT_THAT(happens({}, "", wall("{0.15, 0.1, 0}")), ElementsAreArray(and_then({"A"})));
+  EXPECT_THAT(happens({}, "", wall("{3.15, 0.1, 0}")), ElementsAreArray(and_then({"B"})));
+  EXPECT_THAT(happens({}, "", wall("{1.5, 40, 0}")), ElementsAreArray(quiet));
+  // of one that is there already: whom it touched wakes, and whom it meets
+  const std::string beside =
+      "Body { Id = \"Wall\" GeometryId = \"Unit\" Immovable = true KineticProperties { Position = ";
+  const auto moves = [&](const std::string& from, const std::string& to) {
+    return happens({"set Body.Wall.Position=" + to + "@step=81"}, "", "", beside + from + " } }\n");
+  };
+  EXPECT_THAT(moves("{0.2, 0.1, 0}", "{1.5, 40, 0}"), ElementsAreArray(and_then({"A"})));
+  EXPECT_THAT(moves("{1.5, 40, 0}", "{2.85, 0.1, 0}"), ElementsAreArray(and_then({"B"})));
+  EXPECT_THAT(moves("{0.2, 0.1, 0}", "{2.85, 0.1, 0}"), ElementsAreArray(and_then({"A", "B"})));
+  EXPECT_THAT(moves("{1.5, 40, 0}", "{1.5, 30, 0}"), ElementsAreArray(quiet));
 }
 
 // It hangs by a joint from a body that does not move, and falls with it when that may; it rests on a compound, of which a part
