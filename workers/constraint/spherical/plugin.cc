@@ -265,16 +265,10 @@ class Spherical final : public ConstraintPlugin {
     emit(drive);
   }
 
-  static Discrepancy cone_row(const RegularCone& cone, const Vector3& axis2) {
-    Discrepancy row = swing_row(cone.axis, axis2, cone.angle, AxisMode::kLimited);
-    row.lower.x() = -kUnlimited;
-    return row;
-  }
-
   template <typename Emit>
   static void emit_cone(std::span<const double> cone, const Quaternion& one, const Quaternion& two, Emit&& emit) {
     const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
-    if (cone.size() == 2) return emit(cone_row({a1, cone[1]}, a2));
+    if (cone.size() == 2) return emit(cone_row(a1, a2, cone[1]));
     const Vector3 from = one * Vector3::UnitY(), to = one * Vector3::UnitZ();
     const Vector3 across = swing_between(a1, a2).axis.cross(a1);
     double azimuth = math::atan2(to.dot(across), from.dot(across));
@@ -284,13 +278,15 @@ class Spherical final : public ConstraintPlugin {
     std::size_t last = 0;
     while (last + 1 < count && cone[2 * last + 2] <= azimuth) ++last;
     const ConePiece here = piece_of(cone, last);
-    emit(cone_row(osculating_cone(here.reach(azimuth), here.slope, a1, across), a2));
+    const RegularCone touching = osculating_cone(here.reach(azimuth), here.slope, a1, across);
+    emit(cone_row(touching.axis, a2, touching.angle));
     // at a corner outwards the piece behind it, too
     const bool is_past = azimuth - here.begin < here.end - azimuth;
     const ConePiece next = piece_of(cone, is_past ? (last + count - 1) % count : (last + 1) % count);
     const double corner = is_past ? here.begin : here.end;
     const math::SinCos at = math::sincos(corner);
-    Discrepancy beside = cone_row(osculating_cone(here.reach(corner), next.slope, a1, at.cos * from + at.sin * to), a2);
+    const RegularCone other = osculating_cone(here.reach(corner), next.slope, a1, at.cos * from + at.sin * to);
+    Discrepancy beside = cone_row(other.axis, a2, other.angle);
     const bool is_outward = is_past ? next.slope > here.slope : next.slope < here.slope;
     if (!is_outward) beside.upper.x() = kUnlimited;
     emit(beside);
