@@ -53,6 +53,15 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
   return limits;
 }
 
+JointLimits JointLimits::of_turn(double lower, double upper, std::string_view lower_field,
+                                 std::string_view upper_field) {
+  const JointLimits limits = of(lower, upper, lower_field, upper_field);
+  if (limits.lower > -kUnlimited && limits.upper < kUnlimited && limits.upper - limits.lower >= kWholeTurn)
+    throw Refusal(std::string(upper_field) + " lies a full turn or more above " + std::string(lower_field) +
+                  ", which limits nothing");
+  return limits;
+}
+
 double JointLimits::turn(double angle, double way) const {
   constexpr double kPast = 0.02, kOfWay = 0.5, kMostPast = 1.0;  // rad, that a step may begin beyond a limit by
   if (is_none()) return angle;
@@ -224,6 +233,12 @@ Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle,
   set_swing({first, second}, angle, &d);
   d.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree) | kAngularDiscrepancy | kSwingDiscrepancy;
   return d;
+}
+
+Discrepancy cone_row(const Vector3& first, const Vector3& second, double most) {
+  Discrepancy row = swing_row(first, second, most, AxisMode::kLimited);
+  row.lower.x() = -kUnlimited;
+  return row;
 }
 
 Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& other) {

@@ -25,6 +25,8 @@ struct JointLimits {
   double lower = -kUnlimited, upper = kUnlimited;
 
   static JointLimits of(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
+  // Of an angle that is known within one turn: two that span a whole one are refused, too.
+  static JointLimits of_turn(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
   bool is_none() const { return lower == -kUnlimited && upper == kUnlimited; }
   // The turn that is meant by an angle, among angle + k 2 pi; `way`: what the step turned by to get there. Without limits the
   // one within pi. With two the nearest to their middle, with one the nearest to half a turn on its free side; but where the step
@@ -98,6 +100,8 @@ Discrepancy driven_row(const Vector3& axis, double speed, double torque);
 // The row of the angle between a unit direction of body 1 and one of body 2, which is held at `angle` (rad, 0 ... pi);
 // its error is counted from there.
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle, AxisMode mode = AxisMode::kLocked);
+// The same where that angle is at most `most`: a regular cone.
+Discrepancy cone_row(const Vector3& first, const Vector3& second, double most);
 
 // A frame of a cross of two bars (unit vectors, not parallel): its first axis along the one, the third across both.
 Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& other);

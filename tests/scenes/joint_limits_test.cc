@@ -42,6 +42,12 @@ class TurningLimits : public ::testing::TestWithParam<LimitCase> {
   static std::string ball(const std::string& limits) {
     return "Type = \"Spherical\" CustomProperties { BindPoint = {0, 0, 0} Axis = {0, 0, 1} " + limits + " }";
   }
+  // A cross that is free, or stays as it is, about its other bar: angle 1 or 2 is that about z.
+  static std::string bars(int which, const std::string& limits, const std::string& others = "") {
+    const std::string axes =
+        which == 1 ? "Axis1 = {0, 0, 1} Axis2 = {1, 0, 0} " : "Axis1 = {1, 0, 0} Axis2 = {0, 0, 1} ";
+    return "Type = \"Universal\" CustomProperties { BindPoint = {0, 0, 0} " + axes + limits + " " + others + " }";
+  }
   static double angle_of(const SceneRun& run) {
     const Quaternion q = run.body("A").pose.orientation;
     return 2.0 * std::atan2(q.z(), q.w());
@@ -59,7 +65,9 @@ TEST_P(TurningLimits, HoldWhateverTheSpeed) {
   for (const double speed : {5.0, 12.7, 14.7, 17.0, 25.0, 50.0}) {
     for (const double sign : {-1.0, 1.0}) {
       for (const std::string& joint :
-           {hinge("LowerLimit = -2.95 UpperLimit = 2.95"), ball("TwistLower = -2.95 TwistUpper = 2.95")}) {
+           {hinge("LowerLimit = -2.95 UpperLimit = 2.95"), ball("TwistLower = -2.95 TwistUpper = 2.95"),
+            bars(1, "LowerLimit1 = -2.95 UpperLimit1 = 2.95"),
+            bars(2, "LowerLimit2 = -2.95 UpperLimit2 = 2.95", "LowerLimit1 = 0 UpperLimit1 = 0")}) {
         SceneRun run = turning(joint, sign * speed, 1.0 / 60.0, 1.0);
         run.to_end();
         EXPECT_NEAR(angle_of(run), sign * 2.95, 1e-9) << speed << joint;
@@ -74,16 +82,20 @@ TEST_P(TurningLimits, OfOneSideLetTheOtherGo) {
   for (const double speed : {0.7, 3.0, 20.0}) {
     for (const double sign : {-1.0, 1.0}) {
       const std::string name = sign < 0.0 ? "Upper" : "Lower", number = literal(-sign);
-      for (const std::string& joint : {hinge(name + "Limit = " + number), ball("Twist" + name + " = " + number)}) {
+      for (const std::string& joint : {hinge(name + "Limit = " + number), ball("Twist" + name + " = " + number),
+                                       bars(1, name + "Limit1 = " + number), bars(2, name + "Limit2 = " + number)}) {
         SceneRun run = turning(joint, sign * speed, 1e-2, 15.0 / speed);
         run.to_end();
         const double turned = sign * speed * run.time();
         EXPECT_NEAR(std::remainder(angle_of(run) - turned, 2.0 * M_PI), 0.0, 0.15) << speed << joint;
         EXPECT_NEAR(run.body("A").twist.angular.z(), sign * speed, 1e-9 * speed) << speed << joint;
       }
-      SceneRun stopped = turning(hinge(name + "Limit = " + number), -sign * speed, 1e-2, 3.0);
-      stopped.to_end();
-      EXPECT_NEAR(angle_of(stopped), -sign, 1e-9) << speed;
+      for (const std::string& joint : {hinge(name + "Limit = " + number), bars(1, name + "Limit1 = " + number),
+                                       bars(2, name + "Limit2 = " + number)}) {
+        SceneRun stopped = turning(joint, -sign * speed, 1e-2, 3.0);
+        stopped.to_end();
+        EXPECT_NEAR(angle_of(stopped), -sign, 1e-9) << speed << joint;
+      }
     }
   }
 }
@@ -96,7 +108,8 @@ TEST_P(TurningLimits, OfOneSideBearAMotor) {
           "Type = \"AngularMotor\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} "
           "AngularSpeed = 3 MaximumTorque = " +
           literal(torque) + " } }\nConstraint { Id = \"Stop\" Body2 = \"A\" ";
-      for (const std::string& stop : {hinge("UpperLimit = 0.7"), ball("TwistUpper = 0.7")}) {
+      for (const std::string& stop :
+           {hinge("UpperLimit = 0.7"), ball("TwistUpper = 0.7"), bars(1, "UpperLimit1 = 0.7")}) {
         SceneRun run = turning(motor + stop, 0.0, time_step, 1.5);
         run.to_end();
         EXPECT_NEAR(angle_of(run), 0.7, 1e-6) << torque << ' ' << time_step << stop;
@@ -298,7 +311,8 @@ class LimitedChain : public ::testing::Test {
           "\"Spherical\" CustomProperties { " + point + " Axis = " + literal(axis) +
               " ReachConeAngle = " + literal(upper),
           "\"Universal\" CustomProperties { " + point + " Axis1 = " + literal(axis) +
-              " Axis2 = " + literal(Vector3(axis.cross(Vector3(0.3, 0.5, 0.7)))),
+              " Axis2 = " + literal(Vector3(axis.cross(Vector3(0.3, 0.5, 0.7)))) + range("Limit1", lower, upper) +
+              range("Limit2", -upper, -lower),
       };
       joints += "Constraint { Id = \"J" + std::to_string(i) + "\" Body1 = \"" + last + "\" Body2 = \"" + id +
                 "\" Type = " + kinds[random.below(4)] + " } }\n";

@@ -8,8 +8,12 @@
 // and a2 the shafts. A bend is a turn about an axis across both, and moving the bend round a1 turns by k (a1 - a2): neither
 // has a part along a1 + a2, and all that do not are such turns. Four rows of rank 4, none redundant; left are the two
 // bends. With w1 = O1 a1, w2 = O2 a2 and no bending the row says (O2 - O1)(1 + a1.a2) = 0: equal speeds.
+// With a largest bend one row more, that of a reach cone round a1 (Spherical), active only there: rank 5.
 // A spring and a damper against the bend, torque -k bend - c bend' about the axis across both shafts, take no freedom.
 // Undefined at a bend of 180 degrees, which is refused at the start.
+#include <cmath>
+#include <string>
+
 #include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
@@ -22,7 +26,7 @@ class ConstantVelocity final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "ConstantVelocity",
-            .version = "1.2",
+            .version = "1.3",
             .slot = Slot::kConstraint,
             .meaning = "Joint of shafts that turn alike.",
             .capabilities = {"coordinates"},
@@ -38,7 +42,11 @@ class ConstantVelocity final : public ConstraintPlugin {
                             .means("Spring that straightens the shafts; none if absent."),
                         Property::number("BendDamping", "N*m*s/rad")
                             .at_least(0.0)
-                            .means("Damper of their bending; none if absent.")},
+                            .means("Damper of their bending; none if absent."),
+                        Property::number("MaximumAngle", "rad")
+                            .above(0.0)
+                            .at_most(kHalfTurn)
+                            .means("Largest bend, not below that of the start; none if absent.")},
                        {{"bend", "rad", "Angle between the shafts, 0 ... pi."},
                         {"azimuth", "rad",
                          "Where shaft 2 points round Axis1 in body 1, right-handed about it from the world's x at the "
@@ -64,6 +72,7 @@ class ConstantVelocity final : public ConstraintPlugin {
                 const Vector3 start = azimuth_frame(point, axis1).orientation * Vector3::UnitY();
                 const Vector3 zero = frame1.orientation.conjugate() * start;
                 out.number(math::atan2(zero.z(), zero.y()));
+                write_limit(&properties, bend.angle, &out);
               });
   }
 
@@ -75,11 +84,15 @@ class ConstantVelocity final : public ConstraintPlugin {
       emit(held_point(one, two.position, {true, true, true}));
       emit(twist_row(one.orientation, two.orientation, AxisMode::kLocked, &scale));
       const JointSpring spring = read_spring(&bound);
-      if (spring.is_none()) return;
-      // across the shaft: about it, what the twist's row holds would be pushed by what the step foresees of the turn
-      Discrepancy bend = turn_between(one.orientation, two.orientation);
-      for (const int axis : {1, 2}) spring.yield_on(axis, &bend);
-      emit(bend);
+      if (!spring.is_none()) {
+        // across the shaft: about it, what the twist's row holds would be pushed by what the step foresees of the turn
+        Discrepancy bend = turn_between(one.orientation, two.orientation);
+        for (const int axis : {1, 2}) spring.yield_on(axis, &bend);
+        emit(bend);
+      }
+      bound.number();  // of the coordinates alone
+      if (bound.at_end()) return;
+      emit(cone_row(one.orientation * Vector3::UnitX(), two.orientation * Vector3::UnitX(), bound.number()));
     });
   }
 
@@ -94,6 +107,19 @@ class ConstantVelocity final : public ConstraintPlugin {
       const Vector3 start = one.orientation * Vector3(0.0, zero.cos, zero.sin);
       emit(1, azimuth_of(axis1, start, axis2, bodies.spin2 - bodies.spin1));
     });
+  }
+
+ private:
+  // Nothing where there is none; a request that was recorded before there were any may end here.
+  static void write_limit(PropertyCursor* properties, double start, BoundWriter* out) {
+    constexpr double kRounding = 1e-9;  // rad, of axes that scenes give
+    const double most = properties->at_end() ? std::nan("") : properties->number();
+    if (std::isnan(most)) return;
+    if (!(most > 0.0 && most <= kHalfTurn)) throw Refusal("ConstantVelocity: MaximumAngle is outside 0 ... pi");
+    if (start > most + kRounding)
+      throw Refusal("ConstantVelocity: MaximumAngle " + std::to_string(most) + " lies below the bend of the start, " +
+                    std::to_string(start));
+    out->number(most);
   }
 };
 

@@ -65,10 +65,7 @@ class Revolute final : public ConstraintPlugin {
           demand_type(type, "Revolute");
           const Vector3 point1 = properties.vector(), point2 = properties.vector();
           const double lower = properties.number(), upper = properties.number();
-          const JointLimits limits = JointLimits::of(lower, upper, "Revolute: LowerLimit", "Revolute: UpperLimit");
-          if (!limits.is_none() && limits.upper - limits.lower >= kWholeTurn && limits.lower > -kUnlimited &&
-              limits.upper < kUnlimited)
-            throw Refusal("Revolute: UpperLimit lies a full turn or more above LowerLimit, which limits nothing");
+          const JointLimits limits = JointLimits::of_turn(lower, upper, "Revolute: LowerLimit", "Revolute: UpperLimit");
           const JointSpring spring = JointSpring::of(&properties);
           const Pose frame = hinge_frame(point1, point2, bodies, "Revolute");
           write_frame(bodies.pose1, frame, &out);

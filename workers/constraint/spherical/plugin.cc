@@ -265,16 +265,10 @@ class Spherical final : public ConstraintPlugin {
     emit(drive);
   }
 
-  static Discrepancy cone_row(const RegularCone& cone, const Vector3& axis2) {
-    Discrepancy row = swing_row(cone.axis, axis2, cone.angle, AxisMode::kLimited);
-    row.lower.x() = -kUnlimited;
-    return row;
-  }
-
   template <typename Emit>
   static void emit_cone(std::span<const double> cone, const Quaternion& one, const Quaternion& two, Emit&& emit) {
     const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
-    if (cone.size() == 2) return emit(cone_row({a1, cone[1]}, a2));
+    if (cone.size() == 2) return emit(cone_row(a1, a2, cone[1]));
     const Vector3 from = one * Vector3::UnitY(), to = one * Vector3::UnitZ();
     const Vector3 across = swing_between(a1, a2).axis.cross(a1);
     double azimuth = math::atan2(to.dot(across), from.dot(across));
@@ -284,7 +278,8 @@ class Spherical final : public ConstraintPlugin {
     std::size_t last = 0;
     while (last + 1 < count && cone[2 * last + 2] <= azimuth) ++last;
     const ConePiece here = piece_of(cone, last);
-    emit(cone_row(osculating_cone(here.reach(azimuth), here.slope, a1, across), a2));
+    const RegularCone touching = osculating_cone(here.reach(azimuth), here.slope, a1, across);
+    emit(cone_row(touching.axis, a2, touching.angle));
     // at a corner outwards the piece behind it, too
     const bool is_past = azimuth - here.begin < here.end - azimuth;
     const ConePiece next = piece_of(cone, is_past ? (last + count - 1) % count : (last + 1) % count);
@@ -293,9 +288,9 @@ class Spherical final : public ConstraintPlugin {
     // carried on to where a2 is, which is at the edge or beyond: it bounds nothing that the piece allows
     const double beyond = here.reach(corner) + next.slope * (azimuth - corner);
     const bool bounds = is_outward && beyond < kHalfTurn;
-    Discrepancy beside = cone_row(bounds ? osculating_cone(beyond, next.slope, a1, across)
-                                         : osculating_cone(here.reach(azimuth), here.slope, a1, across),
-                                  a2);
+    const RegularCone other = bounds ? osculating_cone(beyond, next.slope, a1, across)
+                                     : osculating_cone(here.reach(azimuth), here.slope, a1, across);
+    Discrepancy beside = cone_row(other.axis, a2, other.angle);
     if (!bounds) beside.upper.x() = kUnlimited;
     emit(beside);
   }

@@ -5,6 +5,11 @@
 // Freedoms. The shared point takes the translations. The angle of the bars changes at the rate w.n, n = a1 x a2/|a1 x a2|:
 // one turn, about the normal of both bars. Four rows of rank 4 while the bars are not parallel, none redundant; left are the
 // turns about either bar.
+// Limits. The angle about a bar is by how much the other has turned round it since the start, as coordinates tell it, known within
+// one turn; each bar's are one row, active only at a limit: rank 5 or 6 there. It is the swing of the other bar from the direction
+// a right angle behind an angle z, in the body of the bar, counted from a right angle: asin(sin(g) sin(angle - z)), exact for
+// turns of any size, and right within a right angle of z. So z is the middle of limits that are no more than that apart, else
+// the nearer limit (which limits nothing from further away), and half of the way back to it where a step went far beyond.
 // A spring and a damper about either bar take no freedom. Their angle is that by which one bar has turned about the other
 // since the start, asin(sin(g) sin(angle)) where the bars make an angle g: within a right angle, beyond which they pull on.
 // Drives. Body 2 turns on body 1 at p a1 + q a2, with p and q what it turns about the bars. So d1 = (a1 - (a1.a2) a2)/sin^2 g has
@@ -12,20 +17,43 @@
 // alike between the cross and body 2. Each is one row on the velocity about its d, made unit; with a speed of 0 it is the friction
 // of a bearing, of at most its torque.
 // Shafts that are across the bars turn by tan(phi2) = tan(phi1)/cos(bend), not evenly; ConstantVelocity does.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
 #include <string>
 
 #include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/math/transcendental.h"
 
 namespace gravitas {
 namespace {
+
+// A bar of the cross, and the other one, which turns round it by an angle.
+struct Bar {
+  Vector3 axis, start;  // unit, of one body; where the other bar was at the start, as far as it is across the axis
+  Vector3 other;        // unit, of the other body
+  Vector3 turning;      // of that body against this one, rad/s
+  bool is_of_body1;
+
+  std::optional<Coordinate> angle() const { return azimuth_of(axis, start, other, turning); }
+  // One row, whose error is asin(sin(g) sin(angle - zero)).
+  Discrepancy row_from(double zero) const {
+    const math::SinCos behind = math::sincos(zero - kQuarterTurn);
+    const Vector3 from = behind.cos * start + behind.sin * axis.cross(start);
+    return is_of_body1 ? swing_row(from, other, kQuarterTurn, AxisMode::kLimited)
+                       : swing_row(other, from, kQuarterTurn, AxisMode::kLimited);
+  }
+};
 
 class Universal final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {
         .name = "Universal",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Hooke's joint.",
         .capabilities = {"coordinates"},
@@ -57,13 +85,24 @@ class Universal final : public ConstraintPlugin {
               Property::number("AngularSpeed2", "rad/s").means("The same about Axis2."),
               Property::number("MaximumTorque2", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of that drive; unlimited if absent.")},
+                  .means("Largest torque of that drive; unlimited if absent."),
+              Property::number("LowerLimit1", "rad")
+                  .at_most(0.0)
+                  .means("Smallest angle of body 2 relative to body 1 about Axis1, right-handed, 0 at the start; none "
+                         "if absent."),
+              Property::number("UpperLimit1", "rad")
+                  .at_least(0.0)
+                  .means("Largest angle; none if absent. Less than a full turn above LowerLimit1."),
+              Property::number("LowerLimit2", "rad").at_most(0.0).means("The same about Axis2; none if absent."),
+              Property::number("UpperLimit2", "rad")
+                  .at_least(0.0)
+                  .means("Largest angle; none if absent. Less than a full turn above LowerLimit2.")},
              {{"angle1", "rad",
                "Turn of the cross, and of body 2 with it, about Axis1, relative to body 1, right-handed, 0 at the "
-               "start, above -pi up to pi."},
+               "start; the turn that limits are compared with, without them above -pi up to pi."},
               {"angle2", "rad",
-               "Turn of body 2 about Axis2, relative to the cross, right-handed, 0 at the start, above -pi up to "
-               "pi."}}}}};
+               "Turn of body 2 about Axis2, relative to the cross, right-handed, 0 at the start; the turn that limits "
+               "are compared with, without them above -pi up to pi."}}}}};
   }
   explicit Universal(PropertyCursor) {}
 
@@ -79,7 +118,7 @@ class Universal final : public ConstraintPlugin {
                 write_frame(bodies.pose2, cross_frame(point, axis2, axis1), &out);
                 out.number(swing_between(axis1, axis2).angle);
                 for (int bar = 0; bar < 2; ++bar) write_spring(JointSpring::of(&properties), &out);
-                write_drives(&properties, &out);
+                write_drives_and_limits(&properties, &out);
               });
   }
 
@@ -89,7 +128,8 @@ class Universal final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       emit(held_point(one, two.position, {true, true, true}));
       const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
-      emit(swing_row(axis1, axis2, bound.number()));
+      const double between = bound.number();
+      emit(swing_row(axis1, axis2, between));
       const JointSpring spring1 = read_spring(&bound), spring2 = read_spring(&bound);
       // of a direction of either body, across each other at the start
       const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
@@ -101,6 +141,11 @@ class Universal final : public ConstraintPlugin {
       const double sine = axis1.cross(axis2).norm();
       drive_about(axis2.cross(normal), sine, &drive1, emit);
       drive_about(normal.cross(axis1), sine, &drive2, emit);
+      if (bound.at_end()) return;
+      for (const Bar& bar : bars_of(one, two, bodies)) {
+        const JointLimits limits = read_limits(&bound);
+        if (!limits.is_none()) emit(limited_row(bar, limits, between, bodies.time_step));
+      }
     });
   }
 
@@ -108,25 +153,88 @@ class Universal final : public ConstraintPlugin {
                    Host&) override {
     measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-      const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
-      const Vector3 turning = bodies.spin2 - bodies.spin1;
-      // the second axis of either frame is where the other bar was at the start
-      emit(0, azimuth_of(axis1, one.orientation * Vector3::UnitY(), axis2, turning));
-      emit(1, reversed(azimuth_of(axis2, two.orientation * Vector3::UnitY(), axis1, -turning)));
+      bound.number();
+      for (int bar = 0; bar < 2; ++bar) read_spring(&bound);
+      const std::array<Bar, 2> bars = bars_of(one, two, bodies);
+      std::array<JointLimits, 2> limits;
+      if (!bound.at_end())
+        for (int bar = 0; bar < 2; ++bar) bound.table(2);
+      for (std::uint32_t bar = 0; bar < 2; ++bar) {
+        if (!bound.at_end()) limits[bar] = read_limits(&bound);
+        std::optional<Coordinate> angle = bars[bar].angle();
+        // where it is: no step is to be foretold
+        if (angle) angle->value = limits[bar].turn(angle->value, 0.0);
+        emit(bar, angle);
+      }
     });
   }
 
  private:
-  // Of either bar a table of one row or none; nothing where neither has a drive.
-  static void write_drives(PropertyCursor* properties, BoundWriter* out) {
+  // Of either bar a table of one row or none, and its limits, if there are any; nothing where there are neither.
+  static void write_drives_and_limits(PropertyCursor* properties, BoundWriter* out) {
     BoundWriter first, second;
     write_drive(properties, "Universal", &first, "1");
     write_drive(properties, "Universal", &second, "2");
-    if (first.numbers().empty() && second.numbers().empty()) return;
+    const JointLimits limits1 = limits_of(properties, "1"), limits2 = limits_of(properties, "2");
+    const bool has_limits = !limits1.is_none() || !limits2.is_none();
+    if (first.numbers().empty() && second.numbers().empty() && !has_limits) return;
     for (const BoundWriter* drive : {&first, &second}) {
       out->number(drive->numbers().empty() ? 0.0 : 1.0);
       for (const double number : drive->numbers()) out->number(number);
     }
+    if (!has_limits) return;
+    for (const JointLimits& limits : {limits1, limits2}) {
+      out->number(limits.lower);
+      out->number(limits.upper);
+    }
+  }
+
+  // A request that was recorded before there were any may end before.
+  static JointLimits limits_of(PropertyCursor* properties, const std::string& which) {
+    if (properties->at_end()) return {};
+    const double lower = properties->number(), upper = properties->number();
+    return JointLimits::of_turn(lower, upper, "Universal: LowerLimit" + which, "Universal: UpperLimit" + which);
+  }
+
+  static JointLimits read_limits(PropertyCursor* bound) {
+    JointLimits limits;
+    limits.lower = bound->number();
+    limits.upper = bound->number();
+    return limits;
+  }
+
+  // Body 2 turns about its bar as that sees the other one turn back.
+  static std::array<Bar, 2> bars_of(const Pose& one, const Pose& two, const JointBodies& bodies) {
+    const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
+    const Vector3 turning = bodies.spin2 - bodies.spin1;
+    return {Bar{axis1, one.orientation * Vector3::UnitY(), axis2, turning, true},
+            Bar{-axis2, two.orientation * Vector3::UnitY(), axis1, -turning, false}};
+  }
+
+  // `between`: the angle that the bars are held at, which the solution brings them back to.
+  static Discrepancy limited_row(const Bar& bar, const JointLimits& limits, double between, double time_step) {
+    const std::optional<Coordinate> angle = bar.angle();
+    const double turned = angle ? limits.limited_turn(angle->value, time_step * angle->rate) : 0.0;
+    const double zero = zero_of(limits, turned);
+    const bool is_told = angle && std::fabs(turned - zero) <= kQuarterTurn;
+    const double sine = math::sin(between);
+    const auto bound = [&](double limit, double none) {
+      const bool is_near = is_told && std::fabs(limit - zero) <= kQuarterTurn;
+      return is_near ? math::asin(sine * math::sin(limit - zero)) : none;
+    };
+    Discrepancy row = bar.row_from(zero);
+    row.lower.x() = bound(limits.lower, -kUnlimited);
+    row.upper.x() = bound(limits.upper, kUnlimited);
+    return row;
+  }
+
+  // The angle that the row's error is counted from.
+  static double zero_of(const JointLimits& limits, double turned) {
+    const double middle = 0.5 * (limits.lower + limits.upper);
+    if (limits.upper - limits.lower <= kQuarterTurn && std::fabs(turned - middle) <= kQuarterTurn) return middle;
+    const bool is_upper = limits.upper - turned < turned - limits.lower;
+    const double limit = is_upper ? limits.upper : limits.lower, beyond = is_upper ? turned - limit : limit - turned;
+    return beyond > kQuarterTurn ? 0.5 * (turned + limit) : limit;
   }
 };
 
