@@ -222,6 +222,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
   void join_start_velocities();
+  bool lets_go_of_limits();
   std::uint64_t most_reaction_blocks() const;
 
   // stages.cc: a stage each.

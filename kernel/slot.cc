@@ -160,7 +160,10 @@ void StageSlot::attempt(const StageCall& call, Arena* arena, DerivativeSource* d
   if (derivatives != nullptr) derivatives->begin_attempt(true);
   // whom a nested call of the same process takes away must outlast this one
   if (derivatives != nullptr) attempts->asked = hosts_[route.host]->carrier();
+  const bool is_compared = !pending_.empty();
+  const std::uint64_t begin = is_compared ? lap_ns() : 0;
   call_with_room(carrier, routed, arena, derivatives, times);
+  if (is_compared) times->whole = lap_between(begin, lap_ns());
 }
 
 void StageSlot::name(StageFault* fault, std::uint32_t target) const {

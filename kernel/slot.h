@@ -22,7 +22,8 @@ namespace gravitas::kernel {
 
 // Of a call with all its attempts at room, ns.
 struct CallTimes {
-  std::uint64_t compute = 0;  // the plugin worked
+  std::uint64_t compute = 0;  // the plugin worked, where its carrier knows
+  std::uint64_t whole = 0;    // all of a call that is compared
   std::uint64_t check = 0;    // the frame of the answer was checked
   std::uint64_t begin = 0;    // when it was asked again after a failed call; 0: it is the first attempt
 };

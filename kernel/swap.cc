@@ -202,10 +202,13 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, const CallT
     CallTimes second;
     swap->shadow.compare(call, arena, [&] {
       if (derivatives != nullptr) derivatives->begin_attempt(false);
+      const std::uint64_t begin = lap_ns();
       call_with_room(swap->candidate.get(), routed, arena, derivatives, &second);
+      second.whole = lap_between(begin, lap_ns());
       recheck();
     });
-    swap->shadow.add_times(first.compute, second.compute);
+    const auto worked = [](const CallTimes& times) { return times.compute > 0 ? times.compute : times.whole; };
+    swap->shadow.add_times(worked(first), worked(second));
     return true;
   } catch (const StageFault& fault) {
     if (!fault.plugin.empty()) throw;

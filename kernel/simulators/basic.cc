@@ -129,7 +129,9 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i)
     if (!vector_at(data_.contact_warm_impulse.span(), i).isZero(0.0))
       data_.contact_material[kMaterialColumns * i + kRestitution] = 0.0;
-  return solve();
+  std::optional<Trusted<Solution>> solution = solve();
+  while (knows_reactions() && lets_go_of_limits()) solution.emplace(solve());
+  return solution;
 }
 
 }  // namespace gravitas::kernel

@@ -11,6 +11,7 @@
 // that their stiffness bounds the step of an explicit method; the solve is told to leave them alone (kForcesApplied), and what the
 // reactions had along each axis, as limits and bounded drives are there, too.
 #include <algorithm>
+#include <cmath>
 
 #include "kernel/environment.h"
 #include "plugin_sdk/wrench_jacobian.h"
@@ -68,6 +69,23 @@ void Environment::join_start_velocities() {
   data_.start_linear_velocity.assign(data_.solved_linear_velocity);
   data_.start_angular_velocity.assign(data_.solved_angular_velocity);
   data_.time_step[0] = length;
+}
+
+// A limit that bears holds like a lock while the step's end is solved. Where another is struck then, it can pull by no more than it
+// pushed in the step: beyond, it opens.
+bool Environment::lets_go_of_limits() {
+  const DiscrepancyAnswer& joints = data_.discrepancies;
+  bool any = false;
+  for (std::size_t i = 0; i < data_.discrepancy_impulse.size(); ++i) {
+    const AxisMode mode = axis_mode(joints.mode[i / 3], static_cast<int>(i % 3));
+    const bool may_open =
+        mode == AxisMode::kUnilateral || (mode == AxisMode::kLimited && joints.lower[i] < joints.upper[i]);
+    const double push = data_.held_force[i] * data_.time_step[0], impulse = data_.discrepancy_impulse[i];
+    if (!may_open || push * impulse >= 0.0 || std::abs(impulse) <= std::abs(push)) continue;
+    data_.held_force[i] = 0.0;
+    any = true;
+  }
+  return any;
 }
 
 // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.

@@ -56,7 +56,8 @@ std::string swap_line(const api::ServedSwap& swap) {
                               : swap.shadow().calls() > 0 ? "comparing"
                                                           : swap.outcome();
     return fmt::format("{}: {} {} beside {}, from step {} on: {}{}", state, swap.slot(), swap.to(), swap.from(),
-                       swap.step(), comparison_text(swap.shadow()), swap.reason().empty() ? "" : "; " + swap.reason());
+                       swap.step(), comparison_text(swap.shadow(), swap.from(), swap.to()),
+                       swap.reason().empty() ? "" : "; " + swap.reason());
   }
   std::string text =
       fmt::format("{}: {} {} -> {}, before step {}", swap.outcome(), swap.slot(), swap.from(), swap.to(), swap.step());

@@ -136,9 +136,9 @@ void write_comparison(const Comparison& from, const kernel::Environment& environ
   }
 }
 
-std::string comparison_text(const report::v1::Comparison& comparison) {
-  return fmt::format("{} of {} answers differ; {:.3g} us and {:.3g} us a call", comparison.differing_calls(),
-                     comparison.calls(), comparison.from_us(), comparison.to_us());
+std::string comparison_text(const report::v1::Comparison& comparison, const std::string& from, const std::string& to) {
+  return fmt::format("{} of {} answers differ; {} {:.3g} us, {} {:.3g} us a call", comparison.differing_calls(),
+                     comparison.calls(), from, comparison.from_us(), to, comparison.to_us());
 }
 
 std::string disagreement_text(const report::v1::Disagreement& disagreement) {

@@ -27,8 +27,8 @@ std::string edit_line(const report::v1::EditRecord& edit);
 // Without the body.
 void write_disagreement(const Disagreement& from, report::v1::Disagreement* to);
 
-// "3 of 100 answers differ; 12.3 us and 45.6 us a call".
-std::string comparison_text(const report::v1::Comparison& comparison);
+// "3 of 100 answers differ; Sequential 12.3 us, Newton 45.6 us a call".
+std::string comparison_text(const report::v1::Comparison& comparison, const std::string& from, const std::string& to);
 
 // "Solver.Solve linear_velocity: 0.00123 m/s apart at most, 4.5e-06 of the largest (row 7, Ball)".
 std::string disagreement_text(const report::v1::Disagreement& disagreement);

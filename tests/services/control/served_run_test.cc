@@ -308,8 +308,9 @@ TEST(ServedRun, AnotherPluginIsComparedAndLeavesNoTrace) {
   EXPECT_EQ(status.swaps(1).number(), other);
   EXPECT_EQ(status.swaps(1).shadow().calls(), kSteps);
   EXPECT_GT(status.swaps(1).shadow().differing_calls(), 0U);
-  EXPECT_THAT(status_page(status),
-              HasSubstr("  1 ended: solver Sequential beside Sequential, from step 1 on: 0 of 30 "));
+  EXPECT_THAT(
+      status_page(status),
+      HasSubstr("  1 ended: solver Sequential beside Sequential, from step 1 on: 0 of 30 answers differ; Sequential "));
   EXPECT_THAT(status_page(status), HasSubstr("  2 comparing: solver Newton beside Sequential, from step 1 on: "));
   EXPECT_THAT(status_page(status), HasSubstr("      Solver.Solve linear_velocity: "));
 }
@@ -585,6 +586,17 @@ TEST(ServedRun, TellsTheCoordinatesOfJoints) {
   EXPECT_NE(now.coordinates(0).value(), 0.0);
   EXPECT_NE(now.coordinates(0).rate(), 0.0);
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
+// A call of a plugin that is hosted in the process takes time, too.
+TEST(ServedRun, ComparisonsTellTimesInAnyHosting) {
+  RunOptions options = sample("direct").run;
+  options.comparisons = {"solver=Newton"};
+  const RunResult result = run(
+      options, [] { return false; }, [](const Progress&) {});
+  ASSERT_EQ(result.report.comparisons_size(), 1);
+  EXPECT_GT(result.report.comparisons(0).shadow().from_us(), 0.0);
+  EXPECT_GT(result.report.comparisons(0).shadow().to_us(), 0.0);
 }
 
 }  // namespace
