@@ -14,7 +14,8 @@
 // it is n = (c' u - s e)/q, q^2 = s^2 + c'^2, and its curvature on the sphere is cot(r) = cos(c) (s^2 + 2 c'^2)/q^3; so the
 // touching cone has the angle r about cos(r) p + sin(r) n. On the edge value, rate and second derivative are those of the
 // irregular cone itself; what turns far round it in a step is off by the third power of that. A second row is that of the piece
-// behind the nearer corner, carried on to where a2 is; it holds where the corner points outwards. Azimuths count
+// behind the nearer corner, as it is there, or carried on to where a2 is, where the corner's cone would cut into this piece; it
+// holds where the corner points outwards. Azimuths count
 // right-handed about Axis, from the world's x as seen along it (-z for an Axis within 1e-3 of x).
 // Spring and damper: of the whole turn of body 2 against body 1 since the start, torque -k angle about its axis and -c w. They
 // take no freedom.
@@ -283,13 +284,19 @@ class Spherical final : public ConstraintPlugin {
     // at a corner outwards the piece behind it, too
     const bool is_past = azimuth - here.begin < here.end - azimuth;
     const ConePiece next = piece_of(cone, is_past ? (last + count - 1) % count : (last + 1) % count);
-    const double corner = is_past ? here.begin : here.end;
     const bool is_outward = is_past ? next.slope > here.slope : next.slope < here.slope;
-    // carried on to where a2 is, which is at the edge or beyond: it bounds nothing that the piece allows
-    const double beyond = here.reach(corner) + next.slope * (azimuth - corner);
-    const bool bounds = is_outward && beyond < kHalfTurn;
-    const RegularCone other = bounds ? osculating_cone(beyond, next.slope, a1, across)
-                                     : osculating_cone(here.reach(azimuth), here.slope, a1, across);
+    const double corner = is_past ? here.begin : here.end;
+    const math::SinCos at = math::sincos(corner);
+    RegularCone other = osculating_cone(here.reach(corner), next.slope, a1, at.cos * from + at.sin * to);
+    bool bounds = is_outward;
+    // far from the corner that circle may cut into what this piece allows; carried on to where a2 is, the other piece does not
+    constexpr double kRounding = 1e-9;  // rad
+    const auto passed = [&](const RegularCone& one) { return swing_between(one.axis, a2).angle - one.angle; };
+    if (is_outward && passed(other) > passed(touching) + kRounding) {
+      const double beyond = here.reach(corner) + next.slope * (azimuth - corner);
+      bounds = beyond < kHalfTurn;
+      if (bounds) other = osculating_cone(beyond, next.slope, a1, across);
+    }
     Discrepancy beside = cone_row(other.axis, a2, other.angle);
     if (!bounds) beside.upper.x() = kUnlimited;
     emit(beside);
