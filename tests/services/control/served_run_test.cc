@@ -588,16 +588,5 @@ TEST(ServedRun, TellsTheCoordinatesOfJoints) {
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }
 
-// A call of a plugin that is hosted in the process takes time, too.
-TEST(ServedRun, ComparisonsTellTimesInAnyHosting) {
-  RunOptions options = sample("direct").run;
-  options.comparisons = {"solver=Newton"};
-  const RunResult result = run(
-      options, [] { return false; }, [](const Progress&) {});
-  ASSERT_EQ(result.report.comparisons_size(), 1);
-  EXPECT_GT(result.report.comparisons(0).shadow().from_us(), 0.0);
-  EXPECT_GT(result.report.comparisons(0).shadow().to_us(), 0.0);
-}
-
 }  // namespace
 }  // namespace gravitas::control
