@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <filesystem>
 
 #include "plugin_sdk/channel/private_folder.h"
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
 #include "services/edit/edited_scene.h"
+#include "services/run/exchange_spec.h"
 #include "services/run/resume_command.h"
 
 namespace gravitas::control {
@@ -136,8 +136,7 @@ std::string ServedRun::command_to_resume() {
     const std::vector<kernel::PluginChoice>& own = description_.slot(slot).plugins;
     const auto same = std::ranges::find(own, plugin.declaration.name,
                                         [](const kernel::PluginChoice& choice) { return choice.declaration.name; });
-    const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };  // absent ones are NaN
-    if (same != own.end() && !std::ranges::equal(same->settings, plugin.settings, {}, bits, bits))
+    if (same != own.end() && !have_same_settings(*same, plugin))
       add_warning(fmt::format("settings of {} for step {} are not part of the command that goes on: it has the scene's",
                               plugin.declaration.name, step));
   }

@@ -58,19 +58,19 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   // a library is asked in a process, which the steps do not wait for; the copy keeps its name from staying known
   Catalog catalog = catalog_;
   kernel::SwapOrder found = resolve_swap(spec, scenes, &catalog);
-  for (const kernel::PluginChoice& one : active.slot(spec.slot).plugins)
+  const auto take_settings_of = [&](const kernel::PluginChoice& one) {
     if (one.declaration.name == found.plugin.declaration.name &&
         std::ranges::equal(one.declaration.properties, found.plugin.declaration.properties, {}, &Property::name,
                            &Property::name))
       found.plugin.settings = one.settings;
+  };
+  std::ranges::for_each(active.slot(spec.slot).plugins, take_settings_of);
   return between_steps([&] {
     found.step = next_step(spec.text, request.step());
     // what was set for then, too
     for (const Order& one : pending_orders())
-      if (!one.compares() && one.swap.slot == found.slot && one.swap.step <= found.step &&
-          one.swap.plugin.declaration.name == found.plugin.declaration.name &&
-          one.swap.plugin.settings.size() == found.plugin.settings.size())
-        found.plugin.settings = one.swap.plugin.settings;
+      if (!one.compares() && one.swap.slot == found.slot && one.swap.step <= found.step)
+        take_settings_of(one.swap.plugin);
     return order(std::move(found), request.compares() ? OrderKind::kComparison : OrderKind::kSwap);
   });
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 
 #include "plugin_sdk/near_miss.h"
@@ -108,6 +109,11 @@ void require_rerun(const RerunSpec& spec, const kernel::Environment& environment
   const kernel::Plan plan = environment.plan();
   if (std::ranges::find(plan.slots, spec.slot, &kernel::PlannedSlot::slot) == plan.slots.end())
     refuse("--rerun", fmt::format("{}={}", slot_name(spec.slot), spec.every), environment.why_left_out(spec.slot));
+}
+
+bool have_same_settings(const kernel::PluginChoice& one, const kernel::PluginChoice& other) {
+  const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };
+  return std::ranges::equal(one.settings, other.settings, {}, bits, bits);
 }
 
 kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDescription& scene, Catalog* catalog) {

@@ -39,6 +39,9 @@ void require_rerun(const RerunSpec& spec, const kernel::Environment& environment
 // BadInput if there is none of that name.
 kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDescription& scene, Catalog* catalog);
 
+// Bit for bit: absent ones are NaN.
+bool have_same_settings(const kernel::PluginChoice& one, const kernel::PluginChoice& other);
+
 // "space" …; throws BadInput with `option` and `text` before it.
 Slot parse_slot(const std::string& option, const std::string& text, const std::string& name);
 kernel::Hosting parse_hosting_mode(const std::string& option, const std::string& text, const std::string& mode);

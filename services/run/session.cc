@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <filesystem>
 #include <system_error>
@@ -272,7 +271,6 @@ class Run final : private kernel::CommitListener {
       });
     };
     std::erase_if(swaps_, [&](const kernel::SwapOrder& one) { return one.step <= step || is_restored(one); });
-    const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };  // absent ones are NaN
     from_checkpoint(options_.resume, [&] {
       decisions_.assign(resumed.checkpoint.decisions().begin(), resumed.checkpoint.decisions().end());
       *answering = answering_at(resumed.checkpoint, description_, catalog_);
@@ -281,7 +279,7 @@ class Run final : private kernel::CommitListener {
         const bool is_ordered = std::ranges::any_of(swaps_, [&](const kernel::SwapOrder& one) {
           return one.slot == order.slot && one.step == order.step &&
                  one.plugin.declaration.name == order.plugin.declaration.name &&
-                 std::ranges::equal(one.plugin.settings, order.plugin.settings, {}, bits, bits);
+                 have_same_settings(one.plugin, order.plugin);
         });
         if (!is_ordered && !is_restored(order)) swaps_.push_back(std::move(order));
       }
