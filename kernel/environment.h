@@ -297,7 +297,7 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   // exchange.cc: others in a slot.
   StageSlot& slot_of(Slot slot);
-  std::uint32_t place_of(const SwapOrder& order);
+  std::uint32_t place_of(const SwapOrder& order, bool compares);
   void check_fallbacks() const;
   const char* needed_capability(Slot slot) const;
   std::string why_unfit(const PluginDeclaration& plugin) const;

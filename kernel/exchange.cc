@@ -10,11 +10,6 @@
 namespace gravitas::kernel {
 namespace {
 
-[[noreturn]] void impossible(const SwapOrder& order, const std::string& why) {
-  throw std::invalid_argument(std::string("swap ") + slot_name(order.slot) + "=" + order.plugin.declaration.name +
-                              ": " + why);
-}
-
 // Types of the scene that the slot's plugins serve.
 std::vector<std::string> types_in_use(const EnvironmentDescription& description, Slot slot) {
   std::vector<std::string> types;
@@ -45,15 +40,19 @@ std::string Environment::why_left_out(Slot slot) const {
   return "the plan leaves the slot out" + (reason == plan_.left_out.end() ? "" : ": " + reason->why);
 }
 
-// Row of the plugin whose place is taken.
-std::uint32_t Environment::place_of(const SwapOrder& order) {
+// Row of the plugin whose place is taken, or that it is compared with.
+std::uint32_t Environment::place_of(const SwapOrder& order, bool compares) {
+  const auto impossible = [&](const std::string& why) {
+    return std::invalid_argument(std::string(compares ? "compare " : "swap ") + slot_name(order.slot) + "=" +
+                                 order.plugin.declaration.name + ": " + why);
+  };
   const StageSlot& slot = slot_of(order.slot);
   if (order.plugin.declaration.slot != order.slot)
-    impossible(order, std::string("it is a plugin of slot ") + slot_name(order.plugin.declaration.slot));
-  if (!slot.is_running()) impossible(order, why_left_out(order.slot));
+    throw impossible(std::string("it is a plugin of slot ") + slot_name(order.plugin.declaration.slot));
+  if (!slot.is_running()) throw impossible(why_left_out(order.slot));
   if (order.hosting == Hosting::kDirect && !slot.description().process.empty())
-    impossible(order, "its worker process is shared (Process = \"" + slot.description().process +
-                          "\"), and what is hosted direct shares none");
+    throw impossible("its worker process is shared (Process = \"" + slot.description().process +
+                     "\"), and what is hosted direct shares none");
   const std::vector<PluginChoice>& plugins = slot.description().plugins;
   const std::vector<std::string> in_use = types_in_use(description_, order.slot);
   std::string why;
@@ -63,7 +62,7 @@ std::uint32_t Environment::place_of(const SwapOrder& order) {
     if (misfit_here.empty()) return row;
     if (why.empty()) why = misfit_here;
   }
-  impossible(order, why);
+  throw impossible(why);
 }
 
 // What the simulator needs of the plugins of a slot; null: nothing.
@@ -96,7 +95,7 @@ void Environment::check_fallbacks() const {
 }
 
 void Environment::order_swap(const SwapOrder& order, bool compares) {
-  const std::uint32_t row = place_of(order);
+  const std::uint32_t row = place_of(order, compares);
   slot_of(order.slot).order_swap(order, row, compares);
 }
 

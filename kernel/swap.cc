@@ -197,6 +197,7 @@ bool StageSlot::watch_swap(PendingSwap* swap, const StageCall& call, const CallT
                            DerivativeSource* derivatives, const std::function<void()>& recheck) {
   StageCall routed = call;
   routed.target = routes_[call.target].target;
+  routed.is_compared = true;
   routed.deadline_ns = swap->only_compare ? 0 : std::max(kShadowNs, kShadowFactor * slow_calls_.longest());
   try {
     CallTimes second;
@@ -235,6 +236,7 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   SlotHost& host = *hosts_[place];
   StageCall routed = call;
   routed.target = routes_[call.target].target;
+  routed.is_compared = true;
   const auto revisions = [&] {
     std::uint32_t sum = 0;
     for (const StageSlot* slot : slots_)

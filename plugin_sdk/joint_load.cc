@@ -63,12 +63,23 @@ double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const J
   return size * time_step * (response(body1, row.linear1, row.angular1) + response(body2, row.linear2, row.angular2));
 }
 
+// What holds an error: drives and dampers hold nothing together.
+Vector3 holding_part(const Discrepancy& discrepancy, const Vector3& impulse) {
+  const Matrix3 axes = to_rotation_matrix(discrepancy.axes);
+  Vector3 holding = impulse;
+  for (int k = 0; k < 3; ++k) {
+    const AxisMode mode = axis_mode(discrepancy.modes, k);
+    if (mode == AxisMode::kDriven || mode == AxisMode::kFriction) holding -= axes.col(k).dot(impulse) * axes.col(k);
+  }
+  return holding;
+}
+
 double opening(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
   double most = 0.0;
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
     const Vector3 error = error_in_axes_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next);
-    const Vector3 impulse = impulse_of(joint, discrepancy, row, time_step);
+    const Vector3 impulse = holding_part(discrepancy, impulse_of(joint, discrepancy, row, time_step));
     const double length = discrepancy.is_angular() ? std::max(gyration(body1), gyration(body2)) : 1.0;
     most = std::max({most, length * joint_error(discrepancy, error),
                      length * held_back(discrepancy, impulse, body1, body2, time_step)});

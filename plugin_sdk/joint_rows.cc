@@ -27,6 +27,9 @@ double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const Joi
   return bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
 }
 
+constexpr double kPast = 0.02;      // rad, that a step may begin beyond a limit by
+constexpr double kRounding = 1e-6;  // rad, of turns
+
 }  // namespace
 
 void demand_type(std::uint64_t type, std::string_view name) {
@@ -56,14 +59,19 @@ JointLimits JointLimits::of(double lower, double upper, std::string_view lower_f
 JointLimits JointLimits::of_turn(double lower, double upper, std::string_view lower_field,
                                  std::string_view upper_field) {
   const JointLimits limits = of(lower, upper, lower_field, upper_field);
-  if (limits.lower > -kUnlimited && limits.upper < kUnlimited && limits.upper - limits.lower >= kWholeTurn)
+  const bool has_lower = limits.lower > -kUnlimited, has_upper = limits.upper < kUnlimited;
+  // what rests on one of two that all but meet is told as resting on the other, by rounding
+  if (has_lower && has_upper && limits.upper - limits.lower >= kWholeTurn - kRounding)
     throw Refusal(std::string(upper_field) + " lies a full turn or more above " + std::string(lower_field) +
                   ", which limits nothing");
+  if (has_lower != has_upper && std::fabs(has_lower ? limits.lower : limits.upper) >= kWholeTurn - kPast)
+    throw Refusal(std::string(has_lower ? lower_field : upper_field) +
+                  " lies a full turn or more from 0, where the joint starts, and turns are not counted");
   return limits;
 }
 
 double JointLimits::turn(double angle, double way) const {
-  constexpr double kPast = 0.02, kOfWay = 0.5, kMostPast = 1.0;  // rad, that a step may begin beyond a limit by
+  constexpr double kOfWay = 0.5, kMostPast = 1.0;  // rad
   if (is_none()) return angle;
   const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
   // the way is known to first order, or to half of it where a method turns by other spins than those at the end

@@ -32,6 +32,8 @@ struct StageCall {
   std::uint64_t deadline_ns = 0;
   // Of this request; from the second on a death counts only if the worker is known to have read it.
   std::uint32_t attempt = 0;
+  // The answer is held against another one, and not used.
+  bool is_compared = false;
 
   const stage::MethodInfo& info() const { return stage::method_info(method); }
 };

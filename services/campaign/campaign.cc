@@ -21,11 +21,13 @@
 #include <optional>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "plugin_sdk/slots.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/page.h"
 #include "services/campaign/table.h"
+#include "services/check/shell_word.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
@@ -178,6 +180,11 @@ class TrialLog {
   }
   TrialLog(const TrialLog&) = delete;
   TrialLog& operator=(const TrialLog&) = delete;
+  // Throws where not all that was written is in the file.
+  void close() {
+    if (std::FILE* file = std::exchange(file_, nullptr); file != nullptr && std::fclose(file) != 0)
+      fail("'" + path_ + "'");
+  }
   void write(const std::string& line) {
     if (file_ != nullptr && std::fprintf(file_, "%s\n", line.c_str()) < 0) fail("'" + path_ + "'");
   }
@@ -214,6 +221,7 @@ class Parent {
       progress({tally_.injected(), wanted_, tally_.forbidden(), seconds_since(start_)});
     }
     find_orphans();
+    log_.close();
     v1::Table table = tally_.table();
     table.set_seed(options_.seed);
     table.set_tier(options_.draw.tier == Tier::kReal ? "real" : "simulated");
@@ -237,7 +245,8 @@ class Parent {
       if (polled[i].revents != 0) goes_on = child->read_lines([&](const std::string& line) { take(line); });
       const bool hangs = goes_on && child->is_busy() && child->silence() > options_.patience;
       if (goes_on && !hangs) continue;
-      // whatever it was: the trial goes down as forbidden, and another process goes on with the rest
+      // whatever it was: the trial goes down as forbidden, what was left of its batch is left out, and another process
+      // goes on behind it
       const std::string ending = child->end_now();
       blame(child->current(), hangs ? fmt::format("the kernel hung for {} s", options_.patience)
                                     : fmt::format("the kernel's process was {}", ending));
@@ -353,7 +362,7 @@ v1::Trial repeat_trial(const Options& options, std::uint64_t seed) {
 
 std::string repeat_command(const Options& options, std::uint64_t seed) {
   std::string command = "gravitas campaign";
-  for (const std::string& word : trial_words(options)) command += " " + word;
+  for (const std::string& word : trial_words(options)) command += " " + check::shell_word(word);
   return fmt::format("{} --trial {}", command, seed);
 }
 

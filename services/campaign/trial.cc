@@ -284,9 +284,7 @@ void Run::go() {
   write();
 }
 
-std::vector<Slot> Run::hit_by(const PlannedFault& fault) const {
-  return is_between_calls(fault) ? sharing(scene_, fault.slot) : std::vector<Slot>{fault.slot};
-}
+std::vector<Slot> Run::hit_by(const PlannedFault& fault) const { return slots_hit(fault, scene_); }
 
 Run::Injected* Run::find(const FaultRecord& record) {
   Injected* later = nullptr;
@@ -307,6 +305,7 @@ bool Run::is_worn_out(Slot slot) const {
 }
 
 void Run::note_fallbacks() {
+  if (plan_.has_fallbacks) return;  // the plugins themselves: their bits are those of the quiet run
   for (const FaultRecord& record : world_->faults()) has_other_plugin_ |= record.recovered_by.starts_with("fallback");
 }
 

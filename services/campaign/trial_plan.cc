@@ -160,6 +160,8 @@ void draw_value(Draw* draw, PlannedFault* fault) {
       fault->order = "phantom";
       break;
   }
+  // wrong values of the right form are counted by themselves (table.cc)
+  fault->group = fault->duty == Duty::kRecover ? "malformed" : fault->duty == Duty::kWrong ? "values" : "tolerance";
 }
 
 // `is_command`: the worker commits no orders.
@@ -239,19 +241,9 @@ PlannedFault draw_last(Draw* draw, Slot slot) {
                       ? fmt::format("{},at={}", draw->one_of(kEnds), draw->one_of(kMoments))
                       : "nan";
   } else {
-    fault.group = "values";
     draw_value(draw, &fault);
   }
   return fault;
-}
-
-// Whose failures it may count as: a wrong wrench may be noticed by what the integrator makes of it, and is charged to
-// that; a worker that ends between two calls is missed by whoever of its process is asked next.
-std::vector<Slot> slots_hit(const PlannedFault& fault, const Scene& scene) {
-  if (is_between_calls(fault)) return sharing(scene, fault.slot);
-  const bool is_wrong = fault.duty == Duty::kWrong || fault.duty == Duty::kInTolerance;
-  if (fault.slot == Slot::kForce && is_wrong) return {Slot::kForce, Slot::kIntegrator};
-  return {fault.slot};
 }
 
 // Its process holds one plugin; else a command, which is how a liar is started, cannot serve there.
@@ -260,6 +252,13 @@ bool is_alone(const Scene& scene, Slot slot) {
 }
 
 }  // namespace
+
+std::vector<Slot> slots_hit(const PlannedFault& fault, const Scene& scene) {
+  if (is_between_calls(fault)) return sharing(scene, fault.slot);
+  const bool is_wrong = fault.duty == Duty::kWrong || fault.duty == Duty::kInTolerance;
+  if (fault.slot == Slot::kForce && is_wrong) return {Slot::kForce, Slot::kIntegrator};
+  return {fault.slot};
+}
 
 std::uint64_t trial_seed(std::uint64_t campaign_seed, std::uint64_t index) {
   RandomNumbers of_campaign(campaign_seed);

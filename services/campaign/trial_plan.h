@@ -51,6 +51,10 @@ inline bool is_between_calls(const PlannedFault& fault) {
          fault.order.ends_with("at=reply");
 }
 
+// Whose failures it may count as: a wrong wrench may be noticed by what the integrator makes of it, and is charged to
+// that; a worker that ends between two calls is missed by whoever of its process is asked next.
+std::vector<Slot> slots_hit(const PlannedFault& fault, const Scene& scene);
+
 // What the machine does to all of a trial.
 enum class HostTrouble { kNone, kSignals, kSurroundings };
 

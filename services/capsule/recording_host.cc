@@ -45,10 +45,12 @@ class RecordedDerivatives final : public kernel::DerivativeSource {
   std::span<const kernel::ColumnId> answer_columns() const override { return source_->answer_columns(); }
   void evaluate() override {
     const stage::MethodInfo& method = stage::method_info(stage::Method::kIntegratorDerivative);
-    v1::CapsuleDerivative* one = record_->add_derivatives();
-    copy_columns(arena_, trial_columns(), method.request, one->mutable_trial());
+    // one that is not answered is none: what reads it wants both
+    v1::CapsuleDerivative one;
+    copy_columns(arena_, trial_columns(), method.request, one.mutable_trial());
     source_->evaluate();
-    copy_columns(arena_, answer_columns(), method.reply, one->mutable_answer());
+    copy_columns(arena_, answer_columns(), method.reply, one.mutable_answer());
+    *record_->add_derivatives() = std::move(one);
   }
 
  private:
@@ -76,7 +78,7 @@ void RecordingHost::keep(v1::CapsuleCall* record, std::uint32_t target) {
 
 kernel::CallResult RecordingHost::call(const kernel::StageCall& call, kernel::Arena* arena,
                                        kernel::DerivativeSource* derivatives) {
-  if (!is_kept(call.target)) return host_->call(call, arena, derivatives);
+  if (call.is_compared || !is_kept(call.target)) return host_->call(call, arena, derivatives);
   v1::CapsuleCall record = begin_call(call, *arena);
   record.set_step(tape_->step);
   RecordedDerivatives recorded(derivatives, *arena, &record);

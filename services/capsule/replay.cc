@@ -7,6 +7,8 @@
 #include <chrono>
 #include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -192,6 +194,17 @@ std::optional<std::uint64_t> unserved_type(const v1::CapsuleCall& call, const Pl
   return found == types.end() ? std::nullopt : std::optional(*found);
 }
 
+// What befell a process, whichever it was and whatever it wrote.
+std::string without_process(std::string text) {
+  const std::string who = "worker process ";
+  text.erase(std::min(text.size(), text.find("; its last words: ")));
+  const std::size_t at = text.find(who);
+  if (at == std::string::npos) return text;
+  const std::size_t begin = at + who.size();
+  const std::size_t end = std::min(text.size(), text.find_first_not_of("0123456789", begin));
+  return text.erase(begin, end - begin);
+}
+
 // Asks the plugins of a capsule.
 class Player {
  public:
@@ -200,7 +213,7 @@ class Player {
 
   // `substitute`: instead of the capsule's own.
   Answer ask(const v1::CapsuleCall& call, const std::optional<std::string>& substitute) {
-    const auto key = std::make_pair(call.plugin(), substitute);
+    const auto key = std::make_pair(capsule_.plugins()[call.plugin()].SerializeAsString(), substitute);
     std::unique_ptr<Asked>& asked = asked_[key];
     if (!asked) asked = start(call, substitute);
     return asked->ask(call, capsule_.header().poison());
@@ -257,7 +270,7 @@ class Player {
   report::v1::ReplayReport* report_;
   std::map<std::string, check::Examinee> substitutes_;
   std::map<std::pair<std::string, std::uint64_t>, std::string> unserved_;  // why calls are left out
-  std::map<std::pair<std::uint32_t, std::optional<std::string>>, std::unique_ptr<Asked>> asked_;
+  std::map<std::pair<std::string, std::optional<std::string>>, std::unique_ptr<Asked>> asked_;  // by the plugin itself
 };
 
 // The request of a poisoned capsule without what answers its derivatives.
@@ -395,7 +408,9 @@ report::v1::ReplayReport bisect(const ReplayOptions& options, const std::string&
   for_each_call(&capsule, options, &report, progress, must_leave_out,
                 [&](const v1::CapsuleCall& call, std::uint32_t number) {
                   const Answer a = ask(call, *options.plugin);
-                  const std::string text = check::difference(method_of(call), a, ask(call, other), &comparison);
+                  Answer b = ask(call, other);
+                  if (!a.fault.empty() && without_process(a.fault) == without_process(b.fault)) b.fault = a.fault;
+                  const std::string text = check::difference(method_of(call), a, b, &comparison);
                   if (!text.empty()) {
                     report.set_different(1);
                     report.clear_first();  // a difference is what is looked for

@@ -80,6 +80,7 @@ int run_campaign(CampaignArguments* arguments) {
     // the parent lets its processes end their trials, though the whole group is told to end
     std::signal(SIGINT, SIG_IGN);
     std::signal(SIGTERM, SIG_IGN);
+    std::signal(SIGHUP, SIG_IGN);
     campaign::serve_trials(options);
     return kDone;
   }

@@ -33,6 +33,8 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     // swaps that are to come go along, the others are made
     std::vector<Order> pending;
     for (Order& one : pending_orders()) {
+      // after it rows are those of other bodies: what is compared is counted anew
+      if (one.compares()) one.swap.step = environment_->step_count() + 1;
       try {
         next->order_swap(one.swap, one.compares());
       } catch (const std::invalid_argument& problem) {

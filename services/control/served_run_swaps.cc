@@ -87,8 +87,10 @@ api::ServedSwap ServedRun::call_off(const api::CallOffRequest& request) {
                                                 : fmt::format("allowed: {}", fmt::join(pending, ", "));
     for (const api::ServedSwap& one : swap_messages())
       if (one.number() == request.number())
-        throw NotNow(fmt::format("{}this swap is {} already; {}", what, one.outcome(), allowed));
-    throw BadInput(fmt::format("{}no swap has that number; {}", what, allowed));
+        throw NotNow(fmt::format("{}this {} already; {}", what,
+                                 one.compares() ? std::string("comparison has ended") : "swap is " + one.outcome(),
+                                 allowed));
+    throw BadInput(fmt::format("{}no swap or comparison has that number; {}", what, allowed));
   });
 }
 

@@ -391,7 +391,11 @@ class Run final : private kernel::CommitListener {
     try {
       for (const kernel::SwapOrder& order : swaps_)
         if (is_due(order.step)) environment_->order_swap(order);
-      for (const kernel::SwapOrder& order : comparisons_) environment_->order_swap(order, true);
+      // after an edit they are counted anew
+      for (kernel::SwapOrder& order : comparisons_) {
+        if (made > 0) order.step = made + 1;
+        environment_->order_swap(order, true);
+      }
       for (const kernel::FaultInjection& fault : faults_)
         if (is_due(fault.step)) order_fault(fault, description_, swaps_, &*environment_);
       for (const RerunSpec& rerun : reruns_) environment_->set_rerun_every(rerun.slot, rerun.every);

@@ -78,8 +78,9 @@ std::string exchanges(const report::v1::Report& report) {
   for (int i = 0; i < edits; ++i) text += fmt::format("  {}\n", edit_line(report.edits(i)));
   if (report.edits_size() > edits) text += fmt::format("  {} more edits\n", report.edits_size() - edits);
   for (const report::v1::SwapRecord& one : report.comparisons())
-    text += fmt::format("  compared: {} {} with {}: {}\n", one.slot(), one.from(), one.to(),
-                        comparison_text(one.shadow(), one.from(), one.to()));
+    text += fmt::format("  compared{}: {} {} with {}: {}\n",
+                        one.step() > 1 ? fmt::format(" from step {} on", one.step()) : "", one.slot(), one.from(),
+                        one.to(), comparison_text(one.shadow(), one.from(), one.to()));
   return text;
 }
 

@@ -72,7 +72,7 @@ TEST(SimulatedFaults, AreSurvivedBitForBit) {
   EXPECT_GE(outcome.table.injected(), 20000U);
   EXPECT_EQ(outcome.table.forbidden(), 0U);
   EXPECT_LT(outcome.table.forbidden_bound(), 3e-4);
-  for (const char* group : {"process", "hang", "wire", "values", "re-run", "start", "poison", "swap"}) {
+  for (const char* group : {"process", "hang", "wire", "values", "malformed", "re-run", "start", "poison", "swap"}) {
     const campaign::v1::Row* row = find_row(outcome.table, group);
     ASSERT_NE(row, nullptr) << group;
     EXPECT_GT(row->injected(), 50U) << group;

@@ -250,6 +250,18 @@ TEST_P(BreakingOf, TheJerkOfARope) {
   }
 }
 
+// A motor that starts its rotor within a step, and a stiff damper that is struck, hold nothing together.
+TEST_P(BreakingOf, NothingByADriveAlone) {
+  const std::string motor =
+      "Constraint { Type = \"AngularMotor\" Id = \"Motor\" Body2 = \"Ball\" BreakingThreshold = 0.005 CustomProperties "
+      "{ "
+      "BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {1, 0, 0} AngularSpeed = 100 } }\n";
+  SceneRun run(scene_of("", body("Ball", 1.0, Vector3::Zero(), ""), motor, GetParam()));
+  run.steps(20);
+  EXPECT_TRUE(run.holds("Motor"));
+  EXPECT_NEAR(run.body("Ball").twist.angular.x(), 100.0, 1e-9);
+}
+
 // A truck of 1 t at 2 m/s on a slack rope whose plate of 5 kg is bolted to the world: the bolt that breaks took all its momentum,
 // 2000 N s for a bolt of 100 N. What comes after the jerk is one rope with two masses.
 TEST_P(BreakingOf, ABoltThatHoldsATruckForAStep) {

@@ -192,6 +192,25 @@ TEST_P(Drives, OfASteeredWheelKeepItsAxis) {
     }
 }
 
+// Limits, the spring's angle and what is told are the same angle, whatever the axes make with each other.
+TEST_P(Drives, OfASteeredWheelPressOnItsLimits) {
+  for (const double limit : {0.3, -0.6})
+    for (const Vector3& rolling : {Vector3(0, 0, 1), Vector3(0, 0.6, 0.8)}) {
+      SceneRun run("Forces { Force { Type = \"Basic\" Id = \"Turn\" CustomProperties { Torque = {0, " +
+                       literal(limit > 0.0 ? 1.0 : -1.0) +
+                       ", 0} } } }\nSimulator { CustomProperties { TimeStep = 0.002 Duration = 2 SleepEnergy = 0 } }\n"
+                       "Environment { Space { Bodies { Body { Id = \"Disc\" Mass = 2 PrincipalMoments = {0.2, 0.2, "
+                       "0.2} Forces = "
+                       "{ \"Turn\" } } } }\nConstraints { Constraint { Id = \"J\" Body2 = \"Disc\" Type = \"Axle\" "
+                       "CustomProperties { BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = " +
+                       literal(rolling) + " SteeringLowerLimit = -0.6 SteeringUpperLimit = 0.3 } } } }\n",
+                   with());
+      run.to_end();
+      const Vector3 axis = run.body("Disc").pose.orientation * rolling;
+      EXPECT_NEAR(std::atan2(axis.x(), axis.z()), limit, 1e-6) << literal(rolling);
+    }
+}
+
 // Free to steer, with its axes at 53 degrees: a motor in the hub gives the wheel no spin about the steering axis. A torque about
 // the rolling axis alone would.
 TEST_P(Drives, OfAWheelSteerNothing) {

@@ -25,13 +25,14 @@ struct LimitCase {
 class TurningLimits : public ::testing::TestWithParam<LimitCase> {
  protected:
   // A body on the world that turns about z.
-  static SceneRun turning(const std::string& joint, double speed, double time_step, double duration) {
+  static SceneRun turning(const std::string& joint, double speed, double time_step, double duration,
+                          const Vector3& velocity = Vector3::Zero()) {
     const LimitCase& with = GetParam();
     return SceneRun("Simulator { Type = \"" + std::string(with.simulator) +
                         "\" CustomProperties { TimeStep = " + literal(time_step) + " Duration = " + literal(duration) +
                         " } }\nEnvironment { Space { Bodies { Body { Id = \"A\" Mass = 1 PrincipalMoments = {0.1, 0.1, "
                         "0.1} KineticProperties { AngularVelocity = " +
-                        literal(Vector3(0, 0, speed)) +
+                        literal(Vector3(0, 0, speed)) + " LinearVelocity = " + literal(velocity) +
                         " } } } }\nConstraints { Constraint { Id = \"J\" Body2 = \"A\" " + joint + " } } }\n",
                     {set("Solver", std::string(with.solver)), set("Integrator", std::string(with.integrator))});
   }
@@ -98,6 +99,39 @@ TEST_P(TurningLimits, OfOneSideLetTheOtherGo) {
       }
     }
   }
+}
+
+// Turns are not counted: a limit that only a whole turn reaches would hold at once, and two that span one nothing.
+TEST_P(TurningLimits, OfAWholeTurnAreRefused) {
+  for (const std::string& joint : {hinge("UpperLimit = 6.28"), hinge("LowerLimit = -7"), bars(1, "UpperLimit1 = 7"),
+                                   hinge("LowerLimit = -3.15 UpperLimit = 3.15"),
+                                   ball("TwistLower = -3.141592653589793 TwistUpper = 3.141592653589793")}) {
+    try {
+      turning(joint, 1.0, 1e-2, 0.1);
+      ADD_FAILURE() << joint;
+    } catch (const std::exception& refusal) {
+      EXPECT_NE(std::string(refusal.what()).find("a full turn or more"), std::string::npos) << refusal.what();
+    }
+  }
+  SceneRun nearly = turning(hinge("UpperLimit = 6.2"), 3.0, 1e-2, 4.0);
+  nearly.to_end();
+  EXPECT_NEAR(std::remainder(angle_of(nearly) - 6.2, 2.0 * M_PI), 0.0, 1e-9);
+}
+
+// A rope holds nothing where its points meet: what leaves there does so in any direction.
+TEST_P(TurningLimits, OfARopeThatIsSlackLetPointsMeet) {
+  for (const double sign : {-1.0, 1.0})
+    for (const bool is_driven : {false, true}) {
+      const std::string rope =
+          "Type = \"Distance\" CustomProperties { BindPoint1 = {0, 0, 0} BindPoint2 = {0, 0, 0} MaximumDistance = 1 }";
+      const std::string drive =
+          "Type = \"Slider\" CustomProperties { BindPoint = {0, 0, 0} Axis = {1, 0, 0} Speed = " + literal(sign) +
+          " } }\nConstraint { Id = \"Rope\" Body2 = \"A\" ";
+      SceneRun run = turning((is_driven ? drive : std::string()) + rope, 0.0, 1e-2, 0.5,
+                             is_driven ? Vector3(0, 0, 0) : Vector3(sign, 0, 0));
+      run.to_end();
+      EXPECT_NEAR(run.body("A").pose.position.x(), 0.5 * sign, is_driven ? 0.011 : 1e-9) << is_driven;
+    }
 }
 
 // A motor that presses on a single limit rests there: by rounding it is beyond, and moves back by it.

@@ -25,6 +25,7 @@
 namespace gravitas {
 namespace {
 
+using harness::CurrentFolder;
 using harness::ProgramResult;
 using harness::run_program;
 using harness::ScratchFolder;
@@ -77,6 +78,44 @@ TEST(Capsule, OfEveryHostingHoldsTheSameCalls) {
   EXPECT_EQ(direct.size(), 12U);
   EXPECT_EQ(direct, calls("shm"));
   EXPECT_EQ(direct, calls("grpc"));
+}
+
+// Who is asked once more for comparison alone adds nothing.
+TEST(Capsule, HoldsWhatWasUsedAlone) {
+  const auto calls = [](const std::vector<std::string>& more) {
+    const ScratchFolder folder;
+    capsule::Reader reader(capture("force", folder, more));
+    std::vector<std::string> all;
+    recorder::v1::CapsuleCall call;
+    while (reader.next(&call)) all.push_back(call.SerializeAsString());
+    return all;
+  };
+  const std::vector<std::string> plain = calls({});
+  EXPECT_GT(plain.size(), 12U);
+  EXPECT_EQ(calls({"--set", "Simulator.CheckPhysicsEvery=1"}), plain);
+}
+
+// A force that refuses what is too fast leaves the integrator's call without a derivative that it asked for: that call
+// differs, and the others are as they were.
+TEST(Capsule, WithAnUnansweredDerivativeIsRead) {
+  const CurrentFolder here;
+  const ScratchFolder folder;
+  const std::string scene = folder.write("away.gravitas", R"(
+Forces {
+  Force { Type = "Basic" Id = "Push" CustomProperties { Force = {5e155, 0, 0} } }
+  Force { Type = "Drag" Id = "Air" CustomProperties { LinearCoefficient = 0 QuadraticCoefficient = 1e-300 } }
+}
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment {
+  Space { Bodies { Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} Forces = { "Push", "Air" } } } }
+  KineticIntegrator = "RK4"
+})");
+  const std::string file = folder.path("away.capsule");
+  const ProgramResult run = run_program({"capture", scene, "--slot", "integrator", "--out", file}, folder);
+  EXPECT_EQ(run.exit_code, 3) << run.err;
+  const ProgramResult again = run_program({"replay", file}, folder);
+  EXPECT_EQ(again.exit_code, 4) << again.out << again.err;
+  EXPECT_THAT(again.out, HasSubstr("3 calls: 2 same, 1 different\n"));
 }
 
 TEST(Capsule, HoldsTheStepsAndCallsThatWereAskedFor) {
@@ -253,6 +292,19 @@ TEST(Capsule, APoisonedRequestIsKeptAndFailsAgainAlone) {
   const ProgramResult sound = run_program({"replay", kept.file, "--plugin", "SemiImplicitEuler"}, folder);
   EXPECT_EQ(sound.exit_code, 0) << sound.err;
   EXPECT_THAT(sound.out, HasSubstr("1 failed then and are answered now"));
+}
+
+// Whichever processes they were: this one dies in the third call of each.
+TEST(Capsule, TwoDeathsAreAlike) {
+  const ScratchFolder folder;
+  const std::string file = folder.path("motor.capsule");
+  ASSERT_EQ(run_program({"capture", kSample, "--slot", "integrator", "--out", file, "--steps", "12"}, folder).exit_code,
+            0);
+  const std::string library = in_build("/lib/gravitas-faulty/integrator_segv.so"), same = folder.path("same.so");
+  std::filesystem::copy_file(library, same);
+  const ProgramResult alike = run_program({"bisect", file, library, same}, folder);
+  EXPECT_EQ(alike.exit_code, 4) << alike.out << alike.err;
+  EXPECT_THAT(alike.out, HasSubstr("8 calls answered alike, 4 failed alike\n"));
 }
 
 // An answer that came, and that a run would not use, is a failure, and in the run's words.

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,19 @@ class ScratchFolder {
 
  private:
   std::string folder_;
+};
+
+// Files that a run leaves where it was started go into a folder of the test's own.
+class CurrentFolder {
+ public:
+  CurrentFolder() { std::filesystem::current_path(scratch_.path("")); }
+  ~CurrentFolder() { std::filesystem::current_path(before_); }
+  CurrentFolder(const CurrentFolder&) = delete;
+  CurrentFolder& operator=(const CurrentFolder&) = delete;
+
+ private:
+  const std::filesystem::path before_ = std::filesystem::current_path();
+  const ScratchFolder scratch_;
 };
 
 std::string read_file(const std::string& path);

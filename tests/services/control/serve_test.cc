@@ -97,6 +97,14 @@ TEST_P(EndedBy, NothingIsLeft) {
   for (const int worker : workers) EXPECT_NE(kill(worker, 0), 0);
 }
 
+// Paced by the wall clock, it sleeps between two steps for longer than anybody waits for an end.
+TEST(Serve, IsEndedWhileItSleeps) {
+  Served served({"--duration", "3600", "--speed", "1e-4"});
+  ASSERT_FALSE(served.socket().empty());
+  EXPECT_EQ(served.status().state(), "running");
+  EXPECT_EQ(served.end(SIGINT).exit_code, 130);
+}
+
 TEST(Serve, CtlControlsIt) {
   Served served({"--steps", "200", "--speed", "0", "--paused"});
   ASSERT_FALSE(served.socket().empty());

@@ -141,16 +141,5 @@ TEST(ServedOrders, ACaptureWritesOverNoCheckpoint) {
   EXPECT_THAT(served.client.status().files(), ::testing::Contains(options.run.checkpoint));
 }
 
-// A call of a plugin that is hosted in the process takes time, too.
-TEST(ServedOrders, ComparisonsTellTimesInAnyHosting) {
-  RunOptions options = sample("direct").run;
-  options.comparisons = {"solver=Newton"};
-  const RunResult result = run(
-      options, [] { return false; }, [](const Progress&) {});
-  ASSERT_EQ(result.report.comparisons_size(), 1);
-  EXPECT_GT(result.report.comparisons(0).shadow().from_us(), 0.0);
-  EXPECT_GT(result.report.comparisons(0).shadow().to_us(), 0.0);
-}
-
 }  // namespace
 }  // namespace gravitas::control

@@ -1,10 +1,12 @@
 // A served run that goes on from a checkpoint.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <string>
 #include <utility>
 
+#include "tests/paths.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -13,6 +15,7 @@ namespace {
 using harness::quiet_chain;
 using harness::sample;
 using harness::Served;
+using ::testing::HasSubstr;
 
 // From a checkpoint of step 20 and a journal up to 23 or more, in the middle of a swap's probation, with the edit before it.
 TEST(ServedResume, GoesOnFromACheckpoint) {
@@ -75,6 +78,54 @@ TEST(ServedResume, GoesOnFromACheckpoint) {
       EXPECT_EQ(twice.client.status().step(), 0U);
       EXPECT_EQ(twice.to_the_end().chain_hash(), quiet_chain());
     }
+}
+
+// Whom somebody woke is in no journal: the step that wakes is in the checkpoint.
+TEST(ServedResume, GoesOnFromAWake) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample();
+  options.run.scenes = {in_source("/tests/scenes/box_on_plane.gravitas")};
+  options.run.checkpoint = folder.path("served.ck");
+  std::string chain;
+  {
+    ServeOptions undisturbed = options;
+    undisturbed.run.checkpoint.clear();
+    Served asleep(undisturbed), served(options);
+    served.client.step(100);
+    served.client.wake("Box");
+    chain = served.client.step(1).chain_hash();
+    ASSERT_NE(chain, asleep.client.step(101).chain_hash());
+  }
+  ServeOptions again = options;
+  again.run.resume = options.run.checkpoint;
+  Served resumed(again);
+  EXPECT_EQ(resumed.client.status().step(), 101U);
+  EXPECT_EQ(resumed.client.status().chain_hash(), chain);
+}
+
+// Nothing is kept of a last step that is shorter than the others.
+TEST(ServedResume, GoesOnBeforeAShortenedLastStep) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.steps.reset();
+  options.run.duration = 20.4 / 60.0;
+  options.run.checkpoint = folder.path("served.ck");
+  std::string before, end;
+  {
+    Served served(options);
+    before = served.client.step(20).chain_hash();
+    served.edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
+    end = served.client.step(1).chain_hash();
+    ASSERT_EQ(served.client.status().state(), "finished");
+  }
+  ServeOptions again = options;
+  again.run.resume = options.run.checkpoint;
+  Served resumed(again);
+  EXPECT_EQ(resumed.client.status().step(), 20U);
+  EXPECT_EQ(resumed.client.status().chain_hash(), before);
+  EXPECT_THAT(resumed.client.status().last_warning(), HasSubstr("the last step is shorter"));
+  resumed.edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
+  EXPECT_EQ(resumed.to_the_end().chain_hash(), end);
 }
 
 TEST(ServedResume, DoesNotGoOnFromWhatIsNoCheckpointOfItsScene) {

@@ -23,6 +23,7 @@
 namespace gravitas::control {
 namespace {
 
+using harness::CurrentFolder;
 using harness::kSteps;
 using harness::quiet_chain;
 using harness::refusal;
@@ -203,19 +204,6 @@ TEST(ServedRun, AnInjectedFaultIsSurvived) {
   EXPECT_EQ(end.faults(1).slot(), "integrator");
 }
 
-// Files that a run leaves where it was started go into a folder of the test's own.
-class CurrentFolder {
- public:
-  CurrentFolder() { std::filesystem::current_path(scratch_.path("")); }
-  ~CurrentFolder() { std::filesystem::current_path(before_); }
-  CurrentFolder(const CurrentFolder&) = delete;
-  CurrentFolder& operator=(const CurrentFolder&) = delete;
-
- private:
-  const std::filesystem::path before_ = std::filesystem::current_path();
-  const gravitas::harness::ScratchFolder scratch_;
-};
-
 TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
   const CurrentFolder here;
   Served served;
@@ -285,34 +273,8 @@ TEST(ServedRun, ASwapThatIsCalledOffNeverComes) {
   EXPECT_EQ(off.outcome(), "refused");
   EXPECT_EQ(off.reason(), "called off");
   EXPECT_THAT(refusal([&] { served.client.call_off(late); }), HasSubstr("refused already; none is on its way"));
-  EXPECT_THAT(refusal([&] { served.client.call_off(7); }), HasSubstr("no swap has that number"));
+  EXPECT_THAT(refusal([&] { served.client.call_off(7); }), HasSubstr("no swap or comparison has that number"));
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet.to_the_end().chain_hash());
-}
-
-TEST(ServedRun, AnotherPluginIsComparedAndLeavesNoTrace) {
-  Served quiet, served;
-  const auto compare = [&](const std::string& text) {
-    return served.client.swap(parse_swap_request(text, true)).number();
-  };
-  const std::uint32_t same = compare("solver=Sequential"), other = compare("solver=Newton");
-  EXPECT_THAT(refusal([&] { compare("solver=Newtn"); }), HasSubstr("compare solver=Newtn: no solver plugin"));
-  served.client.step(30);
-  EXPECT_EQ(served.client.call_off(same).shadow().calls(), 30U);
-  const api::Status status = served.to_the_end();
-  EXPECT_EQ(status.chain_hash(), quiet.to_the_end().chain_hash());
-  ASSERT_EQ(status.swaps_size(), 2);
-  EXPECT_TRUE(status.swaps(0).compares());
-  EXPECT_EQ(status.swaps(0).shadow().differing_calls(), 0U);
-  EXPECT_GT(status.swaps(0).shadow().from_us(), 0.0);
-  EXPECT_GT(status.swaps(0).shadow().to_us(), 0.0);
-  EXPECT_EQ(status.swaps(1).number(), other);
-  EXPECT_EQ(status.swaps(1).shadow().calls(), kSteps);
-  EXPECT_GT(status.swaps(1).shadow().differing_calls(), 0U);
-  EXPECT_THAT(
-      status_page(status),
-      HasSubstr("  1 ended: solver Sequential beside Sequential, from step 1 on: 0 of 30 answers differ; Sequential "));
-  EXPECT_THAT(status_page(status), HasSubstr("  2 comparing: solver Newton beside Sequential, from step 1 on: "));
-  EXPECT_THAT(status_page(status), HasSubstr("      Solver.Solve linear_velocity: "));
 }
 
 TEST(ServedRun, ASwapOnItsWayNamesWhomItReplaces) {

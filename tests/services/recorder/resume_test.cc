@@ -20,6 +20,7 @@
 namespace gravitas {
 namespace {
 
+using harness::CurrentFolder;
 using harness::ScratchFolder;
 using kernel::Hosting;
 using ::testing::HasSubstr;
@@ -154,6 +155,26 @@ TEST(ResumedSwap, GoesBackToTheSwapBefore) {
   ASSERT_EQ(resumed.report.swaps_size(), 1);
   EXPECT_EQ(resumed.report.swaps(0).from(), "Verlet");
   EXPECT_EQ(resumed.report.swaps(0).outcome(), "rolled back");
+}
+
+// The checkpoint that a paused run leaves knows of it, and so does the command that goes on.
+TEST(ResumedSwap, OfAStepThatWasNotMadeIsMadeOnce) {
+  const CurrentFolder here;
+  const ScratchFolder folder;
+  RunOptions options = options_of("two_spheres_motor", Hosting::kSharedMemory, 80);
+  options.swaps = {"solver=Newton@step=50"};
+  const RunResult whole = run_quietly(options);
+  RunOptions part = options;
+  part.checkpoint = folder.path("checkpoint");
+  part.faults = {"integrator:kill@step=50,times=100"};
+  const RunResult paused = run_quietly(part);
+  ASSERT_EQ(paused.outcome, RunOutcome::kPaused);
+  ASSERT_EQ(paused.report.steps(), 49U);
+  options.resume = part.checkpoint;
+  const RunResult resumed = run_quietly(options);
+  EXPECT_EQ(resumed.report.chain_hash(), whole.report.chain_hash());
+  ASSERT_EQ(resumed.report.swaps_size(), 1);
+  EXPECT_EQ(resumed.report.swaps(0).outcome(), "committed");
 }
 
 // An instance of BasicVerlet or a solver's memory goes on, though the swap is made again.

@@ -92,18 +92,22 @@ TEST_P(Degenerate, MomentsOfOneTo1em8) {
   }
 }
 
-// Two joints that move apart and hold one body: no solution. That is said, and their compromise is the middle.
+// Two joints that move apart and hold one body: no solution. That is said, and their compromise is the middle, whatever spins
+// beside them.
 TEST_P(Degenerate, ContradictionsAreReportedAndCompromised) {
-  SolverProblem p;
-  const auto left = p.add_body({.linear = {-1, 0, 0}, .kinematic = true});
-  const auto right = p.add_body({.linear = {1, 0, 0}, .kinematic = true});
-  const auto middle = p.add_body({.mass = 2.0});
-  p.make_trial(Vector3::Zero());
-  for (const auto end : {left, right}) p.add_discrepancy(end, middle, p.joint_at(end, middle, Vector3::Zero()));
-  const SolverAnswer answer = solve(p);
-  EXPECT_EQ(answer.stop_reason[0], static_cast<std::uint32_t>(StopReason::kContradiction));
-  EXPECT_LE(answer.velocity(middle).norm(), 1e-9);
-  EXPECT_LE(answer.translation(middle).norm(), 1e-9 * p.time_step);
+  for (const bool has_spinner : {false, true}) {
+    SolverProblem p;
+    const auto left = p.add_body({.linear = {-1, 0, 0}, .kinematic = true});
+    const auto right = p.add_body({.linear = {1, 0, 0}, .kinematic = true});
+    const auto middle = p.add_body({.mass = 2.0});
+    if (has_spinner) p.add_body({.pose = {{9, 0, 0}, Quaternion::Identity()}, .angular = {0, 0, 100}});
+    p.make_trial(Vector3::Zero());
+    for (const auto end : {left, right}) p.add_discrepancy(end, middle, p.joint_at(end, middle, Vector3::Zero()));
+    const SolverAnswer answer = solve(p);
+    EXPECT_EQ(answer.stop_reason[0], static_cast<std::uint32_t>(StopReason::kContradiction)) << has_spinner;
+    EXPECT_LE(answer.velocity(middle).norm(), 1e-9) << has_spinner;
+    EXPECT_LE(answer.translation(middle).norm(), 1e-9 * p.time_step) << has_spinner;
+  }
 }
 
 // Two motors that nothing limits drive one body about one axis at 3 and at -1 rad/s: it turns at 1.

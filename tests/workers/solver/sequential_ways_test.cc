@@ -306,6 +306,30 @@ TEST(SequentialWays, JointsEndAtTheSamePlace) {
   }
 }
 
+// A stop that bore and is far now is let go of in whatever way: what is left of an impulse would count as closed.
+TEST(SequentialWays, StopsThatGoBearNothing) {
+  SolverProblem problem;
+  const auto ground = problem.add_immovable();
+  const auto body = problem.add_body({.linear = {1, 0, 0}});
+  Discrepancy stop;
+  stop.modes = pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree, false);
+  stop.point2 = {0.5, 0, 0};
+  stop.lower.x() = 0.0, stop.upper.x() = kUnlimited;
+  problem.add_discrepancy(kNone, body, stop);
+  problem.discrepancy_warm_impulse = {1.0, 0, 0};
+  problem.discrepancy_warm_correction = {0.01, 0, 0};
+  // so that it is relaxed at all
+  const auto other = problem.add_body({.pose = {{5, 1, 0}, Quaternion::Identity()}, .linear = {0, -1.0, 0}});
+  problem.add_contact({.body1 = ground, .body2 = other, .point = {5, 0, 0}, .depth = 0.001, .key = 2});
+  for (const SequentialSettings& way :
+       {SequentialSettings{.order = RelaxationOrder::kSimultaneous}, SequentialSettings{.relaxation_factor = 0.5}}) {
+    const SolverAnswer answer = solve(problem, way);
+    EXPECT_EQ(answer.discrepancy_impulse[0], 0.0);
+    EXPECT_EQ(answer.discrepancy_correction[0], 0.0);
+    EXPECT_EQ(answer.velocity(body), Vector3(1, 0, 0));
+  }
+}
+
 // An impulse that is let go of goes by a share in each sweep: it ends as none, and not as numbers whose squares are none.
 TEST(SequentialWays, ImpulsesThatGoEndInTheirCones) {
   SolverProblem problem;

@@ -9,15 +9,18 @@
 // Four rows of rank 4, left are the turns about s and r; with a suspension rank 3 and a spring.
 //
 // Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
-// start, however the wheel rolls; asin(sin(g) sin(angle)) where s and r make an angle g. Limits are one row, active at a
-// limit; a spring and a damper, torque -k (angle - SteeringAngle) - c angle', take no freedom. With a stiff spring
-// SteeringAngle is the angle that the wheel is steered to. They can tell less than a quarter turn either way.
+// start, however the wheel rolls. Limits are one row, active at a limit, on asin(sin(g) sin(angle)), where s and r make an angle
+// g; a spring and a damper, torque -k e - c e' with that e of angle - SteeringAngle, take no freedom. With a stiff spring
+// SteeringAngle is the angle that the wheel is steered to. They can tell less than a quarter turn either way: from behind, a
+// limit is met half a turn on.
 //
 // Drive. The wheel turns at w2 - w1 = p r + q s, where p is what it rolls at. So d = (r - (r.s) s)/sin^2 g has d.(w2 - w1) = p
 // and d.s = 0: a torque T d does the work T p, and steers nothing, as a motor in the hub of a wheel that may steer does. It is one
 // row on the velocity about d, made unit; with speed 0 it is a brake. Where r and s are across each other d is r.
 //
 // Rolling. What the wheel has rolled is the angle about r by which it sees s turned back: its rate is p, steering is none of it.
+#include <cmath>
+
 #include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
@@ -54,7 +57,9 @@ class Axle final : public ConstraintPlugin {
               Property::number("SteeringLowerLimit", "rad")
                   .at_least(-kMostSteering)
                   .at_most(0.0)
-                  .means("Smallest steering angle, right-handed about SteeringAxis, 0 at the start; none if absent."),
+                  .means("Smallest steering angle, right-handed about SteeringAxis, 0 at the start; none if absent. "
+                         "One limit "
+                         "alone is met from behind, too, half a turn on."),
               Property::number("SteeringUpperLimit", "rad")
                   .at_least(0.0)
                   .at_most(kMostSteering)
@@ -75,8 +80,7 @@ class Axle final : public ConstraintPlugin {
                   .at_least(0.0)
                   .means("Largest torque of the drive; unlimited if absent.")},
              {{"steering", "rad",
-               "Steering angle, right-handed about SteeringAxis, 0 at the start: as limits and SteeringAngle count it, "
-               "without these about the axis, above -pi up to pi."},
+               "Steering angle, right-handed about SteeringAxis, 0 at the start, above -pi up to pi."},
               {"suspension", "m",
                "Way of the wheel along SteeringAxis relative to body 1, 0 at the start; of a wheel that is sprung."},
               {"rolling", "rad",
@@ -132,8 +136,12 @@ class Axle final : public ConstraintPlugin {
       limits.upper = bound.number();
       if (!limits.is_none()) {
         Discrepancy limit = swing_row(across, rolling, kQuarterTurn, AxisMode::kLimited);
-        limit.lower.x() = limits.lower;
-        limit.upper.x() = limits.upper;
+        const double sine = math::sin(angle);
+        const auto counted = [&](double of) {
+          return std::fabs(of) < kUnlimited ? math::asin(sine * math::sin(of)) : of;
+        };
+        limit.lower.x() = counted(limits.lower);
+        limit.upper.x() = counted(limits.upper);
         emit(limit);
       }
       const JointSpring held = read_spring(&bound);
@@ -153,20 +161,12 @@ class Axle final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       bound.number();
       const JointSpring suspension = read_spring(&bound);
-      JointLimits limits;
-      limits.lower = bound.number();
-      limits.upper = bound.number();
-      const JointSpring held = read_spring(&bound);
-      bound.number();
+      // limits, spring and its angle
+      for (int i = 0; i < 5; ++i) bound.number();
       const math::SinCos start = math::sincos(bound.number());
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
       const Vector3 turning = bodies.spin2 - bodies.spin1;
-      if (limits.is_none() && held.is_none()) {
-        emit(0, azimuth_of(steering, one.orientation * Vector3::UnitY(), rolling, turning));
-      } else {
-        const Coordinate from_across = swing_of(-(one.orientation * Vector3::UnitZ()), rolling, bodies);
-        emit(0, Coordinate{from_across.value - kQuarterTurn, from_across.rate});
-      }
+      emit(0, azimuth_of(steering, one.orientation * Vector3::UnitY(), rolling, turning));
       if (!suspension.is_none()) emit(1, way_along(steering, one.position, two.position, bodies));
       emit(2, reversed(azimuth_of(rolling, two.orientation * Vector3(0.0, start.cos, start.sin), steering, -turning)));
     });

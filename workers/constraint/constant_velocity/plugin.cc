@@ -9,7 +9,8 @@
 // has a part along a1 + a2, and all that do not are such turns. Four rows of rank 4, none redundant; left are the two
 // bends. With w1 = O1 a1, w2 = O2 a2 and no bending the row says (O2 - O1)(1 + a1.a2) = 0: equal speeds.
 // With a largest bend one row more, that of a reach cone round a1 (Spherical), active only there: rank 5.
-// A spring and a damper against the bend, torque -k bend - c bend' about the axis across both shafts, take no freedom.
+// A spring against the bend, torque -k bend about the axis across both shafts, and a damper of all turning across shaft 1, -c w,
+// take no freedom. Shafts that turn while they are bent move their bend round: the damper takes c W^2 sin^2(bend) of power then.
 // Undefined at a bend of 180 degrees, which is refused at the start.
 #include <cmath>
 #include <string>
@@ -42,7 +43,9 @@ class ConstantVelocity final : public ConstraintPlugin {
                             .means("Spring that straightens the shafts; none if absent."),
                         Property::number("BendDamping", "N*m*s/rad")
                             .at_least(0.0)
-                            .means("Damper of their bending; none if absent."),
+                            .means("Damper of their bending, and of the bend's going round Axis1, as while bent shafts "
+                                   "turn; none if "
+                                   "absent."),
                         Property::number("MaximumAngle", "rad")
                             .above(0.0)
                             .at_most(kHalfTurn)

@@ -10,8 +10,8 @@
 // What an edit leaves beyond the range is an error of the joint as any other: the pose change of the next step takes it out (with
 // Sequential its CorrectionFactor of it), gives nothing a velocity, and does the work that the way asks for. So a rope hoists as fast
 // as edits shorten it.
-// u turns with the points (the discrepancy is radial). Where the points meet u is undefined and any direction is taken: a
-// rope is slack there, a rod of length 0 is refused.
+// u turns with the points (the discrepancy is radial). Where the points meet u is undefined: a rope, which has no lower limit then,
+// is slack there, a rod of length 0 is refused.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -64,7 +64,8 @@ class Distance final : public ConstraintPlugin {
                 const double start = (point2 - point1).norm();
                 const bool is_rod = std::isnan(least) && std::isnan(most);
                 if (is_rod) least = most = start;
-                if (std::isnan(least)) least = 0.0;
+                // no distance is below 0: as a limit it would hold points that meet, along whatever direction
+                if (!(least > 0.0)) least = -kUnlimited;
                 if (std::isnan(most)) most = kUnlimited;
                 const JointSpring spring = JointSpring::of(&properties);
                 const bool is_rigid = spring.stiffness == 0.0;

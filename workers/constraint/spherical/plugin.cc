@@ -196,7 +196,7 @@ class Spherical final : public ConstraintPlugin {
     cone.irregular = properties->table(2);
     const Vector3 axis = properties->vector();
     const double lower = properties->number(), upper = properties->number();
-    cone.twist = JointLimits::of(lower, upper, "Spherical: TwistLower", "Spherical: TwistUpper");
+    cone.twist = JointLimits::of_turn(lower, upper, "Spherical: TwistLower", "Spherical: TwistUpper");
     if (!std::isnan(angle)) {
       if (!cone.irregular.empty()) throw Refusal("Spherical: ReachConeAngle and ReachCone are both given");
       if (!(angle > 0.0 && angle <= kHalfTurn)) throw Refusal("Spherical: ReachConeAngle is outside 0 ... pi");

@@ -207,6 +207,7 @@ double ContactImpulses::error_of(std::size_t block, const BodyMotion& x) const {
     Eigen::Vector2d slip = velocity.tail<2>();
     const Eigen::Vector2d friction = row.impulse.tail<2>();
     const double allowed = (row.slides ? row.dynamic_friction : row.static_friction) * row.impulse.x();
+    if (!(allowed > 0.0)) continue;  // nothing opposes its slip
     // at the cone's rim it may slip against the friction
     if (friction.norm() >= allowed * (1.0 - 1e-9)) {
       const Eigen::Vector2d along = friction.normalized();

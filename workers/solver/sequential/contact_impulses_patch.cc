@@ -38,7 +38,8 @@ bool ContactImpulses::is_flat(const Patch& patch) const {
   double extent = 0.0;
   for (std::size_t i = patch.first + 1; i < patch.end; ++i) {
     const Row& row = rows_[i];
-    if ((row.frame.col(0) - first.frame.col(0)).squaredNorm() > 1e-18) return false;
+    // tangents, too: where a number of the normal changes its sign, those of one normal differ
+    if ((row.frame - first.frame).squaredNorm() > 1e-18) return false;
     const Vector3 d = row.arm1 - first.arm1;
     height = std::max(height, std::fabs(first.frame.col(0).dot(d)));
     extent = std::max(extent, d.norm());

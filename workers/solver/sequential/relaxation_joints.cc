@@ -273,7 +273,8 @@ double RelaxationJoints::relax_others(const Block& block, double share, double w
     const double value = row.own.along(x1, x2) + row.law.gamma * row.multiplier;
     double relaxed = relaxed_multiplier(row.law, row.multiplier, value, row.response);
     const double whole = relaxed - row.multiplier;
-    if (share < 1.0) relaxed = row.multiplier + share * whole;
+    // a share of the step, then onto what is allowed: a share of the way there would never let go
+    if (share < 1.0) relaxed = relaxed_multiplier(row.law, row.multiplier, value, row.response / share);
     const double amount = relaxed - row.multiplier;
     if (amount == 0.0) continue;
     row.multiplier = relaxed;
@@ -342,8 +343,10 @@ void RelaxationJoints::push_velocity_only(const SolverBodies& bodies, double fac
     for (std::size_t i = block.first; i < block.end; ++i) {
       const Row& row = rows_[i];
       if (!row.law.is_velocity_only || row.multiplier == 0.0) continue;
-      row.own.push(factor * row.multiplier, bodies[block.body1].inverse_mass, bodies[block.body2].inverse_mass,
-                   x[block.body1], x[block.body2]);
+      // the rows' inertia may be that of another place
+      const SolverBody &one = bodies[block.body1], &two = bodies[block.body2];
+      with_turns(row.own, one.inverse_inertia, two.inverse_inertia)
+          .push(factor * row.multiplier, one.inverse_mass, two.inverse_mass, x[block.body1], x[block.body2]);
     }
   }
 }

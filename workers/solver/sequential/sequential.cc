@@ -111,10 +111,11 @@ void SequentialSolver::solve_rows(const stage::SolverSolveRequest& request) {
 bool SequentialSolver::reconcile() {
   if (!used_up_ && !pose_joints_.leaves_out() && !velocity_joints_.leaves_out()) return false;
   double spin = 0.0, turn = 0.0, reach = 0.0, open = 0.0;
-  for (std::uint32_t i = 0; i < bodies_.count(); ++i) {
-    spin = std::max({spin, bodies_[i].trial_velocity.angular.norm(), solution_.velocity[i].angular.norm()});
-    turn = std::max({turn, solution_.displacement[i].angular.norm(), time_step_ * spin});
-  }
+  for (const RelaxationDiscrepancy& d : discrepancies_)
+    for (const std::uint32_t i : {d.body1, d.body2}) {
+      spin = std::max({spin, bodies_[i].trial_velocity.angular.norm(), solution_.velocity[i].angular.norm()});
+      turn = std::max({turn, solution_.displacement[i].angular.norm(), time_step_ * spin});
+    }
   for (std::size_t i = 0; i < pose_laws_.size(); ++i) {
     const RelaxationDiscrepancy& d = discrepancies_[i / 3];
     const ConstraintDirection& direction = d.directions[i % 3];
@@ -156,8 +157,10 @@ double SequentialSolver::reconcile(const std::vector<RelaxationDiscrepancy>& dis
   if (place.empty() || problem.reconcile(bodies_, start, smallest) == 0.0) return 0.0;
   double largest = 0.0;
   for (std::size_t k = 0; k < place.size(); ++k) {
-    (*shift)[place[k]] = problem.rows[k].law.lower_target - laws[place[k]].lower_target;
-    largest = std::max(largest, std::fabs((*shift)[place[k]]) * problem.rows[k].length);
+    // beside what drives yield
+    const double change = problem.rows[k].law.lower_target - laws[place[k]].lower_target;
+    (*shift)[place[k]] += change;
+    largest = std::max(largest, std::fabs(change) * problem.rows[k].length);
   }
   return largest;
 }
@@ -270,7 +273,7 @@ bool SequentialSolver::relax_pose() {
   bool converged = false;
   for (std::uint32_t i = 0, cap = most_sweeps(gaps_.is_empty()); i < cap && !converged; ++i) {
     converged = sweep_.sweep(bodies_, solution_.displacement) <= tolerance;
-    ++summary_.sweeps;
+    count_sweep();
   }
   solution_.displacement = base_;
   pose_joints_.push_all(bodies_, solution_.displacement);
@@ -311,7 +314,7 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
   turn_trial_velocity();
   take_directions(drives_yield_);
   velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
-  impulses_.build(discrepancies_.empty() ? bodies_ : turned_, request, closed_, solution_.contact_impulse);
+  impulses_.build(bodies_, request, closed_, solution_.contact_impulse);
   if (drives_yield_) impulses_.drop_restitution();
   copy(request.contact_normal(), solution_.contact_direction);
 }
@@ -355,12 +358,17 @@ void SequentialSolver::relax_velocity() {
   sum_velocity();
 }
 
+void SequentialSolver::count_sweep() {
+  constexpr std::uint32_t kSilence = 64;
+  if (++summary_.sweeps % kSilence == 0 && host_ != nullptr) host_->mark_progress();
+}
+
 // Sweeps until nothing changes by more than the tolerance (m/s); false if the sweeps ran out.
 bool SequentialSolver::sweep_velocity(double tolerance) {
   const std::uint32_t cap = most_sweeps(impulses_.is_empty());
   for (std::uint32_t done = 1; done <= cap; ++done) {
     summary_.residual = sweep_.sweep(bodies_, solution_.velocity);
-    ++summary_.sweeps;
+    count_sweep();
     const bool converged = summary_.residual <= tolerance;
     if (converged || done == cap / 2 || done == cap / 4 * 3) {
       const double slip = kSlipToChange * std::max(summary_.residual, tolerance);

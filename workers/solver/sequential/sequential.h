@@ -8,7 +8,7 @@
 //     -> pose change again, if friction or drives act on the velocity alone
 //
 // Notation: h time step, * what the integrator made without joints and contacts, J Jacobian rows
-// with arms and world inertia at S* (velocities of jointed islands: inertia at S* (+) delta), M masses,
+// with arms and world inertia at S* (velocities of joints: inertia at S* (+) delta), M masses,
 // lambda impulses (N s), mu position multipliers (kg m), (+) composition of a pose with a translation and a
 // rotation vector (world). delta is not h (v_{n+1} - v*): the multipliers are its own.
 //
@@ -148,6 +148,9 @@ class SequentialSolver {
     sweep_.set_accelerated(settings.nesterov_acceleration);
   }
 
+  // Who is told of progress in long work; nobody at first. It outlives the solutions.
+  void report_to(const Host* host) { host_ = host; }
+
   // Answers the request. Throws Refusal for an impossible one (request_check.h), and where
   // the answer is not finite because the numbers overflow. What is kept between calls is room for
   // rows, nothing else.
@@ -230,6 +233,7 @@ class SequentialSolver {
   template <typename Contacts>
   double choose_start(const BodyMotion& base, double tolerance, Contacts* contacts, BodyMotion* x);
   bool sweep_velocity(double tolerance);
+  void count_sweep();
   // Frames and mechanisms need more sweeps than what lies on each other, which is given up before.
   std::uint32_t most_sweeps(bool has_joints_alone) const { return (has_joints_alone ? 10 : 1) * settings_.iterations; }
   void bound_energy();
@@ -244,6 +248,7 @@ class SequentialSolver {
   void turn_offset(const SolverBodies& bodies);
 
   SequentialSettings settings_;
+  const Host* host_ = nullptr;
   RelaxationSweep sweep_;
   SequentialSummary summary_;
   bool velocity_converged_ = true;

@@ -39,6 +39,7 @@ void SequentialSolver::close_at_end(const stage::SolverSolveRequest& request) {
     before = left;
   }
   if (is_stiff) end_unstiffened(request);
+  used_up_ = used_up_ || !pose_converged_;
 }
 
 // From a displacement to that there is, of what the bodies measure.

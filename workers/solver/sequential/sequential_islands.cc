@@ -26,7 +26,9 @@ void SequentialIslands::solve(const stage::SolverSolveRequest& request, const st
   check_solver_request(request);
   bodies_.load(request);
   const std::span<const Island> islands = finder_.find(request, bodies_);
-  if (islands.size() == 1) {
+  // joints of bodies that nothing pushes are in no island
+  if (islands.size() == 1 && islands[0].discrepancies.size() == request.mode().size()) {
+    whole_.report_to(&host);
     const SequentialSummary summary = whole_.solve(request);
     return write(whole_.solution(), summary.outcome(), reply);
   }
@@ -36,6 +38,7 @@ void SequentialIslands::solve(const stage::SolverSolveRequest& request, const st
     thread_local IslandRequest part;
     thread_local SequentialSolver solver(settings_);
     solver.set(settings_);
+    solver.report_to(&host);
     part.load(request, bodies_, islands[i]);
     outcomes_[i] = solver.solve(part.request()).outcome();
     part.store(solver.solution(), &solution_);

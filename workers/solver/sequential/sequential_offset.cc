@@ -12,7 +12,8 @@ namespace gravitas {
 // the pose change is that without friction's then, or that without any.
 void SequentialSolver::solve_pose_with_offset(const stage::SolverSolveRequest& request, double factor) {
   constexpr double kMuchMore = 2.0;  // of what was open before
-  if (!discrepancies_.empty()) keep_pose(&before_offset_);
+  const auto is_nought = [](const Twist& of) { return of.linear.isZero(0.0) && of.angular.isZero(0.0); };
+  if (!discrepancies_.empty() && std::ranges::all_of(offset_, is_nought)) keep_pose(&before_offset_);
   for (const bool with_friction : {true, false}) {
     set_offset(request, factor, with_friction);
     if (with_friction && !discrepancies_.empty()) guess_pose(request, factor);
