@@ -104,7 +104,7 @@ class Balance {
     return first;
   }
 
-  bool is_unfinished() const { return answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kIterations); }
+  bool is_unfinished() const { return tells_unfinished(static_cast<StopReason>(answer_.stop_reason)); }
 
   // What the pose change turns a body by, rad, and where it carries a point of the trial state.
   Vector3 turn_of(std::uint32_t body) const {
@@ -418,7 +418,7 @@ class Balance {
   // error(S_{n+1}) = (1 - beta) error(S_n) along what is locked, with a beta of 0 ... 1 that the method may choose.
   std::string check_closing() const {
     const DiscrepancyColumns columns = discrepancies();
-    if (answer_.stop_reason == static_cast<std::uint32_t>(StopReason::kContradiction)) return {};
+    if (tells_contradiction(static_cast<StopReason>(answer_.stop_reason))) return {};
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];
       if (!can_be_pushed(one) && !can_be_pushed(two)) continue;

@@ -33,7 +33,7 @@ bool Environment::write_what_joints_bear(const Trusted<TrialState>& trial, std::
 void Environment::update_joints() {
   std::ranges::copy(front().intact.span(), back().intact.data());
   for (const std::uint32_t joint : broken_) back().intact[joint] = 0;
-  const bool contradicts = data_.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction);
+  const bool contradicts = tells_contradiction(static_cast<StopReason>(data_.stop_reason[0]));
   std::vector<std::pair<double, std::uint32_t>> overloaded;  // by how much of what it bears, and joint
   const DiscrepancyAnswer& d = data_.discrepancies;
   const DiscrepancyColumns columns = d.columns();

@@ -137,7 +137,7 @@ SolverOutcome outcome_of(const std::vector<ConeSummary>& summaries) {
   }
   if (!summaries.empty()) outcome.stop_reason = StopReason::kConverged;
   if (contradicts) outcome.stop_reason = StopReason::kContradiction;
-  if (!has_converged) outcome.stop_reason = StopReason::kIterations;
+  if (!has_converged) outcome.stop_reason = together(outcome.stop_reason, StopReason::kIterations);
   return outcome;
 }
 

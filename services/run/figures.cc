@@ -146,7 +146,7 @@ void Figures::measure(kernel::Environment* environment) {
 }
 
 void Figures::look_at(const kernel::InnerStep& inner) {
-  contradicts_ = contradicts_ || inner.data.stop_reason[0] == static_cast<std::uint32_t>(StopReason::kContradiction);
+  contradicts_ = contradicts_ || tells_contradiction(static_cast<StopReason>(inner.data.stop_reason[0]));
 }
 
 void Figures::follow(kernel::Environment* environment) {

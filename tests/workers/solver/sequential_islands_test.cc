@@ -134,6 +134,30 @@ TEST(SequentialIslands, HaveTheSameBytesOnAnyNumberOfThreads) {
   }
 }
 
+// What joints break by is told beside a chain whose sweeps are used up, too.
+TEST(SequentialIslands, TellOfAContradictionBesideWhatIsUnfinished) {
+  for (const bool has_chain : {false, true}) {
+    SolverProblem problem;
+    const auto left = problem.add_body({.linear = {-1, 0, 0}, .kinematic = true});
+    const auto right = problem.add_body({.linear = {1, 0, 0}, .kinematic = true});
+    const auto middle = problem.add_body({.mass = 2.0});
+    std::vector<std::uint32_t> links;
+    for (int i = 0; has_chain && i < 40; ++i)
+      links.push_back(
+          problem.add_body({.mass = i < 39 ? 1.0 : 1e4, .pose = {{9, -0.5 - i, 0}, Quaternion::Identity()}}));
+    problem.make_trial({0, -9.81, 0});
+    for (const auto end : {left, right})
+      problem.add_discrepancy(end, middle, problem.joint_at(end, middle, Vector3::Zero()));
+    std::uint32_t before = kNone;
+    for (std::size_t i = 0; i < links.size(); before = links[i++])
+      problem.add_discrepancy(before, links[i], problem.joint_at(before, links[i], {9, -static_cast<double>(i), 0}));
+    const SolverAnswer answer = problem.solve(OnThreads(1, {.iterations = 20}));
+    const auto reason = static_cast<StopReason>(answer.stop_reason[0]);
+    EXPECT_TRUE(tells_contradiction(reason)) << stop_reason_name(reason);
+    EXPECT_EQ(tells_unfinished(reason), has_chain) << stop_reason_name(reason);
+  }
+}
+
 TEST(SequentialIslands, WithoutAnyBodiesKeepTheirVelocities) {
   SolverProblem problem;
   problem.add_immovable();

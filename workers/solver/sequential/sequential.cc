@@ -61,7 +61,7 @@ SequentialSummary SequentialSolver::solve(const stage::SolverSolveRequest& reque
       !pose_joints_.is_empty() || !gaps_.is_empty() || !velocity_joints_.is_empty() || !impulses_.is_empty();
   summary_.stop_reason = has_rows ? StopReason::kConverged : StopReason::kNothingToDo;
   if (contradicts || drives_contradict_) summary_.stop_reason = StopReason::kContradiction;
-  if (used_up_) summary_.stop_reason = StopReason::kIterations;
+  if (used_up_) summary_.stop_reason = together(summary_.stop_reason, StopReason::kIterations);
   share_out();
   pose_joints_.store(solution_.joint_correction);
   for (std::size_t i = 0; i < pose_laws_.size(); ++i)

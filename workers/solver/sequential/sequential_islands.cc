@@ -13,12 +13,6 @@ namespace {
 // Fewer are solved before another thread has woken.
 constexpr std::size_t kRowsForThreads = 200;
 
-// Of several islands' reasons the one that says most is told: what ran out is not even the compromise.
-int rank(StopReason reason) {
-  return reason == StopReason::kIterations ? static_cast<int>(StopReason::kContradiction) + 1
-                                           : static_cast<int>(reason);
-}
-
 }  // namespace
 
 void SequentialIslands::solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply,
@@ -53,7 +47,7 @@ void SequentialIslands::solve(const stage::SolverSolveRequest& request, const st
   for (const SolverOutcome& one : outcomes_) {
     outcome.iterations = std::max(outcome.iterations, one.iterations);
     outcome.residual = std::max(outcome.residual, one.residual);
-    if (rank(one.stop_reason) > rank(outcome.stop_reason)) outcome.stop_reason = one.stop_reason;
+    outcome.stop_reason = together(outcome.stop_reason, one.stop_reason);
   }
   write(solution_, outcome, reply);
 }

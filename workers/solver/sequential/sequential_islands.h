@@ -13,7 +13,8 @@ class SequentialIslands {
  public:
   explicit SequentialIslands(const SequentialSettings& settings) : settings_(settings), whole_(settings) {}
 
-  // As SequentialSolver::solve(). Of iterations, residuals and reasons to stop the greatest is answered.
+  // As SequentialSolver::solve(). Of iterations and residuals the greatest is answered, of reasons to
+  // stop what together() makes of them.
   void solve(const stage::SolverSolveRequest& request, const stage::SolverSolveReply& reply, const Host& host);
 
  private:
