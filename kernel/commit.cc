@@ -25,7 +25,12 @@ StepOutcome Environment::step() {
     if (!is_idle_ || !wake_orders_.empty()) find_sleepers();
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     times_finer_ = 1;
-    for (make_inner_steps(); must_restart_; make_inner_steps()) return_to_start();
+    for (make_inner_steps(); must_restart_; make_inner_steps()) {
+      return_to_start();
+      if (!std::exchange(has_newcomer_, false)) continue;
+      times_finer_ = 1;
+      find_sleepers();
+    }
     finish_step();
   } catch (...) {
     return_to_start();

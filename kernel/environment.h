@@ -221,7 +221,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
+  void find_start_velocities();
   void join_start_velocities();
+  void add_start_impulses();
   bool lets_go_of_limits();
   std::uint64_t most_reaction_blocks() const;
 
@@ -361,9 +363,11 @@ class Environment : private DerivativeSource, private SlotObserver {
   Validator validator_;
   std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
   std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
+  std::uint32_t first_of_part_ = 0;               // where contacts of an extrapolated part begin, in all attempts
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
+  bool has_newcomer_ = false;                     // then nothing of the attempt before stays
   std::uint32_t times_finer_ = 1;                 // are the inner steps of this step
   std::pair<double, std::uint32_t> turned_far_;   // in the finest ones, since warnings() told of it
   bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
@@ -373,7 +377,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
   std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
-  std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;           // pairs
+  std::vector<double> start_impulse_;  // N s, of joints, where the step begins (Smooth)
+  std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;
 
   Activity activity_;

@@ -122,7 +122,7 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   const PluginDeclaration& now = slot.description().plugins[target].declaration;
   for (const ConstraintGroup& group : model_.constraint_groups)
     if (slot.which() == Slot::kConstraint && group.target == target) bind(group);
-  must_restart_ = true;
+  must_restart_ = has_newcomer_ = true;
   count_jacobian_blocks();
   if (now.name == before.declaration.name) return;
   wakes_all_ = true;

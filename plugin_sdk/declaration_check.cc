@@ -59,7 +59,7 @@ std::string check_property(const Property& p) {
   return check_default(p);
 }
 
-std::string check_properties(const std::string& owner, const std::vector<Property>& properties) {
+std::string check_properties(const std::string& owner, const std::vector<Property>& properties, bool may_name_bodies) {
   std::set<std::string> names;
   for (const Property& p : properties) {
     if (p.name.empty()) return owner + " has a property without a name";
@@ -67,6 +67,8 @@ std::string check_properties(const std::string& owner, const std::vector<Propert
       return owner + " has a property '" + p.name +
              "', which a scene cannot write; allowed: letters, digits and '_', and no digit first";
     if (!names.insert(p.name).second) return owner + " declares " + p.name + " twice";
+    if (p.kind == PropertyKind::kBody && !may_name_bodies)
+      return owner + "." + p.name + " names a body; allowed: of types of forces";
     const std::string problem = check_property(p);
     if (!problem.empty()) return std::string(owner).append(".").append(p.name).append(" ").append(problem);
   }
@@ -97,7 +99,7 @@ std::string check_types(const PluginDeclaration& d) {
     if (!is_written_in_quotes(type.name)) return "a type has no name, or one that a scene cannot write";
     if (!names.insert(type.name).second) return "type " + type.name + " is declared twice";
     if (type.meaning.empty()) return "type " + type.name + " has no meaning";
-    std::string problem = check_properties(type.name, type.properties);
+    std::string problem = check_properties(type.name, type.properties, d.slot == Slot::kForce);
     if (problem.empty()) problem = check_coordinates(type);
     if (!problem.empty()) return problem;
   }
@@ -157,7 +159,7 @@ std::string check_declaration(const PluginDeclaration& d) {
   if (d.meaning.empty()) return "it has no meaning";
   if (!(d.theta >= 0.0 && d.theta <= 1.0)) return "theta is " + number_text(d.theta) + "; allowed: 0 to 1";
   std::string problem = check_capabilities(d);
-  if (problem.empty()) problem = check_properties(d.name, d.properties);
+  if (problem.empty()) problem = check_properties(d.name, d.properties, false);
   return problem.empty() ? check_types(d) : problem;
 }
 

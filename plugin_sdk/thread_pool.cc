@@ -7,11 +7,18 @@
 #include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "plugin_sdk/floating_point.h"
 
 namespace gravitas {
+namespace {
+
+// In a chunk: what is to be done in parallel there is done at once, by who asks.
+thread_local bool is_at_work = false;
+
+}  // namespace
 
 // The chunks of one parallel_for. Each begins with the floating-point control of the caller, whoever runs it. What the first
 // that changes it leaves is the caller's in the end, as if the caller had run them alone: hosts look at that.
@@ -40,9 +47,10 @@ struct ThreadPool::Chunks {
 
   // Takes chunks until none is left.
   void work() {
+    const bool was_at_work = std::exchange(is_at_work, true);
     for (;;) {
       const std::uint64_t begin = next.fetch_add(kChunk);
-      if (begin >= count) return;
+      if (begin >= count) break;
       restore_floating_point_control(control);
       try {
         body(argument, begin, std::min(begin + kChunk, count));
@@ -55,6 +63,7 @@ struct ThreadPool::Chunks {
         if (left_control == control || begin < left_begin) left_control = left, left_begin = begin;
       }
     }
+    is_at_work = was_at_work;
   }
 
   // In the caller, once all are done.
@@ -101,7 +110,7 @@ ThreadPool::~ThreadPool() {
 }
 
 void ThreadPool::parallel_for(std::uint64_t count, void (*body)(void*, std::uint64_t, std::uint64_t), void* argument) {
-  if (threads_ == 1 || count <= kChunk) {
+  if (threads_ == 1 || count <= kChunk || is_at_work) {
     Chunks chunks;
     chunks.begin(count, body, argument);
     chunks.work();

@@ -77,7 +77,10 @@ void Environment::begin_inner_step(double begin, double length) {
   start_wrench_known_ = false;
   // no trace of earlier steps: a step must be the same after a restore
   if (!wrench_is_constant_) std::ranges::fill(data_.start_wrench.span(), 0.0);
-  if (!may_jump_at_start()) return;
+  if (may_jump_at_start()) find_start_velocities();
+}
+
+void Environment::find_start_velocities() {
   static constexpr std::array<double, 6> kNoImpulse{};
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     const double* impulse = is_struck() ? &data_.impulse[6 * i] : kNoImpulse.data();
@@ -131,6 +134,7 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
       data_.contact_material[kMaterialColumns * i + kRestitution] = 0.0;
   std::optional<Trusted<Solution>> solution = solve();
   while (knows_reactions() && lets_go_of_limits()) solution.emplace(solve());
+  if (knows_reactions() && may_jump_at_start()) add_start_impulses();
   return solution;
 }
 

@@ -24,6 +24,8 @@ bool Environment::write_what_joints_bear(const Trusted<TrialState>& trial, std::
     const std::size_t before = broken_.size();
     write_solution(*solution);
     if (broken_.size() == before) return true;
+    // without what has broken, which may have borne something as the step began
+    if (knows_reactions() && may_jump_at_start()) find_start_velocities();
     solution = react(knows_reactions() ? integrate() : trial, true);
   }
   return false;

@@ -49,6 +49,7 @@ void Environment::extrapolate_parts(double begin, double length) {
   bool has_failed = false;
   while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
+    first_of_part_ = inner_;
     NextStop stop{std::min(wanted, left)};
     if (has_contacts()) {
       begin_inner_step(from, stop.length);
@@ -58,7 +59,6 @@ void Environment::extrapolate_parts(double begin, double length) {
     const double part = first_limit(from, stop.length, &passes_limit);
     const bool is_before_impact = stop.length < std::min(wanted, left);
     const bool ends_with_impact = stop.meets && part == stop.length;
-    const bool is_cut = part < std::min(wanted, left);
     if (part < kCrumb * step) finest *= kCoarser;
     const bool is_passed = part <= finest || passes_limit;
     const std::uint32_t pieces = is_passed ? 1 : pieces_to_accuracy(from, part, is_before_impact, ends_with_impact);
@@ -69,7 +69,7 @@ void Environment::extrapolate_parts(double begin, double length) {
     }
     if (pieces == 0) continue;
     done = part == left ? length : done + part;
-    if (!is_cut) wanted = has_failed ? part : kLonger * part;
+    if (part >= std::min(wanted, left)) wanted = has_failed ? part : kLonger * part;
     has_failed = false;
   }
 }
@@ -79,8 +79,8 @@ void Environment::extrapolate_parts(double begin, double length) {
 std::uint32_t Environment::pieces_to_accuracy(double begin, double length, bool is_before_impact,
                                               bool ends_with_impact) {
   const std::size_t front = front_, back = back_;
-  const CommitFigures figures = figures_;
-  const auto go_back = [&] { front_ = front, back_ = back, figures_ = figures; };
+  const auto kept = std::pair(figures_, turned_far_);
+  const auto go_back = [&] { front_ = front, back_ = back, figures_ = kept.first, turned_far_ = kept.second; };
   extrapolation_.begin(), jumps_.begin();
   const std::uint32_t first = ends_with_impact ? 2 : 1;  // whose first inner step does not end with the impact
   const bool sees_jumps = description_.accuracy >= kSeesJumps;

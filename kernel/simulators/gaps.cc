@@ -31,6 +31,8 @@ double Environment::gap_at(std::size_t contact, const State& state) const {
 // Overlap of every contact at S_{n+1}, in the first step at S_0, too, and the pairs that touch.
 void Environment::find_touching() {
   const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
+  // room for all: what grows moves, and spans are held
+  now.resize(data_.contact_body.size());
   now.resize(0);
   const double share = locates_events() ? kLocatedShare : kTouchingShare;
   std::span<const std::uint32_t> touched = before.span();

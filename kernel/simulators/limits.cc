@@ -50,6 +50,7 @@ double Environment::first_limit(double begin, double length, bool* passes) {
     if (start_gaps_[k] - trial_gaps_[k] <= kSlow * accuracy * kShort * length) start_gaps_[k] = 0.0;
   double stop = length;
   for (double trial = length; std::ranges::any_of(start_gaps_, is_open); trial = 2.0 * stop) {
+    *passes = false;  // what a longer trial said
     if (!find_gaps(trial, &trial_gaps_)) return length;
     stop = length;
     for (std::size_t k = 0; k < start_gaps_.size(); ++k) {

@@ -51,8 +51,9 @@ bool Environment::makes_step_finer() {
 
 std::string Environment::why_turned_far(double turn, std::uint32_t body) const {
   return "loads that joints bear turned body \"" + description_.bodies[body].id + "\" by up to " +
-         std::to_string(turn) + " rad in 1/" + std::to_string(kMostTimes) +
-         " of a step, so that its joints may have closed in another assembly of theirs: it is too light for its loads, "
+         std::to_string(turn) + " rad in an inner step, of which a step had " +
+         std::to_string(kMostTimes * description_.substeps) +
+         " and more, so that its joints may have closed in another assembly of theirs: it is too light for its loads, "
          "or TimeStep is too long";
 }
 

@@ -33,13 +33,14 @@ void Environment::locate_events(double begin, double length) {
   std::size_t slides = 0;
   for (int inner = 0; done < length && !must_restart_; ++inner) {
     const double left = length - done;
-    double stop = left;
+    double stop = left, lead = left;
     bool has_found_contacts = false;
     begin_inner_step(begin + done, left);
     Trusted<TrialState> trial = integrate();
     if (inner < (bisects ? kMostBisections : kMostInnerSteps)) {
       stop = bisects ? bisect(trial, begin + done, left, is_near) : first_impact(trial, begin + done, left).length;
       is_near = !is_near && stop < left;
+      lead = stop;
       has_found_contacts = bisects && stop == data_.time_step[0];
       if (stop != data_.time_step[0]) {
         begin_inner_step(begin + done, stop);
@@ -54,6 +55,8 @@ void Environment::locate_events(double begin, double length) {
             : react(trial, has_found_contacts);
     if (!write_what_joints_bear(trial, solution)) return;
     slides += stop < before ? 1 : 0;
+    // what was cut on the way ends far from the impact
+    is_near = is_near && stop == lead;
     end_inner_step();
     done = stop == left ? length : done + stop;
   }

@@ -105,7 +105,9 @@ void Environment::settle() {
   activity_.count_rest(bodies, steps, next.rested.span());
   if (!wrench_is_constant_)
     activity_.start_again_where_pushed(bodies, data_.start_wrench.span(), next.rest_wrench.span(), next.rested.span());
-  for (const std::uint32_t body : activity_.fall_asleep(bodies, connections(), steps, next.rested.span())) {
+  // what is near and bears nothing holds nobody
+  const Connections holds{next.touching.span(), connections().joints};
+  for (const std::uint32_t body : activity_.fall_asleep(bodies, holds, steps, next.rested.span())) {
     for (const Column<double>* velocity : {&next.linear_velocity, &next.angular_velocity})
       set_vector(velocity->span(), body, Vector3::Zero());
     next.state_changed[body] = 1;

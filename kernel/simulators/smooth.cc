@@ -66,9 +66,16 @@ void Environment::join_start_velocities() {
   constrain(Validator::unchecked<Trusted<TrialState>>());
   std::ranges::fill(data_.held_force.span(), 0.0);
   solve();
+  start_impulse_.assign(data_.discrepancy_impulse.span().begin(), data_.discrepancy_impulse.span().end());
   data_.start_linear_velocity.assign(data_.solved_linear_velocity);
   data_.start_angular_velocity.assign(data_.solved_angular_velocity);
   data_.time_step[0] = length;
+}
+
+// What joints bear as the step begins is part of what they bear in it, for those who ask.
+void Environment::add_start_impulses() {
+  if (start_impulse_.size() != data_.held_force.size()) return;
+  for (std::size_t i = 0; i < start_impulse_.size(); ++i) data_.held_force[i] += start_impulse_[i] / data_.time_step[0];
 }
 
 // A limit that bears holds like a lock while the step's end is solved. Where another is struck then, it can pull by no more than it

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/conformance/inquiry.h"
@@ -14,11 +15,23 @@ namespace {
 
 constexpr int kTableRows = 8;
 
-double number_within(const Property& p, Draw* draw) {
+std::pair<double, double> sampled_range(const Property& p) {
   const double low = std::isfinite(p.minimum) ? p.minimum : std::min(-1.0, p.maximum - 2.0);
-  const double high = std::isfinite(p.maximum) ? std::min(p.maximum, low + 2.0) : low + 2.0;
+  return {low, std::isfinite(p.maximum) ? std::min(p.maximum, low + 2.0) : low + 2.0};
+}
+
+double number_within(const Property& p, Draw* draw) {
+  const auto [low, high] = sampled_range(p);
   // inside, so that an exclusive bound is none
   return draw->uniform(low + 0.1 * (high - low), high);
+}
+
+// Of a table's rows, rising: within 0 ... 1 where bounds allow that.
+double argument_within(const Property& p, int row) {
+  if ((p.exclusive_minimum ? p.minimum < 0.0 : p.minimum <= 0.0) && p.maximum >= 1.0)
+    return static_cast<double>(row) / kTableRows;
+  const auto [low, high] = sampled_range(p);
+  return low + (high - low) * (row + 1.0) / (kTableRows + 1.0);
 }
 
 void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* draw, std::vector<double>* out) {
@@ -47,7 +60,7 @@ void append_drawn(const Property& p, const Matrix3& axes, int* next_axis, Draw* 
     case PropertyKind::kTable:
       out->push_back(kTableRows);
       for (int row = 0; row < kTableRows; ++row) {
-        out->push_back(static_cast<double>(row) / kTableRows);
+        out->push_back(argument_within(p, row));
         for (std::uint32_t k = 1; k < p.columns; ++k) out->push_back(number_within(p, draw));
       }
       break;

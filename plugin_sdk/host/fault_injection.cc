@@ -161,6 +161,8 @@ void FaultInjection::spoil_message(std::string* message, std::size_t columns_siz
       break;
     case InjectedFault::kFlip:
       if (order_.word("where") == "payload") {
+        // single values of zero are left out of a message
+        if (column_bits == 0) break;
         flip_bit(message->data(), order_.gives("bit") ? static_cast<std::uint64_t>(order_.number("bit")) % column_bits
                                                       : column_bits / 2);
       } else {

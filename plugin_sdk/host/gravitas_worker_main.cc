@@ -31,6 +31,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -47,6 +48,8 @@
 namespace {
 
 using namespace gravitas;
+
+constexpr std::string_view kUnix = "unix:";
 
 struct Arguments {
   bool sandbox = true;
@@ -249,7 +252,7 @@ int serve(const Arguments& arguments) {
   if (listens) {
     host::take_connections(socket, server.get());
     // so that a script that let the system choose the port knows it
-    if (!arguments.address.starts_with("unix:"))
+    if (!arguments.address.starts_with(kUnix))
       std::cout << "listening at " << host::address_of(socket, arguments.address) << std::endl;
   }
 
@@ -273,7 +276,10 @@ int serve(const Arguments& arguments) {
       }
     }
     // instances are gone with the process: a hanging destructor must not keep it
-    if (!listens) std::_Exit(code);
+    // of a socket whose name is gone nobody else can ask (schemas/WIRE.md)
+    const bool is_named = arguments.address.starts_with(kUnix);
+    const bool is_gone = is_named && access(arguments.address.c_str() + kUnix.size(), F_OK) != 0;
+    if (!listens || is_gone) std::_Exit(code);
     handshake.stopping = false;
   } while (true);
 }

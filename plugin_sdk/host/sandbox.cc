@@ -32,7 +32,7 @@ std::string not_enforced(const std::string& what) { return "no " + what + ": " +
 bool limit(__rlimit_resource resource, std::uint64_t* most) {
   rlimit now{};
   if (getrlimit(resource, &now) != 0) return false;
-  *most = std::min<std::uint64_t>(*most, now.rlim_max);
+  *most = std::min<std::uint64_t>({*most, now.rlim_cur, now.rlim_max});
   now = {*most, *most};
   return setrlimit(resource, &now) == 0;
 }

@@ -70,7 +70,7 @@ Greeted BareWorker::greet(const control::v1::Hello& hello, double seconds) {
   Greeted greeted;
   if (stream->Write(greeting) && stream->Read(&answer)) {
     if (answer.has_refusal()) return {Greeted::kRefused, answer.refusal().text(), {}};
-    if (!answer.has_welcome()) return {Greeted::kRefused, "it answers with something else than Welcome or Refusal", {}};
+    if (!answer.has_welcome()) return {Greeted::kSilent, "it answers with something else than Welcome or Refusal", {}};
     greeted.welcome = answer.welcome();
     if (stream->Read(&answer)) {
       if (answer.has_refusal()) return {Greeted::kRefused, answer.refusal().text(), {}};

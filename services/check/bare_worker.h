@@ -17,7 +17,7 @@ struct Greeted {
   enum Outcome {
     kReady,    // Welcome and Ready
     kRefused,  // Refusal, or a stream that was ended with a status
-    kSilent,   // nothing in time
+    kSilent,   // nothing in time, or nothing that is an answer
     kDied
   };
   Outcome outcome = kSilent;

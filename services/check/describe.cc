@@ -56,7 +56,9 @@ Examinee find_examinee(const std::string& argument) {
       examinee.library = path;
       return examinee;
     case FileKind::kProgram:
-      examinee.command = shell_word(path);
+      // `env`, which starts it, takes a word with '=' for a setting
+      examinee.command =
+          (path.find('=') == std::string::npos ? "" : "/bin/sh -c 'exec \"$0\" \"$@\"' ") + shell_word(path);
       return examinee;
     case FileKind::kLibrary:
       throw BadInput(fmt::format("'{}' is no plugin: a shared library without the function gravitas_plugin; {}",

@@ -130,8 +130,11 @@ void Run::add_finding(const CheckCase& one, std::string text) {
   finding->set_claim(one.claim);
   finding->set_text(std::move(text));
   finding->set_call(std::exchange(examination_.blamed_call, {}));
-  finding->set_again(fmt::format("gravitas check {} --case '{}'{}", shell_word(examinee.argument), one.name,
-                                 examination_.options.quick && !one.only_full ? " --quick" : ""));
+  const Options& options = examination_.options;
+  const bool counts = one.level == Level::kLimits && options.calls != Options{}.calls;
+  finding->set_again(fmt::format("gravitas check {} --case '{}'{}{}", shell_word(examinee.argument), one.name,
+                                 options.quick && !one.only_full ? " --quick" : "",
+                                 counts ? fmt::format(" --calls {}", options.calls) : ""));
 }
 
 void Run::judge_level(Level level, const std::vector<CheckCase>& cases) {

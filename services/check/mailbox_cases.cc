@@ -36,10 +36,11 @@ enum class Expected {
 
 class FrameAbuser {
  public:
-  FrameAbuser(const Examination& examination, const Question& question)
+  // Of the examination's questions.
+  FrameAbuser(Examination& examination, const Question& question)
       : question_(question),
         quiet_(examination.options.quick ? kQuickQuiet : kQuiet),
-        talk_(examination.examinee, examination.patience, elements_for(question)) {
+        talk_(examination.examinee, examination.patience, elements_for(examination, question)) {
     good_ = talk_.ask(question);
     if (!good_.ok()) throw std::runtime_error("before any abuse: " + outcome_text(good_));
   }
@@ -73,9 +74,11 @@ class FrameAbuser {
   }
 
  private:
-  static std::uint64_t elements_for(const Question& question) {
+  static std::uint64_t elements_for(Examination& examination, const Question& question) {
+    const auto number = static_cast<std::size_t>(&question - examination.questions().data());
     std::uint64_t most = 0;
     for (const std::uint64_t count : question.request.counts()) most = std::max(most, count);
+    for (const std::uint64_t count : examination.answers()[number].columns.counts()) most = std::max(most, count);
     return 8 * most + kSpareElements;
   }
 

@@ -127,7 +127,12 @@ bool StreamTalk::send(const std::string& bytes) {
 
 StreamReply StreamTalk::receive(const Question& question, const Call& call) {
   const stage::MethodInfo& method = stage::method_info(question.method);
+  // as in a kernel a call ends after ten deadlines, whatever it marks or asks
+  const double most = 10.0 * deadline_;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(most);
   for (;;) {
+    if (std::chrono::steady_clock::now() > end)
+      throw std::runtime_error(fmt::format("no reply within {:g} s, whatever it marks and asks", most));
     bool ok = false;
     ++pending_;
     io_->Read(&incoming_, this);

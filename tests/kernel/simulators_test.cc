@@ -397,6 +397,21 @@ TEST(Simulators, ExtrapolatedPartsAreInnerStepsForListeners) {
   EXPECT_NEAR(sum.impulse.y(), 2.0 * kGravity * 0.1, 1e-12);
   EXPECT_NEAR(sum.impulse.x(), 2.0 * (world.state().linear_velocity[3] - 1.0), 1e-12);
   EXPECT_NEAR(world.state().linear_velocity[3], 5.0 / 7.0, 1e-12);  // it has come to roll
+
+  // an impact on a surface that is not even: all attempts and what stands draw one normal
+  WorldBuilder uneven = accurate(Simulator::kContinuous, 60, 0.01, 1e-9);
+  uneven.material({.restitution = 0.5, .perturbation = 0.1})
+      .ground()
+      .sphere(0.1, 2.0, Vector3(0, 3.1, 0), Vector3(0, -20, 0));
+  uneven.gravity(Vector3(0, -kGravity, 0));
+  Environment dropped(uneven.description());
+  Sum met;
+  dropped.set_commit_listener(&met);
+  run(&dropped);
+  const Vector3 gained =
+      2.0 * vector_at(dropped.state().linear_velocity, 1) + Vector3(0, 2.0 * kGravity * 0.6 + 40.0, 0);
+  EXPECT_GT(std::fabs(met.impulse.x()), 1e-3);
+  EXPECT_NEAR((met.impulse - gained).norm(), 0.0, 1e-6);
 }
 
 // An instantaneous impulse acts once, however often the first part is made; others fall, slide and are held beside it.
@@ -542,6 +557,22 @@ TEST(Continuous, TwoBodiesMeetHeadOn) {
   EXPECT_NEAR(world.state().linear_velocity[3], 500.0, 1e-9);
   // 6.9 m at 1000 m/s, then back
   EXPECT_NEAR(world.state().position[0], -4.0 + 500.0 * (2.0 * 0.0069 - 0.03), 1e-7);
+}
+
+// From all sides at once into a heap that two of them have begun: more touch than there was ever room for.
+TEST(Simulators, MorePairsThanBeforeTouchAtOnce) {
+  WorldBuilder builder = accurate(Simulator::kBasic, 3, 0.01);
+  constexpr int kBalls = 22;
+  builder.sphere(1.0, 1.0, Vector3(0.05, 0, 0)).sphere(1.0, 1.0, Vector3(-0.05, 0, 0));
+  for (int i = 0; i < kBalls; ++i) {
+    // on a spiral from pole to pole
+    const double z = -1.0 + (2.0 * i + 1.0) / kBalls, angle = 2.4 * i, across = std::sqrt(1.0 - z * z);
+    const Vector3 side(across * std::cos(angle), across * std::sin(angle), z);
+    builder.sphere(1.0, 1.0, 20.0 * side, -1000.0 * side);
+  }
+  Environment world(builder.description());
+  run(&world);
+  EXPECT_EQ(world.step_count(), 3U);
 }
 
 }  // namespace

@@ -478,6 +478,18 @@ TEST(Sleep, NothingSleepsUnderAForceThatKeepsChanging) {
   EXPECT_LT((place_of(world, 1) - Vector3(0, 0.25, 0)).norm(), 1e-9);
 }
 
+// What drifts beside a wall is held by nothing, though others are so fast that its contact is looked for far ahead.
+TEST(Sleep, NothingIsHeldByAWallThatItDoesNotTouch) {
+  WorldBuilder builder;
+  builder.steps(200, kTimeStep).ground().box(Vector3(0.5, 0.5, 0.5), 1.0, Vector3(0, 0.6, 0), Vector3(1e-6, 0, 0));
+  builder.sphere(0.5, 1.0, Vector3(0, 50, 0), Vector3(40, 0, 0));
+  may_sleep(&builder);
+  Environment world(builder.description());
+  run(&world, 200);
+  EXPECT_FALSE(world.is_asleep(1));
+  EXPECT_NEAR(place_of(world, 1).x(), 200 * kTimeStep * 1e-6, 1e-18);
+}
+
 // What is slow and goes somewhere: a drift without hold, a pendulum at its turning points, a slide.
 TEST(Sleep, StopsNoMotion) {
   WorldBuilder builder;

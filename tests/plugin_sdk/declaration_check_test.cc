@@ -86,6 +86,22 @@ TEST(CheckDeclaration, DemandsPropertiesThatASceneCanWrite) {
   EXPECT_EQ(problem_with(Property::number("Low", "N")), "Magnet.Low has no meaning");
 }
 
+// A scene's ids become rows for forces alone.
+TEST(CheckDeclaration, LetsForcesAloneNameBodies) {
+  const auto problem = [](Slot slot, std::vector<Property> of_type, std::vector<Property> of_plugin) {
+    return check_declaration({.name = "Mast",
+                              .version = "1",
+                              .slot = slot,
+                              .meaning = "Stands.",
+                              .types = {{"Mast", "Stands.", std::move(of_type), {}}},
+                              .properties = std::move(of_plugin)});
+  };
+  const Property other = Property::body("Other").means("Who else.");
+  EXPECT_EQ(problem(Slot::kForce, {other}, {}), "");
+  EXPECT_EQ(problem(Slot::kConstraint, {other}, {}), "Mast.Other names a body; allowed: of types of forces");
+  EXPECT_EQ(problem(Slot::kForce, {}, {other}), "Mast.Other names a body; allowed: of types of forces");
+}
+
 TEST(CheckDeclaration, DemandsCoordinatesThatTheCapabilityTellsOf) {
   const auto problem = [](std::vector<std::string> capabilities, std::vector<CoordinateDeclaration> coordinates) {
     return check_declaration({.name = "Mast",

@@ -49,6 +49,22 @@ TEST(ThreadPool, VisitsEveryIndexOnce) {
   }
 }
 
+// In a chunk there is nobody else to ask: it is done at once, and by the same chunks.
+TEST(ThreadPool, DoesAtOnceWhatAChunkAsksFor) {
+  constexpr std::uint64_t kOuter = 300, kInner = 200;
+  for (std::uint32_t threads = 1; threads <= kMostThreads; ++threads) {
+    ThreadPool pool(threads);
+    std::vector<std::atomic<int>> visits(kOuter * kInner);
+    run(&pool, kOuter, [&](std::uint64_t begin, std::uint64_t end) {
+      for (std::uint64_t i = begin; i < end; ++i)
+        run(&pool, kInner, [&, i](std::uint64_t first, std::uint64_t last) {
+          for (std::uint64_t k = first; k < last; ++k) ++visits[i * kInner + k];
+        });
+    });
+    EXPECT_TRUE(std::all_of(visits.begin(), visits.end(), [](const auto& v) { return v == 1; })) << threads;
+  }
+}
+
 TEST(ThreadPool, CutsTheSameChunksWithAnyNumberOfThreads) {
   using Chunks = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
   Chunks expected;

@@ -281,7 +281,7 @@ TEST(PythonSolver, GivesTheSameBitsAgain) {
 
 class PythonWorker : public ::testing::TestWithParam<const char*> {};
 
-INSTANTIATE_TEST_SUITE_P(Both, PythonWorker, ::testing::Values("force_drag", "solver_islands"),
+INSTANTIATE_TEST_SUITE_P(Each, PythonWorker, ::testing::Values("collision_balls", "force_drag", "solver_islands"),
                          [](const auto& one) { return std::string(one.param); });
 
 // With the fewest calls, since a solver in Python takes a hundredth of a second for each, and with as long as a busy machine

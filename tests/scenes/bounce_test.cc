@@ -12,6 +12,7 @@
 namespace gravitas {
 namespace {
 
+using harness::literal;
 using harness::SceneRun;
 using harness::set;
 
@@ -311,6 +312,40 @@ TEST(ElasticRod, WhoseFrictionWouldAddEnergyLosesNone) {
     EXPECT_NEAR(run.kinetic_energy(), before, 1e-8 * before) << solver;
     EXPECT_GT(run.body("Rod").twist.linear.y(), 0.0) << solver;
   }
+}
+
+// A ball comes down slowly in the middle of a step, while a box elsewhere slides to its stop before that: the step is cut
+// there, and the ball bounces as it does alone.
+TEST(BounceWhereItIsMet, DoesNotMindASlideThatEndsElsewhere) {
+  const double h = 1.0 / 60.0, met = 1.8 * h, start = -0.11, arrival = start + kG * met;
+  const auto velocity_after = [&](const std::string& box) {
+    SceneRun run(
+        "Geometries { Geometry { Type = \"Halfspace\" Id = \"Flat\" } Geometry { Type = \"Sphere\" Id = \"Round\" "
+        "CustomProperties { Radius = 0.1 } } Geometry { Type = \"Box\" Id = \"Tile\" CustomProperties { HalfExtents = "
+        "{0.5, 0.1, 0.5} } } }\nMaterials { Material { Id = \"Wood\" RestitutionCoefficient = 0.5 "
+        "StaticFrictionCoefficient = 0.3 DynamicFrictionCoefficient = 0.3 } }\nForces { Force { Type = \"Gravity\" Id "
+        "= "
+        "\"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\nSimulator { Type = \"Bisection\" "
+        "CustomProperties { TimeStep = " +
+            literal(h) +
+            " Duration = 1 } }\nEnvironment { KineticIntegrator = \"Verlet\" ConstraintSolver = \"Newton\" Space { "
+            "Bodies { Body { Id = \"Floor\" GeometryId = \"Flat\" Material = \"Wood\" } Body { Id = \"Ball\" "
+            "GeometryId "
+            "= \"Round\" Mass = 1 Material = \"Wood\" Forces = { \"Down\" } KineticProperties { Position = " +
+            literal(Vector3(0, 0.1 + start * met + 0.5 * kG * met * met, 0)) +
+            " LinearVelocity = " + literal(Vector3(0, -start, 0)) + " } } " + box + " } } }\n",
+        {});
+    run.steps(2);
+    return run.body("Ball").twist.linear.y();
+  };
+  const std::string box =
+      "Body { Id = \"Box\" GeometryId = \"Tile\" Mass = 3 Material = \"Wood\" Forces = { \"Down\" } KineticProperties "
+      "{ "
+      "Position = {50, 0.1, 0} LinearVelocity = " +
+      literal(Vector3(0.3 * kG * 1.2 * h, 0, 0)) + " } }";
+  const double wanted = 0.5 * arrival - kG * 0.2 * h;
+  EXPECT_NEAR(velocity_after(""), wanted, 1e-6);
+  EXPECT_NEAR(velocity_after(box), wanted, 1e-6);
 }
 
 }  // namespace

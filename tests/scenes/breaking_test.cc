@@ -262,6 +262,25 @@ TEST_P(BreakingOf, NothingByADriveAlone) {
   EXPECT_NEAR(run.body("Ball").twist.angular.x(), 100.0, 1e-9);
 }
 
+// It is taut from the start, and the ball flies outwards: the jerk is before the first step with Smooth, and part of it all the same.
+TEST_P(BreakingOf, TheJerkOfARopeAtTheStart) {
+  if (std::string(GetParam()) == "Sequential") GTEST_SKIP() << "it tells no reactions";
+  const std::string ball =
+      "Body { Id = \"Ball\" Mass = 1 PrincipalMoments = {0.1, 0.1, 0.1} KineticProperties { Position = {0, -1, 0} "
+      "LinearVelocity = {0, -10, 0} CanSleep = false } }";
+  for (const char* simulator : {"Basic", "Smooth"})
+    for (const double strength : {990.0, 1010.0}) {  // 10 N s in 0.01 s
+      const std::string rope =
+          "Constraint { Type = \"Distance\" Id = \"Rope\" Body2 = \"Ball\" BreakingForce = " + literal(strength) +
+          " CustomProperties { BindPoint1 = {0, 0, 0} BindPoint2 = {0, -1, 0} MinimumDistance = 0 MaximumDistance = 1 "
+          "} }";
+      SceneRun run(scene_of("", ball, rope, GetParam()), {std::string("Simulator=") + simulator, "Integrator=RK4"});
+      run.steps(3);
+      EXPECT_EQ(run.holds("Rope"), strength > 1000.0) << simulator;
+      EXPECT_NEAR(run.body("Ball").twist.linear.y(), strength > 1000.0 ? 0.0 : -10.0, 1e-9) << simulator;
+    }
+}
+
 // A truck of 1 t at 2 m/s on a slack rope whose plate of 5 kg is bolted to the world: the bolt that breaks took all its momentum,
 // 2000 N s for a bolt of 100 N. What comes after the jerk is one rope with two masses.
 TEST_P(BreakingOf, ABoltThatHoldsATruckForAStep) {

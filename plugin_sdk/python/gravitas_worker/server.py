@@ -177,7 +177,7 @@ def _worker_message(**kind):
 
 def _describe(plugin):
     catalog = description_pb2.Catalog()
-    catalog.entries.add(library=sys.argv[0], description=description_of(plugin, BUILD_ID))
+    catalog.entries.add(library=encodable(sys.argv[0]), description=description_of(plugin, BUILD_ID))
     sys.stdout.buffer.write(catalog.SerializeToString())
 
 
