@@ -114,7 +114,8 @@ void ReactionSolver::let_go_opened() {
 // By no velocity of the state: what is let go of changes these, and would be held again and let go without end.
 double ReactionSolver::strayed(const Row& row) const {
   constexpr double kOfSquare = 0.75;  // a third stage of RK4 on a circle is off by half
-  double turn = 0.0;
+  constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+  double turn = 0.0, coordinates = 0.0;
   for (const std::uint32_t i : {row.body1, row.body2}) {
     const Body& body = bodies_[i];
     const Quaternion since = shorter_arc(body.pose.orientation * body.start.orientation.conjugate());
@@ -124,8 +125,11 @@ double ReactionSolver::strayed(const Row& row) const {
       turning += body.start_velocity.linear.norm() / row.reach;
     }
     turn = std::max({turn, turned, request_->time_step() * turning});
+    coordinates = std::max(coordinates, body.pose.position.cwiseAbs().maxCoeff());
   }
-  return kOfSquare * turn * turn * (row.reach > 0.0 ? row.reach : 1.0);
+  // what rests is where it is told to be but for rounding
+  if (!(row.reach > 0.0)) return kOfSquare * turn * turn + kRounding;
+  return kOfSquare * turn * turn * row.reach + kRounding * (row.reach + coordinates);
 }
 
 void ReactionSolver::turn_to_limit(Joint* joint) {

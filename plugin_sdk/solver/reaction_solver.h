@@ -131,7 +131,8 @@ class ReactionSolver {
   void let_go_opened();
   // Is it a limit that holds now, of those that need not?
   static bool is_closed_limit(const Joint& joint, std::size_t axis);
-  // By how much the row may be off in a state that an integrator tries: the second order of what turns in the step, m or rad.
+  // By how much the row may be off in a state that an integrator tries: the second order of what turns in the step, and
+  // rounding; m or rad.
   double strayed(const Row& row) const;
   static Holding held_always(const Discrepancy& d, int axis);
   Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;

@@ -52,11 +52,13 @@ std::string status_line(const api::Status& status) {
 
 std::string swap_line(const api::ServedSwap& swap) {
   if (swap.compares()) {
-    const std::string state = !swap.reason().empty()      ? "ended"
-                              : swap.shadow().calls() > 0 ? "comparing"
-                                                          : swap.outcome();
+    const std::string state = !swap.reason().empty()       ? "ended"
+                              : swap.outcome() == "shadow" ? "comparing"
+                                                           : swap.outcome();
+    const bool any = swap.shadow().calls() > 0;
     return fmt::format("{}: {} {} beside {}, from step {} on: {}{}", state, swap.slot(), swap.to(), swap.from(),
-                       swap.step(), comparison_text(swap.shadow(), swap.from(), swap.to()),
+                       swap.step(),
+                       any ? comparison_text(swap.shadow(), swap.from(), swap.to()) : "nobody was asked yet",
                        swap.reason().empty() ? "" : "; " + swap.reason());
   }
   std::string text =
