@@ -259,7 +259,7 @@ Trusted<Solution> Environment::solve() {
           joints.mode, joints.lower, joints.upper, joints.compliance, joints.damping, joints.maximum_force,
           data_.discrepancy_warm_impulse, data_.discrepancy_warm_correction, data_.contact_body, data_.contact_normal,
           data_.contact_point, data_.contact_depth, data_.contact_key, data_.contact_material,
-          data_.contact_warm_impulse, data_.contact_warm_correction, data_.held_force);
+          data_.contact_warm_impulse, data_.contact_warm_correction, data_.held_force, joints.restitution);
   const auto reply =
       ids(data_.solved_linear_velocity, data_.solved_angular_velocity, data_.pose_change, data_.discrepancy_impulse,
           data_.discrepancy_correction, data_.contact_impulse, data_.contact_correction, data_.contact_direction,

@@ -12,20 +12,21 @@ DiscrepancyAnswer::DiscrepancyAnswer(Arena* arena, std::uint64_t rows) {
   point1 = numbers(3), point2 = numbers(3), velocity = numbers(3), correction = numbers(1), axes = numbers(4);
   mode = Column<std::uint32_t>(arena, 0, rows);
   lower = numbers(3), upper = numbers(3), compliance = numbers(3), damping = numbers(3), maximum_force = numbers(3);
+  restitution = numbers(1);
 }
 
 std::vector<ColumnId> DiscrepancyAnswer::ids() const {
-  return {constraint.id(), point1.id(), point2.id(), velocity.id(),   correction.id(), axes.id(),
-          mode.id(),       lower.id(),  upper.id(),  compliance.id(), damping.id(),    maximum_force.id()};
+  return {constraint.id(), point1.id(), point2.id(),     velocity.id(), correction.id(),    axes.id(),       mode.id(),
+          lower.id(),      upper.id(),  compliance.id(), damping.id(),  maximum_force.id(), restitution.id()};
 }
 
 DiscrepancyColumns DiscrepancyAnswer::columns() const {
-  return {point1.span(), point2.span(), velocity.span(),   correction.span(), axes.span(),         mode.span(),
-          lower.span(),  upper.span(),  compliance.span(), damping.span(),    maximum_force.span()};
+  return {point1.span(), point2.span(), velocity.span(),   correction.span(), axes.span(),          mode.span(),
+          lower.span(),  upper.span(),  compliance.span(), damping.span(),    maximum_force.span(), restitution.span()};
 }
 
 void DiscrepancyAnswer::resize(std::uint64_t rows) const {
-  constraint.resize(rows), mode.resize(rows), correction.resize(rows), axes.resize(4 * rows);
+  constraint.resize(rows), mode.resize(rows), correction.resize(rows), restitution.resize(rows), axes.resize(4 * rows);
   for (const Column<double>* column :
        {&point1, &point2, &velocity, &lower, &upper, &compliance, &damping, &maximum_force})
     column->resize(3 * rows);
@@ -34,6 +35,7 @@ void DiscrepancyAnswer::resize(std::uint64_t rows) const {
 void DiscrepancyAnswer::copy_row(std::size_t row, const DiscrepancyAnswer& source, std::size_t source_row) const {
   mode[row] = source.mode[source_row];
   correction[row] = source.correction[source_row];
+  restitution[row] = source.restitution[source_row];
   std::copy_n(&source.axes[4 * source_row], 4, &axes[4 * row]);
   const auto copy = [&](const Column<double>& from, const Column<double>& to) {
     std::copy_n(&from[3 * source_row], 3, &to[3 * row]);

@@ -29,7 +29,7 @@ struct DiscrepancyAnswer {
   Column<std::uint32_t> constraint;
   Column<double> point1, point2, velocity, correction, axes;
   Column<std::uint32_t> mode;
-  Column<double> lower, upper, compliance, damping, maximum_force;
+  Column<double> lower, upper, compliance, damping, maximum_force, restitution;
 };
 
 struct StepData {

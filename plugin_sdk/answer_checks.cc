@@ -122,6 +122,8 @@ AnswerProblem check_discrepancy_rows(std::span<const std::uint32_t> constraint, 
     if (!is_valid_mode(rows.mode[i])) return bad_structure("mode", i, " is unknown");
     if (!(rows.correction[i] >= 0.0 && rows.correction[i] <= 1.0))
       return bad_number("correction", i, " is outside 0 … 1");
+    if (!(rows.restitution[i] >= 0.0 && rows.restitution[i] <= 1.0))
+      return bad_number("restitution", i, " is outside 0 … 1");
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
       if (rows.lower[k] > rows.upper[k]) return bad_number("lower", i, " lies above upper");
       if (rows.compliance[k] < 0.0 || rows.damping[k] < 0.0 || rows.maximum_force[k] < 0.0)

@@ -63,14 +63,16 @@ void push_bound(const stage::ConstraintBindReply& reply, std::span<const double>
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d) {
   if (!d.point1.allFinite() || !d.point2.allFinite() || !d.velocity.allFinite() || !std::isfinite(d.correction) ||
       !d.axes.coeffs().allFinite() || !d.lower.allFinite() || !d.upper.allFinite() || !d.compliance.allFinite() ||
-      !d.damping.allFinite() || !d.maximum_force.allFinite())
+      !d.damping.allFinite() || !d.maximum_force.allFinite() || !std::isfinite(d.restitution))
     throw Refusal(
         "it has a discrepancy that is not finite: its bound numbers or the poses of its bodies are not, or too large");
   if ((d.lower.array() > d.upper.array()).any() || d.compliance.minCoeff() < 0.0 || d.damping.minCoeff() < 0.0 ||
-      d.maximum_force.minCoeff() < 0.0 || std::fabs(d.axes.norm() - 1.0) > 1e-6)
+      d.maximum_force.minCoeff() < 0.0 || d.restitution < 0.0 || d.restitution > 1.0 ||
+      std::fabs(d.axes.norm() - 1.0) > 1e-6)
     throw Refusal(
-        "it has a discrepancy with crossed limits, negative numbers or axes that are not unit: its bound numbers "
-        "are none of a joint of this type");
+        "it has a discrepancy with crossed limits, negative numbers, a restitution above 1 or axes that are not unit: "
+        "its "
+        "bound numbers are none of a joint of this type");
   reply.constraint().push(joint);
   push_vector(reply.point1(), d.point1);
   push_vector(reply.point2(), d.point2);
@@ -83,6 +85,7 @@ void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::siz
   push_vector(reply.compliance(), d.compliance);
   push_vector(reply.damping(), d.damping);
   push_vector(reply.maximum_force(), d.maximum_force);
+  reply.restitution().push(d.restitution);
 }
 
 }  // namespace detail

@@ -224,6 +224,7 @@ Discrepancy DiscrepancyColumns::at(std::size_t row) const {
   d.compliance = vector_at(compliance, row);
   d.damping = vector_at(damping, row);
   d.maximum_force = vector_at(maximum_force, row);
+  if (!restitution.empty()) d.restitution = restitution[row];
   return d;
 }
 

@@ -90,6 +90,8 @@ struct Discrepancy {
   Vector3 compliance = Vector3::Zero();                   // m/N or rad/(N m)
   Vector3 damping = Vector3::Zero();                      // N s/m or N m s/rad
   Vector3 maximum_force = Vector3::Constant(kUnlimited);  // N or N m
+  // e of limits and one-sided axes that nothing softens, 0 … 1: what meets them at a speed v leaves them at e v
+  double restitution = 0.0;
 
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
   bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
@@ -195,6 +197,7 @@ struct DiscrepancyColumns {
   std::span<const double> point1, point2, velocity, correction, axes;
   std::span<const std::uint32_t> mode;
   std::span<const double> lower, upper, compliance, damping, maximum_force;
+  std::span<const double> restitution = {};  // empty: none has any
 
   std::size_t size() const { return mode.size(); }
   Discrepancy at(std::size_t row) const;

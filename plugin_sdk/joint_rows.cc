@@ -98,6 +98,35 @@ double JointLimits::limited_turn(double angle, double way) const {
   return turned;
 }
 
+void write_limits(const JointLimits& limits, BoundWriter* out) {
+  for (const double number : {limits.lower, limits.upper, limits.restitution}) out->number(number);
+}
+
+JointLimits read_limits(PropertyCursor* bound) {
+  JointLimits limits;
+  limits.lower = bound->number();
+  limits.upper = bound->number();
+  limits.restitution = bound->number();
+  return limits;
+}
+
+Property restitution_property() {
+  return Property::number("Restitution", "1")
+      .at_least(0.0)
+      .at_most(1.0)
+      .defaults_to({0.0})
+      .means("Share of the speed at which a limit is met that it is left at; 0: it stops dead.");
+}
+
+double read_restitution(PropertyCursor* properties, std::string_view type, bool has_stops, std::string_view stops) {
+  const double restitution = properties->at_end() ? 0.0 : properties->number();
+  if (!(restitution >= 0.0 && restitution <= 1.0))
+    throw Refusal(std::string(type) + ": Restitution " + std::to_string(restitution) + " is outside 0 ... 1");
+  if (restitution > 0.0 && !has_stops)
+    throw Refusal(std::string(type) + ": Restitution is given without " + std::string(stops));
+  return restitution;
+}
+
 JointSpring JointSpring::of(PropertyCursor* properties) {
   if (properties->at_end()) return {};
   const double stiffness = properties->number(), damping = properties->number();
@@ -243,9 +272,10 @@ Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle,
   return d;
 }
 
-Discrepancy cone_row(const Vector3& first, const Vector3& second, double most) {
+Discrepancy cone_row(const Vector3& first, const Vector3& second, double most, double restitution) {
   Discrepancy row = swing_row(first, second, most, AxisMode::kLimited);
   row.lower.x() = -kUnlimited;
+  row.restitution = restitution;
   return row;
 }
 
@@ -295,6 +325,7 @@ Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2
   const double scale = twisting.cosine();
   d.lower.x() = limits.lower > -kUnlimited ? scale * limits.lower : -kUnlimited;
   d.upper.x() = limits.upper < kUnlimited ? scale * limits.upper : kUnlimited;
+  d.restitution = limits.restitution;
   return d;
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "plugin_sdk/constraint.h"
+#include "plugin_sdk/property.h"
 
 namespace gravitas {
 
@@ -23,6 +24,7 @@ Vector3 unit_axis(const Vector3& axis, std::string_view field);
 // Refuses, with the field named, limits that cross, and limits without the 0 of the start between them. NaN: absent.
 struct JointLimits {
   double lower = -kUnlimited, upper = kUnlimited;
+  double restitution = 0.0;  // of both stops
 
   static JointLimits of(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
   // Of an angle that is known within one turn: two that span a whole one are refused, too.
@@ -36,6 +38,15 @@ struct JointLimits {
   // it by 0.02 rad or half of the way, which is known to first order, or moves back by no more than rounding, is on it.
   double limited_turn(double angle, double way) const;
 };
+
+void write_limits(const JointLimits& limits, BoundWriter* out);
+JointLimits read_limits(PropertyCursor* bound);
+
+// `Restitution` of a joint's stops, the last property of its type; a request that was recorded before it had that may end before.
+// Refuses what is outside 0 ... 1, and more than 0 where the joint has no stop, or one that gives way; `stops` says what would
+// make one.
+Property restitution_property();
+double read_restitution(PropertyCursor* properties, std::string_view type, bool has_stops, std::string_view stops);
 
 // A spring and a damper on an axis, which yields as they let it (compliance, joint_laws.h): of torque or force -(k e + c e'),
 // with a damper alone -c e'. As scenes give them: NaN or 0 where there is none.
@@ -101,7 +112,7 @@ Discrepancy driven_row(const Vector3& axis, double speed, double torque);
 // its error is counted from there.
 Discrepancy swing_row(const Vector3& first, const Vector3& second, double angle, AxisMode mode = AxisMode::kLocked);
 // The same where that angle is at most `most`: a regular cone.
-Discrepancy cone_row(const Vector3& first, const Vector3& second, double most);
+Discrepancy cone_row(const Vector3& first, const Vector3& second, double most, double restitution = 0.0);
 
 // A frame of a cross of two bars (unit vectors, not parallel): its first axis along the one, the third across both.
 Pose cross_frame(const Vector3& origin, const Vector3& first, const Vector3& other);

@@ -221,9 +221,9 @@ class Balance {
   }
 
   DiscrepancyColumns discrepancies() const {
-    return {request_.point1(),     request_.point2(),  request_.velocity(),     request_.correction(),
-            request_.axes(),       request_.mode(),    request_.lower(),        request_.upper(),
-            request_.compliance(), request_.damping(), request_.maximum_force()};
+    return {request_.point1(),     request_.point2(),  request_.velocity(),      request_.correction(),
+            request_.axes(),       request_.mode(),    request_.lower(),         request_.upper(),
+            request_.compliance(), request_.damping(), request_.maximum_force(), request_.restitution()};
   }
 
   void add_discrepancies(Directions directions) {

@@ -121,6 +121,7 @@ MessageColumns ConstrainedBodies::request() const {
     add_row(&columns, "discrepancy_warm_impulse", joint.warm_impulse);
     add_row(&columns, "discrepancy_warm_correction", joint.warm_correction);
     add_row(&columns, "discrepancy_applied_force", Vector3::Zero());
+    columns.f64("restitution").push_back(joint.discrepancy.restitution);
   }
   append_contacts(&columns);
   return columns;

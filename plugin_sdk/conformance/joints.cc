@@ -65,10 +65,10 @@ MessageColumns Joints::describe_request() const {
 
 std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
   const MessageColumns reply = inquiry->answer(stage::Method::kConstraintDiscrepancies, describe_request());
-  const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),       reply.f64("velocity"),
-                                   reply.f64("correction"), reply.f64("axes"),         reply.u32("mode"),
-                                   reply.f64("lower"),      reply.f64("upper"),        reply.f64("compliance"),
-                                   reply.f64("damping"),    reply.f64("maximum_force")};
+  const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),        reply.f64("velocity"),
+                                   reply.f64("correction"), reply.f64("axes"),          reply.u32("mode"),
+                                   reply.f64("lower"),      reply.f64("upper"),         reply.f64("compliance"),
+                                   reply.f64("damping"),    reply.f64("maximum_force"), reply.f64("restitution")};
   inquiry->expect_unit("axes", columns.axes, 4);
   std::vector<DescribedJoint> described;
   for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -81,6 +81,8 @@ std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
     const Discrepancy d = columns.at(i);
     inquiry->expect(d.correction >= 0.0 && d.correction <= 1.0,
                     "correction" + row + "is " + number_text(d.correction) + ", outside 0 … 1");
+    inquiry->expect(d.restitution >= 0.0 && d.restitution <= 1.0,
+                    "restitution" + row + "is " + number_text(d.restitution) + ", outside 0 … 1");
     inquiry->expect((d.lower.array() <= d.upper.array()).all(),
                     "lower" + row + "is " + shown(d.lower) + ", above upper " + shown(d.upper));
     inquiry->expect(d.compliance.minCoeff() >= 0.0 && d.damping.minCoeff() >= 0.0 && d.maximum_force.minCoeff() >= 0.0,

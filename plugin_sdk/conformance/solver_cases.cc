@@ -235,6 +235,7 @@ void judge_axes(Subject& subject) {
     AxisMode mode;
     double desired, lower, upper, most;
     double right;  // velocity along x
+    double restitution = 0.0;
   };
   const double speed = 0.3;
   for (const Trial& t :
@@ -244,7 +245,9 @@ void judge_axes(Subject& subject) {
         Trial{"driven to 2 m/s by at most 40 N", AxisMode::kDriven, 2.0, 0.0, 0.0, 40.0, speed + 40.0 * 0.01 / 4.0},
         Trial{"within its limits", AxisMode::kLimited, 0.0, -1.0, 1.0, kUnlimited, speed},
         Trial{"at its upper limit", AxisMode::kLimited, 0.0, -1.0, 0.0, kUnlimited, 0.0},
-        Trial{"at its lower limit, leaving it", AxisMode::kLimited, 0.0, 0.0, 1.0, kUnlimited, speed}}) {
+        Trial{"at its upper limit, of restitution 0.4", AxisMode::kLimited, 0.0, -1.0, 0.0, kUnlimited, -0.4 * speed,
+              0.4},
+        Trial{"at its lower limit, leaving it", AxisMode::kLimited, 0.0, 0.0, 1.0, kUnlimited, speed, 0.4}}) {
     ConstrainedBodies world;
     world.time_step = h;
     world.add({.mass = 4.0, .moments = Vector3::Zero(), .twist = {.linear = Vector3(speed, 0, 0)}});
@@ -255,6 +258,7 @@ void judge_axes(Subject& subject) {
     d.modes = pack_modes(t.mode, AxisMode::kLocked, AxisMode::kLocked);
     d.velocity = Vector3(t.desired, 0, 0);
     d.lower = Vector3(t.lower, 0, 0), d.upper = Vector3(t.upper, 0, 0);
+    d.restitution = t.restitution;
     d.maximum_force = Vector3(t.most, kUnlimited, kUnlimited);
     world.joints = {joint};
     Inquiry inquiry(subject, "4 kg at 0.3 m/s on a joint whose axis x is " + std::string(t.name) + ", h = 0.01");

@@ -51,7 +51,9 @@
 //
 // Laws: joint_laws.h, contact_law.h; solution of the rows: cone_problem.h. Energy. Restitution with friction in coupled
 // impacts can create energy (Kane's paradox): where an island gains, e s of the contacts that arrive and do positive work
-// is lowered, or where none does all of them, to the largest share with which it does not (contact_law.h).
+// is lowered, or where none does all of them, to the largest share with which it does not (contact_law.h). So is what stops of
+// joints give back (joint_bounce.h), together with them; an island with such stops that is unfinished and gains all the same has
+// its impulses scaled back.
 #pragma once
 
 #include <cstdint>

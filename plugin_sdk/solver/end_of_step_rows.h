@@ -38,6 +38,8 @@ struct EndJoint {
   Vector3 errors;                  // along the axes
   std::size_t turns = 0;           // rows that follow its own: two for a rod that pulls, one for a swing that is held
   std::array<double, 3> driven{};  // impulses of drives without bound by which these move the pose, N s, N m s
+  std::array<double, 3> whole_bounces{};  // of which SharedRestitution takes a share
+  std::array<bool, 3> shares{};           // it does
 
   // Of a rod, to its ends: the arms above are to its middle.
   Vector3 own_arm1() const { return arm1 - 0.5 * errors[0] * directions[0].linear; }

@@ -361,8 +361,7 @@ bool IslandSolver::find_closed() {
     for (std::size_t k = 0; k < 3; ++k) {
       const JointLaw known = joint.velocity_laws[k];
       JointLaw& law = joint.velocity_laws[k] = velocity_law_of(joint, k);
-      law.has_lower = law.has_lower || known.has_lower;
-      law.has_upper = law.has_upper || known.has_upper;
+      law.close(known.has_lower, known.has_upper);
       const bool changes = law.has_lower != known.has_lower || law.has_upper != known.has_upper;
       any = any || (changes && !law.is_equality());
     }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver/joint_bounce.h"
 
 namespace gravitas {
 
@@ -169,9 +170,12 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   joint.slop = d.is_angular() ? 1e-9 : closing_slop(middle, one, two);
   joint.length = d.is_angular() ? std::max(one.gyration(), two.gyration()) : 1.0;
   if (!d.is_angular()) coordinates_ = std::max(coordinates_, d.point2.cwiseAbs().maxCoeff());
+  for (int k = 0; k < 3; ++k)
+    joint.states[static_cast<std::size_t>(k)] = joint_axis_state(d, k, joint.axes.col(k), start_error);
+  set_bounces(d, one, two, request_.discrepancy_warm_impulse().subspan(3 * std::size_t{row}, 3), &joint.states);
+  for (const JointAxisState& axis : joint.states) stops_bounce_ = stops_bounce_ || axis.bounce != 0.0;
   for (int k = 0; k < 3; ++k) {
     const auto place = static_cast<std::size_t>(k);
-    joint.states[place] = joint_axis_state(d, k, joint.axes.col(k), start_error);
     if (has_reactions()) hold_what_bears(request_.discrepancy_applied_force()[3 * row + place], &joint.states[place]);
     joint.pose_laws[place] = pose_law(joint.states[place], d.correction, request_.time_step());
     const auto at = 3 * row + static_cast<std::uint32_t>(k);

@@ -188,6 +188,7 @@ class IslandSolver {
   // v*, with turned_by_joints().
   BodyMotion turned_trial_velocity() const;
   bool arrives() const;
+  bool has_bounces() const;  // of stops of joints
   // What the joints alone make of v*, where something arrives: what an impact gains is counted from there.
   BodyMotion velocity_of_joints(BodyMotion velocity);
   bool may_turn() const;
@@ -217,6 +218,14 @@ class IslandSolver {
   bool lower_restitution(const BodyMotion& before, int round);
   void share_restitution(double work, bool only_some);
   void share_restitution();
+  // Of an unfinished solution that gains although nothing bounces any more: the largest share that gains nothing.
+  void scale_back(const BodyMotion& trial);
+  // What stops that are closed give back, by what the joints alone make of v* (velocity_of_joints(), which leaves their rows).
+  void find_bounces(const BodyMotion& before);
+  // Of joints' stops: with the velocities' row, axis and joint.
+  template <class Use>
+  void for_bounces(Use&& use);
+  static void set_bounce(std::size_t k, double bounce, EndJoint* joint);
 
   // ---- rows on velocity alone
 
@@ -265,6 +274,7 @@ class IslandSolver {
   bool yields_ = false;        // contacts, in the pose change
   std::optional<SharedRestitution> restitution_;
   bool all_share_ = false;
+  bool stops_bounce_ = false;  // of some joint
   bool drives_yield_ = false;
   double drives_contradict_ = 0.0;  // joints or each other, m/s
   std::vector<double> reach_;       // of drives that yield

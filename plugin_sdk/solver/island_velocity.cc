@@ -4,6 +4,7 @@
 
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/island_solver.h"
+#include "plugin_sdk/solver/joint_bounce.h"
 
 namespace gravitas {
 namespace {
@@ -94,7 +95,20 @@ double IslandSolver::stop_what_is_locked(BodyMotion* trial) {
   return share;
 }
 
+template <class Use>
+void IslandSolver::for_bounces(Use&& use) {
+  std::size_t next = 0;
+  for (EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!joint.velocity_laws[k].is_active()) continue;
+      const ConeRow& row = cone_.rows[next++];
+      if (joint.velocity_laws[k].bounces()) use(row, k, &joint);
+    }
+  }
+}
+
 void IslandSolver::find_velocity(const BodyMotion& trial) {
+  if (has_bounces()) find_bounces(velocity_of_joints(trial));
   // what rests needs no torque of rolling friction: found without, it is a solution with it, and the next step's guess
   if (may_turn()) {
     build_velocity(false);
@@ -115,6 +129,7 @@ void IslandSolver::find_velocity(const BodyMotion& trial) {
     keep_impulses();
     if (!lower_restitution(before, round)) break;
   }
+  if (!has_velocity_ && stops_bounce_) scale_back(trial);
 }
 
 bool IslandSolver::has_unbounded_drive() const {
@@ -141,6 +156,7 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
   build_velocity(true);
   for (ConeRow& row : cone_.rows) {
     row.multiplier = 0.0;
+    row.law.set_bounce(0.0);
     if (!row.law.is_unbounded_drive()) continue;
     const double masses = bodies_[row.body1].inverse_mass + bodies_[row.body2].inverse_mass;
     row.law.gamma = kGives * row.direction.product(row.direction, masses);
@@ -157,6 +173,8 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
     cone_.push(bodies_, &reached);
   }
   reach_.clear();
+  for (EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k) set_bounce(k, 0.0, &joint);
   for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse, double*) {
     *impulse = 0.0;
     if (!row.law.yields) return;
@@ -211,12 +229,22 @@ BodyMotion IslandSolver::turned_trial_velocity() const {
 }
 
 bool IslandSolver::arrives() const {
-  return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; });
+  return std::ranges::any_of(contacts_, [](const EndContact& c) { return c.is_closed && c.law.target > 0.0; }) ||
+         has_bounces();
+}
+
+bool IslandSolver::has_bounces() const {
+  return stops_bounce_ && std::ranges::any_of(joints_, [](const EndJoint& joint) {
+           return std::ranges::any_of(joint.velocity_laws, &JointLaw::bounces);
+         });
 }
 
 BodyMotion IslandSolver::velocity_of_joints(BodyMotion velocity) {
   if (joints_.empty() || !arrives()) return velocity;
   build_velocity_of_joints();
+  // stops that bounce are part of the impact
+  for (ConeRow& row : cone_.rows)
+    if (row.law.bounces()) row.law.has_lower = row.law.has_upper = false;
   summary_.iterations += cone_.solve(bodies_, velocity, 0.0, settings_).iterations;
   cone_.push(bodies_, &velocity);
   return velocity;
@@ -302,12 +330,14 @@ void IslandSolver::keep_impulses() {
 
 bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
   if (round == 0) restitution_.reset();
+  if (!restitution_)
+    for (EndJoint& joint : joints_) joint.shares.fill(false);
   if (!restitution_ && !arrives()) return false;
   Gain all;
+  const std::size_t joint_rows = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
   for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
     // a drive's or spring's work is real
-    if (r < cone_.contacts.front().first && (cone_.rows[r].law.may_do_work() || cone_.rows[r].law.lower_target != 0.0))
-      continue;
+    if (r < joint_rows && cone_.rows[r].law.may_do_work()) continue;
     add_work(cone_.rows[r], before, velocity_, &all);
   }
   // multipliers of joints do work on what the solution leaves of their rows
@@ -323,6 +353,18 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
   }
   if (!gains) return false;
   bool any_fair = false, any_to_blame = false;
+  for_bounces([&](const ConeRow& row, std::size_t k, EndJoint* joint) {
+    Gain own;
+    add_work(row, before, velocity_, &own);
+    const double sign = std::copysign(1.0, row.law.bounce);
+    const double arrival = -sign * row.direction.along(before[row.body1], before[row.body2]);
+    joint->shares[k] = own.is_to_blame();
+    any_to_blame = any_to_blame || joint->shares[k];
+    double bounce = std::fabs(row.law.bounce);
+    if (round >= kRoundsOfLowering || !lower_to_arrival(own, arrival, &bounce)) return;
+    set_bounce(k, sign * bounce, joint);
+    any_fair = true;
+  });
   std::size_t cone = 0;
   for (EndContact& contact : contacts_) {
     if (!contact.is_closed) continue;
@@ -343,6 +385,12 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
 // Of those that share, or of all.
 void IslandSolver::share_restitution(double work, bool only_some) {
   all_share_ = !only_some;
+  for (EndJoint& joint : joints_) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      joint.shares[k] = joint.shares[k] || all_share_;
+      joint.whole_bounces[k] = joint.velocity_laws[k].bounce;
+    }
+  }
   for (EndContact& contact : contacts_) {
     contact.shares = contact.shares || all_share_;
     contact.whole_target = contact.law.target;
@@ -354,6 +402,39 @@ void IslandSolver::share_restitution(double work, bool only_some) {
 void IslandSolver::share_restitution() {
   for (EndContact& contact : contacts_)
     if (contact.shares) contact.law.target = restitution_->share() * contact.whole_target;
+  for (EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (joint.shares[k]) set_bounce(k, restitution_->share() * joint.whole_bounces[k], &joint);
+}
+
+void IslandSolver::find_bounces(const BodyMotion& before) {
+  for_bounces([&](const ConeRow& row, std::size_t k, EndJoint* joint) {
+    const JointAxisState& axis = joint->states[k];
+    const double rate = row.direction.along(before[row.body1], before[row.body2]) - axis.desired_velocity;
+    set_bounce(k, bounce_of(axis, rate, request_.time_step()), joint);
+  });
+}
+
+void IslandSolver::set_bounce(std::size_t k, double bounce, EndJoint* joint) {
+  joint->states[k].bounce = bounce;
+  joint->velocity_laws[k].set_bounce(bounce);
+}
+
+// A share f of all impulses gains f L + f^2 (W - L), W the gain of the whole and L = lambda.J v*.
+void IslandSolver::scale_back(const BodyMotion& trial) {
+  Gain gain;
+  double along = 0.0;
+  for (const ConeRow& row : cone_.rows) {
+    if (row.multiplier != 0.0 && row.law.may_do_work()) return;
+    add_work(row, trial, velocity_, &gain);
+    along += row.multiplier * row.direction.along(trial[row.body1], trial[row.body2]);
+  }
+  if (!gain.is_real()) return;
+  const double share = std::max(0.0, -along / (gain.work - along));
+  for (ConeRow& row : cone_.rows) row.multiplier *= share;
+  velocity_ = trial;
+  cone_.push(bodies_, &velocity_);
+  keep_impulses();
 }
 
 // ---- rows on velocity alone

@@ -66,6 +66,12 @@ JointLaw soft_law(const JointAxisState& a, double h) {
 
 }  // namespace
 
+std::optional<JointStop> stop_of(const JointAxisState& a, double sign) {
+  if (!is_limit(a.mode) || is_held(a) || is_soft(a)) return std::nullopt;
+  if (sign > 0.0) return has_lower_side(a) ? std::optional(JointStop{1.0, lower_of(a)}) : std::nullopt;
+  return has_upper_side(a) ? std::optional(JointStop{-1.0, a.upper}) : std::nullopt;
+}
+
 bool acts_as_force(const Discrepancy& discrepancy, int axis) {
   const AxisMode mode = axis_mode(discrepancy.modes, axis);
   return is_soft(mode, discrepancy.compliance[axis]) || (is_drive(mode) && discrepancy.damping[axis] > 0.0);
@@ -123,7 +129,7 @@ void add_turns(double turns, Discrepancy* twist) {
 }
 
 void hold_what_bears(double force, JointAxisState* axis) {
-  if (!is_limit(axis->mode) || is_soft(*axis) || force == 0.0) return;
+  if (!is_limit(axis->mode) || is_soft(*axis) || force == 0.0 || axis->bounce != 0.0) return;
   const double target = force > 0.0 ? lower_of(*axis) : axis->upper;
   axis->mode = AxisMode::kLimited;
   axis->lower = axis->upper = target;
@@ -197,9 +203,9 @@ JointLaw velocity_law(const JointAxisState& a, double error_after, double slop, 
   }
   if (is_held(a)) set_equality(law, a.desired_velocity);
   if (!is_limit(a.mode) || is_held(a)) return law;
-  law.has_lower = has_lower_side(a) && error_after <= lower_of(a) + slop;
-  law.has_upper = has_upper_side(a) && error_after >= a.upper - slop;
   law.lower_target = law.upper_target = a.desired_velocity;
+  law.set_bounce(a.bounce);
+  law.close(has_lower_side(a) && error_after <= lower_of(a) + slop, has_upper_side(a) && error_after >= a.upper - slop);
   return law;
 }
 

@@ -21,13 +21,16 @@
 //     others            none
 //   Velocity, bound F h:
 //     locked            J v = v_d
-//     limited           J v >= v_d where closed below, J v <= v_d where closed above
-//     unilateral        J v >= v_d where closed
+//     limited           J v >= v_d + b where closed below, J v <= v_d - b where closed above
+//     unilateral        J v >= v_d + b where closed
 //     driven, friction  J v + gamma lambda = v_d,  gamma = 1/(h d) for d > 0, else 0
 //     with compliance   J v + gamma lambda = v_d - e/(c d + h),  gamma = c/(h (c d + h)),
 //                       for locked, limited and unilateral axes
 //
 // A limit with lower = upper holds like a lock at that error (rods, coupler lengths).
+//
+// b = e s is what a stop gives back of the speed s at which it is arrived at (joint_bounce.h), on the side that is; 0 for
+// all else, and where both sides are closed.
 //
 // A limit is closed where its error after the pose change is within the slop. The soft row is the
 // spring and damper
@@ -50,6 +53,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "plugin_sdk/discrepancy.h"
@@ -59,16 +63,18 @@ namespace gravitas {
 struct JointLaw {
   bool has_lower = false;
   bool has_upper = false;
+  // Has no part in the pose change, which theta h of its impulse moves: drives and friction.
+  bool is_velocity_only = false;
+  bool yields = false;        // of a drive without bound: something is in its way (end_of_step.h)
   double lower_target = 0.0;  // of J x: m, m/s, rad or rad/s
   double upper_target = 0.0;
   double gamma = 0.0;
   double bound = std::numeric_limits<double>::infinity();  // of |lambda|
-  // Has no part in the pose change, which theta h of its impulse moves: drives and friction.
-  bool is_velocity_only = false;
-  bool yields = false;  // of a drive without bound: something is in its way (end_of_step.h)
+  // What a stop gives back, a part of the target of the side that does: above 0 the lower one, below 0 the upper.
+  double bounce = 0.0;
 
-  // Work that it does is real: of a drive, friction or a spring.
-  bool may_do_work() const { return is_velocity_only || gamma > 0.0; }
+  // Work that it does is real: of a drive, friction or a spring, or of a guide that moves by itself.
+  bool may_do_work() const { return is_velocity_only || gamma > 0.0 || is_moved(); }
   // Of what the row misses, what it moves the bodies by where they respond by so much; the rest stays in the spring.
   double share_of_bodies(double response) const { return gamma > 0.0 ? response / (response + gamma) : 1.0; }
   bool is_active() const { return has_lower || has_upper; }
@@ -78,6 +84,22 @@ struct JointLaw {
   // A drive that asks for its velocity whatever stands against it.
   bool is_unbounded_drive() const { return is_velocity_only && is_rigid(); }
   void shift(double amount) { lower_target += amount, upper_target += amount; }
+  bool bounces() const { return bounce > 0.0 ? has_lower : bounce < 0.0 && has_upper; }
+  // Its target beside the bounce is not 0.
+  bool is_moved() const { return lower_target != std::max(0.0, bounce); }
+  // Between two stops that are closed there is no room to leave either.
+  void set_bounce(double next) {
+    if (has_lower && has_upper) next = 0.0;
+    if (next == bounce) return;
+    lower_target = lower_target - std::max(0.0, bounce) + std::max(0.0, next);
+    upper_target = upper_target - std::min(0.0, bounce) + std::min(0.0, next);
+    bounce = next;
+  }
+  // Sides beside those that are.
+  void close(bool lower, bool upper) {
+    has_lower = has_lower || lower, has_upper = has_upper || upper;
+    if (bounce != 0.0) set_bounce(bounce);
+  }
   // By how much a change of the error misses the targets.
   double missed_by(double change) const {
     return std::max({0.0, has_lower ? lower_target - change : 0.0, has_upper ? change - upper_target : 0.0});
@@ -91,7 +113,18 @@ struct JointAxisState {
   double desired_velocity = 0.0;
   double error_at_start = 0.0;  // e_n
   double error_at_trial = 0.0;  // e*
+  // Of a stop towards which the bodies move at S_n (joint_bounce.h):
+  double restitution = 0.0, start_rate = 0.0;  // e and J_n v_n - v_d
+  double bounce = 0.0;                         // JointLaw's, where it closes
 };
+
+// A side of an axis, as errors that grow away from it see it: its gap is sign (error - limit).
+struct JointStop {
+  double sign = 1.0;  // -1: the upper
+  double limit = 0.0;
+};
+// The stop that the axis has on a side, rigid and with room beside it; none for others.
+std::optional<JointStop> stop_of(const JointAxisState& axis, double sign);
 
 // True for axes of velocities alone: driven and friction.
 bool is_drive(AxisMode mode);
@@ -112,7 +145,7 @@ double turns_to_limit(const Discrepancy& discrepancy);
 void add_turns(double turns, Discrepancy* twist);
 
 // A limit that bore `force` while the trial state was integrated holds like a lock: what the integrator is off by to its free
-// side is put right as well, or it would count as open in the next step.
+// side is put right as well, or it would count as open in the next step. Not one that is arrived at and bounces.
 void hold_what_bears(double force, JointAxisState* axis);
 
 // True for a discrepancy of points that is all which holds its two bodies, among the rows next to it. Each may then be pushed

@@ -114,7 +114,7 @@ void ReactionSolver::let_go_opened() {
 // By no velocity of the state: what is let go of changes these, and would be held again and let go without end.
 double ReactionSolver::strayed(const Row& row) const {
   constexpr double kOfSquare = 0.75;  // a third stage of RK4 on a circle is off by half
-  constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+  constexpr double kRoundingOfRest = 64.0 * std::numeric_limits<double>::epsilon();
   double turn = 0.0, coordinates = 0.0;
   for (const std::uint32_t i : {row.body1, row.body2}) {
     const Body& body = bodies_[i];
@@ -128,8 +128,8 @@ double ReactionSolver::strayed(const Row& row) const {
     coordinates = std::max(coordinates, body.pose.position.cwiseAbs().maxCoeff());
   }
   // what rests is where it is told to be but for rounding
-  if (!(row.reach > 0.0)) return kOfSquare * turn * turn + kRounding;
-  return kOfSquare * turn * turn * row.reach + kRounding * (row.reach + coordinates);
+  if (!(row.reach > 0.0)) return kOfSquare * turn * turn + kRoundingOfRest;
+  return kOfSquare * turn * turn * row.reach + kRoundingOfRest * (row.reach + coordinates);
 }
 
 void ReactionSolver::turn_to_limit(Joint* joint) {

@@ -10,8 +10,8 @@
 namespace gravitas {
 
 DiscrepancyColumns columns_of(const stage::SolverSolveRequest& r) {
-  return {r.point1(), r.point2(), r.velocity(),   r.correction(), r.axes(),         r.mode(),
-          r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force()};
+  return {r.point1(), r.point2(), r.velocity(),   r.correction(), r.axes(),          r.mode(),
+          r.lower(),  r.upper(),  r.compliance(), r.damping(),    r.maximum_force(), r.restitution()};
 }
 
 void set_all_unpushed(const stage::SolverSolveRequest& request, const SolverBodies& bodies, SolverSolution* solution) {

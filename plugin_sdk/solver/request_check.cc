@@ -143,6 +143,7 @@ void check_solver_request(const stage::SolverSolveRequest& request) {
   check_numbers("discrepancy_warm_impulse", request.discrepancy_warm_impulse(), request.mode().size(), 3);
   check_numbers("discrepancy_warm_correction", request.discrepancy_warm_correction(), request.mode().size(), 3);
   check_numbers("discrepancy_applied_force", request.discrepancy_applied_force(), request.mode().size(), 3);
+  check_numbers("restitution", request.restitution(), request.mode().size(), 1, 0.0, 1.0);
   check_contacts(request, bodies);
 }
 

@@ -46,6 +46,7 @@ void StalledDrives::stall_rows() {
       const Numbers numbers = left_of(numbers_of(drive, limit));
       const double share = axis.dot(numbers) / axis.squaredNorm();
       if (numbers.isZero(0.0) || (numbers - share * axis).norm() > kAgrees * numbers.norm()) continue;
+      limit.law->set_bounce(0.0);
       const double along = law.lower_target / share;
       const bool is_below = limit.law->has_lower && along < limit.law->lower_target;
       const bool is_above = limit.law->has_upper && along > limit.law->upper_target;

@@ -2,7 +2,8 @@
 //
 // A drive without a bound on its force asks for its velocity whatever stands against it; a limit that it has reached forbids
 // it, and no motion meets both. The limit holds: the drive then keeps its bodies from going back from there, J v >= v_limit
-// with lambda >= 0, and no more. It leaves as soon as its own target points away.
+// with lambda >= 0, and no more. It leaves as soon as its own target points away. What it drives along the limit's axis does not
+// bounce there.
 //
 // A drive has reached a limit of the same two bodies if its row is a multiple of the limit's and what else holds between
 // them (driving points about the axis of a hinge with limits: J_d = s J_l + sum c_k J_k, with J_k v = 0), to 1e-3. A

@@ -174,10 +174,10 @@ std::vector<Anchor> Surveyor::anchors(const kernel::Environment& environment) {
     const MessageColumns asked = request(kAsked, environment, group);
     const std::vector<std::uint32_t>& intact = asked.u32("intact");
     const auto columns = [](const MessageColumns& reply) {
-      return DiscrepancyColumns{reply.f64("point1"),     reply.f64("point2"),       reply.f64("velocity"),
-                                reply.f64("correction"), reply.f64("axes"),         reply.u32("mode"),
-                                reply.f64("lower"),      reply.f64("upper"),        reply.f64("compliance"),
-                                reply.f64("damping"),    reply.f64("maximum_force")};
+      return DiscrepancyColumns{reply.f64("point1"),     reply.f64("point2"),        reply.f64("velocity"),
+                                reply.f64("correction"), reply.f64("axes"),          reply.u32("mode"),
+                                reply.f64("lower"),      reply.f64("upper"),         reply.f64("compliance"),
+                                reply.f64("damping"),    reply.f64("maximum_force"), reply.f64("restitution")};
     };
     const MessageColumns reply =
         slot(Slot::kConstraint).ask(kAsked, group.target, asked, [&](const MessageColumns& answer) {

@@ -82,11 +82,12 @@ struct Rows {
   Numbers point1 = Numbers(3), point2 = Numbers(3), velocity = Numbers(3), correction{1}, axes{1, 0, 0, 0};
   Numbers lower = Numbers(3, -kUnlimited), upper = Numbers(3, kUnlimited);
   Numbers compliance = Numbers(3), damping = Numbers(3), maximum_force = Numbers(3, kUnlimited);
+  Numbers restitution{0.5};
 
   AnswerProblem check(const Ids& intact = {1}) const {
-    return check_discrepancy_rows(
-        constraint, intact,
-        {point1, point2, velocity, correction, axes, mode, lower, upper, compliance, damping, maximum_force});
+    return check_discrepancy_rows(constraint, intact,
+                                  {point1, point2, velocity, correction, axes, mode, lower, upper, compliance, damping,
+                                   maximum_force, restitution});
   }
 };
 
@@ -101,6 +102,8 @@ TEST(AnswerChecks, Discrepancies) {
   };
   expect_structure(with([](Rows& rows) { rows.mode[0] = ~0U; }), "mode of row 0 is unknown");
   expect_number(with([](Rows& rows) { rows.correction[0] = 1.1; }), "correction of row 0 is outside 0 … 1");
+  for (const double wrong : {-0.1, 1.5, std::nan("")})
+    expect_number(with([&](Rows& rows) { rows.restitution[0] = wrong; }), "restitution of row 0 is outside 0 … 1");
   expect_number(with([](Rows& rows) { rows.lower[1] = 1.0, rows.upper[1] = 0.5; }), "lower of row 0 lies above upper");
   for (Numbers Rows::*column : {&Rows::compliance, &Rows::damping, &Rows::maximum_force})
     expect_number(with([&](Rows& rows) { (rows.*column)[2] = -1e-12; }),
@@ -109,8 +112,9 @@ TEST(AnswerChecks, Discrepancies) {
 
   Rows two;
   two.constraint = {1, 0};
-  for (Numbers Rows::*column : {&Rows::point1, &Rows::point2, &Rows::velocity, &Rows::correction, &Rows::axes,
-                                &Rows::lower, &Rows::upper, &Rows::compliance, &Rows::damping, &Rows::maximum_force}) {
+  for (Numbers Rows::*column :
+       {&Rows::point1, &Rows::point2, &Rows::velocity, &Rows::correction, &Rows::axes, &Rows::lower, &Rows::upper,
+        &Rows::compliance, &Rows::damping, &Rows::maximum_force, &Rows::restitution}) {
     const Numbers once = two.*column;
     (two.*column).insert((two.*column).end(), once.begin(), once.end());
   }

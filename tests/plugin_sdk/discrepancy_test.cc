@@ -409,6 +409,7 @@ TEST(DiscrepancyColumns, GiveBackWhatWasPushed) {
     d.upper = random.vector(1.0), d.lower = d.upper - random.vector(1.0).cwiseAbs();
     d.compliance = random.vector(1.0).cwiseAbs(), d.damping = random.vector(1.0).cwiseAbs();
     d.maximum_force = random.vector(1.0).cwiseAbs();
+    d.restitution = random.uniform(0.0, 1.0);
   }
 
   using Reply = stage::ConstraintDiscrepanciesReply;
@@ -431,7 +432,8 @@ TEST(DiscrepancyColumns, GiveBackWhatWasPushed) {
       real(Reply::kUpper),
       real(Reply::kCompliance),
       real(Reply::kDamping),
-      real(Reply::kMaximumForce)};
+      real(Reply::kMaximumForce),
+      real(Reply::kRestitution)};
   ASSERT_EQ(read.size(), given.size());
   for (std::size_t i = 0; i < given.size(); ++i) {
     const Discrepancy d = read.at(i), &g = given[i];
@@ -440,6 +442,7 @@ TEST(DiscrepancyColumns, GiveBackWhatWasPushed) {
     EXPECT_TRUE(d.modes == g.modes && d.lower == g.lower && d.upper == g.upper);
     EXPECT_TRUE(d.compliance == g.compliance && d.damping == g.damping);
     EXPECT_EQ(d.maximum_force, g.maximum_force);
+    EXPECT_EQ(d.restitution, g.restitution);
     EXPECT_EQ(static_cast<const std::uint32_t*>(columns[Reply::kConstraint].data)[i], i);
   }
 }

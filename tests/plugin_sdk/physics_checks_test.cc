@@ -355,6 +355,7 @@ struct Solution {
     for (const auto column : {Request::kLower, Request::kUpper, Request::kCompliance, Request::kDamping})
       request.f64(column) = {0, 0, 0};
     put(&request.f64(Request::kMaximumForce), d.maximum_force);
+    request.f64(Request::kRestitution) = {0.0};
     request.u32(Request::kContactBody) = {0, 1};
     request.f64(Request::kContactNormal) = {0, 1, 0};
     put(&request.f64(Request::kContactPoint), point);

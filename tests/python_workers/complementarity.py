@@ -64,9 +64,11 @@ class Rows:
         return (self.j1 * x[self.body1]).sum(axis=1) + (self.j2 * x[self.body2]).sum(axis=1)
 
     def motion(self, x):
-        """Sum of the magnitudes that J x is made of: what rounding goes by."""
-        size = numpy.abs(self.j1 * x[self.body1]).sum(axis=1) + numpy.abs(self.j2 * x[self.body2]).sum(axis=1)
-        return float((size * self.length).max(initial=0.0))
+        """Largest sum of the magnitudes that J x is made of: what rounding goes by."""
+        return float((self.motions(x) * self.length).max(initial=0.0))
+
+    def motions(self, x):
+        return numpy.abs(self.j1 * x[self.body1]).sum(axis=1) + numpy.abs(self.j2 * x[self.body2]).sum(axis=1)
 
     def push(self, multipliers, x):
         """x += M^-1 J^T lambda; a body whose multipliers are all zero keeps its bits."""

@@ -8,20 +8,19 @@
       -> pose change again, with theta h M^-1 J^T lambda of friction, drives and springs
 
 The laws are those of schemas/gravitas/stage/v1/solver.proto. Bodies that no joint or contact joins are solved apart,
-and do not know of each other. Restitution that would make an island gain energy is dropped for that island. Every
-island is a dense problem: a pile of hundreds of bodies is not what this is for.
+and do not know of each other. Restitution, of contacts and of stops, that would make an island gain energy is dropped
+for that island. Every island is a dense problem: a pile of hundreds of bodies is not what this is for.
 """
 
 import numpy
 
 from complementarity import EPSILON, STILLNESS, Contact, Laws, Rows, apply, cross, dot, solve
-from gravitas_worker import KINEMATIC, MOVABLE, NONE, Property, Refusal, Solver, check_finite, check_indices, main
+from gravitas_worker import KINEMATIC, MOVABLE, NONE, Property, Refusal, Solver, main
+from request_check import ANGULAR, DRIVEN, FRICTION, LIMITED, LOCKED, SWING, TWIST, UNILATERAL, check_request
 from rotations import (conjugate, product, rotation, rotation_vector, sum_along, tangent_of, turn_by, turned_by, unit)
 from surface import perturbed_normal
 
 NOTHING_TO_DO, CONVERGED, ITERATIONS = 0, 1, 2
-FREE, LOCKED, LIMITED, UNILATERAL, FRICTION, DRIVEN = range(6)
-ANGULAR, SWING, TWIST = 1 << 12, 1 << 14, 1 << 16
 UNLIMITED = numpy.finfo(float).max
 
 
@@ -129,6 +128,7 @@ class Scene:
         self.displacement = numpy.zeros_like(self.velocity)
         self._set_joints(request, correction_factor)
         self._set_contacts(request, correction_factor)
+        self._set_bounces(request)
 
     # ---- joints: three rows a discrepancy
 
@@ -224,6 +224,27 @@ class Scene:
         still, count = numpy.repeat(still, 3), len(rows)
         return Rows.joined(rows, self.joint_rows).part(numpy.where(still, count, 0) + numpy.arange(count))
 
+    def _set_bounces(self, r):
+        """What stops give back of the speed at which they are arrived at, away from them: above 0 from the lower. One that
+        pushed in the step before is not arrived at."""
+        bodies = self.bodies
+        restitution = numpy.repeat(r.restitution, 3)
+        self.stop_bounce = numpy.zeros_like(restitution)
+        if not restitution.any():
+            return
+        rows = self.joint_rows_at(-bodies.moved())
+        rate = rows.along(bodies.velocity) - self.desired
+        sign = numpy.where(rate < 0, 1.0, -1.0)
+        limit = numpy.where(rate < 0, self.lower, self.upper)
+        has_stop = (self.mode == LIMITED) & (self.lower < self.upper) & (numpy.abs(limit) < UNLIMITED)
+        limit = numpy.where(has_stop, limit, 0.0)
+        has_stop |= (self.mode == UNILATERAL) & (rate < 0)
+        has_stop &= (self.compliance == 0) & ~(sign * self.joint_warm[0] > 0)
+        has_stop &= numpy.abs(rate) > 1e-12 * rows.motions(bodies.velocity)
+        self.stop_rate, self.stop_gap = rate, numpy.maximum(0.0, sign * (self.error_start - limit))
+        self.stop_restitution = numpy.where(has_stop, restitution, 0.0)
+        self.stop_bounce = -self.stop_restitution * rate  # until Island._find_bounces()
+
     def _swing_at_start(self, r, axes, body1, body2):
         """Of the angle between a direction of body 1, the second axis, and one of body 2, that turned by point2."""
         angle = dot(axes[:, 0], r.point2)[:, None]
@@ -268,6 +289,8 @@ class Scene:
             laws.has_lower[row] = has_lower and after <= rest + self.slop[i]
             laws.has_upper[row] = has_upper and after >= upper - self.slop[i]
             laws.lower[row] = laws.upper[row] = self.desired[i]
+            laws.lower[row] += max(0.0, self.stop_bounce[i])
+            laws.upper[row] += min(0.0, self.stop_bounce[i])
 
     def _set_spring(self, laws, row, i, is_held, has_lower, has_upper, rest):
         """Spring and damper at the end of the step: implicit Euler."""
@@ -322,11 +345,7 @@ class Scene:
 
         def arrival(rows):
             start, trial = rows.along(bodies.velocity), rows.along(bodies.trial_velocity)
-            gained = trial - start
-            square = start * start - 2 * (gained / self.step) * numpy.maximum(0.0, gap)
-            speed = numpy.sqrt(numpy.maximum(0.0, square))
-            rests = ~(trial < 0) | (speed < 2 * numpy.abs(gained))
-            return start, trial, numpy.where(rests, 0.0, speed)
+            return start, trial, arrival_speed(start, trial, gap, self.step)
 
         start, _, speed = arrival(self.gap_rows)
         spread = r.contact_material[:, 5]
@@ -449,7 +468,15 @@ class Island:
         self._sides |= sides
         laws.has_lower, laws.has_upper = self._sides[:, 0].copy(), self._sides[:, 1].copy()
         self._joint_laws = laws
+        # between two stops that are closed there is no room to leave either
+        self._drop_bounces(laws, laws.has_lower & laws.has_upper)
         return is_new
+
+    def _drop_bounces(self, laws, where):
+        count = len(self._joints)
+        where = where[:count] & (self._scene.stop_bounce[self._joints] != 0)
+        for side in (laws.lower, laws.upper):
+            side[:count] = numpy.where(where, self._scene.desired[self._joints], side[:count])
 
     def _solve_velocity(self):
         scene, count = self._scene, len(self._joints)
@@ -469,8 +496,29 @@ class Island:
             self._velocity_only[contact.first + 1 : contact.first + (6 if contact.turns() else 3)] = True
         self._warm = numpy.concatenate([scene.joint_warm[0][self._joints], scene.contact_warm[0][numbers]])
         self._start = self._turned_by_joints()
+        self._find_bounces()
         self._relax()
         self._bound_energy()
+
+    def _find_bounces(self):
+        """What stops that are closed give back of the speed at which the other joints let the bodies arrive."""
+        scene, joints, laws = self._scene, self._joints, self._velocity_laws
+        bounce, own = scene.stop_bounce[joints], numpy.arange(len(joints))
+        closed = numpy.where(bounce > 0, laws.has_lower[own], laws.has_upper[own]) & (bounce != 0)
+        closed &= ~(laws.has_lower[own] & laws.has_upper[own])
+        if not closed.any():
+            return
+        others, rows, velocity = laws.part(own), self._velocity_rows.part(own), self._start.copy()
+        others.has_lower[closed] = others.has_upper[closed] = False
+        tolerance = STILLNESS * rows.motion(velocity)
+        rows.push(solve(rows, others, (), velocity, self._warm[own], self._iterations, tolerance, self._host).multipliers,
+                  velocity)
+        sign, desired = numpy.sign(bounce), scene.desired[joints]
+        speed = arrival_speed(sign * scene.stop_rate[joints], sign * (rows.along(velocity) - desired),
+                              scene.stop_gap[joints], scene.step)
+        target = desired + sign * scene.stop_restitution[joints] * speed
+        laws.lower[own] = numpy.where(closed & (bounce > 0), target, laws.lower[own])
+        laws.upper[own] = numpy.where(closed & (bounce < 0), target, laws.upper[own])
 
     def _turned_by_joints(self):
         """v*, of which spins go along with what joints turn the bodies by, along what these turn by, and no further."""
@@ -500,9 +548,11 @@ class Island:
 
     def _bound_energy(self):
         """What joints and contacts do to the island's energy must not be positive; drives and springs may be."""
-        if any(contact.target > 0 for contact in self._velocity_contacts) and self._gain()[0] > 0:
+        bounces = any(contact.target > 0 for contact in self._velocity_contacts)
+        if (bounces or self._scene.stop_bounce[self._joints].any()) and self._gain()[0] > 0:
             for contact in self._velocity_contacts:
                 contact.target, contact.slides = 0.0, False
+            self._drop_bounces(self._velocity_laws, self._velocity_laws.has_lower | self._velocity_laws.has_upper)
             self._relax()
         gain, along = self._gain()
         is_driven = (self._velocity_laws.velocity_only & (self._multipliers != 0)).any()
@@ -537,43 +587,13 @@ class Island:
         return (part[0] * frame[0] + part[1] * frame[1]) + part[2] * frame[2]
 
 
-def check_request(r):
-    """Refuses what cannot be computed with, column by column."""
-    bodies, least = len(r.flags), {}
-    if not (0 < r.time_step < numpy.inf):
-        raise Refusal(f"time_step is {r.time_step:g}; allowed: finite, above 0")
-    if not 0 <= r.theta <= 1:
-        raise Refusal(f"theta is {r.theta:g}; allowed: 0 to 1")
-    for name in ("inverse_mass", "inverse_inertia", "compliance", "damping", "maximum_force", "contact_material"):
-        least[name] = 0.0
-    for name, column in vars(r).items():
-        if not isinstance(column, numpy.ndarray) or column.dtype.kind != "f":
-            continue
-        check_finite(name, column)
-        check_range(name, column, least.get(name, -numpy.inf), numpy.inf)
-    check_range("correction", r.correction, 0.0, 1.0)
-    check_range("contact_material", r.contact_material[:, 0], 0.0, 1.0)
-    for name in ("orientation", "trial_orientation", "axes", "contact_normal"):
-        column = getattr(r, name)
-        check_range(f"{name} (its norm)", numpy.sqrt((column * column).sum(axis=1)), 1 - 1e-6, 1 + 1e-6)
-    check_indices("discrepancy_body", r.discrepancy_body, bodies, none_allowed=True)
-    check_indices("contact_body", r.contact_body, bodies)
-    for name in ("discrepancy_body", "contact_body"):
-        pairs = getattr(r, name)
-        if (pairs[:, 0] == pairs[:, 1]).any():
-            raise Refusal(f"column {name}: a body is paired with itself")
-    modes = numpy.stack([r.mode >> 4 * i & 0xF for i in range(3)], axis=-1)
-    if (modes > DRIVEN).any() or not numpy.isin(r.mode & ~0xFFF, (0, ANGULAR, ANGULAR | SWING, ANGULAR | TWIST)).all():
-        raise Refusal("column mode: a mode that does not exist")
-    if ((modes == LIMITED) & (r.lower > r.upper)).any():
-        raise Refusal("column lower: above upper")
-
-
-def check_range(name, column, low, high):
-    bad = ~((column >= low) & (column <= high))
-    if bad.any():
-        row = int(numpy.argwhere(bad)[0][0])
-        raise Refusal(f"column {name}, row {row}: {float(column[bad][0]):g}; allowed: {low:g} to {high:g}")
+def arrival_speed(start, trial, way, step):
+    """That of two surfaces, or of a stop, after a way at constant acceleration; none where nothing arrives, or rests."""
+    gained = trial - start
+    square = start * start - 2 * (gained / step) * numpy.maximum(0.0, way)
+    speed = numpy.sqrt(numpy.maximum(0.0, square))
+    rests = ~(trial < 0) | (speed < 2 * numpy.abs(gained))
+    return numpy.where(rests, 0.0, speed)
 
 
 if __name__ == "__main__":

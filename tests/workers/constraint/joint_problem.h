@@ -61,10 +61,10 @@ class JointProblem {
       append(&request.f64("angular_velocity"), body.twist.angular);
     }
     const MessageColumns reply = plugin_->ask(stage::Method::kConstraintDiscrepancies, request);
-    const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),       reply.f64("velocity"),
-                                     reply.f64("correction"), reply.f64("axes"),         reply.u32("mode"),
-                                     reply.f64("lower"),      reply.f64("upper"),        reply.f64("compliance"),
-                                     reply.f64("damping"),    reply.f64("maximum_force")};
+    const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),        reply.f64("velocity"),
+                                     reply.f64("correction"), reply.f64("axes"),          reply.u32("mode"),
+                                     reply.f64("lower"),      reply.f64("upper"),         reply.f64("compliance"),
+                                     reply.f64("damping"),    reply.f64("maximum_force"), reply.f64("restitution")};
     std::vector<Discrepancy> discrepancies;
     for (std::size_t i = 0; i < columns.size(); ++i) discrepancies.push_back(columns.at(i));
     return discrepancies;

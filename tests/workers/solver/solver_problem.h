@@ -82,7 +82,7 @@ class SolverProblem {
       trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity, wrench, point1, point2,
       velocity, correction, axes, lower, upper, compliance, damping, maximum_force, discrepancy_warm_impulse,
       discrepancy_warm_correction, contact_normal, contact_point, contact_depth, contact_material, contact_warm_impulse,
-      contact_warm_correction, discrepancy_applied_force;
+      contact_warm_correction, discrepancy_applied_force, restitution;
   std::vector<TestBody> bodies;
 
   // S* starts as S_n.
@@ -163,6 +163,7 @@ class SolverProblem {
     append(discrepancy_warm_impulse, Vector3::Zero());
     append(discrepancy_warm_correction, Vector3::Zero());
     append(discrepancy_applied_force, Vector3::Zero());
+    restitution.push_back(d.restitution);
     return static_cast<std::uint32_t>(mode.size() - 1);
   }
 
@@ -247,7 +248,8 @@ class SolverProblem {
                                                       column(contact_material),
                                                       column(contact_warm_impulse),
                                                       column(contact_warm_correction),
-                                                      column(discrepancy_applied_force)};
+                                                      column(discrepancy_applied_force),
+                                                      column(restitution)};
     SolverAnswer a;
     a.linear_velocity.resize(3 * flags.size());
     a.angular_velocity.resize(3 * flags.size());

@@ -27,7 +27,7 @@ class ConstantVelocity final : public ConstraintPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "ConstantVelocity",
-            .version = "1.3",
+            .version = "1.4",
             .slot = Slot::kConstraint,
             .meaning = "Joint of shafts that turn alike.",
             .capabilities = {"coordinates"},
@@ -49,7 +49,8 @@ class ConstantVelocity final : public ConstraintPlugin {
                         Property::number("MaximumAngle", "rad")
                             .above(0.0)
                             .at_most(kHalfTurn)
-                            .means("Largest bend, not below that of the start; none if absent.")},
+                            .means("Largest bend, not below that of the start; none if absent."),
+                        restitution_property()},
                        {{"bend", "rad", "Angle between the shafts, 0 ... pi."},
                         {"azimuth", "rad",
                          "Where shaft 2 points round Axis1 in body 1, right-handed about it from the world's x at the "
@@ -95,7 +96,8 @@ class ConstantVelocity final : public ConstraintPlugin {
       }
       bound.number();  // of the coordinates alone
       if (bound.at_end()) return;
-      emit(cone_row(one.orientation * Vector3::UnitX(), two.orientation * Vector3::UnitX(), bound.number()));
+      const double most = bound.number(), restitution = bound.number();
+      emit(cone_row(one.orientation * Vector3::UnitX(), two.orientation * Vector3::UnitX(), most, restitution));
     });
   }
 
@@ -117,12 +119,14 @@ class ConstantVelocity final : public ConstraintPlugin {
   static void write_limit(PropertyCursor* properties, double start, BoundWriter* out) {
     constexpr double kRounding = 1e-9;  // rad, of axes that scenes give
     const double most = properties->at_end() ? std::nan("") : properties->number();
+    const double restitution = read_restitution(properties, "ConstantVelocity", !std::isnan(most), "MaximumAngle");
     if (std::isnan(most)) return;
     if (!(most > 0.0 && most <= kHalfTurn)) throw Refusal("ConstantVelocity: MaximumAngle is outside 0 ... pi");
     if (start > most + kRounding)
       throw Refusal("ConstantVelocity: MaximumAngle " + std::to_string(most) + " lies below the bend of the start, " +
                     std::to_string(start));
     out->number(most);
+    out->number(restitution);
   }
 };
 

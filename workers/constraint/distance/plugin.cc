@@ -31,7 +31,7 @@ class Distance final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Distance",
-        .version = "1.3",
+        .version = "1.4",
         .slot = Slot::kConstraint,
         .meaning = "Rod, rope or cable.",
         .capabilities = {"coordinates"},
@@ -50,7 +50,8 @@ class Distance final : public ConstraintPlugin {
               Property::number("Stiffness", "N/m")
                   .above(0.0)
                   .means("Spring that holds what is beyond the range; rigid if absent."),
-              Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent.")},
+              Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent."),
+              restitution_property()},
              {{"length", "m", "Distance between the points."}}}}};
   }
   explicit Distance(PropertyCursor) {}
@@ -70,6 +71,8 @@ class Distance final : public ConstraintPlugin {
                 const JointSpring spring = JointSpring::of(&properties);
                 const bool is_rigid = spring.stiffness == 0.0;
                 if (is_rigid && spring.damping > 0.0) throw Refusal("Distance: Damping is given without Stiffness");
+                const double restitution = read_restitution(&properties, "Distance", !is_rod && is_rigid,
+                                                            "MinimumDistance or MaximumDistance, or with Stiffness");
                 // with a spring it may start beyond them, and after an edit it need not be where it started
                 const bool is_judged = is_rigid && !bodies.is_kept;
                 demand_range(least, most, is_judged ? start : std::max(least, std::min(start, most)));
@@ -78,6 +81,7 @@ class Distance final : public ConstraintPlugin {
                 out.number(least);
                 out.number(most);
                 write_spring(spring, &out);
+                out.number(restitution);
               });
   }
 
@@ -96,6 +100,7 @@ class Distance final : public ConstraintPlugin {
       const JointSpring spring = read_spring(&bound);
       if (spring.stiffness > 0.0) d.compliance.x() = 1.0 / spring.stiffness;
       d.damping.x() = spring.damping;
+      d.restitution = bound.number();
       emit(d);
     });
   }

@@ -25,7 +25,7 @@ class Revolute final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Revolute",
-        .version = "1.3",
+        .version = "1.4",
         .slot = Slot::kConstraint,
         .meaning = "Hinge.",
         .capabilities = {"coordinates"},
@@ -52,7 +52,8 @@ class Revolute final : public ConstraintPlugin {
                                "absent."),
                     Property::number("MaximumTorque", "N*m")
                         .at_least(0.0)
-                        .means("Largest torque of the drive; unlimited if absent.")},
+                        .means("Largest torque of the drive; unlimited if absent."),
+                    restitution_property()},
                    {{"angle", "rad",
                      "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start; the "
                      "turn that limits are compared with, without them above -pi up to pi."}}}}};
@@ -65,16 +66,19 @@ class Revolute final : public ConstraintPlugin {
           demand_type(type, "Revolute");
           const Vector3 point1 = properties.vector(), point2 = properties.vector();
           const double lower = properties.number(), upper = properties.number();
-          const JointLimits limits = JointLimits::of_turn(lower, upper, "Revolute: LowerLimit", "Revolute: UpperLimit");
+          JointLimits limits = JointLimits::of_turn(lower, upper, "Revolute: LowerLimit", "Revolute: UpperLimit");
           const JointSpring spring = JointSpring::of(&properties);
           const Pose frame = hinge_frame(point1, point2, bodies, "Revolute");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
-          out.number(limits.lower);
-          out.number(limits.upper);
+          const double rest = properties.at_end() ? 0.0 : properties.number();
+          BoundWriter drive;
+          write_drive(&properties, "Revolute", &drive);
+          limits.restitution = read_restitution(&properties, "Revolute", !limits.is_none(), "LowerLimit or UpperLimit");
+          write_limits(limits, &out);
           write_spring(spring, &out);
-          out.number(properties.at_end() ? 0.0 : properties.number());
-          write_drive(&properties, "Revolute", &out);
+          out.number(rest);
+          for (const double number : drive.numbers()) out.number(number);
         });
   }
 
@@ -83,9 +87,7 @@ class Revolute final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       hold_hinge(one, two, emit);
-      JointLimits limits;
-      limits.lower = bound.number();
-      limits.upper = bound.number();
+      const JointLimits limits = read_limits(&bound);
       if (!limits.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, limits));
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
@@ -98,9 +100,7 @@ class Revolute final : public ConstraintPlugin {
                    Host&) override {
     measure_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
-      JointLimits limits;
-      limits.lower = bound.number();
-      limits.upper = bound.number();
+      const JointLimits limits = read_limits(&bound);
       emit(0, twist_of(one, two, limits, bodies));
     });
   }

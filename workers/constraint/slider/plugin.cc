@@ -22,55 +22,55 @@ class Slider final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Slider",
-        .version = "1.2",
+        .version = "1.3",
         .slot = Slot::kConstraint,
         .meaning = "Straight guide.",
         .capabilities = {"coordinates"},
-        .types = {{"Slider",
-                   "The second body slides along an axis of the first and does not turn against it.",
-                   {Property::vector("BindPoint", "m", "world").required().means("A point of the guide."),
-                    Property::vector("Axis", "1", "world").required().means("Its direction, any length."),
-                    Property::number("LowerLimit", "m")
-                        .at_most(0.0)
-                        .means("Smallest way of body 2 along the axis from the start; none if absent."),
-                    Property::number("UpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
-                    Property::number("Speed", "m/s")
-                        .means("Speed of body 2 along the axis that a drive keeps; no drive if absent."),
-                    Property::number("MaximumForce", "N")
-                        .at_least(0.0)
-                        .means("Largest force of the drive; unlimited if absent."),
-                    Property::number("Stiffness", "N/m").at_least(0.0).means("Spring along the axis; none if absent."),
-                    Property::number("Damping", "N*s/m").at_least(0.0).means("Damper along the axis; none if absent."),
-                    Property::number("RestPosition", "m")
-                        .defaults_to({0.0})
-                        .means("Way at which the spring pushes nothing.")},
-                   {{"displacement", "m", "Way of body 2 along the axis, relative to body 1, 0 at the start."}}}}};
+        .types = {
+            {"Slider",
+             "The second body slides along an axis of the first and does not turn against it.",
+             {Property::vector("BindPoint", "m", "world").required().means("A point of the guide."),
+              Property::vector("Axis", "1", "world").required().means("Its direction, any length."),
+              Property::number("LowerLimit", "m")
+                  .at_most(0.0)
+                  .means("Smallest way of body 2 along the axis from the start; none if absent."),
+              Property::number("UpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
+              Property::number("Speed", "m/s")
+                  .means("Speed of body 2 along the axis that a drive keeps; no drive if absent."),
+              Property::number("MaximumForce", "N")
+                  .at_least(0.0)
+                  .means("Largest force of the drive; unlimited if absent."),
+              Property::number("Stiffness", "N/m").at_least(0.0).means("Spring along the axis; none if absent."),
+              Property::number("Damping", "N*s/m").at_least(0.0).means("Damper along the axis; none if absent."),
+              Property::number("RestPosition", "m").defaults_to({0.0}).means("Way at which the spring pushes nothing."),
+              restitution_property()},
+             {{"displacement", "m", "Way of body 2 along the axis, relative to body 1, 0 at the start."}}}}};
   }
   explicit Slider(PropertyCursor) {}
 
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
-    bind_each(request, reply,
-              [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-                demand_type(type, "Slider");
-                const Vector3 point = properties.vector();
-                const Pose frame = frame_along(point, unit_axis(properties.vector(), "Slider: Axis"));
-                const double lower = properties.number(), upper = properties.number();
-                const JointLimits limits = JointLimits::of(lower, upper, "Slider: LowerLimit", "Slider: UpperLimit");
-                const double speed = properties.number(), force = properties.number();
-                const JointSpring spring = JointSpring::of(&properties);
-                const double rest = properties.at_end() ? 0.0 : properties.number();
-                const bool is_driven = !std::isnan(speed);
-                if (!is_driven && !std::isnan(force)) throw Refusal("Slider: MaximumForce is given without Speed");
-                write_frame(bodies.pose1, frame, &out);
-                write_frame(bodies.pose2, frame, &out);
-                out.number(limits.lower);
-                out.number(limits.upper);
-                out.number(is_driven ? 1.0 : 0.0);
-                out.number(is_driven ? speed : 0.0);
-                out.number(std::isnan(force) ? kUnlimited : force);
-                write_spring(spring, &out);
-                out.number(rest);
-              });
+    bind_each(
+        request, reply, [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+          demand_type(type, "Slider");
+          const Vector3 point = properties.vector();
+          const Pose frame = frame_along(point, unit_axis(properties.vector(), "Slider: Axis"));
+          const double lower = properties.number(), upper = properties.number();
+          JointLimits limits = JointLimits::of(lower, upper, "Slider: LowerLimit", "Slider: UpperLimit");
+          const double speed = properties.number(), force = properties.number();
+          const JointSpring spring = JointSpring::of(&properties);
+          const double rest = properties.at_end() ? 0.0 : properties.number();
+          limits.restitution = read_restitution(&properties, "Slider", !limits.is_none(), "LowerLimit or UpperLimit");
+          const bool is_driven = !std::isnan(speed);
+          if (!is_driven && !std::isnan(force)) throw Refusal("Slider: MaximumForce is given without Speed");
+          write_frame(bodies.pose1, frame, &out);
+          write_frame(bodies.pose2, frame, &out);
+          write_limits(limits, &out);
+          out.number(is_driven ? 1.0 : 0.0);
+          out.number(is_driven ? speed : 0.0);
+          out.number(std::isnan(force) ? kUnlimited : force);
+          write_spring(spring, &out);
+          out.number(rest);
+        });
   }
 
   void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
@@ -81,13 +81,12 @@ class Slider final : public ConstraintPlugin {
       hold_orientation(one, two, emit);
 
       const Vector3 axis = one.orientation * Vector3::UnitX();
-      JointLimits limits;
-      limits.lower = bound.number();
-      limits.upper = bound.number();
+      const JointLimits limits = read_limits(&bound);
       if (!limits.is_none()) {
         Discrepancy limit = row_along(axis, one.position, two.position, AxisMode::kLimited);
         limit.lower.x() = limits.lower;
         limit.upper.x() = limits.upper;
+        limit.restitution = limits.restitution;
         emit(limit);
       }
       const bool is_driven = bound.flag();

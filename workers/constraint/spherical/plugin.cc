@@ -72,7 +72,7 @@ class Spherical final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Spherical",
-        .version = "1.3",
+        .version = "1.4",
         .slot = Slot::kConstraint,
         .meaning = "Ball-and-socket joint.",
         .capabilities = {"coordinates"},
@@ -113,7 +113,8 @@ class Spherical final : public ConstraintPlugin {
                       "those of the world at the start; 0 for friction, no drive if absent."),
               Property::number("MaximumTorque", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of the drive about each of these axes; unlimited if absent.")},
+                  .means("Largest torque of the drive about each of these axes; unlimited if absent."),
+              restitution_property()},
              {{"swing", "rad",
                "Angle of Axis in body 2 against Axis in body 1, which ReachConeAngle bounds, 0 ... pi; of a joint with "
                "Axis, as the others."},
@@ -135,10 +136,12 @@ class Spherical final : public ConstraintPlugin {
                 out.vector(inverse_transform_point(bodies.pose2, point));
                 // a request may end here: the joint that leaves all turns free
                 if (properties.at_end()) return;
-                const Cone cone = read_cone(&properties);
+                Cone cone = read_cone(&properties);
                 const JointSpring spring = JointSpring::of(&properties);
                 BoundWriter drive;
                 write_turning_drive(bodies, &properties, &drive);
+                cone.twist.restitution = read_restitution(&properties, "Spherical", !cone.limits_nothing(),
+                                                          "ReachConeAngle, ReachCone, TwistLower or TwistUpper");
                 if (!cone.has_axis && spring.is_none() && drive.numbers().empty()) return;
                 const Pose frame = azimuth_frame(point, cone.axis);
                 write_frame(bodies.pose1, frame, &out);
@@ -167,9 +170,7 @@ class Spherical final : public ConstraintPlugin {
       if (bound.at_end()) return;
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       read_spring(&bound);
-      JointLimits twist;
-      twist.lower = bound.number();
-      twist.upper = bound.number();
+      const JointLimits twist = read_limits(&bound);
       bound.table(2);
       if (!bound.flag()) return;
       const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
@@ -183,7 +184,7 @@ class Spherical final : public ConstraintPlugin {
   struct Cone {
     Vector3 axis = Vector3::UnitX();
     bool has_axis = false;
-    JointLimits twist;
+    JointLimits twist;   // with the restitution of the cone, too
     double angle = 0.0;  // of a regular one, else 0
     std::span<const double> irregular;
 
@@ -212,8 +213,7 @@ class Spherical final : public ConstraintPlugin {
   }
 
   static void write_cone(const Cone& cone, BoundWriter* out) {
-    out->number(cone.twist.lower);
-    out->number(cone.twist.upper);
+    write_limits(cone.twist, out);
     const bool is_regular = cone.angle > 0.0;
     out->number(is_regular ? 1.0 : static_cast<double>(cone.irregular.size() / 2));
     if (is_regular) out->number(0.0), out->number(cone.angle);
@@ -249,11 +249,9 @@ class Spherical final : public ConstraintPlugin {
     const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
     const JointSpring spring = read_spring(&bound);
     if (!spring.is_none()) emit(sprung_turn(one.orientation, two.orientation, spring));
-    JointLimits twist;
-    twist.lower = bound.number();
-    twist.upper = bound.number();
+    const JointLimits twist = read_limits(&bound);
     const std::span<const double> cone = bound.table(2);
-    if (!cone.empty()) emit_cone(cone, one.orientation, two.orientation, emit);
+    if (!cone.empty()) emit_cone(cone, twist.restitution, one.orientation, two.orientation, emit);
     if (!twist.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, twist));
     if (bound.at_end()) return;
     bound.flag();  // has an axis
@@ -267,9 +265,10 @@ class Spherical final : public ConstraintPlugin {
   }
 
   template <typename Emit>
-  static void emit_cone(std::span<const double> cone, const Quaternion& one, const Quaternion& two, Emit&& emit) {
+  static void emit_cone(std::span<const double> cone, double restitution, const Quaternion& one, const Quaternion& two,
+                        Emit&& emit) {
     const Vector3 a1 = one * Vector3::UnitX(), a2 = two * Vector3::UnitX();
-    if (cone.size() == 2) return emit(cone_row(a1, a2, cone[1]));
+    if (cone.size() == 2) return emit(cone_row(a1, a2, cone[1], restitution));
     const Vector3 from = one * Vector3::UnitY(), to = one * Vector3::UnitZ();
     const Vector3 across = swing_between(a1, a2).axis.cross(a1);
     double azimuth = math::atan2(to.dot(across), from.dot(across));
@@ -280,7 +279,7 @@ class Spherical final : public ConstraintPlugin {
     while (last + 1 < count && cone[2 * last + 2] <= azimuth) ++last;
     const ConePiece here = piece_of(cone, last);
     const RegularCone touching = osculating_cone(here.reach(azimuth), here.slope, a1, across);
-    emit(cone_row(touching.axis, a2, touching.angle));
+    emit(cone_row(touching.axis, a2, touching.angle, restitution));
     // at a corner outwards the piece behind it, too
     const bool is_past = azimuth - here.begin < here.end - azimuth;
     const ConePiece next = piece_of(cone, is_past ? (last + count - 1) % count : (last + 1) % count);
@@ -297,7 +296,7 @@ class Spherical final : public ConstraintPlugin {
       bounds = beyond < kHalfTurn;
       if (bounds) other = osculating_cone(beyond, next.slope, a1, across);
     }
-    Discrepancy beside = cone_row(other.axis, a2, other.angle);
+    Discrepancy beside = cone_row(other.axis, a2, other.angle, restitution);
     if (!bounds) beside.upper.x() = kUnlimited;
     emit(beside);
   }

@@ -53,7 +53,7 @@ class Universal final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Universal",
-        .version = "1.3",
+        .version = "1.4",
         .slot = Slot::kConstraint,
         .meaning = "Hooke's joint.",
         .capabilities = {"coordinates"},
@@ -96,7 +96,8 @@ class Universal final : public ConstraintPlugin {
               Property::number("LowerLimit2", "rad").at_most(0.0).means("The same about Axis2; none if absent."),
               Property::number("UpperLimit2", "rad")
                   .at_least(0.0)
-                  .means("Largest angle; none if absent. Less than a full turn above LowerLimit2.")},
+                  .means("Largest angle; none if absent. Less than a full turn above LowerLimit2."),
+              restitution_property()},
              {{"angle1", "rad",
                "Turn of the cross, and of body 2 with it, about Axis1, relative to body 1, right-handed, 0 at the "
                "start; the turn that limits are compared with, without them above -pi up to pi."},
@@ -175,18 +176,18 @@ class Universal final : public ConstraintPlugin {
     BoundWriter first, second;
     write_drive(properties, "Universal", &first, "1");
     write_drive(properties, "Universal", &second, "2");
-    const JointLimits limits1 = limits_of(properties, "1"), limits2 = limits_of(properties, "2");
+    JointLimits limits1 = limits_of(properties, "1"), limits2 = limits_of(properties, "2");
     const bool has_limits = !limits1.is_none() || !limits2.is_none();
+    limits1.restitution = limits2.restitution =
+        read_restitution(properties, "Universal", has_limits, "LowerLimit1, UpperLimit1, LowerLimit2 or UpperLimit2");
     if (first.numbers().empty() && second.numbers().empty() && !has_limits) return;
     for (const BoundWriter* drive : {&first, &second}) {
       out->number(drive->numbers().empty() ? 0.0 : 1.0);
       for (const double number : drive->numbers()) out->number(number);
     }
     if (!has_limits) return;
-    for (const JointLimits& limits : {limits1, limits2}) {
-      out->number(limits.lower);
-      out->number(limits.upper);
-    }
+    write_limits(limits1, out);
+    write_limits(limits2, out);
   }
 
   // A request that was recorded before there were any may end before.
@@ -194,13 +195,6 @@ class Universal final : public ConstraintPlugin {
     if (properties->at_end()) return {};
     const double lower = properties->number(), upper = properties->number();
     return JointLimits::of_turn(lower, upper, "Universal: LowerLimit" + which, "Universal: UpperLimit" + which);
-  }
-
-  static JointLimits read_limits(PropertyCursor* bound) {
-    JointLimits limits;
-    limits.lower = bound->number();
-    limits.upper = bound->number();
-    return limits;
   }
 
   // Body 2 turns about its bar as that sees the other one turn back.
@@ -225,6 +219,7 @@ class Universal final : public ConstraintPlugin {
     Discrepancy row = bar.row_from(zero);
     row.lower.x() = bound(limits.lower, -kUnlimited);
     row.upper.x() = bound(limits.upper, kUnlimited);
+    row.restitution = limits.restitution;
     return row;
   }
 

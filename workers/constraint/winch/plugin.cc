@@ -53,7 +53,7 @@ class Winch final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Winch",
-        .version = "1.0",
+        .version = "1.1",
         .slot = Slot::kConstraint,
         .meaning = "Rope on a drum.",
         .types = {
@@ -78,7 +78,8 @@ class Winch final : public ConstraintPlugin {
               Property::number("Stiffness", "N/m").above(0.0).means("Of what is stretched; rigid if absent."),
               Property::number("Damping", "N*s/m").at_least(0.0).means("Its damping; none if absent."),
               Property::flag("Taut").defaults_to({0.0}).means(
-                  "True: it is never slack, and would push, as what a tensioner keeps tight.")}}}};
+                  "True: it is never slack, and would push, as what a tensioner keeps tight."),
+              restitution_property()}}}};
   }
   explicit Winch(PropertyCursor) {}
 
@@ -93,6 +94,8 @@ class Winch final : public ConstraintPlugin {
                 const double slack = properties.number();
                 const JointSpring spring = JointSpring::of(&properties);
                 const bool is_taut = properties.flag();
+                const double restitution = read_restitution(&properties, "Winch", !is_taut && spring.is_none(),
+                                                            "slack, as Taut and Stiffness leave none");
                 if (!(radius > 0.0)) throw Refusal("Winch: Radius must be above 0");
                 if (spring.stiffness == 0.0 && spring.damping > 0.0)
                   throw Refusal("Winch: Damping is given without Stiffness");
@@ -109,6 +112,7 @@ class Winch final : public ConstraintPlugin {
                 out.number(rope.length + slack);
                 write_spring(spring, &out);
                 out.number(is_taut ? 1.0 : 0.0);
+                out.number(restitution);
               });
   }
 
@@ -135,6 +139,7 @@ class Winch final : public ConstraintPlugin {
       d.lower.x() = is_taut ? d.upper.x() : -kUnlimited;
       if (spring.stiffness > 0.0) d.compliance.x() = 1.0 / (spring.stiffness * steepness * steepness);
       d.damping.x() = spring.damping * steepness * steepness;
+      d.restitution = bound.number();
       emit(d);
     });
   }

@@ -381,24 +381,21 @@ std::uint32_t ContactImpulses::lower_to_arrival(const BodyMotion& before, const 
   return count;
 }
 
-std::vector<bool> ContactImpulses::mark_sharing(const SolverBodies& bodies, const BodyMotion& before,
-                                                const BodyMotion& after, const std::vector<std::uint32_t>& group) {
-  std::vector<bool> is_some(group.size(), false);
+void ContactImpulses::mark_sharing(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
+                                   const std::vector<std::uint32_t>& group, std::vector<bool>* is_some) {
   for (Row& row : rows_) {
     Gain gain;
     gain.work = work_of(row, before, after, &gain.size);
     row.whole_target = row.target;
     row.shares = row.target > 0.0 && gain.is_to_blame();
-    if (row.shares) is_some[group[owner_of(row, bodies)]] = true;
+    if (row.shares) (*is_some)[group[owner_of(row, bodies)]] = true;
   }
-  for (Row& row : rows_) row.shares = row.shares || !is_some[group[owner_of(row, bodies)]];
-  return is_some;
 }
 
 void ContactImpulses::share_all(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
-                                std::uint32_t which) {
+                                const std::vector<bool>& which) {
   for (Row& row : rows_) {
-    if (group[owner_of(row, bodies)] != which) continue;
+    if (!which[group[owner_of(row, bodies)]]) continue;
     row.whole_target = row.target;
     row.shares = true;
   }

@@ -99,12 +99,12 @@ class ContactImpulses final : public RelaxationBlocks {
   // Lowers e s of contacts that arrive and whose impulse does positive work to the speed of arrival (contact_law.h). Returns
   // how many were lowered.
   std::uint32_t lower_to_arrival(const BodyMotion& before, const BodyMotion& after);
-  // Marks the contacts whose e s is to be shared, of each group (by the number of its first body) those to blame, or all where
-  // none is. Returns by group whether some are not.
-  std::vector<bool> mark_sharing(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
-                                 const std::vector<std::uint32_t>& group);
-  // All of a group share, from what their e s are now.
-  void share_all(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, std::uint32_t which);
+  // Marks the contacts whose e s is to be shared, those to blame, and by group (the number of its first body) whether there are
+  // some.
+  void mark_sharing(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
+                    const std::vector<std::uint32_t>& group, std::vector<bool>* is_some);
+  // All of some groups share, from what their e s are now.
+  void share_all(const SolverBodies& bodies, const std::vector<std::uint32_t>& group, const std::vector<bool>& which);
   // Sets e s of the contacts that share to their group's share of the whole; NaN: it stays. Returns how many there are.
   std::uint32_t share_restitution(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                   const std::vector<double>& share);

@@ -414,21 +414,6 @@ void RelaxationJoints::store(Multipliers& multipliers) const {
     if (block.first_left_out < block.end_left_out) share_out(block, &multipliers);
 }
 
-void RelaxationJoints::add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
-                                const std::vector<std::uint32_t>& group, std::vector<Gain>& gains) const {
-  for (const Block& block : blocks_) {
-    Gain& gain = gains[group[owner_of(block, bodies)]];
-    for (std::size_t i = block.first; i < block.end; ++i) {
-      const Row& row = rows_[i];
-      if (row.law.may_do_work()) continue;
-      const double start = row.own.along(before[block.body1], before[block.body2]);
-      const double end = row.own.along(after[block.body1], after[block.body2]);
-      gain.add(0.5 * row.multiplier * (start + end),
-               0.5 * std::fabs(row.multiplier) * (std::fabs(start) + std::fabs(end)));
-    }
-  }
-}
-
 void RelaxationJoints::exempt_driven(const SolverBodies& bodies, const std::vector<std::uint32_t>& group,
                                      std::vector<double>& factor) const {
   for (const Block& block : blocks_)

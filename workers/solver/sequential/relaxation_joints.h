@@ -114,6 +114,20 @@ class RelaxationJoints final : public RelaxationBlocks {
 
   // ---- the bound on energy (sequential.h) ----
 
+  bool has_bounces() const;
+  // What stops give back, by what the joints alone make of v*.
+  void find_bounces(const std::vector<RelaxationDiscrepancy>& discrepancies, const BodyMotion& before,
+                    double time_step);
+  void drop_bounces();
+  // Rows that bounce hold nothing.
+  void leave_out_bounces();
+  // As those of ContactImpulses, of what stops give back.
+  std::uint32_t lower_to_arrival(const BodyMotion& before, const BodyMotion& after);
+  void mark_sharing(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
+                    const std::vector<std::uint32_t>& group, std::vector<bool>* is_some);
+  void share_all(const std::vector<std::uint32_t>& group, const std::vector<bool>& which);
+  std::uint32_t share_restitution(const std::vector<std::uint32_t>& group, const std::vector<double>& share);
+
   // Work of the rows that neither drive nor soften, lambda (J before + J after)/2, J, added to that
   // of body2, or of body1 where body2 is not pushed.
   void add_work(const SolverBodies& bodies, const BodyMotion& before, const BodyMotion& after,
@@ -146,6 +160,12 @@ class RelaxationJoints final : public RelaxationBlocks {
     std::array<double, kBlock> share;  // of the kept rows, all scaled: it is their combination
     double scale;                      // root of J M^-1 J^T
   };
+  // Of a row that bounces: its target is a share of the whole, if it shares.
+  struct Bounce {
+    std::uint32_t row, body;  // the latter: whose group it is of
+    bool shares;
+    double whole;
+  };
   struct Block {
     std::uint32_t body1 = 0, body2 = 0;
     std::uint32_t first = 0, end = 0;  // rows
@@ -163,12 +183,18 @@ class RelaxationJoints final : public RelaxationBlocks {
   void leave_out(const std::array<std::size_t, kBlock>& kept, double inverse_masses, Block* block);
   void orthogonalise(Block& block, double inverse_masses);
   void share_out(const Block& block, Multipliers* multipliers) const;
+  // Of a row of the block, added to the gain.
+  static void add_work(const Block& block, const Row& row, const BodyMotion& before, const BodyMotion& after,
+                       Gain* gain);
+  template <class Use>
+  void for_bounces(Use&& use);
   double relax_rigid(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2);
   double relax_others(const Block& block, double share, double w1, double w2, Twist& x1, Twist& x2);
 
   std::vector<Row> rows_;
   std::vector<Block> blocks_;
   std::vector<LeftOut> left_out_;
+  std::vector<Bounce> bounces_;
   std::vector<Row> rigid_, others_;                 // of the block that is being built
   std::vector<std::array<double, kBlock>> factor_;  // of its rigid rows
   std::vector<double> pivot_;

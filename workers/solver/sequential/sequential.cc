@@ -13,6 +13,7 @@
 #include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
 #include "plugin_sdk/solver/islands.h"
+#include "plugin_sdk/solver/joint_bounce.h"
 #include "plugin_sdk/solver/request_check.h"
 #include "workers/solver/sequential/shock_propagation.h"
 
@@ -181,7 +182,9 @@ void SequentialSolver::load(const stage::SolverSolveRequest& request) {
     discrepancies_.push_back(relaxation_discrepancy(discrepancy, body1, body2,
                                                     is_only_point(request.discrepancy_body(), request.mode(), i),
                                                     bodies_, settings_.correction_factor));
-    const RelaxationDiscrepancy& r = discrepancies_.back();
+    RelaxationDiscrepancy& r = discrepancies_.back();
+    set_bounces(discrepancy, bodies_[body1], bodies_[body2], request.discrepancy_warm_impulse().subspan(3 * i, 3),
+                &r.axes);
     for (std::size_t k = 0; k < 3; ++k) pose_laws_.push_back(pose_law_of(r, k, request.theta()));
     coordinates_ = std::max(coordinates_, discrepancy.point2.cwiseAbs().maxCoeff());
   }
@@ -315,13 +318,14 @@ void SequentialSolver::build_velocity(const stage::SolverSolveRequest& request) 
   take_directions(drives_yield_);
   velocity_joints_.build(bodies_, directed_, velocity_laws_, solution_.joint_impulse);
   impulses_.build(bodies_, request, closed_, solution_.contact_impulse);
-  if (drives_yield_) impulses_.drop_restitution();
+  if (drives_yield_) impulses_.drop_restitution(), velocity_joints_.drop_bounces();
   copy(request.contact_normal(), solution_.contact_direction);
 }
 
 // Velocities and impulses, with the bound on energy.
 void SequentialSolver::solve_velocity() {
   used_up_before_velocity_ = used_up_;
+  if (velocity_joints_.has_bounces()) velocity_joints_.find_bounces(discrepancies_, velocity_of_joints(), time_step_);
   relax_velocity();
   bound_energy();
   velocity_joints_.store(solution_.joint_impulse);
@@ -426,6 +430,7 @@ bool SequentialSolver::find_reach() {
     if (!velocity_laws_[i].is_active()) continue;
     ConeRow& row = problem.rows.emplace_back(row_of(directed_[i / 3], i % 3, velocity_laws_[i]));
     place.push_back(i);
+    row.law.set_bounce(0.0);
     if (!row.law.is_unbounded_drive()) continue;
     row.law.shift(-velocity_shift_[i]);
     const double masses = bodies_[row.body1].inverse_mass + bodies_[row.body2].inverse_mass;
@@ -453,11 +458,12 @@ bool SequentialSolver::find_reach() {
 // ---- energy
 
 void SequentialSolver::bound_energy() {
-  const bool bounces = impulses_.has_restitution();
+  const bool bounces = impulses_.has_restitution() || velocity_joints_.has_bounces();
   if (!bounces && velocity_converged_) return;
   const BodyMotion before = bounces ? velocity_of_joints() : trial_velocity_;
   for (int round = 0; round < 3; ++round) {
-    const std::uint32_t lowered = impulses_.lower_to_arrival(before, solution_.velocity);
+    const std::uint32_t lowered = impulses_.lower_to_arrival(before, solution_.velocity) +
+                                  velocity_joints_.lower_to_arrival(before, solution_.velocity);
     if (lowered == 0) break;
     summary_.restitutions_lowered += lowered;
     relax_velocity();
@@ -469,12 +475,22 @@ void SequentialSolver::bound_energy() {
   if (!velocity_converged_) scale_back();
 }
 
-// gains_ as they are; by group, first the contacts to blame, then all.
+// gains_ as they are; by group, first the contacts and stops to blame, then all.
 void SequentialSolver::share_restitution(const BodyMotion& before) {
-  std::vector<bool> only_some = impulses_.mark_sharing(bodies_, before, solution_.velocity, group_);
+  std::vector<bool> only_some(group_.size(), false);
+  impulses_.mark_sharing(bodies_, before, solution_.velocity, group_, &only_some);
+  velocity_joints_.mark_sharing(bodies_, before, solution_.velocity, group_, &only_some);
+  const auto share_all = [&](const std::vector<bool>& which) {
+    impulses_.share_all(bodies_, group_, which);
+    velocity_joints_.share_all(group_, which);
+  };
+  std::vector<bool> all = only_some;
+  all.flip();
+  share_all(all);
   shared_.assign(bodies_.count() + 1, std::nullopt);
   for (;; add_up_gains(before, solution_.velocity)) {
     shares_.assign(shared_.size(), std::numeric_limits<double>::quiet_NaN());
+    all.assign(group_.size(), false);
     bool any = false;
     for (std::uint32_t i = 0; i < shared_.size(); ++i) {
       const bool gains = gains_[i].is_real();
@@ -482,7 +498,7 @@ void SequentialSolver::share_restitution(const BodyMotion& before) {
       if (!goes_on && shared_[i] && gains && only_some[i]) {
         // those to blame do not suffice
         only_some[i] = false, goes_on = true;
-        impulses_.share_all(bodies_, group_, i);
+        all[i] = true;
         shared_[i].reset();
       }
       if (!goes_on) continue;
@@ -490,7 +506,10 @@ void SequentialSolver::share_restitution(const BodyMotion& before) {
       shares_[i] = shared_[i]->share();
       any = true;
     }
-    const std::uint32_t changed = any ? impulses_.share_restitution(bodies_, group_, shares_) : 0;
+    share_all(all);
+    const std::uint32_t changed = any ? impulses_.share_restitution(bodies_, group_, shares_) +
+                                            velocity_joints_.share_restitution(group_, shares_)
+                                      : 0;
     summary_.restitutions_shared += changed;
     if (changed == 0) break;
     relax_velocity();
@@ -502,6 +521,7 @@ BodyMotion SequentialSolver::velocity_of_joints() {
   BodyMotion velocity = trial_velocity_;
   if (discrepancies_.empty()) return velocity;
   RelaxationJoints joints = velocity_joints_;
+  joints.leave_out_bounces();
   ContactImpulses none;
   const double motion = joints.largest_motion(velocity);
   sweep_.begin(bodies_, {&joints, &none});

@@ -319,17 +319,13 @@ bool SequentialSolver::find_closed() {
       // what is pushed is closed, however far the sweeps have come
       const JointLaw& pose = pose_laws_[3 * i + axis];
       if (pose.is_active() && !pose.is_equality()) {
-        law.has_lower = law.has_lower || pushed_[3 * i + axis] > 0.0;
-        law.has_upper = law.has_upper || pushed_[3 * i + axis] < 0.0;
+        law.close(pushed_[3 * i + axis] > 0.0, pushed_[3 * i + axis] < 0.0);
       }
       JointLaw& known = velocity_laws_[3 * i + axis];
       const bool adds = (law.has_lower && !known.has_lower) || (law.has_upper && !known.has_upper);
       added = added || (adds && !law.is_equality());
-      const bool has_lower = law.has_lower || known.has_lower;
-      const bool has_upper = law.has_upper || known.has_upper;
+      law.close(known.has_lower, known.has_upper);
       known = law;
-      known.has_lower = has_lower;
-      known.has_upper = has_upper;
     }
   }
   stalled_.stall([&](auto&& visit) {
