@@ -174,7 +174,10 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
   }
   reach_.clear();
   for (EndJoint& joint : joints_)
-    for (std::size_t k = 0; k < 3; ++k) set_bounce(k, 0.0, &joint);
+    for (std::size_t k = 0; k < 3; ++k) {
+      joint.states[k].bounce = 0.0;
+      set_bounce(k, 0.0, &joint);
+    }
   for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse, double*) {
     *impulse = 0.0;
     if (!row.law.yields) return;
@@ -416,7 +419,6 @@ void IslandSolver::find_bounces(const BodyMotion& before) {
 }
 
 void IslandSolver::set_bounce(std::size_t k, double bounce, EndJoint* joint) {
-  joint->states[k].bounce = bounce;
   joint->velocity_laws[k].set_bounce(bounce);
 }
 
@@ -424,8 +426,11 @@ void IslandSolver::set_bounce(std::size_t k, double bounce, EndJoint* joint) {
 void IslandSolver::scale_back(const BodyMotion& trial) {
   Gain gain;
   double along = 0.0;
-  for (const ConeRow& row : cone_.rows) {
-    if (row.multiplier != 0.0 && row.law.may_do_work()) return;
+  // contacts that give way have a compliance, too
+  const std::size_t joint_rows = cone_.contacts.empty() ? cone_.rows.size() : cone_.contacts.front().first;
+  for (std::size_t r = 0; r < cone_.rows.size(); ++r) {
+    const ConeRow& row = cone_.rows[r];
+    if (r < joint_rows && row.multiplier != 0.0 && row.law.may_do_work()) return;
     add_work(row, trial, velocity_, &gain);
     along += row.multiplier * row.direction.along(trial[row.body1], trial[row.body2]);
   }

@@ -13,6 +13,7 @@ namespace gravitas {
 namespace {
 
 constexpr double kRateRounding = 1e-12, kRateStill = 1e-8;  // of the speeds that a rate is the difference of
+constexpr double kRateStillAtRest = 1e-10;                  // m/s or rad/s, as reactions have it
 
 Quaternion turn_back(const SolverBody& body) { return body.start.orientation * body.trial.orientation.conjugate(); }
 
@@ -42,8 +43,9 @@ void set_bounces(const Discrepancy& discrepancy, const SolverBody& body1, const 
   for (std::size_t k = 0; k < axes->size(); ++k) {
     JointAxisState& axis = (*axes)[k];
     const double rate = start.directions[k].along(one, two) - axis.desired_velocity;
-    const double none = discrepancy.has_forces_applied() ? kRateStill : kRateRounding;
-    if (!(std::fabs(rate) > none * size_along(start.directions[k], one, two))) continue;
+    const double size = size_along(start.directions[k], one, two);
+    const double none = discrepancy.has_forces_applied() ? kRateStill * size + kRateStillAtRest : kRateRounding * size;
+    if (!(std::fabs(rate) > none)) continue;
     const std::optional<JointStop> stop = stop_of(axis, -rate);
     if (!stop || stop->sign * warm_impulse[k] > 0.0) continue;
     axis.restitution = discrepancy.restitution;

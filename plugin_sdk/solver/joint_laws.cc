@@ -129,7 +129,8 @@ void add_turns(double turns, Discrepancy* twist) {
 }
 
 void hold_what_bears(double force, JointAxisState* axis) {
-  if (!is_limit(axis->mode) || is_soft(*axis) || force == 0.0 || axis->bounce != 0.0) return;
+  if (!is_limit(axis->mode) || is_soft(*axis) || force == 0.0 || axis->bounce * force > 0.0) return;
+  axis->bounce = 0.0;
   const double target = force > 0.0 ? lower_of(*axis) : axis->upper;
   axis->mode = AxisMode::kLimited;
   axis->lower = axis->upper = target;
@@ -195,6 +196,7 @@ JointLaw spring_pose_law(const JointAxisState& a, double approach, double theta,
 JointLaw velocity_law(const JointAxisState& a, double error_after, double slop, double h) {
   JointLaw law = is_soft(a) ? soft_law(a, h) : JointLaw{};
   law.bound = force_bound(a.maximum_force, h);
+  law.is_guided = a.desired_velocity != 0.0;
   if (is_soft(a)) return law;
   if (is_drive(a.mode)) {
     set_equality(law, a.desired_velocity);

@@ -65,6 +65,7 @@ struct JointLaw {
   bool has_upper = false;
   // Has no part in the pose change, which theta h of its impulse moves: drives and friction.
   bool is_velocity_only = false;
+  bool is_guided = false;     // by a desired velocity: a guide that moves by itself
   bool yields = false;        // of a drive without bound: something is in its way (end_of_step.h)
   double lower_target = 0.0;  // of J x: m, m/s, rad or rad/s
   double upper_target = 0.0;
@@ -74,7 +75,7 @@ struct JointLaw {
   double bounce = 0.0;
 
   // Work that it does is real: of a drive, friction or a spring, or of a guide that moves by itself.
-  bool may_do_work() const { return is_velocity_only || gamma > 0.0 || is_moved(); }
+  bool may_do_work() const { return is_velocity_only || gamma > 0.0 || is_guided; }
   // Of what the row misses, what it moves the bodies by where they respond by so much; the rest stays in the spring.
   double share_of_bodies(double response) const { return gamma > 0.0 ? response / (response + gamma) : 1.0; }
   bool is_active() const { return has_lower || has_upper; }
@@ -85,8 +86,6 @@ struct JointLaw {
   bool is_unbounded_drive() const { return is_velocity_only && is_rigid(); }
   void shift(double amount) { lower_target += amount, upper_target += amount; }
   bool bounces() const { return bounce > 0.0 ? has_lower : bounce < 0.0 && has_upper; }
-  // Its target beside the bounce is not 0.
-  bool is_moved() const { return lower_target != std::max(0.0, bounce); }
   // Between two stops that are closed there is no room to leave either.
   void set_bounce(double next) {
     if (has_lower && has_upper) next = 0.0;

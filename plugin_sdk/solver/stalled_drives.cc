@@ -42,11 +42,12 @@ void StalledDrives::stall_rows() {
     if (axis.isZero(0.0)) continue;
     for (const Row& drive : rows_) {
       JointLaw& law = *drive.law;
-      if (drive.kind != Kind::kDrive || !law.is_equality() || !is_of(drive, limit)) continue;
+      if (drive.kind != Kind::kDrive || !is_of(drive, limit)) continue;
       const Numbers numbers = left_of(numbers_of(drive, limit));
       const double share = axis.dot(numbers) / axis.squaredNorm();
       if (numbers.isZero(0.0) || (numbers - share * axis).norm() > kAgrees * numbers.norm()) continue;
       limit.law->set_bounce(0.0);
+      if (!law.is_equality()) continue;
       const double along = law.lower_target / share;
       const bool is_below = limit.law->has_lower && along < limit.law->lower_target;
       const bool is_above = limit.law->has_upper && along > limit.law->upper_target;

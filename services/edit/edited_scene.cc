@@ -380,9 +380,10 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
     }
     return rows;
   };
-  // what an edit throws at what it touched arrives there, as what pressed does not
+  // what an edit throws at what it touched, or at a stop, arrives there, as what pressed does not
   const std::span<const std::uint32_t> pressed = old.at<std::uint32_t>("contact_body");
   const auto is_thrown = [&](std::uint32_t old_one) {
+    if (old_one == kNone || body_row[old_one] == kNone) return false;
     const auto set = log_.motions.find(description_.bodies[body_row[old_one]].id);
     return set != log_.motions.end() && (set->second.linear_velocity || set->second.angular_velocity);
   };
@@ -392,8 +393,11 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
   const std::vector<std::size_t> touching = kept_pairs(touched);
   std::vector<std::size_t> discrepancies;
   const std::span<const std::uint32_t> of_joint = old.at<std::uint32_t>("discrepancy_constraint");
-  for (std::size_t i = 0; i < of_joint.size(); ++i)
-    if (joint_row[of_joint[i]] != kNone) discrepancies.push_back(i);
+  for (std::size_t i = 0; i < of_joint.size(); ++i) {
+    const kernel::ConstraintDescription& joint = before_.constraints[of_joint[i]];
+    if (joint_row[of_joint[i]] != kNone && !is_thrown(joint.body1) && !is_thrown(joint.body2))
+      discrepancies.push_back(i);
+  }
 
   std::map<std::string_view, Numbers> columns;
   std::array<std::vector<double>, 4> motion;

@@ -49,6 +49,24 @@ TEST(EditedJoints, ARopeHoistsWhatHangsOnIt) {
 }
 
 // A drive comes, turns round and goes while it runs: w = T t / I in between.
+// What rests on an elastic stop does not bounce there; what an edit throws at it does, as on a floor.
+TEST(EditedJoints, AThrowAtAStopComesBack) {
+  const std::string stop =
+      "Constraints { Constraint { Type = \"Slider\" Id = \"Guide\" Body2 = \"Load\" CustomProperties { BindPoint = {0, "
+      "0, 0} "
+      "Axis = {0, 1, 0} LowerLimit = 0 Restitution = 1 } } }\n";
+  const std::string load = "Body { Id = \"Load\" Mass = 2 PrincipalMoments = {1, 1, 1} " + kFalls + " }\n";
+  for (const char* solver : {"Sequential", "Newton", "Direct"}) {
+    EditedRun run(scene(load, stop), {}, {std::string("Solver=") + solver});
+    run.options.steps = 20;
+    EXPECT_NEAR(run.end()["Load"].position.y(), 0.0, 1e-12) << solver;
+    EXPECT_NEAR(run.end()["Load"].velocity.y(), 0.0, 1e-12) << solver;
+    run.options.edits = {"set Body.Load.LinearVelocity={0,-3,0}@step=21"};
+    run.options.steps = 21;
+    EXPECT_NEAR(run.end()["Load"].velocity.y(), 3.0, 10 * kStep) << solver;
+  }
+}
+
 TEST(EditedJoints, ADriveIsSetWhileItRuns) {
   const double torque = 0.4 * 2 * 0.1 * 0.1;  // 1 rad/s^2
   for (const std::string& joint :

@@ -526,7 +526,9 @@ BodyMotion SequentialSolver::velocity_of_joints() {
   const double motion = joints.largest_motion(velocity);
   sweep_.begin(bodies_, {&joints, &none});
   joints.push_all(bodies_, velocity);
-  for (std::uint32_t done = 0; done < settings_.iterations; ++done)
+  // what stops give back goes by it
+  const std::uint32_t cap = velocity_joints_.has_bounces() ? most_sweeps(true) : settings_.iterations;
+  for (std::uint32_t done = 0; done < cap; ++done)
     if (sweep_.sweep(bodies_, velocity) <= kStillness * motion) break;
   return velocity;
 }
