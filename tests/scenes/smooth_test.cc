@@ -280,7 +280,8 @@ TEST(Smooth, KeepsTheOrderOfDrivesAboutSquareAxes) {
   const auto end = [&](const std::string& joint, const std::string& integrator, double h) {
     WatchedRun watched(wheel(joint, integrator, h));
     watched.run.to_end();
-    const auto& torque = watched.reactions().at(0).drive_torque();
+    const report::v1::Reaction reaction = watched.reactions().at(0);
+    const auto& torque = reaction.drive_torque();
     std::uint32_t solutions = 0;
     for (const auto& stage : watched.run.report().stages())
       if (stage.stage() == "solve") solutions += stage.calls();
