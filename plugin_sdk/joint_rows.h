@@ -6,6 +6,7 @@
 // would weigh them against ways, which is right for bodies of about that size alone. An error of 1 rad counts as 1 m.
 #pragma once
 
+#include <algorithm>
 #include <string_view>
 
 #include "plugin_sdk/constraint.h"
@@ -137,8 +138,9 @@ template <typename Emit>
 void drive_about(const Vector3& axis, double rate, PropertyCursor* bound, Emit&& emit) {
   if (bound->at_end() || !(rate > 0.0)) return;
   const double speed = bound->number(), torque = bound->number();
-  // the power is that of the torque about what is driven
-  emit(driven_row(axis, rate * speed, torque < kUnlimited * rate ? torque / rate : kUnlimited));
+  // The power is that of the torque about what is driven. No bound stays none: a rate of axes that are square may be
+  // 1 + 2^-52, and a quotient by it a bound, of 1.8e308 N m, that nothing tells from one that may be reached.
+  emit(driven_row(axis, rate * speed, torque < kUnlimited ? std::min(torque / rate, kUnlimited) : kUnlimited));
 }
 
 // Calls emit with the rows that keep axes of two frames across each other: the first of frame 2 across the second and

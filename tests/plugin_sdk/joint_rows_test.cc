@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -33,6 +35,24 @@ TEST(JointRows, ASpringStaysOnItsSideOfASingleLimit) {
           << side << ' ' << beyond;
     }
   }
+}
+
+// What has no bound has none at any rate, though rounding may make that of square axes 1 + 2^-52; a bound keeps its power.
+TEST(JointRows, ADriveWithoutABoundHasNoneAtAnyRate) {
+  constexpr double kSpeed = 3.0, kUlp = std::numeric_limits<double>::epsilon();
+  const auto row_of = [](double rate, double torque) {
+    const std::array<double, 2> numbers = {kSpeed, torque};
+    PropertyCursor bound(numbers);
+    Discrepancy row;
+    drive_about(Vector3::UnitY(), rate, &bound, [&](const Discrepancy& emitted) { row = emitted; });
+    return row;
+  };
+  for (const double rate : {1.0 + kUlp, 1.0, 1.0 - 0.5 * kUlp, 0.25, 1e-6}) {
+    EXPECT_EQ(row_of(rate, kUnlimited).maximum_force.x(), kUnlimited) << rate;
+    EXPECT_EQ(row_of(rate, 2.0).maximum_force.x(), 2.0 / rate) << rate;
+    EXPECT_DOUBLE_EQ(row_of(rate, 2.0).velocity.norm(), rate * kSpeed) << rate;
+  }
+  EXPECT_EQ(row_of(0.25, 0.5 * kUnlimited).maximum_force.x(), kUnlimited);
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -11,6 +13,7 @@
 
 #include "tests/paths.h"
 #include "tests/scenes/scene_run.h"
+#include "tests/scenes/watched_run.h"
 
 namespace gravitas {
 namespace {
@@ -18,6 +21,7 @@ namespace {
 using harness::literal;
 using harness::SceneRun;
 using harness::set;
+using harness::WatchedRun;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -254,6 +258,57 @@ Environment {
   const double ratio = (one.position - half.position).norm() / (half.position - quarter.position).norm();
   EXPECT_GT(ratio, std::exp2(3.9)) << ratio;
   EXPECT_LT(ratio, std::exp2(4.6)) << ratio;
+}
+
+// Drives about axes that are square, so that a rate of 1 may be rounded up: in every stage they hold as others do. RK4 keeps its
+// order, a drive's torque is that of finer steps, and an adaptive method takes no more calls than 1e-3 off square.
+TEST(Smooth, KeepsTheOrderOfDrivesAboutSquareAxes) {
+  const auto wheel = [](const std::string& joint, const std::string& integrator, double h) {
+    return "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = " + literal(h) +
+           " Duration = 0.5 } }\nEnvironment { Space { Bodies { Body { Id = \"Wheel\" Mass = 4 PrincipalMoments = "
+           "{0.22, "
+           "0.04, 0.2} KineticProperties { AngularVelocity = {0, 1.3, 0.9} } } } }\nConstraints { Constraint { Id = "
+           "\"J\" "
+           "Body2 = \"Wheel\" Type = " +
+           joint + " } }\nKineticIntegrator = \"" + integrator + "\"\nConstraintSolver = \"Direct\" }\n";
+  };
+  struct End {
+    Quaternion orientation;
+    Vector3 torque;
+    std::uint32_t solutions;
+  };
+  const auto end = [&](const std::string& joint, const std::string& integrator, double h) {
+    WatchedRun watched(wheel(joint, integrator, h));
+    watched.run.to_end();
+    const report::v1::Reaction reaction = watched.reactions().at(0);
+    const auto& torque = reaction.drive_torque();
+    std::uint32_t solutions = 0;
+    for (const auto& stage : watched.run.report().stages())
+      if (stage.stage() == "solve") solutions += stage.calls();
+    return End{watched.run.body("Wheel").pose.orientation, Vector3(torque.at(0), torque.at(1), torque.at(2)),
+               solutions};
+  };
+  const std::string point = " CustomProperties { BindPoint = {0, 0, 0} ";
+  const auto axle = [&](const std::string& across) {
+    return "\"Axle\"" + point + "SteeringAxis = {0, 1, 0} RollingAxis = {0, " + across + ", 1} AngularSpeed = 0.9 }";
+  };
+  const auto universal = [&](const std::string& across) {
+    return "\"Universal\"" + point + "Axis1 = {0, 1, 0} Axis2 = {0, " + across + ", 1} AngularSpeed2 = 0.9 }";
+  };
+  for (const auto& joint : {std::function(axle), std::function(universal)}) {
+    const std::string square = joint("0");
+    const End exact = end(square, "RK4", 1.0 / 1920.0), coarse = end(square, "RK4", 1.0 / 60.0),
+              fine = end(square, "RK4", 1.0 / 120.0);
+    const double far = harness::angle_between(coarse.orientation, exact.orientation);
+    const double near = harness::angle_between(fine.orientation, exact.orientation);
+    EXPECT_NEAR(std::log2(far / near), 4.0, 0.1) << square << far << ", " << near;
+    EXPECT_LT(far, 1e-7) << square;
+    EXPECT_LT((coarse.torque - exact.torque).norm(), 1e-5 * exact.torque.norm()) << square;
+    EXPECT_GT(exact.torque.norm(), 0.01) << square;
+    EXPECT_LE(end(square, "DormandPrince54", 1.0 / 60.0).solutions,
+              end(joint("0.001"), "DormandPrince54", 1.0 / 60.0).solutions)
+        << square;
+  }
 }
 
 // How a spring of a joint that has turned far pulls when its bodies turn on must be known exactly to a linearly implicit
