@@ -35,8 +35,9 @@
 // (Kane's paradox). Bound: the work of a contact's impulse is lambda.(u_before + u_after)/2. These works (with those of the
 // locks and limits) sum to the change of kinetic energy from what the joints alone make of v* (but for stops that bounce,
 // joint_bounce.h) to v_{n+1}; where it is positive for a connected set of bodies, e s is lowered of its contacts and stops that
-// arrive and whose own work is, or of all where none is, to the largest share with which the set does not gain (contact_law.h). With that no solution gains; sweeps that ran out can,
-// and then all impulses of the set are scaled back to the largest share that does not.
+// arrive and whose own work is, or of all where none is, to the largest share with which the set does not gain
+// (contact_law.h). With that no solution gains; sweeps that ran out can, and then all impulses of the set are scaled back
+// to the largest share that does not.
 // SequentialSummary counts all three. Drives and springs are left out of the sum, and a set that
 // they act on is never scaled: theirs is real work. A kinematic body's work is seen from the body.
 //
