@@ -363,7 +363,6 @@ class Environment : private DerivativeSource, private SlotObserver {
   Validator validator_;
   std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
   std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
-  std::uint32_t first_of_part_ = 0;               // where contacts of an extrapolated part begin, in all attempts
   double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
   double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                     // another plugin came in, and it makes the whole step

@@ -178,8 +178,7 @@ void Environment::look_up_contacts(const Trusted<Contacts>&) {
     };
     while (o < old.contact_key.size() && remembered(o) < identity) ++o;
     const bool known = o < old.contact_key.size() && remembered(o) == identity;
-    const std::uint32_t born = description_.accuracy > 0.0 ? first_of_part_ : inner_;
-    data_.contact_key[i] = known ? old.contact_key[o] : new_contact_key(a, b, feature, step_count_, born);
+    data_.contact_key[i] = known ? old.contact_key[o] : new_contact_key(a, b, feature, step_count_, inner_);
     data_.contact_warm_correction[i] = known ? old.contact_correction[o] : 0.0;
     set_vector(data_.contact_warm_impulse.span(), i,
                known ? vector_at(old.contact_impulse.span(), o) : Vector3::Zero());

@@ -66,6 +66,9 @@ constexpr AxisMode axis_mode(std::uint32_t modes, int axis) {
   return static_cast<AxisMode>((modes >> (4 * axis)) & 0xFU);
 }
 
+// True for axes of velocities alone, which hold no error: driven and friction.
+constexpr bool is_drive(AxisMode mode) { return mode == AxisMode::kDriven || mode == AxisMode::kFriction; }
+
 // True if the value is one that pack_modes() makes.
 constexpr bool is_valid_mode(std::uint32_t modes) {
   const std::uint32_t flags = modes & ~0xFFFU;

@@ -67,10 +67,8 @@ double held_back(const Discrepancy& discrepancy, const Vector3& impulse, const J
 Vector3 holding_part(const Discrepancy& discrepancy, const Vector3& impulse) {
   const Matrix3 axes = to_rotation_matrix(discrepancy.axes);
   Vector3 holding = impulse;
-  for (int k = 0; k < 3; ++k) {
-    const AxisMode mode = axis_mode(discrepancy.modes, k);
-    if (mode == AxisMode::kDriven || mode == AxisMode::kFriction) holding -= axes.col(k).dot(impulse) * axes.col(k);
-  }
+  for (int k = 0; k < 3; ++k)
+    if (is_drive(axis_mode(discrepancy.modes, k))) holding -= axes.col(k).dot(impulse) * axes.col(k);
   return holding;
 }
 

@@ -255,7 +255,7 @@ class Balance {
         const bool is_held = mode == AxisMode::kLocked || mode == AxisMode::kLimited || mode == AxisMode::kUnilateral;
         const bool is_soft = is_held && d.compliance[axis] > 0.0;
         is_driven_ = is_driven_ || is_soft;
-        const bool on_velocity = is_soft || mode == AxisMode::kDriven || mode == AxisMode::kFriction;
+        const bool on_velocity = is_soft || is_drive(mode);
         const std::size_t k = 3 * i + static_cast<std::size_t>(axis);
         has_yielded_ = has_yielded_ || (on_velocity && !is_soft && answer_.discrepancy_correction[k] != 0.0);
         const Vector3 impulse = answer_.discrepancy_impulse[k] * axes.col(axis);

@@ -49,7 +49,6 @@ void Environment::extrapolate_parts(double begin, double length) {
   bool has_failed = false;
   while (done < length && !must_restart_) {
     const double from = begin + done, left = length - done;
-    first_of_part_ = inner_;
     NextStop stop{std::min(wanted, left)};
     if (has_contacts()) {
       begin_inner_step(from, stop.length);
@@ -59,6 +58,7 @@ void Environment::extrapolate_parts(double begin, double length) {
     const double part = first_limit(from, stop.length, &passes_limit);
     const bool is_before_impact = stop.length < std::min(wanted, left);
     const bool ends_with_impact = stop.meets && part == stop.length;
+    const bool is_cut = part < std::min(wanted, left);
     if (part < kCrumb * step) finest *= kCoarser;
     const bool is_passed = part <= finest || passes_limit;
     const std::uint32_t pieces = is_passed ? 1 : pieces_to_accuracy(from, part, is_before_impact, ends_with_impact);
@@ -69,7 +69,7 @@ void Environment::extrapolate_parts(double begin, double length) {
     }
     if (pieces == 0) continue;
     done = part == left ? length : done + part;
-    if (part >= std::min(wanted, left)) wanted = has_failed ? part : kLonger * part;
+    if (!is_cut) wanted = has_failed ? part : kLonger * part;
     has_failed = false;
   }
 }

@@ -8,8 +8,6 @@
 
 namespace gravitas {
 
-bool is_drive(AxisMode mode) { return mode == AxisMode::kDriven || mode == AxisMode::kFriction; }
-
 namespace {
 
 bool is_limit(AxisMode mode) { return mode == AxisMode::kLimited || mode == AxisMode::kUnilateral; }

@@ -125,9 +125,6 @@ struct JointStop {
 // The stop that the axis has on a side, rigid and with room beside it; none for others.
 std::optional<JointStop> stop_of(const JointAxisState& axis, double sign);
 
-// True for axes of velocities alone: driven and friction.
-bool is_drive(AxisMode mode);
-
 // True for an axis whose law is a force of the state: with compliance, or driven or friction with damping.
 bool acts_as_force(const Discrepancy& discrepancy, int axis);
 

@@ -16,6 +16,7 @@
 
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 
 namespace gravitas {
 namespace {
@@ -69,8 +70,7 @@ Hashes hashes_of(const std::string& scene, std::vector<HostingChoice> hosting, s
   options.threads = threads;
   options.overrides = std::move(overrides);
   options.steps = steps;
-  const RunResult result = run(
-      options, [] { return false; }, [](const Progress&) {});
+  const RunResult result = harness::run_quietly(options);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   EXPECT_EQ(result.report.faults_size(), 0);
   return {result.report.state_hash(), result.report.chain_hash()};

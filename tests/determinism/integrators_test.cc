@@ -3,6 +3,7 @@
 
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 
 namespace gravitas {
 namespace {
@@ -19,8 +20,7 @@ void expect_same_bits(const std::string& scene, const std::string& integrator, s
     options.hosting = {{std::nullopt, hosting}};
     options.threads = threads;
     options.overrides = {"Integrator=" + integrator};
-    const RunResult result = run(
-        options, [] { return false; }, [](const Progress&) {});
+    const RunResult result = harness::run_quietly(options);
     EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
     EXPECT_EQ(result.report.faults_size(), 0);
     return result.report.chain_hash();

@@ -11,6 +11,7 @@
 
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 
 namespace gravitas {
 namespace {
@@ -34,8 +35,7 @@ TEST_P(Shipped, RunsToItsEnd) {
   RunOptions options;
   options.scenes = {kFolder + '/' + GetParam() + ".gravitas"};
   options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
-  const RunResult whole = run(
-      options, [] { return false; }, [](const Progress&) {});
+  const RunResult whole = harness::run_quietly(options);
   ASSERT_EQ(whole.outcome, RunOutcome::kCompleted) << whole.fault;
   EXPECT_TRUE(std::isfinite(whole.report.energy().final()));
   EXPECT_LE(whole.report.max_penetration(), 1e-3);

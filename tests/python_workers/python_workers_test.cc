@@ -17,6 +17,7 @@
 #include "services/run/figures.h"
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 
 namespace gravitas {
 namespace {
@@ -140,8 +141,7 @@ Outcome outcome_of(const std::vector<std::string>& scenes, const std::vector<std
   options.scenes = scenes;
   options.overrides = overrides;
   options.steps = 50;
-  const RunResult result = run(
-      options, [] { return false; }, [](const Progress&) {});
+  const RunResult result = harness::run_quietly(options);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   return {result.report.chain_hash(), {result.report.warnings().begin(), result.report.warnings().end()}};
 }

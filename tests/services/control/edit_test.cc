@@ -10,6 +10,7 @@
 #include "services/control/status_text.h"
 #include "services/run/edit_spec.h"
 #include "services/run/summary.h"
+#include "tests/run_quietly.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -17,6 +18,7 @@ namespace {
 
 using harness::quiet_chain;
 using harness::refusal;
+using harness::run_quietly;
 using harness::Served;
 using ::testing::HasSubstr;
 
@@ -58,8 +60,7 @@ TEST(ServedEdit, HasTheChainOfARunWithTheSameEdits) {
 
   RunOptions options = harness::sample("direct").run;
   options.edits = {"add " + more + "@step=31", move + "@step=31", "remove Body.New@step=61"};
-  const RunResult result = run(
-      options, [] { return false; }, [](const Progress&) {});
+  const RunResult result = run_quietly(options);
   EXPECT_EQ(status.chain_hash(), result.report.chain_hash());
   EXPECT_THAT(summarize(result.report, {}),
               HasSubstr("  edit before step 31: 2 changes\n  edit before step 61: 1 change\n"));
@@ -109,9 +110,7 @@ TEST(ServedEdit, SwapsThatAreToComeGoAlong) {
   RunOptions options = harness::sample("direct").run;
   options.edits = {move + "@step=11", push + "@step=23", move + "@step=43"};
   options.swaps = {"solver=Newton@step=40"};
-  EXPECT_EQ(served.to_the_end().chain_hash(), run(
-                                                  options, [] { return false; }, [](const Progress&) {})
-                                                  .report.chain_hash());
+  EXPECT_EQ(served.to_the_end().chain_hash(), run_quietly(options).report.chain_hash());
 }
 
 // It stays broken, and says so.

@@ -7,6 +7,7 @@
 #include "services/control/status_text.h"
 #include "services/run/session.h"
 #include "services/run/summary.h"
+#include "tests/run_quietly.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -15,15 +16,11 @@ namespace {
 using harness::kSteps;
 using harness::parse_swap_request;
 using harness::refusal;
+using harness::run_quietly;
 using harness::sample;
 using harness::Served;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-RunResult run_quietly(const RunOptions& options) {
-  return run(
-      options, [] { return false; }, [](const Progress&) {});
-}
 
 TEST(ServedComparison, LeavesNoTrace) {
   Served quiet, served;

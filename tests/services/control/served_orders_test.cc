@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -23,8 +24,7 @@ using ::testing::Not;
 std::string resumed_end(const std::string& checkpoint, std::vector<std::string>* warnings) {
   RunOptions resumed = sample("direct").run;
   resumed.resume = checkpoint;
-  const RunResult result = run(
-      resumed, [] { return false; }, [](const Progress&) {});
+  const RunResult result = harness::run_quietly(resumed);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   warnings->assign(result.report.warnings().begin(), result.report.warnings().end());
   return result.report.chain_hash();

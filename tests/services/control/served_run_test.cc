@@ -18,6 +18,7 @@
 #include "services/capsule/replay.h"
 #include "services/control/status_text.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -27,6 +28,7 @@ using harness::CurrentFolder;
 using harness::kSteps;
 using harness::quiet_chain;
 using harness::refusal;
+using harness::run_quietly;
 using harness::sample;
 using harness::Served;
 using ::testing::HasSubstr;
@@ -216,8 +218,7 @@ TEST(ServedRun, AFaultThatNobodySurvivesIsAState) {
   // what it left goes on to where nobody disturbed it
   RunOptions resumed = sample("direct").run;
   resumed.resume = status.checkpoint();
-  const RunResult whole = run(
-      resumed, [] { return false; }, [](const Progress&) {});
+  const RunResult whole = run_quietly(resumed);
   EXPECT_EQ(whole.report.chain_hash(), quiet_chain());
   EXPECT_EQ(whole.report.steps(), kSteps);
   EXPECT_GT(whole.report.events().collision_start(), 0U);
@@ -293,8 +294,7 @@ TEST(ServedRun, KeepsACheckpointThatGoesOn) {
   const auto go_on = [&] {
     RunOptions resumed = sample("direct").run;
     resumed.resume = options.run.checkpoint;
-    return run(
-        resumed, [] { return false; }, [](const Progress&) {});
+    return run_quietly(resumed);
   };
   Served quiet(sample()), served(options);
   for (Served* one : {&quiet, &served}) {

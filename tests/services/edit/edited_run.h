@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "services/run/session.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas::edited {
@@ -34,8 +35,7 @@ struct EditedRun {
     options.trajectory = folder.path("motion.csv");
   }
   RunResult run() {
-    RunResult result = gravitas::run(
-        options, [] { return false; }, [](const Progress&) {});
+    RunResult result = harness::run_quietly(options);
     EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
     return result;
   }
@@ -60,15 +60,10 @@ struct EditedRun {
     return rows;
   }
   // Why it stops on the way.
-  std::string fault() {
-    return gravitas::run(
-               options, [] { return false; }, [](const Progress&) {})
-        .fault;
-  }
+  std::string fault() { return harness::run_quietly(options).fault; }
   std::string refusal() {
     try {
-      gravitas::run(
-          options, [] { return false; }, [](const Progress&) {});
+      harness::run_quietly(options);
     } catch (const BadInput& problem) {
       return problem.what();
     }

@@ -18,11 +18,13 @@
 #include "services/recorder/durable_file.h"
 #include "services/recorder/recorder.h"
 #include "services/run/session.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas::edited {
 namespace {
 
+using harness::run_quietly;
 using harness::ScratchFolder;
 using kernel::Hosting;
 using ::testing::HasSubstr;
@@ -221,10 +223,7 @@ TEST(EditedRun, WhatIsNotTouchedKeepsItsBits) {
     options.hosting = {{std::nullopt, Hosting::kDirect}};
     options.steps = 80;
     options.overrides = {"Simulator.SleepEnergy=0"};
-    const auto run_it = [&] {
-      return run(
-          options, [] { return false; }, [](const Progress&) {});
-    };
+    const auto run_it = [&] { return run_quietly(options); };
     const RunResult quiet = run_it();
     const ScratchFolder folder;
     const std::string idle = folder.write("idle", "Materials { Material { Id = \"Unused\" } }");
@@ -485,8 +484,7 @@ TEST(EditedRun, TheJournalKnowsTheEdits) {
   // another edit than the journal's comes out differently
   replace_file(run.options.checkpoint, early);
   run.options.edits = {"set Body.A.Mass=3@step=31"};
-  const RunResult other = gravitas::run(
-      run.options, [] { return false; }, [](const Progress&) {});
+  const RunResult other = run_quietly(run.options);
   EXPECT_EQ(other.outcome, RunOutcome::kFailed);
   EXPECT_THAT(other.fault, HasSubstr("step 31 came out differently"));
 }

@@ -18,11 +18,13 @@
 #include "tests/kernel/run_to_end.h"
 #include "tests/kernel/world_builder.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
 
+using harness::run_quietly;
 using harness::ScratchFolder;
 using harness::WorldBuilder;
 using kernel::Environment;
@@ -197,32 +199,27 @@ RunOptions listened(const ScratchFolder& folder, std::function<void(PairQuestion
   return options;
 }
 
-RunResult run_to_its_end(const RunOptions& options) {
-  return run(
-      options, [] { return false; }, [](const Progress&) {});
-}
-
 TEST(ListenedRun, AFailureIsAWarningAndAnEventAndTheRunGoesOn) {
   const ScratchFolder folder;
   RunOptions options = listened(folder, [](PairQuestion*) { throw std::runtime_error("no idea"); });
-  const RunResult result = run_to_its_end(options);
+  const RunResult result = run_quietly(options);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted);
   EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("it threw: no idea")));
   EXPECT_THAT(harness::read_file(options.events), HasSubstr("\"kind\":\"listener\""));
   options.listener = nullptr;
-  EXPECT_EQ(run_to_its_end(options).report.chain_hash(), result.report.chain_hash());
+  EXPECT_EQ(run_quietly(options).report.chain_hash(), result.report.chain_hash());
 }
 
 TEST(ListenedRun, IsNotResumed) {
   const ScratchFolder folder;
   RunOptions options = listened(folder, [](PairQuestion*) {});
   options.checkpoint = folder.path("checkpoint");
-  ASSERT_EQ(run_to_its_end(options).outcome, RunOutcome::kCompleted);
+  ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
   options.listener = nullptr;
   options.resume = options.checkpoint;
   options.steps = 250;
   try {
-    run_to_its_end(options);
+    run_quietly(options);
     FAIL() << "it was resumed";
   } catch (const BadInput& problem) {
     EXPECT_THAT(problem.what(), HasSubstr("a listener decided about pairs of bodies in that run"));

@@ -11,12 +11,14 @@
 #include <vector>
 
 #include "services/run/session.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
 
 using harness::read_file;
+using harness::run_quietly;
 using harness::ScratchFolder;
 
 // A crate that lands beside a pendulum.
@@ -41,8 +43,7 @@ RunResult run_with(const ScratchFolder& folder, kernel::Hosting hosting, const s
   options.hosting = {{std::nullopt, hosting}};
   options.reactions = reactions;
   options.sample_every = sample_every;
-  return run(
-      options, [] { return false; }, [](const Progress&) {});
+  return run_quietly(options);
 }
 
 std::vector<report::v1::Reaction> lines_of(const std::string& file) {
@@ -123,8 +124,7 @@ TEST(ReactionLog, HasTheTorquesOfRollingAndSpinningFriction) {
       options.overrides = {std::string("Solver=") + solver, std::string("Simulator=") + simulator};
       if (simulator == std::string_view("Substepping")) options.overrides.push_back("Simulator.Substeps=3");
       options.reactions = folder.path("reactions.jsonl");
-      const RunResult result = run(
-          options, [] { return false; }, [](const Progress&) {});
+      const RunResult result = run_quietly(options);
       ASSERT_EQ(result.report.reactions_size(), 3);
       const double load = 2 * 9.81;
       const Vector3 right[] = {{0, 0, 0.02 * load}, {0, -0.01 * load, 0}, {0, 0, 0}};

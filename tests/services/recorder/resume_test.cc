@@ -15,12 +15,14 @@
 #include "services/recorder/recorder.h"
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
 
 using harness::CurrentFolder;
+using harness::run_quietly;
 using harness::ScratchFolder;
 using kernel::Hosting;
 using ::testing::HasSubstr;
@@ -43,11 +45,6 @@ RunOptions options_of(const std::string& scene, Hosting hosting, std::uint32_t s
   options.steps = steps;
   options.overrides = overrides;
   return options;
-}
-
-RunResult run_quietly(const RunOptions& options) {
-  return run(
-      options, [] { return false; }, [](const Progress&) {});
 }
 
 const std::string kCallbacks = in_source("/tests/determinism/callbacks.gravitas");

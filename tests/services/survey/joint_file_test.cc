@@ -13,12 +13,14 @@
 #include "plugin_sdk/math/rotation.h"
 #include "services/run/session.h"
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
 namespace {
 
 using harness::read_file;
+using harness::run_quietly;
 using harness::ScratchFolder;
 using kernel::Hosting;
 using ::testing::Contains;
@@ -82,11 +84,6 @@ RunOptions mechanism_options(const ScratchFolder& folder, const std::string& sce
   return options;
 }
 
-RunResult run_mechanism(const RunOptions& options) {
-  return run(
-      options, [] { return false; }, [](const Progress&) {});
-}
-
 // A name with a comma stands in quotes, which joint_cells() does not know.
 std::string without_comma(std::string scene) {
   const std::string id = R"(Rails, \"left\")";
@@ -95,13 +92,13 @@ std::string without_comma(std::string scene) {
 
 TEST(JointFile, IsTheSameInEveryHostingAndChangesNoBit) {
   const ScratchFolder folder;
-  const RunResult quiet = run_mechanism(mechanism_options(folder, kMechanism));
+  const RunResult quiet = run_quietly(mechanism_options(folder, kMechanism));
   std::string first;
   for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc}) {
     RunOptions options = mechanism_options(folder, kMechanism, hosting);
     options.joints = folder.path("joints.csv");
     options.sample_every = 0.1;
-    const RunResult result = run_mechanism(options);
+    const RunResult result = run_quietly(options);
     EXPECT_EQ(result.report.chain_hash(), quiet.report.chain_hash());
     EXPECT_THAT(result.report.warnings(), Not(Contains(HasSubstr("joints"))));
     if (first.empty()) first = read_file(options.joints);
@@ -117,7 +114,7 @@ TEST(JointFile, AgreesWithTheTrajectoryThroughWholeTurns) {
   RunOptions options = mechanism_options(folder, without_comma(kMechanism));
   options.joints = folder.path("joints.csv");
   options.trajectory = folder.path("trajectory.csv");
-  run_mechanism(options);
+  run_quietly(options);
   std::map<double, std::vector<double>> bob;
   for (const std::vector<std::string>& cells :
        joint_cells(options.trajectory, "time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz"))
@@ -153,7 +150,7 @@ TEST(JointFile, RatesAreWhatValuesChangeBy) {
   options.joints = folder.path("joints.csv");
   options.time_step = 5e-4;
   options.duration = 0.2;
-  run_mechanism(options);
+  run_quietly(options);
   std::map<std::string, std::vector<JointRow>> joints;
   for (JointRow& row : joint_rows_of(options.joints)) joints[row.joint].push_back(std::move(row));
   ASSERT_EQ(joints.size(), 3U);
@@ -171,7 +168,7 @@ TEST(JointFile, ALimitIsHitWhereItSaysAndADriveKeepsItsSpeed) {
   const ScratchFolder folder;
   RunOptions options = mechanism_options(folder, without_comma(kMechanism));
   options.joints = folder.path("joints.csv");
-  const RunResult result = run_mechanism(options);
+  const RunResult result = run_quietly(options);
   const double accuracy = result.report.max_joint_error() + 1e-12;
   EXPECT_LT(accuracy, 1e-5);
   double last = 1.0, lowest = 0.0;
@@ -190,16 +187,16 @@ TEST(JointFile, AResumedRunHasTheSameRows) {
   RunOptions whole = mechanism_options(folder, kMechanism);
   whole.steps = 60;
   whole.joints = folder.path("whole.csv");
-  run_mechanism(whole);
+  run_quietly(whole);
   RunOptions first = whole;
   first.joints = folder.path("first.csv");
   first.steps = 25;
   first.checkpoint = folder.path("checkpoint");
-  run_mechanism(first);
+  run_quietly(first);
   RunOptions rest = whole;
   rest.joints = folder.path("rest.csv");
   rest.resume = first.checkpoint;
-  run_mechanism(rest);
+  run_quietly(rest);
   const std::string all = read_file(whole.joints), head = survey::kJointHead;
   std::string begin = read_file(first.joints), end = read_file(rest.joints);
   ASSERT_TRUE(end.starts_with(head));
@@ -232,7 +229,7 @@ Environment {
 })");
   options.joints = folder.path("joints.csv");
   options.edits = {"remove Constraint.Taken@step=11"};
-  const RunResult result = run_mechanism(options);
+  const RunResult result = run_quietly(options);
   EXPECT_EQ(result.report.events().break_(), 1);
   std::map<std::string, std::size_t> rows;
   for (const JointRow& row : joint_rows_of(options.joints)) ++rows[row.joint];
@@ -254,7 +251,7 @@ TEST(JointFile, SaysWhichJointsDoNotSayWhatIsCountedFromWhere) {
     RunOptions options = mechanism_options(folder, changed.replace(changed.find(foot), foot.size(), ball));
     options.joints = folder.path("joints.csv");
     options.steps = 3;
-    const RunResult result = run_mechanism(options);
+    const RunResult result = run_quietly(options);
     std::map<std::string, int> rows;
     for (const JointRow& row : joint_rows_of(options.joints)) ++rows[row.joint];
     // of a ball joint that is at rest where it started, swing and twist
@@ -285,9 +282,9 @@ Environment {
   }
 })",
                                          Hosting::kSharedMemory);
-  const RunResult quiet = run_mechanism(options);
+  const RunResult quiet = run_quietly(options);
   options.joints = folder.path("joints.csv");
-  const RunResult result = run_mechanism(options);
+  const RunResult result = run_quietly(options);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted);
   EXPECT_EQ(result.report.chain_hash(), quiet.report.chain_hash());
   EXPECT_THAT(result.report.warnings(), Not(Contains(HasSubstr("joints"))));
