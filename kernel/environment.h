@@ -105,6 +105,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t step_count() const { return step_count_; }
   std::uint32_t total_steps() const { return description_.steps; }
   double time_step() const { return description_.time_step; }
+  // s, of the last inner step that was made; 0 before the first, also after a restore.
+  double inner_step_length() const { return data_.time_step[0]; }
   // Time of the committed state, s: n * time step as a product.
   double time() const { return time_of(step_count_); }
 
@@ -160,6 +162,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void set_commit_listener(CommitListener* listener);
   // At most one; null: the scene's own rules hold. What it decides is part of what determines the trajectory.
   void set_pair_arbiter(PairArbiter* arbiter) { arbiter_ = arbiter; }
+  const PairArbiter* pair_arbiter() const { return arbiter_; }
 
   // The committed state with everything that the next steps depend on; its columns are valid until the next step.
   SavedState saved_state() const;
@@ -399,7 +402,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   // Known once the forces have been asked at the start.
   bool wrench_is_constant_ = true;
   bool has_impulses_ = false;
-  bool is_anew_ = true;  // no step yet, or none since an edit
+  bool is_anew_ = true;         // no step yet, or none since an edit
+  double start_overlap_ = 0.0;  // m, where such a step begins
   bool start_wrench_known_ = false;
   bool attempt_counts_ = true;
   std::vector<std::size_t> next_in_group_;  // scratch of merge_discrepancies()

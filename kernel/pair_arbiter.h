@@ -20,6 +20,8 @@ class PairArbiter {
   // Pairs whose bounds overlap, 2 numbers each, ascending: puts those that collide in front, in their order, and
   // returns how many numbers these are.
   virtual std::size_t keep_allowed(const Environment& environment, std::span<std::uint32_t> pairs) = 0;
+  // As keep_allowed(), of what is known already: decides about nothing.
+  virtual std::size_t leave_out_forbidden(std::span<std::uint32_t> pairs) const = 0;
   // Two bodies a contact, in their order, and the material row of each (kMaterialColumns of plugin_sdk/solver.h), which
   // holds the scene's.
   virtual void mix_materials(std::span<const std::uint32_t> bodies, std::span<double> rows) = 0;

@@ -28,7 +28,7 @@ double Environment::gap_at(std::size_t contact, const State& state) const {
                     carry(point + half, data_.contact_body[2 * contact]));
 }
 
-// Overlap of every contact at S_{n+1}, in the first step at S_0, too, and the pairs that touch.
+// Overlap of every contact at S_{n+1}, in the first step and after an edit where it begins, too, and the pairs that touch.
 void Environment::find_touching() {
   const Column<std::uint32_t>&now = data_.touching, &before = front().touching;
   // room for all: what grows moves, and spans are held
@@ -36,11 +36,13 @@ void Environment::find_touching() {
   now.resize(0);
   const double share = locates_events() ? kLocatedShare : kTouchingShare;
   std::span<const std::uint32_t> touched = before.span();
+  if (inner_ == 0) start_overlap_ = 0.0;
   for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
     const std::uint32_t a = data_.contact_body[2 * i], b = data_.contact_body[2 * i + 1];
     const double gap = gap_at(i, back());
-    const bool begins = step_count_ == 0 && data_.contact_depth[i] > 0.0;
-    figures_.penetration = std::max({figures_.penetration, -gap, begins ? -gap_at(i, front()) : 0.0});
+    const bool begins = is_anew_ && inner_ == 0 && data_.contact_depth[i] > 0.0;
+    if (begins) start_overlap_ = std::max(start_overlap_, -gap_at(i, front()));
+    figures_.penetration = std::max(figures_.penetration, -gap);
     // what touched, and opened no further in a very short inner step, is no flight
     const bool goes_on = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touched) &&
                          gap <= kTouchingShare * margin_ && gap - gap_at(i, front()) <= share * margin_;
@@ -50,6 +52,7 @@ void Environment::find_touching() {
     now.resize(size + 2);
     now[size] = a, now[size + 1] = b;
   }
+  figures_.penetration = std::max(figures_.penetration, start_overlap_);
   const auto key = [](const Column<std::uint32_t>& pair) {
     return [&](std::size_t i) { return std::array{pair[2 * i], pair[2 * i + 1]}; };
   };

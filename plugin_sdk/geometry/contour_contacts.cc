@@ -44,6 +44,8 @@ class FlatContour {
   const Vector2& point(std::size_t i) const { return points_[i]; }
   const Vector2& end_of_edge(std::size_t i) const { return points_[(i + 1) % count()]; }
   std::uint32_t code(std::size_t i) const { return contour_.codes[i]; }
+  // Of the edge from corner i to the next: that of a line does not depend on where it begins.
+  std::uint32_t edge_code(std::size_t i) const { return count() == 2 ? contour_.code : contour_.codes[i]; }
   std::uint32_t own_code() const { return contour_.code; }
   const Vector3& place(std::size_t i) const { return contour_.points[i]; }
 
@@ -87,10 +89,8 @@ class FlatContour {
   double turn_ = 1.0;
 };
 
-// 15 bits of each, and one for a second meeting of the same two.
-std::uint32_t feature_of(std::uint32_t a, std::uint32_t b, bool is_second = false) {
-  return (is_second ? 0x80000000U : 0U) | (a & 0x7FFFU) << 15 | (b & 0x7FFFU);
-}
+// 15 bits of each.
+std::uint32_t feature_of(std::uint32_t a, std::uint32_t b) { return (a & 0x7FFFU) << 15 | (b & 0x7FFFU); }
 
 struct Patch {
   const FlatContour& a;
@@ -149,7 +149,7 @@ void add_contour_contacts(const Contour& a, double rounding_a, const Contour& b,
       if (!(s >= 0.0 && s <= 1.0 && t >= 0.0 && t <= 1.0)) continue;
       const Vector3& from = flat_a.place(i);
       const Vector3& to = flat_a.place((i + 1) % a.count);
-      patch.add(from + s * (to - from), feature_of(0x4000U | flat_a.code(i), 0x4000U | flat_b.code(k)));
+      patch.add(from + s * (to - from), feature_of(0x4000U | flat_a.edge_code(i), 0x4000U | flat_b.edge_code(k)));
     }
   }
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 
@@ -192,6 +193,19 @@ class Builder {
     }
     loops_ = std::move(merged);
     normals_ = std::move(normals);
+    straighten();
+  }
+
+  // Leaves out what lies within an edge: it belongs to two faces alone.
+  void straighten() {
+    std::vector<std::size_t> faces(vertices_.size(), 0);
+    for (const Loop& loop : loops_)
+      for (const std::uint32_t v : loop) ++faces[v];
+    const auto is_within = [&](std::uint32_t v) { return faces[v] == 2; };
+    for (const Loop& loop : loops_)
+      if (std::ranges::count_if(loop, std::not_fn(is_within)) < 3)
+        for (const std::uint32_t v : loop) faces[v] = 3;
+    for (Loop& loop : loops_) std::erase_if(loop, is_within);
   }
 
   ConvexPolyhedron assembled() const {

@@ -30,6 +30,13 @@ Separation with_rounding(const PlacedPair& pair, const Vector3& normal, double c
   return {normal, core_depth + pair.rounding(), a + pair.a.rounding() * normal, b - pair.b.rounding() * normal};
 }
 
+// The corners that the search for the distance ends with.
+struct Simplex {
+  std::array<Difference, 4> corners;
+  std::size_t count = 1;
+  std::array<double, 4> weight{1.0};  // of the corners' place nearest to the origin
+};
+
 // A difference that is nearly nothing, `shortness` of the reach, has no good direction: it is made square to the line or
 // triangle that carries it.
 Vector3 square_to(std::span<const Difference> carrier, const Vector3& normal, double shortness) {
@@ -55,8 +62,8 @@ class Polytope {
   explicit Polytope(const PlacedPair& pair) : pair_(pair), reach_(pair.reach()) {}
 
   // `simplex`: what the search for the distance ended with.
-  Separation expand(std::span<const Difference> simplex) {
-    if (!start_from(simplex) && !start()) return flat();
+  Separation expand(const Simplex& simplex) {
+    if (!start_from(simplex) && !start()) return flat(simplex);
     for (;;) {
       const std::size_t nearest = nearest_face();
       const Face& face = faces_[nearest];
@@ -84,13 +91,14 @@ class Polytope {
   };
 
   // The tetrahedron that was found to hold the origin, if it is none of a sliver.
-  bool start_from(std::span<const Difference> simplex) {
+  bool start_from(const Simplex& simplex) {
     constexpr double kSliver = 1e-3;
-    if (simplex.size() < 4) return false;
-    const Vector3 ab = simplex[1].w - simplex[0].w, ac = simplex[2].w - simplex[0].w, ad = simplex[3].w - simplex[0].w;
+    if (simplex.count < 4) return false;
+    const std::array<Difference, 4>& corners = simplex.corners;
+    const Vector3 ab = corners[1].w - corners[0].w, ac = corners[2].w - corners[0].w, ad = corners[3].w - corners[0].w;
     const double volume = ab.cross(ac).dot(ad);
     if (!(volume * volume > kSliver * kSliver * ab.squaredNorm() * ac.squaredNorm() * ad.squaredNorm())) return false;
-    std::copy(simplex.begin(), simplex.end(), vertices_.begin());
+    std::ranges::copy(corners, vertices_.begin());
     add_tetrahedron(volume > 0.0);
     return true;
   }
@@ -155,10 +163,12 @@ class Polytope {
     add_face(2, is_above ? 0 : 3, is_above ? 3 : 0);
   }
 
-  // Of cores that lie in a plane or line together: no depth across it.
-  Separation flat() const {
-    const Vector3 a = pair_.support_a(normal_), b = pair_.support_b(normal_);
-    return with_rounding(pair_, normal_, normal_.dot(a - b), a, b);
+  // Of cores that lie in a plane or line together: no depth across it. They meet where the search for their distance ended.
+  Separation flat(const Simplex& simplex) const {
+    const double depth = normal_.dot(pair_.support_a(normal_) - pair_.support_b(normal_));
+    Vector3 place = Vector3::Zero();
+    for (std::size_t k = 0; k < simplex.count; ++k) place += simplex.weight[k] * simplex.corners[k].a;
+    return with_rounding(pair_, normal_, depth, place, place);
   }
 
   void add_face(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
@@ -255,14 +265,6 @@ class Polytope {
   Vector3 point_b_ = Vector3::Zero();
 };
 
-// The corners that the search for the distance ends with.
-struct Simplex {
-  std::array<Difference, 4> corners;
-  std::size_t count = 1;
-
-  std::span<const Difference> used() const { return std::span(corners.data(), count); }
-};
-
 // Nothing if the cores overlap or touch.
 std::optional<Separation> search_distance(const PlacedPair& pair, double margin, Simplex* out) {
   constexpr int kIterations = 96;
@@ -270,6 +272,7 @@ std::optional<Separation> search_distance(const PlacedPair& pair, double margin,
   std::array<Difference, 4>& simplex = out->corners;
   std::size_t& count = out->count;
   count = 1;
+  out->weight = {1.0};
   std::array<Vector3, 4> corners;
   Vector3 first = pair.p_AB + pair.R_AB * pair.b.centre() - pair.a.centre();
   if (!(first.squaredNorm() > 0.0)) first = Vector3::UnitY();
@@ -302,6 +305,7 @@ std::optional<Separation> search_distance(const PlacedPair& pair, double margin,
       closest.weight[kept++] = found.weight[k];
     }
     count = kept;
+    out->weight = closest.weight;
     if (count == 4 || count == 0) return std::nullopt;
   }
   const double distance = length_of(closest.point);
@@ -325,7 +329,7 @@ std::optional<Separation> find_distance(const PlacedPair& pair, double margin) {
 Separation find_separation(const PlacedPair& pair, double margin) {
   Simplex simplex;
   const std::optional<Separation> apart = search_distance(pair, margin, &simplex);
-  return apart ? *apart : Polytope(pair).expand(simplex.used());
+  return apart ? *apart : Polytope(pair).expand(simplex);
 }
 
 }  // namespace gravitas

@@ -8,7 +8,7 @@
 // by a polytope that grows inside a - b where its boundary is nearest (S. Cameron's and G. van den Bergen's expanding
 // polytope). Both start from the same directions every time: the answer depends on the arguments alone.
 //
-// Exact to rounding for flat faces. For curved ones the depth is at most 1e-9 of `reach` above the least, the normal off
+// Exact to rounding for flat faces. For curved ones the depth is at most 1e-12 of `reach` above the least, the normal off
 // by the square root of that over the radius of curvature; solids whose every direction is the least (a ball is not among
 // them, being rounded, but two equal cylinders end on end inside each other come near) end at 96 points: 1e-4.
 #pragma once

@@ -118,7 +118,9 @@ Inside inside_cone(const Ray& ray, double radius, double half) {
   part.clip(ray, Vector3::UnitY(), half);
   if (part.is_empty()) return part;
   const double k = radius / (2.0 * half), kk = k * k;
-  const Vector3 &d = ray.direction, o = ray.origin - Vector3(0.0, half, 0.0);
+  // from the place nearest to the centre, so that far origins cancel no digits
+  const double nearest = -ray.origin.dot(ray.direction);
+  const Vector3 &d = ray.direction, o = ray.origin + nearest * ray.direction - Vector3(0.0, half, 0.0);
   const double a = d.x() * d.x() + d.z() * d.z() - kk * d.y() * d.y();
   const double b = o.x() * d.x() + o.z() * d.z() - kk * o.y() * d.y();
   const double c = o.x() * o.x() + o.z() * o.z() - kk * o.y() * o.y();
@@ -133,8 +135,8 @@ Inside inside_cone(const Ray& ray, double radius, double half) {
       if (c > 0.0) part.make_empty();
     } else {
       const double t = -c / (2.0 * b);
-      if (b < 0.0) part.enter(t, normal(t));
-      if (b > 0.0) part.leave(t);
+      if (b < 0.0) part.enter(nearest + t, normal(t));
+      if (b > 0.0) part.leave(nearest + t);
     }
     return part;
   }
@@ -144,16 +146,16 @@ Inside inside_cone(const Ray& ray, double radius, double half) {
       part.make_empty();
       return part;
     }
-    part.enter(crossing->first, normal(crossing->first));
-    part.leave(crossing->second);
+    part.enter(nearest + crossing->first, normal(crossing->first));
+    part.leave(nearest + crossing->second);
     return part;
   }
   // steeper than the slope: inside below the first crossing or beyond the second, whichever lies in the lower half
   if (!crossing) return part;
   if (d.y() < 0.0) {
-    part.enter(crossing->second, normal(crossing->second));
+    part.enter(nearest + crossing->second, normal(crossing->second));
   } else {
-    part.leave(crossing->first);
+    part.leave(nearest + crossing->first);
   }
   return part;
 }

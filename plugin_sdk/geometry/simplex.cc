@@ -103,9 +103,11 @@ std::optional<double> ray_on_triangle(const Vector3& origin, const Vector3& dire
   const Vector3 arm = origin - corners[0];
   const Vector3 q = arm.cross(ab);
   const double u = arm.dot(p) / determinant, v = direction.dot(q) / determinant, t = ac.dot(q) / determinant;
-  // neighbours both take their border, so that no ray slips through between them
-  constexpr double kBorder = 1e-14;
-  if (!(u >= -kBorder && v >= -kBorder && u + v <= 1.0 + kBorder && t >= 0.0)) return std::nullopt;
+  // neighbours both take their border, wider by what far origins round off, so that no ray slips through between them
+  const double longest = std::sqrt(std::max(ab.squaredNorm(), ac.squaredNorm()));
+  const double rounded = std::sqrt(arm.squaredNorm() * direction.squaredNorm()) * longest / std::fabs(determinant);
+  const double border = 1e-14 + 1e-15 * rounded;
+  if (!(u >= -border && v >= -border && u + v <= 1.0 + border && t >= 0.0)) return std::nullopt;
   return t;
 }
 

@@ -231,7 +231,7 @@ class PolyhedronMap final : public SupportMap {
     }
     if (second == first) return;
     out->add(vertex(second), 1 + second);
-    out->code = (first * 31U + second * 17U + 1U) & 0x7FFFU;
+    out->code = (std::min(first, second) * 31U + std::max(first, second) * 17U + 1U) & 0x7FFFU;
   }
 
  private:

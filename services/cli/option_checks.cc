@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <cmath>
 #include <functional>
+#include <system_error>
 
 namespace gravitas::cli {
 namespace {
@@ -27,9 +29,12 @@ bool is_read(const std::string& text, Number* number) {
 CLI::Validator whole_number(std::uint64_t least, std::uint64_t most) {
   return check_of(
       [=](const std::string& text) {
+        // in decimals alone: options are read as C reads numbers, 010 as eight, and one too large as the largest
         std::uint64_t number = 0;
-        // a negative one would be read as one that is large
-        return !text.starts_with('-') && is_read(text, &number) && number >= least && number <= most;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+        const bool is_decimal = text == "0" || !text.starts_with('0');
+        return is_decimal && error == std::errc() && end == text.data() + text.size() && number >= least &&
+               number <= most;
       },
       fmt::format("a whole number from {} to {}", least, most));
 }

@@ -428,9 +428,10 @@ void ServedRun::on_inner_step(const kernel::Environment& environment, const kern
 }
 
 void ServedRun::on_commit(const kernel::Environment& environment) {
-  recorder_->on_commit(environment);
   event_source_->on_commit(environment);
   with_subscriptions([&](Subscription* one) { one->source().on_commit(environment); });
+  // last: it throws where a disk is full
+  recorder_->on_commit(environment);
 }
 
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {

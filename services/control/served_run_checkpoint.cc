@@ -9,6 +9,7 @@
 #include "services/control/served_run.h"
 #include "services/edit/edited_scene.h"
 #include "services/run/exchange_spec.h"
+#include "services/run/file_names.h"
 #include "services/run/resume_command.h"
 
 namespace gravitas::control {
@@ -76,9 +77,8 @@ void ServedRun::keep_checkpoint(const JournalReading& known) {
   try {
     const std::string path = checkpoint_target(options_.checkpoint);
     // the journal of another file starts anew
-    const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == path;
-    recorder_->keep(std::filesystem::absolute(path), options_.checkpoint_every, goes_on ? known : JournalReading{},
-                    *environment_);
+    recorder_->keep(std::filesystem::absolute(path), options_.checkpoint_every,
+                    goes_on_in_its_checkpoint(options_) ? known : JournalReading{}, *environment_);
   } catch (const std::runtime_error& problem) {
     throw BadInput(problem.what());
   }

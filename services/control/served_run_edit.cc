@@ -81,11 +81,10 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     recorder_->set_decisions(std::move(decisions));
     scene_ = edited.scene();
     description_ = edited.description();
+    pair_decisions_.follow(environment_->model(), next->model());
     environment_ = std::move(next);
     environment_->set_commit_listener(this);
-    pair_decisions_.forget();
-    if (listener_) environment_->set_pair_arbiter(&pair_decisions_);
-    recorder_->note_edit(edit);
+    if (listener_ || pair_decisions_.has_decided()) environment_->set_pair_arbiter(&pair_decisions_);
     event_source_->begin_again();
     reactions_->begin_again();
     figures_->begin_again(environment_.get());
@@ -99,6 +98,13 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
       if (std::ranges::find(warnings_, warning) != warnings_.end()) continue;
       made.add_warnings(warning);
       add_warning(warning);
+    }
+    // last, as the edit is made: a disk may be full
+    try {
+      recorder_->note_edit(edit);
+    } catch (const std::system_error& problem) {
+      fault_ = problem.what();
+      keep_faulted_state();
     }
     made.set_pause_us(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
     return made;

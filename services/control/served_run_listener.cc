@@ -28,6 +28,8 @@ void ServedRun::end_listening(const std::shared_ptr<RemoteListener>& listener) {
 void ServedRun::attend_listener() {
   environment_->set_pair_arbiter(&pair_decisions_);
   recorder_->note_listener();
+  // no journal knows of it
+  if (recorder_->keeps()) recorder_->save(*environment_);
 }
 
 void ServedRun::leave_aside(const std::string& why) {

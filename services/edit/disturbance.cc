@@ -65,6 +65,11 @@ ChangedBodies changed_bodies(const EditedParts& parts) {
     if (meets_others || shapes.contains(body.geometry_id())) bodies.placed.insert(body.id());
   }
   bodies.all.insert(bodies.placed.begin(), bodies.placed.end());
+  // who a force names, too, as a spring its other end
+  for (const kernel::EnvironmentDescription* one : {&parts.described, &parts.next})
+    for (const kernel::BodyDescription& body : one->bodies)
+      if (std::ranges::any_of(body.forces, [&](std::uint32_t row) { return forces.contains(one->forces[row].id); }))
+        bodies.all.insert(body.id);
 
   Ids joints = changed(before.constraints().constraint(), after.constraints().constraint());
   joints.insert(parts.log.new_joints.begin(), parts.log.new_joints.end());

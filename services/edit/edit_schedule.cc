@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "services/recorder/journal.h"
+#include "services/run/file_names.h"
 
 namespace gravitas {
 
@@ -31,6 +32,7 @@ void EditSchedule::rehearse(const RunOptions& options, scene::v1::Scene scene,
     const EditedScene edited(options, scene, description, catalog, &edit, nullptr);
     scene = edited.scene();
     description = edited.description();
+    require_separate_files(options, scene, to_come_);
   }
 }
 

@@ -55,6 +55,10 @@ void EventSource::begin_again() {
 
 void EventSource::leave_out_past(const kernel::Environment& environment) {
   faults_ = environment.faults().size();
+  leave_out_swaps(environment);
+}
+
+void EventSource::leave_out_swaps(const kernel::Environment& environment) {
   visit_swaps(environment, [](const kernel::SwapRecord&) {});
 }
 

@@ -31,6 +31,8 @@ class EventSource final : public kernel::CommitListener {
   void begin_again();
   // Faults and swaps so far are not told.
   void leave_out_past(const kernel::Environment& environment);
+  // Those alone that were made already: of a run that is resumed, before its checkpoint.
+  void leave_out_swaps(const kernel::Environment& environment);
 
   void on_inner_step(const kernel::Environment& environment, const kernel::InnerStep& inner) override;
   void on_commit(const kernel::Environment& environment) override;

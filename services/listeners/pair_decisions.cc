@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <condition_variable>
 #include <exception>
+#include <map>
 #include <mutex>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -15,13 +18,25 @@ namespace {
 
 std::pair<std::uint32_t, std::uint32_t> pair_of(const PairQuestion& one) { return {one.a, one.b}; }
 
+// As the scene has it.
+std::array<double, kMaterialColumns> material_of(const kernel::Model& model, std::uint32_t a, std::uint32_t b) {
+  std::array<double, kMaterialColumns> material;
+  const std::size_t row = std::size_t{model.material[a]} * model.material_count + model.material[b];
+  std::copy_n(&model.material_pairs[kMaterialColumns * row], kMaterialColumns, material.begin());
+  return material;
+}
+
 // Why answers cannot be used; empty if they can.
 std::string find_impossible(std::span<const PairQuestion> answers) {
-  for (const PairQuestion& answer : answers)
+  for (const PairQuestion& answer : answers) {
     for (const double number : answer.material)
       if (!std::isfinite(number) || number < 0.0)
         return fmt::format("its material of '{}' and '{}' has the number {}; allowed: finite ones >= 0", answer.id_a,
                            answer.id_b, number);
+    if (answer.material[kRestitution] > 1.0)
+      return fmt::format("its material of '{}' and '{}' has the restitution {}; allowed: 0 to 1", answer.id_a,
+                         answer.id_b, answer.material[kRestitution]);
+  }
   return {};
 }
 
@@ -85,6 +100,21 @@ void PairDecisions::leave_aside(const std::string& why) {
   report_(fmt::format("the listener that decides about pairs is left aside: {}; the scene's own rules hold", why));
 }
 
+void PairDecisions::follow(const kernel::Model& before, const kernel::Model& after) {
+  std::map<std::string_view, std::uint32_t> rows;
+  for (std::uint32_t i = 0; i < after.body_count; ++i) rows[after.body_id[i]] = i;
+  std::erase_if(decided_, [&](PairQuestion& one) {
+    const auto a = rows.find(one.id_a), b = rows.find(one.id_b);
+    if (a == rows.end() || b == rows.end()) return true;
+    const std::uint32_t first = std::min(a->second, b->second), second = std::max(a->second, b->second);
+    const bool is_as_before = material_of(before, one.a, one.b) == material_of(after, first, second);
+    if (first != a->second) std::swap(one.id_a, one.id_b);
+    one.a = first, one.b = second;
+    return !is_as_before;
+  });
+  std::ranges::sort(decided_, {}, pair_of);
+}
+
 PairDecisions::Decisions::const_iterator PairDecisions::find(Decisions::const_iterator from, std::uint32_t a,
                                                              std::uint32_t b) const {
   const auto found = std::ranges::lower_bound(from, decided_.end(), std::pair{a, b}, {}, pair_of);
@@ -97,11 +127,13 @@ std::size_t PairDecisions::keep_allowed(const kernel::Environment& environment, 
   for (std::size_t i = 0; i < pairs.size() && is_listening(); i += 2) {
     const std::uint32_t a = pairs[i], b = pairs[i + 1];
     if (find(decided_.begin(), a, b) != decided_.end()) continue;
-    PairQuestion& question = questions.emplace_back(PairQuestion{a, b, model.body_id[a], model.body_id[b], true, {}});
-    const std::size_t row = std::size_t{model.material[a]} * model.material_count + model.material[b];
-    std::copy_n(&model.material_pairs[kMaterialColumns * row], kMaterialColumns, question.material.begin());
+    questions.push_back({a, b, model.body_id[a], model.body_id[b], true, material_of(model, a, b)});
   }
   if (!questions.empty()) ask(std::move(questions));
+  return leave_out_forbidden(pairs);
+}
+
+std::size_t PairDecisions::leave_out_forbidden(std::span<std::uint32_t> pairs) const {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < pairs.size(); i += 2) {
     const auto decision = find(decided_.begin(), pairs[i], pairs[i + 1]);

@@ -29,10 +29,14 @@ class PairDecisions final : public kernel::PairArbiter {
   bool is_listening() const { return desk_ != nullptr; }
   // True if a trajectory may depend on what was decided.
   bool has_decided() const { return !decided_.empty(); }
+  // The scene was edited: what was decided holds for who is still there by id, but where what the scene says of the two
+  // materials is new, which is asked about anew.
+  void follow(const kernel::Model& before, const kernel::Model& after);
   // Of another run: nothing is decided.
   void forget() { decided_.clear(); }
 
   std::size_t keep_allowed(const kernel::Environment& environment, std::span<std::uint32_t> pairs) override;
+  std::size_t leave_out_forbidden(std::span<std::uint32_t> pairs) const override;
   void mix_materials(std::span<const std::uint32_t> bodies, std::span<double> rows) override;
 
  private:

@@ -62,8 +62,10 @@ void write_all(int file, std::span<const std::byte> bytes, const std::string& wh
   }
 }
 
+std::string fresh_name_of(const std::string& path) { return path + ".tmp"; }
+
 void replace_file(const std::string& path, std::span<const std::byte> bytes) {
-  const std::string fresh = path + ".tmp";
+  const std::string fresh = fresh_name_of(path);
   try {
     write_and_sync(fresh, bytes);
     if (std::rename(fresh.c_str(), path.c_str()) != 0) fail("'" + path + "'");

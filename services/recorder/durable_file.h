@@ -15,7 +15,10 @@ void write_all(int file, std::span<const std::byte> bytes, const std::string& wh
 // An error of the disk (full, broken) rather than of a name.
 bool is_disk_error(const std::error_code& code);
 
-// Puts `bytes` into the place of the file: PATH.tmp in the same folder, fsync, rename, fsync of the folder. On failure
+// Of the file that replaces one: PATH.tmp.
+std::string fresh_name_of(const std::string& path);
+
+// Puts `bytes` into the place of the file: fresh_name_of() it, in the same folder, fsync, rename, fsync of the folder. On failure
 // throws std::system_error naming the file; what was at `path` is still there, and PATH.tmp is gone.
 void replace_file(const std::string& path, std::span<const std::byte> bytes);
 

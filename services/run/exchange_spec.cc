@@ -139,7 +139,8 @@ kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDe
   const std::vector<kernel::PluginChoice>& own = scene.slot(spec.slot).plugins;
   const auto same = std::ranges::find_if(own, [&](const kernel::PluginChoice& one) {
     return one.declaration.name == plugin->declaration.name &&
-           one.declaration.properties.size() == plugin->declaration.properties.size();
+           std::ranges::equal(one.declaration.properties, plugin->declaration.properties, {}, &Property::name,
+                              &Property::name);
   });
   order.plugin.settings = same != own.end() ? same->settings : default_settings(spec, plugin->declaration);
   return order;

@@ -164,7 +164,7 @@ void Figures::follow(kernel::Environment* environment) {
     opening_step_ = environment->step_count();
   if (const double way = environment->time_step() * last_.speed;
       !runaway_ && scene_size_ > 0.0 && way > kRunaway * scene_size_)
-    runaway_ = Runaway{environment->step_count(), last_.fastest, way,
+    runaway_ = Runaway{environment->step_count(), description_.bodies[last_.fastest].id, way,
                        environment->step_count() == 0 || environment->step_count() + 1 == edited_step_};
   for (Drive& drive : drives_) drive.speed = drive_speed(drive, environment->state());
 }
@@ -203,7 +203,7 @@ void Figures::write(report::v1::Report* report) const {
   if (runaway_)
     report->add_warnings(fmt::format(
         "body \"{}\" {} {:.3g} m in step {}, over a million times what the scene measures ({:.3g} m): {}",
-        description_.bodies[runaway_->body].id, runaway_->is_given ? "goes" : "went", runaway_->way,
+        runaway_->body, runaway_->is_given ? "goes" : "went", runaway_->way,
         runaway_->step + (runaway_->is_given ? 1 : 0), scene_size_,
         runaway_->is_given ? "that is the speed which it was given"
                            : "it runs away, as where TimeStep is too long for the forces and the integrator"));
@@ -234,10 +234,13 @@ void Figures::write(recorder::v1::Tally* tally) const {
 }
 
 void Figures::resume(const recorder::v1::Tally& tally) {
-  largest_kinetic_ = std::max(largest_kinetic_, tally.largest_kinetic_energy());
-  largest_deviation_ = std::max(largest_deviation_, tally.largest_energy_deviation());
-  penetration_ = std::max(penetration_, tally.penetration());
-  joint_error_ = std::max(joint_error_, tally.joint_error());
+  // what was followed so far is the scene with its edits at the start, which never was
+  largest_kinetic_ = tally.largest_kinetic_energy();
+  largest_deviation_ = tally.largest_energy_deviation();
+  penetration_ = tally.penetration();
+  joint_error_ = tally.joint_error();
+  runaway_.reset();
+  opening_step_.reset();
   if (tally.initial_momenta_size() != 6) return;
   const double* momenta = tally.initial_momenta().data();
   initial_ = Totals{0.0, tally.initial_energy(), Vector3(momenta[0], momenta[1], momenta[2]),

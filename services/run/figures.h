@@ -52,9 +52,9 @@ class Figures {
 
   struct Runaway {
     std::uint64_t step;  // that was made last
-    std::uint32_t body;
-    double way;     // m, in a step
-    bool is_given;  // no step has been made with that speed
+    std::string body;    // its id: rows change by edits
+    double way;          // m, in a step
+    bool is_given;       // no step has been made with that speed
   };
 
   Totals totals(kernel::Environment* environment) const;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "services/recorder/durable_file.h"
 #include "services/recorder/recorder.h"
 #include "services/run/resumption.h"
 
@@ -51,11 +52,14 @@ std::vector<NamedFile> outputs_of(const RunOptions& options) {
 
 std::vector<NamedFile> kept_by(const RunOptions& options) {
   const std::string target = options.checkpoint.empty() ? "" : checkpoint_target(options.checkpoint);
-  return {{"--checkpoint", target}, {"the journal of --checkpoint", journal(target)}};
+  return {{"--checkpoint", target},
+          {"the journal of --checkpoint", journal(target)},
+          {"the next one of --checkpoint", target.empty() ? "" : fresh_name_of(target)}};
 }
 
 std::vector<NamedFile> resumed_by(const RunOptions& options) {
-  return {{"--resume", options.resume}, {"the journal of --resume", journal(options.resume)}};
+  const std::string target = options.resume.empty() ? "" : checkpoint_target(options.resume);
+  return {{"--resume", options.resume}, {"the journal of --resume", journal(target)}};
 }
 
 }  // namespace
@@ -65,6 +69,10 @@ std::vector<NamedFile> checkpoints_of(const RunOptions& options) {
   for (NamedFile& file : resumed_by(options)) files.push_back(std::move(file));
   std::erase_if(files, [](const NamedFile& file) { return file.path.empty(); });
   return files;
+}
+
+bool goes_on_in_its_checkpoint(const RunOptions& options) {
+  return !options.checkpoint.empty() && !options.resume.empty() && is_same_file(options.checkpoint, options.resume);
 }
 
 std::vector<NamedFile> files_of(const scene::v1::Scene& scene) {
@@ -97,9 +105,7 @@ void require_separate_files(const RunOptions& options, const scene::v1::Scene& s
     for (const edit::v1::Change& change : edit.changes())
       if (change.has_add()) inputs.push_back({"--edit add", change.add().name()});
   require_separate(inputs, kept);
-  const bool goes_on =
-      !options.checkpoint.empty() && !options.resume.empty() && is_same_file(kept[0].path, options.resume);
-  if (!goes_on) require_separate(resumed, kept);
+  if (!goes_on_in_its_checkpoint(options)) require_separate(resumed, kept);
   for (const std::vector<NamedFile>* others : {&kept, &resumed})
     inputs.insert(inputs.end(), others->begin(), others->end());
   require_separate(inputs, outputs_of(options));

@@ -20,6 +20,9 @@ std::vector<NamedFile> files_of(const scene::v1::Scene& scene);
 // Of --checkpoint and --resume, with their journals.
 std::vector<NamedFile> checkpoints_of(const RunOptions& options);
 
+// True if --checkpoint goes on in the file that --resume names, by whatever names.
+bool goes_on_in_its_checkpoint(const RunOptions& options);
+
 // Throws BadInput if an output is the same file as an input or as another output, by whatever names. Files that are not
 // ordinary ones (devices, pipes) may be named twice.
 void require_separate(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);

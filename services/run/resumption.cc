@@ -57,7 +57,7 @@ Resumption read_resumption(const std::string& path, const kernel::EnvironmentDes
         fmt::format("it is the state after step {}, beyond the end of this run at step {}; --steps and --duration "
                     "count from t = 0",
                     checkpoint->step(), description.steps));
-  JournalReading journal = read_journal_beside(path, digest_of(scene), checkpoint->step(), warnings);
+  JournalReading journal = read_journal_beside(checkpoint_target(path), digest_of(scene), checkpoint->step(), warnings);
   // the checkpoint has those before a step that was not made
   for (const edit::v1::Edit& made : checkpoint->edits()) {
     const auto known = std::ranges::find_if(journal.edits, [&](const auto& one) { return is_same_edit(made, one); });

@@ -111,6 +111,7 @@ class Run final : private kernel::CommitListener {
     events_->resume(resumed_tally_);
     if (!event_kinds_.is_empty())
       event_source_.emplace(events_.get(), event_kinds_, options_.ongoing_rate.value_or(kOngoingRate));
+    if (event_source_ && !options_.resume.empty()) event_source_->leave_out_swaps(*environment_);
     if (result_.outcome == RunOutcome::kCompleted) guard([&] { start_recorder(); });
     guard([&] {
       for_outputs([](auto& output) { output.begin(); });
@@ -162,7 +163,11 @@ class Run final : private kernel::CommitListener {
     const bool keeps = recorder_ && recorder_->keeps();
     guard([&] {
       if (is_unrepeatable_) return;
-      if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
+      try {
+        if (!keeps && result_.outcome == RunOutcome::kPaused) keep_paused_state();
+      } catch (const BadInput& problem) {
+        result_.fault += fmt::format("; no checkpoint: {}", problem.what());
+      }
       if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
     });
     // after a failure the one before
@@ -340,14 +345,11 @@ class Run final : private kernel::CommitListener {
     // another environment: nothing is on probation there
     for (recorder::v1::Decision& decision : decisions_) settle(&decision);
     take(edited);
+    if (pair_decisions_) pair_decisions_->follow(environment_->model(), next->model());
     environment_ = std::move(next);
     edits_.note(*edit);
     note_edit(*edit, &result_.report);
-    if (recorder_) {
-      recorder_->set_decisions(decisions_);
-      recorder_->note_edit(*edit);
-    }
-    if (pair_decisions_) pair_decisions_->forget();
+    if (recorder_) recorder_->set_decisions(decisions_);
     if (event_source_) event_source_->begin_again();
     if (trajectory_) trajectory_->follow(description_);
     if (reactions_) reactions_->begin_again();
@@ -359,6 +361,8 @@ class Run final : private kernel::CommitListener {
          fmt::format("{} changes before step {}", edit->changes_size(), edit->step()));
     for (const std::uint32_t body : woken)
       tell({EventKind::kWake, environment_->step_count(), environment_->time(), body}, "");
+    // last, as the edit is made: a disk may be full
+    if (recorder_) recorder_->note_edit(*edit);
   }
 
   void attend() {
@@ -482,15 +486,14 @@ class Run final : private kernel::CommitListener {
     if (checkpoint_path_.empty() && journal_.commits.empty()) return;
     recorder_.emplace(identity_, [this] { return tally(); });
     recorder_->set_edits(edits_.made());
-    recorder_->expect(journal_of(options_.resume), journal_.commits);
+    if (!journal_.commits.empty()) recorder_->expect(journal_of(checkpoint_target(options_.resume)), journal_.commits);
     recorder_->set_decisions(decisions_);
     if (options_.listener) recorder_->note_listener();
     if (checkpoint_path_.empty()) return;
-    // the journal of another file starts anew
-    const bool goes_on = !options_.resume.empty() && checkpoint_target(options_.resume) == checkpoint_path_;
     try {
-      recorder_->keep(checkpoint_path_, options_.checkpoint_every, goes_on ? journal_ : JournalReading{},
-                      *environment_);
+      // the journal of another file starts anew
+      recorder_->keep(checkpoint_path_, options_.checkpoint_every,
+                      goes_on_in_its_checkpoint(options_) ? journal_ : JournalReading{}, *environment_);
     } catch (const std::system_error& error) {
       if (is_disk_error(error.code())) throw;
       throw BadInput(error.what());

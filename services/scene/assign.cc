@@ -12,14 +12,23 @@ namespace pb = google::protobuf;
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-void trim(const Entry& entry, const TextPosition& position, std::string* text, Diagnostics* diagnostics) {
+}  // namespace
+
+std::string trim_reference(const std::string& what, std::string* text) {
   const auto first = std::find_if_not(text->begin(), text->end(), is_blank);
   const auto last = std::find_if_not(text->rbegin(), std::make_reverse_iterator(first), is_blank).base();
-  if (first == text->begin() && last == text->end()) return;
+  if (first == text->begin() && last == text->end()) return {};
   std::string trimmed(first, last);
-  diagnostics->warning(position,
-                       entry.name + " is \"" + *text + "\"; the blanks around \"" + trimmed + "\" are dropped");
+  std::string warning = what + " is \"" + *text + "\"; the blanks around \"" + trimmed + "\" are dropped";
   *text = std::move(trimmed);
+  return warning;
+}
+
+namespace {
+
+void trim(const Entry& entry, const TextPosition& position, std::string* text, Diagnostics* diagnostics) {
+  if (const std::string warning = trim_reference(entry.name, text); !warning.empty())
+    diagnostics->warning(position, warning);
 }
 
 // Checks one text of a property; trims ids.

@@ -15,6 +15,9 @@ namespace gravitas::scene {
 void assign(const BlockRule& rule, const Entry& entry, PropertyValue value, google::protobuf::Message* block,
             Diagnostics* diagnostics);
 
+// Drops the blanks around a reference; returns a warning that says so of `what`, empty if there are none.
+std::string trim_reference(const std::string& what, std::string* text);
+
 // Sets `Name = value` among properties that a plugin declares; one of that name is replaced.
 void assign_property(std::string_view name, const TextPosition& name_position, PropertyValue value,
                      v1::Properties* properties);

@@ -129,7 +129,12 @@ void hand_on_accuracy(BuildContext* context) {
     for (const auto& own : context->environment.kinetic_integrator().custom_properties().property())
       if (own.name() == "Accuracy")
         context->diagnostics->error(place, "Accuracy stands in KineticIntegrator { … } too; allowed: one of them");
-    integrator.settings[at] = properties.accuracy();
+    PropertyValue given = PropertyValue::of(properties.accuracy());
+    given.position = place;
+    std::vector<double> numbers;
+    std::vector<PropertyProblem> problems;
+    if (flatten_value(property, given, &numbers, &problems)) integrator.settings[at] = numbers.front();
+    context->diagnostics->add(problems, place, "");
     return;
   }
   context->diagnostics->error(

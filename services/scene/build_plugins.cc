@@ -77,6 +77,12 @@ void PluginSelection::read_block(const Plugin& message) {
                                 "Fallback of an unnamed plugin; required: Name, Library or Command, since the slot " +
                                     quoted(message.slot()) + " may hold several");
   }
+  if (is_list(slot) && !has_name && is_written(message, Plugin::kAddressFieldNumber) &&
+      !is_written(message, Plugin::kLibraryFieldNumber)) {
+    context_.diagnostics->error(place_of(message, Plugin::kAddressFieldNumber),
+                                "Address of an unnamed plugin; required: Name or Library, since the slot " +
+                                    quoted(message.slot()) + " may hold several");
+  }
   read_process(slot, message);
   check_place(message);
   of_slot.push_back({&message, nullptr, false});
@@ -336,7 +342,8 @@ void PluginSelection::add_choice(const InstalledPlugin& plugin, const v1::Proper
   }
   kernel::PluginChoice choice{plugin.declaration, plugin.library, {}, plugin.command};
   for (const Block& block : blocks(slot))
-    if (block.library == &plugin || block.message->name() == plugin.declaration.name || !is_list(slot))
+    if (is_written(*block.message, Plugin::kAddressFieldNumber) &&
+        (block.library == &plugin || block.message->name() == plugin.declaration.name || !is_list(slot)))
       choice.address = block.message->address();
   const std::string what = std::string(slot_name(slot)) + " plugin " + quoted(plugin.declaration.name);
   context_.flatten_properties(plugin.declaration.properties,

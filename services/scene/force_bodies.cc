@@ -7,6 +7,7 @@
 
 #include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/property_value.h"
+#include "services/scene/assign.h"
 
 namespace gravitas::scene {
 namespace {
@@ -107,6 +108,8 @@ void flatten_force(const TypeDeclaration& type, const v1::Force& force, const Id
                                                             "; allowed: " + allowed_values(*declared));
       return;
     }
+    if (const std::string warning = trim_reference(value.name, &value.value.text); !warning.empty())
+      context->diagnostics->warning(value.value.position, warning);
     const std::uint32_t row = bodies.find(value.value.text, value.name, value.position, context->diagnostics);
     if (row == kNone) return;
     const TextPosition position = value.value.position;

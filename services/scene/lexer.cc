@@ -53,7 +53,8 @@ bool is_underflow(std::string_view number) {
     if (is_negative || exponent.starts_with('+')) exponent.remove_prefix(1);
     long long value = 0;
     const auto read = std::from_chars(exponent.data(), exponent.data() + exponent.size(), value);
-    if (read.ec != std::errc()) value = 1'000'000'000'000LL;
+    constexpr long long kBeyondAll = 1'000'000'000'000LL;
+    value = read.ec != std::errc() ? kBeyondAll : std::min(value, kBeyondAll);
     power += is_negative ? -value : value;
   }
   return power < 0;

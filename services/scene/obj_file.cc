@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <sstream>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "services/scene/input_file.h"
 
@@ -29,7 +31,7 @@ std::string_view take_word(std::string_view* line) {
 // All of the text is one number.
 template <typename Number>
 bool is_read(std::string_view text, Number* number) {
-  if (text.starts_with('+')) text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *number);
   return error == std::errc() && end == text.data() + text.size();
 }
@@ -55,6 +57,8 @@ class LineCheck {
     return why.empty() ? "" : ':' + std::to_string(line_) + ": " + why;
   }
 
+  // To the last bit, which the loader loses.
+  std::vector<double> take_coordinates() { return std::move(coordinates_); }
   // That the faces give.
   std::size_t triangles() const { return triangles_; }
 
@@ -73,6 +77,7 @@ class LineCheck {
         return (word.empty() ? "a vertex has " + std::to_string(i) + " coordinates"
                              : "a coordinate is \"" + std::string(word) + '"') +
                "; allowed: v and three finite numbers";
+      coordinates_.push_back(number);
     }
     ++vertices_;
     return "";
@@ -100,6 +105,7 @@ class LineCheck {
 
   std::int64_t line_ = 0, vertices_ = 0;
   std::size_t triangles_ = 0;
+  std::vector<double> coordinates_;
   // of all indices, which may come before their vertices
   std::int64_t largest_ = 0, line_of_largest_ = 0;
 };
@@ -126,7 +132,7 @@ bool read_obj(const std::string& path, ObjMesh* mesh, std::string* why) {
     *why = why->empty() ? ": is no OBJ file" : ": " + *why;
     return false;
   }
-  mesh->vertices.assign(attributes.vertices.begin(), attributes.vertices.end());
+  mesh->vertices = check.take_coordinates();
   for (const tinyobj::shape_t& shape : shapes)
     for (const tinyobj::index_t& index : shape.mesh.indices) mesh->triangles.push_back(index.vertex_index);
   if (mesh->triangles.empty()) *why = ": has no face; allowed: one or more";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/scene/assign.h"
 #include "services/scene/obj_file.h"
 
 namespace gravitas::scene {
@@ -154,7 +155,10 @@ bool expand_compound(SiblingShapes* siblings, std::vector<NamedValue>* values, S
                     what + " is " + shown(row) +
                         "; allowed: {\"GeometryId\", {px, py, pz}, {qw, qx, qy, qz}} or the same with a density > 0",
                     problems);
-    SiblingShapes::Found found = siblings->find(row.list[0].text);
+    std::string id = row.list[0].text;
+    if (const std::string warning = trim_reference("the GeometryId of " + what, &id); !warning.empty())
+      problems->push_back({row.list[0].position, warning, true});
+    SiblingShapes::Found found = siblings->find(id);
     if (!found.shape) return found.why.empty() ? false : refuse(row.list[0].position, what + ' ' + found.why, problems);
     if (found.shape->is_unbounded())
       return refuse(row.list[0].position, what + " is unbounded; allowed: bounded shapes", problems);

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/recorder/output_file.h"
@@ -23,7 +24,11 @@ class FrameFile {
   void flush() { file_.flush(); }
 
   // The scene was edited, and who answers knows it.
-  void begin_again(Surveyor* surveyor) { instrumentation_.emplace(surveyor); }
+  void begin_again(Surveyor* surveyor) {
+    Instrumentation next(surveyor);
+    next.go_on_from(std::move(*instrumentation_));
+    instrumentation_.emplace(std::move(next));
+  }
 
   // Called for the initial state and after every commit; `last` forces a sample.
   void offer(const kernel::Environment& environment, bool last);

@@ -85,7 +85,6 @@ class Impulses {
     if (found == feature_.size() || identity(found) != wanted) return Vector3::Zero();
     return vector_at(impulse_, found);
   }
-  double step_length() const { return state_.step_length; }
 
  private:
   kernel::SavedState state_;
@@ -177,8 +176,9 @@ void Instrumentation::add_contacts(const kernel::Environment& environment, bool 
     return environment.is_asleep(body) || (environment.model().flags[body] & kMovable) == 0;
   };
   const auto inner_length = [&](const Contact& contact) {
-    const double step = stands(contact.a) && stands(contact.b) ? environment.time_step() : impulses.step_length();
-    return step / surveyor_.description().substeps;
+    const double made = environment.inner_step_length();
+    if (made > 0.0 && !(stands(contact.a) && stands(contact.b))) return made;
+    return environment.time_step() / surveyor_.description().substeps;
   };
   for (const Contact& contact : contacts) {
     const std::string id = body_id(contact.a) + "/" + body_id(contact.b);
@@ -225,14 +225,14 @@ void Instrumentation::add_bounds(const kernel::Environment& environment, Frame* 
 }
 
 void Instrumentation::add_trajectories(const kernel::Environment& environment, Frame* frame) {
-  const bool is_first = last_origins_.empty();
-  last_origins_.resize(environment.model().body_count);
+  std::map<std::string, Vector3> origins;
   for (std::uint32_t body = 0; body < environment.model().body_count; ++body) {
-    const Vector3 origin = placed(environment, body).position;
-    if (!is_first && origin != last_origins_[body])
-      add_line(v1::KIND_TRAJECTORY, body_id(body), last_origins_[body], origin, frame);
-    last_origins_[body] = origin;
+    const Vector3 origin = origins[body_id(body)] = placed(environment, body).position;
+    const auto last = last_origins_.find(body_id(body));
+    if (last != last_origins_.end() && last->second != origin)
+      add_line(v1::KIND_TRAJECTORY, body_id(body), last->second, origin, frame);
   }
+  last_origins_ = std::move(origins);
 }
 
 void Instrumentation::add_space(const kernel::Environment& environment, Frame* frame) {

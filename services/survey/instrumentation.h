@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gravitas/instrumentation/v1/instrumentation.pb.h"
@@ -31,6 +32,8 @@ class Instrumentation {
   explicit Instrumentation(Surveyor* surveyor);
 
   Frame frame(const kernel::Environment& environment, const std::vector<Kind>& kinds);
+  // Trajectories go on from those of one before, of the same run.
+  void go_on_from(Instrumentation&& before) { last_origins_ = std::move(before.last_origins_); }
 
  private:
   void add_contacts(const kernel::Environment& environment, bool shows_contacts, bool shows_reactions, Frame* frame);
@@ -50,7 +53,7 @@ class Instrumentation {
   std::string geometry_plugin_;
   std::map<std::uint32_t, MessageColumns> shape_geometry_;  // by kinds
   std::optional<double> extent_;
-  std::vector<Vector3> last_origins_;  // of the geometries, in the last frame with trajectories
+  std::map<std::string, Vector3> last_origins_;  // of the geometries by body, in the last frame with trajectories
 };
 
 }  // namespace gravitas::survey

@@ -259,6 +259,26 @@ class Answerer {
     return pairs;
   }
 
+  // Asks about each pair with bodies of its own: what a body touches besides counts as what it rests on.
+  static void part(const Pairs& pairs, MessageColumns* request) {
+    const auto repeat = [&](const char* name, std::size_t size, std::size_t row) {
+      std::vector<double>& numbers = request->f64(name);
+      for (std::size_t k = 0; k < size; ++k) {
+        const double number = numbers[size * row + k];
+        numbers.push_back(number);
+      }
+    };
+    std::vector<std::uint32_t>& shapes = request->u32("body_shape");
+    for (const std::uint32_t row : pairs) {
+      request->u32("pair").push_back(static_cast<std::uint32_t>(shapes.size()));
+      const std::uint32_t shape = shapes[row];
+      shapes.push_back(shape);
+      for (const char* vector : {"geometry_position", "position", "linear_velocity", "angular_velocity"})
+        repeat(vector, 3, row);
+      for (const char* quaternion : {"geometry_orientation", "orientation"}) repeat(quaternion, 4, row);
+    }
+  }
+
   // Per question, in the order of the bodies.
   std::vector<std::vector<Touch>> touches(const std::vector<Asked>& questions, double margin) {
     std::vector<std::vector<Touch>> found(questions.size());
@@ -266,8 +286,9 @@ class Answerer {
     for (const char* velocity : {"linear_velocity", "angular_velocity"})
       request.f64(velocity).resize(request.f64("position").size());
     request.f64("margin") = {margin};
-    const Pairs& pairs = request.u32("pair") = pairs_within(questions, {}, margin);
+    const Pairs pairs = pairs_within(questions, {}, margin);
     if (pairs.empty()) return found;
+    part(pairs, &request);
     const MessageColumns reply = surveyor_.ask(stage::Method::kCollisionManifolds, request, contact_check(request));
     const std::vector<std::uint32_t>& rows = reply.u32("contact_pair");
     for (std::size_t i = 0; i < rows.size(); ++i) {

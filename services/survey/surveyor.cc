@@ -143,8 +143,9 @@ std::vector<Contact> Surveyor::contacts(const kernel::Environment& environment) 
           [&](const MessageColumns& reply) { return check_pairs(reply.u32("pair"), model.flags.span()); });
   MessageColumns asked = request(stage::Method::kCollisionManifolds, environment);
   asked.f64("margin") = {margin};
-  asked.u32("pair") = pairs.u32("pair");
-  if (asked.u32("pair").empty()) return {};
+  std::vector<std::uint32_t>& wanted = asked.u32("pair") = pairs.u32("pair");
+  if (environment.pair_arbiter() != nullptr) wanted.resize(environment.pair_arbiter()->leave_out_forbidden(wanted));
+  if (wanted.empty()) return {};
   const MessageColumns reply = ask(stage::Method::kCollisionManifolds, asked, contact_check(asked));
   std::vector<Contact> contacts;
   for (std::size_t i = 0; i < reply.u32("contact_pair").size(); ++i) {

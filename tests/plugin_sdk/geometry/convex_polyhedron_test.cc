@@ -67,6 +67,28 @@ TEST(ConvexPolyhedron, MergesCoplanarTrianglesAndTakesEitherOrder) {
   }
 }
 
+// A vertex in the middle of the edge from 0 to 1, to which triangles of both faces go: the box is one of eight corners, and
+// its triangles have areas.
+TEST(ConvexPolyhedron, LeavesOutWhatLiesWithinAnEdge) {
+  std::vector<Vector3> corners = box_corners({1, 1, 1});
+  corners.push_back(0.5 * (corners[0] + corners[1]));
+  const std::vector<std::vector<std::uint32_t>> faces = {{0, 4, 6, 2}, {1, 3, 7, 5}, {8, 1, 5}, {8, 5, 4},
+                                                         {8, 4, 0},    {2, 6, 7, 3}, {8, 0, 2}, {8, 2, 3},
+                                                         {8, 3, 1},    {4, 5, 7, 6}};
+  std::string why;
+  const auto solid = make_convex_polyhedron(corners, faces, &why);
+  ASSERT_TRUE(solid) << why;
+  EXPECT_EQ(solid->vertices.size(), 8U);
+  EXPECT_EQ(solid->faces.size(), 6U);
+  const std::vector<std::uint32_t> triangles = solid->triangles();
+  ASSERT_EQ(triangles.size(), 36U);
+  for (std::size_t i = 0; i < 36; i += 3) {
+    const Vector3 &a = solid->vertices[triangles[i]], &b = solid->vertices[triangles[i + 1]],
+                  &c = solid->vertices[triangles[i + 2]];
+    EXPECT_NEAR((b - a).cross(c - a).norm(), 4.0, 1e-14);
+  }
+}
+
 TEST(ConvexPolyhedron, NamesTheFaceThatIsWrong) {
   const std::vector<Vector3> corners = box_corners({1, 1, 1});
   Faces faces = box_faces();
@@ -126,7 +148,8 @@ TEST(ConvexHull, LeavesOutWhatIsInsideAndMergesFaces) {
   const auto hull = convex_hull(points, &why);
   ASSERT_TRUE(hull) << why;
   EXPECT_EQ(hull->faces.size(), 6U);
-  for (const Vector3& v : hull->vertices) EXPECT_NE((v.cwiseAbs().array() == Eigen::Array3d(1, 2, 3)).count(), 0);
+  EXPECT_EQ(hull->vertices.size(), 8U);
+  for (const Vector3& v : hull->vertices) EXPECT_EQ(v.cwiseAbs(), Vector3(1, 2, 3));
 }
 
 TEST(ConvexHull, HoldsEveryPointAndOnlyWithinItsFaces) {

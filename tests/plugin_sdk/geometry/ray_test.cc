@@ -151,6 +151,30 @@ TEST(Ray, KeepsItsDigitsFarFromTheSolid) {
     ASSERT_TRUE(other);
     EXPECT_NEAR(other->distance, far - 0.8, 4e-9 + 4e-16 * far);
   }
+  // half way down the slope of a cone of height 2
+  const SceneShape cone = struck_shape_of(SceneShape::Kind::kCone, {1, 1, 1});
+  for (const double far : {1e3, 1e6, 1e8}) {
+    const std::optional<RayHit> hit = cast_ray(cone, {{-far, 0.0, 0.0}, Vector3::UnitX(), 2.0 * far});
+    ASSERT_TRUE(hit);
+    EXPECT_NEAR(hit->distance, far - 0.5, 4e-16 * far);
+  }
+}
+
+// Aimed at the diagonal that two triangles share, from all sides.
+TEST(Ray, DoesNotSlipThroughBetweenTriangles) {
+  const SceneShape cube = cube_mesh(false);
+  std::mt19937_64 random(7);
+  const auto draw = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  for (const double far : {5.0, 50.0, 1e3}) {
+    for (int i = 0; i < 2000; ++i) {
+      // of the face x = -1, from (-1, -1, -1) to (-1, 1, 1)
+      const double along = draw(-0.9, 0.9);
+      const Vector3 place(-1.0, along, along), way = Vector3(1.0, draw(-0.5, 0.5), draw(-0.5, 0.5)).normalized();
+      const std::optional<RayHit> hit = cast_ray(cube, {place - far * way, way, 2.0 * far});
+      ASSERT_TRUE(hit) << far;
+      EXPECT_NEAR(hit->distance, far, 1e-12 * far);
+    }
+  }
 }
 
 }  // namespace

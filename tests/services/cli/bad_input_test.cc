@@ -278,7 +278,9 @@ TEST(BadInput, WhatIsReadIsNotWrittenOver) {
            {{solid, "--report", "x.obj"}, "--report x.obj: it is the same file as a mesh of the scene, " + obj},
            {{solid, "--checkpoint", "x.obj"}, "the same file as a mesh of the scene, " + obj},
            {{"--edit", "add added.gravitas@step=1", "--events", added},
-            "the same file as --edit add " + added + "; allowed"}}) {
+            "the same file as --edit add " + added + "; allowed"},
+           {{"--edit", "add solid.gravitas@step=1", "--trajectory", "x.obj"},
+            "the same file as a mesh of the scene, "}}) {
     std::vector<std::string> arguments = {"run", scene};
     arguments.insert(arguments.end(), options.begin(), options.end());
     const ProgramResult result = run_program(arguments, folder);
@@ -321,6 +323,7 @@ TEST(BadInput, NoFileIsWrittenTwice) {
   EXPECT_EQ(run({"--resume", "c", "--events", "c.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--resume", "c", "--checkpoint", "c.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--checkpoint", "d", "--events", "d.journal"}).exit_code, 2);
+  EXPECT_EQ(run({"--checkpoint", "d", "--events", "d.tmp"}).exit_code, 2);
   EXPECT_EQ(run({"--resume", "c"}).exit_code, 0);
 }
 
@@ -413,6 +416,8 @@ TEST(BadInput, OptionsOfTheCommandLine) {
            {{"--threads", "0"}, "--threads: \"0\"; allowed: a whole number from 1 to 1024"},
            {{"--steps", "-1"}, "--steps: \"-1\"; allowed: a whole number from 0 to 4294967295"},
            {{"--steps", "1.5"}, "--steps: \"1.5\"; allowed: a whole number"},
+           {{"--steps", "010"}, "--steps: \"010\"; allowed: a whole number"},
+           {{"--steps", "0x10"}, "--steps: \"0x10\"; allowed: a whole number"},
            {{"--steps", "4294967296"}, "--steps: \"4294967296\"; allowed: a whole number"},
            {{"--dt", "abc"}, "--dt: \"abc\"; allowed: a finite number of seconds > 0"},
            {{"--duration", "abc"}, "--duration: \"abc\"; allowed: a finite number of seconds >= 0"},

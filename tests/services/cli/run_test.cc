@@ -318,6 +318,11 @@ TEST(Run, TellsWhatHasNoNumber) {
   EXPECT_THAT(result.err,
               HasSubstr("m in step 1, over a million times what the scene measures (2 m): that is the speed "
                         "which it was given"));
+  // a checkpoint of it goes on
+  EXPECT_EQ(run_program({"run", scene, "--hosting", "direct", "--steps", "2", "--checkpoint", "c"}, folder).exit_code,
+            0);
+  const ProgramResult resumed = run_program({"run", scene, "--hosting", "direct", "--resume", "c"}, folder);
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
 }
 
 TEST(Run, WarnsOfOrdersBeyondItsEnd) {

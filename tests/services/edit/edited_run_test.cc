@@ -416,6 +416,23 @@ TEST(EditedRun, WhatHoldsASleeperWakesItWhenItChanges) {
   EXPECT_NEAR(laid.end().at("A").velocity.y(), -10 * 20 * kStep, 1e-9);
 }
 
+// B is held to the ceiling by a spring that A alone lists, and falls when that goes; what is left is gravity.
+TEST(EditedRun, WhoASpringHeldWakesWhenItGoes) {
+  EditedRun run(scene("Body { Id = \"Ground\" GeometryId = \"Flat\" }\n"
+                      "Body { Id = \"Ceiling\" GeometryId = \"Flat\" KineticProperties { Position = {0, 4.9, 0} "
+                      "Orientation = {0, 1, 0, 0} } }\n" +
+                      ball("A", "Position = {0, 0.1, 0}", "Forces = { \"Down\", \"Pushes\" }") +
+                      ball("B", "Position = {0, 4.8, 0}", kFalls)),
+                {"set Body.A.Forces={\"Down\"}@step=81", "remove Force.Pushes@step=81"},
+                {"Simulator.SleepEnergy=0.001", "Simulator.SleepTime=0.5"});
+  run.options.scenes.push_back(run.folder.write(
+      "spring.gravitas",
+      "Forces { Force { Type = \"Spring\" Id = \"Pushes\" CustomProperties { Stiffness = 100 RestLength = 6 "
+      "AnchorBody = \"B\" } } }"));
+  run.options.steps = 100;
+  EXPECT_NEAR(run.end().at("B").velocity.y(), -10 * 20 * kStep, 1e-9);
+}
+
 // A plugin that takes over binds joints where they were bound, not where the scene had the bodies.
 TEST(EditedRun, JointsAreBoundAgainWhereTheyWere) {
   BusyRun run;

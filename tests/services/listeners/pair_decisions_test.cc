@@ -157,6 +157,11 @@ TEST(PairDecisions, AnImpossibleMaterialIsNotUsed) {
     ASSERT_EQ(decided.problems.size(), 1U);
     EXPECT_THAT(decided.problems[0], HasSubstr("allowed: finite ones >= 0"));
   }
+  const auto bouncy = std::make_shared<Says>([](PairQuestion* pair) { pair->material[kRestitution] = 1.2; });
+  const Decided decided = decide(head_on(), bouncy);
+  EXPECT_EQ(decided.chain, quiet);
+  ASSERT_EQ(decided.problems.size(), 1U);
+  EXPECT_THAT(decided.problems[0], HasSubstr("the restitution 1.2; allowed: 0 to 1"));
 }
 
 // Waits until the test lets it go.
@@ -208,6 +213,46 @@ TEST(ListenedRun, AFailureIsAWarningAndAnEventAndTheRunGoesOn) {
   EXPECT_THAT(harness::read_file(options.events), HasSubstr("\"kind\":\"listener\""));
   options.listener = nullptr;
   EXPECT_EQ(run_quietly(options).report.chain_hash(), result.report.chain_hash());
+}
+
+// A body that comes first by its row, one of other pairs that changes, and one whose material does.
+TEST(ListenedRun, DecisionsHoldOverEditsButOfMaterialsThatChange) {
+  const ScratchFolder folder;
+  const std::string scene = folder.write("scene.gravitas", R"(
+Geometries { Geometry { Type = "Sphere" Id = "Unit" CustomProperties { Radius = 0.1 } }
+             Geometry { Type = "Halfspace" Id = "Flat" } }
+Materials { Material { Id = "Rubber" RestitutionCoefficient = 0.5 } }
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, -10, 0} } } }
+Simulator { CustomProperties { TimeStep = 0.01 Duration = 1 } }
+Environment { Space { Bodies {
+  Body { Id = "First" GeometryId = "Unit" Mass = 1 KineticProperties { Position = {50, 90, 0} } }
+  Body { Id = "A" GeometryId = "Unit" Mass = 1 Material = "Rubber" KineticProperties { Position = {0, 0.3, 0} } Forces = { "Down" } }
+  Body { Id = "Ground" GeometryId = "Flat" }
+} } })");
+  const auto asks = [&](const std::vector<std::string>& edits, double* lowest) {
+    std::vector<std::string> asked;
+    RunOptions options;
+    options.scenes = {scene};
+    options.edits = edits;
+    options.hosting = {{std::nullopt, Hosting::kDirect}};
+    options.listener_deadline = 10.0;
+    options.listener = std::make_shared<Says>([&](PairQuestion* pair) {
+      asked.push_back(pair->id_a + " " + pair->id_b);
+      pair->may_collide = false;
+    });
+    const RunResult result = run_quietly(options);
+    EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    *lowest = result.report.linear_momentum().final(1);
+    return asked;
+  };
+  double falls = 0.0;
+  EXPECT_THAT(asks({}, &falls), ::testing::ElementsAre("First Ground", "A Ground"));
+  EXPECT_NEAR(falls, -10.0, 1e-12);
+  EXPECT_THAT(asks({"set Body.First.Mass=2@step=60", "remove Body.First@step=70"}, &falls),
+              ::testing::ElementsAre("First Ground", "A Ground"));
+  EXPECT_NEAR(falls, -10.0, 1e-12) << "it falls on through the ground";
+  EXPECT_THAT(asks({"set Material.Rubber.RestitutionCoefficient=0.7@step=60"}, &falls),
+              ::testing::ElementsAre("First Ground", "A Ground", "A Ground"));
 }
 
 TEST(ListenedRun, IsNotResumed) {

@@ -4,8 +4,10 @@
 #include <signal.h>
 #include <sys/resource.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/recorder/checkpoint.h"
@@ -129,6 +131,25 @@ TEST(ResumedSwap, IsRolledBackAsInTheRunThatNeverStopped) {
       EXPECT_EQ(resumed.report.swaps(0).outcome(), expected.report.swaps(0).outcome());
     }
   }
+}
+
+// Its events were told before the checkpoint.
+TEST(ResumedSwap, IsToldOnce) {
+  const ScratchFolder folder;
+  RunOptions part = options_of("two_spheres_motor", Hosting::kDirect, 60);
+  part.swaps = {"solver=Newton@step=50"};
+  part.checkpoint = folder.path("checkpoint");
+  part.events = folder.path("events");
+  part.event_kinds = {"swap"};
+  ASSERT_EQ(run_quietly(part).outcome, RunOutcome::kCompleted);
+  EXPECT_THAT(harness::read_file(part.events), HasSubstr("committed"));
+  RunOptions rest = part;
+  rest.checkpoint.clear();
+  rest.resume = part.checkpoint;
+  rest.steps = 80;
+  rest.events = folder.path("more");
+  ASSERT_EQ(run_quietly(rest).outcome, RunOutcome::kCompleted);
+  EXPECT_EQ(harness::read_file(rest.events), "");
 }
 
 // To the plugin before it, which another swap had brought in, and not to the scene's.
@@ -268,6 +289,24 @@ TEST_F(Killed, ATornJournalIsUsedAsFarAsItGoes) {
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("are no whole record")));
   EXPECT_EQ(read_journal(read_whole_file(journal_), run_identity(), 0).commits.size(), 250U);
+}
+
+// By whatever name the checkpoint is known: over a symbolic link, or spelt otherwise.
+TEST_F(Killed, TheJournalIsThatOfTheFileItself) {
+  const std::string link = folder_.path("latest");
+  std::filesystem::create_symlink("checkpoint", link);
+  const std::string spelt = folder_.path("./checkpoint");
+  const std::vector<std::byte> checkpoint = read_whole_file(path_), journal = read_whole_file(journal_);
+  for (const auto& [resume, target] : {std::pair{link, link}, {path_, spelt}, {spelt, path_}, {link, path_}}) {
+    replace_file(path_, checkpoint);
+    replace_file(journal_, journal);
+    RunOptions options = go_on();
+    options.resume = resume;
+    options.checkpoint = target;
+    const RunResult result = run_quietly(options);
+    EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    EXPECT_EQ(read_journal(read_whole_file(journal_), run_identity(), 0).commits.size(), 250U) << resume << target;
+  }
 }
 
 TEST_F(Killed, AForeignJournalIsLeftAsideWithAWarning) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "services/run/session.h"
+#include "tests/run_quietly.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -188,6 +189,22 @@ Environment { Space { Bodies {
   };
   EXPECT_THAT(warnings(2e4), ElementsAre(AllOf(HasSubstr("body \"Bob\" went "), HasSubstr("it runs away"))));
   EXPECT_THAT(warnings(1e4), ElementsAre());
+}
+
+// It is named, though rows of bodies changed since.
+TEST(Figures, ABodyThatRanAwayIsNamedAfterAnEdit) {
+  const harness::ScratchFolder folder;
+  RunOptions options;
+  options.scenes = {folder.write("scene.gravitas", R"(
+Forces { Force { Type = "Spring" Id = "Stiff" CustomProperties { Stiffness = 2e4 } } }
+Simulator { CustomProperties { Duration = 1 } }
+Environment { Space { Bodies {
+  Body { Id = "A" Mass = 1 PrincipalMoments = {1, 1, 1} }
+  Body { Id = "TheOneThatRunsAway" Mass = 1 PrincipalMoments = {1, 1, 1} KineticProperties { Position = {1, 0, 0} } Forces = { "Stiff" } } } } })")};
+  options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
+  options.edits = {"remove Body.A@step=50", "remove Body.TheOneThatRunsAway@step=55"};
+  const RunResult result = harness::run_quietly(options);
+  EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("body \"TheOneThatRunsAway\" went ")));
 }
 
 TEST(Figures, OfAnEmptyWorldAreZero) {

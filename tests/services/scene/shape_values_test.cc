@@ -67,6 +67,13 @@ TEST(ShapeValues, WithoutFacesAPolyhedronIsTheHull) {
   EXPECT_EQ(numbers[13], 4.0);
 }
 
+TEST(ShapeValues, BlanksAroundTheNameOfAChildAreDropped) {
+  const BuiltScene scene = built_of(geometry("Compound", "Children = {{\" Block \",{-2,0,0},{1,0,0,0}}}") +
+                                    geometry("Box", "HalfExtents = {1,1,1}", " Block"));
+  EXPECT_THAT(scene.errors(), IsEmpty());
+  EXPECT_TRUE(scene.description.has_value());
+}
+
 TEST(ShapeValues, CompoundsNameTheirChildrenInAnyOrder) {
   const BuiltScene scene =
       built_of(geometry("Compound", "Children = {{\"Block\",{-2,0,0},{1,0,0,0}},{\"Block\",{2,0,0},{1,0,0,0},300}}") +
@@ -147,6 +154,19 @@ TEST_F(ObjFile, IsReadWithPolygonsAndScale) {
   EXPECT_THAT(scene.warnings(), IsEmpty());
   ASSERT_TRUE(scene.description.has_value());
   EXPECT_NEAR(scene.description->bodies[0].mass, 100.0, 1e-11);
+}
+
+// 0.3 and 0.7 are the nearest doubles, as in a scene.
+TEST_F(ObjFile, CoordinatesAreReadToTheLastBit) {
+  const std::string faces = "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const BuiltScene file = with("v 0.3 0.7 +0.1\nv 1.3 0 0\nv 0 1.7 0\nv 0 0 1e-1\n" + faces);
+  const BuiltScene text = built_of(
+      geometry("TriangleMesh",
+               "Vertices = {{0.3,0.7,0.1},{1.3,0,0},{0,1.7,0},{0,0,0.1}} Faces = {{0,2,1},{0,1,3},{0,3,2},{1,2,3}}"));
+  ASSERT_TRUE(file.description.has_value() && text.description.has_value());
+  EXPECT_EQ(file.description->shapes[0].parameters, text.description->shapes[0].parameters);
+  EXPECT_THAT(with("v +-1 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + faces).errors(),
+              ElementsAre(HasSubstr("x.obj:1: a coordinate is \"+-1\"")));
 }
 
 TEST_F(ObjFile, TrianglesWithoutAreaAreCountedAndOpenOnesSaidToBeShells) {

@@ -195,6 +195,29 @@ TEST(Queries, BoxesAreClosestAtTheirCorners) {
   EXPECT_NEAR(answers.closest(0).hits(0).distance(), std::sqrt(3.0), 1e-6);
 }
 
+// Two flush tiles: contacts of a run are mended over their seam, answers are not, whatever else is asked beside.
+TEST(Queries, TilesDoNotHideEachOther) {
+  SurveyedScene scene(R"(
+Geometries { Geometry { Type = "Box" Id = "Tile" CustomProperties { HalfExtents = {1, 0.5, 1} } } }
+Environment { Space { Bodies {
+  Body { Id = "A" GeometryId = "Tile" Immovable = true KineticProperties { Position = {0, -0.5, 0} } }
+  Body { Id = "B" GeometryId = "Tile" Immovable = true KineticProperties { Position = {2, -0.5, 0} } }
+} } })");
+  query::v1::Batch batch;
+  query::v1::ClosestPoints* closest = batch.add_closest();
+  set_ball(0.1, {0.5, 0.3, 0}, closest->mutable_shape());
+  closest->set_distance(1.0);
+  for (const double x : {0.95, 0.5}) set_ball(0.1, {x, 0.05, 0}, batch.add_overlaps()->mutable_shape());
+  const query::v1::Answers answers = ask(&scene, batch);
+  ASSERT_THAT(bodies_of(answers.closest(0).hits()), ElementsAre("A", "B"));
+  EXPECT_NEAR(answers.closest(0).hits(0).distance(), 0.2, 1e-12);
+  EXPECT_NEAR(answers.closest(0).hits(1).distance(), std::hypot(0.5, 0.3) - 0.1, 1e-12);
+  ASSERT_THAT(bodies_of(answers.overlaps(0).hits()), ElementsAre("A", "B"));
+  EXPECT_NEAR(answers.overlaps(0).hits(0).depth(), 0.05, 1e-12);
+  EXPECT_NEAR(answers.overlaps(0).hits(1).depth(), 0.1 - std::hypot(0.05, 0.05), 1e-12);
+  EXPECT_THAT(bodies_of(answers.overlaps(1).hits()), ElementsAre("A"));
+}
+
 // ---- many
 
 std::string crowd(int count, std::uint64_t seed, bool has_ground) {

@@ -291,6 +291,23 @@ void collide_mesh_halfspace(const TriangleMesh& mesh, const Vector3& up, const V
   }
 }
 
+// A mesh that lies wholly inside a closed one, whose triangles it does not meet, leaves over the place nearest to one of its
+// vertices. `sign` 1: the outer mesh is the first of the pair.
+void push_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI, const Pose& X_AO,
+                      double sign, const Collector& out) {
+  const Vector3 p = transform_point(X_OI, inner.vertices()[0]);
+  if (!outer.is_closed() || !outer.box().overlaps({p, p})) return;
+  const TriangleMesh::Nearest nearest = outer.nearest(p);
+  if (!(nearest.signed_distance < 0.0)) return;
+  const Vector3& n = nearest.outward;
+  Vector3 back = p;
+  for (const Vector3& v : inner.vertices())
+    if (const Vector3 x = transform_point(X_OI, v); n.dot(x - back) < 0.0) back = x;
+  const double depth = n.dot(nearest.point - back);
+  out.add(TriangleMesh::kNone,
+          ContactPoint{transform_point(X_AO, 0.5 * (nearest.point + back)), sign * (X_AO.orientation * n), depth, 0});
+}
+
 void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, const Flush& flush,
                        double margin, const Collector& out) {
   const Matrix3 R = X_AB.orientation.toRotationMatrix();
@@ -299,6 +316,7 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
   const Vector3 half = R.cwiseAbs().transpose() * a.box().half_extents();
   const Vector3 middle = R.transpose() * (centre_a - X_AB.position);
   const Box3 box{middle - half, middle + half};
+  bool any = false;
   b.for_each_in(box.widened(margin + 1e-12 * half.maxCoeff()), [&](std::uint32_t tb) {
     std::array<Vector3, 3> corners = b.corners(tb);
     Box3 own;
@@ -319,9 +337,13 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
       Manifold manifold;
       contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
       flush.lay(pair, margin, &manifold);
+      any = any || manifold.count > 0;
       out.add(std::uint64_t{ta} << 32 | tb, manifold);
     });
   });
+  if (any) return;
+  push_out_of_mesh(a, b, X_AB, {}, 1.0, out);
+  push_out_of_mesh(b, a, relative(X_AB, {}), X_AB, -1.0, out);
 }
 
 // ---- parts

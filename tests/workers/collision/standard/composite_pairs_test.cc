@@ -117,6 +117,16 @@ TEST(Mesh, PushesOutwardFromWithin) {
   ASSERT_EQ(inside.size(), 1U);
   EXPECT_NEAR(inside[0].normal.x(), 1.0, 1e-14);
   EXPECT_NEAR(inside[0].depth, 1.05, 1e-14);
+  // another mesh, whichever is the first
+  const Shape& small = shapes.box_mesh({0.1, 0.1, 0.1});
+  for (const bool is_first : {true, false}) {
+    const ContactList nested = is_first ? all_contacts(mesh, at(0, 0, 0), small, at(1.2, 0.3, -0.2))
+                                        : all_contacts(small, at(1.2, 0.3, -0.2), mesh, at(0, 0, 0));
+    ASSERT_EQ(nested.size(), 1U);
+    EXPECT_NEAR(nested[0].normal.x(), is_first ? 1.0 : -1.0, 1e-14);
+    EXPECT_NEAR(nested[0].depth, 0.9, 1e-14);
+    EXPECT_NEAR(nested[0].point.x(), 1.55, 1e-14);
+  }
   // an open field pushes to the side on which the centre is
   const Shape& field = shapes.field(4);
   for (const double side : {1.0, -1.0}) {
