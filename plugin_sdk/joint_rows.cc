@@ -115,7 +115,8 @@ Property restitution_property() {
       .at_least(0.0)
       .at_most(1.0)
       .defaults_to({0.0})
-      .means("Share of the speed at which a limit is met that it is left at; 0: it stops dead.");
+      .means("Share of the speed at which a limit is met that it is left at; 0: it stops dead. Limits that give way have "
+             "none.");
 }
 
 double read_restitution(PropertyCursor* properties, std::string_view type, bool has_stops, std::string_view stops) {

@@ -365,7 +365,7 @@ class Balance {
     if (request_.mode().size() > 0) after = std::min(after, after_there);
     if (after <= before * (1.0 + 1e-9)) return {};
     char text[160];
-    std::snprintf(text, sizeof text, "kinetic energy grows from %.6g J to %.6g J, and nothing drives", before, after);
+    std::snprintf(text, sizeof text, "kinetic energy grows from %.12g J to %.12g J, and nothing drives", before, after);
     return text;
   }
 

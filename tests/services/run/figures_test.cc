@@ -191,6 +191,21 @@ Environment { Space { Bodies {
   EXPECT_THAT(warnings(1e4), ElementsAre());
 }
 
+// Two balls that overlap by 0.15 m are apart after the first inner step, whatever the simulator.
+TEST(Figures, AnOverlapAtTheStartIsPenetration) {
+  for (const char* simulator :
+       {"Type = \"Basic\"", "Type = \"Substepping\" CustomProperties { Substeps = 4 }", "Type = \"Continuous\"",
+        "Type = \"Continuous\" CustomProperties { Accuracy = 1e-6 }", "Type = \"Bisection\""}) {
+    const report::v1::Report report = figures_of(std::string("Simulator { ") + simulator + R"( }
+Geometries { Geometry { Type = "Sphere" Id = "Ball" CustomProperties { Radius = 0.3 } } }
+Environment { Space { Bodies {
+  Body { Id = "A" GeometryId = "Ball" Mass = 1 }
+  Body { Id = "B" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {0.45, 0, 0} } } } } })",
+                                                 3);
+    EXPECT_NEAR(report.max_penetration(), 0.15, 1e-12) << simulator;
+  }
+}
+
 // It is named, though rows of bodies changed since.
 TEST(Figures, ABodyThatRanAwayIsNamedAfterAnEdit) {
   const harness::ScratchFolder folder;
