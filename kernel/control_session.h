@@ -31,6 +31,9 @@ class ControlSession {
   // False when the last heartbeat has been waiting for its answer for long, or the stream has ended.
   bool answers_heartbeats() const;
 
+  // Ends the stream, and whoever waits for it.
+  void cancel();
+
   // Asks the worker to finish and exit.
   void drain();
 
@@ -42,7 +45,6 @@ class ControlSession {
   std::string greet(const control::v1::Hello& hello);
   std::string judge(const control::v1::Hello& hello);
   void beat();
-  void cancel();
 
   static constexpr std::int64_t kAnswered = 0, kEnded = 1;
   std::unique_ptr<control::v1::WorkerControl::Stub> stub_;

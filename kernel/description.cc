@@ -1,5 +1,6 @@
 #include "kernel/description.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -50,6 +51,21 @@ std::string validate_joint(const EnvironmentDescription& d, const ConstraintDesc
 }
 
 }  // namespace
+
+std::string why_apart(const std::vector<PluginChoice>& plugins) {
+  const auto is_apart = [&](const PluginChoice& one) {
+    return !one.command.empty() || one.address != plugins[0].address;
+  };
+  if (plugins.size() < 2 || std::ranges::none_of(plugins, is_apart)) return {};
+  return "a command or an address serves one plugin, and this process would hold others besides";
+}
+
+void SlotDescription::end_attachment() {
+  const auto has_address = [](const PluginChoice& one) { return !one.address.empty(); };
+  if (!attached || std::ranges::any_of(plugins, has_address)) return;
+  attached = false;
+  deadline = SlotDescription().deadline;
+}
 
 const char* hosting_name(Hosting hosting) {
   constexpr const char* kNames[] = {"direct", "shm", "grpc"};

@@ -41,7 +41,12 @@ struct PluginChoice {
   std::string address = {};
   // What takes over when nothing else helps, with the same types; null: nothing.
   std::shared_ptr<const PluginChoice> fallback = nullptr;
+
+  bool is_elsewhere() const { return !command.empty() || !address.empty(); }
 };
+
+// Why one process cannot hold these; empty if it can.
+std::string why_apart(const std::vector<PluginChoice>& plugins);
 
 // Deadline of a worker that stops in a debugger, s.
 inline constexpr double kAttachedDeadline = 1e8;
@@ -65,6 +70,9 @@ struct SlotDescription {
   std::string process = {};
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
   Defences defences = {};
+
+  // Whoever takes over from a worker that was started by hand has a deadline again.
+  void end_attachment();
 };
 
 struct ShapeDescription {

@@ -82,13 +82,15 @@ std::string Environment::why_unfit(const PluginDeclaration& plugin) const {
 
 void Environment::check_fallbacks() const {
   for (const StageSlot* slot : slots_)
-    for (const PluginChoice& plugin : slot->description().plugins) {
+    for (std::uint32_t row = 0; row < slot->description().plugins.size(); ++row) {
+      const PluginChoice& plugin = slot->description().plugins[row];
       if (const std::string why = why_unfit(plugin.declaration); !why.empty())
         throw UnfitPlugin(why, needed_capability(slot->which()));
       if (!plugin.fallback) continue;
       const PluginDeclaration& fallback = plugin.fallback->declaration;
       std::string why = why_no_stand_in(plugin.declaration, fallback, types_in_use(description_, slot->which()));
       if (why.empty()) why = why_unfit(fallback);
+      if (why.empty()) why = slot->why_no_fallback(row);
       if (!why.empty())
         throw std::invalid_argument("fallback " + fallback.name + " of " + plugin.declaration.name + ": " + why);
     }

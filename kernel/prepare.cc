@@ -43,7 +43,6 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
   for (const State& state : states_) state.write(description_);
   data_.margin[0] = margin_;
   data_.theta[0] = description_.integrator.plugins.empty() ? 0.5 : description_.integrator.plugins[0].declaration.theta;
-  check_fallbacks();
   start_slots(starter);
   for (const ConstraintGroup& group : model_.constraint_groups) bind(group);
   ask_constant_forces();
@@ -58,6 +57,7 @@ Environment::~Environment() {
 
 void Environment::start_slots(const HostStarter& starter) {
   for (StageSlot* slot : slots_) slot->find_hosts(slots_, description_.threads, starter);
+  check_fallbacks();
   for (StageSlot* slot : slots_) slot->start(this, &faults_);
   for (StageSlot* slot : slots_) slot->finish_start();
 }

@@ -21,15 +21,18 @@ StageSlot::StageSlot(Slot which, SlotDescription description) : which_(which), d
 void StageSlot::find_hosts(std::span<StageSlot* const> slots, std::uint32_t threads, const HostStarter& starter) {
   slots_ = slots;
   for (const PluginChoice& plugin : description_.plugins) {
-    const bool is_elsewhere = !plugin.command.empty() || !plugin.address.empty();
+    // a command may have to take over, which serves nobody besides
+    const auto is_alone = [](const PluginChoice& one) {
+      return !one.command.empty() || (one.address.empty() && one.fallback && one.fallback->is_elsewhere());
+    };
     const auto shares = [&](const StageSlot* slot) {
       return slot == this || (!description_.process.empty() && slot->description_.process == description_.process &&
-                              slot->description_.hosting == description_.hosting && !is_elsewhere &&
+                              slot->description_.hosting == description_.hosting && plugin.address.empty() &&
                               description_.hosting != Hosting::kDirect);
     };
     const auto takes = [&](const std::shared_ptr<SlotHost>& one) {
       const PluginChoice& first = one->description().plugins[0];
-      return first.command.empty() && plugin.command.empty() && first.address == plugin.address;
+      return !is_alone(first) && !is_alone(plugin) && first.address == plugin.address;
     };
     std::shared_ptr<SlotHost> host;
     for (const StageSlot* slot : slots_) {
@@ -40,7 +43,7 @@ void StageSlot::find_hosts(std::span<StageSlot* const> slots, std::uint32_t thre
     if (!host) {
       SlotDescription description = description_;
       description.plugins.clear();
-      if (is_elsewhere) description.hosting = Hosting::kGrpc;
+      if (plugin.is_elsewhere()) description.hosting = Hosting::kGrpc;
       host = std::make_shared<SlotHost>(std::move(description), threads, starter);
     }
     if (std::ranges::find(hosts_, host) == hosts_.end()) hosts_.push_back(host);
@@ -126,8 +129,12 @@ void StageSlot::call_with_room(Carrier* carrier, const StageCall& call, Arena* a
     if (result.status == GRAVITAS_OK) return;
     // who took over in the middle may know none: the question has no answer any more
     if (result.status == GRAVITAS_UNKNOWN_METHOD &&
-        (call.method == stage::Method::kForceJacobians || call.method == stage::Method::kSolverReactionJacobians))
+        (call.method == stage::Method::kForceJacobians || call.method == stage::Method::kSolverReactionJacobians)) {
+      // what was refused of the attempt before is none; in a comparison they hold what the answer is held against
+      for (const ColumnId column : call.reply)
+        if (!call.is_compared) arena->set_count(column, 0);
       return;
+    }
     if (result.status == GRAVITAS_REFUSED)
       throw StageFault(FaultKind::kRefusal, "status", "it refused: " + result.text);
     if (result.status != GRAVITAS_NEEDS_CAPACITY)

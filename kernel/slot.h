@@ -65,6 +65,10 @@ class StageSlot {
   void drain();
 
   bool is_running() const { return !hosts_.empty(); }
+  // Why the host of the plugin in row `target` could not hold its fallback; empty if it could.
+  std::string why_no_fallback(std::uint32_t target) const {
+    return hosts_[routes_[target].host]->why_no_fallback(which_);
+  }
   Slot which() const { return which_; }
   const SlotDescription& description() const { return description_; }
   std::vector<std::string> take_complaints();
@@ -120,7 +124,8 @@ class StageSlot {
   void set_rerun_every(std::uint32_t steps);
 
  private:
-  // The plugins of a slot live in one host, but for those that are commands or at an address; hosts may be shared.
+  // The plugins of a slot live in one host, but for those that are commands, are at an address or may be followed by such;
+  // hosts may be shared.
   struct Route {
     std::size_t host;
     std::uint32_t target;

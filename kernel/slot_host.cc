@@ -123,28 +123,37 @@ void SlotHost::replace_description(SlotDescription description) {
   ++revision_;
 }
 
+SlotDescription SlotHost::after_fallback(Slot slot) const {
+  SlotDescription next = description_;
+  // what nobody vouches for does not come into this process
+  if (next.hosting == Hosting::kDirect) next.hosting = Hosting::kSharedMemory;
+  for (PluginChoice& plugin : next.plugins) {
+    if (plugin.declaration.slot != slot || !plugin.fallback) continue;
+    plugin = PluginChoice(*plugin.fallback);
+    plugin.fallback = nullptr;
+    if (plugin.is_elsewhere()) next.hosting = Hosting::kGrpc;
+  }
+  next.end_attachment();
+  return next;
+}
+
 std::string SlotHost::next_rung(Slot slot) {
   if (const auto previous = previous_.extract(slot)) {
     SlotDescription next = description_;
     next.hosting = previous.mapped().hosting;
+    next.attached = previous.mapped().attached;
+    next.deadline = previous.mapped().deadline;
     for (std::size_t i = 0; i < next.plugins.size(); ++i)
       if (next.plugins[i].declaration.slot == slot) next.plugins[i] = previous.mapped().plugins[i];
     replace_description(std::move(next));
     return "previous build";
   }
-  const auto has_fallback = [&](const PluginChoice& one) { return one.declaration.slot == slot && one.fallback; };
-  if (std::ranges::none_of(description_.plugins, has_fallback)) return {};
-  SlotDescription next = description_;
-  // what nobody vouches for does not come into this process
-  if (next.hosting == Hosting::kDirect) next.hosting = Hosting::kSharedMemory;
   std::string names;
-  for (PluginChoice& plugin : next.plugins) {
-    if (!has_fallback(plugin)) continue;
-    plugin = PluginChoice(*plugin.fallback);
-    plugin.fallback = nullptr;
-    names += (names.empty() ? "" : ", ") + plugin.declaration.name;
-  }
-  replace_description(std::move(next));
+  for (const PluginChoice& plugin : description_.plugins)
+    if (plugin.declaration.slot == slot && plugin.fallback)
+      names += (names.empty() ? "" : ", ") + plugin.fallback->declaration.name;
+  if (names.empty()) return {};
+  replace_description(after_fallback(slot));
   return "fallback " + names;
 }
 

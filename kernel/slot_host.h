@@ -75,6 +75,8 @@ class SlotHost {
   std::unique_ptr<Spare> prepare(const SlotDescription& description) const;
   // Lets `carrier`, with another plugin of the slot, answer from now on; the old one stays warm until end_probation().
   void cut_over(Slot slot, std::unique_ptr<Carrier> carrier, SlotDescription description);
+  // Why the slot's fallbacks could not be held; empty if they could.
+  std::string why_no_fallback(Slot slot) const { return why_apart(after_fallback(slot).plugins); }
   bool is_on_probation() const { return old_ != nullptr; }
   void end_probation();
   // Ends a host in the background: a dying process must not hold up a step.
@@ -90,6 +92,8 @@ class SlotHost {
   std::string take_host();
   // Empty: there is none.
   std::string next_rung(Slot slot);
+  // Once those plugins of the slot that have a fallback are replaced by it.
+  SlotDescription after_fallback(Slot slot) const;
   void replace_description(SlotDescription description);
 
   SlotDescription description_;

@@ -83,7 +83,8 @@ void StageSlot::prepare_swaps() {
     swap.next.plugins[row] = swap.order.plugin;
     swap.next.plugins[row].fallback = now.plugins[row].fallback;
     if (swap.order.hosting) swap.next.hosting = *swap.order.hosting;
-    if (!swap.order.plugin.command.empty() || !swap.order.plugin.address.empty()) swap.next.hosting = Hosting::kGrpc;
+    if (swap.order.plugin.is_elsewhere()) swap.next.hosting = Hosting::kGrpc;
+    swap.next.end_attachment();
     const bool shows_hosting = swap.next.hosting != now.hosting;
     swaps_[swap.record].from = shows_hosting ? shown(now.plugins[row], now) : now.plugins[row].declaration.name;
     if (shows_hosting) swaps_[swap.record].to = shown(swap.order.plugin, swap.next);
@@ -273,7 +274,9 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
       if (!fault.plugin.empty()) throw;
       checker->kill();
       host.retire(std::move(checker));
-      return true;
+      if (fault.kind != FaultKind::kDeath && fault.kind != FaultKind::kDeadline) return true;
+      complaints_.push_back("a re-run came to nothing: " + fault.text());
+      return unknown;
     }
   };
   const auto keep = [&] {
@@ -290,7 +293,8 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   keep();
   if (revisions() != revisions_before) return;
   if (is_outvoted)
-    throw StageFault(FaultKind::kDisagreement, "re-run", "two other processes answered the same request otherwise");
+    throw StageFault(FaultKind::kDisagreement, "re-run",
+                     "another process answered the same request otherwise, and no third agreed");
   complaints_.emplace_back("another process answered the same request otherwise; a third agreed with the first");
 }
 

@@ -40,7 +40,11 @@ int open_regular(const std::string& path) {
 int private_copy(const std::string& path) {
   const int source = open_regular(path);
   struct stat status;
-  if (source < 0 || fstat(source, &status) != 0) return -1;
+  if (source < 0) return -1;
+  if (fstat(source, &status) != 0) {
+    close_keeping_errno(source);
+    return -1;
+  }
   int copy = memfd_create("gravitas plugin", MFD_CLOEXEC);
   off_t offset = 0;
   while (copy >= 0 && offset < status.st_size) {
@@ -82,6 +86,7 @@ std::vector<Property> read_properties(const gravitas_property* plain, std::uint6
   return properties;
 }
 
+// 0 if it could not be taken.
 std::uint64_t content_digest(int descriptor) {
   struct stat status;
   if (fstat(descriptor, &status) != 0 || status.st_size == 0) return 0;
@@ -189,7 +194,7 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
   static std::map<std::uint64_t, PluginLibrary> loaded;
   const std::lock_guard lock(mutex);
   const std::uint64_t content = content_digest(copy);
-  if (const auto known = loaded.find(content); known != loaded.end()) {
+  if (const auto known = loaded.find(content); content != 0 && known != loaded.end()) {
     close(copy);
     return known->second;
   }
@@ -202,7 +207,7 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     return {};
   }
   PluginLibrary library = checked(handle, control, path, problem);
-  if (library.table != nullptr) loaded.emplace(content, library);
+  if (library.table != nullptr && content != 0) loaded.emplace(content, library);
   return library;
 }
 

@@ -19,6 +19,8 @@ namespace {
 
 class DirectCarrier final : public Carrier {
  public:
+  // Without plugins: so that those that are there are let go when the next one refuses.
+  explicit DirectCarrier(std::uint32_t threads) : threads_(threads) {}
   DirectCarrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads);
   ~DirectCarrier() override;
 
@@ -40,7 +42,7 @@ class DirectCarrier final : public Carrier {
   ThreadPool threads_;
 };
 
-DirectCarrier::DirectCarrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads) : threads_(threads) {
+DirectCarrier::DirectCarrier(const std::vector<PluginChoice>& plugins, std::uint32_t threads) : DirectCarrier(threads) {
   for (const PluginChoice& plugin : plugins) {
     std::string problem;
     PluginLibrary library = load_plugin_library(plugin.library, &problem);

@@ -71,6 +71,8 @@ class GrpcCarrier final : public Carrier {
   Stream& stream_of(const MethodInfo& method, Patience* patience);
   void write(Stream* stream, const grpc::ByteBuffer& message, Patience* patience);
   void wait(Stream* stream, Patience* patience);
+  // Throws if no time is left.
+  void check_time(const Patience& patience);
   [[noreturn]] void report_broken(Stream* stream, const Patience& patience);
   [[noreturn]] void report_death(const Patience& patience) {
     link_.report_death(patience.is_unread && link_.requests_taken() == patience.taken);
@@ -140,10 +142,13 @@ void GrpcCarrier::wait(Stream* stream, Patience* patience) {
       return;
     }
     if (link_.has_ended()) report_death(*patience);
-    const std::uint64_t later = channel::now_ns();
-    if (later < patience->until && later < patience->cap) continue;
-    link_.report_overdue(later >= patience->cap, patience->deadline_ns);
+    check_time(*patience);
   }
+}
+
+void GrpcCarrier::check_time(const Patience& patience) {
+  const std::uint64_t now = channel::now_ns();
+  if (now >= std::min(patience.until, patience.cap)) link_.report_overdue(now >= patience.cap, patience.deadline_ns);
 }
 
 GrpcCarrier::Stream& GrpcCarrier::stream_of(const MethodInfo& method, Patience* patience) {
@@ -222,7 +227,8 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   leave_out_known(&stream, method, request, hashes, &header, &patience);
   write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
 
-  for (;;) {
+  // after all that is no answer, since whoever sends such things without end is never waited for
+  for (;; check_time(patience)) {
     stream.io->Read(&stream.incoming, &stream);
     wait(&stream, &patience);
     const wire::FlatMessage flat(stream.incoming);
@@ -285,10 +291,10 @@ void GrpcCarrier::answer_callback(Stream* stream, const wire::ColumnsReader& rea
 
   const std::uint64_t asked = channel::now_ns();
   derivatives->evaluate();
-  // the plugin's clock stood still
-  const std::uint64_t pause = channel::now_ns() - asked;
-  patience->until += pause;
-  patience->cap += pause;
+  // the plugin's clock stood still, and it has shown that it gets on
+  const std::uint64_t now = channel::now_ns();
+  patience->until = now + patience->deadline_ns;
+  patience->cap += now - asked;
   const auto answer = plain_columns(*arena, derivatives->answer_columns());
   write(stream, wire::to_byte_buffer({{}, {}, &header, kDerivative.reply, answer}), patience);
 }

@@ -219,13 +219,14 @@ gravitas_frame_header SharedMemoryCarrier::wait_for_message(std::uint64_t start,
         seen_marks_ = marks();
         seen_ns_ = channel::now_ns();
         *spent_ns += seen_ns_ - start;
+        // who asks without end is never waited for
+        if (header.kind == GRAVITAS_FRAME_CALLBACK && seen_ns_ >= cap) link_->report_overdue(true, deadline_ns);
         return header;
       }
       // a late or foreign message is dropped
       if (seen_ != channel::kEnded && header.epoch == link_->epoch() && header.magic != GRAVITAS_MAGIC)
         link_->report_bad_frame("a header without the magic");
-      now = channel::now_ns();
-      continue;
+      if (seen_ == channel::kEnded) continue;
     }
     now = channel::now_ns();
     if (const std::uint64_t new_marks = marks(); new_marks != last_marks) {

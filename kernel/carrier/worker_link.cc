@@ -17,6 +17,7 @@
 #include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/channel/mailbox.h"
 #include "plugin_sdk/channel/private_folder.h"
+#include "plugin_sdk/shell_word.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -84,7 +85,8 @@ ListeningCommand start_listening_command(const std::string& command, std::chrono
   if (folder.path().empty()) fail_start("no folder for its socket: " + std::string(std::strerror(errno)));
   const std::string socket = folder.path() + "/worker";
   std::vector<std::string> words = worker_words();
-  words.insert(words.end(), {"--exec", "/bin/sh", "-c", "exec env " + command + " --listen unix:" + socket});
+  words.insert(words.end(),
+               {"--exec", "/bin/sh", "-c", "exec env " + command + " --listen " + shell_word("unix:" + socket)});
   ListeningCommand started{spawn(words, {}, std::move(on_end)), -1};
   const auto until = std::chrono::steady_clock::now() + limit;
   while ((started.descriptor = channel::connect_to("unix:" + socket)) < 0) {
@@ -120,9 +122,8 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
   hello.set_epoch(epoch_);
   hello.set_nonce(channel::now_ns() ^ (static_cast<std::uint64_t>(getpid()) << 32));
   hello.set_threads(threads);
+  if (const std::string why = why_apart(slot.plugins); !why.empty()) fail_start(why);
   for (const PluginChoice& plugin : slot.plugins) {
-    if (slot.plugins.size() > 1 && (!plugin.command.empty() || plugin.address != address_))
-      fail_start("a command or an address serves one plugin, and this process would hold others besides");
     control::v1::PluginSettings* settings = hello.add_plugins();
     settings->set_plugin(plugin.declaration.name);
     plugins_.push_back(plugin.declaration.name);
@@ -141,7 +142,14 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
   } else {
     start_program(slot, threads, with_descriptors, std::move(on_end));
   }
-  control_ = std::make_unique<ControlSession>(channel_, std::move(hello));
+  try {
+    control_ = std::make_unique<ControlSession>(channel_, std::move(hello));
+  } catch (...) {
+    // no thread: nobody else would end what was started
+    kill();
+    if (descriptor_socket_ >= 0) close(descriptor_socket_);
+    throw;
+  }
 }
 
 void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t threads, bool with_descriptors,
@@ -164,23 +172,27 @@ void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t thread
   if (with_descriptors) {
     arguments.insert(arguments.end(), {"--descriptor-fd", "4"});
     inherited.push_back(descriptors[1]);
-  } else {
-    watch_->shut_at_end(control[0]);
-    on_end = [watch = watch_] { watch->say_ended(); };
-    arguments.insert(arguments.end(), {"--mailbox-fd", "4"});
-    inherited.push_back(fcntl(watch_->descriptor(), F_DUPFD_CLOEXEC, 0));
   }
-  if (const std::uint64_t memory = kWorkerMemory / 2 + threads * kThreadMemory; memory > kWorkerMemory)
-    arguments.insert(arguments.end(), {"--memory-limit", std::to_string(memory)});
-  for (const PluginChoice& plugin : slot.plugins) arguments.push_back(plugin.library);
+  const auto close_all = [&] {
+    for (const int descriptor : inherited) close(descriptor);
+  };
   try {
+    if (!with_descriptors) {
+      watch_->shut_at_end(control[0]);
+      on_end = [watch = watch_] { watch->say_ended(); };
+      arguments.insert(arguments.end(), {"--mailbox-fd", "4"});
+      inherited.push_back(fcntl(watch_->descriptor(), F_DUPFD_CLOEXEC, 0));
+    }
+    if (const std::uint64_t memory = kWorkerMemory / 2 + threads * kThreadMemory; memory > kWorkerMemory)
+      arguments.insert(arguments.end(), {"--memory-limit", std::to_string(memory)});
+    for (const PluginChoice& plugin : slot.plugins) arguments.push_back(plugin.library);
     process_ = spawn(arguments, inherited, std::move(on_end));
   } catch (...) {
-    for (const int descriptor : inherited) close(descriptor);
+    close_all();
     if (descriptor_socket_ >= 0) close(descriptor_socket_);
     throw;
   }
-  for (const int descriptor : inherited) close(descriptor);
+  close_all();
 }
 
 WorkerLink::~WorkerLink() {
@@ -192,7 +204,7 @@ WorkerLink::~WorkerLink() {
 }
 
 void WorkerLink::finish() {
-  const std::stop_callback give_up(stop_, [this] { kill(); });
+  const std::stop_callback give_up(stop_, [this] { process_ ? kill() : control_->cancel(); });
   std::string problem = control_->wait_until_ready(kStartLimit);
   const auto& served = control_->welcome().plugins();
   if (problem.empty() && served.size() != static_cast<int>(plugins_.size()))

@@ -36,11 +36,16 @@ EndWatch::~EndWatch() {
 void EndWatch::shut_at_end(int socket) {
   const int own = fcntl(socket, F_DUPFD_CLOEXEC, 0);
   if (own < 0) return;
-  thread_ = std::thread([this, own] {
-    wait_for_change(theirs_, kAlive);
-    shutdown(own, SHUT_RDWR);
+  try {
+    thread_ = std::thread([this, own] {
+      wait_for_change(theirs_, kAlive);
+      shutdown(own, SHUT_RDWR);
+      close(own);
+    });
+  } catch (...) {
     close(own);
-  });
+    throw;
+  }
 }
 
 }  // namespace gravitas::channel

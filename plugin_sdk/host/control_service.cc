@@ -94,18 +94,20 @@ std::vector<std::string> ControlService::take_complaints() {
 
 grpc::Status ControlService::Session(grpc::ServerContext*,
                                      grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
+  // who says nothing keeps nobody away
+  KernelMessage message;
+  if (!stream->Read(&message) || !message.has_hello())
+    return {grpc::StatusCode::INVALID_ARGUMENT, "the first message must be Hello"};
   if (taken_.exchange(true)) return {grpc::StatusCode::ALREADY_EXISTS, "this worker has its kernel"};
-  grpc::Status status = serve_kernel(stream);
+  grpc::Status status = serve_kernel(message.hello(), stream);
   taken_ = false;
   return status;
 }
 
-grpc::Status ControlService::serve_kernel(grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
+grpc::Status ControlService::serve_kernel(const Hello& hello,
+                                          grpc::ServerReaderWriter<WorkerMessage, KernelMessage>* stream) {
   KernelMessage message;
-  if (!stream->Read(&message) || !message.has_hello())
-    return {grpc::StatusCode::INVALID_ARGUMENT, "the first message must be Hello"};
-
-  const Admission admission = judge(message.hello());
+  const Admission admission = judge(hello);
   if (!admission.text.empty()) {
     WorkerMessage answer;
     answer.mutable_refusal()->set_reason(admission.reason);
@@ -117,7 +119,7 @@ grpc::Status ControlService::serve_kernel(grpc::ServerReaderWriter<WorkerMessage
     on_end(false);
     return grpc::Status::OK;
   }
-  stream->Write(welcome(message.hello()));
+  stream->Write(welcome(hello));
   WorkerMessage ready;
   ready.mutable_ready();
   stream->Write(ready);

@@ -51,7 +51,8 @@ class ControlService final : public control::v1::WorkerControl::Service {
       grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream) override;
 
  private:
-  grpc::Status serve_kernel(grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream);
+  grpc::Status serve_kernel(const control::v1::Hello& hello,
+                            grpc::ServerReaderWriter<control::v1::WorkerMessage, control::v1::KernelMessage>* stream);
   std::vector<std::string> take_complaints();
   control::v1::WorkerMessage welcome(const control::v1::Hello& hello) const;
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "plugin_sdk/channel/address.h"
+#include "plugin_sdk/shell_word.h"
 
 namespace gravitas::scene {
 namespace {
@@ -32,10 +33,7 @@ std::string quoted(const std::string& name) { return '"' + name + '"'; }
 // The command as one that runs in the folder.
 std::string in_folder(const std::filesystem::path& folder, const std::string& command) {
   if (folder.empty()) return command;
-  std::string quoted_folder;
-  for (const char c : std::filesystem::absolute(folder).string())
-    quoted_folder += c == '\'' ? "'\\''" : std::string(1, c);
-  return "env -C '" + quoted_folder + "' " + command;
+  return "env -C " + shell_word(std::filesystem::absolute(folder).string()) + " " + command;
 }
 
 }  // namespace

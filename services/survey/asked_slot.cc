@@ -48,10 +48,9 @@ AskedSlot::AskedSlot(Slot which, kernel::SlotDescription description, std::uint3
   description_.standbys = 0;
   // whoever debugs a worker of the run shall not find questions in it
   if (description_.attached) {
-    description_.attached = false;
     description_.hosting = kernel::Hosting::kSharedMemory;
-    description_.deadline = kernel::SlotDescription().deadline;
     for (kernel::PluginChoice& plugin : description_.plugins) plugin.address.clear();
+    description_.end_attachment();
   }
   for (std::uint32_t i = 0; i < stage::kMethodCount; ++i) {
     const auto method = static_cast<stage::Method>(i);

@@ -8,7 +8,9 @@
 
 #include <cstring>
 #include <string>
+#include <vector>
 
+#include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
 #include "plugin_sdk/floating_point.h"
 #include "tests/kernel/world_builder.h"
@@ -203,6 +205,15 @@ TEST(FailingPlugins, ALibraryThatIsNoPluginIsNamedAtTheStart) {
       EXPECT_NE(fault.text().find("README.md"), std::string::npos) << fault.text();
     }
   }
+}
+
+// The sanitizer sees those that are not.
+TEST(FailingPlugins, ThoseBeforeOneThatRefusesAreLetGo) {
+  WorldBuilder builder = ball_on_ground(Hosting::kDirect);
+  std::vector<kernel::PluginChoice> plugins = builder.description().force.plugins;
+  plugins.push_back(builder.description().solver.plugins[0]);
+  plugins.back().settings.clear();
+  EXPECT_THROW(kernel::make_direct_carrier(plugins, 1), kernel::StageFault);
 }
 
 TEST(FailingPlugins, OneWhoseConstructorChangesFloatingPointArithmeticIsNamedAtTheStart) {

@@ -1,20 +1,29 @@
 // Workers reached by gRPC that the kernel did not start over inherited sockets: at an address, and by a command.
 #include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <limits>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
+#include "gravitas/control/v1/control.grpc.pb.h"
 #include "kernel/carrier/carrier.h"
 #include "kernel/environment.h"
+#include "plugin_sdk/channel/address.h"
+#include "plugin_sdk/channel/mailbox.h"
+#include "plugin_sdk/library.h"
 #include "tests/kernel/one_call.h"
 #include "tests/kernel/world_builder.h"
 
@@ -31,6 +40,7 @@ using kernel::Hosting;
 using kernel::StageFault;
 using kernel::StepOutcome;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 WorldBuilder balls(std::uint32_t count) {
   WorldBuilder builder(Hosting::kDirect);
@@ -175,6 +185,79 @@ TEST(GrpcCarrier, ACommandThatIsNoWorkerIsAnError) {
   EXPECT_THAT(start_fault(builder).text(), HasSubstr("exit code 127"));
 }
 
+TEST(GrpcCarrier, ACommandTakesOverFromALibrary) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(5, 0.01).sphere(0.5, 1.0, Vector3::Zero(), Vector3(3, 2, 1)).force("Drag", "force_drag", {0.1, 0.5});
+  const std::string quiet = chain_by_grpc_of(builder);
+  kernel::PluginChoice& drag = builder.description().force.plugins[0];
+  kernel::PluginChoice command = drag;
+  command.command = kernel::worker_program() + " " + command.library;
+  drag.fallback = std::make_shared<kernel::PluginChoice>(command);
+  Environment world(builder.description());
+  world.inject({Slot::kForce, "kill", 3, 2});
+  while (world.step_count() < world.total_steps()) ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  EXPECT_EQ(world.chain_hash().text(), quiet);
+  EXPECT_EQ(world.faults().back().recovered_by, "fallback Drag");
+}
+
+TEST(GrpcCarrier, ACommandsSocketMayHaveAnyPath) {
+  const std::string place = ::testing::TempDir() + "/one's own; \"place\" " + std::to_string(getpid());
+  const char* before = getenv("TMPDIR");
+  const std::string old = before != nullptr ? before : "";
+  ASSERT_EQ(mkdir(place.c_str(), 0700), 0);
+  setenv("TMPDIR", place.c_str(), 1);
+  WorldBuilder builder = balls(1);
+  kernel::PluginChoice& solver = builder.description().solver.plugins[0];
+  solver.command = kernel::worker_program() + " " + solver.library;
+  EXPECT_NO_THROW(Environment world(builder.description()));
+  before != nullptr ? setenv("TMPDIR", old.c_str(), 1) : unsetenv("TMPDIR");
+  rmdir(place.c_str());
+}
+
+// The connection is made, and then nobody says anything.
+TEST(GrpcCarrier, AStopEndsTheWaitingForAWorkerAtAnAddress) {
+  const std::string path = ::testing::TempDir() + "/gravitas_silent_" + std::to_string(getpid());
+  const int listening = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const auto address = channel::unix_address(path);
+  ASSERT_TRUE(address);
+  unlink(path.c_str());
+  ASSERT_EQ(bind(listening, reinterpret_cast<const sockaddr*>(&*address), sizeof *address), 0);
+  ASSERT_EQ(listen(listening, 1), 0);
+  kernel::SlotDescription slot = balls(1).description().solver;
+  slot.plugins[0].address = "unix:" + path;
+  std::stop_source source;
+  source.request_stop();
+  try {
+    start_grpc_carrier(slot, 1, source.get_token());
+    ADD_FAILURE() << "it started";
+  } catch (const StageFault& fault) {
+    EXPECT_THAT(fault.text(), Not(HasSubstr("did not answer")));
+  }
+  close(listening);
+  unlink(path.c_str());
+}
+
+TEST(GrpcCarrier, WhoSaysNothingKeepsNoKernelFromAListeningWorker) {
+  using control::v1::WorkerControl;
+  const ListeningWorker worker(plugin_path("solver_sequential"));
+  const auto stub = WorkerControl::NewStub(grpc::CreateChannel(worker.address(), grpc::InsecureChannelCredentials()));
+  grpc::ClientContext context;
+  const auto silent = stub->Session(&context);
+  // it has come: the worker answers what came after it
+  grpc::ClientContext probe;
+  control::v1::KernelMessage nonsense;
+  nonsense.mutable_drain();
+  const auto next = stub->Session(&probe);
+  next->Write(nonsense);
+  next->Finish();
+  WorldBuilder builder = balls(3);
+  const std::string direct = chain_by_grpc_of(builder);
+  builder.description().solver.plugins[0].address = worker.address();
+  EXPECT_EQ(chain_by_grpc_of(builder), direct);
+  context.TryCancel();
+  silent->Finish();
+}
+
 // Nine thousand shapes are more than goes inline: they travel as an asset, in the one call that needs it.
 TEST(GrpcCarrier, LargeColumnsTravelAsAssets) {
   WorldBuilder builder = balls(9000);
@@ -265,6 +348,45 @@ TEST_P(WorkerCarrier, TheAskersDeadlineStandsStillWhileItsDerivativeIsEvaluated)
   SlowForces forces(call, kDeadline);
   EXPECT_EQ(call.make(carrier.get(), &forces).status, GRAVITAS_OK);
   EXPECT_EQ(forces.asked, 1);
+}
+
+// Answers at once, for twice as long as it may be asked.
+class PatientForces final : public kernel::DerivativeSource {
+ public:
+  PatientForces(const OneCall& call, double deadline)
+      : call_(call), until_(channel::now_ns() + static_cast<std::uint64_t>(20e9 * deadline)) {}
+  std::span<const kernel::ColumnId> trial_columns() const override { return call_.trial; }
+  std::span<const kernel::ColumnId> answer_columns() const override { return call_.derivative; }
+  void evaluate() override {
+    if (channel::now_ns() > until_) throw StageFault(FaultKind::kFailure, "test", "asked for ever");
+  }
+
+ private:
+  const OneCall& call_;
+  std::uint64_t until_;
+};
+
+// Each question starts the deadline anew, up to ten times.
+TEST_P(WorkerCarrier, AnIntegratorThatAsksForEverIsEnded) {
+  constexpr double kDeadline = 0.25;
+  const std::string library = harness::faulty_plugin_path("integrator_asks_forever");
+  std::string problem;
+  kernel::SlotDescription slot;
+  slot.hosting = GetParam();
+  slot.deadline = kDeadline;
+  slot.plugins = {{load_plugin_library(library, &problem).declaration, library, {}}};
+  const std::unique_ptr<kernel::Carrier> carrier = start_host(slot, 1, {});
+  harness::Integration call;
+  *call.u32(stage::IntegratorIntegrateRequest::kWrenchIsConstant) = 0;
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(call.make(carrier.get()).status, GRAVITAS_OK);
+  PatientForces forces(call, kDeadline);
+  try {
+    call.make(carrier.get(), &forces);
+    FAIL() << "it was answered";
+  } catch (const StageFault& fault) {
+    EXPECT_EQ(fault.kind, FaultKind::kDeadline) << fault.text();
+    EXPECT_THAT(fault.text(), HasSubstr("ten times"));
+  }
 }
 
 TEST(GrpcCarrier, AMethodThatTheWorkerDoesNotServeIsNamed) {

@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -38,6 +40,7 @@ constexpr std::uint32_t kLadderSteps = 12, kManySteps = 20'000;
 enum class Fate {
   kServes,
   kDiesAtFourthCall,
+  kDiesAtTenthCall,
   kDiesOfItsFirstCall,
   kDiesUnread,  // before it looks at its first request
   kDoesNotStart,
@@ -58,7 +61,9 @@ class Mortal final : public Carrier {
                           kernel::DerivativeSource* derivatives) override {
     ++calls_;
     if (fate_ == Fate::kDiesUnread) die(true);
-    if (fate_ == Fate::kDiesOfItsFirstCall || (fate_ == Fate::kDiesAtFourthCall && calls_ == 4)) die(false);
+    if (fate_ == Fate::kDiesOfItsFirstCall || (fate_ == Fate::kDiesAtFourthCall && calls_ == 4) ||
+        (fate_ == Fate::kDiesAtTenthCall && calls_ == 10))
+      die(false);
     return plugins_->call(call, arena, derivatives);
   }
   int process_id() const override { return getpid(); }
@@ -77,12 +82,14 @@ class Ladder : public ::testing::Test {
   // Standbys are started side by side with the run, so their order holds where a slot has one.
   kernel::HostStarter starter(std::vector<Fate> fates, Slot of = Slot::kSolver) {
     starts_ = 0;
+    started_.clear();
     return [this, of, fates = std::move(fates)](const SlotDescription& slot, std::uint32_t threads, std::stop_token) {
       Fate fate = Fate::kServes;
       if (slot.plugins[0].declaration.slot == of) {
         const std::lock_guard lock(mutex_);
         if (starts_ < fates.size()) fate = fates[starts_];
         ++starts_;
+        started_.push_back(slot);
       }
       if (fate == Fate::kDoesNotStart) throw StageFault(FaultKind::kHandshake, "test", "it does not start");
       if (fate == Fate::kLacksThreads) throw std::system_error(EAGAIN, std::generic_category(), "thread");
@@ -104,6 +111,16 @@ class Ladder : public ::testing::Test {
       ASSERT_EQ(world->step(), StepOutcome::kCommitted) << world->fault()->fault.text();
   }
 
+  // Where, and with which deadline.
+  std::vector<std::string> started() {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::string> all;
+    for (const SlotDescription& slot : started_)
+      all.push_back(std::string(kernel::hosting_name(slot.hosting)) +
+                    (slot.attached ? ", attached" : ", not attached") +
+                    (slot.deadline == SlotDescription().deadline ? "" : ", for ever"));
+    return all;
+  }
   std::size_t starts() {
     const std::lock_guard lock(mutex_);
     return starts_;
@@ -118,6 +135,7 @@ class Ladder : public ::testing::Test {
  private:
   std::mutex mutex_;
   std::size_t starts_ = 0;
+  std::vector<SlotDescription> started_;
 };
 
 TEST_F(Ladder, ARequestThatKillsTwoHostsIsPoison) {
@@ -196,6 +214,129 @@ TEST_F(Ladder, AFallbackThatTakesOverAtTheStartIsToldToWhoListensLater) {
     EXPECT_EQ(witness.decisions.size(), 1U);
     EXPECT_THAT(late.decisions, IsEmpty());
   }
+}
+
+// It serves no other plugin, so the one that it may have to follow is alone from the start.
+TEST_F(Ladder, AFallbackThatIsACommandTakesOverByGrpc) {
+  for (const Hosting hosting : {Hosting::kDirect, Hosting::kSharedMemory, Hosting::kGrpc}) {
+    SCOPED_TRACE(kernel::hosting_name(hosting));
+    WorldBuilder builder(hosting);
+    builder.steps(kLadderSteps, 0.01).sphere(0.5, 1.0, Vector3::Zero()).gravity(Vector3(0, -9.81, 0));
+    builder.force("Drag", "force_drag", {0.1, 0.5});
+    SlotDescription& force = builder.description().force;
+    force.standbys = 0;
+    force.process = builder.description().integrator.process = "one";
+    kernel::PluginChoice other = force.plugins[1];
+    other.declaration.name = "Other";
+    other.command = "a worker of its own";
+    force.plugins[1].fallback = std::make_shared<kernel::PluginChoice>(other);
+    std::vector<Fate> fates = {Fate::kDiesAtFourthCall, Fate::kDiesOfItsFirstCall};
+    Environment world(builder.description(), [&](const SlotDescription& slot, std::uint32_t threads, std::stop_token) {
+      Fate fate = Fate::kServes;
+      const std::string& name = slot.plugins[0].declaration.name;
+      if (name == "Drag" || name == "Other") {
+        EXPECT_EQ(slot.plugins.size(), 1U);
+      }
+      if (name == "Drag" && !fates.empty()) fate = fates[0], fates.erase(fates.begin());
+      return std::make_unique<Mortal>(kernel::make_direct_carrier(slot.plugins, threads), slot.hosting, fate);
+    });
+    PoisonWitness witness;
+    world.set_commit_listener(&witness);
+    run(&world);
+    EXPECT_THAT(witness.decisions, ElementsAre("fallback Other at 3: Other, grpc"));
+  }
+}
+
+TEST_F(Ladder, AFallbackThatItsHostCannotHoldIsRefused) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(kLadderSteps, 0.01).sphere(0.5, 1.0, Vector3::Zero()).gravity(Vector3(0, -9.81, 0));
+  builder.force("Drag", "force_drag", {0.1, 0.5});
+  std::vector<kernel::PluginChoice>& plugins = builder.description().force.plugins;
+  std::vector<std::shared_ptr<kernel::PluginChoice>> libraries;
+  for (kernel::PluginChoice& plugin : plugins) {
+    libraries.push_back(std::make_shared<kernel::PluginChoice>(plugin));
+    plugin.address = "unix:/of/one/worker";
+  }
+  plugins[1].fallback = libraries[1];
+  const auto why = [&]() -> std::string {
+    try {
+      Environment world(builder.description(), starter({}));
+    } catch (const std::invalid_argument& problem) {
+      return problem.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(
+      why(),
+      "fallback Drag of Drag: a command or an address serves one plugin, and this process would hold others besides");
+  plugins[0].fallback = libraries[0];
+  EXPECT_EQ(why(), "accepted");
+}
+
+// Answers a Jacobian that is none, or knows of none.
+class WrongJacobians final : public Carrier {
+ public:
+  WrongJacobians(std::unique_ptr<Carrier> plugins, bool knows) : plugins_(std::move(plugins)), knows_(knows) {}
+  kernel::CallResult call(const kernel::StageCall& call, kernel::Arena* arena,
+                          kernel::DerivativeSource* derivatives) override {
+    const bool is_asked = call.method == stage::Method::kForceJacobians;
+    if (is_asked && !knows_) return {GRAVITAS_UNKNOWN_METHOD, "", 0, 0};
+    kernel::CallResult result = plugins_->call(call, arena, derivatives);
+    if (is_asked && result.status == GRAVITAS_OK)
+      *reinterpret_cast<double*>(arena->data(call.reply[1])) = std::numeric_limits<double>::quiet_NaN();
+    return result;
+  }
+  int process_id() const override { return getpid(); }
+  Hosting hosting() const override { return Hosting::kSharedMemory; }
+
+ private:
+  std::unique_ptr<Carrier> plugins_;
+  bool knows_;
+};
+
+TEST_F(Ladder, AWrongJacobianIsNotThatOfAFallbackWithoutAny) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(kLadderSteps, 0.01).plugin(Slot::kIntegrator, plugin_path("integrator_rosenbrock"), {1e-3});
+  builder.sphere(0.5, 1.0, Vector3::Zero(), Vector3(3, 2, 1)).force("Drag", "force_drag", {0.1, 0.5});
+  SlotDescription& force = builder.description().force;
+  force.standbys = 0;
+  kernel::PluginChoice other = force.plugins[0];
+  other.declaration.name = "Other";
+  other.declaration.capabilities.clear();
+  force.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(other);
+  Environment world(builder.description(), [&](const SlotDescription& slot, std::uint32_t threads, std::stop_token) {
+    return std::make_unique<WrongJacobians>(kernel::make_direct_carrier(slot.plugins, threads),
+                                            slot.plugins[0].declaration.name != "Other");
+  });
+  run(&world);
+  ASSERT_EQ(world.faults().size(), 2U);
+  for (const kernel::FaultRecord& fault : world.faults()) EXPECT_EQ(fault.fault.plugin, "Drag");
+  EXPECT_EQ(world.faults()[1].recovered_by, "fallback Other");
+}
+
+// A worker that was started by hand has no deadline; who takes over has, until it has to come back.
+TEST_F(Ladder, WhoTakesOverFromAnAttachedWorkerHasADeadline) {
+  WorldBuilder builder = world(0);
+  SlotDescription& solver = builder.description().solver;
+  const kernel::PluginChoice library = solver.plugins[0];
+  solver.hosting = Hosting::kGrpc;
+  solver.attached = true;
+  solver.deadline = kernel::kAttachedDeadline;
+  solver.plugins[0].address = "unix:/of/one/worker";
+  const std::string attached = "grpc, attached, for ever", ours = "grpc, not attached";
+
+  Environment swapped(builder.description(),
+                      starter({Fate::kServes, Fate::kDiesAtTenthCall, Fate::kDiesOfItsFirstCall}));
+  swapped.order_swap({Slot::kSolver, library, std::nullopt, 1});
+  run(&swapped);
+  EXPECT_THAT(started(), ElementsAre(attached, ours, ours, attached));
+  ASSERT_EQ(swapped.faults().size(), 2U);
+  EXPECT_EQ(swapped.faults()[1].recovered_by, "previous build");
+
+  solver.plugins[0].fallback = std::make_shared<kernel::PluginChoice>(library);
+  Environment fallen(builder.description(), starter({Fate::kDiesAtFourthCall, Fate::kDiesOfItsFirstCall}));
+  run(&fallen);
+  EXPECT_THAT(started(), ElementsAre(attached, attached, ours));
 }
 
 // Between two steps it is the next one that others make.
@@ -301,6 +442,18 @@ TEST_F(Ladder, WhoIsAskedForComparisonOutlastsAFallbackInItsCall) {
   EXPECT_EQ(world.faults().back().recovered_by, "fallback Drag");
   EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
   EXPECT_THAT(world.warnings(), IsEmpty());
+}
+
+// Nor does it say anything of who answered first.
+TEST_F(Ladder, WhoDiesWhileItIsAskedForComparisonDoesNotAnswerOtherwise) {
+  std::vector<Fate> fates(100, Fate::kDiesOfItsFirstCall);
+  fates[0] = Fate::kServes;
+  Environment world(Ladder::world(0).description(), starter(fates));
+  world.set_rerun_every(Slot::kSolver, 1);
+  run(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  EXPECT_TRUE(world.faults().empty());
+  EXPECT_THAT(world.warnings(), Contains(HasSubstr("a re-run came to nothing: it died")));
 }
 
 TEST_F(Ladder, PoisonStaysPoisonWhenTheFallbackDoesNotStart) {
