@@ -159,7 +159,7 @@ api::ServedSwap ServedRun::swap_message(const Order& order, const std::vector<ke
   api::ServedSwap swap;
   swap.set_number(order.number);
   swap.set_slot(slot_name(record.slot));
-  swap.set_step(record.step);
+  swap.set_step(std::max(record.step, record.since));
   swap.set_from(record.from);
   swap.set_to(record.to);
   swap.set_outcome(swap_state_name(record.state));

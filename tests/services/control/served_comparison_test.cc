@@ -68,6 +68,20 @@ TEST(ServedComparison, IsCountedAnewAfterAnEdit) {
   }
 }
 
+TEST(ServedComparison, NamesWhoAnswersAfterASwapAndCountsAnew) {
+  Served served;
+  const std::uint32_t number = served.client.swap(parse_swap_request("solver=Newton", true)).number();
+  served.client.step(20);
+  EXPECT_EQ(served.swap("solver=Newton").outcome(), "committed");
+  served.client.step(10);
+  const api::Status status = served.client.status();
+  EXPECT_THAT(status_page(status),
+              HasSubstr("comparing: solver Newton beside Newton, from step 21 on: 0 of 30 answers differ"));
+  const api::ServedSwap ended = served.client.call_off(number);
+  EXPECT_EQ(ended.step(), 21U);
+  EXPECT_EQ(ended.shadow().calls(), 30U);
+}
+
 TEST(ServedComparison, OfAPluginWithoutAPlaceIsRefusedAsWhatItIs) {
   Served served;
   const std::string why = refusal([&] { served.client.swap(parse_swap_request("collision=SweepAndPrune", true)); });
@@ -87,6 +101,20 @@ TEST(Comparison, OfARunWithEditsSaysFromWhereItCounts) {
   const std::string text = summarize(result.report, {});
   EXPECT_THAT(text, HasSubstr("  compared: solver Sequential with Newton: "));
   EXPECT_THAT(text, HasSubstr("  compared from step 41 on: solver Sequential with Newton: "));
+}
+
+TEST(Comparison, OfARunWithASwapTellsEachPair) {
+  RunOptions options = sample("direct").run;
+  options.comparisons = {"solver=Newton"};
+  options.swaps = {"solver=Newton@step=41"};
+  const RunResult result = run_quietly(options);
+  ASSERT_EQ(result.report.comparisons_size(), 2);
+  EXPECT_EQ(result.report.comparisons(0).shadow().calls(), 40U);
+  EXPECT_EQ(result.report.comparisons(1).shadow().calls(), kSteps - 40U);
+  EXPECT_EQ(result.report.comparisons(1).shadow().differing_calls(), 0U);
+  const std::string text = summarize(result.report, {});
+  EXPECT_THAT(text, HasSubstr("  compared: solver Sequential with Newton: "));
+  EXPECT_THAT(text, HasSubstr("  compared from step 41 on: solver Newton with Newton: 0 of 80 answers differ"));
 }
 
 // A call of a plugin that is hosted in the process takes time, too.
