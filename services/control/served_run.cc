@@ -72,7 +72,7 @@ kernel::HostStarter ServedRun::starter() {
 
 void ServedRun::begin_environment(const Resumption* from) {
   // where the new one cannot be made the old one stays
-  Beginning begins{first_scene_, first_description_, slots_of(first_description_), {}};
+  Beginning begins{first_scene_, first_description_, slots_of(first_description_), {}, {}};
   if (from != nullptr) {
     begins = restored(*from);
   } else {
@@ -110,6 +110,12 @@ void ServedRun::begin_environment(const Resumption* from) {
   pair_decisions_.forget();
   if (listener_) attend_listener();
   orders_.clear();
+  for (kernel::SwapOrder& one : begins.swaps) {
+    // one of a step that was not made is still to come, and goes by who answers
+    if (one.step > environment_->step_count()) continue;
+    const std::uint32_t rank = rank_of(one, orders_);
+    orders_.push_back({std::move(one), OrderKind::kSwap, ++last_order_, rank});
+  }
   warnings_ = scene_warnings_;
   fault_.clear();
   checkpoint_.clear();

@@ -144,6 +144,7 @@ class ServedRun final : private kernel::CommitListener {
     scene::v1::Scene scene;
     kernel::EnvironmentDescription description, active;
     std::unique_ptr<kernel::Environment> environment;
+    std::vector<kernel::SwapOrder> swaps;  // that the checkpoint knows
   };
   // With null the scene begins.
   void begin_environment(const Resumption* from);
