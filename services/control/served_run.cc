@@ -48,6 +48,8 @@ ServedRun::ServedRun(const ServeOptions& options)
       timer_(loop_) {
   for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
   require_separate_files(options_, first_scene_, {});
+  for (const std::string& text : options_.comparisons)
+    comparisons_.push_back(resolve_swap(parse_compare("--compare", text), first_description_, &catalog_));
   if (options_.resume.empty()) {
     begin_environment(nullptr);
   } else {
@@ -124,6 +126,11 @@ void ServedRun::begin_environment(const Resumption* from) {
   poisoned_step_ = 0;
   next_collection_ = {};
   stand(environment_->step_count() >= environment_->total_steps() ? State::kFinished : State::kPaused);
+  for (kernel::SwapOrder& one : comparisons_) {
+    if (state_ == State::kFinished) break;
+    one.step = environment_->step_count() + 1;
+    order(one, OrderKind::kComparison);
+  }
   status_now();
   if (!options_.checkpoint.empty()) keep_checkpoint(from != nullptr ? from->journal : JournalReading{});
 }

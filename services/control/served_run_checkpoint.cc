@@ -38,6 +38,7 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
   again.checkpoint_every = 0;
   again.duration.reset();
   again.steps = last;
+  again.comparisons.clear();
   const RunResult result = run(
       again, [] { return false; }, [](const Progress&) {});
   if (result.outcome != RunOutcome::kCompleted)
@@ -122,7 +123,8 @@ std::string ServedRun::command_to_resume() {
   if (recorder_->has_listened()) return {};
   RunOptions options = options_;
   for (std::string& scene : options.scenes) scene = std::filesystem::absolute(scene);
-  // what was ordered for later
+  // what was ordered for later, and what is compared still
+  options.comparisons.clear();
   for (const Order& one : pending_orders()) {
     const auto& [slot, plugin, hosting, step] = one.swap;
     if (one.kind == OrderKind::kSetting) {
