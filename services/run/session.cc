@@ -561,6 +561,7 @@ void Run::write_report() {
     if (const auto kind = static_cast<EventKind>(i); event_kinds_.has(kind))
       report.add_event_kinds(event_kind_name(kind));
   write_past();
+  if (recorder_ && !recorder_->warning().empty()) warnings_.push_back(recorder_->warning());
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   name_orders(faults_, description_, report.steps(), true, &report);
   if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <utility>
@@ -164,6 +165,22 @@ TEST(ServedResume, ListsTheSwapsThatWereMade) {
     resumed.client.reset();
     EXPECT_EQ(resumed.client.status().swaps_size(), 0);
   }
+}
+
+TEST(ServedResume, AJournalThatIsReplacedMeanwhileIsTold) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  Served served(options);
+  served.client.step(10);
+  const std::uint32_t before = served.client.status().warning_count();
+  folder.write("other", "of somebody else");
+  std::filesystem::rename(folder.path("other"), folder.path("served.ck.journal"));
+  served.client.step(1);
+  served.run.save_checkpoint();
+  const api::Status status = served.client.status();
+  EXPECT_EQ(status.warning_count(), before + 1U);
+  EXPECT_THAT(status.last_warning(), HasSubstr("served.ck.journal' was removed or replaced"));
 }
 
 TEST(ServedResume, DoesNotGoOnFromWhatIsNoCheckpointOfItsScene) {
