@@ -156,7 +156,8 @@ TEST(CheckOfPurity, AnAnswerThatDoesNotComeInTimeIsNoOtherAnswer) {
 TEST(CheckOfACommand, ThatServesAGoodPluginConforms) {
   const std::vector<std::string> good = libraries_of(kPlugins);
   ASSERT_FALSE(good.empty());
-  std::string command = in_build("/bin/gravitas-worker ") + kPlugins + "/" + good.front() + ".so";
+  std::string command =
+      in_shell(in_build("/bin/gravitas-worker")) + " " + in_shell(kPlugins + "/" + good.front() + ".so");
   const auto report = check_library(command, {.quick = true, .level = {}, .only_case = {}});
   EXPECT_TRUE(report.conforms()) << report.DebugString();
   EXPECT_EQ(report.command(), command);

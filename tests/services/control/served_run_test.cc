@@ -276,12 +276,12 @@ TEST(ServedRun, AFaultedOneNamesTheCommandThatGoesOn) {
   ASSERT_EQ(status.edits_size(), 1);
   ASSERT_EQ(status.edits(0).texts_size(), 1);
   EXPECT_EQ(status.edits(0).texts(0), "set Body.Ball01.LinearVelocity={0,1,0}");
-  ASSERT_THAT(status.resume_command(), StartsWith("gravitas run /"));
+  ASSERT_THAT(status.resume_command(), StartsWith("gravitas run " + in_shell(kSample)));
   EXPECT_THAT(status.resume_command(),
               HasSubstr(" --set Solver.Iterations=60 --hosting shm --swap space=Grid@step=110 "));
   EXPECT_THAT(status_page(status), HasSubstr("to go on: " + status.resume_command()));
   const gravitas::harness::ScratchFolder folder;
-  const std::string command = in_build("/bin/") + status.resume_command() + " --json > " + folder.path("out");
+  const std::string command = in_shell(in_build("/bin/")) + status.resume_command() + " --json > " + folder.path("out");
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   EXPECT_EQ(harness::read_report(harness::read_file(folder.path("out"))).chain_hash(), quiet.to_the_end().chain_hash());
 }
