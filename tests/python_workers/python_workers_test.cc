@@ -295,5 +295,17 @@ TEST_P(PythonWorker, ConformsSaysTheKit) {
   EXPECT_EQ(check.code, 0) << check.words;
 }
 
+TEST(PythonKit, NonsenseIsNoRefusal) {
+  const auto check = [](const std::string& worker) {
+    const std::string command = "/usr/bin/python3 " + in_shell(kFolder + worker);
+    return ended(kPython + " " + kGravitas + " check " + in_shell(command) + " --case handshake/magic");
+  };
+  const Ended sound = check("force_drag.py");
+  EXPECT_EQ(sound.code, 0) << sound.words;
+  const Ended mumbling = check("mumbling_drag.py");
+  EXPECT_EQ(mumbling.code, 4) << mumbling.words;
+  EXPECT_THAT(mumbling.words, HasSubstr("it answers with something else than Welcome or Refusal"));
+}
+
 }  // namespace
 }  // namespace gravitas
