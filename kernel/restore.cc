@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <string>
 #include <tuple>
 
@@ -137,8 +138,12 @@ std::string Environment::find_misfit(const SavedState& saved) const {
 std::string Environment::restore(const SavedState& saved) {
   std::string problem = find_misfit(saved);
   if (!problem.empty()) return problem;
-  // what was swapped in shortly before is on probation still
+  // swaps are made where they were; what was swapped in shortly before is on probation still
+  std::set<std::uint32_t> begun;
+  for (const SwapRecord& swap : swaps()) begun.insert(std::min(swap.step, saved.step));
   for (std::uint32_t step = saved.step - std::min(saved.step, SlotHost::kProbation); step <= saved.step; ++step)
+    begun.insert(step);
+  for (const std::uint32_t step : begun)
     for (StageSlot* slot : slots_) slot->begin_step(step);
   problem = ColumnReader(saved.columns, model_, front()).read_into(back());
   if (problem.empty()) problem = find_wrong_body(back(), front(), model_);

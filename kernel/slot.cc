@@ -235,6 +235,8 @@ void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) 
     if (!by_us && now.hosting == description_.hosting && is_same_plugin(plugin, description_.plugins[target])) continue;
     const PluginChoice before = std::exchange(description_.plugins[target], plugin);
     if (place == 0) description_.hosting = now.hosting;
+    for (PendingSwap& swap : pending_)
+      if (swap.only_compare && swap.target == target) count_anew(&swap, !is_same_plugin(plugin, before));
     observer_->on_decision({which_, target, step_, why, &now, &description_.plugins[target]});
     observer_->on_plugin_change(*this, target, before);
   }

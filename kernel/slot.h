@@ -156,6 +156,9 @@ class StageSlot {
   void advance_swaps();
   bool advance_swap(PendingSwap* swap);
   void cut_over(PendingSwap* swap);
+  void name_pair(const PendingSwap& swap);
+  // Where another one answers than a comparison counts: another plugin, or elsewhere.
+  void count_anew(PendingSwap* comparison, bool is_other);
   void refuse(PendingSwap* swap, const std::string& reason);
   void close_probation(const SlotHost* host, SwapState state, const std::string& reason);
   void close_all_probations(SlotHost* host, SwapState state, const std::string& reason);

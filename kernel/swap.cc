@@ -85,11 +85,32 @@ void StageSlot::prepare_swaps() {
     if (swap.order.hosting) swap.next.hosting = *swap.order.hosting;
     if (swap.order.plugin.is_elsewhere()) swap.next.hosting = Hosting::kGrpc;
     swap.next.end_attachment();
-    const bool shows_hosting = swap.next.hosting != now.hosting;
-    swaps_[swap.record].from = shows_hosting ? shown(now.plugins[row], now) : now.plugins[row].declaration.name;
-    if (shows_hosting) swaps_[swap.record].to = shown(swap.order.plugin, swap.next);
+    name_pair(swap);
     swap.spare = hosts_[swap.host]->prepare(swap.next);
   }
+}
+
+// Who answers now, and who is to.
+void StageSlot::name_pair(const PendingSwap& swap) {
+  const SlotDescription& now = hosts_[swap.host]->description();
+  const PluginChoice& plugin = now.plugins[routes_[swap.target].target];
+  const bool shows_hosting = swap.next.hosting != now.hosting;
+  SwapRecord& record = swaps_[swap.record];
+  record.from = shows_hosting ? shown(plugin, now) : plugin.declaration.name;
+  record.to = shows_hosting ? shown(swap.order.plugin, swap.next) : swap.order.plugin.declaration.name;
+}
+
+void StageSlot::count_anew(PendingSwap* comparison, bool is_other) {
+  if (!comparison->spare && !comparison->candidate) return;
+  SwapRecord before = swaps_[comparison->record];
+  name_pair(*comparison);
+  if (!is_other && swaps_[comparison->record].from == before.from) return;
+  if (comparison->shadow.result().calls > 0) {
+    before.shadow = comparison->shadow.result();
+    swaps_.push_back(std::move(before));
+    swaps_[comparison->record].since = step_;
+  }
+  comparison->shadow = {};
 }
 
 void StageSlot::advance_swaps() {

@@ -33,7 +33,10 @@ struct SwapRecord {
   Slot slot;
   std::uint32_t step;    // first step that the new host makes
   std::string from, to;  // plugins, with the hosting where that changes
+  // Of a comparison: from this step on `from` is who answers; 0: from the begin. What was counted beside others before
+  // is a record of its own.
   bool only_compared = false;
+  std::uint32_t since = 0;
   SwapState state = SwapState::kPreparing;
   std::string reason;     // why it was refused or rolled back
   double pause_us = 0.0;  // the cut-over alone

@@ -9,5 +9,7 @@ namespace gravitas {
 // in_source("/deploy/scenes"), in_build("/lib/gravitas")
 std::string in_source(const std::string& path = "");
 std::string in_build(const std::string& path = "");
+// As a shell reads it back, with its blanks.
+std::string in_shell(const std::string& path);
 
 }  // namespace gravitas

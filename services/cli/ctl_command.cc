@@ -56,6 +56,9 @@ std::string socket_of(const CtlLine& line) {
 int perform(const CtlLine& line, const Order& order) {
   try {
     ControlClient client(socket_of(line));
+    client.on_wait([](const api::Status& status) {
+      std::cerr << fmt::format("gravitas ctl: {}; this waits for its end\n", control::waiting_line(status));
+    });
     return order(line, &client);
   } catch (const control::ControlError& error) {
     using Kind = control::ControlError::Kind;

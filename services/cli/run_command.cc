@@ -167,8 +167,7 @@ void add_run(CLI::App* app, Action* action) {
       "Change the scene while the simulation runs, before step N: \"add FILE@step=N\", \"remove Body.Ball@step=N\", "
       "\"set Body.Ball.Position={0,1,0}@step=N\"; FILE holds Geometries, Materials, Forces, Bodies, Constraints; "
       "changes before the same step are one; repeatable");
-  add_list(command, "--compare", &options.comparisons,
-           "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
+  add_comparisons(command, &options.comparisons);
   add_list(command, "--rerun", &options.reruns,
            "Ask another process the same in every N-th step and take the majority's bytes: SLOT=N; repeatable");
   add_list(command, "--fault", &options.faults, "Inject a fault: SLOT:KIND@step=N[,arg=...]; repeatable");

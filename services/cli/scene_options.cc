@@ -59,6 +59,11 @@ void add_list(CLI::App* command, const char* name, std::vector<std::string>* val
   command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
 }
 
+void add_comparisons(CLI::App* command, std::vector<std::string>* values) {
+  add_list(command, "--compare", values,
+           "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");
+}
+
 void add_event_options(CLI::App* command, const char* name, std::optional<std::vector<std::string>>* kinds,
                        std::optional<double>* ongoing_rate) {
   command

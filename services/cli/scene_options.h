@@ -30,6 +30,9 @@ class SceneOptions {
 // An option that may be repeated, with one value each time.
 void add_list(CLI::App* command, const char* name, std::vector<std::string>* values, const char* text);
 
+// --compare.
+void add_comparisons(CLI::App* command, std::vector<std::string>* values);
+
 // Kinds of events under `name`, and --ongoing-rate.
 void add_event_options(CLI::App* command, const char* name, std::optional<std::vector<std::string>>* kinds,
                        std::optional<double>* ongoing_rate);

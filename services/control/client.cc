@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <future>
+#include <utility>
 
 #include "gravitas/control_api/v1/control_api.grpc.pb.h"
 #include "services/run/exchange_spec.h"
@@ -15,6 +16,9 @@ namespace gravitas::control {
 namespace {
 
 constexpr std::chrono::seconds kConnect{3};
+// How long a call waits before it says for what.
+constexpr std::chrono::seconds kPatience{1};
+constexpr double kLongStep = 0.5;  // s
 constexpr std::uint32_t kSwapIntervalMs = 20;
 // How soon a call that waits notices that it was interrupted.
 constexpr std::chrono::milliseconds kInterruptGlance{20};
@@ -53,14 +57,32 @@ void require(const grpc::Status& status) {
 struct ControlClient::Connection {
   std::shared_ptr<grpc::Channel> channel;
   std::unique_ptr<api::Control::Stub> stub;
+  std::function<void(const api::Status&)> on_wait;
 
   template <typename Request, typename Reply>
   Reply call(grpc::Status (api::Control::Stub::*method)(grpc::ClientContext*, const Request&, Reply*),
              const Request& request) {
     grpc::ClientContext context;
     Reply reply;
-    require((stub.get()->*method)(&context, request, &reply));
+    const auto answer = [&] { return (stub.get()->*method)(&context, request, &reply); };
+    if (!on_wait) {
+      require(answer());
+      return reply;
+    }
+    std::future<grpc::Status> end = std::async(std::launch::async, answer);
+    for (bool is_told = false; !is_told && end.wait_for(kPatience) == std::future_status::timeout;) is_told = tell();
+    require(end.get());
     return reply;
+  }
+
+  // False if there is nothing to tell: it is not a step that takes so long.
+  bool tell() {
+    grpc::ClientContext context;
+    api::Status status;
+    if (!stub->GetStatus(&context, api::StatusRequest(), &status).ok()) return false;
+    if (status.waited() < kLongStep) return false;
+    on_wait(status);
+    return true;
   }
 };
 
@@ -76,6 +98,8 @@ ControlClient::ControlClient(const std::string& place) : connection_(std::make_u
 }
 
 ControlClient::~ControlClient() = default;
+
+void ControlClient::on_wait(std::function<void(const api::Status&)> tell) { connection_->on_wait = std::move(tell); }
 
 api::Status ControlClient::status() { return connection_->call(&api::Control::Stub::GetStatus, api::StatusRequest()); }
 

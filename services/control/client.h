@@ -30,6 +30,10 @@ class ControlClient {
   ControlClient(const ControlClient&) = delete;
   ControlClient& operator=(const ControlClient&) = delete;
 
+  // Called once, from now on, in a call that waits for a second and more while one step is being made: with the status
+  // then, whose `waited` says since when. Streams tell by themselves.
+  void on_wait(std::function<void(const api::Status&)> tell);
+
   api::Status status();
   api::Status pause();
   api::Status resume();

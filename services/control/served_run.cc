@@ -48,6 +48,8 @@ ServedRun::ServedRun(const ServeOptions& options)
       timer_(loop_) {
   for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
   require_separate_files(options_, first_scene_, {});
+  for (const std::string& text : options_.comparisons)
+    comparisons_.push_back(resolve_swap(parse_compare("--compare", text), first_description_, &catalog_));
   if (options_.resume.empty()) {
     begin_environment(nullptr);
   } else {
@@ -72,7 +74,7 @@ kernel::HostStarter ServedRun::starter() {
 
 void ServedRun::begin_environment(const Resumption* from) {
   // where the new one cannot be made the old one stays
-  Beginning begins{first_scene_, first_description_, slots_of(first_description_), {}};
+  Beginning begins{first_scene_, first_description_, slots_of(first_description_), {}, {}};
   if (from != nullptr) {
     begins = restored(*from);
   } else {
@@ -110,6 +112,12 @@ void ServedRun::begin_environment(const Resumption* from) {
   pair_decisions_.forget();
   if (listener_) attend_listener();
   orders_.clear();
+  for (kernel::SwapOrder& one : begins.swaps) {
+    // one of a step that was not made is still to come, and goes by who answers
+    if (one.step > environment_->step_count()) continue;
+    const std::uint32_t rank = rank_of(one, orders_);
+    orders_.push_back({std::move(one), OrderKind::kSwap, ++last_order_, rank});
+  }
   warnings_ = scene_warnings_;
   fault_.clear();
   checkpoint_.clear();
@@ -118,6 +126,11 @@ void ServedRun::begin_environment(const Resumption* from) {
   poisoned_step_ = 0;
   next_collection_ = {};
   stand(environment_->step_count() >= environment_->total_steps() ? State::kFinished : State::kPaused);
+  for (kernel::SwapOrder& one : comparisons_) {
+    if (state_ == State::kFinished) break;
+    one.step = environment_->step_count() + 1;
+    order(one, OrderKind::kComparison);
+  }
   status_now();
   if (!options_.checkpoint.empty()) keep_checkpoint(from != nullptr ? from->journal : JournalReading{});
 }

@@ -46,7 +46,8 @@ namespace gravitas::control {
 namespace api = control_api::v1;
 
 struct ServeOptions {
-  RunOptions run;      // the scene and its overrides; of files the checkpoints alone, to go on from and to keep
+  // The scene and its overrides; what is compared all along; of files the checkpoints alone, to go on from and to keep.
+  RunOptions run;
   double speed = 1.0;  // simulated seconds per second of wall time; 0: as fast as possible
   bool is_paused = false;
   std::vector<std::string> hosting_words = {};  // of the command line, for the one that goes on from a checkpoint
@@ -144,6 +145,7 @@ class ServedRun final : private kernel::CommitListener {
     scene::v1::Scene scene;
     kernel::EnvironmentDescription description, active;
     std::unique_ptr<kernel::Environment> environment;
+    std::vector<kernel::SwapOrder> swaps;  // that the checkpoint knows
   };
   // With null the scene begins.
   void begin_environment(const Resumption* from);
@@ -238,6 +240,7 @@ class ServedRun final : private kernel::CommitListener {
   std::string fault_, checkpoint_, resume_command_;
   std::uint32_t poisoned_step_ = 0;  // the last
   std::vector<kernel::FaultInjection> injected_;
+  std::vector<kernel::SwapOrder> comparisons_;  // of the command line
   std::vector<Order> orders_;
   std::uint32_t last_order_ = 0;       // its number
   std::vector<std::string> warnings_;  // different ones

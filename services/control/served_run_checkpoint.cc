@@ -8,6 +8,7 @@
 #include "plugin_sdk/slots.h"
 #include "services/control/served_run.h"
 #include "services/edit/edited_scene.h"
+#include "services/recorder/decision.h"
 #include "services/run/exchange_spec.h"
 #include "services/run/file_names.h"
 #include "services/run/resume_command.h"
@@ -38,6 +39,7 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
   again.checkpoint_every = 0;
   again.duration.reset();
   again.steps = last;
+  again.comparisons.clear();
   const RunResult result = run(
       again, [] { return false; }, [](const Progress&) {});
   if (result.outcome != RunOutcome::kCompleted)
@@ -53,7 +55,7 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
 
 // Its edits are made, and whoever answered when it was written answers.
 ServedRun::Beginning ServedRun::restored(const Resumption& from) {
-  Beginning begins{first_scene_, first_description_, {}, {}};
+  Beginning begins{first_scene_, first_description_, {}, {}, {}};
   for (edit::v1::Edit one : from.checkpoint.edits()) {
     const EditedScene edited(options_, begins.scene, begins.description, &catalog_, &one, nullptr);
     scene::v1::Scene scene = edited.scene();
@@ -66,6 +68,8 @@ ServedRun::Beginning ServedRun::restored(const Resumption& from) {
     Answering answering = answering_at(checkpoint, begins.description, catalog_);
     for (auto* one : {&answering.now, &answering.begun}) apply_hosting(options_.hosting, one);
     begins.environment = start(answering.begun, starter(), &begins.scene);
+    const std::vector<recorder::v1::Decision> decisions(checkpoint.decisions().begin(), checkpoint.decisions().end());
+    begins.swaps = past_swaps(decisions, catalog_, answering.now);
     restore(&checkpoint, answering.now, catalog_, begins.environment.get());
     for (const Slot slot : kSlots) begins.active.slot(slot) = answering.now.slot(slot);
   });
@@ -119,7 +123,8 @@ std::string ServedRun::command_to_resume() {
   if (recorder_->has_listened()) return {};
   RunOptions options = options_;
   for (std::string& scene : options.scenes) scene = std::filesystem::absolute(scene);
-  // what was ordered for later
+  // what was ordered for later, and what is compared still
+  options.comparisons.clear();
   for (const Order& one : pending_orders()) {
     const auto& [slot, plugin, hosting, step] = one.swap;
     if (one.kind == OrderKind::kSetting) {

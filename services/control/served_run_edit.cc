@@ -23,12 +23,13 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     edit.set_step(made.step());
     *edit.mutable_changes() = request.changes();
     Catalog catalog = catalog_;  // which other threads read; the scene's libraries are added again
-    const EditedScene edited(options_, scene_, description_, &catalog, &edit, &*environment_);
+    EditedScene edited(options_, scene_, description_, &catalog, &edit, &*environment_);
     kernel::EnvironmentDescription begun = edited.description(), active = description_;
     for (const Slot slot : kSlots) active.slot(slot) = active_.slot(slot);
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
+    edited.look_at_limits(active, *environment_, begun, *next);
     const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next);
     // swaps that are to come go along, the others are made
     std::vector<Order> pending;

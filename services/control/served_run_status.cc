@@ -124,6 +124,7 @@ api::Status ServedRun::status_now() {
   status.mutable_edits()->Swap(report.mutable_edits());
   keep_last(status.mutable_edits());
   collect_warnings();
+  if (const std::string line = recorder_->warning(); !line.empty()) add_warning(line);
   status.set_warning_count(static_cast<std::uint32_t>(warnings_.size()));
   if (!warnings_.empty()) status.set_last_warning(warnings_.back());
   const std::lock_guard lock(known_mutex_);
@@ -159,7 +160,7 @@ api::ServedSwap ServedRun::swap_message(const Order& order, const std::vector<ke
   api::ServedSwap swap;
   swap.set_number(order.number);
   swap.set_slot(slot_name(record.slot));
-  swap.set_step(record.step);
+  swap.set_step(std::max(record.step, record.since));
   swap.set_from(record.from);
   swap.set_to(record.to);
   swap.set_outcome(swap_state_name(record.state));

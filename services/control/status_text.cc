@@ -68,12 +68,14 @@ std::string swap_line(const api::ServedSwap& swap) {
   return text + (swap.reason().empty() ? "" : "; " + swap.reason());
 }
 
+std::string waiting_line(const api::Status& status) {
+  return fmt::format("step {} has taken {:.1f} s so far", status.step() + 1, status.waited());
+}
+
 std::string status_page(const api::Status& status) {
   const std::string speed = status.speed() == 0.0 ? "as fast as possible" : fmt::format("speed {:g}", status.speed());
   std::string text = fmt::format("{}, {}\n  {}\n", status.scene(), speed, status_line(status));
-  if (status.waited() > 0.0)
-    text += fmt::format("  step {} has taken {:.1f} s so far; below is what was known before\n", status.step() + 1,
-                        status.waited());
+  if (status.waited() > 0.0) text += fmt::format("  {}; below is what was known before\n", waiting_line(status));
   if (!status.fault().empty()) text += fmt::format("  fault: {}\n", status.fault());
   if (!status.checkpoint().empty())
     text += fmt::format("  checkpoint: {}; {}\n", status.checkpoint(),

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 
@@ -10,6 +11,7 @@
 #include "plugin_sdk/motion_curve.h"
 #include "plugin_sdk/slots.h"
 #include "services/edit/disturbance.h"
+#include "services/edit/turned_joints.h"
 
 namespace gravitas {
 namespace {
@@ -139,6 +141,11 @@ void EditedScene::refuse_late_impulses() const {
                         edit_.step(), id, body.id));
     }
   }
+}
+
+void EditedScene::look_at_limits(const kernel::EnvironmentDescription& active, const kernel::Environment& now,
+                                 const kernel::EnvironmentDescription& begun, const kernel::Environment& next) {
+  std::ranges::move(warnings_of_turned_joints(edit_, {active, now}, {begun, next}), std::back_inserter(warnings_));
 }
 
 // Whatever is set of a joint that broke, it holds nothing.

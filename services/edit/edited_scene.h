@@ -42,8 +42,10 @@ class EditedScene {
 
   const scene::v1::Scene& scene() const { return scene_; }
   const kernel::EnvironmentDescription& description() const { return description_; }
-  // Of scene and builder.
+  // Of scene and builder; of who answers before (`active`) and after (`begun`), once the state is handed over.
   const std::vector<std::string>& warnings() const { return warnings_; }
+  void look_at_limits(const kernel::EnvironmentDescription& active, const kernel::Environment& now,
+                      const kernel::EnvironmentDescription& begun, const kernel::Environment& next);
 
   // Starts the environment of description(), whoever answers there. Throws BadInput that names the edit.
   std::unique_ptr<kernel::Environment> start(const kernel::EnvironmentDescription& begun,

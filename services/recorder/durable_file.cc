@@ -45,6 +45,13 @@ void write_and_sync(const std::string& path, std::span<const std::byte> bytes) {
 
 }  // namespace
 
+bool has_lost_its_name(int file, const std::string& path) {
+  struct stat written = {}, there = {};
+  if (fstat(file, &written) != 0 || !S_ISREG(written.st_mode)) return false;
+  if (stat(path.c_str(), &there) != 0) return errno == ENOENT || errno == ENOTDIR;
+  return there.st_dev != written.st_dev || there.st_ino != written.st_ino;
+}
+
 bool is_disk_error(const std::error_code& code) {
   return code == std::errc::no_space_on_device || code == std::errc::file_too_large || code == std::errc::io_error ||
          code == std::error_code(EDQUOT, std::generic_category());

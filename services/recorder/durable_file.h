@@ -12,6 +12,9 @@ namespace gravitas {
 // Writes all bytes to a file descriptor; throws std::system_error naming `what`.
 void write_all(int file, std::span<const std::byte> bytes, const std::string& what);
 
+// Whether an open ordinary file is no longer the one of that name: it was removed, moved or replaced.
+bool has_lost_its_name(int file, const std::string& path);
+
 // An error of the disk (full, broken) rather than of a name.
 bool is_disk_error(const std::error_code& code);
 

@@ -195,6 +195,7 @@ void JournalWriter::flush() {
   last_flush_ = Clock::now();
   const std::vector<std::byte> waiting = std::exchange(buffer_, {});
   write_all(file_, waiting, "journal '" + path_ + "'");
+  is_lost_ = is_lost_ || has_lost_its_name(file_, path_);
 }
 
 }  // namespace gravitas

@@ -64,6 +64,8 @@ class JournalWriter {
   // One that the journal knows and that is made again is not written again.
   void append(const edit::v1::Edit& edit);
   void flush();
+  // As the last flush found: somebody removed the file, or put another into its place.
+  bool is_lost() const { return is_lost_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -73,6 +75,7 @@ class JournalWriter {
 
   std::string path_;
   int file_ = -1;
+  bool is_lost_ = false;
   std::uint64_t check_ = 0;
   std::uint32_t last_step_;
   std::vector<edit::v1::Edit> known_edits_;  // not made again so far

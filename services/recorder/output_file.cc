@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "services/recorder/durable_file.h"
+
 namespace gravitas {
 
 OutputFile::OutputFile(std::string what, std::string path, Allowed allowed)
@@ -50,17 +52,10 @@ void OutputFile::flush() {
   if (file_ && std::fflush(file_.get()) != 0) fail();
 }
 
-bool OutputFile::has_lost_its_name() const {
-  struct stat written = {}, there = {};
-  if (fstat(fileno(file_.get()), &written) != 0 || !S_ISREG(written.st_mode)) return false;
-  if (stat(path_.c_str(), &there) != 0) return errno == ENOENT || errno == ENOTDIR;
-  return there.st_dev != written.st_dev || there.st_ino != written.st_ino;
-}
-
 void OutputFile::close() {
   begin();
   if (!file_) return;
-  const bool is_lost = has_lost_its_name();
+  const bool is_lost = has_lost_its_name(fileno(file_.get()), path_);
   if (std::fclose(file_.release()) != 0) fail();
   if (is_lost)
     throw std::system_error(ENOENT, std::generic_category(),

@@ -36,7 +36,6 @@ class OutputFile {
 
  private:
   [[noreturn]] void fail() const;
-  bool has_lost_its_name() const;
   std::string named() const { return what_ + " '" + path_ + "'"; }
 
   std::string what_, path_;

@@ -71,6 +71,14 @@ void Recorder::check(const JournalEntry& commit) {
                   commit.step, commit.chain.text(), before.chain.text(), expected_journal_));
 }
 
+std::string Recorder::warning() const {
+  if (!journal_ || !journal_->is_lost()) return {};
+  return fmt::format(
+      "journal '{}' was removed or replaced while the run wrote it: whoever goes on has the checkpoint alone, without "
+      "the edits and swaps after it",
+      journal_of(path_));
+}
+
 void Recorder::save(const kernel::Environment& environment) {
   journal_->flush();
   if (ends_in_a_shortened_step(environment)) return;

@@ -69,6 +69,8 @@ class Recorder final : public kernel::CommitListener {
   void save_to(const std::string& path, const kernel::Environment& environment) const;
 
   bool keeps() const { return journal_.has_value(); }
+  // What went wrong and ended nothing; empty: nothing.
+  std::string warning() const;
   const std::string& path() const { return path_; }
   // Step of the last checkpoint that was put into path().
   std::optional<std::uint32_t> saved_step() const { return saved_step_; }

@@ -158,7 +158,7 @@ std::string disagreement_text(const report::v1::Disagreement& disagreement) {
 void write_swaps(const kernel::Environment& environment, report::v1::Report* report) {
   for (const kernel::SwapRecord& one : environment.swaps()) {
     report::v1::SwapRecord* swap = one.only_compared ? report->add_comparisons() : report->add_swaps();
-    swap->set_step(one.step);
+    swap->set_step(std::max(one.step, one.since));
     swap->set_slot(slot_name(one.slot));
     swap->set_from(one.from);
     swap->set_to(one.to);
@@ -168,6 +168,7 @@ void write_swaps(const kernel::Environment& environment, report::v1::Report* rep
     swap->set_reason(one.reason);
     write_comparison(one.shadow, environment, swap->mutable_shadow());
   }
+  std::ranges::stable_sort(*report->mutable_comparisons(), {}, &report::v1::SwapRecord::step);
 }
 
 report::v1::Plan plan_message(const kernel::Environment& environment,

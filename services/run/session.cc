@@ -328,12 +328,13 @@ class Run final : private kernel::CommitListener {
 
   // Another environment goes on; what this one has to tell is told now.
   void make(edit::v1::Edit* edit) {
-    const EditedScene edited(options_, scene_, description_, &catalog_, edit, &*environment_);
+    EditedScene edited(options_, scene_, description_, &catalog_, edit, &*environment_);
     kernel::EnvironmentDescription active = description_, begun = edited.description();
     put_in_place(decisions_, catalog_, &active);
     keep_who_answers(description_, active, &begun);
     std::unique_ptr<kernel::Environment> next = edited.start(begun, starter());
     const auto parted = edited.hand_over(*environment_, next.get());
+    edited.look_at_limits(active, *environment_, begun, *next);
     const std::vector<std::uint32_t> woken = edited.woken(*environment_, *next);
     for (const std::string& warning : edited.warnings())
       if (std::ranges::find(warnings_, warning) == warnings_.end()) warnings_.push_back(warning);
@@ -564,6 +565,7 @@ void Run::write_report() {
     if (const auto kind = static_cast<EventKind>(i); event_kinds_.has(kind))
       report.add_event_kinds(event_kind_name(kind));
   write_past();
+  if (recorder_ && !recorder_->warning().empty()) warnings_.push_back(recorder_->warning());
   for (std::string& warning : warnings_) report.add_warnings(std::move(warning));
   name_orders(faults_, description_, report.steps(), true, &report);
   if (!edits_.made().empty()) report.add_warnings("times of stages and steps are those since the last edit");

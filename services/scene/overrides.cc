@@ -193,6 +193,13 @@ class Override {
   void set(const BlockRule& rule, const Entry& entry, pb::Message* block) {
     if (entry.name == "Type" || entry.name == "Name") drop_old_properties(rule, entry, block);
     assign(rule, entry, entry.form == Form::kText ? text_value() : any_value(), block, diagnostics_);
+    if (auto* body = pb::DynamicCastToGenerated<v1::Body>(block)) replace_mass(entry.field->number(), body);
+  }
+
+  // A body has one of both: the one that is set takes the place of the other. Moments that are written go with a Mass.
+  static void replace_mass(int field, v1::Body* body) {
+    if (field == v1::Body::kMassFieldNumber) body->clear_mass_density();
+    if (field == v1::Body::kMassDensityFieldNumber && body->principal_moments_size() == 0) body->clear_mass();
   }
 
   void free_property(const Entry& entry, pb::Message* block, const Part& name) {

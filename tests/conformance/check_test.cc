@@ -21,6 +21,7 @@ namespace files = std::filesystem;
 
 const std::string kPlugins = in_build("/lib/gravitas");
 const std::string kFaulty = in_build("/lib/gravitas-faulty");
+const std::string kHonest = in_build("/lib/gravitas-honest");
 // Fewer calls than a full check makes, which takes minutes: `gravitas check PLUGIN` by hand makes them all.
 constexpr std::uint32_t kFewCalls = 300;
 
@@ -95,6 +96,17 @@ TEST_P(CheckOfTheTree, ConformsInAFullCheckOfFewCalls) {
   for (const report::v1::CheckLevel& level : report.levels()) EXPECT_EQ(level.verdict(), "passed") << level.level();
 }
 
+class CheckOfTheHonest : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(CheckOfTheHonest, Conforms) {
+  const std::string library = kHonest + "/" + GetParam() + ".so";
+  const auto report = check_library(library, {.quick = true, .level = {}, .only_case = {}});
+  EXPECT_TRUE(report.conforms()) << report.DebugString();
+  // a quick check tries one forbidden value of each setting
+  const auto settings = check_library(library, {.level = {}, .only_case = "handshake/settings"});
+  EXPECT_EQ(settings.findings_size(), 0) << settings.DebugString();
+}
+
 class CheckOfFaults : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(CheckOfFaults, FailsAtItsLevelInAQuickCheck) {
@@ -114,6 +126,7 @@ std::string name_of(const ::testing::TestParamInfo<std::string>& info) { return 
 INSTANTIATE_TEST_SUITE_P(All, QuickCheckOfTheTree, ::testing::ValuesIn(one_of_each_slot(libraries_of(kPlugins))),
                          name_of);
 INSTANTIATE_TEST_SUITE_P(All, CheckOfTheTree, ::testing::ValuesIn(libraries_of(kPlugins)), name_of);
+INSTANTIATE_TEST_SUITE_P(All, CheckOfTheHonest, ::testing::ValuesIn(libraries_of(kHonest)), name_of);
 INSTANTIATE_TEST_SUITE_P(All, CheckOfFaults, ::testing::ValuesIn(libraries_of(kFaulty)), name_of);
 INSTANTIATE_TEST_SUITE_P(All, CheckOfSlowFaults, ::testing::ValuesIn(libraries_of(kFaulty + "/long")), name_of);
 
@@ -156,7 +169,8 @@ TEST(CheckOfPurity, AnAnswerThatDoesNotComeInTimeIsNoOtherAnswer) {
 TEST(CheckOfACommand, ThatServesAGoodPluginConforms) {
   const std::vector<std::string> good = libraries_of(kPlugins);
   ASSERT_FALSE(good.empty());
-  std::string command = in_build("/bin/gravitas-worker ") + kPlugins + "/" + good.front() + ".so";
+  std::string command =
+      in_shell(in_build("/bin/gravitas-worker")) + " " + in_shell(kPlugins + "/" + good.front() + ".so");
   const auto report = check_library(command, {.quick = true, .level = {}, .only_case = {}});
   EXPECT_TRUE(report.conforms()) << report.DebugString();
   EXPECT_EQ(report.command(), command);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "plugin_sdk/conformance/inquiry.h"
+#include "plugin_sdk/property_value.h"
 
 namespace gravitas::conformance {
 namespace {
@@ -84,6 +85,21 @@ TEST(SampleValues, TablesAscend) {
   ASSERT_EQ(values.size(), 33U);
   EXPECT_EQ(values[0], 8.0);
   for (std::size_t row = 1; row < 8; ++row) EXPECT_GT(values[1 + 4 * row], values[1 + 4 * (row - 1)]);
+}
+
+// Bounds of a table hold for all of its numbers, the first of a row among them.
+TEST(SampleValues, TablesKeepTheirBoundsAndAscend) {
+  const std::vector<Property> tables[] = {
+      {Property::table("Table", 2, "1", "world").at_least(2.0).at_most(5.0).required()},
+      {Property::table("Table", 2, "1", "world").at_most(-3.0).required()},
+      {Property::table("Table", 2, "1", "world").above(0.0).at_most(1.0).required()},
+      {Property::table("Table", 2, "1", "world").at_most(0.5).required()}};
+  for (const std::vector<Property>& properties : tables) {
+    Draw draw(1);
+    const std::vector<double> values = sample_values(properties, &draw);
+    EXPECT_EQ(check_flattened(properties, values), "");
+    for (std::size_t row = 1; row < 8; ++row) EXPECT_GT(values[1 + 2 * row], values[1 + 2 * (row - 1)]);
+  }
 }
 
 TEST(SampleValues, WhatTheSceneLanguageGivesMustBeTaken) {

@@ -29,8 +29,9 @@ class Machine {
     chmod(path(program).c_str(), 0755);
   }
   int install(const std::string& what) const {
-    const std::string command = "PATH=" + folder_.path() + ":$PATH " + in_source("/deploy/install_dependencies ") +
-                                what + " >" + path("out") + " 2>&1";
+    const std::string command = "PATH=" + folder_.path() + ":$PATH " +
+                                in_shell(in_source("/deploy/install_dependencies")) + " " + what + " >" + path("out") +
+                                " 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));
   }
   std::string text(const std::string& name) const {

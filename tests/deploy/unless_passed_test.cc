@@ -33,7 +33,8 @@ class Shard {
   // Returns the exit code.
   int test(const std::string& inputs, const std::string& arguments = "") const {
     const std::string command = "cd " + folder_.path() + " && GRAVITAS_TEST_INPUTS='" + inputs + "' " +
-                                in_source("/tests/unless_passed results.xml ./program ") + arguments + " >out 2>&1";
+                                in_shell(in_source("/tests/unless_passed")) + " results.xml ./program " + arguments +
+                                " >out 2>&1";
     return WEXITSTATUS(std::system(command.c_str()));
   }
   int runs() const {

@@ -6,11 +6,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gravitas/campaign/v1/campaign.pb.h"
+#include "services/campaign/scenes.h"
+#include "services/campaign/table.h"
+#include "services/campaign/trial_plan.h"
 #include "tests/services/cli/program.h"
 
 namespace gravitas {
@@ -47,6 +52,46 @@ const campaign::v1::Row* find_row(const Table& table, const std::string& group) 
   for (const campaign::v1::Row& row : table.rows())
     if (row.group() == group) return &row;
   return nullptr;
+}
+
+// What any check of the form finds is not counted as a wrong value, so that the share which escapes is of those alone
+// that may escape.
+TEST(CampaignCounts, WrongValuesAreDrawnOfTheRightForm) {
+  const std::vector<campaign::Scene> scenes = campaign::load_scenes({}, 1);
+  std::map<std::string, int> drawn;
+  for (std::uint64_t i = 0; i < 2000; ++i)
+    for (const campaign::PlannedFault& fault :
+         campaign::draw_trial(campaign::trial_seed(7, i), scenes, {.tier = campaign::Tier::kSimulated}).faults) {
+      ++drawn[fault.group];
+      const bool is_no_number = fault.order.starts_with("nan") || fault.order.starts_with("inf");
+      const bool has_ids = fault.slot == Slot::kSpace || fault.slot == Slot::kCollision;
+      const bool is_out_of_order = has_ids && (fault.order == "permute" || fault.order == "double");
+      if (is_no_number || is_out_of_order) {
+        EXPECT_THAT(fault.group, ::testing::AnyOf("malformed", "poison")) << fault.order;
+      }
+      EXPECT_EQ(fault.group == "values", fault.duty == campaign::Duty::kWrong && !fault.rerun) << fault.order;
+    }
+  EXPECT_GT(drawn["values"], 100);
+  EXPECT_GT(drawn["malformed"], 100);
+}
+
+TEST(CampaignCounts, WrongValuesAreThoseOfTheirGroupThatSomethingFoundOrNothingDid) {
+  Trial trial;
+  for (const auto& [group, outcome] : {std::pair{"values", "B"},
+                                       {"values", "not caught"},
+                                       {"values", "M"},
+                                       {"malformed", "B"},
+                                       {"poison", "B"},
+                                       {"re-run", "B"},
+                                       {"tolerance", "needs re-run"}}) {
+    campaign::v1::Fault* fault = trial.add_faults();
+    fault->set_group(group);
+    fault->set_outcome(outcome);
+  }
+  campaign::Tally tally;
+  tally.add(trial, "gravitas campaign --trial 1");
+  EXPECT_EQ(tally.table().wrong_values(), 2U);
+  EXPECT_EQ(tally.table().not_caught(), 1U);
 }
 
 // Real worker processes: part N of 4, 500 faults each.

@@ -26,6 +26,7 @@
 #include "plugin_sdk/library.h"
 #include "tests/kernel/one_call.h"
 #include "tests/kernel/world_builder.h"
+#include "tests/paths.h"
 
 namespace gravitas {
 namespace {
@@ -171,7 +172,7 @@ TEST(GrpcCarrier, ACommandStartsAWorkerBesideTheSlotsLibraries) {
   builder.force("Basic", "force_basic", {0, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   const std::string direct = chain_by_grpc_of(builder);
   kernel::PluginChoice& gravity = builder.description().force.plugins[0];
-  gravity.command = kernel::worker_program() + " " + gravity.library;
+  gravity.command = in_shell(kernel::worker_program()) + " " + in_shell(gravity.library);
   EXPECT_EQ(chain_by_grpc_of(builder), direct);
   builder.hosting(Slot::kForce, Hosting::kSharedMemory);
   EXPECT_EQ(chain_by_grpc_of(builder), direct);

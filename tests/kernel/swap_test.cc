@@ -195,6 +195,63 @@ TEST_P(Swapped, ComparisonChangesNoBitAndNeverCutsOver) {
   EXPECT_TRUE(world.faults().empty());
 }
 
+// Euler, compared with it, and Euler in its place: before they differ in every step, then in none.
+TEST_P(Swapped, AComparisonCountsAnewBesideWhoTakesOver) {
+  Environment world(builder().description());
+  const kernel::PluginChoice euler = other(Slot::kIntegrator, plugin_path("integrator_euler"));
+  world.order_swap({Slot::kIntegrator, euler, std::nullopt, 0}, true);
+  world.order_swap({Slot::kIntegrator, euler, std::nullopt, 11});
+  run_to_end(&world);
+  const std::vector<SwapRecord> records = world.swaps();
+  ASSERT_EQ(records.size(), 3U);
+  EXPECT_EQ(records[0].from, "Euler");
+  EXPECT_EQ(records[0].to, "Euler");
+  EXPECT_EQ(records[0].since, 11U);
+  EXPECT_EQ(records[0].shadow.calls, kSwapSteps - 10);
+  EXPECT_EQ(records[0].shadow.differing_calls, 0U);
+  EXPECT_TRUE(records[1].only_compared);
+  EXPECT_EQ(records[1].from, "SemiImplicitEuler");
+  EXPECT_EQ(records[1].since, 0U);
+  EXPECT_EQ(records[1].shadow.calls, 10U);
+  EXPECT_EQ(records[1].shadow.differing_calls, 10U);
+  EXPECT_FALSE(records[2].only_compared);
+}
+
+// Who takes over is the same plugin in the same place: no other pair.
+TEST_P(Swapped, AComparisonCountsOnBesideTheSamePlugin) {
+  Environment world(builder().description());
+  world.order_swap({Slot::kIntegrator, other(Slot::kIntegrator, plugin_path("integrator_euler")), std::nullopt, 0},
+                   true);
+  world.order_swap({Slot::kIntegrator, plugin_of(Slot::kIntegrator), std::nullopt, 11});
+  run_to_end(&world);
+  ASSERT_EQ(world.swaps().size(), 2U);
+  EXPECT_TRUE(world.swaps()[0].only_compared);
+  EXPECT_EQ(world.swaps()[0].shadow.calls, kSwapSteps);
+  EXPECT_EQ(world.swaps()[0].since, 0U);
+}
+
+TEST_P(Swapped, AComparisonBesideWhoIsRolledBackCountsAnewTwice) {
+  if (GetParam() == Hosting::kDirect) GTEST_SKIP() << "it would end this process";
+  Environment world(builder().description());
+  world.order_swap({Slot::kIntegrator, plugin_of(Slot::kIntegrator), std::nullopt, 0}, true);
+  ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+  world.order_swap(
+      {Slot::kIntegrator, other(Slot::kIntegrator, faulty_plugin_path("integrator_killed")), std::nullopt, 2});
+  run_to_end(&world);
+  std::vector<SwapRecord> compared = world.swaps();
+  std::erase_if(compared, [](const SwapRecord& one) { return !one.only_compared; });
+  ASSERT_EQ(compared.size(), 3U);
+  EXPECT_EQ(compared[0].from, "SemiImplicitEuler");
+  EXPECT_EQ(compared[0].since, 4U);
+  // the step in which it took over again was begun anew
+  EXPECT_EQ(compared[0].shadow.calls, kSwapSteps - 3 + 1);
+  EXPECT_EQ(compared[0].shadow.differing_calls, 0U);
+  EXPECT_EQ(compared[1].shadow.calls, 1U);
+  EXPECT_NE(compared[2].from, "SemiImplicitEuler");
+  EXPECT_EQ(compared[2].since, 2U);
+  EXPECT_EQ(compared[2].shadow.calls, 2U);
+}
+
 TEST_P(Swapped, WhatIsCalledOffLeavesNoTraceAndTheNextComesAllTheSame) {
   Environment world(builder().description());
   kernel::PluginChoice weaker = plugin_of(Slot::kSolver);

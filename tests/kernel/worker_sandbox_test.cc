@@ -18,6 +18,7 @@
 #include "plugin_sdk/channel/supervisor.h"
 #include "tests/kernel/one_call.h"
 #include "tests/kernel/world_builder.h"
+#include "tests/paths.h"
 #include "tests/sanitized.h"
 
 namespace gravitas {
@@ -202,9 +203,9 @@ TEST(WorkerSandbox, ACommandWhoseKernelIsGoneAlreadyIsNotStarted) {
 TEST(WorkerSandbox, ACommandSaysItsOwn) {
   kernel::SlotDescription slot = slot_with("integrator_nan", Hosting::kGrpc);
   kernel::PluginChoice& plugin = slot.plugins[0];
-  plugin.command = kernel::worker_program() + " " + plugin.library;
+  plugin.command = in_shell(kernel::worker_program()) + " " + in_shell(plugin.library);
   expect_whole_sandbox(start(slot)->sandbox());
-  plugin.command = kernel::worker_program() + " --no-sandbox " + plugin.library;
+  plugin.command = in_shell(kernel::worker_program()) + " --no-sandbox " + in_shell(plugin.library);
   EXPECT_THAT(start(slot)->sandbox(), IsEmpty());
 }
 

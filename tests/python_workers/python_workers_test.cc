@@ -28,7 +28,8 @@ using testing::HasSubstr;
 
 const std::string kFolder = in_source("/tests/python_workers/");
 const std::string kScenes = in_source("/tests/scenes/");
-const std::string kPython = "PYTHONPATH=" + in_build("/lib/python");
+const std::string kPython = "PYTHONPATH=" + in_shell(in_build("/lib/python"));
+const std::string kGravitas = in_shell(in_build("/bin/gravitas"));
 
 // What the workers inherit.
 class PythonPath : public ::testing::Environment {
@@ -99,7 +100,7 @@ Ended ended(const std::string& command) {
 }
 
 TEST(PythonSdk, PassesItsOwnTests) {
-  const Ended tests = ended(kPython + " /usr/bin/python3 -B " + kFolder + "sdk_test.py");
+  const Ended tests = ended(kPython + " /usr/bin/python3 -B " + in_shell(kFolder + "sdk_test.py"));
   EXPECT_EQ(tests.code, 0) << tests.words;
   EXPECT_THAT(tests.words, testing::ContainsRegex("Ran [1-9][0-9] tests"));
 }
@@ -164,8 +165,8 @@ MixedRun solved_in_python(const std::string& name, std::vector<std::string> over
 
 // It commits no orders, so what can be comes from outside, and the rest is not taken for survived.
 TEST(PythonForce, IsKilledAndStoppedFromOutside) {
-  const std::string run =
-      in_build("/bin/gravitas run ") + kFolder + "falling_with_drag.gravitas --steps 30 --set Plugin.force.Deadline=1 ";
+  const std::string run = kGravitas + " run " + in_shell(kFolder + "falling_with_drag.gravitas") +
+                          " --steps 30 --set Plugin.force.Deadline=1 ";
   const Ended quiet = ended(run + "--json | grep chain_hash");
   const Ended hurt =
       ended(run + "--fault force:kill@step=5 --fault force:hang@step=12 --fault force:nan@step=20 --json");
@@ -179,8 +180,9 @@ TEST(PythonForce, IsKilledAndStoppedFromOutside) {
 }
 
 TEST(PythonSolver, OrdersThatCannotComeFromOutsideAreRefused) {
-  const Ended refused = ended(in_build("/bin/gravitas run ") + kFolder + "solver.gravitas " + kScenes +
-                              "pendulum.gravitas --set Solver=PythonIslands --fault solver:nan@step=5");
+  const Ended refused =
+      ended(kGravitas + " run " + in_shell(kFolder + "solver.gravitas") + " " +
+            in_shell(kScenes + "pendulum.gravitas") + " --set Solver=PythonIslands --fault solver:nan@step=5");
   EXPECT_EQ(refused.code, 2) << refused.words;
   EXPECT_THAT(refused.words,
               HasSubstr("fault nan in slot solver: the worker of a Command commits no orders itself; allowed"));
@@ -287,10 +289,22 @@ INSTANTIATE_TEST_SUITE_P(Each, PythonWorker, ::testing::Values("collision_balls"
 // With the fewest calls, since a solver in Python takes a hundredth of a second for each, and with as long as a busy machine
 // takes for them.
 TEST_P(PythonWorker, ConformsSaysTheKit) {
-  const std::string command = "/usr/bin/python3 " + kFolder + GetParam() + ".py";
+  const std::string command = "/usr/bin/python3 " + in_shell(kFolder + GetParam() + ".py");
   const Ended check =
-      ended(kPython + " " + in_build("/bin/gravitas check '") + command + "' --quick --quick-limit 300 --calls 300");
+      ended(kPython + " " + kGravitas + " check " + in_shell(command) + " --quick --quick-limit 300 --calls 300");
   EXPECT_EQ(check.code, 0) << check.words;
+}
+
+TEST(PythonKit, NonsenseIsNoRefusal) {
+  const auto check = [](const std::string& worker) {
+    const std::string command = "/usr/bin/python3 " + in_shell(kFolder + worker);
+    return ended(kPython + " " + kGravitas + " check " + in_shell(command) + " --case handshake/magic");
+  };
+  const Ended sound = check("force_drag.py");
+  EXPECT_EQ(sound.code, 0) << sound.words;
+  const Ended mumbling = check("mumbling_drag.py");
+  EXPECT_EQ(mumbling.code, 4) << mumbling.words;
+  EXPECT_THAT(mumbling.words, HasSubstr("it answers with something else than Welcome or Refusal"));
 }
 
 }  // namespace

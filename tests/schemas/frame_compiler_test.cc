@@ -45,7 +45,7 @@ struct Outcome {
 };
 
 Outcome frame_compiler(const std::string& arguments) {
-  FILE* pipe = popen((in_build("/bin/frame_compiler ") + arguments + " 2>&1").c_str(), "r");
+  FILE* pipe = popen((in_shell(in_build("/bin/frame_compiler")) + " " + arguments + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return {-1, "popen failed"};
   Outcome outcome{0, ""};
   for (int c = fgetc(pipe); c != EOF; c = fgetc(pipe)) outcome.words += static_cast<char>(c);
@@ -112,7 +112,7 @@ TEST_F(FrameCompiler, LintFindsNothingInTheSchemasOfTheTree) {
     ++count;
   }
   ASSERT_GE(count, 12);
-  const Outcome outcome = frame_compiler("--proto-root " + kSchemas.string() + " --lint" + names);
+  const Outcome outcome = frame_compiler("--proto-root " + in_shell(kSchemas) + " --lint" + names);
   EXPECT_EQ(outcome.words, "");
   EXPECT_EQ(outcome.exit_code, 0);
 }
@@ -162,7 +162,7 @@ TEST_F(FrameCompiler, LintSaysWhereAFileIsNoProto) {
   const Outcome outcome = lint("message Parcel {\n  double = 1;\n}");
   EXPECT_THAT(outcome.words, StartsWith("bad.proto:5:10: "));
   EXPECT_EQ(outcome.exit_code, 1);
-  const Outcome missing = frame_compiler("--proto-root " + kSchemas.string() + " --lint nothing/here.proto");
+  const Outcome missing = frame_compiler("--proto-root " + in_shell(kSchemas) + " --lint nothing/here.proto");
   EXPECT_THAT(missing.words, HasSubstr("nothing/here.proto"));
   EXPECT_EQ(missing.exit_code, 1);
 }
@@ -229,7 +229,7 @@ TEST_F(FrameCompiler, RefusesMoreColumnsThanAFrameHas) {
 
 TEST_F(FrameCompiler, AFolderThatCannotBeWrittenIsAnError) {
   const Outcome outcome =
-      frame_compiler("--proto-root " + kSchemas.string() + " --out " + (folder_ / "no/such/folder.h").string());
+      frame_compiler("--proto-root " + in_shell(kSchemas) + " --out " + (folder_ / "no/such/folder.h").string());
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_FALSE(fs::exists(folder_ / "no"));
 }

@@ -313,7 +313,9 @@ TEST(Wire, RefusesWhatIsNoMessageAndSaysWhy) {
 
 // What a worker in another language asks the compiler for is what the kernel compares.
 TEST(Wire, TheSchemaHashIsPrintedAsTheKernelHasIt) {
-  FILE* pipe = popen((in_build("/bin/frame_compiler --proto-root ") + in_source("/schemas --hash")).c_str(), "r");
+  const std::string command =
+      in_shell(in_build("/bin/frame_compiler")) + " --proto-root " + in_shell(in_source("/schemas")) + " --hash";
+  FILE* pipe = popen(command.c_str(), "r");
   ASSERT_NE(pipe, nullptr);
   std::uint64_t printed = 0;
   EXPECT_EQ(fscanf(pipe, "0x%" SCNx64, &printed), 1);

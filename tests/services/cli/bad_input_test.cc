@@ -587,9 +587,10 @@ TEST(BadInput, AReportThatCannotBeWrittenIsRefusedBeforeTheRun) {
 
 // What could not be printed is not done.
 TEST(StandardOutput, ThatCannotBeWrittenIsAFailure) {
-  for (const std::string& words : {"plan --json " + kSample, "run --duration 0.1 --hosting direct --json " + kSample,
-                                   std::string("--help"), std::string("--version"), std::string("run --help")}) {
-    const std::string command = in_build("/bin/gravitas") + " " + words + " > /dev/full 2> /dev/null";
+  for (const std::string& words :
+       {"plan --json " + in_shell(kSample), "run --duration 0.1 --hosting direct --json " + in_shell(kSample),
+        std::string("--help"), std::string("--version"), std::string("run --help")}) {
+    const std::string command = in_shell(in_build("/bin/gravitas")) + " " + words + " > /dev/full 2> /dev/null";
     EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 1) << words;
   }
 }

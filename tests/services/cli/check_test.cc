@@ -47,7 +47,7 @@ TEST(Check, ExitCodeAndLastLineAreTheVerdict) {
   EXPECT_TRUE(good.out.ends_with("no finding in what was asked for: C0\n")) << good.out;
   const ProgramResult bad = run_program({"check", kBad, "--quick"}, folder);
   EXPECT_EQ(bad.exit_code, 4);
-  EXPECT_THAT(bad.out, HasSubstr("again  gravitas check " + kBad + " --case"));
+  EXPECT_THAT(bad.out, HasSubstr("again  gravitas check " + in_shell(kBad) + " --case"));
   EXPECT_TRUE(bad.out.ends_with("does not conform: fails C0\n")) << bad.out;
 }
 

@@ -60,10 +60,11 @@ TEST(Checkpoints, APausedRunNamesTheOneItWroteAndTheCommandThatGoesOn) {
        "shm", "--hosting", "solver=direct", "--threads", "2", "--swap", "solver=Newton@step=90"},
       folder);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.err,
-              HasSubstr("checkpoint '" + kept + "' holds step 10; to go on: gravitas run " + kSample + " " + plugins +
-                        " --duration 1.5 --set Integrator=Faulty --hosting shm --hosting solver=direct --threads 2 " +
-                        "--swap solver=Newton@step=90 --resume '" + kept + "'"));
+  EXPECT_THAT(
+      result.err,
+      HasSubstr("checkpoint '" + kept + "' holds step 10; to go on: gravitas run " + in_shell(kSample) + " " + plugins +
+                " --duration 1.5 --set Integrator=Faulty --hosting shm --hosting solver=direct --threads 2 " +
+                "--swap solver=Newton@step=90 --resume '" + kept + "'"));
   // it resumes: the same plugin dies again, and uses up a budget of its own
   const ProgramResult again = run_program(
       {"run", kSample, plugins, "--set", "Integrator=Faulty", "--resume", kept, "--checkpoint", kept}, folder);

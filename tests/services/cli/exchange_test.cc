@@ -112,8 +112,8 @@ TEST(Exchange, AWorkerThatIsKilledWhileItStartsIsStartedOnceMore) {
                                           "[ \"$1\" = --describe ] && start=describe || start=$(cat start)\n"
                                           "[ -e killed.$start ] || { touch killed.$start; kill -9 $$; }\n"
                                           "exec " +
-                                              in_build("/bin/gravitas-worker") + " \"$@\" " +
-                                              in_build("/lib/gravitas/solver_sequential.so") + "\n");
+                                              in_shell(in_build("/bin/gravitas-worker")) + " \"$@\" " +
+                                              in_shell(in_build("/lib/gravitas/solver_sequential.so")) + "\n");
   const std::string plugins =
       folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"solver\" Command = \"sh worker.sh\" } }");
   folder.write("start", "run");
@@ -215,8 +215,8 @@ TEST(Exchange, TheReportSaysWhatIsEnforcedOnEveryWorker) {
 TEST(Exchange, AnAttachedWorkerHasNoDeadline) {
   const ScratchFolder folder;
   const std::string address = "unix:" + folder.path("worker");
-  const std::string command = in_build("/bin/gravitas-worker --listen ") + address + " " +
-                              in_build("/lib/gravitas/solver_sequential.so >/dev/null 2>&1 & echo $!");
+  const std::string command = in_shell(in_build("/bin/gravitas-worker")) + " --listen " + address + " " +
+                              in_shell(in_build("/lib/gravitas/solver_sequential.so")) + " >/dev/null 2>&1 & echo $!";
   FILE* const shell = popen(command.c_str(), "r");
   int process = 0;
   ASSERT_EQ(fscanf(shell, "%d", &process), 1);

@@ -357,8 +357,8 @@ TEST(Run, KnowsHowWorkersEndedUnderAParentThatIgnoresThem) {
 TEST(Run, ASmallStackIsRaisedOrRefused) {
   const ScratchFolder folder;
   const auto run = [&](const std::string& limit, const std::string& hosting) {
-    const std::string command = "ulimit " + limit + " -s 64; " + in_build("/bin/gravitas") + " run " +
-                                shipped_scene("stack") + " --steps 5 --quiet --hosting " + hosting +
+    const std::string command = "ulimit " + limit + " -s 64; " + in_shell(in_build("/bin/gravitas")) + " run " +
+                                in_shell(shipped_scene("stack")) + " --steps 5 --quiet --hosting " + hosting +
                                 " > /dev/null 2> " + folder.path("told");
     return WEXITSTATUS(std::system(command.c_str()));
   };

@@ -273,6 +273,9 @@ TEST(Serve, WhatCannotBeIsExitCode2) {
   result = harness::run_program({"serve", kSample, "--headless", "--speed", "-1"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("--speed -1"));
+  result = harness::run_program({"serve", kSample, "--headless", "--compare", "solver=Newtn"}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--compare solver=Newtn: no solver plugin"));
   result = harness::run_program({"serve", kSample, "--headless", "--listen", "0.0.0.0:4711"}, folder);
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, HasSubstr("others with --allow-remote"));

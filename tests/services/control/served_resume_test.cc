@@ -2,11 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <utility>
 
 #include "tests/paths.h"
+#include "tests/run_quietly.h"
 #include "tests/services/control/served.h"
 
 namespace gravitas::control {
@@ -126,6 +128,59 @@ TEST(ServedResume, GoesOnBeforeAShortenedLastStep) {
   EXPECT_THAT(resumed.client.status().last_warning(), HasSubstr("the last step is shorter"));
   resumed.edit({"set Body.Ball01.LinearVelocity={0,1,0}"});
   EXPECT_EQ(resumed.to_the_end().chain_hash(), end);
+}
+
+// Long after its probation, and within it.
+TEST(ServedResume, ListsTheSwapsThatWereMade) {
+  for (const std::uint32_t kept : {20U, 40U}) {
+    const gravitas::harness::ScratchFolder folder;
+    ServeOptions options = sample("direct");
+    options.run.checkpoint = folder.path("served.ck");
+    {
+      Served served(options);
+      served.client.step(10);
+      served.client.swap(harness::parse_swap_request("solver=Newton@step=18"));
+      served.client.step(kept - 10U);
+      served.run.save_checkpoint();
+    }
+    ServeOptions again = sample("direct");
+    again.run.resume = options.run.checkpoint;
+    Served resumed(again);
+    const api::Status status = resumed.client.status();
+    EXPECT_EQ(status.step(), kept);
+    ASSERT_EQ(status.swaps_size(), 1) << kept;
+    EXPECT_EQ(status.swaps(0).slot(), "solver");
+    EXPECT_EQ(status.swaps(0).step(), 18U);
+    EXPECT_EQ(status.swaps(0).from(), "Sequential");
+    EXPECT_EQ(status.swaps(0).to(), "Newton");
+    EXPECT_EQ(status.swaps(0).outcome(), kept == 20U ? "probation" : "committed");
+    // as a run that goes on tells it
+    const RunResult run = harness::run_quietly(again.run);
+    ASSERT_EQ(run.report.swaps_size(), 1);
+    EXPECT_EQ(run.report.swaps(0).step(), 18U);
+    EXPECT_EQ(run.report.swaps(0).outcome(), "committed");
+    const api::ServedSwap second = resumed.swap("solver=Direct");
+    EXPECT_GT(second.number(), status.swaps(0).number());
+    EXPECT_EQ(resumed.client.status().swaps_size(), 2);
+    resumed.client.reset();
+    EXPECT_EQ(resumed.client.status().swaps_size(), 0);
+  }
+}
+
+TEST(ServedResume, AJournalThatIsReplacedMeanwhileIsTold) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  Served served(options);
+  served.client.step(10);
+  const std::uint32_t before = served.client.status().warning_count();
+  folder.write("other", "of somebody else");
+  std::filesystem::rename(folder.path("other"), folder.path("served.ck.journal"));
+  served.client.step(1);
+  served.run.save_checkpoint();
+  const api::Status status = served.client.status();
+  EXPECT_EQ(status.warning_count(), before + 1U);
+  EXPECT_THAT(status.last_warning(), HasSubstr("served.ck.journal' was removed or replaced"));
 }
 
 TEST(ServedResume, DoesNotGoOnFromWhatIsNoCheckpointOfItsScene) {

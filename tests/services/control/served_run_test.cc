@@ -82,6 +82,29 @@ TEST(ServedRun, TellsItsStatusWhileAStepWaitsForAWorkerThatHangs) {
   EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
 }
 
+TEST(ServedRun, WhoWaitsForAStepThatHangsIsToldSo) {
+  ServeOptions options = sample();
+  options.run.overrides = {"Plugin.solver.Deadline=5"};
+  Served served(options);
+  served.client.step(10);
+  std::vector<api::Status> told;
+  ControlClient waiting(served.socket.path());
+  waiting.on_wait([&](const api::Status& status) { told.push_back(status); });
+  waiting.pause();
+  waiting.reactions();
+  EXPECT_TRUE(told.empty());
+  served.client.inject("solver:hang@step=11");
+  std::future<api::Status> step = std::async(std::launch::async, [&] { return served.client.step(1); });
+  while (served.client.status().waited() == 0.0 && step.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    continue;
+  EXPECT_EQ(waiting.pause().step(), 11U);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_GE(told[0].waited(), 0.5);
+  EXPECT_THAT(waiting_line(told[0]), StartsWith("step 11 has taken "));
+  step.get();
+  EXPECT_EQ(served.to_the_end().chain_hash(), quiet_chain());
+}
+
 TEST(ServedRun, ResumedItGoesOnAndPausedItStands) {
   ServeOptions options = sample();
   options.run.steps = 100'000'000;
@@ -253,12 +276,12 @@ TEST(ServedRun, AFaultedOneNamesTheCommandThatGoesOn) {
   ASSERT_EQ(status.edits_size(), 1);
   ASSERT_EQ(status.edits(0).texts_size(), 1);
   EXPECT_EQ(status.edits(0).texts(0), "set Body.Ball01.LinearVelocity={0,1,0}");
-  ASSERT_THAT(status.resume_command(), StartsWith("gravitas run /"));
+  ASSERT_THAT(status.resume_command(), StartsWith("gravitas run " + in_shell(kSample)));
   EXPECT_THAT(status.resume_command(),
               HasSubstr(" --set Solver.Iterations=60 --hosting shm --swap space=Grid@step=110 "));
   EXPECT_THAT(status_page(status), HasSubstr("to go on: " + status.resume_command()));
   const gravitas::harness::ScratchFolder folder;
-  const std::string command = in_build("/bin/") + status.resume_command() + " --json > " + folder.path("out");
+  const std::string command = in_shell(in_build("/bin/")) + status.resume_command() + " --json > " + folder.path("out");
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   EXPECT_EQ(harness::read_report(harness::read_file(folder.path("out"))).chain_hash(), quiet.to_the_end().chain_hash());
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "tests/services/edit/edited_run.h"
 
@@ -65,6 +66,31 @@ TEST(EditedJoints, AThrowAtAStopComesBack) {
     run.options.steps = 21;
     EXPECT_NEAR(run.end()["Load"].velocity.y(), 3.0, 10 * kStep) << solver;
   }
+}
+
+// At -0.5 rad when its limit is set: beyond one at -0.1 rad, from which 5.78 rad is where it came from.
+TEST(EditedJoints, ALimitThatTakesTheAngleForAnotherTurnIsToldOf) {
+  const auto joint = [](const std::string& more) {
+    return "Constraints { Constraint { Type = \"Revolute\" Id = \"Door\" Body2 = \"A\" CustomProperties { "
+           "BindAxisPoint1 = "
+           "{0, 0, 0} BindAxisPoint2 = {0, 0, 1} " +
+           more + " } } }\n";
+  };
+  const auto warnings = [&](const std::string& more, const std::string& edit) {
+    EditedRun run(scene(ball("A", "AngularVelocity = {0, 0, -1}"), joint(more)), {edit});
+    const auto all = run.run().report.warnings();
+    std::vector<std::string> told;
+    for (const std::string& one : all)
+      if (one.find("Door") != std::string::npos) told.push_back(one);
+    return told;
+  };
+  EXPECT_THAT(warnings("", "set Constraint.Door.LowerLimit=-0.1@step=51"),
+              ::testing::ElementsAre(
+                  "edit before step 51: set Constraint.Door.LowerLimit=-0.1: the joint 'Door' stands at angle = -0.5 "
+                  "rad, which counts as 5.78319 rad with its limits, as if it had come from behind"));
+  // what it has not reached, and what holds it with another limit on the other side
+  EXPECT_THAT(warnings("", "set Constraint.Door.LowerLimit=-0.6@step=51"), ::testing::IsEmpty());
+  EXPECT_THAT(warnings("UpperLimit = 1", "set Constraint.Door.LowerLimit=-0.1@step=51"), ::testing::IsEmpty());
 }
 
 TEST(EditedJoints, ADriveIsSetWhileItRuns) {

@@ -2,6 +2,7 @@
 // stops and resumes change no bit.
 #include "tests/services/edit/edited_run.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -64,6 +65,19 @@ TEST(EditedRun, BodiesComeAndGo) {
   EXPECT_NEAR(result.report.energy().initial(), 1.0, 1e-12);
   EXPECT_NEAR(result.report.energy().final(), 2.5, 1e-12);
   EXPECT_LT(result.report.energy().max_relative_drift(), 1e-12);
+}
+
+// Pushed by 4 N from rest: at 2 m/s when its mass, by density so far, becomes 8 kg.
+TEST(EditedRun, TheMassOfABodyOfADensityIsSet) {
+  const double volume = 4.0 / 3.0 * 3.14159265358979323846 * 1e-3;
+  const std::string pushed = fmt::format(
+      "Body {{ Id = \"A\" GeometryId = \"Unit\" MassDensity = {} Forces = {{ \"Wind\" }} }}\n", 1.0 / volume);
+  EditedRun run(
+      "Forces { Force { Type = \"Basic\" Id = \"Wind\" CustomProperties { Force = {4, 0, 0} } } }" + scene(pushed),
+      {"set Body.A.Mass=8@step=51"});
+  EXPECT_NEAR(run.end()["A"].velocity.x(), 4.0 * 0.5 + 0.5 * 0.5, 1e-12);
+  run.options.edits = {"set Body.A.Mass=8@step=51", fmt::format("set Body.A.MassDensity={}@step=76", 2.0 / volume)};
+  EXPECT_NEAR(run.end()["A"].velocity.x(), 4.0 * 0.5 + 0.5 * 0.25 + 2.0 * 0.25, 1e-12);
 }
 
 TEST(EditedRun, AForceThatIsSetActsFromThenOn) {

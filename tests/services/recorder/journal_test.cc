@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -137,6 +138,24 @@ TEST(Journal, IsWrittenByOneRunAtATime) {
     FAIL() << "two writers";
   } catch (const std::runtime_error& problem) {
     EXPECT_THAT(problem.what(), HasSubstr("another run is writing it"));
+  }
+}
+
+TEST(Journal, NoticesThatItsFileWasRemovedOrReplaced) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j"), elsewhere = folder.path("k");
+  for (const bool is_replaced : {false, true}) {
+    JournalWriter writer(path, kRun, {});
+    writer.append(entry(1));
+    writer.flush();
+    EXPECT_FALSE(writer.is_lost());
+    // moved there, it has a name still, but another one
+    std::filesystem::rename(path, elsewhere);
+    if (is_replaced) std::ofstream(path) << "of somebody else";
+    writer.append(entry(2));
+    writer.flush();
+    EXPECT_TRUE(writer.is_lost());
+    std::filesystem::remove(path);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -68,6 +69,28 @@ INSTANTIATE_TEST_SUITE_P(
       return (slash == std::string::npos ? path : path.substr(slash + 1, path.rfind('.') - slash - 1)) +
              which.param.suffix;
     });
+
+TEST(ResumedRun, AJournalThatIsRemovedMeanwhileIsToldOnce) {
+  const ScratchFolder folder;
+  RunOptions options = options_of("bounce", Hosting::kDirect, 120);
+  options.checkpoint = folder.path("kept");
+  options.checkpoint_every = 20;
+  const std::string journal = journal_of(options.checkpoint);
+  const auto told = [&](std::uint32_t removed_at) {
+    const RunResult result = run(
+        options, [] { return false; },
+        [&](const Progress& now) {
+          if (now.step == removed_at) std::filesystem::remove(journal);
+        });
+    EXPECT_EQ(result.outcome, RunOutcome::kCompleted);
+    return std::ranges::count_if(result.report.warnings(), [&](const std::string& warning) {
+      return warning.starts_with("journal '" + journal + "' was removed or replaced");
+    });
+  };
+  EXPECT_EQ(told(0), 0);
+  EXPECT_EQ(told(50), 1);
+  EXPECT_EQ(told(0), 0);
+}
 
 TEST_P(Resume, EndsWithTheChainAndTheReportOfTheRunThatNeverStopped) {
   const auto [scene, steps, stop, overrides, suffix] = GetParam();

@@ -90,6 +90,27 @@ TEST(Overrides, SetPropertiesOfBlocksWithIds) {
   EXPECT_EQ(description.constraints[0].body2, 1U);
 }
 
+// A sphere of 0.5 m has 2/5 m r^2 = m / 10, whichever of both made it.
+TEST(Overrides, MassAndDensityTakeEachOthersPlace) {
+  const auto ball = [](const std::vector<std::string>& overrides) { return overridden(overrides).bodies.at(0); };
+  const double volume = 4.0 / 3.0 * 3.14159265358979323846 * 0.125;
+  for (const std::vector<std::string>& overrides :
+       {std::vector<std::string>{"Body.Ball01.Mass=3"}, {"Body.Ball01.MassDensity=7", "Body.Ball01.Mass=3"}}) {
+    EXPECT_DOUBLE_EQ(ball(overrides).mass, 3.0);
+    EXPECT_NEAR((ball(overrides).inertia - Vector3::Constant(0.3)).norm(), 0.0, 1e-14);
+  }
+  const auto dense = ball({"Body.Ball01.Mass=3", "Body.Ball01.MassDensity=6"});
+  EXPECT_NEAR(dense.mass, 6.0 * volume, 1e-14);
+  EXPECT_NEAR(dense.inertia.x(), 0.6 * volume, 1e-14);
+}
+
+TEST(Overrides, MomentsThatAreWrittenGoWithAMass) {
+  const std::vector<std::string> told = {"Body.Ball01.Mass=3", "Body.Ball01.PrincipalMoments={1,1,1}"};
+  EXPECT_DOUBLE_EQ(overridden({told[0], told[1], "Body.Ball01.Mass=4"}).bodies.at(0).inertia.x(), 1.0);
+  EXPECT_THAT(build(kScene, {told[0], told[1], "Body.Ball01.MassDensity=6"}).errors(),
+              ElementsAre(::testing::HasSubstr("has Mass and MassDensity; allowed: one of them")));
+}
+
 TEST(Overrides, SetHostingAndDeadlines) {
   const kernel::EnvironmentDescription description =
       overridden({"Plugin.solver.Deadline=5", "Plugin.solver.Hosting=direct"});
