@@ -59,7 +59,8 @@ Trusted<TrialState> Environment::integrate() {
   DerivativeSource* derivatives = data_.wrench_is_constant[0] != 0 ? nullptr : this;
   const auto trial = ask(Stage::kIntegrate, &integrator_, call, derivatives,
                          [&](const auto& answer) { return validator_.trial_state(answer, data_, front()); });
-  follow_motion(inner_end_time(), data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+  data_.trial_time[0] = inner_end_time();
+  follow_motion(data_.trial_time[0], data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                 data_.trial_angular_velocity);
   return trial;
 }
@@ -194,8 +195,9 @@ void Environment::ask_discrepancies(const Column<double>& time, const Column<dou
     const Column<std::uint32_t>& intact = data_.group_intact[g];
     for (std::size_t i = 0; i < group.row.size(); ++i)
       intact[i] = front().intact[group.row[i]] != 0 && !has_broken(group.row[i]) && !sleeps(group.row[i]) ? 1 : 0;
-    const auto request = ids(time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact,
-                             position, orientation, linear_velocity, angular_velocity);
+    const auto request =
+        ids(time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact, position,
+            orientation, linear_velocity, angular_velocity, data_.inverse_mass, data_.inverse_inertia);
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
     const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
     ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) {

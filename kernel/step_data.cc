@@ -12,23 +12,39 @@ DiscrepancyAnswer::DiscrepancyAnswer(Arena* arena, std::uint64_t rows) {
   point1 = numbers(3), point2 = numbers(3), velocity = numbers(3), correction = numbers(1), axes = numbers(4);
   mode = Column<std::uint32_t>(arena, 0, rows);
   lower = numbers(3), upper = numbers(3), compliance = numbers(3), damping = numbers(3), maximum_force = numbers(3);
-  restitution = numbers(1);
+  restitution = numbers(1), desired_acceleration = numbers(3);
 }
 
 std::vector<ColumnId> DiscrepancyAnswer::ids() const {
-  return {constraint.id(), point1.id(), point2.id(),     velocity.id(), correction.id(),    axes.id(),       mode.id(),
-          lower.id(),      upper.id(),  compliance.id(), damping.id(),  maximum_force.id(), restitution.id()};
+  return {constraint.id(),  point1.id(),
+          point2.id(),      velocity.id(),
+          correction.id(),  axes.id(),
+          mode.id(),        lower.id(),
+          upper.id(),       compliance.id(),
+          damping.id(),     maximum_force.id(),
+          restitution.id(), desired_acceleration.id()};
 }
 
 DiscrepancyColumns DiscrepancyAnswer::columns() const {
-  return {point1.span(), point2.span(), velocity.span(),   correction.span(), axes.span(),          mode.span(),
-          lower.span(),  upper.span(),  compliance.span(), damping.span(),    maximum_force.span(), restitution.span()};
+  return {point1.span(),
+          point2.span(),
+          velocity.span(),
+          correction.span(),
+          axes.span(),
+          mode.span(),
+          lower.span(),
+          upper.span(),
+          compliance.span(),
+          damping.span(),
+          maximum_force.span(),
+          restitution.span(),
+          desired_acceleration.span()};
 }
 
 void DiscrepancyAnswer::resize(std::uint64_t rows) const {
   constraint.resize(rows), mode.resize(rows), correction.resize(rows), restitution.resize(rows), axes.resize(4 * rows);
   for (const Column<double>* column :
-       {&point1, &point2, &velocity, &lower, &upper, &compliance, &damping, &maximum_force})
+       {&point1, &point2, &velocity, &lower, &upper, &compliance, &damping, &maximum_force, &desired_acceleration})
     column->resize(3 * rows);
 }
 
@@ -43,6 +59,7 @@ void DiscrepancyAnswer::copy_row(std::size_t row, const DiscrepancyAnswer& sourc
   copy(source.point1, point1), copy(source.point2, point2), copy(source.velocity, velocity);
   copy(source.lower, lower), copy(source.upper, upper), copy(source.compliance, compliance);
   copy(source.damping, damping), copy(source.maximum_force, maximum_force);
+  copy(source.desired_acceleration, desired_acceleration);
 }
 
 StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescription& d) {
@@ -91,6 +108,7 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   wrench_with_reactions = bodies_if(is_smooth, 6);
   reaction_residual = Column<double>(arena, 1, 0);
 
+  trial_time = Column<double>(arena, 1, 0);
   trial_position = bodies(3), trial_orientation = bodies(4), trial_linear_velocity = bodies(3);
   trial_angular_velocity = bodies(3);
   error_estimate = Column<double>(arena, 1, 0);

@@ -29,7 +29,7 @@ struct DiscrepancyAnswer {
   Column<std::uint32_t> constraint;
   Column<double> point1, point2, velocity, correction, axes;
   Column<std::uint32_t> mode;
-  Column<double> lower, upper, compliance, damping, maximum_force, restitution;
+  Column<double> lower, upper, compliance, damping, maximum_force, restitution, desired_acceleration;
 };
 
 struct StepData {
@@ -65,9 +65,9 @@ struct StepData {
   Column<double> kinematic_acceleration, reaction, discrepancy_force, held_force, reaction_residual,
       wrench_with_reactions;
 
-  // Stage::kIntegrate: S*.
-  Column<double> trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity, error_estimate,
-      next_plugin_state;
+  // Stage::kIntegrate: S*, and its time.
+  Column<double> trial_time, trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity,
+      error_estimate, next_plugin_state;
 
   // Stage::kBound.
   Column<double> lower, upper;

@@ -42,6 +42,13 @@ JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std:
   bodies.velocity1 = of(request.linear_velocity(), body1);
   bodies.velocity2 = of(request.linear_velocity(), body2);
   bodies.time_step = request.time_step();
+  bodies.time = request.time();
+  const auto inverse_mass_of = [&](std::uint32_t body) {
+    return body < request.inverse_mass().size() ? request.inverse_mass()[body] : 0.0;
+  };
+  bodies.inverse_mass1 = inverse_mass_of(body1), bodies.inverse_mass2 = inverse_mass_of(body2);
+  bodies.inverse_inertia1 = of(request.inverse_inertia(), body1);
+  bodies.inverse_inertia2 = of(request.inverse_inertia(), body2);
   return bodies;
 }
 
@@ -63,7 +70,8 @@ void push_bound(const stage::ConstraintBindReply& reply, std::span<const double>
 void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::size_t joint, const Discrepancy& d) {
   if (!d.point1.allFinite() || !d.point2.allFinite() || !d.velocity.allFinite() || !std::isfinite(d.correction) ||
       !d.axes.coeffs().allFinite() || !d.lower.allFinite() || !d.upper.allFinite() || !d.compliance.allFinite() ||
-      !d.damping.allFinite() || !d.maximum_force.allFinite() || !std::isfinite(d.restitution))
+      !d.damping.allFinite() || !d.maximum_force.allFinite() || !std::isfinite(d.restitution) ||
+      !d.acceleration.allFinite())
     throw Refusal(
         "it has a discrepancy that is not finite: its bound numbers or the poses of its bodies are not, or too large");
   if ((d.lower.array() > d.upper.array()).any() || d.compliance.minCoeff() < 0.0 || d.damping.minCoeff() < 0.0 ||
@@ -86,6 +94,7 @@ void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::siz
   push_vector(reply.damping(), d.damping);
   push_vector(reply.maximum_force(), d.maximum_force);
   reply.restitution().push(d.restitution);
+  push_vector(reply.desired_acceleration(), d.acceleration);
 }
 
 }  // namespace detail

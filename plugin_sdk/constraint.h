@@ -26,6 +26,11 @@ struct JointBodies {
   Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
   Vector3 velocity1 = Vector3::Zero(), velocity2 = Vector3::Zero();
   double time_step = 0.0;
+  // Of the state, s; zero when joints are bound
+  double time = 0.0;
+  // 1/kg, and 1/(kg m^2) about the principal axes; zero of what nothing pushes, and when joints are bound
+  double inverse_mass1 = 0.0, inverse_mass2 = 0.0;
+  Vector3 inverse_inertia1 = Vector3::Zero(), inverse_inertia2 = Vector3::Zero();
 
   // The centre of mass of body 2, or where that is the world of body 1: a place that is no long way from what the joint
   // holds, wherever the origin is.

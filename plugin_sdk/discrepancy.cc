@@ -225,6 +225,7 @@ Discrepancy DiscrepancyColumns::at(std::size_t row) const {
   d.damping = vector_at(damping, row);
   d.maximum_force = vector_at(maximum_force, row);
   if (!restitution.empty()) d.restitution = restitution[row];
+  if (!desired_acceleration.empty()) d.acceleration = vector_at(desired_acceleration, row);
   return d;
 }
 

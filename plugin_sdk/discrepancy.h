@@ -95,6 +95,8 @@ struct Discrepancy {
   Vector3 maximum_force = Vector3::Constant(kUnlimited);  // N or N m
   // e of limits and one-sided axes that nothing softens, 0 … 1: what meets them at a speed v leaves them at e v
   double restitution = 0.0;
+  // What the desired velocity along each axis changes by, world, m/s^2 or rad/s^2. Simulator Smooth needs it.
+  Vector3 acceleration = Vector3::Zero();
 
   bool is_angular() const { return (modes & kAngularDiscrepancy) != 0; }
   bool is_radial() const { return (modes & kRadialDiscrepancy) != 0; }
@@ -200,7 +202,7 @@ struct DiscrepancyColumns {
   std::span<const double> point1, point2, velocity, correction, axes;
   std::span<const std::uint32_t> mode;
   std::span<const double> lower, upper, compliance, damping, maximum_force;
-  std::span<const double> restitution = {};  // empty: none has any
+  std::span<const double> restitution = {}, desired_acceleration = {};  // empty: none has any
 
   std::size_t size() const { return mode.size(); }
   Discrepancy at(std::size_t row) const;

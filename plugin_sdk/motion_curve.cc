@@ -5,37 +5,13 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/checks.h"
+#include "plugin_sdk/math/hermite.h"
 #include "plugin_sdk/math/rotation.h"
 
 namespace gravitas {
 namespace {
 
 constexpr std::size_t kColumns = MotionTable::kColumns;
-
-// Slope at a row between difference quotients `before` over h1 and `after` over h2: that of the parabola, or rest.
-Vector3 slope(const Vector3& before, double h1, const Vector3& after, double h2) {
-  if (before.isZero(0.0) || after.isZero(0.0)) return Vector3::Zero();
-  return (h2 * before + h1 * after) / (h1 + h2);
-}
-
-// Slope at an end, next to the quotient `near` over h1, with `far` over h2 beyond.
-Vector3 end_slope(const Vector3& near, double h1, const Vector3& far, double h2) {
-  if (near.isZero(0.0)) return Vector3::Zero();
-  return near + (h1 / (h1 + h2)) * (near - far);
-}
-
-std::vector<Vector3> slopes(const std::vector<Vector3>& quotients, const std::vector<double>& lengths) {
-  const std::size_t intervals = quotients.size();
-  std::vector<Vector3> all(intervals + 1, Vector3::Zero());
-  if (intervals == 0) return all;
-  if (intervals == 1) return {quotients[0], quotients[0]};
-  all.front() = end_slope(quotients[0], lengths[0], quotients[1], lengths[1]);
-  for (std::size_t i = 1; i < intervals; ++i)
-    all[i] = slope(quotients[i - 1], lengths[i - 1], quotients[i], lengths[i]);
-  all.back() =
-      end_slope(quotients[intervals - 1], lengths[intervals - 1], quotients[intervals - 2], lengths[intervals - 2]);
-  return all;
-}
 
 }  // namespace
 
@@ -69,7 +45,9 @@ MotionCurve::MotionCurve(const MotionTable& table, const Pose& frame_in_body)
     moves.emplace_back((to.pose.position - from.pose.position) / lengths[i]);
     turns.emplace_back(log_rotation(shorter_arc(to.pose.orientation * from.pose.orientation.conjugate())) / lengths[i]);
   }
-  const std::vector<Vector3> velocities = slopes(moves, lengths), angular = slopes(turns, lengths);
+  const Vector3 none = Vector3::Zero();
+  const std::vector<Vector3> velocities = hermite_rates(moves, lengths, none),
+                             angular = hermite_rates(turns, lengths, none);
   for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i].twist = {velocities[i], angular[i]};
   for (std::size_t i = 0; i + 1 < rows_.size(); ++i) {
     const Vector3 first = lengths[i] / 3.0 * angular[i], last = lengths[i] / 3.0 * angular[i + 1];
@@ -90,12 +68,9 @@ MotionCurve::State MotionCurve::frame_at(double time) const {
   const double h = to.time - from.time, s = (time - from.time) / h, r = 1.0 - s;
   State state;
 
-  // x = x0 + (3 s^2 - 2 s^3)(x1 - x0) + h (s r^2 v0 - s^2 r v1)
-  const Vector3 move = to.pose.position - from.pose.position;
-  const Vector3 &v0 = from.twist.linear, &v1 = to.twist.linear;
-  state.pose.position = from.pose.position + s * s * (1.0 + 2.0 * r) * move + h * (s * r * r * v0 - s * s * r * v1);
-  state.twist.linear = 6.0 * s * r / h * move + r * (1.0 - 3.0 * s) * v0 + s * (3.0 * s - 2.0) * v1;
-  state.change.linear = (6.0 * (r - s) / h * move + (6.0 * s - 4.0) * v0 + (6.0 * s - 2.0) * v1) / h;
+  const HermitePoint<Vector3> way =
+      hermite_point(from.pose.position, from.twist.linear, to.pose.position, to.twist.linear, h, s);
+  state.pose.position = way.value, state.twist.linear = way.rate, state.change.linear = way.change;
 
   // factors from the right: q = e3 e2 e1 q0, each turning what those before it did
   const std::array<double, 3> b = {1.0 - r * r * r, s * s * (3.0 - 2.0 * s), s * s * s};

@@ -10,11 +10,9 @@
 // SIGGRAPH 1995, cumulative Bezier basis, here with turns in world axes): unit without normalising, through both rows,
 // with the angular velocities w_k and w_{k+1} there; at a constant angular velocity it is exact.
 //
-// Velocities at rows are those of the parabola through the row and its neighbours (at the ends the first and last
-// three), turns taken as rotation vectors / time; of two rows, their difference quotient. So motion at constant
-// velocities is exact, and so are positions at constant acceleration. Where a neighbouring row says the same position
-// (attitude), the velocity (angular velocity) is zero: a row that stands twice is a rest. Before the first row and
-// after the last the body goes on with the velocities there. Between rows it turns by less than half a turn, the
+// Velocities at rows are those of math/hermite.h, turns taken as rotation vectors / time. So motion at constant velocities is
+// exact, and so are positions at constant acceleration. A position or attitude that stands twice is a rest. Before the first
+// row and after the last the body goes on with the velocities there. Between rows it turns by less than half a turn, the
 // shorter way.
 #pragma once
 

@@ -317,20 +317,33 @@ bool bends_at(std::span<const double> rows, std::size_t columns, std::size_t row
   return false;
 }
 
+// Calls visit(rows, columns) for each table over time.
+template <typename Visit>
+void for_each_table_over_time(const std::vector<Property>& declared, std::span<const double> numbers, Visit&& visit) {
+  for (const Property& p : declared) {
+    const std::size_t size = flat_size_of(p, numbers);
+    if (size > 0 && p.kind == PropertyKind::kTable && is_over_time(p)) visit(numbers.subspan(1, size - 1), p.columns);
+    numbers = numbers.subspan(size);
+  }
+}
+
 }  // namespace
 
 std::vector<double> bends_of(const std::vector<Property>& declared, std::span<const double> numbers) {
   std::vector<double> times;
-  for (const Property& p : declared) {
-    const std::size_t size = flat_size_of(p, numbers);
-    if (size > 0 && p.kind == PropertyKind::kTable && is_over_time(p)) {
-      const std::span<const double> rows = numbers.subspan(1, size - 1);
-      for (std::size_t row = 0; row * p.columns < rows.size(); ++row)
-        if (const double time = rows[row * p.columns]; bends_at(rows, p.columns, row))
-          if (times.empty() || times.back() != time) times.push_back(time);
-    }
-    numbers = numbers.subspan(size);
-  }
+  for_each_table_over_time(declared, numbers, [&](std::span<const double> rows, std::size_t columns) {
+    for (std::size_t row = 0; row * columns < rows.size(); ++row)
+      if (const double time = rows[row * columns]; bends_at(rows, columns, row))
+        if (times.empty() || times.back() != time) times.push_back(time);
+  });
+  return times;
+}
+
+std::vector<double> times_of(const std::vector<Property>& declared, std::span<const double> numbers) {
+  std::vector<double> times;
+  for_each_table_over_time(declared, numbers, [&](std::span<const double> rows, std::size_t columns) {
+    for (std::size_t at = 0; at < rows.size(); at += columns) times.push_back(rows[at]);
+  });
   return times;
 }
 

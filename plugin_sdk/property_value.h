@@ -82,6 +82,9 @@ std::size_t flat_size_of(const Property& declared, std::span<const double> numbe
 // Times at which tables over time (Property::table) jump or bend, s, as they come; they are constant before and after.
 std::vector<double> bends_of(const std::vector<Property>& declared, std::span<const double> numbers);
 
+// The times of all rows of such tables, as they come.
+std::vector<double> times_of(const std::vector<Property>& declared, std::span<const double> numbers);
+
 // Checks flattened values, which may come from anywhere: their number, and that each is one that its
 // property takes. Empty, or what is wrong; what is allowed.
 std::string check_flattened(const std::vector<Property>& declared, std::span<const double> numbers);

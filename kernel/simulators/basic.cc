@@ -43,7 +43,7 @@ double Environment::length_to_switch(double begin, double length) {
   asked_from_ = -kInfinity, asked_until_ = kInfinity;
   ends_at_switch_ = false;
   const std::vector<double>& switches = description_.switches;
-  if (switches.empty() || (wrench_is_constant_ && model_.curves.empty())) return length;
+  if (switches.empty() || (wrench_is_constant_ && model_.curves.empty() && !knows_reactions())) return length;
   const double from = time() + begin;
   const double slack = std::max(kSameTime * length_of_step(step_count_ + 1), 4.0 * kEpsilon * from);
   const auto next = std::ranges::upper_bound(switches, from + slack);
@@ -108,7 +108,7 @@ const Column<double>& Environment::start_angular_velocity() const {
 }
 
 void Environment::constrain(const Trusted<TrialState>&) {
-  ask_discrepancies(data_.time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+  ask_discrepancies(data_.trial_time, data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                     data_.trial_angular_velocity);
   const std::size_t forces = 3 * data_.discrepancies.mode.size();
   if (data_.held_force.size() != forces) {

@@ -34,7 +34,7 @@ void Environment::ask_reactions() {
                joints.point1, joints.point2, joints.velocity, joints.correction, joints.axes, joints.mode, joints.lower,
                joints.upper, joints.compliance, joints.damping, joints.maximum_force, block_body, block,
                front().position, front().orientation, start_linear_velocity(), start_angular_velocity(),
-               data_.time_step);
+               data_.time_step, joints.desired_acceleration);
   };
   data_.block_body.resize(0), data_.block.resize(0);
   data_.discrepancy_force.resize(3 * joints.mode.size());
@@ -61,7 +61,8 @@ void Environment::join_start_velocities() {
   data_.trial_orientation.assign(front().orientation);
   data_.trial_linear_velocity.assign(data_.start_linear_velocity);
   data_.trial_angular_velocity.assign(data_.start_angular_velocity);
-  follow_motion(data_.time[0], data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
+  data_.trial_time[0] = data_.time[0];
+  follow_motion(data_.trial_time[0], data_.trial_position, data_.trial_orientation, data_.trial_linear_velocity,
                 data_.trial_angular_velocity);
   constrain(Validator::unchecked<Trusted<TrialState>>());
   std::ranges::fill(data_.held_force.span(), 0.0);

@@ -136,6 +136,7 @@ MessageColumns ConstrainedBodies::reactions_request() const {
   for (const char* of : {"position", "orientation", "linear_velocity", "angular_velocity"})
     columns.f64(std::string("start_") + of) = columns.f64(of);
   append_joints(&columns);
+  for (const BodyJoint& joint : joints) add_row(&columns, "desired_acceleration", joint.discrepancy.acceleration);
   return columns;
 }
 

@@ -59,16 +59,27 @@ MessageColumns Joints::describe_request() const {
   for (const JointedBody& body : bodies) {
     append(&request.f64("linear_velocity"), body.twist.linear);
     append(&request.f64("angular_velocity"), body.twist.angular);
+    request.f64("inverse_mass").push_back(1.0);
+    append(&request.f64("inverse_inertia"), Vector3(Vector3::Ones()));
   }
   return request;
 }
 
 std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
   const MessageColumns reply = inquiry->answer(stage::Method::kConstraintDiscrepancies, describe_request());
-  const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),        reply.f64("velocity"),
-                                   reply.f64("correction"), reply.f64("axes"),          reply.u32("mode"),
-                                   reply.f64("lower"),      reply.f64("upper"),         reply.f64("compliance"),
-                                   reply.f64("damping"),    reply.f64("maximum_force"), reply.f64("restitution")};
+  const DiscrepancyColumns columns{reply.f64("point1"),
+                                   reply.f64("point2"),
+                                   reply.f64("velocity"),
+                                   reply.f64("correction"),
+                                   reply.f64("axes"),
+                                   reply.u32("mode"),
+                                   reply.f64("lower"),
+                                   reply.f64("upper"),
+                                   reply.f64("compliance"),
+                                   reply.f64("damping"),
+                                   reply.f64("maximum_force"),
+                                   reply.f64("restitution"),
+                                   reply.f64("desired_acceleration")};
   inquiry->expect_unit("axes", columns.axes, 4);
   std::vector<DescribedJoint> described;
   for (std::size_t i = 0; i < columns.size(); ++i) {

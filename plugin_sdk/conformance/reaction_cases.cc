@@ -1,5 +1,5 @@
 // The optional questions of slot solver, reactions and how they change with the state: that with them the points of ball-and-socket joints accelerate
-// as one, that they are the pushes of the multipliers reported, and what they do to bodies that nothing can push.
+// as one, or as desired, that they are the pushes of the multipliers reported, and what they do to bodies that nothing can push.
 //
 // Tolerance: kReactionRounding of the largest force, acceleration or torque of the question.
 #include <algorithm>
@@ -144,13 +144,16 @@ void judge_hanging(Subject& subject) {
 }
 
 void judge_accelerations(Subject& subject) {
-  Draw draw(91);
+  Draw draw(91), of_desired(92);
   for (int trial = 0; trial < 24; ++trial) {
     const std::uint32_t links = 1 + draw.below(4);
-    const bool is_carried = trial % 3 == 2;
-    const Mechanism chain = swinging_chain(&draw, links, is_carried);
+    const bool is_carried = trial % 3 == 2, is_guided = trial % 4 == 3;
+    Mechanism chain = swinging_chain(&draw, links, is_carried);
+    if (is_guided)
+      for (BodyJoint& joint : chain.world.joints) joint.discrepancy.acceleration = of_desired.vector(3.0);
     Inquiry inquiry(subject, "random chain number " + std::to_string(trial) + " of " + std::to_string(links) +
-                                 " links that swing" + (is_carried ? " from a kinematic body" : " from the world"));
+                                 " links that swing" + (is_carried ? " from a kinematic body" : " from the world") +
+                                 (is_guided ? ", with desired accelerations" : ""));
     const Reactions came = chain.ask(&inquiry);
     std::vector<Wrench> pushes(chain.world.bodies.size());
     double size = 1.0;
@@ -158,8 +161,8 @@ void judge_accelerations(Subject& subject) {
       const BodyJoint& joint = chain.world.joints[i];
       const Vector3 one = point_acceleration(chain, came, joint.body1, joint.discrepancy.point1),
                     two = point_acceleration(chain, came, joint.body2, joint.discrepancy.point2);
-      inquiry.expect_near(joint_text("relative acceleration of the points", i), two - one, Vector3::Zero(),
-                          kReactionRounding * std::max({1.0, one.norm(), two.norm()}));
+      inquiry.expect_near(joint_text("relative acceleration of the points", i), two - one,
+                          joint.discrepancy.acceleration, kReactionRounding * std::max({1.0, one.norm(), two.norm()}));
       const Vector3 force = came.joint_force(i);  // axes are the world's
       size += force.norm();
       for (const auto& [body, sign] : {std::pair(joint.body1, -1.0), std::pair(joint.body2, 1.0)}) {
@@ -306,7 +309,8 @@ std::vector<Case> reaction_cases(const PluginDeclaration& declaration) {
   std::vector<Case> cases = {
       make_case("solver/reactions_hanging", "A joint bears the weight and the centripetal force of what hangs on it.",
                 judge_hanging),
-      make_case("solver/reactions", "With the reactions the points of joints accelerate as one.", judge_accelerations),
+      make_case("solver/reactions", "With the reactions the points of joints accelerate as one, or as desired.",
+                judge_accelerations),
       make_case("solver/reactions_springs", "Springs of joints are among the reactions, and not applied again.",
                 judge_springs),
       make_case("solver/reactions_twice", "Joints that hold what is held already change nothing.", judge_twice),

@@ -170,6 +170,9 @@ void IslandSolver::load_joint(const DiscrepancyColumns& columns, std::uint32_t r
   joint.slop = d.is_angular() ? 1e-9 : closing_slop(middle, one, two);
   joint.length = d.is_angular() ? std::max(one.gyration(), two.gyration()) : 1.0;
   if (!d.is_angular()) coordinates_ = std::max(coordinates_, d.point2.cwiseAbs().maxCoeff());
+  // of a body at the origin whose turn is given, steps would go on among the roundings of its angle
+  if (d.is_twist() && axis_mode(d.modes, 0) == AxisMode::kLocked)
+    coordinates_ = std::max(coordinates_, kHalfTurn * joint.length);
   for (int k = 0; k < 3; ++k)
     joint.states[static_cast<std::size_t>(k)] = joint_axis_state(d, k, joint.axes.col(k), start_error);
   set_bounces(d, one, two, request_.discrepancy_warm_impulse().subspan(3 * std::size_t{row}, 3), &joint.states);

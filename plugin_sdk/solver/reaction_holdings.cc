@@ -143,6 +143,7 @@ void ReactionSolver::turn_to_limit(Joint* joint) {
 
 ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, int axis, const Row& row) const {
   constexpr double kStill = 1e-8, kStillAtRest = 1e-10;  // of the speeds, and m/s or rad/s
+  constexpr double kOfChange = 2.0;                      // of what it is asked for changes by in a step
   const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
   const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
   const double rate = row.direction.along(one.velocity, two.velocity) - along.dot(d.velocity);
@@ -153,9 +154,11 @@ ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, i
   Holding holding;
   if (is_drive(axis_mode(d.modes, axis))) {
     const double bound = d.maximum_force[axis];
+    // the velocity that is asked for is that of the state, not of S_n
+    const double changed = kOfChange * request_->time_step() * std::abs(along.dot(d.acceleration));
     holding.is_velocity = true;
     holding.least = -bound, holding.most = bound;
-    holding.holds = std::abs(rate) <= still && bound > 0.0;
+    holding.holds = std::abs(rate) <= still + changed && bound > 0.0;
     if (!holding.holds) holding.push = std::copysign(bound, -rate), holding.missing = std::abs(rate);
     return holding;
   }

@@ -166,10 +166,19 @@ std::uint32_t ReactionSolver::row_of(std::uint32_t body) const {
 
 void ReactionSolver::load_joints() {
   joints_.clear();
-  const DiscrepancyColumns columns{request_->point1(),     request_->point2(),       request_->velocity(),
-                                   request_->correction(), request_->axes(),         request_->mode(),
-                                   request_->lower(),      request_->upper(),        request_->compliance(),
-                                   request_->damping(),    request_->maximum_force()};
+  const DiscrepancyColumns columns{request_->point1(),
+                                   request_->point2(),
+                                   request_->velocity(),
+                                   request_->correction(),
+                                   request_->axes(),
+                                   request_->mode(),
+                                   request_->lower(),
+                                   request_->upper(),
+                                   request_->compliance(),
+                                   request_->damping(),
+                                   request_->maximum_force(),
+                                   {},
+                                   request_->desired_acceleration()};
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::uint32_t one = row_of(request_->discrepancy_body()[2 * i]);
     const std::uint32_t two = row_of(request_->discrepancy_body()[2 * i + 1]);
@@ -256,7 +265,7 @@ const Discrepancy& ReactionSolver::at_pose(const Joint& joint) {
     return d;
   }
   const Quaternion turn1 = one.pose.orientation * one.asked.orientation.conjugate();
-  d.velocity = turn1 * d.velocity;
+  d.velocity = turn1 * d.velocity, d.acceleration = turn1 * d.acceleration;
   if (d.is_twist()) {
     const Twisting asked = twisting_of(d);
     const Twisting now = asked.turned(turn1, two.pose.orientation * two.asked.orientation.conjugate());
@@ -309,6 +318,7 @@ ReactionSolver::Arms ReactionSolver::arms_of(const Discrepancy& d, const Matrix3
 ReactionSolver::Row ReactionSolver::row_of_axis(const Discrepancy& d, const Matrix3& axes, int axis, const Arms& arms,
                                                 const Joint& joint) const {
   Row row = d.is_radial() && axis == 0 ? radial_row(d, arms, joint) : axis_row(d, axes.col(axis), arms, joint);
+  row.gamma -= (d.is_angular() ? Vector3(axes.col(axis)) : row.direction.linear).dot(d.acceleration);
   row.place = joint.place + static_cast<std::size_t>(axis);
   return row;
 }

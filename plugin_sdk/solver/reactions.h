@@ -3,7 +3,7 @@
 //   J M^-1 J^T lambda = -(gamma + J a),   reaction = J^T lambda
 //
 // a is what forces, the gyroscopic term and drag make of each body (of a kinematic one what it is given), gamma what
-// the velocities alone do to the second derivative of each row's error. Points of a discrepancy are carried by their
+// the velocities alone do to the second derivative of each row's error, less its desired acceleration. Points of a discrepancy are carried by their
 // bodies, its axes by body 1, a radial axis by its points; with w the relative velocity of the points seen from body 1,
 //
 //   along an axis      gamma = a.(w2 x (w2 x r2) - w1 x (w1 x r1) - 2 w1 x w),   r2 the arm to body 2's point, r1 to where

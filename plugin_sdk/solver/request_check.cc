@@ -156,6 +156,7 @@ void check_reactions_request(const stage::SolverReactionsRequest& r) {
   check_numbers("wrench", r.wrench(), bodies, 6);
   check_numbers("acceleration", r.acceleration(), bodies, 6);
   check_discrepancies(r, bodies, 0);
+  check_numbers("desired_acceleration", r.desired_acceleration(), r.mode().size(), 3);
   if (!(r.time_step() > 0.0 && std::isfinite(r.time_step())))
     refuse("time_step", 0, std::to_string(r.time_step()) + " is not positive");
   check_numbers("start_position", r.start_position(), bodies, 3);

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "plugin_sdk/property_value.h"
 #include "services/scene/build_bodies.h"
 #include "services/scene/build_context.h"
 #include "services/scene/build_filter.h"
@@ -196,6 +197,20 @@ void check_bodies(const Constraint& joint, const kernel::ConstraintDescription& 
       "Constraint \"" + joint.id() + "\" " + wrong);
 }
 
+// A joint that changes with time keeps its bodies awake, since nothing else tells when it moves them. What it does to
+// accelerations may jump at the rows of its tables, where steps of Smooth end.
+void keep_time(const std::vector<double>& times, const kernel::ConstraintDescription& joint,
+               kernel::EnvironmentDescription* description) {
+  if (times.empty()) return;
+  for (const std::uint32_t body : {joint.body1, joint.body2})
+    if (body != kNone) description->bodies[body].flags &= ~std::uint32_t{kCanSleep};
+  if (description->simulator != kernel::Simulator::kSmooth) return;
+  std::vector<double>& switches = description->switches;
+  switches.insert(switches.end(), times.begin(), times.end());
+  std::ranges::sort(switches);
+  switches.erase(std::unique(switches.begin(), switches.end()), switches.end());
+}
+
 void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
   for (const Constraint& joint : context->environment.constraints().constraint()) {
     if (context->diagnostics->full()) return;
@@ -211,10 +226,10 @@ void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildCon
     const bool has_first = find_body(joint, Constraint::kBody1FieldNumber, bodies, context, &description.body1);
     const bool has_second = find_body(joint, Constraint::kBody2FieldNumber, bodies, context, &description.body2);
     if (has_first && has_second) check_bodies(joint, description, context);
-    if (type != nullptr) {
-      context->flatten_properties(type->properties, joint.custom_properties(), place_of(joint.location()),
-                                  joint.type() + " \"" + joint.id() + '"', &description.parameters);
-    }
+    if (type != nullptr &&
+        context->flatten_properties(type->properties, joint.custom_properties(), place_of(joint.location()),
+                                    joint.type() + " \"" + joint.id() + '"', &description.parameters))
+      keep_time(times_of(type->properties, description.parameters), description, &context->description);
     context->description.constraints.push_back(std::move(description));
   }
 }

@@ -101,6 +101,8 @@ MessageColumns Surveyor::request(stage::Method method, const kernel::Environment
   filler.put("filter_group", view(model.filter_group));
   filler.put("filter_mask", view(model.filter_mask));
   filler.put("mass", view(model.mass));
+  filler.put("inverse_mass", view(model.inverse_mass));
+  filler.put("inverse_inertia", view(model.inverse_inertia));
   filler.put("shape_hash", view(model.shape_hash));
   filler.put("shape_type", view(model.shape_type));
   filler.put("shape_parameter_begin", view(model.shape_parameter_begin));
@@ -175,10 +177,19 @@ std::vector<Anchor> Surveyor::anchors(const kernel::Environment& environment) {
     const MessageColumns asked = request(kAsked, environment, group);
     const std::vector<std::uint32_t>& intact = asked.u32("intact");
     const auto columns = [](const MessageColumns& reply) {
-      return DiscrepancyColumns{reply.f64("point1"),     reply.f64("point2"),        reply.f64("velocity"),
-                                reply.f64("correction"), reply.f64("axes"),          reply.u32("mode"),
-                                reply.f64("lower"),      reply.f64("upper"),         reply.f64("compliance"),
-                                reply.f64("damping"),    reply.f64("maximum_force"), reply.f64("restitution")};
+      return DiscrepancyColumns{reply.f64("point1"),
+                                reply.f64("point2"),
+                                reply.f64("velocity"),
+                                reply.f64("correction"),
+                                reply.f64("axes"),
+                                reply.u32("mode"),
+                                reply.f64("lower"),
+                                reply.f64("upper"),
+                                reply.f64("compliance"),
+                                reply.f64("damping"),
+                                reply.f64("maximum_force"),
+                                reply.f64("restitution"),
+                                reply.f64("desired_acceleration")};
     };
     const MessageColumns reply =
         slot(Slot::kConstraint).ask(kAsked, group.target, asked, [&](const MessageColumns& answer) {

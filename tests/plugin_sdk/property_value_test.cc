@@ -143,6 +143,10 @@ TEST(PropertyValue, ATableOverTimeJumpsWhereATimeComesTwiceAndBendsWhereItsSlope
   EXPECT_EQ(jumps({2, 5}), std::vector<double>());
   // what is not whole says nothing
   EXPECT_EQ(bends_of(declared, std::vector<double>{1, 1, 1, 5, 0}), std::vector<double>());
+  // of those of a time alone, all of its rows
+  EXPECT_EQ(times_of(declared, std::vector<double>{1, 1, 1, 3, 0, 0, 0.1, 0.3, 0.2, 0.6, 1, 7, 4, 0}),
+            (std::vector<double>{0, 0.1, 0.2}));
+  EXPECT_EQ(times_of(declared, std::vector<double>{1, 1, 1, 5, 0}), std::vector<double>());
 }
 
 TEST(Flatten, FollowsTheOrderOfDeclaration) {

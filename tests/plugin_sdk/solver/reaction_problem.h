@@ -40,7 +40,7 @@ class ReactionProblem {
     axes.insert(axes.end(), {d.axes.w(), d.axes.x(), d.axes.y(), d.axes.z()});
     mode.push_back(d.modes);
     append(lower, d.lower), append(upper, d.upper), append(compliance, d.compliance), append(damping, d.damping);
-    append(maximum_force, d.maximum_force);
+    append(maximum_force, d.maximum_force), append(desired_acceleration, d.acceleration);
   }
 
   using Request = stage::SolverReactionsRequest;
@@ -75,7 +75,8 @@ class ReactionProblem {
             column(has_moved ? start_orientation : orientation),
             column(has_moved ? start_linear_velocity : linear_velocity),
             column(has_moved ? start_angular_velocity : angular_velocity),
-            {&time_step, 1}};
+            {&time_step, 1},
+            column(desired_acceleration)};
   }
 
   void solve() {
@@ -123,7 +124,7 @@ class ReactionProblem {
   std::vector<std::uint32_t> flags, discrepancy_body, mode, block_body;
   std::vector<double> inverse_mass, inertia, inverse_inertia, drag, position, orientation, linear_velocity,
       angular_velocity, wrench, acceleration, point1, point2, velocity, correction, axes, lower, upper, compliance,
-      damping, maximum_force, block;
+      damping, maximum_force, desired_acceleration, block;
 
  private:
   static void append(std::vector<double>& column, const Vector3& v) { column.insert(column.end(), v.begin(), v.end()); }

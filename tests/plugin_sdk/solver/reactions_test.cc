@@ -243,6 +243,26 @@ TEST(Reactions, OfABoundedDriveHoldItsVelocityWithinTheBound) {
   EXPECT_EQ(driven(3.1, 12.0).reaction(0), Vector3(-20, 0, 0));
 }
 
+// What it is asked for changes by 7 m/s^2: 12 + F = 2 7. In S_n it was asked for another velocity than in the state, by up to
+// what that changes by in the step.
+TEST(Reactions, OfADriveGiveItTheAccelerationThatIsDesired) {
+  for (const double bound : {kUnlimited, 20.0})
+    for (const AxisMode mode : {AxisMode::kDriven, AxisMode::kLocked}) {
+      if (mode == AxisMode::kLocked && bound < kUnlimited) continue;
+      Discrepancy drive;
+      drive.modes = pack_modes(mode, AxisMode::kFree, AxisMode::kFree);
+      drive.velocity.x() = 3.0, drive.acceleration = {7.0, 5.0, 0.0}, drive.maximum_force.x() = bound;
+      Problem problem;
+      problem.add_body(2.0, {0, 0, 0}, {2.95, 0, 0}, {12, 1.0, 0});
+      problem.add_joint(kNone, 0, drive);
+      problem.begin_step();
+      problem.linear_velocity = {3.0, 0.0, 0.0};
+      problem.solve();
+      EXPECT_NEAR(problem.reaction(0).x(), 2.0, 1e-14);
+      EXPECT_EQ(problem.reaction(0).y(), 0.0);
+    }
+}
+
 // Two bodies in a row on a stop, the first pressed on it by 10 N, the second pressed on the first or pulled off.
 TEST(Reactions, OfStopsAreThoseThatPress) {
   const auto stop = [](double at) {

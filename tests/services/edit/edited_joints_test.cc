@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/services/edit/edited_run.h"
@@ -107,6 +109,39 @@ TEST(EditedJoints, ADriveIsSetWhileItRuns) {
     EXPECT_NEAR(run.run().report.drives(0).speed(), 0.5 - 0.4, 1e-9);
     run.options.edits = {run.options.edits[1]};
     EXPECT_THAT(run.fault(), ::testing::HasSubstr("MaximumTorque is given without AngularSpeed"));
+  }
+}
+
+// A course is one of the scene's time: another one goes on at the step of its edit, and a run that is stopped in the middle comes
+// to the same bits.
+TEST(EditedJoints, ACourseIsSetWhileItIsFollowed) {
+  for (const char* bound : {"", " MaximumForce = 80"}) {
+    EditedRun run(
+        scene(ball("A", "LinearVelocity = {1, 0, 0}"),
+              "Constraints { Constraint { Id = \"J\" Type = \"Slider\" Body2 = \"A\" CustomProperties { BindPoint = "
+              "{0, 0, 0} Axis = {1, 0, 0} Motion = {{0, 0}, {0.3, 0.3}}" +
+                  std::string(bound) + " } } }\n"),
+        {"set Constraint.J.Motion={{0,0},{0.3,0.3},{0.5,0.6},{0.8,0.6},{1,0.2}}@step=31"});
+    const std::string edit = run.options.edits[0];
+    const RunResult whole = run.run();
+    EXPECT_NEAR(run.end()["A"].position.x(), 0.2, *bound == '\0' ? 1e-12 : 1e-3) << bound;
+    run.options.steps = 30;
+    EXPECT_NEAR(run.end()["A"].position.x(), 0.3, 1e-12) << bound;
+    run.options.steps = 70;
+    EXPECT_NEAR(run.end()["A"].position.x(), 0.6, *bound == '\0' ? 1e-12 : 1e-6) << bound;
+    for (const std::uint32_t stop : {20U, 45U}) {
+      run.options.steps = stop;
+      run.options.checkpoint = run.folder.path("checkpoint");
+      run.run();
+      run.options.steps = 100;
+      run.options.resume = std::exchange(run.options.checkpoint, "");
+      EXPECT_EQ(run.run().report.chain_hash(), whole.report.chain_hash()) << bound << stop;
+      run.options.resume.clear();
+    }
+    run.options.edits = {"set Constraint.J.Motion={{0,0},{0,1}}@step=31"};
+    EXPECT_THAT(run.fault(), ::testing::HasSubstr("Motion cannot be followed"));
+    run.options.edits = {edit, "set Constraint.J.Speed=1@step=41"};
+    EXPECT_THAT(run.fault(), ::testing::HasSubstr("Speed and Motion are both given"));
   }
 }
 

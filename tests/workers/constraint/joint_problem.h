@@ -20,11 +20,13 @@ struct JointedBody {
 
 class JointProblem {
  public:
+  static constexpr double kMass = 2.0, kInertia = 0.5;  // of either body
   std::vector<JointedBody> bodies = std::vector<JointedBody>(2);
   // kNone is the world.
   std::vector<std::uint32_t> ends = {0, 1};
   bool is_intact = true;
   bool is_kept = false;  // bound anew after an edit
+  double time = 0.0;
 
   JointProblem(PluginUnderTest* plugin, std::string_view type) : plugin_(plugin), type_(type) {}
 
@@ -49,6 +51,7 @@ class JointProblem {
   // The discrepancies in the present state.
   std::vector<Discrepancy> describe() const {
     MessageColumns request = PluginUnderTest::request_of(stage::Method::kConstraintDiscrepancies);
+    request.f64("time") = {time};
     request.f64("time_step") = {0.01};
     request.u64("constraint_type") = {type_id(type_)};
     request.u32("constraint_body") = ends;
@@ -59,12 +62,23 @@ class JointProblem {
     for (const JointedBody& body : bodies) {
       append(&request.f64("linear_velocity"), body.twist.linear);
       append(&request.f64("angular_velocity"), body.twist.angular);
+      request.f64("inverse_mass").push_back(1.0 / kMass);
+      append(&request.f64("inverse_inertia"), Vector3::Constant(1.0 / kInertia));
     }
     const MessageColumns reply = plugin_->ask(stage::Method::kConstraintDiscrepancies, request);
-    const DiscrepancyColumns columns{reply.f64("point1"),     reply.f64("point2"),        reply.f64("velocity"),
-                                     reply.f64("correction"), reply.f64("axes"),          reply.u32("mode"),
-                                     reply.f64("lower"),      reply.f64("upper"),         reply.f64("compliance"),
-                                     reply.f64("damping"),    reply.f64("maximum_force"), reply.f64("restitution")};
+    const DiscrepancyColumns columns{reply.f64("point1"),
+                                     reply.f64("point2"),
+                                     reply.f64("velocity"),
+                                     reply.f64("correction"),
+                                     reply.f64("axes"),
+                                     reply.u32("mode"),
+                                     reply.f64("lower"),
+                                     reply.f64("upper"),
+                                     reply.f64("compliance"),
+                                     reply.f64("damping"),
+                                     reply.f64("maximum_force"),
+                                     reply.f64("restitution"),
+                                     reply.f64("desired_acceleration")};
     std::vector<Discrepancy> discrepancies;
     for (std::size_t i = 0; i < columns.size(); ++i) discrepancies.push_back(columns.at(i));
     return discrepancies;

@@ -13,7 +13,10 @@
 // (from the middle of the limits, where there are some) the angle, and so the spring, goes on from the other side.
 // A drive to a speed with a largest torque is one row on the velocity about a (rank 6), as in an `AngularMotor`; at a limit that it
 // drives against it stalls, and with speed 0 it is a brake.
+// A drive along a course over time (plugin_sdk/joint_motion.h) is one row, too: of the angle, or with a largest torque of the
+// velocity.
 #include "plugin_sdk/joint_coordinates.h"
+#include "plugin_sdk/joint_motion.h"
 #include "plugin_sdk/joint_rows.h"
 #include "plugin_sdk/math/rotation.h"
 
@@ -25,7 +28,7 @@ class Revolute final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Revolute",
-        .version = "1.4",
+        .version = "1.5",
         .slot = Slot::kConstraint,
         .meaning = "Hinge.",
         .capabilities = {"coordinates"},
@@ -53,7 +56,9 @@ class Revolute final : public ConstraintPlugin {
                     Property::number("MaximumTorque", "N*m")
                         .at_least(0.0)
                         .means("Largest torque of the drive; unlimited if absent."),
-                    restitution_property()},
+                    restitution_property(),
+                    motion_property("rad", "Angle, counted as by the limits but through any number of turns,",
+                                    "MaximumTorque")},
                    {{"angle", "rad",
                      "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start; the "
                      "turn that limits are compared with, without them above -pi up to pi."}}}}};
@@ -72,13 +77,13 @@ class Revolute final : public ConstraintPlugin {
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           const double rest = properties.at_end() ? 0.0 : properties.number();
-          BoundWriter drive;
-          write_drive(&properties, "Revolute", &drive);
+          JointDrive drive = JointDrive::of(&properties);
           limits.restitution = read_restitution(&properties, "Revolute", !limits.is_none(), "LowerLimit or UpperLimit");
+          drive.follow(&properties, "Revolute", "AngularSpeed", "MaximumTorque");
           write_limits(limits, &out);
           write_spring(spring, &out);
           out.number(rest);
-          for (const double number : drive.numbers()) out.number(number);
+          write_drive(drive, &out);
         });
   }
 
@@ -88,11 +93,16 @@ class Revolute final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       hold_hinge(one, two, emit);
       const JointLimits limits = read_limits(&bound);
-      if (!limits.is_none()) emit(limited_twist_row(one.orientation, two.orientation, bodies, limits));
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
+      const JointDrive drive = read_drive(&bound);
+      if (!limits.is_none() && !drive.is_course_alone())
+        emit(limited_twist_row(one.orientation, two.orientation, bodies, limits));
       if (!spring.is_none()) emit(sprung_twist_row(one.orientation, two.orientation, bodies, limits, rest, spring));
-      drive_about(axis_between(one, two), 1.0, &bound, emit);
+      if (!drive.motion.is_none())
+        emit(followed_twist(one, two, bodies, limits, drive.motion.at(bodies.time).within(limits), drive.force));
+      else if (!drive.is_none())
+        emit(driven_row(axis_between(one, two), drive.speed, drive.force));
     });
   }
 

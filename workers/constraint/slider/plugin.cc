@@ -8,10 +8,10 @@
 // lever.
 // The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit) and a
 // drive to a speed with a largest force (one row on the velocity, rank 6). A spring and a damper along it, force
-// -k (way - RestPosition) - c way', take no freedom.
-#include <cmath>
-
+// -k (way - RestPosition) - c way', take no freedom. A drive along a course over time (plugin_sdk/joint_motion.h) is one row, too: of
+// the way, or with a largest force of the velocity.
 #include "plugin_sdk/joint_coordinates.h"
+#include "plugin_sdk/joint_motion.h"
 #include "plugin_sdk/joint_rows.h"
 
 namespace gravitas {
@@ -22,7 +22,7 @@ class Slider final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Slider",
-        .version = "1.3",
+        .version = "1.4",
         .slot = Slot::kConstraint,
         .meaning = "Straight guide.",
         .capabilities = {"coordinates"},
@@ -43,7 +43,8 @@ class Slider final : public ConstraintPlugin {
               Property::number("Stiffness", "N/m").at_least(0.0).means("Spring along the axis; none if absent."),
               Property::number("Damping", "N*s/m").at_least(0.0).means("Damper along the axis; none if absent."),
               Property::number("RestPosition", "m").defaults_to({0.0}).means("Way at which the spring pushes nothing."),
-              restitution_property()},
+              restitution_property(),
+              motion_property("m", "Way of body 2 along the axis from the start", "MaximumForce")},
              {{"displacement", "m", "Way of body 2 along the axis, relative to body 1, 0 at the start."}}}}};
   }
   explicit Slider(PropertyCursor) {}
@@ -56,20 +57,17 @@ class Slider final : public ConstraintPlugin {
           const Pose frame = frame_along(point, unit_axis(properties.vector(), "Slider: Axis"));
           const double lower = properties.number(), upper = properties.number();
           JointLimits limits = JointLimits::of(lower, upper, "Slider: LowerLimit", "Slider: UpperLimit");
-          const double speed = properties.number(), force = properties.number();
+          JointDrive drive = JointDrive::of(&properties);
           const JointSpring spring = JointSpring::of(&properties);
           const double rest = properties.at_end() ? 0.0 : properties.number();
           limits.restitution = read_restitution(&properties, "Slider", !limits.is_none(), "LowerLimit or UpperLimit");
-          const bool is_driven = !std::isnan(speed);
-          if (!is_driven && !std::isnan(force)) throw Refusal("Slider: MaximumForce is given without Speed");
+          drive.follow(&properties, "Slider", "Speed", "MaximumForce");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           write_limits(limits, &out);
-          out.number(is_driven ? 1.0 : 0.0);
-          out.number(is_driven ? speed : 0.0);
-          out.number(std::isnan(force) ? kUnlimited : force);
           write_spring(spring, &out);
           out.number(rest);
+          write_drive(drive, &out);
         });
   }
 
@@ -82,23 +80,27 @@ class Slider final : public ConstraintPlugin {
 
       const Vector3 axis = one.orientation * Vector3::UnitX();
       const JointLimits limits = read_limits(&bound);
-      if (!limits.is_none()) {
+      const JointSpring spring = read_spring(&bound);
+      const double rest = bound.number();
+      const JointDrive drive = read_drive(&bound);
+      if (!limits.is_none() && !drive.is_course_alone()) {
         Discrepancy limit = row_along(axis, one.position, two.position, AxisMode::kLimited);
         limit.lower.x() = limits.lower;
         limit.upper.x() = limits.upper;
         limit.restitution = limits.restitution;
         emit(limit);
       }
-      const bool is_driven = bound.flag();
-      Discrepancy drive = row_along(axis, two.position, two.position, AxisMode::kDriven);
-      drive.velocity = bound.number() * axis;
-      drive.maximum_force.x() = bound.number();
-      if (is_driven) emit(drive);
-
-      const JointSpring spring = read_spring(&bound);
-      if (spring.is_none()) return;
-      const Vector3 rest = one.position + bound.number() * axis;
-      emit(sprung(row_along(axis, rest, two.position, AxisMode::kFree), spring));
+      if (!drive.motion.is_none()) {
+        const CourseState course = drive.motion.at(bodies.time).within(limits);
+        emit(followed_way(axis, one.position, two.position, bodies, course, drive.force));
+      } else if (!drive.is_none()) {
+        Discrepancy driven = row_along(axis, two.position, two.position, AxisMode::kDriven);
+        driven.velocity = drive.speed * axis;
+        driven.maximum_force.x() = drive.force;
+        emit(driven);
+      }
+      if (!spring.is_none())
+        emit(sprung(row_along(axis, one.position + rest * axis, two.position, AxisMode::kFree), spring));
     });
   }
 
