@@ -69,7 +69,7 @@ void add_event_options(CLI::App* command, const char* name, std::optional<std::v
   command
       ->add_option(name, *kinds,
                    "Kinds of events to look for, separated by commas: collision_start, collision_ongoing, "
-                   "collision_end, break, wake, sleep, fault, swap, edit, listener; all; none. If absent: "
+                   "collision_end, limit_start, break, wake, sleep, fault, swap, edit, listener; all; none. If absent: "
                    "collision_start, collision_end, break, wake, sleep. What is not looked for costs nothing")
       ->delimiter(',')
       ->allow_extra_args(false);

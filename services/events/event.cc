@@ -10,8 +10,8 @@ namespace gravitas {
 namespace {
 
 constexpr std::array<const char*, static_cast<std::size_t>(EventKind::kCount)> kEventKindNames = {
-    "collision_start", "collision_ongoing", "collision_end", "break", "wake", "sleep", "fault", "swap", "edit",
-    "listener"};
+    "collision_start", "collision_ongoing", "collision_end", "limit_start", "break", "wake", "sleep", "fault", "swap",
+    "edit", "listener"};
 
 }  // namespace
 

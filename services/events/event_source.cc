@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "plugin_sdk/activity.h"
+#include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/merged_rows.h"
 #include "plugin_sdk/slots.h"
 #include "services/run/kernel_names.h"
@@ -72,6 +73,7 @@ void EventSource::on_inner_step(const kernel::Environment& environment, const ke
   ongoing_.clear();
   if (kinds_.has(EventKind::kCollisionStart) || kinds_.has(EventKind::kCollisionEnd)) find_changes(environment, inner);
   if (kinds_.has(EventKind::kCollisionOngoing)) find_ongoing(environment, inner);
+  if (kinds_.has(EventKind::kLimitStart)) find_limits(environment, inner);
   if (kinds_.has(EventKind::kBreak)) find_breaks(environment, inner);
 }
 
@@ -131,6 +133,43 @@ void EventSource::find_ongoing(const kernel::Environment& environment, const ker
     Event event = collision(EventKind::kCollisionOngoing, environment, inner, &contact);
     if (has_pair(inner.before.touching.span(), a, b) && has_pair(inner.after.touching.span(), a, b))
       ongoing_.push_back(std::move(event));
+  }
+}
+
+// A side that pushes, did not in the step before, and closed where the step began, by more than rounding: what rests on it, or
+// is pressed on it by what comes, does not meet it.
+void EventSource::find_limits(const kernel::Environment& environment, const kernel::InnerStep& inner) {
+  constexpr double kRounding = 1e-9;  // of the speeds
+  const kernel::StepData& data = inner.data;
+  const DiscrepancyColumns columns = data.discrepancies.columns();
+  for (std::size_t row = 0; row < columns.size(); ++row) {
+    const Discrepancy limit = columns.at(row);
+    for (int axis = 0; axis < 3; ++axis) {
+      const AxisMode mode = axis_mode(limit.modes, axis);
+      if (mode != AxisMode::kUnilateral && !(mode == AxisMode::kLimited && limit.lower[axis] < limit.upper[axis]))
+        continue;
+      const std::size_t at = 3 * row + static_cast<std::size_t>(axis);
+      const double impulse = data.discrepancy_impulse[at], before = data.discrepancy_warm_impulse[at];
+      if (impulse == 0.0 || impulse * before > 0.0) continue;
+      const std::uint32_t a = data.discrepancy_body[2 * row], b = data.discrepancy_body[2 * row + 1];
+      const auto of = [](std::uint32_t body, std::span<const double> column) {
+        return body == kNone ? Vector3(Vector3::Zero()) : Vector3(vector_at(column, body));
+      };
+      const JacobianRow jacobian =
+          jacobian_row(limit, limit.axes * Vector3::Unit(axis), of(a, data.trial_position.span()),
+                       of(b, data.trial_position.span()));
+      const double ways[] = {jacobian.linear1.dot(of(a, inner.before.linear_velocity.span())),
+                             jacobian.angular1.dot(of(a, inner.before.angular_velocity.span())),
+                             jacobian.linear2.dot(of(b, inner.before.linear_velocity.span())),
+                             jacobian.angular2.dot(of(b, inner.before.angular_velocity.span()))};
+      double rate = 0.0, largest = 0.0;
+      for (const double way : ways) rate += way, largest = std::max(largest, std::fabs(way));
+      const double closing = impulse > 0.0 ? -rate : rate;
+      if (!(closing > kRounding * largest)) continue;
+      const std::uint32_t joint = data.discrepancies.constraint[row];
+      events_.push_back({EventKind::kLimitStart, environment.step_count() + 1, inner.end, a, b, joint, closing,
+                         std::fabs(impulse)});
+    }
   }
 }
 

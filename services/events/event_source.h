@@ -45,6 +45,7 @@ class EventSource final : public kernel::CommitListener {
                   std::size_t* contact) const;
   void find_changes(const kernel::Environment& environment, const kernel::InnerStep& inner);
   void find_ongoing(const kernel::Environment& environment, const kernel::InnerStep& inner);
+  void find_limits(const kernel::Environment& environment, const kernel::InnerStep& inner);
   void find_breaks(const kernel::Environment& environment, const kernel::InnerStep& inner);
   void find_activity(const kernel::Environment& environment);
   void find_faults(const kernel::Environment& environment);

@@ -100,7 +100,13 @@ class SceneRun final : private EventListener {
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;
   std::vector<Event> events_;
-  EventSource source_{this};
+  // beside those that a run looks for unless it is told otherwise: limits that are met
+  static EventKinds kinds() {
+    EventKinds all = default_event_kinds();
+    all.add(EventKind::kLimitStart);
+    return all;
+  }
+  EventSource source_{this, kinds()};
   report::v1::Report report_;
 };
 

@@ -61,6 +61,52 @@ INSTANTIATE_TEST_SUITE_P(Each, StopBounces, ::testing::ValuesIn(kStopCases), [](
          (which.param.accuracy > 0.0 ? "Accurate" : "");
 });
 
+// Each bounce is told once, with the speed and the impulse of it; what rests on its stop is not told again.
+TEST_P(StopBounces, AreTold) {
+  constexpr double kMass = 2.0, kSpeed = 0.9;
+  for (const double e : {1.0, 0.7, 0.25, 0.0}) {
+    SceneRun run = scene(body("A", kMass, {0, 0, 0}, {kSpeed, 0, 0}),
+                         joint("Slider",
+                               "BindPoint = {0, 0, 0} Axis = {1, 0, 0} LowerLimit = -0.1 UpperLimit = 0.05 "
+                               "Restitution = " +
+                                   literal(e),
+                               "Body2 = \"A\""),
+                         0.005, 1.0);
+    double direction = 1.0, speed = kSpeed;
+    std::size_t bounces = 0;
+    while (!run.is_done()) {
+      run.step();
+      const double now = run.body("A").twist.linear.x();
+      if (now * direction > 0.0 && e > 0.0) continue;
+      if (e == 0.0 && (now != 0.0 || bounces == 1)) continue;
+      direction = -direction;
+      ASSERT_EQ(run.count_events(EventKind::kLimitStart), ++bounces) << e << " at " << run.time();
+      const Event& told = run.events().back();
+      EXPECT_EQ(told.constraint, 0U);
+      EXPECT_EQ(told.step, run.step_count());
+      EXPECT_NEAR(told.relative_speed, speed, 1e-9);
+      EXPECT_NEAR(told.impulse, kMass * speed * (1.0 + e), 1e-9);
+      speed *= e;
+    }
+    EXPECT_GE(bounces, 1U);
+    EXPECT_EQ(run.count_events(EventKind::kLimitStart), bounces) << e;
+  }
+}
+
+// A ball on a rope of 1 m that falls from 0.4 m below its end: taut once, by sqrt(2 g 0.6), and then it hangs.
+TEST_P(StopBounces, ARopeThatGetsTautIsToldOnce) {
+  SceneRun run = scene(body("A", 2.0, {0, -0.4, 0}, {0, 0, 0}, Vector3::Zero(), "Forces = { \"Down\" }"),
+                       joint("Distance", "BindPoint1 = {0, 0, 0} BindPoint2 = {0, -0.4, 0} MaximumDistance = 1",
+                             "Body2 = \"A\""),
+                       0.005, 1.0,
+                       "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -10, 0} } }");
+  run.to_end();
+  ASSERT_EQ(run.count_events(EventKind::kLimitStart), 1U);
+  const auto told = std::ranges::find(run.events(), EventKind::kLimitStart, &Event::kind);
+  EXPECT_NEAR(told->relative_speed, std::sqrt(2.0 * 10.0 * 0.6), 0.06);
+  EXPECT_NEAR(told->time, std::sqrt(2.0 * 0.6 / 10.0), 0.006);
+}
+
 // Between two stops without loads a speed is e^n of the first after n of them, exactly, and of e = 1 what it was.
 TEST_P(StopBounces, OfASliderAreAPowerOfTheFirst) {
   for (const double e : {1.0, 0.7, 0.25}) {
