@@ -39,6 +39,8 @@ JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std:
   const std::uint32_t body1 = request.constraint_body()[2 * joint], body2 = request.constraint_body()[2 * joint + 1];
   bodies.spin1 = of(request.angular_velocity(), body1);
   bodies.spin2 = of(request.angular_velocity(), body2);
+  bodies.start_spin1 = of(request.start_angular_velocity(), body1);
+  bodies.start_spin2 = of(request.start_angular_velocity(), body2);
   bodies.velocity1 = of(request.linear_velocity(), body1);
   bodies.velocity2 = of(request.linear_velocity(), body2);
   bodies.time_step = request.time_step();

@@ -24,7 +24,10 @@ Discrepancy row_of(const Twisting& twisting, AxisMode mode) {
 double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies) {
   const Vector3 one = first_axis(frame1), two = first_axis(frame2);
   const double bend = 1.0 + one.dot(two);
-  return bend > 0.0 ? bodies.time_step * (bodies.spin2 - bodies.spin1).dot(one + two) / bend : 0.0;
+  if (!(bend > 0.0)) return 0.0;
+  const Vector3 along = (one + two) / bend;
+  return bodies.time_step * mean_rate((bodies.start_spin2 - bodies.start_spin1).dot(along),
+                                      (bodies.spin2 - bodies.spin1).dot(along));
 }
 
 constexpr double kPast = 0.02;      // rad, that a step may begin beyond a limit by
@@ -40,6 +43,10 @@ Vector3 unit_axis(const Vector3& axis, std::string_view field) {
   const double length = axis.stableNorm();
   if (!(length > 0.0) || !std::isfinite(length)) throw Refusal(std::string(field) + " has no direction");
   return axis / length;
+}
+
+double mean_rate(double at_start, double at_end) {
+  return at_start * at_end < 0.0 ? 0.5 * (at_start + at_end) : at_end;
 }
 
 JointLimits JointLimits::of(double lower, double upper, std::string_view lower_field, std::string_view upper_field) {

@@ -40,6 +40,10 @@ struct JointLimits {
   double limited_turn(double angle, double way) const;
 };
 
+// At which the step turned to where it ends, by the rates at its start and end: as methods do, the one at its end, but where it turned
+// round in the step, the mean of both.
+double mean_rate(double at_start, double at_end);
+
 void write_limits(const JointLimits& limits, BoundWriter* out);
 JointLimits read_limits(PropertyCursor* bound);
 

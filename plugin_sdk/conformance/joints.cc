@@ -59,6 +59,7 @@ MessageColumns Joints::describe_request() const {
   for (const JointedBody& body : bodies) {
     append(&request.f64("linear_velocity"), body.twist.linear);
     append(&request.f64("angular_velocity"), body.twist.angular);
+    append(&request.f64("start_angular_velocity"), body.twist.angular);
     request.f64("inverse_mass").push_back(1.0);
     append(&request.f64("inverse_inertia"), Vector3(Vector3::Ones()));
   }

@@ -114,6 +114,7 @@ MessageColumns Surveyor::request(stage::Method method, const kernel::Environment
   filler.put("orientation", state.orientation);
   filler.put("linear_velocity", state.linear_velocity);
   filler.put("angular_velocity", state.angular_velocity);
+  filler.put("start_angular_velocity", state.angular_velocity);
   if (!filler.has("lower")) return request;
   std::vector<double>&lower = request.f64("lower"), &upper = request.f64("upper");
   lower.resize(3 * std::size_t{model.body_count});

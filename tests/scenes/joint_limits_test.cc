@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 namespace gravitas {
 namespace {
 
+using harness::angle_between;
 using harness::literal;
 using harness::SceneRun;
 using harness::set;
@@ -132,6 +134,46 @@ TEST_P(TurningLimits, OfARopeThatIsSlackLetPointsMeet) {
       run.to_end();
       EXPECT_NEAR(run.body("A").pose.position.x(), 0.5 * sign, is_driven ? 0.011 : 1e-9) << is_driven;
     }
+}
+
+// Met and left in one step, by a spring or a load: no other than where a second limit, far off, stands beside it.
+TEST(JointLimits, ASingleLimitHoldsWhatTurnsRoundInAStep) {
+  const auto swing = [](const std::string& integrator, const std::string& joint, double spin, double step,
+                        const std::string& load) {
+    return std::make_unique<SceneRun>(
+        "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -10, 0} } } }\n"
+        "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = " +
+        literal(step) +
+        " Duration = 0.3 } }\nEnvironment { Space { Bodies { Body { Id = \"A\" Mass = 2 PrincipalMoments = {0.05, 0.06, "
+        "0.1} KineticProperties { Position = {0.5, 0, 0} LinearVelocity = " +
+        literal(Vector3(0.0, 0.5 * spin, 0.0)) + " AngularVelocity = " + literal(Vector3(0, 0, spin)) + " } " + load +
+        " } } }\nConstraints { Constraint { Type = \"Revolute\" Id = \"J\" Body2 = \"A\" CustomProperties { BindAxisPoint1 = "
+        "{0, 0, 0} BindAxisPoint2 = {0, 0, 1} " +
+        joint + " } } }\nKineticIntegrator = \"" + integrator + "\" ConstraintSolver = \"Newton\" }\n");
+  };
+  struct Case {
+    const char* joint;
+    double limit, spin;
+    const char* load;
+  };
+  for (const auto& [joint, limit, spin, load] :
+       {Case{"UpperLimit = 0.001 Stiffness = 100 RestAngle = -1", 1e-3, 2.5, ""},
+        Case{"UpperLimit = 0.001 Stiffness = 100 RestAngle = -1 Restitution = 0.5", 1e-3, 2.5, ""},
+        Case{"UpperLimit = 0.00001 Restitution = 0.5", 1e-5, 0.2, "Forces = { \"G\" }"}}) {
+    for (const char* integrator : {"RK4", "DormandPrince54", "DormandPrince853", "Radau"}) {
+      for (const double step : {1.0 / 60.0, 1e-2, 1.0 / 240.0}) {
+        const auto single = swing(integrator, joint, spin, step, load);
+        const auto both = swing(integrator, std::string("LowerLimit = -3 ") + joint, spin, step, load);
+        while (!single->is_done()) {
+          single->step(), both->step();
+          const Quaternion q = single->body("A").pose.orientation;
+          ASSERT_LE(2.0 * std::atan2(q.z(), q.w()), limit + 1e-9) << joint << integrator << ' ' << single->time();
+          ASSERT_NEAR(angle_between(q, both->body("A").pose.orientation), 0.0, 1e-6)
+              << joint << integrator << ' ' << single->time();
+        }
+      }
+    }
+  }
 }
 
 // A motor that presses on a single limit rests there: by rounding it is beyond, and moves back by it.

@@ -83,6 +83,7 @@ class JointUnderTest {
     const Vector3 w2 = w1 + carry_.orientation * motion.spin;
     request.f64("linear_velocity") = {v1.x(), v1.y(), v1.z(), v2.x(), v2.y(), v2.z()};
     request.f64("angular_velocity") = {w1.x(), w1.y(), w1.z(), w2.x(), w2.y(), w2.z()};
+    request.f64("start_angular_velocity") = request.f64("angular_velocity");
     request.f64("inverse_mass").assign(2, 1.0);
     request.f64("inverse_inertia").assign(6, 1.0);
     const MessageColumns reply = plugin_.ask(stage::Method::kConstraintCoordinates, request);

@@ -62,6 +62,7 @@ class JointProblem {
     for (const JointedBody& body : bodies) {
       append(&request.f64("linear_velocity"), body.twist.linear);
       append(&request.f64("angular_velocity"), body.twist.angular);
+      append(&request.f64("start_angular_velocity"), body.twist.angular);
       request.f64("inverse_mass").push_back(1.0 / kMass);
       append(&request.f64("inverse_inertia"), Vector3::Constant(1.0 / kInertia));
     }

@@ -143,9 +143,11 @@ class Universal final : public ConstraintPlugin {
       drive_about(axis2.cross(normal), sine, &drive1, emit);
       drive_about(normal.cross(axis1), sine, &drive2, emit);
       if (bound.at_end()) return;
-      for (const Bar& bar : bars_of(one, two, bodies)) {
+      const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1),
+                               start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
+      for (std::size_t bar = 0; bar < 2; ++bar) {
         const JointLimits limits = read_limits(&bound);
-        if (!limits.is_none()) emit(limited_row(bar, limits, between, bodies.time_step));
+        if (!limits.is_none()) emit(limited_row(bars[bar], start[bar].angle(), limits, between, bodies.time_step));
       }
     });
   }
@@ -156,7 +158,7 @@ class Universal final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       bound.number();
       for (int bar = 0; bar < 2; ++bar) read_spring(&bound);
-      const std::array<Bar, 2> bars = bars_of(one, two, bodies);
+      const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1);
       std::array<JointLimits, 2> limits;
       if (!bound.at_end())
         for (int bar = 0; bar < 2; ++bar) bound.table(2);
@@ -198,17 +200,19 @@ class Universal final : public ConstraintPlugin {
   }
 
   // Body 2 turns about its bar as that sees the other one turn back.
-  static std::array<Bar, 2> bars_of(const Pose& one, const Pose& two, const JointBodies& bodies) {
+  static std::array<Bar, 2> bars_of(const Pose& one, const Pose& two, const Vector3& turning) {
     const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
-    const Vector3 turning = bodies.spin2 - bodies.spin1;
     return {Bar{axis1, one.orientation * Vector3::UnitY(), axis2, turning, true},
             Bar{-axis2, two.orientation * Vector3::UnitY(), axis1, -turning, false}};
   }
 
-  // `between`: the angle that the bars are held at, which the solution brings them back to.
-  static Discrepancy limited_row(const Bar& bar, const JointLimits& limits, double between, double time_step) {
+  // `between`: the angle that the bars are held at, which the solution brings them back to. `start`: by the rates where the step
+  // begins.
+  static Discrepancy limited_row(const Bar& bar, const std::optional<Coordinate>& start, const JointLimits& limits,
+                                 double between, double time_step) {
     const std::optional<Coordinate> angle = bar.angle();
-    const double turned = angle ? limits.limited_turn(angle->value, time_step * angle->rate) : 0.0;
+    const double way = angle && start ? time_step * mean_rate(start->rate, angle->rate) : 0.0;
+    const double turned = angle ? limits.limited_turn(angle->value, way) : 0.0;
     const double zero = zero_of(limits, turned);
     const bool is_told = angle && std::fabs(turned - zero) <= kQuarterTurn;
     const double sine = math::sin(between);
