@@ -144,10 +144,12 @@ TEST(JointLimits, ASingleLimitHoldsWhatTurnsRoundInAStep) {
         "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -10, 0} } } }\n"
         "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = " +
         literal(step) +
-        " Duration = 0.3 } }\nEnvironment { Space { Bodies { Body { Id = \"A\" Mass = 2 PrincipalMoments = {0.05, 0.06, "
+        " Duration = 0.3 } }\nEnvironment { Space { Bodies { Body { Id = \"A\" Mass = 2 PrincipalMoments = {0.05, "
+        "0.06, "
         "0.1} KineticProperties { Position = {0.5, 0, 0} LinearVelocity = " +
         literal(Vector3(0.0, 0.5 * spin, 0.0)) + " AngularVelocity = " + literal(Vector3(0, 0, spin)) + " } " + load +
-        " } } }\nConstraints { Constraint { Type = \"Revolute\" Id = \"J\" Body2 = \"A\" CustomProperties { BindAxisPoint1 = "
+        " } } }\nConstraints { Constraint { Type = \"Revolute\" Id = \"J\" Body2 = \"A\" CustomProperties { "
+        "BindAxisPoint1 = "
         "{0, 0, 0} BindAxisPoint2 = {0, 0, 1} " +
         joint + " } } }\nKineticIntegrator = \"" + integrator + "\" ConstraintSolver = \"Newton\" }\n");
   };
