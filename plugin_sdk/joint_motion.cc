@@ -94,7 +94,8 @@ CourseState JointMotion::at(double time) const {
 }
 
 void JointMotion::write(BoundWriter* out) const {
-  out->number(static_cast<double>(rows().size() / kBound));
+  const std::size_t count = rows().size() / kBound;
+  out->number(static_cast<double>(count));
   for (const double number : rows()) out->number(number);
 }
 

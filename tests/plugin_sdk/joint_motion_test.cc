@@ -118,7 +118,7 @@ TEST(JointMotion, ABoundedOneComesNearer) {
   // a = 40/2/4 m/s^2
   EXPECT_NEAR(speed(1.0), std::sqrt(2.0 * 5.0), 2e-3);
   EXPECT_NEAR(speed(-1.0), -std::sqrt(2.0 * 5.0), 2e-3);
-  EXPECT_NEAR(speed(1e-9), 1e-9 / 2e-4, 1e-11);
+  EXPECT_NEAR(speed(1e-11), 1e-11 / 2e-4, 1e-11);
   EXPECT_EQ(speed(0.0), 0.0);
   // nothing that can be moved, nothing to move with
   bodies.inverse_mass2 = 0.0;
