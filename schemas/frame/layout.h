@@ -7,11 +7,11 @@
 //
 //   mailbox of the kernel (worker: read-only)      mailbox of the worker (both: read-write)
 //   +--------------------------------+              +--------------------------------+
-//   | signal, cpu                    |              | signal, cpu, progress, fault   |
-//   | FrameHeader                    |              | FrameHeader                    |
+//   | signal, sleeping, cpu          |              | signal, sleeping, cpu          |
+//   | FrameHeader                    |              | FrameHeader, progress, compute |
 //   | FrameColumn[column_count]      |  request     | FrameColumn[column_count]      |  reply
-//   | FrameColumn[reply_count]       |  room for    +--------------------------------+
-//   +--------------------------------+  the reply
+//   | FrameColumn[reply_count], text |  room for    | text                           |
+//   +--------------------------------+  the reply   +--------------------------------+
 //        offsets into the state segment                offsets into the response segment
 //
 // All numbers are little-endian; doubles are IEEE 754. No type here has a constructor, a pointer that crosses

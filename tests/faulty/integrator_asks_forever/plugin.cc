@@ -8,7 +8,12 @@ namespace {
 void misbehave(const gravitas::faulty::Request& request, const gravitas::faulty::Reply&, gravitas::Host& host) {
   std::vector<double> room;
   gravitas::Derivatives derivatives(request, host, &room);
-  for (;;) derivatives.wrenches_at_start();
+  for (;;) {
+    derivatives.wrenches_at_start();
+    // some microseconds of work, so that the time is spent here
+    for (volatile int i = 0; i < 10'000; i = i + 1) {
+    }
+  }
 }
 
 }  // namespace
