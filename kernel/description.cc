@@ -64,7 +64,6 @@ void SlotDescription::end_attachment() {
   const auto has_address = [](const PluginChoice& one) { return !one.address.empty(); };
   if (!attached || std::ranges::any_of(plugins, has_address)) return;
   attached = false;
-  deadline = SlotDescription().deadline;
 }
 
 const char* hosting_name(Hosting hosting) {

@@ -73,6 +73,7 @@ struct SlotDescription {
 
   // Whoever takes over from a worker that was started by hand has a deadline again.
   void end_attachment();
+  double call_deadline() const { return attached ? kAttachedDeadline : deadline; }
 };
 
 struct ShapeDescription {

@@ -131,8 +131,8 @@ void StageSlot::call_with_room(Carrier* carrier, const StageCall& call, Arena* a
     if (result.status == GRAVITAS_UNKNOWN_METHOD &&
         (call.method == stage::Method::kForceJacobians || call.method == stage::Method::kSolverReactionJacobians)) {
       // what was refused of the attempt before is none; in a comparison they hold what the answer is held against
-      for (const ColumnId column : call.reply)
-        if (!call.is_compared) arena->set_count(column, 0);
+      if (!call.is_compared)
+        for (const ColumnId column : call.reply) arena->set_count(column, 0);
       return;
     }
     if (result.status == GRAVITAS_REFUSED)

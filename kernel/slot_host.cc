@@ -142,7 +142,6 @@ std::string SlotHost::next_rung(Slot slot) {
     SlotDescription next = description_;
     next.hosting = previous.mapped().hosting;
     next.attached = previous.mapped().attached;
-    next.deadline = previous.mapped().deadline;
     for (std::size_t i = 0; i < next.plugins.size(); ++i)
       if (next.plugins[i].declaration.slot == slot) next.plugins[i] = previous.mapped().plugins[i];
     replace_description(std::move(next));

@@ -33,9 +33,9 @@ struct SwapRecord {
   Slot slot;
   std::uint32_t step;    // first step that the new host makes
   std::string from, to;  // plugins, with the hosting where that changes
-  // Of a comparison: from this step on `from` is who answers; 0: from the begin. What was counted beside others before
-  // is a record of its own.
   bool only_compared = false;
+  // Of a comparison: the step from which on `from` answers; 0: since it began. What was counted beside others before is a
+  // record of its own.
   std::uint32_t since = 0;
   SwapState state = SwapState::kPreparing;
   std::string reason;     // why it was refused or rolled back

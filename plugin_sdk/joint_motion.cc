@@ -159,8 +159,10 @@ Discrepancy followed_twist(const Pose& frame1, const Pose& frame2, const JointBo
                          twist_between(frame1.orientation, frame2.orientation)};
   const double bend = 1.0 + seen.first.dot(seen.second);
   const double speed = bend > 0.0 ? (bodies.spin2 - bodies.spin1).dot(seen.first + seen.second) / bend : 0.0;
-  double error = limits.turn(seen.angle, bodies.time_step * speed) - course.value;
-  if (limits.is_none()) error -= kWholeTurn * std::round(error / kWholeTurn);
+  double error = limits.turn(seen.angle, twisted_way(frame1.orientation, frame2.orientation, bodies)) - course.value;
+  // turns beyond a single limit are not counted; far from it, and where nothing may hold it back, it is whichever is near
+  const double to_limit = std::min(limits.upper - course.value, course.value - limits.lower);
+  if (torque >= kUnlimited || to_limit > 0.75 * kWholeTurn) error -= kWholeTurn * std::round(error / kWholeTurn);
   if (torque >= kUnlimited) {
     const Twisting off = {seen.first, seen.second, error};
     const Vector3 axis = off.cosine() * off.bisector();

@@ -78,7 +78,7 @@ struct JointDrive {
               std::string_view force_field);
 
   bool is_none() const { return motion.is_none() && std::isnan(speed); }
-  // What limits stop of it, and nothing else can move: no row of theirs is needed, and would contradict it.
+  // It is met whatever is in its way, and its course ends at the limits: rows of limits would contradict it.
   bool is_course_alone() const { return !motion.is_none() && force >= kUnlimited; }
 };
 void write_drive(const JointDrive& drive, BoundWriter* out);

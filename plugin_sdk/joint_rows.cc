@@ -20,16 +20,6 @@ Discrepancy row_of(const Twisting& twisting, AxisMode mode) {
   return d;
 }
 
-// What the twist of the frames changed by in the step.
-double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies) {
-  const Vector3 one = first_axis(frame1), two = first_axis(frame2);
-  const double bend = 1.0 + one.dot(two);
-  if (!(bend > 0.0)) return 0.0;
-  const Vector3 along = (one + two) / bend;
-  return bodies.time_step * mean_rate((bodies.start_spin2 - bodies.start_spin1).dot(along),
-                                      (bodies.spin2 - bodies.spin1).dot(along));
-}
-
 constexpr double kPast = 0.02;      // rad, that a step may begin beyond a limit by
 constexpr double kRounding = 1e-6;  // rad, of turns
 
@@ -47,6 +37,15 @@ Vector3 unit_axis(const Vector3& axis, std::string_view field) {
 
 double mean_rate(double at_start, double at_end) {
   return at_start * at_end < 0.0 ? 0.5 * (at_start + at_end) : at_end;
+}
+
+double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies) {
+  const Vector3 one = first_axis(frame1), two = first_axis(frame2);
+  const double bend = 1.0 + one.dot(two);
+  if (!(bend > 0.0)) return 0.0;
+  const Vector3 along = (one + two) / bend;
+  return bodies.time_step *
+         mean_rate((bodies.start_spin2 - bodies.start_spin1).dot(along), (bodies.spin2 - bodies.spin1).dot(along));
 }
 
 JointLimits JointLimits::of(double lower, double upper, std::string_view lower_field, std::string_view upper_field) {
@@ -122,8 +121,9 @@ Property restitution_property() {
       .at_least(0.0)
       .at_most(1.0)
       .defaults_to({0.0})
-      .means("Share of the speed at which a limit is met that it is left at; 0: it stops dead. Limits that give way have "
-             "none.");
+      .means(
+          "Share of the speed at which a limit is met that it is left at; 0: it stops dead. Limits that give way have "
+          "none.");
 }
 
 double read_restitution(PropertyCursor* properties, std::string_view type, bool has_stops, std::string_view stops) {

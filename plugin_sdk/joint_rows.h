@@ -40,9 +40,12 @@ struct JointLimits {
   double limited_turn(double angle, double way) const;
 };
 
-// At which the step turned to where it ends, by the rates at its start and end: as methods do, the one at its end, but where it turned
-// round in the step, the mean of both.
+// The rate at which a step turned to where it ends, by those at its start and end: the one at its end, as methods of order 1 move
+// bodies; the mean of both where it turned round in between.
 double mean_rate(double at_start, double at_end);
+
+// What the twist of two frames (twist_between()) changed by in the step, rad.
+double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies);
 
 void write_limits(const JointLimits& limits, BoundWriter* out);
 JointLimits read_limits(PropertyCursor* bound);

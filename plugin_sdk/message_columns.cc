@@ -93,4 +93,14 @@ std::string MessageColumns::bytes() const {
   return bytes;
 }
 
+DiscrepancyColumns discrepancy_columns(const MessageColumns& reply) {
+  DiscrepancyColumns columns;
+  columns.point1 = reply.f64("point1"), columns.point2 = reply.f64("point2"), columns.velocity = reply.f64("velocity");
+  columns.correction = reply.f64("correction"), columns.axes = reply.f64("axes"), columns.mode = reply.u32("mode");
+  columns.lower = reply.f64("lower"), columns.upper = reply.f64("upper"), columns.compliance = reply.f64("compliance");
+  columns.damping = reply.f64("damping"), columns.maximum_force = reply.f64("maximum_force");
+  columns.restitution = reply.f64("restitution"), columns.desired_acceleration = reply.f64("desired_acceleration");
+  return columns;
+}
+
 }  // namespace gravitas

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "plugin_sdk/discrepancy.h"
 #include "schemas/stage_frames.h"
 
 namespace gravitas {
@@ -48,5 +49,8 @@ class MessageColumns {
   std::span<const stage::ColumnInfo> infos_;
   std::vector<Numbers> columns_;
 };
+
+// Of an answer of Constraint.Discrepancies; valid as long as that is.
+DiscrepancyColumns discrepancy_columns(const MessageColumns& reply);
 
 }  // namespace gravitas

@@ -35,7 +35,7 @@ const MethodInfo& kDerivative = stage::method_info(stage::Method::kIntegratorDer
 class GrpcCarrier final : public Carrier {
  public:
   GrpcCarrier(const SlotDescription& slot, std::uint32_t threads, std::stop_token stop)
-      : slot_deadline_ns_(static_cast<std::uint64_t>(slot.deadline * 1e9)),
+      : slot_deadline_ns_(static_cast<std::uint64_t>(slot.call_deadline() * 1e9)),
         link_(
             slot, threads, false, [] {}, std::move(stop)) {
     link_.finish();

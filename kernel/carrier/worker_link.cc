@@ -209,7 +209,7 @@ void WorkerLink::finish() {
   const auto& served = control_->welcome().plugins();
   if (problem.empty() && served.size() != static_cast<int>(plugins_.size()))
     problem = "it serves another number of plugins than asked for";
-  for (int i = 0; i < served.size() && problem.empty(); ++i)
+  for (int i = 0; problem.empty() && i < served.size(); ++i)
     if (const std::string& name = plugins_[static_cast<std::size_t>(i)]; served[i].name() != name)
       problem = "it serves plugin '" + served[i].name() + "', not '" + name + "'";
   if (problem.empty()) return;

@@ -68,19 +68,7 @@ MessageColumns Joints::describe_request() const {
 
 std::vector<DescribedJoint> Joints::describe(Inquiry* inquiry) const {
   const MessageColumns reply = inquiry->answer(stage::Method::kConstraintDiscrepancies, describe_request());
-  const DiscrepancyColumns columns{reply.f64("point1"),
-                                   reply.f64("point2"),
-                                   reply.f64("velocity"),
-                                   reply.f64("correction"),
-                                   reply.f64("axes"),
-                                   reply.u32("mode"),
-                                   reply.f64("lower"),
-                                   reply.f64("upper"),
-                                   reply.f64("compliance"),
-                                   reply.f64("damping"),
-                                   reply.f64("maximum_force"),
-                                   reply.f64("restitution"),
-                                   reply.f64("desired_acceleration")};
+  const DiscrepancyColumns columns = discrepancy_columns(reply);
   inquiry->expect_unit("axes", columns.axes, 4);
   std::vector<DescribedJoint> described;
   for (std::size_t i = 0; i < columns.size(); ++i) {

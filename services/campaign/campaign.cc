@@ -23,11 +23,11 @@
 #include <thread>
 #include <utility>
 
+#include "plugin_sdk/shell_word.h"
 #include "plugin_sdk/slots.h"
 #include "services/campaign/leftovers.h"
 #include "services/campaign/page.h"
 #include "services/campaign/table.h"
-#include "services/check/shell_word.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/json.h"
 #include "services/run/session.h"
@@ -362,7 +362,7 @@ v1::Trial repeat_trial(const Options& options, std::uint64_t seed) {
 
 std::string repeat_command(const Options& options, std::uint64_t seed) {
   std::string command = "gravitas campaign";
-  for (const std::string& word : trial_words(options)) command += " " + check::shell_word(word);
+  for (const std::string& word : trial_words(options)) command += " " + shell_word(word);
   return fmt::format("{} --trial {}", command, seed);
 }
 

@@ -85,13 +85,7 @@ std::string wrong_rows(stage::Method method, const Messages& of) {
     case stage::Method::kConstraintBind:
       return check_bound_begin(reply.u32("bound_begin"), reply.f64("bound").size()).text;
     case stage::Method::kConstraintDiscrepancies:
-      return check_discrepancy_rows(
-                 reply.u32("constraint"), request.u32("intact"),
-                 {reply.f64("point1"), reply.f64("point2"), reply.f64("velocity"), reply.f64("correction"),
-                  reply.f64("axes"), reply.u32("mode"), reply.f64("lower"), reply.f64("upper"), reply.f64("compliance"),
-                  reply.f64("damping"), reply.f64("maximum_force"), reply.f64("restitution"),
-                  reply.f64("desired_acceleration")})
-          .text;
+      return check_discrepancy_rows(reply.u32("constraint"), request.u32("intact"), discrepancy_columns(reply)).text;
     case stage::Method::kForceWrenches:
       return check_wrench_flags(reply.u32("flags")).text;
     case stage::Method::kForceJacobians:

@@ -9,11 +9,11 @@
 #include "plugin_sdk/conformance/sample_values.h"
 #include "plugin_sdk/declaration_check.h"
 #include "plugin_sdk/host/description_message.h"
+#include "plugin_sdk/shell_word.h"
 #include "services/catalog/catalog.h"
 #include "services/catalog/describe_process.h"
 #include "services/check/examination.h"
 #include "services/check/plugin_file.h"
-#include "services/check/shell_word.h"
 #include "services/run/session.h"
 
 namespace gravitas::check {

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "plugin_sdk/declaration_check.h"
+#include "plugin_sdk/shell_word.h"
 #include "services/check/answer_text.h"
-#include "services/check/shell_word.h"
 
 namespace gravitas::check {
 

@@ -53,12 +53,14 @@ std::string socket_of(const CtlLine& line) {
   throw BadInput(text);
 }
 
+void tell_of_waiting(const api::Status& status) {
+  std::cerr << fmt::format("gravitas ctl: {}; this waits for its end\n", control::waiting_line(status));
+}
+
 int perform(const CtlLine& line, const Order& order) {
   try {
     ControlClient client(socket_of(line));
-    client.on_wait([](const api::Status& status) {
-      std::cerr << fmt::format("gravitas ctl: {}; this waits for its end\n", control::waiting_line(status));
-    });
+    client.on_wait(tell_of_waiting);
     return order(line, &client);
   } catch (const control::ControlError& error) {
     using Kind = control::ControlError::Kind;
@@ -97,7 +99,8 @@ int follow_swap(const CtlLine& line, ControlClient* client, const api::SwapOrder
     return kDone;
   }
   api::Status status;
-  const std::optional<api::ServedSwap> swap = control::wait_for_swap(client, ordered.number(), &status);
+  const std::optional<api::ServedSwap> swap =
+      control::wait_for_swap(client, ordered.number(), &status, tell_of_waiting);
   if (!swap) {
     std::cerr << "gravitas ctl: the swap is not known any more: the run was reset, or has ended\n";
     return kExaminedFailed;

@@ -240,10 +240,13 @@ api::SetPropertyRequest parse_set_request(const std::string& text) {
   return request;
 }
 
-std::optional<api::ServedSwap> wait_for_swap(ControlClient* client, std::uint32_t number, api::Status* last) {
+std::optional<api::ServedSwap> wait_for_swap(ControlClient* client, std::uint32_t number, api::Status* last,
+                                             const std::function<void(const api::Status&)>& on_wait) {
   std::optional<api::ServedSwap> found;
+  bool is_told = false;
   client->watch(kSwapIntervalMs, [&](const api::Status& status) {
     *last = status;
+    if (on_wait && !is_told && status.waited() >= 1.0) is_told = true, on_wait(status);
     found.reset();
     for (const api::ServedSwap& swap : status.swaps())
       if (swap.number() == number) found = swap;

@@ -30,7 +30,7 @@ class ControlClient {
   ControlClient(const ControlClient&) = delete;
   ControlClient& operator=(const ControlClient&) = delete;
 
-  // Called once, from now on, in a call that waits for a second and more while one step is being made: with the status
+  // From now on each call that waits for a second or more while one step is being made calls it once: with the status
   // then, whose `waited` says since when. Streams tell by themselves.
   void on_wait(std::function<void(const api::Status&)> tell);
 
@@ -74,6 +74,8 @@ api::SetPropertyRequest parse_set_request(const std::string& text);
 
 // Waits, while the run goes on, until the swap of that number is committed, rolled back or refused, and returns it as
 // it stands then. Nothing if it is not known any more.
-std::optional<api::ServedSwap> wait_for_swap(ControlClient* client, std::uint32_t number, api::Status* last);
+// `on_wait` as ControlClient::on_wait().
+std::optional<api::ServedSwap> wait_for_swap(ControlClient* client, std::uint32_t number, api::Status* last,
+                                             const std::function<void(const api::Status&)>& on_wait = {});
 
 }  // namespace gravitas::control

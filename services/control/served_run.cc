@@ -102,7 +102,7 @@ void ServedRun::begin_environment(const Resumption* from) {
     recorder_->set_decisions({kept.decisions().begin(), kept.decisions().end()});
     for (const edit::v1::Edit& one : kept.edits()) note_edit(one, &past_);
     events_->resume(kept.tally());
-    figures_->resume(kept.tally());
+    figures_->resume(kept.tally(), kept.edits_size() > 0);
     figures_->follow(environment_.get());
   }
   event_source_.emplace(events_.get());
@@ -448,11 +448,12 @@ void ServedRun::on_commit(const kernel::Environment& environment) {
 }
 
 void ServedRun::on_decision(const kernel::Environment& environment, const kernel::Decision& decision) {
-  recorder_->on_decision(environment, decision);
   kernel::SlotDescription& slot = active_.slot(decision.slot);
   slot.plugins.at(decision.target) = *decision.plugin;
   if (decision.target == 0) slot.hosting = decision.host->hosting;
   if (survey_) survey_->surveyor.follow(decision);
+  // last: it throws where a disk is full
+  recorder_->on_decision(environment, decision);
 }
 
 }  // namespace gravitas::control

@@ -229,7 +229,7 @@ class ServedRun final : private kernel::CommitListener {
   PairDecisions pair_decisions_{[this](const std::string& why) { leave_aside(why); }};
 
   std::unique_ptr<kernel::Environment> environment_;
-  // Made with the first question, and anew after a reset; trajectories are drawn from frame to frame.
+  // Made with the first question, and anew after a reset or an edit; trajectories are drawn from frame to frame.
   struct Survey {
     survey::Surveyor surveyor;
     survey::Instrumentation instrumentation{&surveyor};

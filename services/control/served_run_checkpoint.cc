@@ -106,7 +106,8 @@ void ServedRun::keep_faulted_state() {
     const bool keeps = recorder_->keeps();
     const std::string path =
         keeps ? recorder_->path() : std::filesystem::absolute(paused_checkpoint(options_)).string();
-    if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
+    // also where one of this step is kept: an edit may have come since, which its journal did not take
+    if (keeps) recorder_->save(*environment_);
     if (!keeps) {
       recorder_->save_to(path, *environment_);
       remove_other_journal(options_, path);

@@ -74,7 +74,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     orders_ = std::move(pending);
     next_collection_ = {};
     collect_warnings();
-    survey_.reset();
+    const std::unique_ptr<Survey> asked = std::move(survey_);
     for (const Slot slot : kSlots) active_.slot(slot) = begun.slot(slot);
     std::vector<recorder::v1::Decision> decisions = recorder_->decisions();
     translate_decisions(description_, edited.description(), &decisions);
@@ -82,6 +82,10 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     recorder_->set_decisions(std::move(decisions));
     scene_ = edited.scene();
     description_ = edited.description();
+    if (asked) {
+      surveyor();
+      survey_->instrumentation.go_on_from(std::move(asked->instrumentation));
+    }
     pair_decisions_.follow(environment_->model(), next->model());
     environment_ = std::move(next);
     environment_->set_commit_listener(this);
@@ -106,6 +110,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     } catch (const std::system_error& problem) {
       fault_ = problem.what();
       keep_faulted_state();
+      made.add_warnings(fault_);
     }
     made.set_pause_us(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
     return made;

@@ -13,7 +13,14 @@ void ServedRun::listen(std::shared_ptr<RemoteListener> listener, double deadline
     if (listener_) throw NotNow("another client decides about pairs");
     listener_ = std::move(listener);
     pair_decisions_.listen(listener_, seconds);
-    attend_listener();
+    try {
+      attend_listener();
+    } catch (...) {
+      // a full disk: nobody has been asked
+      pair_decisions_.leave();
+      listener_.reset();
+      throw;
+    }
   });
 }
 

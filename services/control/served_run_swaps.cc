@@ -59,10 +59,7 @@ api::SwapOrdered ServedRun::swap(const api::SwapRequest& request) {
   Catalog catalog = catalog_;
   kernel::SwapOrder found = resolve_swap(spec, scenes, &catalog);
   const auto take_settings_of = [&](const kernel::PluginChoice& one) {
-    if (one.declaration.name == found.plugin.declaration.name &&
-        std::ranges::equal(one.declaration.properties, found.plugin.declaration.properties, {}, &Property::name,
-                           &Property::name))
-      found.plugin.settings = one.settings;
+    if (has_same_properties(one.declaration, found.plugin.declaration)) found.plugin.settings = one.settings;
   };
   std::ranges::for_each(active.slot(spec.slot).plugins, take_settings_of);
   return between_steps([&] {

@@ -51,7 +51,7 @@ std::vector<std::string> warnings_of_turned_joints(const edit::v1::Edit& edit, c
     if (was == stood.end() || !is_turned(was->value, now.value)) continue;
     warnings.push_back(fmt::format(
         "edit before step {}: set {}: the joint '{}' stands at {} = {:.6g} rad, which counts as {:.6g} rad with its "
-        "limits, as if it had come from behind",
+        "limits",
         edit.step(), change->set(), joint, now.name, was->value, now.value));
   }
   return warnings;

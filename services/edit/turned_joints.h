@@ -1,7 +1,7 @@
 // Joints whose angle limits take for another turn once an edit has set them.
 //
 // An angle is known within a turn. With a single limit it is the turn on its free side, so a joint that stands beyond a
-// limit that was just set counts as one that comes from behind, and the limit lets it go. Nobody would notice.
+// limit that was just set may count as one that comes from behind, which the limit lets go. Nobody would notice.
 #pragma once
 
 #include <string>

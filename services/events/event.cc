@@ -9,9 +9,17 @@
 namespace gravitas {
 namespace {
 
-constexpr std::array<const char*, static_cast<std::size_t>(EventKind::kCount)> kEventKindNames = {
-    "collision_start", "collision_ongoing", "collision_end", "limit_start", "break", "wake", "sleep", "fault", "swap",
-    "edit", "listener"};
+constexpr std::array<const char*, static_cast<std::size_t>(EventKind::kCount)> kEventKindNames = {"collision_start",
+                                                                                                  "collision_ongoing",
+                                                                                                  "collision_end",
+                                                                                                  "limit_start",
+                                                                                                  "break",
+                                                                                                  "wake",
+                                                                                                  "sleep",
+                                                                                                  "fault",
+                                                                                                  "swap",
+                                                                                                  "edit",
+                                                                                                  "listener"};
 
 }  // namespace
 

@@ -62,9 +62,9 @@ struct Event {
   std::uint32_t constraint = kNone;    // that broke, or of the limit
   // Of a collision that starts or goes on, at S*: the largest speed of approach along the normal of a contact, and how b's
   // surface moves against a's there, m/s, world; the normal impulse of all contacts of the pair, N s, in the inner step.
-  double relative_speed = 0.0, impulse = 0.0;
   // Of a limit: the rate at which it closes where the inner step begins, m/s or rad/s, and its impulse, N s or N m s, in that
   // step (with Smooth at its end).
+  double relative_speed = 0.0, impulse = 0.0;
   Vector3 relative_velocity = Vector3::Zero();
   // Of the run: the slot, the plugin, what it was ("death", "committed"), and why.
   std::string slot = {}, plugin = {}, what = {}, text = {};

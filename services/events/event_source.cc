@@ -155,9 +155,8 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
       const auto of = [](std::uint32_t body, std::span<const double> column) {
         return body == kNone ? Vector3(Vector3::Zero()) : Vector3(vector_at(column, body));
       };
-      const JacobianRow jacobian =
-          jacobian_row(limit, limit.axes * Vector3::Unit(axis), of(a, data.trial_position.span()),
-                       of(b, data.trial_position.span()));
+      const JacobianRow jacobian = jacobian_row(limit, limit.axes * Vector3::Unit(axis),
+                                                of(a, data.trial_position.span()), of(b, data.trial_position.span()));
       const double ways[] = {jacobian.linear1.dot(of(a, inner.before.linear_velocity.span())),
                              jacobian.angular1.dot(of(a, inner.before.angular_velocity.span())),
                              jacobian.linear2.dot(of(b, inner.before.linear_velocity.span())),
@@ -167,8 +166,8 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
       const double closing = impulse > 0.0 ? -rate : rate;
       if (!(closing > kRounding * largest)) continue;
       const std::uint32_t joint = data.discrepancies.constraint[row];
-      events_.push_back({EventKind::kLimitStart, environment.step_count() + 1, inner.end, a, b, joint, closing,
-                         std::fabs(impulse)});
+      events_.push_back(
+          {EventKind::kLimitStart, environment.step_count() + 1, inner.end, a, b, joint, closing, std::fabs(impulse)});
     }
   }
 }

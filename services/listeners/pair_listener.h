@@ -2,8 +2,9 @@
 // together (§ 3.6.5).
 //
 // A run asks about each pair once, when the scene's rules let it collide and the bounds of its bodies first overlap; the
-// answer holds for the rest of the run, unless an edit changes what the scene says of the two materials. Decisions are an input of a run, as its scene is: the same ones give the same bits,
-// in any hosting. They are no part of a checkpoint, so a run in which a listener decided is not resumed.
+// answer holds for the rest of the run, unless an edit changes what the scene says of the two materials. Decisions are an
+// input of a run, as its scene is: the same ones give the same bits, in any hosting. They are no part of a checkpoint, so a
+// run in which a listener decided is not resumed.
 #pragma once
 
 #include <array>

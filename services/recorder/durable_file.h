@@ -21,8 +21,8 @@ bool is_disk_error(const std::error_code& code);
 // Of the file that replaces one: PATH.tmp.
 std::string fresh_name_of(const std::string& path);
 
-// Puts `bytes` into the place of the file: fresh_name_of() it, in the same folder, fsync, rename, fsync of the folder. On failure
-// throws std::system_error naming the file; what was at `path` is still there, and PATH.tmp is gone.
+// Puts `bytes` into the place of the file: writes fresh_name_of(path), in the same folder, fsync, rename, fsync of the folder.
+// On failure throws std::system_error naming the file; what was at `path` is still there, and PATH.tmp is gone.
 void replace_file(const std::string& path, std::span<const std::byte> bytes);
 
 // Writes a text where a damaged old one is no loss. Throws std::system_error naming `what` and the file.

@@ -111,6 +111,11 @@ void require_rerun(const RerunSpec& spec, const kernel::Environment& environment
     refuse("--rerun", fmt::format("{}={}", slot_name(spec.slot), spec.every), environment.why_left_out(spec.slot));
 }
 
+bool has_same_properties(const PluginDeclaration& one, const PluginDeclaration& other) {
+  return one.name == other.name &&
+         std::ranges::equal(one.properties, other.properties, {}, &Property::name, &Property::name);
+}
+
 bool have_same_settings(const kernel::PluginChoice& one, const kernel::PluginChoice& other) {
   const auto bits = [](double setting) { return std::bit_cast<std::uint64_t>(setting); };
   return std::ranges::equal(one.settings, other.settings, {}, bits, bits);
@@ -137,11 +142,8 @@ kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDe
   order.hosting = spec.hosting;
   order.plugin = {plugin->declaration, plugin->library, {}, plugin->command};
   const std::vector<kernel::PluginChoice>& own = scene.slot(spec.slot).plugins;
-  const auto same = std::ranges::find_if(own, [&](const kernel::PluginChoice& one) {
-    return one.declaration.name == plugin->declaration.name &&
-           std::ranges::equal(one.declaration.properties, plugin->declaration.properties, {}, &Property::name,
-                              &Property::name);
-  });
+  const auto same = std::ranges::find_if(
+      own, [&](const kernel::PluginChoice& one) { return has_same_properties(one.declaration, plugin->declaration); });
   order.plugin.settings = same != own.end() ? same->settings : default_settings(spec, plugin->declaration);
   return order;
 }

@@ -39,6 +39,10 @@ void require_rerun(const RerunSpec& spec, const kernel::Environment& environment
 // BadInput if there is none of that name.
 kernel::SwapOrder resolve_swap(const SwapSpec& spec, const kernel::EnvironmentDescription& scene, Catalog* catalog);
 
+// The same plugin, perhaps of another build, whose properties have the same names in the same order: settings of one are such
+// of the other.
+bool has_same_properties(const PluginDeclaration& one, const PluginDeclaration& other);
+
 // Bit for bit: absent ones are NaN.
 bool have_same_settings(const kernel::PluginChoice& one, const kernel::PluginChoice& other);
 

@@ -233,14 +233,15 @@ void Figures::write(recorder::v1::Tally* tally) const {
   tally->set_reference_energy(reference_energy_);
 }
 
-void Figures::resume(const recorder::v1::Tally& tally) {
-  // what was followed so far is the scene with its edits at the start, which never was
+void Figures::resume(const recorder::v1::Tally& tally, bool was_edited) {
   largest_kinetic_ = tally.largest_kinetic_energy();
   largest_deviation_ = tally.largest_energy_deviation();
   penetration_ = tally.penetration();
   joint_error_ = tally.joint_error();
-  runaway_.reset();
-  opening_step_.reset();
+  if (was_edited) {
+    runaway_.reset();
+    opening_step_.reset();
+  }
   if (tally.initial_momenta_size() != 6) return;
   const double* momenta = tally.initial_momenta().data();
   initial_ = Totals{0.0, tally.initial_energy(), Vector3(momenta[0], momenta[1], momenta[2]),

@@ -28,7 +28,8 @@ class Figures {
   // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
   // from the restored state on.
   void write(recorder::v1::Tally* tally) const;
-  void resume(const recorder::v1::Tally& tally);
+  // `was_edited`: what was followed so far is the scene with its edits at the start, which never was.
+  void resume(const recorder::v1::Tally& tally, bool was_edited);
 
  private:
   struct Totals {

@@ -72,7 +72,9 @@ std::vector<NamedFile> checkpoints_of(const RunOptions& options) {
 }
 
 bool goes_on_in_its_checkpoint(const RunOptions& options) {
-  return !options.checkpoint.empty() && !options.resume.empty() && is_same_file(options.checkpoint, options.resume);
+  // hard links have journals of their own
+  return !options.checkpoint.empty() && !options.resume.empty() &&
+         target_of(options.checkpoint) == target_of(options.resume);
 }
 
 std::vector<NamedFile> files_of(const scene::v1::Scene& scene) {

@@ -56,7 +56,6 @@ void apply_hosting(const std::vector<HostingChoice>& choices, kernel::Environmen
       if (!choice.slot || *choice.slot == slot) {
         description->slot(slot).hosting = choice.hosting;
         description->slot(slot).attached = choice.attached;
-        if (choice.attached) description->slot(slot).deadline = kernel::kAttachedDeadline;
         for (kernel::PluginChoice& plugin : description->slot(slot).plugins) plugin.address = choice.address;
       }
   }

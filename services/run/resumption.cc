@@ -97,8 +97,7 @@ std::string checkpoint_target(const std::string& path) {
   std::error_code none;
   const fs::file_status status = fs::status(path, none);
   if (!fs::exists(status)) return path;
-  if (!fs::is_regular_file(status))
-    throw BadInput(fmt::format("checkpoint '{}': it is not an ordinary file, and is not replaced", path));
+  if (!fs::is_regular_file(status)) throw BadInput(fmt::format("checkpoint '{}': it is not an ordinary file", path));
   return fs::is_symlink(fs::symlink_status(path)) ? fs::canonical(path).string() : path;
 }
 

@@ -242,7 +242,7 @@ class Run final : private kernel::CommitListener {
     from_checkpoint(options_.resume, [&] { restore(&from->checkpoint, answering, catalog_, environment_.get()); });
     resumed_tally_ = from->checkpoint.tally();
     journal_ = std::move(from->journal);
-    figures_->resume(resumed_tally_);
+    figures_->resume(resumed_tally_, from->checkpoint.edits_size() > 0);
     guard([&] { figures_->follow(environment_.get()); });
   }
 

@@ -177,26 +177,11 @@ std::vector<Anchor> Surveyor::anchors(const kernel::Environment& environment) {
   for (const kernel::ConstraintGroup& group : environment.model().constraint_groups) {
     const MessageColumns asked = request(kAsked, environment, group);
     const std::vector<std::uint32_t>& intact = asked.u32("intact");
-    const auto columns = [](const MessageColumns& reply) {
-      return DiscrepancyColumns{reply.f64("point1"),
-                                reply.f64("point2"),
-                                reply.f64("velocity"),
-                                reply.f64("correction"),
-                                reply.f64("axes"),
-                                reply.u32("mode"),
-                                reply.f64("lower"),
-                                reply.f64("upper"),
-                                reply.f64("compliance"),
-                                reply.f64("damping"),
-                                reply.f64("maximum_force"),
-                                reply.f64("restitution"),
-                                reply.f64("desired_acceleration")};
-    };
     const MessageColumns reply =
         slot(Slot::kConstraint).ask(kAsked, group.target, asked, [&](const MessageColumns& answer) {
-          return check_discrepancy_rows(answer.u32("constraint"), intact, columns(answer));
+          return check_discrepancy_rows(answer.u32("constraint"), intact, discrepancy_columns(answer));
         });
-    const DiscrepancyColumns rows = columns(reply);
+    const DiscrepancyColumns rows = discrepancy_columns(reply);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       if ((rows.mode[i] & kAngularDiscrepancy) != 0) continue;
       const Vector3 point1 = vector_at(rows.point1, i), point2 = vector_at(rows.point2, i);

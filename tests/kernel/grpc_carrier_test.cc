@@ -192,7 +192,7 @@ TEST(GrpcCarrier, ACommandTakesOverFromALibrary) {
   const std::string quiet = chain_by_grpc_of(builder);
   kernel::PluginChoice& drag = builder.description().force.plugins[0];
   kernel::PluginChoice command = drag;
-  command.command = kernel::worker_program() + " " + command.library;
+  command.command = in_shell(kernel::worker_program()) + " " + in_shell(command.library);
   drag.fallback = std::make_shared<kernel::PluginChoice>(command);
   Environment world(builder.description());
   world.inject({Slot::kForce, "kill", 3, 2});
@@ -209,7 +209,7 @@ TEST(GrpcCarrier, ACommandsSocketMayHaveAnyPath) {
   setenv("TMPDIR", place.c_str(), 1);
   WorldBuilder builder = balls(1);
   kernel::PluginChoice& solver = builder.description().solver.plugins[0];
-  solver.command = kernel::worker_program() + " " + solver.library;
+  solver.command = in_shell(kernel::worker_program()) + " " + in_shell(solver.library);
   EXPECT_NO_THROW(Environment world(builder.description()));
   before != nullptr ? setenv("TMPDIR", old.c_str(), 1) : unsetenv("TMPDIR");
   rmdir(place.c_str());

@@ -1,4 +1,5 @@
 // The ladder that a failed call climbs, with hosts that die as they are told to: no process, no chance.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -118,7 +119,7 @@ class Ladder : public ::testing::Test {
     for (const SlotDescription& slot : started_)
       all.push_back(std::string(kernel::hosting_name(slot.hosting)) +
                     (slot.attached ? ", attached" : ", not attached") +
-                    (slot.deadline == SlotDescription().deadline ? "" : ", for ever"));
+                    (slot.call_deadline() < kernel::kAttachedDeadline ? fmt::format(", {:g} s", slot.deadline) : ""));
     return all;
   }
   std::size_t starts() {
@@ -321,9 +322,9 @@ TEST_F(Ladder, WhoTakesOverFromAnAttachedWorkerHasADeadline) {
   const kernel::PluginChoice library = solver.plugins[0];
   solver.hosting = Hosting::kGrpc;
   solver.attached = true;
-  solver.deadline = kernel::kAttachedDeadline;
+  solver.deadline = 7.0;
   solver.plugins[0].address = "unix:/of/one/worker";
-  const std::string attached = "grpc, attached, for ever", ours = "grpc, not attached";
+  const std::string attached = "grpc, attached", ours = "grpc, not attached, 7 s";
 
   Environment swapped(builder.description(),
                       starter({Fate::kServes, Fate::kDiesAtTenthCall, Fate::kDiesOfItsFirstCall}));

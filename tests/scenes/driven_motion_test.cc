@@ -114,6 +114,20 @@ TEST_P(DrivenMotion, IsWhereItsCourseIsAtEachStep) {
   }
 }
 
+// Through turns, though it has a single limit, which tells an angle within one.
+TEST_P(DrivenMotion, TurnsOnAwayFromASingleLimit) {
+  const auto way = [](double t) { return -0.4 * t - 1.5 * t * t - 0.5 * t * t * t * t; };
+  for (const char* bound : {"", " MaximumTorque = 20"}) {
+    SceneRun run(course_scene(course_hinge(std::string(" UpperLimit = 0.75") + bound + course_of(0, 2, 40, way))),
+                 with());
+    while (!run.is_done()) {
+      run.step();
+      ASSERT_LT(turns_apart(disc_angle(run), way(run.time())), *bound == '\0' ? 1e-3 : 0.02) << bound << run.time();
+    }
+    EXPECT_LT(way(run.time()), -4.0 * kPi);
+  }
+}
+
 // Two free bodies share the turn by their moments, and keep their momentum.
 TEST_P(DrivenMotion, FreeBodiesShareItByTheirMoments) {
   const auto way = [](double t) { return 1.5 * t * t; };
@@ -234,7 +248,7 @@ TEST_P(DrivenMotion, BoundedItFallsBehindAndComesBack) {
   }
 }
 
-// So much of a torque that a course goes on without it: nothing is driven.
+// A bound of 0: nothing is driven.
 TEST_P(DrivenMotion, WithoutAnyTorqueItTurnsFreely) {
   SceneRun run(course_scene(course_hinge(" MaximumTorque = 0 Motion = {{0, 0}, {1, 1}}"), "",
                             "KineticProperties { AngularVelocity = {0, 0, 0.5} }"),
@@ -311,8 +325,8 @@ TEST(DrivenMotionOfManyTurns, KeepsItsAngle) {
     }
 }
 
-// The order of an integrator is kept with Smooth: a pendulum whose pivot is driven along x = A sin^2 in one cubic piece a
-// quarter. A hinge in the middle of what is driven feels Coriolis and Jdot terms.
+// The order of an integrator is kept with Smooth: an arm that a course of four rows turns, and a pendulum at its end, which
+// feels Coriolis and Jdot terms.
 class OrderOfDrivenMotion : public ::testing::TestWithParam<std::pair<const char*, double>> {};
 INSTANTIATE_TEST_SUITE_P(Each, OrderOfDrivenMotion,
                          ::testing::Values(std::pair{"RK4", 4.0}, std::pair{"DormandPrince54", 0.0}),

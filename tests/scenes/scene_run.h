@@ -94,18 +94,18 @@ class SceneRun final : private EventListener {
   void on_event(const Event& event) override { events_.push_back(event); }
   std::uint32_t row(const std::string& id) const;
   Motion motion(std::uint32_t body) const;
-
-  std::vector<std::string> warnings_;
-  kernel::EnvironmentDescription description_;
-  std::unique_ptr<kernel::Environment> environment_;
-  std::unique_ptr<Figures> figures_;
-  std::vector<Event> events_;
   // beside those that a run looks for unless it is told otherwise: limits that are met
   static EventKinds kinds() {
     EventKinds all = default_event_kinds();
     all.add(EventKind::kLimitStart);
     return all;
   }
+
+  std::vector<std::string> warnings_;
+  kernel::EnvironmentDescription description_;
+  std::unique_ptr<kernel::Environment> environment_;
+  std::unique_ptr<Figures> figures_;
+  std::vector<Event> events_;
   EventSource source_{this, kinds()};
   report::v1::Report report_;
 };

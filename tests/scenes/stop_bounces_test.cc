@@ -95,11 +95,10 @@ TEST_P(StopBounces, AreTold) {
 
 // A ball on a rope of 1 m that falls from 0.4 m below its end: taut once, by sqrt(2 g 0.6), and then it hangs.
 TEST_P(StopBounces, ARopeThatGetsTautIsToldOnce) {
-  SceneRun run = scene(body("A", 2.0, {0, -0.4, 0}, {0, 0, 0}, Vector3::Zero(), "Forces = { \"Down\" }"),
-                       joint("Distance", "BindPoint1 = {0, 0, 0} BindPoint2 = {0, -0.4, 0} MaximumDistance = 1",
-                             "Body2 = \"A\""),
-                       0.005, 1.0,
-                       "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -10, 0} } }");
+  SceneRun run =
+      scene(body("A", 2.0, {0, -0.4, 0}, {0, 0, 0}, Vector3::Zero(), "Forces = { \"Down\" }"),
+            joint("Distance", "BindPoint1 = {0, 0, 0} BindPoint2 = {0, -0.4, 0} MaximumDistance = 1", "Body2 = \"A\""),
+            0.005, 1.0, "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -10, 0} } }");
   run.to_end();
   ASSERT_EQ(run.count_events(EventKind::kLimitStart), 1U);
   const auto told = std::ranges::find(run.events(), EventKind::kLimitStart, &Event::kind);

@@ -9,15 +9,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin_sdk/shell_word.h"
+
 namespace gravitas::structure {
 namespace {
-
-// single quotes for the shell
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return result + "'";
-}
 
 // what a command prints, cut at zero bytes; empty when it fails
 std::vector<std::string> output_of(const std::string& command) {
@@ -130,7 +125,7 @@ SourceTree tree_of_folder(const std::filesystem::path& root) {
 
 SourceTree tree_of_repository(const std::filesystem::path& root) {
   SourceTree tree{root, {}};
-  for (std::string& file : output_of("git -C " + quoted(root.string()) + " ls-files -z 2>/dev/null")) {
+  for (std::string& file : output_of("git -C " + shell_word(root.string()) + " ls-files -z 2>/dev/null")) {
     if (std::filesystem::is_regular_file(root / file)) tree.files.push_back(std::move(file));
   }
   if (tree.files.empty()) return tree_of_folder(root);

@@ -323,6 +323,7 @@ TEST(Run, TellsWhatHasNoNumber) {
             0);
   const ProgramResult resumed = run_program({"run", scene, "--hosting", "direct", "--resume", "c"}, folder);
   EXPECT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("that is the speed which it was given"));
 }
 
 TEST(Run, WarnsOfOrdersBeyondItsEnd) {

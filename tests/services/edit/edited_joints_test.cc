@@ -89,7 +89,7 @@ TEST(EditedJoints, ALimitThatTakesTheAngleForAnotherTurnIsToldOf) {
   EXPECT_THAT(warnings("", "set Constraint.Door.LowerLimit=-0.1@step=51"),
               ::testing::ElementsAre(
                   "edit before step 51: set Constraint.Door.LowerLimit=-0.1: the joint 'Door' stands at angle = -0.5 "
-                  "rad, which counts as 5.78319 rad with its limits, as if it had come from behind"));
+                  "rad, which counts as 5.78319 rad with its limits"));
   // what it has not reached, and what holds it with another limit on the other side
   EXPECT_THAT(warnings("", "set Constraint.Door.LowerLimit=-0.6@step=51"), ::testing::IsEmpty());
   EXPECT_THAT(warnings("UpperLimit = 1", "set Constraint.Door.LowerLimit=-0.1@step=51"), ::testing::IsEmpty());

@@ -229,7 +229,7 @@ Environment { Space { Bodies {
   Body { Id = "A" GeometryId = "Unit" Mass = 1 Material = "Rubber" KineticProperties { Position = {0, 0.3, 0} } Forces = { "Down" } }
   Body { Id = "Ground" GeometryId = "Flat" }
 } } })");
-  const auto asks = [&](const std::vector<std::string>& edits, double* lowest) {
+  const auto asks = [&](const std::vector<std::string>& edits, double* momentum) {
     std::vector<std::string> asked;
     RunOptions options;
     options.scenes = {scene};
@@ -242,7 +242,7 @@ Environment { Space { Bodies {
     });
     const RunResult result = run_quietly(options);
     EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
-    *lowest = result.report.linear_momentum().final(1);
+    *momentum = result.report.linear_momentum().final(1);
     return asked;
   };
   double falls = 0.0;

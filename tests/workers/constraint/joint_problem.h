@@ -67,19 +67,7 @@ class JointProblem {
       append(&request.f64("inverse_inertia"), Vector3::Constant(1.0 / kInertia));
     }
     const MessageColumns reply = plugin_->ask(stage::Method::kConstraintDiscrepancies, request);
-    const DiscrepancyColumns columns{reply.f64("point1"),
-                                     reply.f64("point2"),
-                                     reply.f64("velocity"),
-                                     reply.f64("correction"),
-                                     reply.f64("axes"),
-                                     reply.u32("mode"),
-                                     reply.f64("lower"),
-                                     reply.f64("upper"),
-                                     reply.f64("compliance"),
-                                     reply.f64("damping"),
-                                     reply.f64("maximum_force"),
-                                     reply.f64("restitution"),
-                                     reply.f64("desired_acceleration")};
+    const DiscrepancyColumns columns = discrepancy_columns(reply);
     std::vector<Discrepancy> discrepancies;
     for (std::size_t i = 0; i < columns.size(); ++i) discrepancies.push_back(columns.at(i));
     return discrepancies;
