@@ -30,7 +30,9 @@ struct Joints {
   std::vector<double> position = {1, 2, 3, 4, 5, 6};
   std::vector<double> orientation = {1, 0, 0, 0, 0, 1, 0, 0};
   std::vector<double> angular_velocity = {0, 0, 1, 0, 0, 2};
-  std::vector<double> time_step = {0.01};
+  std::vector<double> start_angular_velocity = {0, 3, 0, 0, 4, 0};
+  std::vector<double> time = {1.5}, time_step = {0.01};
+  std::vector<double> inverse_mass = {0.5, 0.0};
 
   template <typename Bind>
   void bind(Bind bind) {
@@ -57,7 +59,10 @@ struct Joints {
     request[Request::kPosition] = column_of(position);
     request[Request::kOrientation] = column_of(orientation);
     request[Request::kAngularVelocity] = column_of(angular_velocity);
+    request[Request::kStartAngularVelocity] = column_of(start_angular_velocity);
+    request[Request::kTime] = column_of(time);
     request[Request::kTimeStep] = column_of(time_step);
+    request[Request::kInverseMass] = column_of(inverse_mass);
     std::array<gravitas_reply_column, Reply::kColumnCount> reply{};
     std::vector<std::array<double, 64>> room(Reply::kColumnCount);
     for (std::size_t i = 0; i < room.size(); ++i) reply[i] = {room[i].data(), 64, 0};
@@ -113,14 +118,19 @@ TEST(DescribeEach, TellsWhichJointADiscrepancyIsOf) {
 
 TEST(DescribeEach, TellsHowBodiesTurnAndForHowLong) {
   Joints joints;
-  std::vector<Vector3> first, second;
+  std::vector<Vector3> first, second, start;
+  std::vector<double> inverse_masses;
   joints.describe([&](std::uint64_t, PropertyCursor, const JointBodies& bodies, auto&&) {
-    first.push_back(bodies.spin1), second.push_back(bodies.spin2);
+    first.push_back(bodies.spin1), second.push_back(bodies.spin2), start.push_back(bodies.start_spin1);
+    inverse_masses.push_back(bodies.inverse_mass1);
     EXPECT_EQ(bodies.time_step, 0.01);
+    EXPECT_EQ(bodies.time, 1.5);
   });
   const Vector3 a(0, 0, 1), b(0, 0, 2), world = Vector3::Zero();
   EXPECT_EQ(first, (std::vector<Vector3>{a, world, b}));
   EXPECT_EQ(second, (std::vector<Vector3>{b, b, world}));
+  EXPECT_EQ(start, (std::vector<Vector3>{{0, 3, 0}, world, {0, 4, 0}}));
+  EXPECT_EQ(inverse_masses, (std::vector<double>{0.5, 0.0, 0.0}));
 }
 
 TEST(DescribeEach, LeavesBrokenJointsOut) {

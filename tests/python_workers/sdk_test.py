@@ -444,7 +444,8 @@ class Joints(unittest.TestCase):
         request = constraint_pb2.ConstraintDiscrepanciesRequest(
             constraint_type=[type_id("Mast")] * 2, constraint_body=[0, 1, 1, 0], bound_begin=[0, 0, 0], intact=[0, 1],
             position=[4.5, 0, 0, 1.5, 0, 0], orientation=[1, 0, 0, 0] * 2, linear_velocity=[-2.0, 0, 0, 7.0, 0, 0],
-            angular_velocity=[0.0] * 6, call=call_pb2.Call(epoch=3))
+            angular_velocity=[0.0] * 6, start_angular_velocity=[0.0] * 6, inverse_mass=[1.0] * 2,
+            inverse_inertia=[1.0] * 6, call=call_pb2.Call(epoch=3))
         method = stage_methods("constraint")["Coordinates"]
 
         def reply_of(plugin):

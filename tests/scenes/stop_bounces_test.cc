@@ -102,8 +102,9 @@ TEST_P(StopBounces, ARopeThatGetsTautIsToldOnce) {
   run.to_end();
   ASSERT_EQ(run.count_events(EventKind::kLimitStart), 1U);
   const auto told = std::ranges::find(run.events(), EventKind::kLimitStart, &Event::kind);
-  EXPECT_NEAR(told->relative_speed, std::sqrt(2.0 * 10.0 * 0.6), 0.06);
-  EXPECT_NEAR(told->time, std::sqrt(2.0 * 0.6 / 10.0), 0.006);
+  // in two steps, by which a method of the first order may be late
+  EXPECT_NEAR(told->relative_speed, std::sqrt(2.0 * 10.0 * 0.6), 2.0 * 0.005 * 10.0);
+  EXPECT_NEAR(told->time, std::sqrt(2.0 * 0.6 / 10.0), 2.0 * 0.005);
 }
 
 // Between two stops without loads a speed is e^n of the first after n of them, exactly, and of e = 1 what it was.

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,9 +29,9 @@ class EventList final : public EventListener {
 
 std::string text_of(const Event& event) {
   kernel::EnvironmentDescription ids;
-  ids.bodies.resize(5);
+  ids.bodies.resize(6);
   for (std::size_t i = 0; i < ids.bodies.size(); ++i) ids.bodies[i].id = std::to_string(i);
-  ids.constraints.resize(1);
+  ids.constraints.resize(2);
   return event_message(event, ids).ShortDebugString();
 }
 
@@ -46,7 +47,8 @@ std::vector<std::string> heard_in(const kernel::EnvironmentDescription& descript
   return texts;
 }
 
-// A box that rests, a ball that comes down on it and wakes it, and two on a joint that one of them breaks at once.
+// A box that rests, a ball that comes down on it and wakes it, two on a joint that one of them breaks at once, and one that falls
+// into its rope.
 kernel::EnvironmentDescription eventful(Hosting hosting) {
   WorldBuilder builder(hosting);
   builder.steps(200, 0.01).material({.restitution = 0.2}).ground();
@@ -56,6 +58,9 @@ kernel::EnvironmentDescription eventful(Hosting hosting) {
   for (kernel::BodyDescription& body : builder.description().bodies)
     if ((body.flags & kMovable) != 0) body.flags |= kCanSleep;
   builder.description().constraints[0].breaking_force = 1e-3;
+  constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
+  builder.sphere(0.2, 1.0, Vector3(-6, 5, 0));
+  builder.joint("Distance", "constraint_distance", kNone, 5, {-6, 5, 0, -6, 5, 0, kAbsent, 1, kAbsent, kAbsent, 0});
   return builder.gravity({0, -9.81, 0}).description();
 }
 
