@@ -16,6 +16,7 @@ namespace gravitas::scene {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 std::vector<std::string> read_errors_of(const std::string& text) { return texts(read(text).problems.errors); }
