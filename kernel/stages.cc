@@ -197,7 +197,7 @@ void Environment::ask_discrepancies(const Column<double>& time, const Column<dou
       intact[i] = front().intact[group.row[i]] != 0 && !has_broken(group.row[i]) && !sleeps(group.row[i]) ? 1 : 0;
     const auto request = ids(time, data_.time_step, group.type, group.body, group.bound_begin, group.bound, intact,
                              position, orientation, linear_velocity, angular_velocity, data_.inverse_mass,
-                             data_.inverse_inertia, start_angular_velocity());
+                             data_.inverse_inertia, start_angular_velocity(), data_.time);
     const std::vector<ColumnId>& reply = discrepancy_reply_[g];
     const StageCall call{stage::Method::kConstraintDiscrepancies, group.target, request, reply};
     ask(Stage::kConstrain, &constraint_, call, nullptr, [&](const auto& answer) {

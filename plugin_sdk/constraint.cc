@@ -45,6 +45,7 @@ JointBodies bodies_of(const stage::ConstraintDiscrepanciesRequest& request, std:
   bodies.velocity2 = of(request.linear_velocity(), body2);
   bodies.time_step = request.time_step();
   bodies.time = request.time();
+  bodies.elapsed = request.time() - request.start_time();
   const auto inverse_mass_of = [&](std::uint32_t body) {
     return body < request.inverse_mass().size() ? request.inverse_mass()[body] : 0.0;
   };

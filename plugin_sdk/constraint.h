@@ -26,6 +26,8 @@ struct JointBodies {
   Vector3 spin1 = Vector3::Zero(), spin2 = Vector3::Zero();
   Vector3 velocity1 = Vector3::Zero(), velocity2 = Vector3::Zero();
   double time_step = 0.0;
+  // s, since the step began; in stages of Smooth a part of it
+  double elapsed = 0.0;
   // rad/s, where the step begins
   Vector3 start_spin1 = Vector3::Zero(), start_spin2 = Vector3::Zero();
   // Of the state, s; zero when joints are bound

@@ -146,8 +146,9 @@ Property motion_property(std::string_view unit, std::string_view what, std::stri
   return Property::table("Motion", kGiven, "s," + std::string(unit), "")
       .means(
           std::string(what) +
-          " that a drive keeps over time: rows {t, value} by ascending time, smooth between them, at the rates of its "
-          "ends before and after. Accelerations jump at rows, where steps of Smooth end. A value that stands twice is "
+          " that a drive keeps over time: rows {t, value} by ascending time, cubic between them, with the rates of "
+          "parabolas through three rows, at those of its ends before and after. Accelerations jump at rows, where "
+          "steps of Smooth end. A value that stands twice is "
           "a rest. Limits stop it. With " +
           std::string(bound) +
           " it may fall behind, and catches up; without, it is met at the end of each step, whatever is in its way.");

@@ -35,17 +35,13 @@ Vector3 unit_axis(const Vector3& axis, std::string_view field) {
   return axis / length;
 }
 
-double mean_rate(double at_start, double at_end) {
-  return at_start * at_end < 0.0 ? 0.5 * (at_start + at_end) : at_end;
-}
-
-double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies) {
+StepTurn twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies) {
   const Vector3 one = first_axis(frame1), two = first_axis(frame2);
   const double bend = 1.0 + one.dot(two);
-  if (!(bend > 0.0)) return 0.0;
+  if (!(bend > 0.0)) return {};
   const Vector3 along = (one + two) / bend;
-  return bodies.time_step *
-         mean_rate((bodies.start_spin2 - bodies.start_spin1).dot(along), (bodies.spin2 - bodies.spin1).dot(along));
+  return StepTurn::of((bodies.start_spin2 - bodies.start_spin1).dot(along), (bodies.spin2 - bodies.spin1).dot(along),
+                      bodies.elapsed);
 }
 
 JointLimits JointLimits::of(double lower, double upper, std::string_view lower_field, std::string_view upper_field) {
@@ -89,6 +85,12 @@ double JointLimits::turn(double angle, double way) const {
   const double seen = nearest(angle), begun = seen - way, known = nearest(begun);
   if (!(known >= lower - past && known <= upper + past)) return seen;
   return seen + (known - begun);
+}
+
+double JointLimits::at_limit(double one, double other) const {
+  const bool has_lower = lower > -kUnlimited, has_upper = upper < kUnlimited;
+  if (has_lower == has_upper) return one;
+  return has_upper ? std::max(one, other) : std::min(one, other);
 }
 
 double JointLimits::limited_turn(double angle, double way) const {

@@ -22,6 +22,16 @@ void demand_type(std::uint64_t type, std::string_view name);
 // The vector made unit. Throws Refusal naming the field if it has no direction.
 Vector3 unit_axis(const Vector3& axis, std::string_view field);
 
+// What a step has turned by so far, rad: by the rate that it has come to, as methods of order 1 move bodies, and by the mean of that
+// and the one that it began with, as those of order 2 do.
+struct StepTurn {
+  double by_end = 0.0, by_mean = 0.0;
+
+  static StepTurn of(double rate_at_start, double rate_at_end, double elapsed) {
+    return {elapsed * rate_at_end, 0.5 * elapsed * (rate_at_start + rate_at_end)};
+  }
+};
+
 // Refuses, with the field named, limits that cross, and limits without the 0 of the start between them. NaN: absent.
 struct JointLimits {
   double lower = -kUnlimited, upper = kUnlimited;
@@ -35,17 +45,24 @@ struct JointLimits {
   // one within pi. With two the nearest to their middle, with one the nearest to half a turn on its free side; but where the step
   // began within the limits in another, that: what a step turns beyond a limit is beyond it, however little is between the two.
   double turn(double angle, double way) const;
+  // The same where the way is known by two methods: with one limit what either says to have come to it from its free side has.
+  double turn(double angle, const StepTurn& way) const {
+    return at_limit(turn(angle, way.by_end), turn(angle, way.by_mean));
+  }
   // That turn as the limits see it. A single limit is met again once a turn: what comes from behind it passes. What began beyond
   // it by 0.02 rad or half of the way, which is known to first order, or moves back by no more than rounding, is on it.
   double limited_turn(double angle, double way) const;
+  double limited_turn(double angle, const StepTurn& way) const {
+    return at_limit(limited_turn(angle, way.by_end), limited_turn(angle, way.by_mean));
+  }
+
+ private:
+  // Of two turns the one at the only limit; the first where there are two.
+  double at_limit(double one, double other) const;
 };
 
-// The rate at which a step turned to where it ends, by those at its start and end: the one at its end, as methods of order 1 move
-// bodies; the mean of both where it turned round in between.
-double mean_rate(double at_start, double at_end);
-
-// What the twist of two frames (twist_between()) changed by in the step, rad.
-double twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies);
+// What the twist of two frames (twist_between()) changed by in the step.
+StepTurn twisted_way(const Quaternion& frame1, const Quaternion& frame2, const JointBodies& bodies);
 
 void write_limits(const JointLimits& limits, BoundWriter* out);
 JointLimits read_limits(PropertyCursor* bound);

@@ -47,6 +47,7 @@ void Joints::bind(Inquiry* inquiry) {
 MessageColumns Joints::describe_request() const {
   MessageColumns request = empty_request(stage::Method::kConstraintDiscrepancies);
   request.f64("time_step") = {0.01};
+  request.f64("start_time") = {-0.01};
   for (const Joint& joint : joints) {
     request.u64("constraint_type").push_back(joint.type);
     request.u32("constraint_body").push_back(joint.body1);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "plugin_sdk/activity.h"
@@ -30,6 +31,19 @@ bool has_pair(std::span<const std::uint32_t> pairs, std::uint32_t a, std::uint32
 
 std::pair<std::uint32_t, std::uint32_t> bodies_of(const kernel::StepData& data, std::size_t contact) {
   return {data.contact_body[2 * contact], data.contact_body[2 * contact + 1]};
+}
+
+// What an impulse of 1 along a row changes its rate by, of the bodies alone.
+double mobility(const kernel::StepData& data, const JacobianRow& row, std::uint32_t a, std::uint32_t b) {
+  double sum = 0.0;
+  for (const auto& [body, linear, angular] :
+       {std::tuple{a, row.linear1, row.angular1}, {b, row.linear2, row.angular2}}) {
+    if (body == kNone) continue;
+    const Vector3 own = quaternion_at(data.trial_orientation.span(), body).conjugate() * angular;
+    sum += data.inverse_mass[body] * linear.squaredNorm() +
+           own.cwiseAbs2().dot(vector_at(data.inverse_inertia.span(), body));
+  }
+  return sum;
 }
 
 }  // namespace
@@ -136,10 +150,12 @@ void EventSource::find_ongoing(const kernel::Environment& environment, const ker
   }
 }
 
-// A side that pushes, did not in the step before, and closed where the step began, by more than rounding: what rests on it, or
-// is pressed on it by what comes, does not meet it.
+// A side that pushes, did not in the step before, and closed where the step began, by more than rounding, and is stopped: what
+// rests on it, or is pressed on it by what comes, does not meet it. Nor does what swings on a taut rope, though its rate there, by
+// the rope's direction where the step ends, is none that an impulse changed.
 void EventSource::find_limits(const kernel::Environment& environment, const kernel::InnerStep& inner) {
-  constexpr double kRounding = 1e-9;  // of the speeds
+  constexpr double kRounding = 1e-9, kNothing = 1e-12;  // of the speeds; m or rad in the step
+  constexpr double kOfStop = 1e-3;                      // of the rate
   const kernel::StepData& data = inner.data;
   const DiscrepancyColumns columns = data.discrepancies.columns();
   for (std::size_t row = 0; row < columns.size(); ++row) {
@@ -164,7 +180,8 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
       double rate = 0.0, largest = 0.0;
       for (const double way : ways) rate += way, largest = std::max(largest, std::fabs(way));
       const double closing = impulse > 0.0 ? -rate : rate;
-      if (!(closing > kRounding * largest)) continue;
+      if (!(closing > kRounding * largest && closing * environment.time_step() > kNothing)) continue;
+      if (!(std::fabs(impulse) * mobility(data, jacobian, a, b) > kOfStop * closing)) continue;
       const std::uint32_t joint = data.discrepancies.constraint[row];
       events_.push_back(
           {EventKind::kLimitStart, environment.step_count() + 1, inner.end, a, b, joint, closing, std::fabs(impulse)});

@@ -48,7 +48,7 @@ void from_checkpoint(const std::string& path, Action&& action) {
 // there, and is removed.
 void remove_other_journal(const RunOptions& options, const std::string& checkpoint);
 
-// The file itself where `path` is a symbolic link to one. Throws BadInput if there is something else than an ordinary
+// The file itself where `path` is a symbolic link to one, or to one that is to be. Throws BadInput if there is something else than an ordinary
 // file, which a checkpoint must not replace.
 std::string checkpoint_target(const std::string& path);
 

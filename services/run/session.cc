@@ -301,6 +301,7 @@ class Run final : private kernel::CommitListener {
       for (edit::v1::Edit one : resumed->checkpoint.edits()) {
         take(EditedScene(options_, scene_, description_, &catalog_, &one, nullptr));
         edits_.note(one);
+        note_edit(one, &result_.report);
       }
       edits_.leave_out_past(resumed->checkpoint.step(), resumed->journal.edits);
     }

@@ -96,6 +96,7 @@ MessageColumns Surveyor::request(stage::Method method, const kernel::Environment
   MessageColumns request(stage::method_info(method).request);
   Filler filler(method, &request);
   filler.put("time", std::array{environment.time()});
+  filler.put("start_time", std::array{environment.time()});
   filler.put("time_step", std::array{environment.time_step()});
   filler.put("flags", view(model.flags));
   filler.put("filter_group", view(model.filter_group));

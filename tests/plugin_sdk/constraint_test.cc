@@ -31,7 +31,7 @@ struct Joints {
   std::vector<double> orientation = {1, 0, 0, 0, 0, 1, 0, 0};
   std::vector<double> angular_velocity = {0, 0, 1, 0, 0, 2};
   std::vector<double> start_angular_velocity = {0, 3, 0, 0, 4, 0};
-  std::vector<double> time = {1.5}, time_step = {0.01};
+  std::vector<double> time = {1.5}, time_step = {0.01}, start_time = {1.25};
   std::vector<double> inverse_mass = {0.5, 0.0};
 
   template <typename Bind>
@@ -62,6 +62,7 @@ struct Joints {
     request[Request::kStartAngularVelocity] = column_of(start_angular_velocity);
     request[Request::kTime] = column_of(time);
     request[Request::kTimeStep] = column_of(time_step);
+    request[Request::kStartTime] = column_of(start_time);
     request[Request::kInverseMass] = column_of(inverse_mass);
     std::array<gravitas_reply_column, Reply::kColumnCount> reply{};
     std::vector<std::array<double, 64>> room(Reply::kColumnCount);
@@ -125,6 +126,7 @@ TEST(DescribeEach, TellsHowBodiesTurnAndForHowLong) {
     inverse_masses.push_back(bodies.inverse_mass1);
     EXPECT_EQ(bodies.time_step, 0.01);
     EXPECT_EQ(bodies.time, 1.5);
+    EXPECT_EQ(bodies.elapsed, 0.25);
   });
   const Vector3 a(0, 0, 1), b(0, 0, 2), world = Vector3::Zero();
   EXPECT_EQ(first, (std::vector<Vector3>{a, world, b}));

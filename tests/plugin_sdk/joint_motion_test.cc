@@ -104,7 +104,7 @@ TEST(JointMotion, ATwistIsKnownWithinHalfATurnOfItsCourse) {
 // What is far behind comes nearer at the speed that a quarter of the force takes away on the way, what is near in two steps.
 TEST(JointMotion, ABoundedOneComesNearer) {
   JointBodies bodies;
-  bodies.time_step = 1e-4;
+  bodies.time_step = bodies.elapsed = 1e-4;
   bodies.inverse_mass2 = 0.5;
   bodies.velocity2 = Vector3::UnitX() * 3.0;
   const auto speed = [&](double behind) {
@@ -128,7 +128,7 @@ TEST(JointMotion, ABoundedOneComesNearer) {
 // A bar that turns about its end: its moment there, not about its centre.
 TEST(JointMotion, ABoundedOneKnowsTheMomentAboutItsAxis) {
   JointBodies bodies;
-  bodies.time_step = 1e-4;
+  bodies.time_step = bodies.elapsed = 1e-4;
   bodies.pose2.position = {0, 1.5, 0};
   bodies.inverse_mass2 = 0.5, bodies.inverse_inertia2 = {1.0 / 1.5, 1.0, 1.0};
   const Discrepancy d = followed_twist({}, {}, bodies, {}, {1.0, 0.0, 0.0}, 24.0);

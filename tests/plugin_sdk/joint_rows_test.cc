@@ -22,10 +22,10 @@ TEST(JointRows, ASpringStaysOnItsSideOfASingleLimit) {
     JointLimits limits;
     (side > 0.0 ? limits.upper : limits.lower) = side * kLimit;
     JointBodies bodies;
-    bodies.time_step = 0.01;
+    bodies.time_step = bodies.elapsed = 0.01;
     for (const double beyond : {-0.1, 1e-4, 5e-3}) {
       const double angle = side * (kLimit + beyond);
-      bodies.spin2 = -side * 0.5 * std::fabs(beyond) / bodies.time_step * Vector3::UnitX();
+      bodies.spin2 = bodies.start_spin2 = -side * 0.5 * std::fabs(beyond) / bodies.time_step * Vector3::UnitX();
       const Quaternion turned = exp_rotation(angle * Vector3::UnitX());
       const Discrepancy spring =
           sprung_twist_row(Quaternion::Identity(), turned, bodies, limits, side * kRest, {50.0, 1.0});

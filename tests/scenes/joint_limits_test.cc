@@ -160,6 +160,7 @@ TEST(JointLimits, ASingleLimitHoldsWhatTurnsRoundInAStep) {
   };
   for (const auto& [joint, limit, spin, load] :
        {Case{"UpperLimit = 0.001 Stiffness = 100 RestAngle = -1", 1e-3, 2.5, ""},
+        Case{"UpperLimit = 0.5 Stiffness = 2800", 0.5, 30.0, ""},
         Case{"UpperLimit = 0.001 Stiffness = 100 RestAngle = -1 Restitution = 0.5", 1e-3, 2.5, ""},
         Case{"UpperLimit = 0.00001 Restitution = 0.5", 1e-5, 0.2, "Forces = { \"G\" }"}}) {
     for (const char* integrator : {"RK4", "DormandPrince54", "DormandPrince853", "Radau"}) {

@@ -93,6 +93,30 @@ TEST_P(StopBounces, AreTold) {
   }
 }
 
+// A bar that falls on the stop of its hinge, and one that comes to it without a load: each meets it once and rests there.
+TEST_P(StopBounces, WhatRestsIsNotToldAgain) {
+  for (const bool falls : {true, false}) {
+    SceneRun run = scene(
+        body("A", 2.0, {1, 0, 0}, falls ? Vector3(0, 0, 0) : Vector3(0, -3, 0),
+             falls ? Vector3(0, 0, 0) : Vector3(0, 0, -3), falls ? "Forces = { \"Down\" }" : ""),
+        joint("Revolute", "BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 0, 1} LowerLimit = -0.5", "Body2 = \"A\""),
+        1.0 / 60.0, 2.0,
+        "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } }");
+    run.to_end();
+    EXPECT_EQ(run.count_events(EventKind::kLimitStart), 1U) << falls;
+  }
+}
+
+// On a taut rope what swings gets it taut no more.
+TEST_P(StopBounces, WhatSwingsOnATautRopeIsNotTold) {
+  SceneRun run = scene(
+      body("A", 2.0, {1, 0, 0}, {0, 0, 0}, Vector3::Zero(), "Forces = { \"Down\" }"),
+      joint("Distance", "BindPoint1 = {0, 0, 0} BindPoint2 = {1, 0, 0} MaximumDistance = 1", "Body2 = \"A\""),
+      1.0 / 240.0, 2.0, "Force { Type = \"Gravity\" Id = \"Down\" CustomProperties { Acceleration = {0, -9.81, 0} } }");
+  run.to_end();
+  EXPECT_EQ(run.count_events(EventKind::kLimitStart), 0U);
+}
+
 // A ball on a rope of 1 m that falls from 0.4 m below its end: taut once, by sqrt(2 g 0.6), and then it hangs.
 TEST_P(StopBounces, ARopeThatGetsTautIsToldOnce) {
   SceneRun run =

@@ -469,8 +469,8 @@ TEST(Reactions, OfATwistAtItsLimitHoldWhicheverTurnIsTold) {
   const Quaternion start = exp_rotation(limits.upper * Vector3::UnitX()),
                    now = exp_rotation((limits.upper + 1e-5) * Vector3::UnitX());
   JointBodies bodies;
-  bodies.time_step = 0.01;
-  bodies.spin2 = -5e-6 / bodies.time_step * Vector3::UnitX();
+  bodies.time_step = bodies.elapsed = 0.01;
+  bodies.spin2 = bodies.start_spin2 = -5e-6 / bodies.time_step * Vector3::UnitX();
   const Discrepancy told = limited_twist_row(Quaternion::Identity(), now, bodies, limits);
   EXPECT_LT((told.point2 - told.point1).dot(Vector3::UnitX()), -5.0);
   Problem problem;

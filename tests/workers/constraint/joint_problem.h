@@ -53,6 +53,7 @@ class JointProblem {
     MessageColumns request = PluginUnderTest::request_of(stage::Method::kConstraintDiscrepancies);
     request.f64("time") = {time};
     request.f64("time_step") = {0.01};
+    request.f64("start_time") = {time - 0.01};
     request.u64("constraint_type") = {type_id(type_)};
     request.u32("constraint_body") = ends;
     request.u32("bound_begin") = bound_begin_;

@@ -291,21 +291,37 @@ void collide_mesh_halfspace(const TriangleMesh& mesh, const Vector3& up, const V
   }
 }
 
-// A mesh that lies wholly inside a closed one, whose triangles it does not meet, leaves over the place nearest to one of its
-// vertices. `sign` 1: the outer mesh is the first of the pair.
+// A mesh of which a vertex lies inside a closed one, and whose triangles tell no contact with it, leaves over the place nearest to
+// such a vertex, of some of them the one that is the least way. `sign` 1: the outer mesh is the first of the pair.
 void push_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI, const Pose& X_AO,
                       double sign, const Collector& out) {
+  // wholly inside one vertex tells as much as all
+  constexpr std::size_t kTried = 32;
+  if (!outer.is_closed()) return;
+  ContactPoint least;
+  least.depth = std::numeric_limits<double>::infinity();
+  std::size_t tried = 0;
+  for (const Vector3& vertex : inner.vertices()) {
+    const Vector3 p = transform_point(X_OI, vertex);
+    if (!outer.box().overlaps({p, p})) continue;
+    const TriangleMesh::Nearest nearest = outer.nearest(p);
+    if (!(nearest.signed_distance < 0.0)) continue;
+    const Vector3& n = nearest.outward;
+    Vector3 back = p;
+    for (const Vector3& v : inner.vertices())
+      if (const Vector3 x = transform_point(X_OI, v); n.dot(x - back) < 0.0) back = x;
+    const double depth = n.dot(nearest.point - back);
+    if (depth < least.depth)
+      least = {transform_point(X_AO, 0.5 * (nearest.point + back)), sign * (X_AO.orientation * n), depth, 0};
+    if (++tried == kTried) break;
+  }
+  if (tried > 0) out.add(TriangleMesh::kNone, least);
+}
+
+// True if a vertex lies inside: of meshes that do not cross, all do.
+bool begins_inside(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI) {
   const Vector3 p = transform_point(X_OI, inner.vertices()[0]);
-  if (!outer.is_closed() || !outer.box().overlaps({p, p})) return;
-  const TriangleMesh::Nearest nearest = outer.nearest(p);
-  if (!(nearest.signed_distance < 0.0)) return;
-  const Vector3& n = nearest.outward;
-  Vector3 back = p;
-  for (const Vector3& v : inner.vertices())
-    if (const Vector3 x = transform_point(X_OI, v); n.dot(x - back) < 0.0) back = x;
-  const double depth = n.dot(nearest.point - back);
-  out.add(TriangleMesh::kNone,
-          ContactPoint{transform_point(X_AO, 0.5 * (nearest.point + back)), sign * (X_AO.orientation * n), depth, 0});
+  return outer.is_closed() && outer.box().overlaps({p, p}) && outer.nearest(p).signed_distance < 0.0;
 }
 
 void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, const Flush& flush,
@@ -316,7 +332,7 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
   const Vector3 half = R.cwiseAbs().transpose() * a.box().half_extents();
   const Vector3 middle = R.transpose() * (centre_a - X_AB.position);
   const Box3 box{middle - half, middle + half};
-  bool any = false;
+  bool any = false, cross = false;
   b.for_each_in(box.widened(margin + 1e-12 * half.maxCoeff()), [&](std::uint32_t tb) {
     std::array<Vector3, 3> corners = b.corners(tb);
     Box3 own;
@@ -327,6 +343,7 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
       const PlacedPair pair{triangle_a, triangle_b, Matrix3::Identity(), Vector3::Zero()};
       const Separation least = find_separation(pair, margin);
       if (!(least.depth >= -margin)) return;
+      cross = cross || least.depth > 0.0;
       const bool a_behind = !a.is_closed() && a.normal(ta).dot(centre_b - triangle_a.centre()) < 0.0;
       const bool b_behind = !b.is_closed() && triangle_b.normal().dot(centre_a - triangle_b.centre()) < 0.0;
       const TriangleSide side_a{a, ta, a_behind ? -1.0 : 1.0, Matrix3::Identity()};
@@ -342,8 +359,9 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
     });
   });
   if (any) return;
-  push_out_of_mesh(a, b, X_AB, {}, 1.0, out);
-  push_out_of_mesh(b, a, relative(X_AB, {}), X_AB, -1.0, out);
+  const Pose X_BA = relative(X_AB, {});
+  if (cross || begins_inside(a, b, X_AB)) push_out_of_mesh(a, b, X_AB, {}, 1.0, out);
+  if (cross || begins_inside(b, a, X_BA)) push_out_of_mesh(b, a, X_BA, X_AB, -1.0, out);
 }
 
 // ---- parts

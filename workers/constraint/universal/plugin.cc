@@ -147,7 +147,7 @@ class Universal final : public ConstraintPlugin {
                                start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
       for (std::size_t bar = 0; bar < 2; ++bar) {
         const JointLimits limits = read_limits(&bound);
-        if (!limits.is_none()) emit(limited_row(bars[bar], start[bar].angle(), limits, between, bodies.time_step));
+        if (!limits.is_none()) emit(limited_row(bars[bar], start[bar].angle(), limits, between, bodies.elapsed));
       }
     });
   }
@@ -209,9 +209,9 @@ class Universal final : public ConstraintPlugin {
   // `between`: the angle that the bars are held at, which the solution brings them back to. `start`: by the rates where the step
   // begins.
   static Discrepancy limited_row(const Bar& bar, const std::optional<Coordinate>& start, const JointLimits& limits,
-                                 double between, double time_step) {
+                                 double between, double elapsed) {
     const std::optional<Coordinate> angle = bar.angle();
-    const double way = angle && start ? time_step * mean_rate(start->rate, angle->rate) : 0.0;
+    const StepTurn way = angle && start ? StepTurn::of(start->rate, angle->rate, elapsed) : StepTurn{};
     const double turned = angle ? limits.limited_turn(angle->value, way) : 0.0;
     const double zero = zero_of(limits, turned);
     const bool is_told = angle && std::fabs(turned - zero) <= kQuarterTurn;

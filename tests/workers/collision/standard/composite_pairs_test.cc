@@ -127,6 +127,15 @@ TEST(Mesh, PushesOutwardFromWithin) {
     EXPECT_NEAR(nested[0].depth, 0.9, 1e-14);
     EXPECT_NEAR(nested[0].point.x(), 1.55, 1e-14);
   }
+  // one that is turned and half out, none of whose triangles tells a normal that both surfaces have: over x = 1, whole
+  const Shape &unit = shapes.box_mesh({1, 1, 1}), &block = shapes.box_mesh({0.3, 0.3, 0.3});
+  const Pose half_out{Vector3(0.775, 0, 0),
+                      Quaternion(0.81462242327153234, 0, -0.4101160247437402, 0.41011602474374037)};
+  const Matrix3 R = half_out.orientation.toRotationMatrix();
+  const ContactList crossing = all_contacts(unit, at(0, 0, 0), block, half_out);
+  ASSERT_EQ(crossing.size(), 1U);
+  EXPECT_NEAR(crossing[0].normal.x(), 1.0, 1e-14);
+  EXPECT_NEAR(crossing[0].depth, 1.0 - 0.775 + 0.3 * R.row(0).cwiseAbs().sum(), 1e-12);
   // an open field pushes to the side on which the centre is
   const Shape& field = shapes.field(4);
   for (const double side : {1.0, -1.0}) {
