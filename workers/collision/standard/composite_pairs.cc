@@ -291,15 +291,15 @@ void collide_mesh_halfspace(const TriangleMesh& mesh, const Vector3& up, const V
   }
 }
 
-// A mesh of which a vertex lies inside a closed one, and whose triangles tell no contact with it, leaves over the place nearest to
-// such a vertex, of some of them the one that is the least way. `sign` 1: the outer mesh is the first of the pair.
-void push_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI, const Pose& X_AO,
-                      double sign, const Collector& out) {
+// How a mesh of which a vertex lies inside a closed one leaves that, over the place nearest to such a vertex, of some of them the
+// one that is the least way. `sign` 1: the outer mesh is the first of the pair. Infinitely deep if none lies inside.
+ContactPoint way_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI, const Pose& X_AO,
+                             double sign) {
   // wholly inside one vertex tells as much as all
   constexpr std::size_t kTried = 32;
-  if (!outer.is_closed()) return;
   ContactPoint least;
   least.depth = std::numeric_limits<double>::infinity();
+  if (!outer.is_closed()) return least;
   std::size_t tried = 0;
   for (const Vector3& vertex : inner.vertices()) {
     const Vector3 p = transform_point(X_OI, vertex);
@@ -315,7 +315,7 @@ void push_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inner, cons
       least = {transform_point(X_AO, 0.5 * (nearest.point + back)), sign * (X_AO.orientation * n), depth, 0};
     if (++tried == kTried) break;
   }
-  if (tried > 0) out.add(TriangleMesh::kNone, least);
+  return least;
 }
 
 // True if a vertex lies inside: of meshes that do not cross, all do.
@@ -359,9 +359,16 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
     });
   });
   if (any) return;
+  // triangles tell nothing: one mesh leaves the other by the lesser way
   const Pose X_BA = relative(X_AB, {});
-  if (cross || begins_inside(a, b, X_AB)) push_out_of_mesh(a, b, X_AB, {}, 1.0, out);
-  if (cross || begins_inside(b, a, X_BA)) push_out_of_mesh(b, a, X_BA, X_AB, -1.0, out);
+  ContactPoint least;
+  least.depth = std::numeric_limits<double>::infinity();
+  if (cross || begins_inside(a, b, X_AB)) least = way_out_of_mesh(a, b, X_AB, {}, 1.0);
+  if (cross || begins_inside(b, a, X_BA)) {
+    const ContactPoint other = way_out_of_mesh(b, a, X_BA, X_AB, -1.0);
+    if (other.depth < least.depth) least = other;
+  }
+  if (std::isfinite(least.depth)) out.add(TriangleMesh::kNone, least);
 }
 
 // ---- parts
