@@ -34,6 +34,7 @@ StepOutcome Environment::step() {
     finish_step();
   } catch (...) {
     return_to_start();
+    has_newcomer_ = false;
     figures_ = figures;
     try {
       throw;

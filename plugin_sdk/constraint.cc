@@ -82,8 +82,7 @@ void push_discrepancy(const stage::ConstraintDiscrepanciesReply& reply, std::siz
       std::fabs(d.axes.norm() - 1.0) > 1e-6)
     throw Refusal(
         "it has a discrepancy with crossed limits, negative numbers, a restitution above 1 or axes that are not unit: "
-        "its "
-        "bound numbers are none of a joint of this type");
+        "its bound numbers are none of a joint of this type");
   reply.constraint().push(joint);
   push_vector(reply.point1(), d.point1);
   push_vector(reply.point2(), d.point2);

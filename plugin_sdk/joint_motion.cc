@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kGiven = 2, kBound = 3;  // numbers of a row
 
-// At most a force, and so much of acceleration by it, the speed at which what is behind by `behind` comes nearer.
+// The speed at which what is `behind` comes nearer, where the largest force accelerates by `acceleration` (joint_motion.h).
 double catching_up(double behind, double acceleration, double time_step) {
   constexpr double kSteps = 2.0, kOfForce = 0.25;
   const double time = kSteps * time_step, reach = kOfForce * acceleration * time * time;
@@ -160,10 +160,15 @@ Discrepancy followed_twist(const Pose& frame1, const Pose& frame2, const JointBo
                          twist_between(frame1.orientation, frame2.orientation)};
   const double bend = 1.0 + seen.first.dot(seen.second);
   const double speed = bend > 0.0 ? (bodies.spin2 - bodies.spin1).dot(seen.first + seen.second) / bend : 0.0;
-  double error = limits.turn(seen.angle, twisted_way(frame1.orientation, frame2.orientation, bodies)) - course.value;
   // turns beyond a single limit are not counted; far from it, and where nothing may hold it back, it is whichever is near
   const double to_limit = std::min(limits.upper - course.value, course.value - limits.lower);
-  if (torque >= kUnlimited || to_limit > 0.75 * kWholeTurn) error -= kWholeTurn * std::round(error / kWholeTurn);
+  const bool is_nearest = torque >= kUnlimited || to_limit > 0.75 * kWholeTurn;
+  double error = seen.angle - course.value;
+  if (is_nearest) {
+    error -= kWholeTurn * std::round(error / kWholeTurn);
+  } else {
+    error = limits.turn(seen.angle, twisted_way(frame1.orientation, frame2.orientation, bodies)) - course.value;
+  }
   if (torque >= kUnlimited) {
     const Twisting off = {seen.first, seen.second, error};
     const Vector3 axis = off.cosine() * off.bisector();

@@ -1,11 +1,14 @@
 // For authors of joints: a course that a drive follows, the property `Motion`, and the rows that keep it.
 //
 //   declaration     motion_property("rad", "Angle of the crank", "MaximumTorque")
-//   bind            const JointMotion motion = JointMotion::of(properties.table(2), "Crank: Motion");
-//                   motion.write(&out);
-//   discrepancies   const JointMotion motion = JointMotion::read(&bound);
-//                   if (!motion.is_none())
-//                     emit(followed_twist(one, two, bodies, limits, motion.at(bodies.time), torque));
+//   bind            JointDrive drive = JointDrive::of(&properties);
+//                   drive.follow(&properties, "Crank", "AngularSpeed", "MaximumTorque");
+//                   write_drive(drive, &out);
+//   discrepancies   const JointDrive drive = read_drive(&bound);
+//                   if (!limits.is_none() && !drive.is_course_alone()) emit(limited_twist_row(q1, q2, bodies, limits));
+//                   if (!drive.motion.is_none())
+//                     emit(followed_twist(one, two, bodies, limits, drive.motion.at(bodies.time).within(limits),
+//                                         drive.force));
 //
 // The course is a curve through rows {t, value} (math/hermite.h), continuous with its rate (C1); before the first row and after
 // the last it goes on with the rates there. The time is that of the state: the end of the step while one is made, so that

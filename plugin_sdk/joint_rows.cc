@@ -237,8 +237,8 @@ Discrepancy meshing_row(const Vector3& axis, const Vector3& point, double ahead,
                         const JointBodies& bodies) {
   constexpr double kClearly = 1e-4;  // of a period
   Discrepancy d = row_along(axis, point, point, AxisMode::kLocked);
-  const double made = bodies.time_step * jacobian_row(d, axis, bodies.pose1.position, bodies.pose2.position)
-                                             .velocity(bodies.velocity1, bodies.spin1, bodies.velocity2, bodies.spin2);
+  const double made = bodies.elapsed * jacobian_row(d, axis, bodies.pose1.position, bodies.pose2.position)
+                                           .velocity(bodies.velocity1, bodies.spin1, bodies.velocity2, bodies.spin2);
   double nearest = std::numeric_limits<double>::infinity(), known = error;
   for (const double share : {1.0, 0.5, 0.0}) {
     const double expected = share * made, one = error - period * std::round((error - expected) / period);

@@ -22,8 +22,8 @@ void demand_type(std::uint64_t type, std::string_view name);
 // The vector made unit. Throws Refusal naming the field if it has no direction.
 Vector3 unit_axis(const Vector3& axis, std::string_view field);
 
-// What a step has turned by so far, rad: by the rate that it has come to, as methods of order 1 move bodies, and by the mean of that
-// and the one that it began with, as those of order 2 do.
+// What a step has turned by so far, rad: by the rate that it has come to, as methods of order 1 move bodies, and by the
+// mean of that and the one that it began with, as those of order 2 do.
 struct StepTurn {
   double by_end = 0.0, by_mean = 0.0;
 

@@ -11,6 +11,7 @@
 #include "plugin_sdk/solver.h"
 #include "plugin_sdk/solver/contact_law.h"
 #include "plugin_sdk/solver/joint_laws.h"
+#include "plugin_sdk/solver/reply.h"
 
 namespace gravitas {
 namespace {
@@ -220,14 +221,8 @@ class Balance {
     return axes;
   }
 
-  DiscrepancyColumns discrepancies() const {
-    return {request_.point1(),     request_.point2(),  request_.velocity(),      request_.correction(),
-            request_.axes(),       request_.mode(),    request_.lower(),         request_.upper(),
-            request_.compliance(), request_.damping(), request_.maximum_force(), request_.restitution()};
-  }
-
   void add_discrepancies(Directions directions) {
-    const DiscrepancyColumns columns = discrepancies();
+    const DiscrepancyColumns columns = columns_of(request_);
     const double share = request_.theta() * request_.time_step();
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const Discrepancy d = columns.at(i);
@@ -417,7 +412,7 @@ class Balance {
 
   // error(S_{n+1}) = (1 - beta) error(S_n) along what is locked, with a beta of 0 ... 1 that the method may choose.
   std::string check_closing() const {
-    const DiscrepancyColumns columns = discrepancies();
+    const DiscrepancyColumns columns = columns_of(request_);
     if (tells_contradiction(static_cast<StopReason>(answer_.stop_reason))) return {};
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const std::uint32_t one = request_.discrepancy_body()[2 * i], two = request_.discrepancy_body()[2 * i + 1];

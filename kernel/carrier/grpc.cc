@@ -227,7 +227,7 @@ CallResult GrpcCarrier::call(const StageCall& call, Arena* arena, DerivativeSour
   leave_out_known(&stream, method, request, hashes, &header, &patience);
   write(&stream, wire::to_byte_buffer({method.request, request, &header}), &patience);
 
-  // after all that is no answer, since whoever sends such things without end is never waited for
+  // also after what is no answer: who sends such things without end leaves nothing to wait for
   for (;; check_time(patience)) {
     stream.io->Read(&stream.incoming, &stream);
     wait(&stream, &patience);

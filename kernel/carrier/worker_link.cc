@@ -129,23 +129,23 @@ WorkerLink::WorkerLink(const SlotDescription& slot, std::uint32_t threads, bool 
     plugins_.push_back(plugin.declaration.name);
     for (const double number : plugin.settings) settings->add_numbers(number);
   }
-  if (!address_.empty()) {
-    if (!channel::is_local_address(address_)) fail_start("'" + address_ + "' is no address of this machine");
-    const int descriptor = channel::connect_to(address_);
-    if (descriptor < 0) fail_start("no worker answers at " + address_ + ": " + std::strerror(errno));
-    channel_ = worker_channel(descriptor);
-  } else if (!slot.plugins[0].command.empty()) {
-    const ListeningCommand started =
-        start_listening_command(slot.plugins[0].command, kStartLimit, std::move(on_end), stop_);
-    process_ = started.process;
-    channel_ = worker_channel(started.descriptor);
-  } else {
-    start_program(slot, threads, with_descriptors, std::move(on_end));
-  }
   try {
+    if (!address_.empty()) {
+      if (!channel::is_local_address(address_)) fail_start("'" + address_ + "' is no address of this machine");
+      const int descriptor = channel::connect_to(address_);
+      if (descriptor < 0) fail_start("no worker answers at " + address_ + ": " + std::strerror(errno));
+      channel_ = worker_channel(descriptor);
+    } else if (!slot.plugins[0].command.empty()) {
+      const ListeningCommand started =
+          start_listening_command(slot.plugins[0].command, kStartLimit, std::move(on_end), stop_);
+      process_ = started.process;
+      channel_ = worker_channel(started.descriptor);
+    } else {
+      start_program(slot, threads, with_descriptors, std::move(on_end));
+    }
     control_ = std::make_unique<ControlSession>(channel_, std::move(hello));
   } catch (...) {
-    // no thread: nobody else would end what was started
+    // nobody else would end what was started
     kill();
     if (descriptor_socket_ >= 0) close(descriptor_socket_);
     throw;
@@ -189,7 +189,6 @@ void WorkerLink::start_program(const SlotDescription& slot, std::uint32_t thread
     process_ = spawn(arguments, inherited, std::move(on_end));
   } catch (...) {
     close_all();
-    if (descriptor_socket_ >= 0) close(descriptor_socket_);
     throw;
   }
   close_all();

@@ -103,11 +103,13 @@ std::optional<double> ray_on_triangle(const Vector3& origin, const Vector3& dire
   const Vector3 arm = origin - corners[0];
   const Vector3 q = arm.cross(ab);
   const double u = arm.dot(p) / determinant, v = direction.dot(q) / determinant, t = ac.dot(q) / determinant;
+  constexpr double kMostBorder = 2e-6;
+  if (!(u >= -kMostBorder && v >= -kMostBorder && u + v <= 1.0 + kMostBorder && t >= 0.0)) return std::nullopt;
   // neighbours both take their border, wider by what far origins round off, so that no ray slips through between them
   const double longest = std::sqrt(std::max(ab.squaredNorm(), ac.squaredNorm()));
   const double rounded = std::sqrt(arm.squaredNorm() * direction.squaredNorm()) * longest / std::fabs(determinant);
   const double border = 1e-14 + std::min(1e-15 * rounded, 1e-6);  // what runs along the plane has no digits to tell
-  if (!(u >= -border && v >= -border && u + v <= 1.0 + border && t >= 0.0)) return std::nullopt;
+  if (!(u >= -border && v >= -border && u + v <= 1.0 + border)) return std::nullopt;
   return t;
 }
 

@@ -275,10 +275,10 @@ int serve(const Arguments& arguments) {
                           [&](std::string text) { service.complain(std::move(text)); });
       }
     }
-    // instances are gone with the process: a hanging destructor must not keep it
     // of a socket whose name is gone nobody else can ask (schemas/WIRE.md)
     const bool is_named = arguments.address.starts_with(kUnix);
     const bool is_gone = is_named && access(arguments.address.c_str() + kUnix.size(), F_OK) != 0;
+    // instances are gone with the process: a hanging destructor must not keep it
     if (!listens || is_gone) std::_Exit(code);
     handshake.stopping = false;
   } while (true);

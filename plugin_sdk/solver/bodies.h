@@ -79,6 +79,11 @@ struct ConstraintDirection {
   double along(const Twist& x1, const Twist& x2) const {
     return linear.dot(x2.linear - x1.linear) + angular1.dot(x1.angular) + angular2.dot(x2.angular);
   }
+  // Of the speeds that along() is the difference of.
+  double size_along(const Twist& x1, const Twist& x2) const {
+    return linear.norm() * (x1.linear.norm() + x2.linear.norm()) + angular1.norm() * x1.angular.norm() +
+           angular2.norm() * x2.angular.norm();
+  }
   // this M^-1 other^T
   double product(const ConstraintDirection& other, double inverse_masses) const {
     return inverse_masses * linear.dot(other.linear) + angular1.dot(other.turn1) + angular2.dot(other.turn2);

@@ -182,6 +182,9 @@ class IslandSolver {
   // What drives that yield bear moves them no more.
   void hold_loads_of_drives();
   // Of joints, with the law of each, its impulse and EndJoint::driven.
+  // use(row, axis, joint) for the axes that have a row, in the order of rows.
+  template <class Use>
+  void for_active_axes(Use&& use);
   template <class Use>
   void for_velocity_rows(Use&& use);
 
@@ -225,7 +228,6 @@ class IslandSolver {
   // Of joints' stops: with the velocities' row, axis and joint.
   template <class Use>
   void for_bounces(Use&& use);
-  static void set_bounce(std::size_t k, double bounce, EndJoint* joint);
 
   // ---- rows on velocity alone
 

@@ -96,15 +96,18 @@ double IslandSolver::stop_what_is_locked(BodyMotion* trial) {
 }
 
 template <class Use>
-void IslandSolver::for_bounces(Use&& use) {
+void IslandSolver::for_active_axes(Use&& use) {
   std::size_t next = 0;
-  for (EndJoint& joint : joints_) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (!joint.velocity_laws[k].is_active()) continue;
-      const ConeRow& row = cone_.rows[next++];
-      if (joint.velocity_laws[k].bounces()) use(row, k, &joint);
-    }
-  }
+  for (EndJoint& joint : joints_)
+    for (std::size_t k = 0; k < 3; ++k)
+      if (joint.velocity_laws[k].is_active()) use(cone_.rows[next++], k, &joint);
+}
+
+template <class Use>
+void IslandSolver::for_bounces(Use&& use) {
+  for_active_axes([&](const ConeRow& row, std::size_t k, EndJoint* joint) {
+    if (joint->velocity_laws[k].bounces()) use(row, k, joint);
+  });
 }
 
 void IslandSolver::find_velocity(const BodyMotion& trial) {
@@ -176,7 +179,7 @@ bool IslandSolver::let_drives_yield(const BodyMotion& trial) {
   for (EndJoint& joint : joints_)
     for (std::size_t k = 0; k < 3; ++k) {
       joint.states[k].bounce = 0.0;
-      set_bounce(k, 0.0, &joint);
+      joint.velocity_laws[k].set_bounce(0.0);
     }
   for_velocity_rows([&](const ConeRow& row, JointLaw* law, double* impulse, double*) {
     *impulse = 0.0;
@@ -201,11 +204,9 @@ void IslandSolver::hold_loads_of_drives() {
 
 template <class Use>
 void IslandSolver::for_velocity_rows(Use&& use) {
-  std::size_t next = 0;
-  for (EndJoint& joint : joints_)
-    for (std::size_t k = 0; k < 3; ++k)
-      if (joint.velocity_laws[k].is_active())
-        use(cone_.rows[next++], &joint.velocity_laws[k], &answer_.joint_impulse[3 * joint.row + k], &joint.driven[k]);
+  for_active_axes([&](const ConeRow& row, std::size_t k, EndJoint* joint) {
+    use(row, &joint->velocity_laws[k], &answer_.joint_impulse[3 * joint->row + k], &joint->driven[k]);
+  });
 }
 
 BodyMotion IslandSolver::turned_trial_velocity() const {
@@ -365,7 +366,7 @@ bool IslandSolver::lower_restitution(const BodyMotion& before, int round) {
     any_to_blame = any_to_blame || joint->shares[k];
     double bounce = std::fabs(row.law.bounce);
     if (round >= kRoundsOfLowering || !lower_to_arrival(own, arrival, &bounce)) return;
-    set_bounce(k, sign * bounce, joint);
+    joint->velocity_laws[k].set_bounce(sign * bounce);
     any_fair = true;
   });
   std::size_t cone = 0;
@@ -407,19 +408,15 @@ void IslandSolver::share_restitution() {
     if (contact.shares) contact.law.target = restitution_->share() * contact.whole_target;
   for (EndJoint& joint : joints_)
     for (std::size_t k = 0; k < 3; ++k)
-      if (joint.shares[k]) set_bounce(k, restitution_->share() * joint.whole_bounces[k], &joint);
+      if (joint.shares[k]) joint.velocity_laws[k].set_bounce(restitution_->share() * joint.whole_bounces[k]);
 }
 
 void IslandSolver::find_bounces(const BodyMotion& before) {
   for_bounces([&](const ConeRow& row, std::size_t k, EndJoint* joint) {
     const JointAxisState& axis = joint->states[k];
     const double rate = row.direction.along(before[row.body1], before[row.body2]) - axis.desired_velocity;
-    set_bounce(k, bounce_of(axis, rate, request_.time_step()), joint);
+    joint->velocity_laws[k].set_bounce(bounce_of(axis, rate, request_.time_step()));
   });
-}
-
-void IslandSolver::set_bounce(std::size_t k, double bounce, EndJoint* joint) {
-  joint->velocity_laws[k].set_bounce(bounce);
 }
 
 // A share f of all impulses gains f L + f^2 (W - L), W the gain of the whole and L = lambda.J v*.

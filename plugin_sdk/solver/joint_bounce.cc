@@ -12,8 +12,7 @@
 namespace gravitas {
 namespace {
 
-constexpr double kRateRounding = 1e-12, kRateStill = 1e-8;  // of the speeds that a rate is the difference of
-constexpr double kRateStillAtRest = 1e-10;                  // m/s or rad/s, as reactions have it
+constexpr double kRateRounding = 1e-12;  // of the speeds that a rate is the difference of
 
 Quaternion turn_back(const SolverBody& body) { return body.start.orientation * body.trial.orientation.conjugate(); }
 
@@ -22,11 +21,6 @@ EndBody at_start(const SolverBody& body) {
   end.pose = body.start;
   end.turn = to_rotation_matrix(turn_back(body));
   return end;
-}
-
-double size_along(const ConstraintDirection& d, const Twist& one, const Twist& two) {
-  return d.linear.norm() * (one.linear.norm() + two.linear.norm()) + d.angular1.norm() * one.angular.norm() +
-         d.angular2.norm() * two.angular.norm();
 }
 
 }  // namespace
@@ -43,8 +37,8 @@ void set_bounces(const Discrepancy& discrepancy, const SolverBody& body1, const 
   for (std::size_t k = 0; k < axes->size(); ++k) {
     JointAxisState& axis = (*axes)[k];
     const double rate = start.directions[k].along(one, two) - axis.desired_velocity;
-    const double size = size_along(start.directions[k], one, two);
-    const double none = discrepancy.has_forces_applied() ? kRateStill * size + kRateStillAtRest : kRateRounding * size;
+    const double size = start.directions[k].size_along(one, two);
+    const double none = discrepancy.has_forces_applied() ? still_rate(size) : kRateRounding * size;
     if (!(std::fabs(rate) > none)) continue;
     const std::optional<JointStop> stop = stop_of(axis, -rate);
     if (!stop || stop->sign * warm_impulse[k] > 0.0) continue;

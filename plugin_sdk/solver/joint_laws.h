@@ -97,7 +97,7 @@ struct JointLaw {
   // Sides beside those that are.
   void close(bool lower, bool upper) {
     has_lower = has_lower || lower, has_upper = has_upper || upper;
-    if (bounce != 0.0) set_bounce(bounce);
+    set_bounce(bounce);
   }
   // By how much a change of the error misses the targets.
   double missed_by(double change) const {
@@ -116,6 +116,9 @@ struct JointAxisState {
   double restitution = 0.0, start_rate = 0.0;  // e and J_n v_n - v_d
   double bounce = 0.0;                         // JointLaw's, where it closes
 };
+
+// A rate that reactions take for none, m/s or rad/s, of speeds whose difference it is (ConstraintDirection::size_along()).
+inline double still_rate(double size) { return 1e-8 * size + 1e-10; }
 
 // A side of an axis, as errors that grow away from it see it: its gap is sign (error - limit).
 struct JointStop {

@@ -142,15 +142,11 @@ void ReactionSolver::turn_to_limit(Joint* joint) {
 }
 
 ReactionSolver::Holding ReactionSolver::holding_at_start(const Discrepancy& d, int axis, const Row& row) const {
-  constexpr double kStill = 1e-8, kStillAtRest = 1e-10;  // of the speeds, and m/s or rad/s
-  constexpr double kOfChange = 2.0;                      // of what it is asked for changes by in a step
+  constexpr double kOfChange = 2.0;  // of what it is asked for changes by in a step
   const Body &one = bodies_[row.body1], &two = bodies_[row.body2];
   const Vector3 along = d.is_angular() ? Vector3(to_rotation_matrix(d.axes).col(axis)) : row.direction.linear;
   const double rate = row.direction.along(one.velocity, two.velocity) - along.dot(d.velocity);
-  const double speeds = row.direction.linear.norm() * (one.velocity.linear.norm() + two.velocity.linear.norm()) +
-                        row.direction.angular1.norm() * one.velocity.angular.norm() +
-                        row.direction.angular2.norm() * two.velocity.angular.norm();
-  const double still = kStill * speeds + kStillAtRest;
+  const double still = still_rate(row.direction.size_along(one.velocity, two.velocity));
   Holding holding;
   if (is_drive(axis_mode(d.modes, axis))) {
     const double bound = d.maximum_force[axis];

@@ -78,9 +78,11 @@ std::string judge_start(Examination& examination) {
 std::vector<double> forbidden_values(const Property& p) {
   std::vector<double> values = {std::numeric_limits<double>::infinity()};
   if (p.is_required || !p.default_numbers.empty()) values.push_back(std::numeric_limits<double>::quiet_NaN());
-  if (std::isfinite(p.minimum))
-    values.push_back(p.exclusive_minimum ? p.minimum : std::nextafter(p.minimum, -HUGE_VAL));
-  if (std::isfinite(p.maximum)) values.push_back(std::nextafter(p.maximum, HUGE_VAL));
+  // the nearest that it does not take: of whole numbers a whole one
+  const double least = p.kind == PropertyKind::kInteger ? 1.0 : 0.0;
+  const double below = std::min(p.minimum - least, std::nextafter(p.minimum, -HUGE_VAL));
+  if (std::isfinite(p.minimum)) values.push_back(p.exclusive_minimum ? p.minimum : below);
+  if (std::isfinite(p.maximum)) values.push_back(std::max(p.maximum + least, std::nextafter(p.maximum, HUGE_VAL)));
   const double half = std::max(p.minimum, 0.0) + 0.5;
   if (p.kind == PropertyKind::kInteger && half != std::floor(half)) values.push_back(half);
   if (p.kind == PropertyKind::kFlag) values.push_back(2.0);

@@ -246,7 +246,10 @@ std::optional<api::ServedSwap> wait_for_swap(ControlClient* client, std::uint32_
   bool is_told = false;
   client->watch(kSwapIntervalMs, [&](const api::Status& status) {
     *last = status;
-    if (on_wait && !is_told && status.waited() >= 1.0) is_told = true, on_wait(status);
+    if (on_wait && !is_told && status.waited() >= std::chrono::duration<double>(kPatience).count()) {
+      is_told = true;
+      on_wait(status);
+    }
     found.reset();
     for (const api::ServedSwap& swap : status.swaps())
       if (swap.number() == number) found = swap;

@@ -126,10 +126,11 @@ void ServedRun::begin_environment(const Resumption* from) {
   poisoned_step_ = 0;
   next_collection_ = {};
   stand(environment_->step_count() >= environment_->total_steps() ? State::kFinished : State::kPaused);
-  for (kernel::SwapOrder& one : comparisons_) {
-    if (state_ == State::kFinished) break;
-    one.step = environment_->step_count() + 1;
-    order(one, OrderKind::kComparison);
+  if (state_ != State::kFinished) {
+    for (kernel::SwapOrder one : comparisons_) {
+      one.step = environment_->step_count() + 1;
+      order(std::move(one), OrderKind::kComparison);
+    }
   }
   status_now();
   if (!options_.checkpoint.empty()) keep_checkpoint(from != nullptr ? from->journal : JournalReading{});

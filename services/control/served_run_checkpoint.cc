@@ -107,15 +107,23 @@ void ServedRun::keep_faulted_state() {
     const std::string path =
         keeps ? recorder_->path() : std::filesystem::absolute(paused_checkpoint(options_)).string();
     // also where one of this step is kept: an edit may have come since, which its journal did not take
-    if (keeps) recorder_->save(*environment_);
-    if (!keeps) {
+    if (keeps) {
+      recorder_->save(*environment_);
+    } else {
       recorder_->save_to(path, *environment_);
       remove_other_journal(options_, path);
     }
     checkpoint_ = path;
     resume_command_ = command_to_resume();
   } catch (const std::exception& problem) {
-    fault_ += fmt::format("; no checkpoint: {}", problem.what());
+    if (!recorder_->keeps() || !recorder_->saved_step()) {
+      fault_ += fmt::format("; no checkpoint: {}", problem.what());
+      return;
+    }
+    // the one before
+    fault_ += fmt::format("; the checkpoint is that of step {}: {}", *recorder_->saved_step(), problem.what());
+    checkpoint_ = recorder_->path();
+    resume_command_ = command_to_resume();
   }
 }
 

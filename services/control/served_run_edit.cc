@@ -74,7 +74,6 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     orders_ = std::move(pending);
     next_collection_ = {};
     collect_warnings();
-    const std::unique_ptr<Survey> asked = std::move(survey_);
     for (const Slot slot : kSlots) active_.slot(slot) = begun.slot(slot);
     std::vector<recorder::v1::Decision> decisions = recorder_->decisions();
     translate_decisions(description_, edited.description(), &decisions);
@@ -82,7 +81,7 @@ api::EditMade ServedRun::edit(const api::EditRequest& request) {
     recorder_->set_decisions(std::move(decisions));
     scene_ = edited.scene();
     description_ = edited.description();
-    if (asked) {
+    if (const std::unique_ptr<Survey> asked = std::move(survey_)) {
       surveyor();
       survey_->instrumentation.go_on_from(std::move(asked->instrumentation));
     }

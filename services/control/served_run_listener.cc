@@ -11,16 +11,10 @@ void ServedRun::listen(std::shared_ptr<RemoteListener> listener, double deadline
     throw BadInput(fmt::format("a deadline of {:g} s; allowed: more than 0, up to 60", deadline));
   between_steps([&] {
     if (listener_) throw NotNow("another client decides about pairs");
+    // first: where a disk is full it throws, and nobody is asked
+    attend_listener();
+    pair_decisions_.listen(listener, seconds);
     listener_ = std::move(listener);
-    pair_decisions_.listen(listener_, seconds);
-    try {
-      attend_listener();
-    } catch (...) {
-      // a full disk: nobody has been asked
-      pair_decisions_.leave();
-      listener_.reset();
-      throw;
-    }
   });
 }
 
@@ -33,10 +27,16 @@ void ServedRun::end_listening(const std::shared_ptr<RemoteListener>& listener) {
 }
 
 void ServedRun::attend_listener() {
-  environment_->set_pair_arbiter(&pair_decisions_);
+  const bool has_listened = recorder_->has_listened();
   recorder_->note_listener();
-  // no journal knows of it
-  if (recorder_->keeps()) recorder_->save(*environment_);
+  try {
+    // no journal knows of it
+    if (recorder_->keeps()) recorder_->save(*environment_);
+  } catch (...) {
+    recorder_->note_listener(has_listened);
+    throw;
+  }
+  environment_->set_pair_arbiter(&pair_decisions_);
 }
 
 void ServedRun::leave_aside(const std::string& why) {

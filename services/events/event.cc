@@ -1,6 +1,6 @@
 #include "services/events/event.h"
 
-#include <array>
+#include <iterator>
 #include <stdexcept>
 #include <vector>
 
@@ -9,17 +9,18 @@
 namespace gravitas {
 namespace {
 
-constexpr std::array<const char*, static_cast<std::size_t>(EventKind::kCount)> kEventKindNames = {"collision_start",
-                                                                                                  "collision_ongoing",
-                                                                                                  "collision_end",
-                                                                                                  "limit_start",
-                                                                                                  "break",
-                                                                                                  "wake",
-                                                                                                  "sleep",
-                                                                                                  "fault",
-                                                                                                  "swap",
-                                                                                                  "edit",
-                                                                                                  "listener"};
+constexpr const char* kEventKindNames[] = {"collision_start",
+                                           "collision_ongoing",
+                                           "collision_end",
+                                           "limit_start",
+                                           "break",
+                                           "wake",
+                                           "sleep",
+                                           "fault",
+                                           "swap",
+                                           "edit",
+                                           "listener"};
+static_assert(std::size(kEventKindNames) == static_cast<std::size_t>(EventKind::kCount));
 
 }  // namespace
 
@@ -34,13 +35,13 @@ EventKinds parse_event_kinds(std::span<const std::string> names) {
   EventKinds kinds;
   for (const std::string& name : names) {
     bool is_known = name == "none" || name == "all";
-    for (std::size_t i = 0; i < kEventKindNames.size(); ++i) {
+    for (std::size_t i = 0; i < std::size(kEventKindNames); ++i) {
       if (name != "all" && name != kEventKindNames[i]) continue;
       kinds.add(static_cast<EventKind>(i));
       is_known = true;
     }
     if (is_known) continue;
-    std::vector<std::string> allowed(kEventKindNames.begin(), kEventKindNames.end());
+    std::vector<std::string> allowed(std::begin(kEventKindNames), std::end(kEventKindNames));
     allowed.insert(allowed.end(), {"all", "none"});
     throw std::invalid_argument("no kind of event \"" + name + "\"; " + allowed_names(name, allowed));
   }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
 #include "plugin_sdk/activity.h"
 #include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/joint_load.h"
 #include "plugin_sdk/merged_rows.h"
 #include "plugin_sdk/slots.h"
 #include "services/run/kernel_names.h"
@@ -33,17 +33,13 @@ std::pair<std::uint32_t, std::uint32_t> bodies_of(const kernel::StepData& data, 
   return {data.contact_body[2 * contact], data.contact_body[2 * contact + 1]};
 }
 
-// What an impulse of 1 along a row changes its rate by, of the bodies alone.
-double mobility(const kernel::StepData& data, const JacobianRow& row, std::uint32_t a, std::uint32_t b) {
-  double sum = 0.0;
-  for (const auto& [body, linear, angular] :
-       {std::tuple{a, row.linear1, row.angular1}, {b, row.linear2, row.angular2}}) {
-    if (body == kNone) continue;
-    const Vector3 own = quaternion_at(data.trial_orientation.span(), body).conjugate() * angular;
-    sum += data.inverse_mass[body] * linear.squaredNorm() +
-           own.cwiseAbs2().dot(vector_at(data.inverse_inertia.span(), body));
-  }
-  return sum;
+JointBody joint_body(const kernel::StepData& data, std::uint32_t body) {
+  JointBody one;
+  if (body == kNone) return one;
+  one.trial = {vector_at(data.trial_position.span(), body), quaternion_at(data.trial_orientation.span(), body)};
+  one.inverse_mass = data.inverse_mass[body];
+  one.inverse_moments = vector_at(data.inverse_inertia.span(), body);
+  return one;
 }
 
 }  // namespace
@@ -150,9 +146,9 @@ void EventSource::find_ongoing(const kernel::Environment& environment, const ker
   }
 }
 
-// A side that pushes, did not in the step before, and closed where the step began, by more than rounding, and is stopped: what
-// rests on it, or is pressed on it by what comes, does not meet it. Nor does what swings on a taut rope, though its rate there, by
-// the rope's direction where the step ends, is none that an impulse changed.
+// A limit is met by a side that pushes now and did not in the step before, if it closed where the step began, by more than
+// rounding, and its impulse changes that rate. So what rests on a limit, or is pressed on it, does not meet it. The rate is along
+// the row where the step ends: what swings on a taut rope seems to close, with next to no impulse.
 void EventSource::find_limits(const kernel::Environment& environment, const kernel::InnerStep& inner) {
   constexpr double kRounding = 1e-9, kNothing = 1e-12;  // of the speeds; m or rad in the step
   constexpr double kOfStop = 1e-3;                      // of the rate
@@ -171,8 +167,9 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
       const auto of = [](std::uint32_t body, std::span<const double> column) {
         return body == kNone ? Vector3(Vector3::Zero()) : Vector3(vector_at(column, body));
       };
-      const JacobianRow jacobian = jacobian_row(limit, limit.axes * Vector3::Unit(axis),
-                                                of(a, data.trial_position.span()), of(b, data.trial_position.span()));
+      const Vector3 along = limit.axes * Vector3::Unit(axis);
+      const JacobianRow jacobian =
+          jacobian_row(limit, along, of(a, data.trial_position.span()), of(b, data.trial_position.span()));
       const double ways[] = {jacobian.linear1.dot(of(a, inner.before.linear_velocity.span())),
                              jacobian.angular1.dot(of(a, inner.before.angular_velocity.span())),
                              jacobian.linear2.dot(of(b, inner.before.linear_velocity.span())),
@@ -181,7 +178,8 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
       for (const double way : ways) rate += way, largest = std::max(largest, std::fabs(way));
       const double closing = impulse > 0.0 ? -rate : rate;
       if (!(closing > kRounding * largest && closing * environment.time_step() > kNothing)) continue;
-      if (!(std::fabs(impulse) * mobility(data, jacobian, a, b) > kOfStop * closing)) continue;
+      const double change = held_back(limit, impulse * along, joint_body(data, a), joint_body(data, b), 1.0);
+      if (!(change > kOfStop * closing)) continue;
       const std::uint32_t joint = data.discrepancies.constraint[row];
       events_.push_back(
           {EventKind::kLimitStart, environment.step_count() + 1, inner.end, a, b, joint, closing, std::fabs(impulse)});

@@ -101,6 +101,7 @@ void PairDecisions::leave_aside(const std::string& why) {
 }
 
 void PairDecisions::follow(const kernel::Model& before, const kernel::Model& after) {
+  if (decided_.empty()) return;
   std::map<std::string_view, std::uint32_t> rows;
   for (std::uint32_t i = 0; i < after.body_count; ++i) rows[after.body_id[i]] = i;
   std::erase_if(decided_, [&](PairQuestion& one) {

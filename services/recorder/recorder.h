@@ -44,7 +44,7 @@ class Recorder final : public kernel::CommitListener {
   void note_edit(const edit::v1::Edit& edit);
 
   // A listener decides about pairs: nobody goes on from what is kept from now on.
-  void note_listener() { listener_decided_ = true; }
+  void note_listener(bool decided = true) { listener_decided_ = decided; }
   bool has_listened() const { return listener_decided_; }
 
   // The next steps must have the chain hashes of this journal.

@@ -14,13 +14,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The file that a name leads to over symbolic links, of which the last may lead to none yet.
-fs::path target_of(fs::path path) {
+// The file that a name leads to, by its one name.
+fs::path target_of(const fs::path& path) {
   std::error_code none;
-  // as many as Linux follows
-  for (int i = 0; i < 40 && fs::is_symlink(fs::symlink_status(path, none)); ++i)
-    path = path.parent_path() / fs::read_symlink(path, none);
-  return fs::weakly_canonical(fs::absolute(path), none);
+  return fs::weakly_canonical(fs::absolute(end_of_links(path)), none);
 }
 
 bool is_same_file(const std::string& a, const std::string& b) {
@@ -72,7 +69,7 @@ std::vector<NamedFile> checkpoints_of(const RunOptions& options) {
 }
 
 bool goes_on_in_its_checkpoint(const RunOptions& options) {
-  // hard links have journals of their own
+  // hard links of one file have journals of their own: they are refused
   return !options.checkpoint.empty() && !options.resume.empty() &&
          target_of(options.checkpoint) == target_of(options.resume);
 }

@@ -5,6 +5,7 @@
 #include "plugin_sdk/shell_word.h"
 
 namespace gravitas {
+
 std::string resume_command(const RunOptions& options, const std::vector<std::string>& hosting_words,
                            const std::string& checkpoint) {
   std::string command = "gravitas run";

@@ -26,15 +26,6 @@ std::vector<std::byte> read_or_refuse(const std::string& path) {
   }
 }
 
-// Where the links of a name lead, of which the last may lead to nothing yet.
-fs::path end_of_links(fs::path path) {
-  std::error_code none;
-  // as many as Linux follows
-  for (int i = 0; i < 40 && fs::is_symlink(fs::symlink_status(path, none)); ++i)
-    path = path.parent_path() / fs::read_symlink(path, none);
-  return path;
-}
-
 JournalReading read_journal_beside(const std::string& path, const Hash& run, std::uint32_t step,
                                    std::vector<std::string>* warnings) {
   const std::string journal = journal_of(path);
@@ -102,10 +93,18 @@ void remove_other_journal(const RunOptions& options, const std::string& checkpoi
     fs::remove(journal_of(checkpoint), none);
 }
 
+fs::path end_of_links(fs::path path) {
+  std::error_code none;
+  // as many as Linux follows
+  for (int i = 0; i < 40 && fs::is_symlink(fs::symlink_status(path, none)); ++i)
+    path = path.parent_path() / fs::read_symlink(path, none);
+  return path;
+}
+
 std::string checkpoint_target(const std::string& path) {
   std::error_code none;
   const fs::file_status status = fs::status(path, none);
-  if (!fs::exists(status)) return fs::is_symlink(fs::symlink_status(path, none)) ? end_of_links(path).string() : path;
+  if (!fs::exists(status)) return end_of_links(path).string();
   if (!fs::is_regular_file(status)) throw BadInput(fmt::format("checkpoint '{}': it is not an ordinary file", path));
   return fs::is_symlink(fs::symlink_status(path)) ? fs::canonical(path).string() : path;
 }

@@ -1,6 +1,7 @@
 // What `--resume` names: a checkpoint and the journal beside it, read and held against the scene.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -48,8 +49,11 @@ void from_checkpoint(const std::string& path, Action&& action) {
 // there, and is removed.
 void remove_other_journal(const RunOptions& options, const std::string& checkpoint);
 
-// The file itself where `path` is a symbolic link to one, or to one that is to be. Throws BadInput if there is something else than an ordinary
-// file, which a checkpoint must not replace.
+// Where the symbolic links of a name lead, of which the last may lead to nothing yet.
+std::filesystem::path end_of_links(std::filesystem::path path);
+
+// The file itself where `path` is a symbolic link to one, or to one that is to be. Throws BadInput if there is something
+// else than an ordinary file, which a checkpoint must not replace.
 std::string checkpoint_target(const std::string& path);
 
 }  // namespace gravitas

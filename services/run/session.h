@@ -35,7 +35,8 @@ struct RunOptions {
   std::vector<HostingChoice> hosting;
   std::string trajectory, report, events, reactions, joints;
   std::string capsule;  // that `starter` writes: nothing else does, and it is none of what is read
-  // What is looked for, written to `events` and, but for limits and samples, counted (services/events/event.h); default_event_kinds() if absent.
+  // What is looked for, written to `events` and, but for limits and samples, counted (services/events/event.h);
+  // default_event_kinds() if absent.
   std::optional<std::vector<std::string>> event_kinds;
   std::optional<double> ongoing_rate;              // Hz, of collision_ongoing; kOngoingRate if absent
   std::string instrumentation;                     // file of debug geometry (services/survey/frame_file.h)

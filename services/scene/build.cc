@@ -205,10 +205,7 @@ void keep_time(const std::vector<double>& times, const kernel::ConstraintDescrip
   for (const std::uint32_t body : {joint.body1, joint.body2})
     if (body != kNone) description->bodies[body].flags &= ~std::uint32_t{kCanSleep};
   if (description->simulator != kernel::Simulator::kSmooth) return;
-  std::vector<double>& switches = description->switches;
-  switches.insert(switches.end(), times.begin(), times.end());
-  std::ranges::sort(switches);
-  switches.erase(std::unique(switches.begin(), switches.end()), switches.end());
+  description->switches.insert(description->switches.end(), times.begin(), times.end());
 }
 
 void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildContext* context) {
@@ -232,6 +229,9 @@ void build_constraints(const IdIndex& bodies, PluginSelection* plugins, BuildCon
       keep_time(times_of(type->properties, description.parameters), description, &context->description);
     context->description.constraints.push_back(std::move(description));
   }
+  std::vector<double>& switches = context->description.switches;
+  std::ranges::sort(switches);
+  switches.erase(std::unique(switches.begin(), switches.end()), switches.end());
 }
 
 // ---- all of it

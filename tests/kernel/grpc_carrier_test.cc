@@ -351,7 +351,7 @@ TEST_P(WorkerCarrier, TheAskersDeadlineStandsStillWhileItsDerivativeIsEvaluated)
   EXPECT_EQ(forces.asked, 1);
 }
 
-// Answers at once, for longer than it may be asked: answers take time, too, which is not the asker's.
+// Answers at once, for sixty deadlines: the asker has ten, without the time that answers take.
 class PatientForces final : public kernel::DerivativeSource {
  public:
   PatientForces(const OneCall& call, double deadline)

@@ -9,9 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "services/catalog/catalog.h"
-#include "services/run/exchange_spec.h"
-#include "tests/paths.h"
 #include "tests/scenes/scene_run.h"
 #include "tests/scenes/watched_run.h"
 
@@ -293,13 +290,8 @@ TEST(DrivenMotionOfSwaps, GoesOn) {
   for (const char* bound : {"", " MaximumTorque = 0.4"}) {
     const std::string text = course_scene(course_hinge(course_of(0, 2, 40, way) + bound));
     SceneRun alone(text, {"Solver=Newton"}), swapped(text, {"Solver=Sequential"});
-    RunOptions options;
-    options.scenes = {in_source("/tests/scenes/chain.gravitas")};
-    std::vector<std::string> warnings;
-    Catalog catalog;
-    load(options, &warnings, &catalog);
     for (const char* order : {"solver=Newton@step=40", "solver=Direct@step=80", "solver=Sequential@step=120"})
-      swapped.environment().order_swap(resolve_swap(parse_swap(order), swapped.description(), &catalog));
+      swapped.order_swap(order);
     while (!alone.is_done()) {
       alone.step(), swapped.step();
       ASSERT_NEAR(disc_angle(swapped), disc_angle(alone), 1e-10) << bound << alone.time();

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "services/run/exchange_spec.h"
 #include "tests/paths.h"
 
 namespace gravitas::harness {
@@ -31,7 +32,7 @@ class NamedText {
 };
 
 kernel::EnvironmentDescription load_scene(const std::string& scene, std::vector<std::string> overrides,
-                                          std::vector<std::string>* warnings) {
+                                          std::vector<std::string>* warnings, Catalog* catalog) {
   RunOptions options;
   options.overrides = std::move(overrides);
   options.hosting = {{std::nullopt, kernel::Hosting::kDirect}};
@@ -42,7 +43,7 @@ kernel::EnvironmentDescription load_scene(const std::string& scene, std::vector<
   } else {
     options.scenes = {scene.starts_with('/') ? scene : in_source("/tests/scenes/") + scene};
   }
-  return load(options, warnings);
+  return load(options, warnings, catalog);
 }
 
 }  // namespace
@@ -70,7 +71,7 @@ double angle_between(const Quaternion& a, const Quaternion& b) {
 }
 
 SceneRun::SceneRun(const std::string& scene, std::vector<std::string> overrides)
-    : description_(load_scene(scene, std::move(overrides), &warnings_)),
+    : description_(load_scene(scene, std::move(overrides), &warnings_, &catalog_)),
       environment_(start(description_)),
       figures_(std::make_unique<Figures>(description_)) {
   environment_->set_commit_listener(&source_);
@@ -150,6 +151,10 @@ Vector3 SceneRun::angular_momentum() const {
     sum += gravitas::angular_momentum(mass(id), moments(id), m.pose, m.twist);
   }
   return sum;
+}
+
+void SceneRun::order_swap(const std::string& order) {
+  environment_->order_swap(resolve_swap(parse_swap(order), description_, &catalog_));
 }
 
 const report::v1::Report& SceneRun::report() {

@@ -81,6 +81,9 @@ class SceneRun final : private EventListener {
   Vector3 momentum() const;
   Vector3 angular_momentum() const;
 
+  // As --swap has it: "solver=Newton@step=40".
+  void order_swap(const std::string& order);
+
   // What `gravitas run` would report so far.
   const report::v1::Report& report();
   const std::vector<Event>& events() const { return events_; }
@@ -102,6 +105,7 @@ class SceneRun final : private EventListener {
   }
 
   std::vector<std::string> warnings_;
+  Catalog catalog_;
   kernel::EnvironmentDescription description_;
   std::unique_ptr<kernel::Environment> environment_;
   std::unique_ptr<Figures> figures_;

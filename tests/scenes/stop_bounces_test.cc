@@ -7,9 +7,6 @@
 #include <vector>
 
 #include "plugin_sdk/conformance/draw.h"
-#include "services/catalog/catalog.h"
-#include "services/run/exchange_spec.h"
-#include "tests/paths.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
@@ -326,13 +323,8 @@ TEST(StopBouncesOfSwaps, GoOn) {
       "0, "
       "0} LowerLimit = -0.1 UpperLimit = 0.05 Restitution = 0.9 } } } }\n";
   SceneRun alone(text, {"Solver=Newton"}), swapped(text, {"Solver=Sequential"});
-  RunOptions options;
-  options.scenes = {in_source("/tests/scenes/chain.gravitas")};
-  std::vector<std::string> warnings;
-  Catalog catalog;
-  load(options, &warnings, &catalog);
   for (const char* order : {"solver=Newton@step=40", "solver=Direct@step=80", "solver=Sequential@step=120"})
-    swapped.environment().order_swap(resolve_swap(parse_swap(order), swapped.description(), &catalog));
+    swapped.order_swap(order);
   while (!alone.is_done()) {
     alone.step(), swapped.step();
     EXPECT_NEAR(swapped.body("A").twist.linear.x(), alone.body("A").twist.linear.x(), 1e-13);

@@ -81,6 +81,14 @@ TEST(FileNames, NoFileIsWrittenTwice) {
   // a checkpoint may take the place of the one that the run goes on from, and nothing else may
   EXPECT_EQ(run({"--checkpoint", "c"}).exit_code, 0);
   EXPECT_EQ(run({"--resume", "c", "--checkpoint", "./c"}).exit_code, 0);
+  std::filesystem::create_hard_link(folder.path("c"), folder.path("h"));
+  EXPECT_EQ(run({"--resume", "c", "--checkpoint", "h"}).exit_code, 2);
+  // a link that leads nowhere yet
+  std::filesystem::create_directory(folder.path("disk"));
+  std::filesystem::create_symlink("disk/run", folder.path("link"));
+  EXPECT_EQ(run({"--checkpoint", "link"}).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path("link")));
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder.path("disk/run")));
   EXPECT_EQ(run({"--resume", "c", "--report", "c"}).exit_code, 2);
   EXPECT_EQ(run({"--resume", "c", "--events", "c.journal"}).exit_code, 2);
   EXPECT_EQ(run({"--resume", "c", "--checkpoint", "c.journal"}).exit_code, 2);

@@ -292,20 +292,21 @@ void collide_mesh_halfspace(const TriangleMesh& mesh, const Vector3& up, const V
 }
 
 // How a mesh of which a vertex lies inside a closed one leaves that, over the place nearest to such a vertex, of some of them the
-// one that is the least way. `sign` 1: the outer mesh is the first of the pair. Infinitely deep if none lies inside.
+// one that is the least way. `sign` 1: the outer mesh is the first of the pair. Of meshes that do not cross all vertices lie inside
+// or none. Infinitely deep if none does.
 ContactPoint way_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI, const Pose& X_AO,
-                             double sign) {
-  // wholly inside one vertex tells as much as all
-  constexpr std::size_t kTried = 32;
+                             double sign, bool cross) {
+  constexpr std::size_t kTried = 32;  // each is a pass over all vertices
   ContactPoint least;
   least.depth = std::numeric_limits<double>::infinity();
   if (!outer.is_closed()) return least;
   std::size_t tried = 0;
   for (const Vector3& vertex : inner.vertices()) {
     const Vector3 p = transform_point(X_OI, vertex);
-    if (!outer.box().overlaps({p, p})) continue;
-    const TriangleMesh::Nearest nearest = outer.nearest(p);
-    if (!(nearest.signed_distance < 0.0)) continue;
+    TriangleMesh::Nearest nearest;
+    const bool is_inside = outer.box().overlaps({p, p}) && (nearest = outer.nearest(p)).signed_distance < 0.0;
+    if (!is_inside && !cross) break;
+    if (!is_inside) continue;
     const Vector3& n = nearest.outward;
     Vector3 back = p;
     for (const Vector3& v : inner.vertices())
@@ -316,12 +317,6 @@ ContactPoint way_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inne
     if (++tried == kTried) break;
   }
   return least;
-}
-
-// True if a vertex lies inside: of meshes that do not cross, all do.
-bool begins_inside(const TriangleMesh& outer, const TriangleMesh& inner, const Pose& X_OI) {
-  const Vector3 p = transform_point(X_OI, inner.vertices()[0]);
-  return outer.is_closed() && outer.box().overlaps({p, p}) && outer.nearest(p).signed_distance < 0.0;
 }
 
 void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, const Flush& flush,
@@ -360,14 +355,9 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
   });
   if (any) return;
   // triangles tell nothing: one mesh leaves the other by the lesser way
-  const Pose X_BA = relative(X_AB, {});
-  ContactPoint least;
-  least.depth = std::numeric_limits<double>::infinity();
-  if (cross || begins_inside(a, b, X_AB)) least = way_out_of_mesh(a, b, X_AB, {}, 1.0);
-  if (cross || begins_inside(b, a, X_BA)) {
-    const ContactPoint other = way_out_of_mesh(b, a, X_BA, X_AB, -1.0);
-    if (other.depth < least.depth) least = other;
-  }
+  ContactPoint least = way_out_of_mesh(a, b, X_AB, {}, 1.0, cross);
+  const ContactPoint other = way_out_of_mesh(b, a, relative(X_AB, {}), X_AB, -1.0, cross);
+  if (other.depth < least.depth) least = other;
   if (std::isfinite(least.depth)) out.add(TriangleMesh::kNone, least);
 }
 

@@ -94,8 +94,9 @@ class Winch final : public ConstraintPlugin {
                 const double slack = properties.number();
                 const JointSpring spring = JointSpring::of(&properties);
                 const bool is_taut = properties.flag();
-                const double restitution = read_restitution(&properties, "Winch", !is_taut && spring.is_none(),
-                                                            "slack, as Taut and Stiffness leave none");
+                const double restitution =
+                    read_restitution(&properties, "Winch", !is_taut && spring.is_none(),
+                                     "a rope that stops dead: with Taut, Stiffness or Damping it does not");
                 if (!(radius > 0.0)) throw Refusal("Winch: Radius must be above 0");
                 if (spring.stiffness == 0.0 && spring.damping > 0.0)
                   throw Refusal("Winch: Damping is given without Stiffness");
@@ -129,7 +130,7 @@ class Winch final : public ConstraintPlugin {
       if (steepness == 0.0 || !std::isfinite(steepness)) return;  // it ends on the axis
       const Vector3 along = rope.gradient / steepness, seen = drum.orientation.conjugate() * rope.normal;
       Discrepancy d = row_along(along, end - rope.length * along, end, AxisMode::kLimited);
-      const double made = bodies.time_step * steepness *
+      const double made = bodies.elapsed * steepness *
                           jacobian_row(d, along, bodies.pose1.position, bodies.pose2.position)
                               .velocity(bodies.velocity1, bodies.spin1, bodies.velocity2, bodies.spin2);
       const double error = in_its_turn(rope.length - paid_out - radius * math::atan2(seen.z(), seen.y()), made,

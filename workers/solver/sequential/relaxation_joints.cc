@@ -385,10 +385,7 @@ double RelaxationJoints::largest_motion(const BodyMotion& x) const {
     const Twist& x1 = x[block.body1];
     const Twist& x2 = x[block.body2];
     for (std::size_t i = block.first; i < block.end; ++i) {
-      const ConstraintDirection& own = rows_[i].own;
-      const double motion = own.linear.norm() * (x1.linear.norm() + x2.linear.norm()) +
-                            own.angular1.norm() * x1.angular.norm() + own.angular2.norm() * x2.angular.norm();
-      largest = std::max(largest, motion * rows_[i].length);
+      largest = std::max(largest, rows_[i].own.size_along(x1, x2) * rows_[i].length);
     }
   }
   return largest;
