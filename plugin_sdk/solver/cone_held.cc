@@ -12,38 +12,38 @@ constexpr double kRefined = 4.0;
 
 }  // namespace
 
-std::vector<std::size_t> ConeProblem::order_held(const SolverBodies& bodies) {
-  const auto ends_of = [&](std::uint32_t r) {
-    const auto end = [&](std::uint32_t body) { return bodies[body].is_pushed() ? body : kNone; };
-    return RowEnds(end(rows[r].body1), end(rows[r].body2));
-  };
-  elimination_.arrange(ends_of, &held_);
+void ConeProblem::order_held(const SolverBodies& bodies) {
+  const auto end = [&](std::uint32_t body) { return bodies[body].is_pushed() ? body : kNone; };
+  const auto ends_of = [&](std::uint32_t r) { return RowEnds(end(rows[r].body1), end(rows[r].body2)); };
+  const bool is_new = elimination_.arrange(ends_of, &held_);
+  if (!is_new && held_of_body_.size() == bodies.count() + 1) return;
   clear_lists(bodies.count() + 1, &held_of_body_);
-  std::vector<std::size_t> first(held_.size());
+  first_held_.resize(held_.size());
   for (std::uint32_t i = 0; i < held_.size(); ++i) {
-    first[i] = i;
-    const RowEnds ends = ends_of(held_[i]);
+    std::size_t first = i;
+    const RowEnds& ends = elimination_.ends(i);
     for (const std::uint32_t body : {ends.first, ends.second}) {
       if (body == kNone) continue;
       std::vector<std::uint32_t>& list = held_of_body_[body];
-      if (!list.empty()) first[i] = std::min<std::size_t>(first[i], list.front());
+      if (!list.empty()) first = std::min<std::size_t>(first, list.front());
       list.push_back(i);
     }
+    first_held_[i] = first;
   }
-  return first;
 }
 
 // W_EE = L D L^T, and the side of the held rows.
-void ConeProblem::factorise(const SolverBodies& bodies, const std::vector<std::size_t>& first) {
+void ConeProblem::factorise(const SolverBodies& bodies) {
   side_.resize(held_.size());
-  for (std::size_t i = 0; i < held_.size(); ++i)
-    side_[i] = (rows[held_[i]].law.lower_target - free_[held_[i]]) / scale_[held_[i]];
-  factor_.start(first);
-  for (std::uint32_t i = 0; i < held_.size(); ++i) {
-    for (std::size_t j = first[i]; j <= i; ++j) {
-      double entry = coupling(rows[held_[i]], rows[held_[j]], bodies);
-      if (i == j) entry += rows[held_[i]].law.gamma;
-      factor_.entry(i, j) = entry / (scale_[held_[i]] * scale_[held_[j]]);
+  factor_.start(first_held_);
+  for (std::size_t i = 0; i < held_.size(); ++i) {
+    const ConeRow& row = rows[held_[i]];
+    const double scale = scale_[held_[i]];
+    side_[i] = (row.law.lower_target - free_[held_[i]]) / scale;
+    for (std::size_t j = first_held_[i]; j <= i; ++j) {
+      double entry = coupling(row, rows[held_[j]], bodies);
+      if (i == j) entry += row.law.gamma;
+      factor_.entry(i, j) = entry / (scale * scale_[held_[j]]);
     }
   }
   factor_.factorise();
@@ -53,11 +53,11 @@ void ConeProblem::factorise(const SolverBodies& bodies, const std::vector<std::s
 double ConeProblem::reconcile(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
   constexpr double kMostEntries = 2e7;  // a second or two
   classify(bodies, x0);
-  const std::vector<std::size_t> first = order_held(bodies);
+  order_held(bodies);
   double entries = 0.0;
-  for (std::size_t i = 0; i < first.size(); ++i) entries += static_cast<double>(i - first[i]);
+  for (std::size_t i = 0; i < held_.size(); ++i) entries += static_cast<double>(i - first_held_[i]);
   if (entries > kMostEntries) return 0.0;
-  factorise(bodies, first);
+  factorise(bodies);
   const double contradiction = make_consistent(bodies, smallest);
   for (std::size_t i = 0; i < held_.size() && contradiction > 0.0; ++i) {
     JointLaw& law = rows[held_[i]].law;
@@ -144,50 +144,49 @@ void ConeProblem::refine(const SolverBodies& bodies, const BodyMotion& x0, doubl
 
 // A row's value is summed from what all rows of its bodies push: a hinge's turn about a thin rod is, too, from what holds the
 // rod's end, whatever its own torque.
-double ConeProblem::largest_held_sum() const {
+double ConeProblem::largest_held_sum() {
   const auto pushed = [&](const std::vector<std::uint32_t>& list) {
     double most = 0.0;
     for (const std::uint32_t i : list) most = std::max(most, scale_[held_[i]] * std::fabs(rows[held_[i]].multiplier));
     return most;
   };
-  std::vector<double> of_body(held_of_body_.size());
-  std::ranges::transform(held_of_body_, of_body.begin(), pushed);
+  pushed_.resize(held_of_body_.size());
+  std::ranges::transform(held_of_body_, pushed_.begin(), pushed);
   double most = 0.0;
   for (const std::uint32_t r : held_)
-    most = std::max(most, way_of(r) * std::max(of_body[rows[r].body1], of_body[rows[r].body2]));
+    most = std::max(most, way_of(r) * std::max(pushed_[rows[r].body1], pushed_[rows[r].body2]));
   return most;
 }
 
-std::vector<double> ConeProblem::missing_of_held(const SolverBodies& bodies, const BodyMotion& x0) const {
-  BodyMotion x = x0;
-  push(bodies, &x);
-  std::vector<double> missing(held_.size());
+void ConeProblem::find_missing_of_held(const SolverBodies& bodies, const BodyMotion& x0) {
+  x_ = x0;
+  push(bodies, &x_);
+  side_.resize(held_.size());
   for (std::size_t i = 0; i < held_.size(); ++i) {
     const ConeRow& row = rows[held_[i]];
-    missing[i] = (row.law.lower_target - value(x, held_[i]) - row.law.gamma * row.multiplier) / scale_[held_[i]];
+    side_[i] = (row.law.lower_target - value(x_, held_[i]) - row.law.gamma * row.multiplier) / scale_[held_[i]];
   }
-  return missing;
 }
 
-void ConeProblem::add_to_held(std::vector<double>* missing) {
-  factor_.solve(missing);
-  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier += (*missing)[i] / scale_[held_[i]];
+void ConeProblem::add_to_held() {
+  factor_.solve(&side_);
+  for (std::size_t i = 0; i < held_.size(); ++i) rows[held_[i]].multiplier += side_[i] / scale_[held_[i]];
 }
 
 double ConeProblem::refine_held(const SolverBodies& bodies, const BodyMotion& x0) {
-  std::vector<double> missing = missing_of_held(bodies, x0);
-  if (factor_.dropped() > 0) make_consistent(bodies, &missing);
+  find_missing_of_held(bodies, x0);
+  if (factor_.dropped() > 0) make_consistent(bodies, &side_);
   double largest = 0.0;
   for (std::size_t i = 0; i < held_.size(); ++i)
-    largest = std::max(largest, std::fabs(missing[i]) * scale_[held_[i]] * rows[held_[i]].length);
-  add_to_held(&missing);
+    largest = std::max(largest, std::fabs(side_[i]) * scale_[held_[i]] * rows[held_[i]].length);
+  add_to_held();
   return largest;
 }
 
 double ConeProblem::correct(const SolverBodies& bodies, const BodyMotion& x0, double smallest) {
-  side_ = missing_of_held(bodies, x0);
+  find_missing_of_held(bodies, x0);
   const double contradiction = make_consistent(bodies, smallest);
-  add_to_held(&side_);
+  add_to_held();
   return contradiction;
 }
 

@@ -67,9 +67,8 @@ void ConeProblem::classify(const SolverBodies& bodies, const BodyMotion& x0) {
     if (spin1 != 0.0) size += row.direction.angular1.norm() * spin1;
     if (spin2 != 0.0) size += row.direction.angular2.norm() * spin2;
     motion_ = std::max(motion_, size * row.length);
-    if (!std::isfinite(motion_))
-      throw Refusal("velocities, errors or arms so large that their products are not finite");
   }
+  if (!std::isfinite(motion_)) throw Refusal("velocities, errors or arms so large that their products are not finite");
 
   const std::uint32_t scalars = contacts.empty() ? static_cast<std::uint32_t>(rows.size()) : contacts.front().first;
   for (std::uint32_t r = 0; r < scalars; ++r) {
@@ -237,7 +236,8 @@ ConeSummary ConeProblem::solve(const SolverBodies& bodies, const BodyMotion& x0,
     for (ConeRow& row : rows) row.multiplier = 0.0;
     return summary;
   }
-  factorise(bodies, order_held(bodies));
+  order_held(bodies);
+  factorise(bodies);
   summary.contradiction = make_consistent(bodies, smallest);
   const double tolerance = std::max(smallest, settings.tolerance * size());
   lambda_.resize(static_cast<Eigen::Index>(other_.size()));

@@ -207,9 +207,9 @@ class ConeProblem {
 
   double value(const BodyMotion& x, std::uint32_t r) const;
   void classify(const SolverBodies& bodies, const BodyMotion& x0);
-  // Puts the held rows in the order of elimination_order.h; returns where their profiles begin.
-  std::vector<std::size_t> order_held(const SolverBodies& bodies);
-  void factorise(const SolverBodies& bodies, const std::vector<std::size_t>& first);
+  // Puts the held rows in the order of elimination_order.h.
+  void order_held(const SolverBodies& bodies);
+  void factorise(const SolverBodies& bodies);
   double size() const;
   // The side of the held rows; as reconcile().
   double make_consistent(const SolverBodies& bodies, double smallest);
@@ -256,14 +256,15 @@ class ConeProblem {
   void solve_dense(const ConeSettings& settings, double tolerance, ConeSummary* summary);
   void solve_large(const SolverBodies& bodies, const BodyMotion& x0, const ConeSettings& settings, double tolerance,
                    ConeSummary* summary);
-  // (target - value)/scale of the held rows with their multipliers.
-  std::vector<double> missing_of_held(const SolverBodies& bodies, const BodyMotion& x0) const;
+  // side_ as (target - value)/scale of the held rows with their multipliers.
+  void find_missing_of_held(const SolverBodies& bodies, const BodyMotion& x0);
   // Mends the held rows; returns by how much they were off (m/s, m).
   double refine_held(const SolverBodies& bodies, const BodyMotion& x0);
-  void add_to_held(std::vector<double>* missing);
+  // What side_ asks for.
+  void add_to_held();
   void share_out(const SolverBodies& bodies);
   // Largest of what the value of a held row is summed from, m/s, m.
-  double largest_held_sum() const;
+  double largest_held_sum();
 
   const Host* host_ = nullptr;
 
@@ -279,9 +280,12 @@ class ConeProblem {
   EqualSprings shares_;   // of multipliers
   EqualSprings nearest_;  // of sides, where has_nearest_
   bool has_nearest_ = false;
-  std::vector<std::vector<std::uint32_t>> held_of_body_;                // places among held_
-  std::vector<std::vector<std::uint32_t>> others_of_body_;              // places among other_
-  std::vector<double> side_;                                            // (target - q)/scale of held rows
+  std::vector<std::vector<std::uint32_t>> held_of_body_;    // places among held_
+  std::vector<std::vector<std::uint32_t>> others_of_body_;  // places among other_
+  std::vector<std::size_t> first_held_;                     // where their profiles begin
+  std::vector<double> side_;                                // (target - q)/scale of held rows
+  std::vector<double> pushed_;                              // by body, largest scaled multiplier of held rows
+  BodyMotion x_;                                            // that multipliers make
   std::vector<std::vector<std::pair<std::uint32_t, double>>> to_held_;  // W_OE, scaled
   Eigen::MatrixXd carried_;                                             // W_EE^-1 W_EO, scaled
   Eigen::MatrixXd response_;                                            // W', scaled

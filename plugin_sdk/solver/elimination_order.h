@@ -26,16 +26,21 @@ std::vector<std::uint32_t> elimination_order(std::span<const RowEnds> rows);
 // Puts rows in that order, which it remembers as long as the same bodies meet.
 class EliminationOrder {
  public:
+  // False if the rows meet as those before them did.
   template <typename Row, typename EndsOf>
-  void arrange(EndsOf&& ends_of, std::vector<Row>* rows) {
+  bool arrange(EndsOf&& ends_of, std::vector<Row>* rows) {
     ends_.clear();
     for (const Row& row : *rows) ends_.push_back(ends_of(row));
-    if (ends_ != known_) order_ = elimination_order(ends_), known_ = ends_;
-    if (order_.empty()) return;
+    const bool is_new = ends_ != known_;
+    if (is_new) order_ = elimination_order(ends_), known_ = ends_;
+    if (order_.empty()) return is_new;
     std::vector<Row> arranged;
     for (const std::uint32_t place : order_) arranged.push_back((*rows)[place]);
     *rows = std::move(arranged);
+    return is_new;
   }
+  // Bodies of a row that was arranged last, by its place.
+  const RowEnds& ends(std::size_t place) const { return known_[order_.empty() ? place : order_[place]]; }
 
  private:
   std::vector<RowEnds> ends_, known_;

@@ -6,16 +6,26 @@
 #include "plugin_sdk/solver/request_check.h"
 
 namespace gravitas {
+namespace {
+
+// Of a request. Memory is all that stays of it.
+struct Whole {
+  SolverBodies bodies;
+  SolverSolution answer;
+  IslandFinder finder;
+};
+
+}  // namespace
 
 void solve_end_of_step(const stage::SolverSolveRequest& request, const ConeSettings& settings,
                        const stage::SolverSolveReply& reply, Host& host) {
   check_solver_request(request);
-  SolverBodies bodies;
+  thread_local Whole whole;
+  SolverBodies& bodies = whole.bodies;
+  SolverSolution& answer = whole.answer;
   bodies.load(request);
-  SolverSolution answer;
   set_all_unpushed(request, bodies, &answer);
-  IslandFinder finder;
-  const std::span<const Island> islands = finder.find(request, bodies);
+  const std::span<const Island> islands = whole.finder.find(request, bodies);
   std::vector<ConeSummary> summaries(islands.size());
   host.parallel_for_each(islands.size(), [&](std::uint64_t i) {
     // its matrices are large; memory is all that stays of them

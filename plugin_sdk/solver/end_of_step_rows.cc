@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/math/transcendental.h"
@@ -97,16 +98,16 @@ ConeContact cone_contact(const EndContact& contact, std::uint32_t first, bool ha
 }
 
 bool ShrinkingSteps::end_with(double change, double size, double rounding) {
-  const std::size_t before = changes_.size();
+  const std::size_t before = count_++;
   const double enough = std::max(rounding, 1e-14 * size);
-  const double rate = before > 0 ? change / changes_[before - 1] : 1.0;
+  const double rate = before > 0 ? change / last_ : 1.0;
   double next = change;
   if (rate < 1e-2) {
     next *= rate;
-    const double rate_before = before > 1 ? changes_[before - 1] / changes_[before - 2] : 0.0;
+    const double rate_before = before > 1 ? last_ / last_but_one_ : 0.0;
     if (rate * rate < rate_before * rate_before * rate_before) next *= std::sqrt(rate);
   }
-  changes_.push_back(change);
+  last_but_one_ = std::exchange(last_, change);
   return next <= enough || (before > 3 && !(rate < 0.9) && change <= 1e-9 * size);
 }
 

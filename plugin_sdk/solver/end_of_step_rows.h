@@ -109,10 +109,11 @@ class ShrinkingSteps {
   // True if, after a step that changed ways of at most `size` by `change` (m), the next would change them by rounding alone:
   // by this change times the rate of the last two, and a part of it where the rate fell as fast as that method's does.
   bool end_with(double change, double size, double rounding);
-  std::size_t count() const { return changes_.size(); }
+  std::size_t count() const { return count_; }
 
  private:
-  std::vector<double> changes_;
+  std::size_t count_ = 0;
+  double last_ = 0.0, last_but_one_ = 0.0;  // changes
 };
 
 // Of all islands.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/island_solver.h"
@@ -34,16 +35,17 @@ void IslandSolver::find_pose() {
   AndersonAcceleration acceleration;
   double last_change = 0.0;
   NearestPose nearest;
+  BodyMotion x0, next;
   for (bool is_last = false; !is_last;) {
     settings_.may_rest = may_rest();
     stiffen();
     turn_offset();
     build_pose();
-    const BodyMotion x0 = start_of_step();
+    start_step(&x0);
     ConeSummary solved = cone_.solve(bodies_, x0, representable(), settings_);
     // where the steps end: before, redundant rows are off by the square of a turn
     pose_contradiction_ = solved.contradiction;
-    BodyMotion next = x0;
+    next = x0;
     cone_.push(bodies_, &next);
     const double change = largest_change(next, displacement_), size = largest(next);
     // factors without what the corrections stiffen lead away
@@ -63,8 +65,9 @@ void IslandSolver::find_pose() {
     shrinks_slowly_ = shrinks_slowly_ || (steps.count() > kStepsAlone && change > std::max(least, kSlow * last_change));
     last_change = change;
     // reactions leave so little to close that only where rows become dependent steps shrink slowly
-    move_to_end(shrinks_slowly_ && !is_last && !has_reactions() ? accelerated(displacement_, next, &acceleration)
-                                                                : std::move(next));
+    if (shrinks_slowly_ && !is_last && !has_reactions()) next = accelerated(displacement_, next, &acceleration);
+    displacement_.swap(next);
+    move_to_end();
     keep_corrections();
     const bool goes_on = !has_reactions() || steps.count() < kStepsAlone || keep_nearest(&nearest);
     if (shrinks_slowly_ && has_reactions())
@@ -171,21 +174,20 @@ std::vector<double> IslandSolver::yielding() const {
 }
 
 bool IslandSolver::follow_chords(double before) {
+  BodyMotion x0, next;
   for (;;) {
     place_unstiffened();
     turn_offset();
-    std::vector<std::size_t> turns;
-    for (const EndJoint& joint : joints_) turns.push_back(joint.turns);
-    build_pose();
-    if (!std::ranges::equal(joints_, turns, {}, &EndJoint::turns)) return false;  // other rows than have factors
-    const BodyMotion x0 = start_of_step();
+    if (build_pose()) return false;  // other rows than have factors
+    start_step(&x0);
     pose_contradiction_ = cone_.correct(bodies_, x0, representable());
     ++summary_.iterations;
-    BodyMotion next = x0;
+    next = x0;
     cone_.push(bodies_, &next);
     const double change = largest_change(next, displacement_), size = largest(next);
     if (!(change <= before)) return false;
-    move_to_end(std::move(next));
+    displacement_.swap(next);
+    move_to_end();
     keep_corrections();
     if (!(change <= kRateOfChords * before) || pose_contradiction_ > 0.0) return false;
     const double enough = std::max(4.0 * representable(), 1e-14 * size);
@@ -269,7 +271,8 @@ double IslandSolver::largest_way() const {
   return largest;
 }
 
-void IslandSolver::build_pose() {
+bool IslandSolver::build_pose() {
+  bool changes = false;
   cone_.rows.clear();
   cone_.contacts.clear();
   for (EndJoint& joint : joints_) {
@@ -285,9 +288,10 @@ void IslandSolver::build_pose() {
       row.start = joint.errors[static_cast<Eigen::Index>(k)] - joint.states[k].error_at_trial -
                   row.direction.along(displacement_[joint.body1], displacement_[joint.body2]);
     }
-    joint.turns = 0;
+    const std::size_t turns = std::exchange(joint.turns, 0);
     build_turns_of_rod(&joint);
     build_turn_of_swing(&joint);
+    changes = changes || joint.turns != turns;
   }
   for (const EndContact& contact : contacts_) {
     ConeRow& row = cone_.rows.emplace_back();
@@ -298,13 +302,14 @@ void IslandSolver::build_pose() {
     row.softness = contact.softness;
     row.multiplier = answer_.contact_correction[contact.row];
   }
-  if (!yields_) return;
+  if (!yields_) return changes;
   ConeRow* row = cone_.rows.data() + cone_.rows.size() - contacts_.size();
   for (const double share : yielding()) {
     const double masses = bodies_[row->body1].inverse_mass + bodies_[row->body2].inverse_mass;
     row->law.gamma = share * row->direction.product(row->direction, masses);
     ++row;
   }
+  return changes;
 }
 
 // A rod that pulls with mu resists to being turned: across it, with mu/length.

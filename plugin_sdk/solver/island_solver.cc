@@ -14,7 +14,8 @@ IslandSolver::IslandSolver(const stage::SolverSolveRequest& request, const Solve
                            const ConeSettings& settings, ConeProblem* cone, SolverSolution* answer)
     : request_(request), island_(island), settings_(settings), answer_(*answer), cone_(*cone) {
   // its own bodies, and those that it is held by
-  rows_ = island.bodies;
+  rows_.reserve(island.bodies.size() + 2 * (island.discrepancies.size() + island.contacts.size()) + 1);
+  rows_.assign(island.bodies.begin(), island.bodies.end());
   for (const std::uint32_t row : island.discrepancies)
     for (const std::size_t end : {0U, 1U}) rows_.push_back(all.row(request.discrepancy_body()[2 * row + end]));
   for (const std::uint32_t row : island.contacts)
@@ -117,6 +118,8 @@ void IslandSolver::load() {
   velocity_ = start_motion(&SolverBody::trial_velocity);
   displacement_ = offset_ = driven_ = start_motion(nullptr);
   end_.resize(bodies_.count() + 1);
+  gyration_.reserve(end_.size());
+  pushed_.reserve(island_.bodies.size());
   for (std::uint32_t i = 0; i <= bodies_.count(); ++i) {
     end_[i] = {bodies_[i].trial, bodies_[i].inverse_inertia, bodies_[i].inverse_inertia};
     gyration_.push_back(bodies_[i].gyration());
@@ -129,6 +132,7 @@ void IslandSolver::load() {
   joints_.reserve(island_.discrepancies.size());
   contacts_.reserve(island_.contacts.size());
   for (const std::uint32_t row : island_.discrepancies) load_joint(columns, row);
+  if (island_.contacts.empty()) return;
   find_joined();
   for (const std::uint32_t row : island_.contacts) load_contact(row);
   std::vector<double> displacing;
@@ -232,10 +236,10 @@ void IslandSolver::guess_offset(double share) {
     for (std::size_t k = 0; k < 3; ++k) {
       if (slips(joint, k)) joint.states[k].mode = AxisMode::kFree;
       if (is_spring(joint.states[k])) load_spring(k, &joint);
-      const JointLaw law = velocity_law_of(joint, k);
+      if (!is_drive(joint.states[k].mode)) continue;
       const double impulse = answer_.joint_impulse[3 * joint.row + k];
-      if (law.is_velocity_only) push_at_trial(joint, joint.directions[k], share * impulse, &offset_);
-      if (law.is_unbounded_drive()) joint.driven[k] = impulse;
+      push_at_trial(joint, joint.directions[k], share * impulse, &offset_);
+      if (velocity_law_of(joint, k).is_unbounded_drive()) joint.driven[k] = impulse;
     }
   }
   driven_ = offset_;
@@ -299,22 +303,22 @@ void IslandSolver::move_to_end() {
 }
 
 void IslandSolver::stiffen() {
-  std::vector<Matrix3> stiffness(bodies_.count() + 1, Matrix3::Zero());
+  stiffness_.assign(bodies_.count() + 1, Matrix3::Zero());
   for (const EndJoint& joint : joints_) {
     if (joint.discrepancy.is_angular()) continue;
     Vector3 push = Vector3::Zero();
     for (std::size_t k = 0; k < 3; ++k)
       push += answer_.joint_correction[3 * joint.row + k] * joint.directions[k].linear;
     const bool is_rod = joint.discrepancy.is_radial();
-    stiffness[joint.body1] += geometric_stiffness(is_rod ? joint.own_arm1() : joint.arm1, -push);
-    stiffness[joint.body2] += geometric_stiffness(is_rod ? joint.own_arm2() : joint.arm2, push);
+    stiffness_[joint.body1] += geometric_stiffness(is_rod ? joint.own_arm1() : joint.arm1, -push);
+    stiffness_[joint.body2] += geometric_stiffness(is_rod ? joint.own_arm2() : joint.arm2, push);
   }
   for (const std::uint32_t i : pushed_) {
     EndBody& end = end_[i];
-    end.is_stiffened = !stiffness[i].isZero(0.0);
+    end.is_stiffened = !stiffness_[i].isZero(0.0);
     if (end.is_stiffened)
       end.stiffened =
-          stiffened_inverse(end.pose.orientation, vector_at(request_.inverse_inertia(), rows_[i]), stiffness[i]);
+          stiffened_inverse(end.pose.orientation, vector_at(request_.inverse_inertia(), rows_[i]), stiffness_[i]);
   }
   place_unstiffened();
 }
@@ -324,16 +328,15 @@ void IslandSolver::place_unstiffened() {
     if (!end_[i].is_stiffened) end_[i].stiffened = end_[i].inverse_inertia;
 }
 
-BodyMotion IslandSolver::start_of_step() const {
-  BodyMotion x0 = offset_;
+void IslandSolver::start_step(BodyMotion* x0) const {
+  *x0 = offset_;
   for (const std::uint32_t i : pushed_) {
     const Vector3 missing = offset_[i].angular - displacement_[i].angular;
     if (missing.isZero(0.0) || !end_[i].is_stiffened) continue;
     const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
-    x0[i].angular =
+    (*x0)[i].angular =
         displacement_[i].angular + end_[i].stiffened * (world_inertia(end_[i].pose.orientation, moments) * missing);
   }
-  return x0;
 }
 
 void IslandSolver::move_to_end(EndJoint* joint) const {

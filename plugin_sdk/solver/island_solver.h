@@ -98,7 +98,7 @@ class IslandSolver {
   void place_unstiffened();
 
   // Newton's step for delta = offset + M^-1 J^T mu with the stiffness: x0 = delta_k + (M + K)^-1 M (offset - delta_k).
-  BodyMotion start_of_step() const;
+  void start_step(BodyMotion* x0) const;
 
   void move_to_end(EndJoint* joint) const;
 
@@ -156,7 +156,8 @@ class IslandSolver {
   double sum_of_ways() const;
   double largest_way() const;
 
-  void build_pose();
+  // True if the rows that follow a joint's own are others than in the last.
+  bool build_pose();
   void build_turns_of_rod(EndJoint* joint);
   void build_turn_of_swing(EndJoint* joint);
   void add_turn(const ConstraintDirection& direction, double compliance, EndJoint* joint);
@@ -263,7 +264,8 @@ class IslandSolver {
   std::vector<EndContact> contacts_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> joined_;  // rising
   std::vector<EndBody> end_;
-  std::vector<double> gyration_;  // radii, m
+  std::vector<double> gyration_;    // radii, m
+  std::vector<Matrix3> stiffness_;  // of stiffen(), by body
   double coordinates_ = 0.0, pose_contradiction_ = 0.0;
   BodyMotion velocity_, displacement_, offset_;
   std::vector<Vector3> offset_moment_;  // that turns by offset_, kg m^2; zero where that turns nothing

@@ -14,15 +14,28 @@ constexpr double kDependent = 1e-12;
 constexpr double kRounding = 8.0 * std::numeric_limits<double>::epsilon();
 constexpr double kDoubtful = 1e-4;  // of a diagonal: pivots that may be rounding
 
+constexpr std::size_t kShort = 8;  // rows of joints in a chain: loops that are not worth being unrolled
+
 double dot(const double* a, const double* b, std::size_t count) {
-  constexpr std::size_t kShort = 8;  // rows of joints in a chain
   if (count < kShort) {
     double sum = 0.0;
+#pragma clang loop unroll(disable)
     for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
     return sum;
   }
   const auto size = static_cast<Eigen::Index>(count);
   return Eigen::Map<const Eigen::VectorXd>(a, size).dot(Eigen::Map<const Eigen::VectorXd>(b, size));
+}
+
+// b -= share a
+void subtract(double share, const double* a, double* b, std::size_t count) {
+  if (count < kShort) {
+#pragma clang loop unroll(disable) vectorize(disable)
+    for (std::size_t i = 0; i < count; ++i) b[i] -= a[i] * share;
+    return;
+  }
+  const auto size = static_cast<Eigen::Index>(count);
+  Eigen::Map<Eigen::VectorXd>(b, size) -= share * Eigen::Map<const Eigen::VectorXd>(a, size);
 }
 
 }  // namespace
@@ -43,23 +56,23 @@ void ProfileLdlt::start(const std::vector<std::size_t>& first) {
 
 void ProfileLdlt::factorise(double least) {
   least_pivot_ = 1.0, weakest_ = 0;
+  scaled_.resize(size());
   for (std::size_t i = 0; i < size(); ++i) {
     double* row = &values_[begin_[i]];
     const std::size_t from = first_[i];
     const double diagonal = row[i - from];
     double pivot = diagonal;
-    // row[j] holds l_ij d_j until it is divided
     for (std::size_t j = from; j < i; ++j) {
-      const double* other = &values_[begin_[j]];
+      double& entry = row[j - from];
+      if (!(pivot_[j] > 0.0)) {
+        entry = scaled_[j] = 0.0;
+        continue;
+      }
       const std::size_t both = std::max(from, first_[j]);
-      row[j - from] =
-          pivot_[j] > 0.0 ? row[j - from] - dot(row + (both - from), other + (both - first_[j]), j - both) : 0.0;
-    }
-    for (std::size_t j = from; j < i; ++j) {
-      if (!(pivot_[j] > 0.0)) continue;
-      const double scaled = row[j - from];
-      row[j - from] = scaled / pivot_[j];
-      pivot -= scaled * row[j - from];
+      const double scaled = entry - dot(&scaled_[both], &values_[begin_[j] + both - first_[j]], j - both);
+      scaled_[j] = scaled;
+      entry = scaled / pivot_[j];
+      pivot -= scaled * entry;
     }
     if (pivot > std::max(least, kDependent) * diagonal && (pivot > kDoubtful * diagonal || !is_rounding(i, pivot))) {
       pivot_[i] = pivot;
@@ -109,9 +122,7 @@ void ProfileLdlt::solve_transposed(std::vector<double>* x) const {
     if (!(pivot_[i] > 0.0)) continue;
     const double known = (*x)[i];
     if (known == 0.0) continue;
-    const double* row = &values_[begin_[i]];
-    double* to = &(*x)[first_[i]];
-    for (std::size_t j = 0; j < i - first_[i]; ++j) to[j] -= row[j] * known;
+    subtract(known, &values_[begin_[i]], &(*x)[first_[i]], i - first_[i]);
   }
 }
 

@@ -63,6 +63,7 @@ class ProfileLdlt {
   std::vector<std::size_t> first_, begin_;
   std::vector<double> values_, pivot_;  // 0: dropped
   std::vector<double> combination_;     // scratch
+  std::vector<double> scaled_;          // scratch: l_ij d_j of a row
   double least_pivot_ = 1.0;
   std::size_t weakest_ = 0;
   std::vector<std::size_t> dropped_;
