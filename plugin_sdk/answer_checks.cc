@@ -140,19 +140,23 @@ AnswerProblem check_multipliers(const SolutionColumns& answer, std::span<const d
   for (std::size_t i = 0; i < answer.contact_correction.size(); ++i) {
     const Vector3 impulse = vector_at(answer.contact_impulse, i), normal = vector_at(answer.contact_direction, i);
     const double* row = &material[kMaterialColumns * i];
-    const double along = normal.dot(impulse), tolerance = kRounding * impulse.stableNorm() + kSmallest;
-    if (along < -tolerance) return bad_number("contact_impulse", i, " pulls the bodies together");
+    // found only for what lies outside without it
+    const auto tolerance = [&] { return kRounding * impulse.stableNorm() + kSmallest; };
+    const double along = normal.dot(impulse);
+    if (along < 0.0 && along < -tolerance()) return bad_number("contact_impulse", i, " pulls the bodies together");
     const double friction = std::max(row[kStaticFriction], row[kDynamicFriction]);
-    if ((impulse - along * normal).norm() > friction * along + tolerance)
+    const double across = (impulse - along * normal).norm();
+    if (!(across <= friction * along) && across > friction * along + tolerance())
       return bad_number("contact_impulse", i, " leaves the friction cone");
+    if (answer.contact_correction[i] < 0.0) return bad_number("contact_correction", i, " is negative");
     const Vector3 turning = vector_at(answer.contact_turning, i);
-    const double spinning = normal.dot(turning), pressed = along + tolerance;
+    if (turning.isZero(0.0)) continue;
+    const double spinning = normal.dot(turning), pressed = along + tolerance();
     const double rounding = kRounding * turning.stableNorm() + kSmallest;
     if (std::fabs(spinning) > row[kSpinningFriction] * pressed + rounding)
       return bad_number("contact_turning", i, " spins by more than spinning friction can");
     if ((turning - spinning * normal).norm() > row[kRollingFriction] * pressed + rounding)
       return bad_number("contact_turning", i, " rolls by more than rolling friction can");
-    if (answer.contact_correction[i] < 0.0) return bad_number("contact_correction", i, " is negative");
   }
   for (std::size_t i = 0; i < mode.size(); ++i) {
     for (int axis = 0; axis < 3; ++axis) {

@@ -32,14 +32,22 @@ double gyration(const JointBody& body) {
 
 }  // namespace
 
-JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step) {
+double joint_error(const JointRows& joint, const JointBody& body1, const JointBody& body2) {
+  double error = 0.0;
+  for (std::size_t row = joint.first; row < joint.end; ++row) {
+    const Discrepancy discrepancy = joint.rows.at(row);
+    error = std::max(error, joint_error(discrepancy, error_in_axes_at(discrepancy, body1.trial, body2.trial, body1.next,
+                                                                      body2.next)));
+  }
+  return error;
+}
+
+JointLoad joint_load(const JointRows& joint, const JointBody& body1, double time_step) {
   JointLoad load;
   Vector3 sum = Vector3::Zero(), turn = Vector3::Zero();
   std::optional<Vector3> about;
   for (std::size_t row = joint.first; row < joint.end; ++row) {
     const Discrepancy discrepancy = joint.rows.at(row);
-    const Vector3 error = error_in_axes_at(discrepancy, body1.trial, body2.trial, body1.next, body2.next);
-    load.error = std::max(load.error, joint_error(discrepancy, error));
     const Vector3 impulse = impulse_of(joint, discrepancy, row, time_step);
     if (discrepancy.is_angular()) {
       turn += impulse;

@@ -25,13 +25,15 @@ struct JointRows {
   std::span<const double> forces = {};
 };
 
+// How far the joint is open at S_{n+1}, m, or rad for angular rows: joint_error() of the worst.
+double joint_error(const JointRows& joint, const JointBody& body1, const JointBody& body2);
+
 struct JointLoad {
-  double error = 0.0;   // at S_{n+1}, m, or rad for angular rows
   double force = 0.0;   // norm of the sum of what pushed, N
   double torque = 0.0;  // norm of the sum of what turned, about the joint's first point at S_{n+1}, N m
 };
 
-JointLoad joint_load(const JointRows& joint, const JointBody& body1, const JointBody& body2, double time_step);
+JointLoad joint_load(const JointRows& joint, const JointBody& body1, double time_step);
 
 // How far a discrepancy would have come open in the step without the impulse (N s, world) that held it, m:
 // |impulse| h / m_eff, with m_eff the mass that the bodies at S* show along it; rad for the angular twin, with moments.

@@ -57,13 +57,14 @@ void Environment::update_joints() {
     const auto share = [](double of, double most) { return most > 0.0 ? of / most : 0.0; };
     const double force = description.breaking_force, torque = description.breaking_torque;
     const double threshold = description.breaking_threshold;
-    const JointLoad load = joint_load(rows, one, two, h);
-    const bool is_torn = contradicts && (force > 0.0 || torque > 0.0) && is_pulled_apart(rows, one, two);
+    const bool may_tear = force > 0.0 || torque > 0.0;
+    const JointLoad load = may_tear ? joint_load(rows, one, h) : JointLoad{};
+    const bool is_torn = contradicts && may_tear && is_pulled_apart(rows, one, two);
     const double overload =
         std::max({share(is_torn ? kTorn : load.force, force), share(is_torn ? kTorn : load.torque, torque),
                   threshold > 0.0 ? opening(rows, one, two, h) / threshold : 0.0});
     if (overload > 1.0) overloaded.emplace_back(-overload, joint);
-    figures_.joint_error = std::max(figures_.joint_error, load.error);
+    figures_.joint_error = std::max(figures_.joint_error, joint_error(rows, one, two));
   }
   const std::size_t at_once = std::min(overloaded.size(), 1 + broken_.size() / kToOne);
   std::ranges::sort(overloaded);

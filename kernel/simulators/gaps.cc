@@ -43,10 +43,12 @@ void Environment::find_touching() {
     const bool begins = is_anew_ && inner_ == 0 && data_.contact_depth[i] > 0.0;
     if (begins) start_overlap_ = std::max(start_overlap_, -gap_at(i, front()));
     figures_.penetration = std::max(figures_.penetration, -gap);
+    const bool touched_before = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touched);
     // what touched, and opened no further in a very short inner step, is no flight
-    const bool goes_on = starts_with(data_.contact_body.span().subspan(2 * i, 2), &touched) &&
-                         gap <= kTouchingShare * margin_ && gap - gap_at(i, front()) <= share * margin_;
-    const bool touches = gap <= share * margin_ || goes_on || !vector_at(data_.contact_impulse.span(), i).isZero(0.0);
+    const auto goes_on = [&] {
+      return touched_before && gap <= kTouchingShare * margin_ && gap - gap_at(i, front()) <= share * margin_;
+    };
+    const bool touches = gap <= share * margin_ || !vector_at(data_.contact_impulse.span(), i).isZero(0.0) || goes_on();
     const std::uint64_t size = now.size();
     if (!touches || (size > 0 && now[size - 2] == a && now[size - 1] == b)) continue;
     now.resize(size + 2);

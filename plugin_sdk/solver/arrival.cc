@@ -4,17 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "plugin_sdk/math/rotation.h"
-
 namespace gravitas {
-namespace {
-
-Twist displacement_of(const SolverBody& body) {
-  const Quaternion turn = body.trial.orientation * body.start.orientation.conjugate();
-  return {body.trial.position - body.start.position, log_rotation(turn)};
-}
-
-}  // namespace
 
 double arrival_speed(double start_velocity, double trial_velocity, double way, double time_step) {
   if (!(trial_velocity < 0.0)) return 0.0;
@@ -25,7 +15,7 @@ double arrival_speed(double start_velocity, double trial_velocity, double way, d
 }
 
 double gap_before(double gap, const ConstraintDirection& direction, const SolverBody& body1, const SolverBody& body2) {
-  return gap - direction.along(displacement_of(body1), displacement_of(body2));
+  return gap - direction.along(body1.way, body2.way);
 }
 
 }  // namespace gravitas

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 
 #include "plugin_sdk/math/rotation.h"
 
@@ -25,6 +26,14 @@ void SolverBodies::load(const stage::SolverSolveRequest& request) {
     if ((flags & kMovable) == 0 || (flags & kKinematic) != 0) continue;
     body.inverse_mass = request.inverse_mass()[i];
     body.inverse_inertia = world_inverse_inertia(body.trial.orientation, vector_at(request.inverse_inertia(), i));
+  }
+  const std::span<const std::uint32_t> touching = request.contact_body();
+  for (std::size_t k = 0; k < touching.size(); ++k) {
+    const bool is_known = k >= 2 && touching[k - 2] == touching[k];  // contacts of a pair follow each other
+    if (is_known || touching[k] == kNone) continue;
+    SolverBody& body = bodies_[touching[k]];
+    body.way = {body.trial.position - body.start.position,
+                log_rotation(body.trial.orientation * body.start.orientation.conjugate())};
   }
 }
 

@@ -24,6 +24,7 @@ struct SolverBody {
   Pose trial;                                 // S*
   Twist start_velocity;
   Twist trial_velocity;
+  Twist way;  // from S_n to S*; of bodies that touch
 
   bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
   double gyration() const;  // radius_of_gyration() of dynamics.h, m

@@ -16,10 +16,15 @@ IslandSolver::IslandSolver(const stage::SolverSolveRequest& request, const Solve
   // its own bodies, and those that it is held by
   rows_.reserve(island.bodies.size() + 2 * (island.discrepancies.size() + island.contacts.size()) + 1);
   rows_.assign(island.bodies.begin(), island.bodies.end());
+  // what holds a pair comes one after the other
+  const auto add = [&](std::uint32_t row) {
+    if (row != rows_.back() && row != rows_[rows_.size() - std::min<std::size_t>(rows_.size(), 2)])
+      rows_.push_back(row);
+  };
   for (const std::uint32_t row : island.discrepancies)
-    for (const std::size_t end : {0U, 1U}) rows_.push_back(all.row(request.discrepancy_body()[2 * row + end]));
+    for (const std::size_t end : {0U, 1U}) add(all.row(request.discrepancy_body()[2 * row + end]));
   for (const std::uint32_t row : island.contacts)
-    for (const std::size_t end : {0U, 1U}) rows_.push_back(request.contact_body()[2 * row + end]);
+    for (const std::size_t end : {0U, 1U}) add(request.contact_body()[2 * row + end]);
   rows_.push_back(all.row(kNone));
   std::sort(rows_.begin(), rows_.end());
   rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());

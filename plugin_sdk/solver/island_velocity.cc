@@ -303,7 +303,7 @@ void IslandSolver::build_velocity(const EndContact& contact, bool with_turning) 
   for (int k = 0; k < (cone.has_friction ? 3 : 1); ++k)
     add(with_turns(direction_at(law.frame.col(k), arm1, arm2), inverse1, inverse2), 1.0, impulse[k]);
   cone_.rows[first].softness = contact.softness;
-  const double length = std::max(bodies_[contact.body1].gyration(), bodies_[contact.body2].gyration());
+  const double length = std::max(gyration_[contact.body1], gyration_[contact.body2]);
   for (int k = 0; k < (cone.has_turning ? 3 : 0); ++k)
     add(with_turns(turning_about(law.frame.col(k)), inverse1, inverse2), length, contact.turning[k]);
 }
