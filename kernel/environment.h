@@ -37,6 +37,7 @@
 #include "plugin_sdk/extrapolation.h"
 #include "plugin_sdk/lap_clock.h"
 #include "plugin_sdk/merged_rows.h"
+#include "plugin_sdk/stop_location.h"
 #include "plugin_sdk/trajectory_hash.h"
 
 namespace gravitas::kernel {
@@ -228,6 +229,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   void join_start_velocities();
   void add_start_impulses();
   bool lets_go_of_limits();
+  // stops.cc: inner steps that end where stops are met.
+  void meet_stops(double begin, double length);
+  double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
+  void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
   std::uint64_t most_reaction_blocks() const;
 
   // stages.cc: a stage each.
@@ -379,6 +384,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities
   std::vector<double> start_gaps_, trial_gaps_;                                       // of limits
+  std::vector<StopGap> first_stops_, start_stops_, end_stops_, trial_stops_;
+  std::vector<double> borne_;          // N, by joints in the derivatives of S* (Smooth)
   std::vector<double> start_impulse_;  // N s, of joints, where the step begins (Smooth)
   std::vector<std::array<std::uint32_t, 2>> pressed_, pressed_by_attempts_;  // pairs
   double margin_ = 0.0;

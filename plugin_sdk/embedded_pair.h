@@ -8,7 +8,7 @@
 // long, by between 0.2 and 5 times. So Accuracy bounds the error of an inner step, not that of the end, which gathers
 // them. The length that the last one would have had is kept in plugin_state for the step to come; without, the first one
 // is guessed from the first two derivatives (Hairer, Norsett, Wanner, Solving ODEs I, II.4). The answer's error_estimate is
-// the largest E / Accuracy of the step. Refused, with the body's number: what no inner step can follow.
+// the largest E / Accuracy of the step. Refused: what no inner step can follow.
 //
 // With dense output (dense_step.h) the last inner step goes on past the boundary where nothing but the plugin changed the
 // bodies in the step before, and serves the steps within it: each is Simpson's rule with the derivatives of its start, and
@@ -99,17 +99,20 @@ class EmbeddedPair : public IntegratorPlugin {
       const double h = may_pass ? passing_inner_step(request, inner, left) : next_inner_step(inner, left);
       const double error = evaluate(1, Pair::kErrorStages, h) ? Pair::error(stages_, h) / accuracy_ : HUGE_VAL;
       if (error <= 1.0 && evaluate(Pair::kErrorStages, Pair::kStages, h)) {
-        worst = std::max(worst, error);
         const double longer = factor(error, before);
         // a step cut short at a boundary says little of long ones
         inner = longer < kFastest ? longer * h : std::max(inner, longer * h);
         before = std::max(error, 1e-4);
         if (h > left) {
           make_dense(request, h);
-          if (goes_along(request, left)) return answer_along(request, reply, {inner, worst}, left);
+          if (goes_along(request, left)) {
+            answer_along(request, reply, {inner, error}, left);
+            return reply.error_estimate().set(std::max(worst, error));
+          }
           may_pass = false;
           continue;
         }
+        worst = std::max(worst, error);
         stages_.advance(Pair::kStages - 1, h);
         done = h == left ? whole : done + h;
       } else {

@@ -1,6 +1,6 @@
 // For authors of integrators: the stages of an explicit Runge-Kutta step of free bodies.
 //
-// In a step from (x0, q0, v0, w0) at t0 over h, with nodes 0 = c_1 <= c_2 <= ... <= 1 and weights a_ij, stage i is at
+// In a step from (x0, q0, v0, w0) at t0 over h, with nodes c_1 = 0, none above 1, and weights a_ij, stage i is at
 //
 //   x_i = x0 + h sum_j a_ij v_j    v_i = v0 + h sum_j a_ij a_j      (w_i likewise, with alpha_j)
 //   q_i = chart(q0, h sum_j a_ij r_j)
@@ -100,8 +100,10 @@ class MotionStages {
     for (std::size_t j = 0; j < weights.size(); ++j) {
       if (weights[j] == 0.0) continue;
       const Rate& r = deviation(j, body);
-      const double slowed = h * weights[j] * damping_factor(damping, (end - c[j]) * h);
       moved += h * weights[j] * r.velocity;
+      // where nodes go back the factor grows beyond all numbers: nothing stays nothing
+      if (r.linear.isZero(0.0) && r.angular.isZero(0.0)) continue;
+      const double slowed = h * weights[j] * damping_factor(damping, (end - c[j]) * h);
       linear += slowed * r.linear;
       angular += slowed * r.angular;
     }

@@ -57,6 +57,7 @@ double Environment::length_to_switch(double begin, double length) {
 void Environment::make_part(double begin, double length) {
   if (description_.accuracy > 0.0) return extrapolate_parts(begin, length);
   if (locates_events()) return locate_events(begin, length);
+  if (knows_reactions()) return meet_stops(begin, length);
   begin_inner_step(begin, length);
   if (make_next_state()) end_inner_step();
 }
@@ -133,7 +134,12 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
     if (!vector_at(data_.contact_warm_impulse.span(), i).isZero(0.0))
       data_.contact_material[kMaterialColumns * i + kRestitution] = 0.0;
   std::optional<Trusted<Solution>> solution = solve();
-  while (knows_reactions() && lets_go_of_limits()) solution.emplace(solve());
+  if (knows_reactions()) {
+    // S* was integrated with what lets go
+    borne_.assign(data_.held_force.span().begin(), data_.held_force.span().end());
+    while (lets_go_of_limits()) solution.emplace(solve());
+    std::ranges::copy(borne_, data_.held_force.data());
+  }
   if (knows_reactions() && may_jump_at_start()) add_start_impulses();
   return solution;
 }

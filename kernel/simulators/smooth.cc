@@ -48,7 +48,8 @@ void Environment::ask_reactions() {
   const auto with_forces = request(data_.jacobian_body, data_.jacobian);
   ask_jacobians(Stage::kSolve, &solver_, {stage::Method::kSolverReactionJacobians, 0, with_forces, {}},
                 most_reaction_blocks());
-  if (data_.block_body.size() == 0) data_.jacobian_blocks[0] = 0;
+  // of this state alone: of others a run that is resumed would know nothing
+  if (data_.block_body.size() == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
 }
 
 // What bodies do at the start, or an impulse gives them, joints may not allow: it jumps there and then, as by a solve at the
@@ -79,9 +80,10 @@ void Environment::add_start_impulses() {
   for (std::size_t i = 0; i < start_impulse_.size(); ++i) data_.held_force[i] += start_impulse_[i] / data_.time_step[0];
 }
 
-// A limit that bears holds like a lock while the step's end is solved. Where another is struck then, it can pull by no more than it
-// pushed in the step: beyond, it opens.
+// A limit that bears holds like a lock while the step's end is solved, so that what the method is off by to its free side is put
+// right, too. That is a small share of what it pushed in the step: where it would pull by more, it opens.
 bool Environment::lets_go_of_limits() {
+  constexpr double kOfPush = 1e-3;
   const DiscrepancyAnswer& joints = data_.discrepancies;
   bool any = false;
   for (std::size_t i = 0; i < data_.discrepancy_impulse.size(); ++i) {
@@ -89,7 +91,7 @@ bool Environment::lets_go_of_limits() {
     const bool may_open =
         mode == AxisMode::kUnilateral || (mode == AxisMode::kLimited && joints.lower[i] < joints.upper[i]);
     const double push = data_.held_force[i] * data_.time_step[0], impulse = data_.discrepancy_impulse[i];
-    if (!may_open || push * impulse >= 0.0 || std::abs(impulse) <= std::abs(push)) continue;
+    if (!may_open || push * impulse >= 0.0 || std::abs(impulse) <= kOfPush * std::abs(push)) continue;
     data_.held_force[i] = 0.0;
     any = true;
   }

@@ -10,7 +10,8 @@ class DenseLu {
   DenseLu() = default;
   explicit DenseLu(const Eigen::MatrixXd& a) { factorise(a); }
 
-  // Precondition: a is square. A singular one gives numbers that are not finite.
+  // Precondition: a is square. A singular one gives numbers that are not finite, or some solution
+  // where b has nothing of what it lacks.
   void factorise(const Eigen::MatrixXd& a);
   // Precondition: factorised, b of that size.
   Eigen::VectorXd solve(const Eigen::VectorXd& b) const;

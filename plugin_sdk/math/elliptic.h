@@ -13,7 +13,7 @@ struct EllipticValues {
 // For a fixed modulus. Same bits on every machine: arithmetic, sqrt and plugin_sdk/math alone.
 class EllipticFunctions {
  public:
-  // From the complementary parameter m_c = 1 - k^2 in (0, 1]; smaller ones are taken as 1e-300, whose period is 695.
+  // From the complementary parameter m_c = 1 - k^2 in (0, 1]; smaller ones are taken as 1e-300, whose quarter period is 347.
   explicit EllipticFunctions(double complementary_parameter);
 
   // K, a quarter of the period of sn and cn, half of dn's: pi / (2 agm(1, sqrt(m_c))).

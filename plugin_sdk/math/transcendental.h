@@ -3,7 +3,7 @@
 // The C library picks between variants of these functions by the processor it runs on, and the
 // variants differ in the last bit; a trajectory computed through them is not the same on two
 // machines. The functions here are built from +, -, *, /, sqrt and integer operations alone: no
-// dispatch, no fused operation, no global state. The same argument gives the same bits wherever the
+// dispatch, no fused operation but where it gives the same bits (double_double.h), no global state. The same argument gives the same bits wherever the
 // code is compiled without contraction and with round-to-nearest. Results of a simulation use
 // these and never the std:: ones.
 //

@@ -27,8 +27,9 @@ using kernel::Hosting;
 
 const std::string kHashes = in_source("/tests/determinism/hashes.json");
 // whose hashes are committed
-constexpr const char* kScenes[] = {"two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack",
-                                   "thruster",          "pile",   "callbacks",     "suspension",      "stops"};
+constexpr const char* kScenes[] = {
+    "two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack", "thruster", "pile", "callbacks",
+    "suspension",        "stops",  "taut"};
 constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
                            Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 

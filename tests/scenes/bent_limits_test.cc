@@ -97,9 +97,14 @@ TEST_P(BentLimitsInMotion, OfBothBarsHoldAtOnce) {
                                -azimuth_of(turn * bar2, turn * start2, bar1, Vector3::Zero())->value};
       for (int k = 0; k < 2; ++k) least[k] = std::min(least[k], angles[k]), most[k] = std::max(most[k], angles[k]);
     }
-    EXPECT_NEAR(least[0], -0.3, 1e-6) << bar2.transpose();
-    EXPECT_NEAR(std::max(most[1] - 1.0, -1.2 - least[1]), 0.0, 1e-6) << bar2.transpose();
+    EXPECT_GE(least[0], -0.3 - 1e-6) << bar2.transpose();
+    EXPECT_LE(std::max(most[1] - 1.0, -1.2 - least[1]), 1e-6) << bar2.transpose();
     EXPECT_LE(most[0], 0.4 + 1e-6);
+    // `Smooth` meets them within its steps
+    const double nearly = std::string(GetParam().simulator) == "Smooth" ? 1e-5 : 1e-6;
+    EXPECT_LE(least[0], -0.3 + nearly) << bar2.transpose();
+    EXPECT_GE(std::max(most[1] - 1.0, -1.2 - least[1]), -nearly) << bar2.transpose();
+    EXPECT_GE(run.count_events(EventKind::kLimitStart), 2U);
     EXPECT_LE(run.energy(), energy);
     EXPECT_LE(run.report().max_joint_error(), 1e-6);
   }

@@ -7,7 +7,8 @@
 // and II.10, whose coefficients these are; Prince, Dormand, J. Comput. Appl. Math. 7 (1981) 67.
 // Twelve derivatives an inner step and one more a step. Damping as in motion_stages.h. Stability: explicit, h sqrt(k/m)
 // < 5.9, so that a stiff force costs as many inner steps as it takes; see Radau. Known failure: energy drifts by what the
-// accuracy lets through; where forces are not smooth, or at an accuracy above about 1e-7, DormandPrince54 is faster.
+// accuracy lets through; where forces are not smooth, or at an accuracy above about 1e-7, DormandPrince54 is faster. Nodes that go
+// back (1/3 to 1/4) let inner steps with a damping d be no longer than some tens of 1/d where forces change.
 #include "plugin_sdk/embedded_pair.h"
 
 namespace gravitas {

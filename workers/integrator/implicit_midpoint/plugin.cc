@@ -324,7 +324,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       for (const Group& group : groups_) {
         if (k >= group.size()) continue;
         const Eigen::Index at = group.number(k);
-        shifted[at] += shift(unknown_.segment<6>(at - at % 6), at % 6);
+        shifted[at] += shift(bodies_[static_cast<std::size_t>(at / 6)], unknown_.segment<6>(at - at % 6), at % 6);
       }
       const Eigen::VectorXd change = residual(shifted) - left;
       for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -374,7 +374,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     MiddleChange change;
     for (Eigen::Index k = 0; k < 6; ++k) {
       Vector6 shifted = z;
-      shifted[k] += shift(z, k);
+      shifted[k] += shift(body, z, k);
       const BodyState other = middle_of(body, shifted);
       change.col(k) << other.pose.position - middle.pose.position,
           log_rotation(other.pose.orientation * middle.pose.orientation.conjugate()),
@@ -390,7 +390,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     const Vector3 w = z.tail<3>(), here = turning_residual(body, w);
     for (Eigen::Index k = 0; k < 3; ++k) {
       Vector3 shifted = w;
-      shifted[k] += shift(z, k + 3);
+      shifted[k] += shift(body, z, k + 3);
       change.block<3, 1>(3, 3 + k) = (turning_residual(body, shifted) - here) / (shifted[k] - w[k]);
     }
     return change;
@@ -402,8 +402,10 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return body.inverse_moments.asDiagonal() * to_rotation_matrix(back);
   }
 
-  static double shift(const Vector6& z, Eigen::Index k) {
-    return kDifference * std::max(z.segment<3>(k - k % 3).norm(), 1e-3);
+  // What the middle moves by is to be seen among the roundings of its place or attitude.
+  double shift(const Body& body, const Vector6& z, Eigen::Index k) const {
+    const double seen = 1e-4 * (k < 3 ? body.start.pose.position.norm() : 1.0) / h_;
+    return kDifference * std::max({z.segment<3>(k - k % 3).norm(), 1e-3, seen});
   }
   static Eigen::Index first_of(std::size_t place) { return 6 * static_cast<Eigen::Index>(place); }
 

@@ -190,12 +190,15 @@ class Radau final : public IntegratorPlugin {
   // An error that is too large may be that of a stiff transient: its own start is taken for the estimate.
   void estimate_again(double h) {
     shifted_ = motion_.start() + error_vector_;
-    if (!motion_.is_in_chart(0.0, shifted_) || !motion_.evaluate(0.0, shifted_, &shifted_rate_)) return;
+    if (!motion_.is_in_chart(0.0, shifted_)) return;
+    asks_elsewhere_ = true;
+    if (!motion_.evaluate(0.0, shifted_, &shifted_rate_)) return;
     error_ = std::min(error_, estimate(h, shifted_rate_));
   }
 
   // One round for all stages; by how much they changed, infinite where one cannot be taken.
   double improve(double h) {
+    asks_elsewhere_ = false;
     for (std::size_t i = 0; i < kStages; ++i) {
       shifted_ = motion_.start() + z_[i];
       const double elapsed = kNodes[i] * h;
@@ -296,6 +299,8 @@ class Radau final : public IntegratorPlugin {
     last_step_ = h;
     last_start_ = motion_.start();
     last_z_ = z_;
+    // with `Smooth` the last question tells what joints bear
+    if (asks_elsewhere_) motion_.evaluate(h, last_start_ + z_[kStages - 1], &shifted_rate_);
     motion_.accept(h, motion_.start() + z_[kStages - 1]);
     has_rate_ = is_fresh_ = false;
     has_matrix_ = rate_ <= kKeeps;
@@ -326,6 +331,7 @@ class Radau final : public IntegratorPlugin {
   double last_step_ = 0.0;  // of the inner step before
   Stages last_z_;
   Eigen::VectorXd last_start_;
+  bool asks_elsewhere_ = false;  // than in the stages, last
   Eigen::VectorXd rate_at_start_, shifted_rate_, error_vector_, shifted_, mean_rate_, bent_;
   std::vector<double> room_;
 };

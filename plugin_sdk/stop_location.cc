@@ -1,0 +1,83 @@
+#include "plugin_sdk/stop_location.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "plugin_sdk/math/hermite.h"
+#include "plugin_sdk/math/rotation.h"
+#include "plugin_sdk/solver/joint_laws.h"
+
+namespace gravitas {
+namespace {
+
+constexpr double kSlop = 1e-8;      // of the arm, m, or rad: what reactions take for none
+constexpr double kRounding = 1e-6;  // of coordinates, which a gap is told from as from an arm
+constexpr double kBend = 2.0;       // by so much more than the straight way back a gap may have been less
+constexpr int kLooks = 16;          // at the cubic, which turns twice at most
+constexpr int kHalvings = 60;
+
+}  // namespace
+
+bool StopGap::may_have_closed(double time) const {
+  return exists() && (gap < 0.0 || (rate > 0.0 && gap < kBend * rate * time));
+}
+
+std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const StopBody& body1,
+                                           const StopBody& body2) {
+  std::array<StopGap, kStopsOfRow> stops;
+  const Matrix3 axes = to_rotation_matrix(discrepancy.axes);
+  const Vector3 error = discrepancy.point2 - discrepancy.point1;
+  const Vector3 middle = 0.5 * (discrepancy.point1 + discrepancy.point2);
+  double slop = kSlop, reach = 1.0;
+  if (!discrepancy.is_angular()) {
+    double arm = 0.0;
+    for (const StopBody* body : {&body1, &body2})
+      if (body->is_pushed) arm = std::max(arm, (middle - body->centre).norm());
+    slop = kSlop * arm;
+    reach = arm + kRounding * middle.cwiseAbs().maxCoeff();
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const AxisMode mode = axis_mode(discrepancy.modes, axis);
+    const bool is_limited = mode == AxisMode::kLimited && discrepancy.lower[axis] < discrepancy.upper[axis];
+    if ((!is_limited && mode != AxisMode::kUnilateral) || discrepancy.compliance[axis] > 0.0) continue;
+    const bool is_radial = discrepancy.is_radial() && axis == 0;
+    const double length = error.norm();
+    const Vector3 along = is_radial && length > 0.0 ? Vector3(error / length) : Vector3(axes.col(axis));
+    const double value = is_radial ? length : along.dot(error);
+    const JacobianRow row = jacobian_row(discrepancy, along, body1.centre, body2.centre);
+    const Twist &one = body1.velocity, &two = body2.velocity;
+    const double rate =
+        row.velocity(one.linear, one.angular, two.linear, two.angular) - along.dot(discrepancy.velocity);
+    const double speeds = std::fabs(row.linear1.dot(one.linear)) + std::fabs(row.angular1.dot(one.angular)) +
+                          std::fabs(row.linear2.dot(two.linear)) + std::fabs(row.angular2.dot(two.angular));
+    const double still = still_rate(speeds);
+    const auto place = 2 * static_cast<std::size_t>(axis);
+    const double lower = is_limited ? discrepancy.lower[axis] : 0.0;
+    if (lower > -kUnlimited) stops[place] = {value - lower, rate, slop, reach, still};
+    if (is_limited && discrepancy.upper[axis] < kUnlimited)
+      stops[place + 1] = {discrepancy.upper[axis] - value, -rate, slop, reach, still};
+  }
+  return stops;
+}
+
+double closing_time(const StopGap& from, const StopGap& to, double length) {
+  const auto gap_at = [&](double share) {
+    return hermite_point(from.gap, from.rate, to.gap, to.rate, length, share).value;
+  };
+  double open = 0.0, closed = -1.0, lowest = 0.0;
+  for (int look = 1; look <= kLooks; ++look) {
+    const double share = static_cast<double>(look) / kLooks, gap = gap_at(share);
+    lowest = std::min(lowest, gap);
+    if (gap < 0.0 && closed < 0.0) closed = share;
+    if (closed < 0.0) open = share;
+  }
+  if (closed < 0.0 || !(lowest < -to.slop)) return std::numeric_limits<double>::infinity();
+  for (int halving = 0; halving < kHalvings; ++halving) {
+    const double middle = 0.5 * (open + closed);
+    (gap_at(middle) < 0.0 ? closed : open) = middle;
+  }
+  return closed * length;
+}
+
+}  // namespace gravitas

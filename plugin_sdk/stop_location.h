@@ -1,0 +1,43 @@
+// Where a stop of a joint closes on the way between two states: decisions from the gap of one stop and its rate in both.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/math/types.h"
+
+namespace gravitas {
+
+// A stop of a joint in a state: one side of an axis that limits its error rigidly and leaves it room.
+struct StopGap {
+  double gap = kUnlimited;  // of the error to it, m or rad; below 0 beyond it
+  double rate = 0.0;        // of the gap, m/s or rad/s
+  double slop = 0.0;        // gap that is none
+  double reach = 1.0;       // m that a rad counts as: arms and coordinates; 1 of turns
+  double still = 0.0;       // rate that is none
+
+  bool exists() const { return gap < kUnlimited; }
+  // Bears nothing from here on: it is away, or goes away.
+  bool is_open() const { return exists() && (gap > slop || rate > still); }
+  // May have closed in a time that ends here, as far as this state alone tells.
+  bool may_have_closed(double time) const;
+};
+
+// Lower and upper stop of each axis, in turn. Bodies as they are in the state for which the discrepancy was told; of the world
+// all is zero.
+struct StopBody {
+  Vector3 centre = Vector3::Zero();
+  Twist velocity = {};
+  bool is_pushed = false;
+};
+constexpr std::size_t kStopsOfRow = 6;
+std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const StopBody& body1,
+                                           const StopBody& body2);
+
+// The time (s) from the first state on at which an open stop closes, on the cubic through both gaps with their rates; infinite
+// where that does not come beyond the slop of the second state in `length`. Precondition: the first gap is at least 0.
+double closing_time(const StopGap& from, const StopGap& to, double length);
+
+}  // namespace gravitas
