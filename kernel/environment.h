@@ -229,6 +229,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   void join_start_velocities();
   void add_start_impulses();
   bool lets_go_of_limits();
+  void note_what_joints_take();
+  static std::string why_joints_took(double share, std::uint32_t step);
   // stops.cc: inner steps that end where stops are met.
   void meet_stops(double begin, double length);
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
@@ -369,17 +371,18 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::vector<State> states_;  // a third one, S_n, where there are inner steps; kSpareState for attempts at them
   StepData data_;
   Validator validator_;
-  std::size_t front_ = 0, back_ = 1, start_ = 2;  // start_: S_n, from the second inner step on
-  std::uint32_t step_count_ = 0, inner_ = 0;      // inner steps of this step so far
-  double inner_end_ = 0.0;                        // of the inner step that is being made, s after S_n
-  double asked_from_ = 0.0, asked_until_ = 0.0;   // times at which forces may be asked, between two jumps
-  bool must_restart_ = false;                     // another plugin came in, and it makes the whole step
-  bool has_newcomer_ = false;                     // then nothing of the attempt before stays
-  std::uint32_t times_finer_ = 1;                 // are the inner steps of this step
-  std::pair<double, std::uint32_t> turned_far_;   // in the finest ones, since warnings() told of it
-  bool ends_at_switch_ = false;                   // a force jumps at the end of what is being made
-  std::vector<std::uint32_t> broken_;             // joints, under their load in the inner step that is being made
-  std::optional<Trusted<Pairs>> pairs_;           // the last
+  std::size_t front_ = 0, back_ = 1, start_ = 2;      // start_: S_n, from the second inner step on
+  std::uint32_t step_count_ = 0, inner_ = 0;          // inner steps of this step so far
+  double inner_end_ = 0.0;                            // of the inner step that is being made, s after S_n
+  double asked_from_ = 0.0, asked_until_ = 0.0;       // times at which forces may be asked, between two jumps
+  bool must_restart_ = false;                         // another plugin came in, and it makes the whole step
+  bool has_newcomer_ = false;                         // then nothing of the attempt before stays
+  std::uint32_t times_finer_ = 1;                     // are the inner steps of this step
+  std::pair<double, std::uint32_t> turned_far_;       // in the finest ones, since warnings() told of it
+  std::pair<double, std::uint32_t> taken_by_joints_;  // share of velocities, and the step, since warnings() (Smooth)
+  bool ends_at_switch_ = false;                       // a force jumps at the end of what is being made
+  std::vector<std::uint32_t> broken_;                 // joints, under their load in the inner step that is being made
+  std::optional<Trusted<Pairs>> pairs_;               // the last
   Extrapolation extrapolation_, jumps_;
   static constexpr std::uint32_t kMostPieces = 8;                                     // of a part that is extrapolated
   std::vector<double> first_changes_[kMostPieces], trial_changes_, scales_, missed_;  // of velocities

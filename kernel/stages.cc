@@ -36,6 +36,8 @@ std::vector<std::string> Environment::warnings() {
                     " ms in a call, longer than its deadline; direct hosting cannot interrupt it");
   }
   if (const auto [turn, body] = std::exchange(turned_far_, {}); turn > 0.0) lines.push_back(why_turned_far(turn, body));
+  if (const auto [share, step] = std::exchange(taken_by_joints_, {}); share > 0.0)
+    lines.push_back(why_joints_took(share, step));
   for (StageSlot* slot : slots_)
     for (const std::string& complaint : slot->take_complaints())
       lines.push_back(std::string("worker of slot ") + slot_name(slot->which()) + ": " + complaint);

@@ -138,6 +138,7 @@ std::optional<Trusted<Solution>> Environment::react(const Trusted<TrialState>& t
     // S* was integrated with what lets go
     borne_.assign(data_.held_force.span().begin(), data_.held_force.span().end());
     while (lets_go_of_limits()) solution.emplace(solve());
+    note_what_joints_take();
     std::ranges::copy(borne_, data_.held_force.data());
   }
   if (knows_reactions() && may_jump_at_start()) add_start_impulses();

@@ -98,6 +98,47 @@ bool Environment::lets_go_of_limits() {
   return any;
 }
 
+// Derivatives know the joints, so that at the step's end these have next to nothing to take of the velocities, but where a stop
+// closes or a drive slips. Where they take much, the mechanism has passed a place where its rows depend on each other, as a
+// parallelogram that lies flat, and a stage fell on it; or the step is long for the integrator. Energy is lost or gained then.
+void Environment::note_what_joints_take() {
+  constexpr double kMuch = 0.05;  // of the velocities
+  constexpr double kOfHeld = 1e-3, kOfLoad = 1e-6;
+  const DiscrepancyAnswer& joints = data_.discrepancies;
+  const double h = data_.time_step[0];
+  if (!broken_.empty()) return;
+  for (std::size_t i = 0; i < data_.discrepancy_impulse.size(); ++i) {
+    const AxisMode mode = axis_mode(joints.mode[i / 3], static_cast<int>(i % 3));
+    const bool holds = mode == AxisMode::kLocked || (mode == AxisMode::kLimited && joints.lower[i] == joints.upper[i]);
+    if (!holds && std::abs(data_.discrepancy_impulse[i]) > kOfHeld * h * std::abs(data_.held_force[i])) return;
+  }
+  double taken = 0.0, all = 0.0;
+  for (std::uint32_t i = 0; i < model_.body_count; ++i) {
+    if (!is_awake(i) || !(model_.inverse_mass[i] > 0.0)) continue;
+    const auto energy = [&](const Vector3& velocity, const Vector3& spin) {
+      const Vector3 turning = quaternion_at(data_.trial_orientation.span(), i).conjugate() * spin;
+      return velocity.squaredNorm() / model_.inverse_mass[i] +
+             turning.cwiseAbs2().dot(vector_at(model_.inertia.span(), i));
+    };
+    const Vector3 velocity = vector_at(data_.trial_linear_velocity.span(), i);
+    const Vector3 spin = vector_at(data_.trial_angular_velocity.span(), i);
+    taken += energy(vector_at(data_.solved_linear_velocity.span(), i) - velocity,
+                    vector_at(data_.solved_angular_velocity.span(), i) - spin);
+    // what rests is moved by roundings of its load
+    all += energy(velocity, spin) +
+           energy(kOfLoad * h * model_.inverse_mass[i] * vector_at(data_.reaction.span(), 2 * i), Vector3::Zero());
+  }
+  if (taken > kMuch * kMuch * all)
+    taken_by_joints_ = std::max(taken_by_joints_, std::pair(std::sqrt(taken / all), step_count_ + 1));
+}
+
+std::string Environment::why_joints_took(double share, std::uint32_t step) {
+  return "in step " + std::to_string(step) + " the joints took or gave " + std::to_string(std::lround(100.0 * share)) +
+         " % of the velocities at its end: a mechanism was where the rows of its joints depend on each other, or "
+         "TimeStep is too "
+         "long for the integrator; energy may be lost or gained";
+}
+
 // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
 std::uint64_t Environment::most_reaction_blocks() const {
   if (!has_capability(solver_.description().plugins[0].declaration, "reaction_jacobians")) return 0;

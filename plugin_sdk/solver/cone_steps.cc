@@ -70,7 +70,9 @@ double ConeProblem::residual_of(const Eigen::VectorXd& lambda, const Eigen::Vect
     project(block, &lambda[block.first], &y[block.first], projected);
     for (std::uint32_t k = 0; k < block.count; ++k) {
       const std::uint32_t r = other_[block.first + k];
-      worst = std::max(worst, std::fabs(lambda[block.first + k] - projected[k]) * way_of(r));
+      const double missed = std::fabs(lambda[block.first + k] - projected[k]) * way_of(r);
+      if (!std::isfinite(missed)) return std::numeric_limits<double>::infinity();
+      worst = std::max(worst, missed);
     }
   }
   return worst;

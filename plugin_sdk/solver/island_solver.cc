@@ -86,7 +86,7 @@ void IslandSolver::leave_out_wandering(double last_change) {
 }
 
 IslandSolver::PoseChange IslandSolver::pose_change() const {
-  PoseChange change{displacement_, offset_, offset_moment_, {}, {}, has_pose_};
+  PoseChange change{displacement_, offset_, offset_moment_, {}, {}, has_pose_, pose_contradiction_};
   for (const EndJoint& joint : joints_)
     for (std::size_t k = 0; k < 3; ++k) change.of_joints.push_back(answer_.joint_correction[3 * joint.row + k]);
   for (const EndContact& contact : contacts_) change.of_contacts.push_back(answer_.contact_correction[contact.row]);
@@ -97,6 +97,7 @@ void IslandSolver::take(const PoseChange& change) {
   offset_ = change.offset;
   offset_moment_ = change.offset_moment;
   has_pose_ = change.has_converged;
+  pose_contradiction_ = change.contradiction;
   auto of_joint = change.of_joints.begin();
   for (const EndJoint& joint : joints_)
     for (std::size_t k = 0; k < 3; ++k) answer_.joint_correction[3 * joint.row + k] = *of_joint++;

@@ -48,6 +48,7 @@ class IslandSolver {
     std::vector<Vector3> offset_moment;
     std::vector<double> of_joints, of_contacts;  // corrections
     bool has_converged;
+    double contradiction;
   };
   PoseChange pose_change() const;
   void take(const PoseChange& change);

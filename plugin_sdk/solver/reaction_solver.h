@@ -138,6 +138,7 @@ class ReactionSolver {
   Holding holding_at_start(const Discrepancy& d, int axis, const Row& row) const;
   // The multipliers of the rows that hold. Returns what they are missed by.
   double solve_held();
+  double find_multipliers();
   // Lets go of what bears more than it can; holds again what closes without; leaves to the end of the step what reaches its
   // velocity in it. False where nothing is to change.
   bool change_holdings();

@@ -58,6 +58,18 @@ double ReactionSolver::solve_held() {
   make_rows();
   factorise(0.0);
   if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
+  double missed = find_multipliers();
+  // Dependent rows contradict each other by what the state is off the joints. Left out in some states that an integrator tries and
+  // made to agree in others, they would have it lose its order.
+  if (missed > 0.0 && !agrees_) {
+    agree_with_joints();
+    missed = find_multipliers();
+  }
+  if (!agrees_) share_out();
+  return missed;
+}
+
+double ReactionSolver::find_multipliers() {
   accelerate();
   std::vector<double>& side = multipliers_;
   side.resize(rows_.size());
@@ -66,10 +78,11 @@ double ReactionSolver::solve_held() {
     const double along = row.direction.along(bodies_[row.body1].acceleration, bodies_[row.body2].acceleration);
     side[i] = -(row.gamma + along) / row.scale;
   }
-  const double missed = factor_.make_consistent(&side);
+  double largest = 0.0;  // what is missed is scaled
+  for (const Row& row : rows_) largest = std::max(largest, row.scale);
+  const double missed = largest * factor_.make_consistent(&side);
   factor_.solve(&side);
   for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
-  if (!agrees_) share_out();
   return missed;
 }
 
