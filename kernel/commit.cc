@@ -30,6 +30,7 @@ StepOutcome Environment::step() {
       if (!std::exchange(has_newcomer_, false)) continue;
       times_finer_ = 1;
       find_sleepers();
+      if (has_new_forces_) ask_forces();
     }
     finish_step();
   } catch (...) {
@@ -124,13 +125,16 @@ void Environment::return_to_start() {
 void Environment::finish_step() {
   // begun when the last answer had been checked
   const std::uint64_t start = lap_ns_;
-  ++step_count_;
   settle();
   is_idle_ = inner_ == 0;
   if (!is_idle_) state_hash_ = kernel::state_hash(front());
   inner_ = 0;
   is_anew_ = false;
   chain_hash_ = gravitas::chain_hash(chain_hash_, state_hash_);
+  // what takes memory may fail: only now the state is S_{n+1}
+  ++step_count_;
+  wakes_all_ = false;
+  wake_orders_.clear();
   lap_ns_ = lap_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_between(start, lap_ns_));
 }

@@ -52,6 +52,10 @@ std::string validate_joint(const EnvironmentDescription& d, const ConstraintDesc
 
 }  // namespace
 
+bool is_same_plugin(const PluginChoice& a, const PluginChoice& b) {
+  return a.library == b.library && a.command == b.command && a.address == b.address && a.settings == b.settings;
+}
+
 std::string why_apart(const std::vector<PluginChoice>& plugins) {
   const auto is_apart = [&](const PluginChoice& one) {
     return !one.command.empty() || one.address != plugins[0].address;

@@ -45,6 +45,9 @@ struct PluginChoice {
   bool is_elsewhere() const { return !command.empty() || !address.empty(); }
 };
 
+// True if the same answers.
+bool is_same_plugin(const PluginChoice& a, const PluginChoice& b);
+
 // Why one process cannot hold these; empty if it can.
 std::string why_apart(const std::vector<PluginChoice>& plugins);
 
@@ -139,6 +142,8 @@ struct EnvironmentDescription {
   std::vector<double> material_pairs = std::vector<double>(6, 0.0);
   std::vector<BodyDescription> bodies;
   std::vector<ForceDescription> forces;
+  // In each step, though all may say at the start that their wrenches are constant: whoever answered before them did not.
+  bool asks_forces = false;
   // Times at which forces or motions jump or bend, s, rising: inner steps end there, and ask forces on their own side.
   std::vector<double> switches;
   std::vector<ConstraintDescription> constraints;

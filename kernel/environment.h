@@ -117,6 +117,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   // True while the joint holds.
   bool is_intact(std::uint32_t constraint) const { return front().intact[constraint] != 0; }
 
+  // False where all said at the start that they are constant.
+  bool asks_forces() const { return !wrench_is_constant_; }
   // What the forces report as potential energy in the committed state, J.
   double potential_energy();
 
@@ -153,7 +155,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   const DurationHistogram& validation_time(Stage stage) const { return validation_[static_cast<std::size_t>(stage)]; }
   const DurationHistogram& step_time() const { return step_profile_; }
 
-  // With the next step the island of a body is awake, if it sleeps. To be given again after a resume before that.
+  // With the next step the island of a body is awake, if it sleeps.
   void wake(std::uint32_t body) { wake_orders_.push_back(body); }
   std::span<const std::uint32_t> wake_orders() const { return wake_orders_; }
   bool is_asleep(std::uint32_t body) const { return can_sleep() && front().rested[body] == kAsleep; }
@@ -290,6 +292,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   const Column<double>& told_wrench() const { return knows_reactions() ? data_.wrench_with_reactions : data_.wrench; }
   void begin_attempt(bool counts) override;
   void evaluate() override;
+  // Of S_n, until all are answered by the same plugins.
+  void ask_forces();
   // At the time in data_.derivative_time.
   void ask_forces(const Column<double>& position, const Column<double>& orientation,
                   const Column<double>& linear_velocity, const Column<double>& angular_velocity);
@@ -377,6 +381,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   double asked_from_ = 0.0, asked_until_ = 0.0;       // times at which forces may be asked, between two jumps
   bool must_restart_ = false;                         // another plugin came in, and it makes the whole step
   bool has_newcomer_ = false;                         // then nothing of the attempt before stays
+  bool has_new_forces_ = false;                       // one for forces, and not all are answered by it
   std::uint32_t times_finer_ = 1;                     // are the inner steps of this step
   std::pair<double, std::uint32_t> turned_far_;       // in the finest ones, since warnings() told of it
   std::pair<double, std::uint32_t> taken_by_joints_;  // share of velocities, and the step, since warnings() (Smooth)
@@ -397,7 +402,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::uint32_t sleepers_ = 0;               // in this step
   bool wakes_all_ = false;                   // with the next step
   bool is_idle_ = false;                     // nothing moved in the last step, and nothing has come up since
-  std::vector<std::uint32_t> wake_orders_;   // of the user
+  std::vector<std::uint32_t> wake_orders_;   // with the next step
   std::vector<std::uint32_t> pushed_;        // asleep, under another force than before
   std::vector<std::uint32_t> joint_bodies_;  // scratch of connections()
   std::vector<MergedRow> merged_;            // scratch

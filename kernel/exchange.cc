@@ -125,9 +125,14 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   for (const ConstraintGroup& group : model_.constraint_groups)
     if (slot.which() == Slot::kConstraint && group.target == target) bind(group);
   must_restart_ = has_newcomer_ = true;
+  has_new_forces_ |= slot.which() == Slot::kForce;
   count_jacobian_blocks();
   if (now.name == before.declaration.name) return;
   wakes_all_ = true;
+  // for who goes on from S_n elsewhere
+  wake_orders_.clear();
+  for (std::uint32_t i = 0; i < model_.body_count; ++i)
+    if (is_asleep(i)) wake_orders_.push_back(i);
   find_sleepers();
   if (slot.which() == Slot::kIntegrator) {
     data_.theta[0] = now.theta;

@@ -18,6 +18,15 @@ void Environment::ask_forces(const Column<double>& position, const Column<double
   }
 }
 
+void Environment::ask_forces() {
+  data_.derivative_time[0] = time();
+  do {
+    has_new_forces_ = false;
+    ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
+  } while (has_new_forces_);
+  count_jacobian_blocks();
+}
+
 void Environment::sum_wrenches() {
   const std::span<double> sum = data_.wrench.span();
   std::ranges::fill(sum, 0.0);
@@ -34,7 +43,8 @@ bool Environment::is_constant(std::size_t group) const {
 
 void Environment::count_jacobian_blocks() {
   std::uint64_t blocks = knows_reactions() ? most_reaction_blocks() : 0;
-  bool can_all = !knows_reactions() || blocks > 0;
+  // who came in has not said yet what is constant
+  bool can_all = !has_new_forces_ && (!knows_reactions() || blocks > 0);
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];
     if (is_constant(g)) continue;
@@ -99,10 +109,7 @@ void Environment::evaluate() {
 }
 
 double Environment::potential_energy() {
-  if (force_.is_running()) {
-    data_.derivative_time[0] = time();
-    ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
-  }
+  if (force_.is_running()) ask_forces();
   double sum = 0.0;
   for (const Model::Application& one : model_.applications) {
     const ForceAnswer& answer = data_.force_answers[one.group];

@@ -83,10 +83,10 @@ void Environment::bind(const ConstraintGroup& group) {
 // Forces are asked in the initial state. If all say that it is their answer for ever, their host is let go.
 void Environment::ask_constant_forces() {
   if (!force_.is_running()) return;
-  data_.derivative_time[0] = 0.0;
-  ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
+  ask_forces();
   sum_wrenches();
 
+  wrench_is_constant_ = !description_.asks_forces;
   std::ranges::fill(data_.impulse.span(), 0.0);
   for (std::size_t g = 0; g < model_.force_groups.size(); ++g) {
     const ForceGroup& group = model_.force_groups[g];

@@ -112,7 +112,8 @@ double Environment::length_of_step(std::uint32_t step) const {
 }
 
 SavedState Environment::saved_state() const {
-  SavedState saved{step_count_, length_of_step(step_count_), is_anew_, state_hash_, chain_hash_, figures_, {}};
+  SavedState saved{step_count_, length_of_step(step_count_), is_anew_, state_hash_, chain_hash_, figures_, wake_orders_,
+                   {}};
   front().visit_columns([&](const char* name, StateRows, std::uint32_t, const auto& column) {
     saved.columns.push_back({name, std::span(column.data(), column.size())});
   });
@@ -131,6 +132,8 @@ std::string Environment::find_misfit(const SavedState& saved) const {
            " s: a shortened last step can neither be continued nor be made of a whole one";
   for (const double figure : {saved.figures.penetration, saved.figures.joint_error})
     if (!std::isfinite(figure) || figure < 0.0) return "its overlap or joint error is impossible";
+  for (const std::uint32_t body : saved.wake_orders)
+    if (body >= model_.body_count) return "it wakes a body that there is not";
   if (saved.step == 0 && !(saved.state_hash == state_hash_)) return "it is another initial state";
   return {};
 }
@@ -157,6 +160,7 @@ std::string Environment::restore(const SavedState& saved) {
   }
   std::swap(front_, back_);
   wakes_all_ = is_idle_ = false;
+  wake_orders_ = saved.wake_orders;
   step_count_ = saved.step;
   is_anew_ = saved.is_anew;
   figures_ = saved.figures;

@@ -29,7 +29,8 @@ struct SavedState {
   bool is_anew = false;      // of the scene, or made by an edit: no step
   Hash state_hash, chain_hash;
   CommitFigures figures;
-  std::vector<SavedColumn> columns;  // all of State::visit_columns(), in its order
+  std::vector<std::uint32_t> wake_orders;  // bodies that are awake with the next step
+  std::vector<SavedColumn> columns;        // all of State::visit_columns(), in its order
 };
 
 }  // namespace gravitas::kernel

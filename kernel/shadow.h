@@ -33,6 +33,9 @@ class Shadow {
     result_.first_ns += first_ns, result_.second_ns += second_ns;
   }
 
+  // From here on, be it while answers are compared.
+  void count_anew() { result_ = {}; }
+
   bool last_differed() const { return last_differed_; }
   const Comparison& result() const { return result_; }
 

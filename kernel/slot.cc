@@ -8,14 +8,6 @@
 #include "plugin_sdk/checks.h"
 
 namespace gravitas::kernel {
-namespace {
-
-bool is_same_plugin(const PluginChoice& a, const PluginChoice& b) {
-  return a.library == b.library && a.command == b.command && a.address == b.address && a.settings == b.settings;
-}
-
-}  // namespace
-
 StageSlot::StageSlot(Slot which, SlotDescription description) : which_(which), description_(std::move(description)) {}
 
 void StageSlot::find_hosts(std::span<StageSlot* const> slots, std::uint32_t threads, const HostStarter& starter) {
@@ -221,16 +213,22 @@ void StageSlot::note_recovery(const Attempts& attempts) {
 }
 
 void StageSlot::let_all_adopt(const SlotHost& host, const std::string& why) {
-  for (StageSlot* slot : slots_) slot->adopt(host, why, slot == this);
+  const std::uint32_t revision = host.revision();
+  for (StageSlot* slot : slots_)
+    if (host.revision() == revision) slot->adopt(host, why, slot == this);
 }
 
 void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) {
   const SlotDescription& now = host.description();
-  for (std::uint32_t target = 0; target < routes_.size(); ++target) {
+  needs_attention_ = true;
+  // who comes in is asked, and may fail: then all have adopted who came after
+  const std::uint32_t revision = host.revision();
+  for (std::uint32_t target = 0; target < routes_.size() && host.revision() == revision; ++target) {
     if (hosts_.empty() || &host_of(target) != &host) continue;
     // who answers for comparison has the plugins of before
     const std::size_t place = routes_[target].host;
-    if (place < rerun_.checkers.size()) hosts_[place]->retire(std::move(rerun_.checkers[place]));
+    if (place < rerun_.checkers.size())
+      hosts_[place]->retire(std::move(std::exchange(rerun_.checkers[place], {}).process));
     const PluginChoice& plugin = now.plugins[routes_[target].target];
     if (!by_us && now.hosting == description_.hosting && is_same_plugin(plugin, description_.plugins[target])) continue;
     const PluginChoice before = std::exchange(description_.plugins[target], plugin);
@@ -240,7 +238,6 @@ void StageSlot::adopt(const SlotHost& host, const std::string& why, bool by_us) 
     observer_->on_decision({which_, target, step_, why, &now, &description_.plugins[target]});
     observer_->on_plugin_change(*this, target, before);
   }
-  needs_attention_ = true;
 }
 
 }  // namespace gravitas::kernel

@@ -135,9 +135,13 @@ class StageSlot {
     SlotHost* host;
     std::size_t record;
   };
+  struct Checker {
+    std::unique_ptr<Carrier> process;
+    bool is_lacking = false;  // it could not be started, which takes its time
+  };
   struct Rerun {
     std::uint32_t every = 0;
-    std::vector<std::unique_ptr<Carrier>> checkers;  // per host
+    std::vector<Checker> checkers;  // per host
   };
 
   SlotHost& host_of(std::uint32_t target) { return *hosts_[routes_[target].host]; }

@@ -110,7 +110,7 @@ void StageSlot::count_anew(PendingSwap* comparison, bool is_other) {
     swaps_.push_back(std::move(before));
     swaps_[comparison->record].since = step_;
   }
-  comparison->shadow = {};
+  comparison->shadow.count_anew();
 }
 
 void StageSlot::advance_swaps() {
@@ -165,6 +165,8 @@ void StageSlot::cut_over(PendingSwap* swap) {
   record.shadow = swap->shadow.result();
   host.cut_over(which_, std::move(swap->candidate), std::move(swap->next));
   probation_.push_back({&host, swap->record});
+  // who comes in is asked already: a comparison that is lost in that would be taken out from under this swap
+  is_watched_ = false;
   let_all_adopt(host, "swap");
   swaps_[swap->record].pause_us = microseconds(start);
 }
@@ -267,7 +269,9 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   };
   const std::uint32_t revision = host.revision(), revisions_before = revisions();
   rerun_.checkers.resize(hosts_.size());
-  std::unique_ptr<Carrier> checker = std::move(rerun_.checkers[place]);
+  Checker& kept = rerun_.checkers[place];
+  if (kept.is_lacking) return;
+  std::unique_ptr<Carrier> checker = std::move(kept.process);
   // whether it gave other bytes
   const auto differs = [&] {
     Shadow shadow;
@@ -281,14 +285,19 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   };
   // `unknown` is what holds where nobody else can be asked
   const auto is_doubted = [&](bool unknown) {
+    std::string why;
     for (int tries = 0; !checker && tries < 2; ++tries) {
       try {
         checker = host.prepare(host.description())->take();
       } catch (const StageFault& fault) {
-        complaints_.push_back("no other process for a re-run: " + fault.text());
+        why = fault.text();
       }
     }
-    if (!checker) return unknown;
+    if (!checker) {
+      complaints_.push_back("no other process for a re-run, and none is looked for any more: " + why);
+      kept.is_lacking = true;
+      return unknown;
+    }
     try {
       return differs();
     } catch (const StageFault& fault) {
@@ -302,7 +311,7 @@ void StageSlot::rerun(const StageCall& call, Arena* arena, DerivativeSource* der
   };
   const auto keep = [&] {
     if (host.revision() != revision) return host.retire(std::move(checker));
-    rerun_.checkers[place] = std::move(checker);
+    kept.process = std::move(checker);
   };
   if (!is_doubted(false)) return keep();
   if (checker) {

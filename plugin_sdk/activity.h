@@ -18,7 +18,8 @@
 // Asleep, a body has velocity 0, and nothing moves it until its whole island is woken: by a contact or a joint with what
 // moves, by the user, by another plugin in a slot, or by a force that changes; and while forces change, nothing rests.
 // A force has changed when the difference to what it was when the rest began, were it alone, would in SleepRule::time
-// bring the body to SleepRule::energy. A joint whose drive depends on time alone wakes nobody; no shipped one does.
+// bring the body to SleepRule::energy. A joint whose drive depends on time alone wakes nobody: it
+// must keep its bodies awake (no kCanSleep), as services/scene has those that follow a table.
 #pragma once
 
 #include <cstdint>

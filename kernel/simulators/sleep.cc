@@ -94,8 +94,6 @@ Connections Environment::connections() {
 
 // The last inner step has become the state in front.
 void Environment::settle() {
-  wakes_all_ = false;
-  wake_orders_.clear();
   if (!can_sleep() || inner_ == 0) return;
   const State& next = front();
   for (std::uint32_t i = 0; i < model_.body_count; ++i)

@@ -197,7 +197,12 @@ class ReactionSolver {
   // counts for more than its size: redundant ones are dependent no more (pivots of e^2, which no rounding explains), and
   // near a singular configuration, at a distance x, directions are off by e/x^2. So the question is answered for the
   // nearest state that agrees with the joints, in pose and in velocity; where there is none, for the one asked.
-  void agree_with_joints();
+  //
+  // Next to the place itself such a state may lie on another branch than the one that the bodies are on, whose velocities are others:
+  // where much of them were taken away, it is looked for a little ahead of the state, where branches are apart.
+  void agree_with_joints(bool is_beside = false);
+  bool leads_elsewhere(const std::vector<Twist>& change) const;
+  void go_ahead(double turn_off);
   void move(const std::vector<Twist>& change);
   std::vector<double> errors(double Row::*of) const;
 

@@ -410,7 +410,7 @@ bool ReactionSolver::is_amplifying() const {
   return largest > kMuch;
 }
 
-void ReactionSolver::agree_with_joints() {
+void ReactionSolver::agree_with_joints(bool is_beside) {
   constexpr int kRounds = 12;
   constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
   const std::vector<Body> asked = bodies_;
@@ -448,12 +448,46 @@ void ReactionSolver::agree_with_joints() {
   const double least = std::max({kSingular, kMargin * turn * turn, turn > kRounding ? kStuck * turn : 0.0});
   if (has_moved_ || factor_.least_pivot() < least) factorise(least);
   const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
+  if (!is_beside && leads_elsewhere(change)) {
+    bodies_ = asked;
+    has_moved_ = asked_elsewhere;
+    go_ahead(far);
+    return agree_with_joints(true);
+  }
   for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
     bodies_[i].velocity.linear += change[i].linear;
     bodies_[i].velocity.angular += change[i].angular;
   }
   agrees_ = true;
   make_rows();
+}
+
+bool ReactionSolver::leads_elsewhere(const std::vector<Twist>& change) const {
+  constexpr double kMuch = 0.05;  // of the velocities
+  double taken = 0.0, all = 0.0;
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+    const Body& body = bodies_[i];
+    if (!(body.inverse_mass > 0.0)) continue;
+    const auto energy = [&](const Twist& of) {
+      const Vector3 turning = body.pose.orientation.conjugate() * of.angular;
+      return of.linear.squaredNorm() / body.inverse_mass + turning.cwiseAbs2().dot(vector_at(request_->inertia(), i));
+    };
+    taken += energy(change[i]), all += energy(body.velocity);
+  }
+  return taken > kMuch * kMuch * all;
+}
+
+void ReactionSolver::go_ahead(double turn_off) {
+  constexpr double kLeast = 1e-3, kOfError = 20.0;  // rad; of what the state is off by
+  make_rows();
+  double fastest = 0.0;
+  for (const Row& row : rows_)
+    fastest = std::max(fastest, (bodies_[row.body2].velocity.angular - bodies_[row.body1].velocity.angular).norm());
+  if (!(fastest > 0.0)) return;
+  const double time = std::max(kLeast, kOfError * turn_off) / fastest;
+  std::vector<Twist> way;
+  for (const Body& body : bodies_) way.push_back({time * body.velocity.linear, time * body.velocity.angular});
+  move(way);
 }
 
 void ReactionSolver::move(const std::vector<Twist>& change) {

@@ -161,12 +161,13 @@ void add_run(CLI::App* app, Action* action) {
                       "Go on from this checkpoint; --steps and --duration count from t = 0. Files of output hold what "
                       "follows it");
   add_list(command, "--swap", &options.swaps,
-           "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N; repeatable");
+           "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N (from 1, so "
+           "at (N - 1) TimeStep); repeatable");
   add_list(
       command, "--edit", &options.edits,
-      "Change the scene while the simulation runs, before step N: \"add FILE@step=N\", \"remove Body.Ball@step=N\", "
-      "\"set Body.Ball.Position={0,1,0}@step=N\"; FILE holds Geometries, Materials, Forces, Bodies, Constraints; "
-      "changes before the same step are one; repeatable");
+      "Change the scene while the simulation runs, before step N (from 1, so at (N - 1) TimeStep): \"add "
+      "FILE@step=N\", \"remove Body.Ball@step=N\", \"set Body.Ball.Position={0,1,0}@step=N\"; FILE "
+      "holds Geometries, Materials, Forces, Bodies, Constraints; changes before the same step are one; repeatable");
   add_comparisons(command, &options.comparisons);
   add_list(command, "--rerun", &options.reruns,
            "Ask another process the same in every N-th step and take the majority's bytes: SLOT=N; repeatable");

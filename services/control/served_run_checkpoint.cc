@@ -91,7 +91,9 @@ void ServedRun::keep_checkpoint(const JournalReading& known) {
 std::optional<ServedRun::Saved> ServedRun::save_checkpoint() {
   return between_steps([this]() -> std::optional<Saved> {
     if (!recorder_->keeps()) return {};
-    if (recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
+    // whom to wake may have been ordered since
+    if (recorder_->saved_step() != environment_->step_count() || !environment_->wake_orders().empty())
+      recorder_->save(*environment_);
     checkpoint_ = recorder_->path();
     resume_command_ = command_to_resume();
     return Saved{recorder_->saved_step().value(), resume_command_};
@@ -154,8 +156,6 @@ std::string ServedRun::command_to_resume() {
       add_warning(fmt::format("settings of {} for step {} are not part of the command that goes on: it has the scene's",
                               plugin.declaration.name, step));
   }
-  if (!environment_->wake_orders().empty())
-    add_warning("whom to wake before the next step is not part of the command that goes on");
   return resume_command(options, hosting_words_, checkpoint_);
 }
 

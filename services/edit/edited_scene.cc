@@ -415,7 +415,7 @@ std::vector<std::array<std::uint32_t, 2>> EditedScene::hand_over(const kernel::E
     motion[2].insert(motion[2].end(), twist_[i].linear.begin(), twist_[i].linear.end());
     motion[3].insert(motion[3].end(), twist_[i].angular.begin(), twist_[i].angular.end());
   }
-  kernel::SavedState saved{before.step, before.step_length, true, {}, {}, before.figures, {}};
+  kernel::SavedState saved{before.step, before.step_length, true, {}, {}, before.figures, {}, {}};
   saved.state_hash = gravitas::state_hash({motion[0], motion[1], motion[2], motion[3]});
   saved.chain_hash = gravitas::chain_hash(before.chain_hash, digest_of(edit_));
   columns["position"] = std::move(motion[0]);
@@ -474,7 +474,8 @@ void keep_who_answers(const kernel::EnvironmentDescription& before, const kernel
       if (same == scenes.end()) continue;
       const auto fallback = plugin.fallback;
       plugin = active.slot(slot).plugins.at(static_cast<std::size_t>(same - scenes.begin()));
-      plugin.fallback = fallback;
+      // who took over has none
+      if (plugin.fallback) plugin.fallback = fallback;
     }
     if (!scenes.empty()) next->slot(slot).hosting = active.slot(slot).hosting;
   }

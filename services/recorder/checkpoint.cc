@@ -106,6 +106,8 @@ Checkpoint make_checkpoint(const kernel::Environment& environment, const recorde
   set_hash(saved.chain_hash, checkpoint.mutable_chain_hash());
   checkpoint.set_penetration(saved.figures.penetration);
   checkpoint.set_joint_error(saved.figures.joint_error);
+  checkpoint.mutable_wake_orders()->Add(saved.wake_orders.begin(), saved.wake_orders.end());
+  checkpoint.set_asks_forces(environment.asks_forces());
   std::size_t next = 0;
   visit_columns(checkpoint.mutable_state(), [&]<typename T>(const char* name, pb::RepeatedField<T>* column) {
     const kernel::SavedColumn& source = saved.columns.at(next++);
@@ -179,6 +181,7 @@ kernel::SavedState saved_state_of(Checkpoint* checkpoint) {
                            hash_of(checkpoint->state_hash()),
                            hash_of(checkpoint->chain_hash()),
                            {checkpoint->penetration(), checkpoint->joint_error()},
+                           {checkpoint->wake_orders().begin(), checkpoint->wake_orders().end()},
                            {}};
   visit_columns(checkpoint->mutable_state(), [&]<typename T>(const char* name, pb::RepeatedField<T>* column) {
     saved.columns.push_back({name, std::span<const T>(column->data(), static_cast<std::size_t>(column->size()))});

@@ -90,10 +90,13 @@ void put_in_place(std::span<const recorder::v1::Decision> decisions, const Catal
     const kernel::SwapOrder order = order_of(decision, catalog);
     kernel::SlotDescription& slot = begun->slot(order.slot);
     if (decision.target() >= slot.plugins.size()) throw std::runtime_error("it names a plugin that the slot lacks");
-    const auto fallback = slot.plugins[decision.target()].fallback;
-    slot.plugins[decision.target()] = order.plugin;
-    slot.plugins[decision.target()].fallback = fallback;
-    slot.hosting = *order.hosting;
+    kernel::PluginChoice& plugin = slot.plugins[decision.target()];
+    const auto fallback = plugin.fallback;
+    plugin = order.plugin;
+    // none follows the one that took over
+    if (fallback && !is_same_plugin(*fallback, plugin)) plugin.fallback = fallback;
+    // what answers by gRPC whatever the slot's hosting takes no neighbours along
+    if (!plugin.is_elsewhere() || slot.plugins.size() == 1) slot.hosting = *order.hosting;
   }
 }
 
@@ -101,13 +104,10 @@ void take_back_swaps(std::span<const recorder::v1::Decision> decisions, const Ca
                      const kernel::EnvironmentDescription& scene, kernel::EnvironmentDescription* begun) {
   for (const recorder::v1::Decision& decision : decisions) {
     if (!is_swap(decision)) continue;
-    if (decision.has_before()) {
-      put_in_place(std::span(&decision.before(), 1), catalog, begun);
-      continue;
-    }
     const Slot slot = *find_slot(decision.slot());
     begun->slot(slot).plugins[decision.target()] = scene.slot(slot).plugins[decision.target()];
     begun->slot(slot).hosting = scene.slot(slot).hosting;
+    if (decision.has_before()) put_in_place(std::span(&decision.before(), 1), catalog, begun);
   }
 }
 
@@ -117,7 +117,7 @@ std::vector<kernel::SwapOrder> past_swaps(std::span<const recorder::v1::Decision
   for (const recorder::v1::Decision& decision : decisions) {
     if (!is_swap(decision)) continue;
     orders.push_back(order_of(decision, catalog));
-    orders.back().hosting = answering.slot(orders.back().slot).hosting;
+    if (!orders.back().plugin.is_elsewhere()) orders.back().hosting = answering.slot(orders.back().slot).hosting;
   }
   return orders;
 }

@@ -71,6 +71,7 @@ Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel:
   const std::vector<recorder::v1::Decision> decisions(checkpoint.decisions().begin(), checkpoint.decisions().end());
   Answering answering{description, {}};
   put_in_place(decisions, catalog, &answering.now);
+  answering.now.asks_forces = checkpoint.asks_forces();
   answering.begun = answering.now;
   take_back_swaps(decisions, catalog, description, &answering.begun);
   return answering;

@@ -16,9 +16,11 @@
 namespace {
 
 std::atomic<std::uint64_t> allocations{0};
+std::atomic<bool> next_fails{false};
 
 void* counted(std::size_t size, std::size_t alignment) {
   allocations.fetch_add(1, std::memory_order_relaxed);
+  if (next_fails.exchange(false)) throw std::bad_alloc();
   const std::size_t rounded = (size + alignment - 1) / alignment * alignment;
   void* memory = alignment <= alignof(std::max_align_t) ? std::malloc(size) : std::aligned_alloc(alignment, rounded);
   if (memory == nullptr) throw std::bad_alloc();
@@ -76,6 +78,32 @@ TEST(Allocation, AStepAllocatesNothingAfterWarmUp) {
   for (int i = 0; i < 100; ++i) world.step();
   EXPECT_EQ(allocations - before, 0U);
   EXPECT_EQ(world.step_count(), 300U);
+}
+
+// Who falls asleep with a step is found at its end.
+TEST(Allocation, AStepThatLacksMemoryIsNotCountedAndCanBeMadeAgain) {
+  harness::WorldBuilder builder(kernel::Hosting::kDirect);
+  builder.steps(100, 0.01).ground().sphere(0.5, 1.0, Vector3(0, 0.5, 0)).gravity(Vector3(0, -9.81, 0));
+  builder.body().flags |= kCanSleep;
+  Environment quiet(builder.description()), world(builder.description());
+  int failures = 0;
+  while (quiet.step_count() < 100) {
+    const Hash chain = quiet.chain_hash();
+    ASSERT_EQ(quiet.step(), StepOutcome::kCommitted);
+    next_fails = world.step_count() > 20;
+    try {
+      ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+    } catch (const std::bad_alloc&) {
+      ++failures;
+      ASSERT_EQ(world.step_count() + 1, quiet.step_count());
+      ASSERT_EQ(world.chain_hash(), chain);
+      ASSERT_EQ(world.step(), StepOutcome::kCommitted);
+    }
+    next_fails = false;
+    ASSERT_EQ(world.chain_hash(), quiet.chain_hash());
+  }
+  EXPECT_GT(failures, 0);
+  EXPECT_TRUE(world.is_asleep(1));
 }
 
 }  // namespace

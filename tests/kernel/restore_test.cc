@@ -204,6 +204,7 @@ const std::vector<Spoilt>& ways_to_spoil() {
       {"step_length", [](OwnedState* s) { s->head.step_length = 0.001; }, "shortened last step"},
       {"nan_length", [](OwnedState* s) { s->head.step_length = kNan; }, "shortened last step"},
       {"figure", [](OwnedState* s) { s->head.figures.penetration = -1.0; }, "impossible"},
+      {"wakes_nobody", [](OwnedState* s) { s->head.wake_orders = {4}; }, "wakes a body that there is not"},
       {"initial", [](OwnedState* s) { s->head.step = 0, s->head.step_length = 0; }, "another initial state"}};
   return ways;
 }

@@ -96,6 +96,27 @@ class Columns(unittest.TestCase):
         self.assertEqual(columns["force_parameter"].tolist(), [1, 2, 1])
         self.assertEqual(columns["application"].tolist(), [[300, 5]])
 
+    def test_what_a_plugin_gives_is_taken_as_it_is_or_not_at_all(self):
+        flags, wrench = (stage_methods("force")["Wrenches"].reply[name] for name in ("flags", "wrench"))
+        most = 2**32 - 1
+        for given in ([0, most], [1.0, 2.0], numpy.array([3], numpy.int64), (), numpy.zeros((0, 1)), [[1], [2]]):
+            self.assertEqual(flags.taken(given).tolist(), numpy.array(given, numpy.uint64).tolist())
+        for given, told in ((numpy.array([0, -1]), "-1"), ([1.9], "1.9"), ([numpy.nan], "nan"), ([most + 1], most + 1),
+                            ([numpy.inf], "inf"), ([2.0**64], "1.8446744073709552e\\+19"), (-3, "-3")):
+            with self.assertRaisesRegex(ValueError, f"column flags has {told}, not a whole number of 32 bits"):
+                flags.taken(given)
+        key = stage_methods("collision")["Manifolds"].request["shape_hash"]
+        self.assertEqual(key.taken(numpy.array([2**64 - 1], numpy.uint64)).tolist(), [2**64 - 1])
+        for given in ([-1], [2.0**64]):
+            with self.assertRaisesRegex(ValueError, "not a whole number of 64 bits"):
+                key.taken(given)
+        rows = numpy.arange(18.0).reshape(3, 6)
+        for given in (rows, rows.reshape(-1), rows.reshape(3, 2, 3), rows.tolist()):
+            self.assertEqual(wrench.taken(given).reshape(-1).tolist(), rows.reshape(-1).tolist())
+        for given in (rows.T, rows.reshape(1, 18), rows.reshape(9, 2)):
+            with self.assertRaisesRegex(ValueError, "column wrench has the shape .*, not 6 numbers a row"):
+                wrench.taken(given)
+
     def test_what_is_no_message_is_refused_with_the_reason(self):
         layout = stage_methods("force")["Wrenches"].request
         for data, reason in (
@@ -213,6 +234,10 @@ class Midpoint(Integrator):
         reply.plugin_state = request.plugin_state
         if request.time == 3.0:
             reply.position = numpy.zeros((5, 3))
+        if request.time == 7.0:
+            reply.position = first[:, :3].T
+        if request.time == 8.0:
+            host.derivative(8.0, request.position.T, *state[1:])
 
 
 class Stream:
@@ -393,6 +418,14 @@ class Talk(unittest.TestCase):
         outcome = self.reply(stream.send(self.answer([1.0] * 12))).outcome
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
         self.assertIn("column position has 5 rows", outcome.text)
+
+    def test_rows_that_lie_the_other_way_are_not_sent(self):
+        _, stream = self.ready()
+        for time, what in ((7.0, "the plugin's answer"), (8.0, "the state of a derivative")):
+            stream.send(self.request(time=time))
+            stream.send(self.answer([1.0] * 12))
+            outcome = self.reply(stream.send(self.answer([1.0] * 12))).outcome
+            self.assertEqual(outcome.text, f"{what} is wrong: column position has the shape (3, 2), not 3 numbers a row")
 
     def test_the_same_request_gets_the_same_bytes(self):
         _, stream = self.ready()

@@ -70,6 +70,7 @@ class Call(Host):
         self.method, self.head, self._derivative = method, head, derivative
         self.outgoing = queue.SimpleQueue()
         self.incoming = queue.SimpleQueue()  # None: the kernel is gone
+        self.rows = {}  # by their word, as the request has them
         self._marks, self._last_mark = 0, time.monotonic()
 
     def reply(self, columns, **outcome):
@@ -92,7 +93,8 @@ class Call(Host):
         if self._derivative is None:
             raise RuntimeError("a derivative is asked for by integrators only")
         asked = {"time": time, "position": position, "orientation": orientation, "linear_velocity": linear_velocity,
-                 "angular_velocity": angular_velocity}
+                 "angular_velocity": angular_velocity, "with_jacobian": 0}
+        asked = self.checked(self._derivative.request, asked, "the state of a derivative")
         self._send(Sent.QUESTION, None, {}, self._derivative.request.serialize(asked))
         answer = self.incoming.get()
         try:
@@ -104,9 +106,20 @@ class Call(Host):
             wrench = self._derivative.reply.parse(message.derivative).columns["wrench"]
         except WireError as error:
             raise CallFailed(f"the derivative's answer cannot be read: {error}", Outcome.STATUS_CALLBACK_FAILED)
-        if wrench.shape != (len(position), 6):
+        if wrench.shape != (self.rows["body"], 6):
             raise CallFailed("the derivative's answer is not six numbers a body", Outcome.STATUS_CALLBACK_FAILED)
         return wrench
+
+    def checked(self, layout, values, what):
+        """The columns of a message out of the plugin's hands."""
+        try:
+            columns = {column.name: column.taken(values.get(column.name, ())) for column in layout.columns}
+        except ValueError as error:
+            raise CallFailed(f"{what} is wrong: {error}") from None
+        problem = check_rows(layout, columns, self.rows)
+        if problem:
+            raise CallFailed(f"{what} is wrong: {problem}")
+        return columns
 
     def _send(self, kind, columns, outcome, derivative=None):
         outcome["text"] = encodable(outcome.get("text", ""))
@@ -181,26 +194,18 @@ class Session:
 
     def _answer(self, call, message):
         """The columns of the reply."""
-        layout, rows = call.method.request, {}
+        layout = call.method.request
         answer = getattr(self._plugin, self._plugin.methods[call.method.name], None)
         if answer is None:
             raise CallFailed("the plugin does not answer this method", Outcome.STATUS_UNKNOWN_METHOD)
         self._put_assets(call.head, layout, message)
-        problem = check_rows(layout, message.columns, rows)
+        problem = check_rows(layout, message.columns, call.rows)
         if problem:
             raise Refusal(problem)
         reply = Columns({})
         with numpy.errstate(all="ignore"):
             answer(Columns(message.columns), reply, call)
-        columns = {}
-        for column in call.method.reply.columns:
-            columns[column.name] = numpy.asarray(getattr(reply, column.name, ()), column.dtype)
-            if column.is_value and columns[column.name].size != 1:
-                raise CallFailed(f"the plugin left {column.name} without a value")
-        problem = check_rows(call.method.reply, columns, rows)
-        if problem:
-            raise CallFailed(f"the plugin's answer is wrong: {problem}")
-        return columns
+        return call.checked(call.method.reply, vars(reply), "the plugin's answer")
 
     def _put_assets(self, head, layout, message):
         """Columns that were sent before."""

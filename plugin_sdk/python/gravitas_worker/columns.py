@@ -54,6 +54,24 @@ class Column:
             return numbers
         return numbers.reshape(-1, self.components)
 
+    def taken(self, value):
+        """A plugin's value as numbers of the column. Raises ValueError where that would make others of them, or other rows."""
+        given = numpy.asarray(value)
+        with numpy.errstate(all="ignore"):
+            numbers = given.astype(self.dtype)
+        if self.dtype.kind == "u":
+            whole = (given >= 0) & (numbers == given)
+            if given.dtype.kind == "f":
+                whole &= given < 2.0 ** (8 * self.dtype.itemsize)  # beyond, machines differ
+            if not whole.all():
+                bad = given[~whole].flat[0]
+                raise ValueError(f"column {self.name} has {bad}, not a whole number of {8 * self.dtype.itemsize} bits")
+        if self.is_value and numbers.size != 1:
+            raise ValueError(f"{self.name} was left without a value")
+        if numbers.ndim > 1 and numbers.size != 0 and numbers.size != len(numbers) * self.components:
+            raise ValueError(f"column {self.name} has the shape {numbers.shape}, not {self.components} numbers a row")
+        return numbers
+
 
 class Message:
     """What one message holds. `columns` has every column, the empty ones too."""

@@ -105,6 +105,25 @@ TEST(ServedResume, GoesOnFromAWake) {
   EXPECT_EQ(resumed.client.status().chain_hash(), chain);
 }
 
+// Nor is it lost before that step, where the checkpoint is asked for again.
+TEST(ServedResume, GoesOnFromAnOrderToWake) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample();
+  options.run.scenes = {in_source("/tests/scenes/box_on_plane.gravitas")};
+  options.run.checkpoint = folder.path("served.ck");
+  Served served(options);
+  served.client.step(100);
+  served.run.save_checkpoint();
+  served.client.wake("Box");
+  served.run.save_checkpoint();
+  ServeOptions again = options;
+  again.run.resume = options.run.checkpoint;
+  again.run.checkpoint.clear();
+  Served resumed(again);
+  EXPECT_EQ(resumed.client.status().step(), 100U);
+  EXPECT_EQ(resumed.client.step(1).chain_hash(), served.client.step(1).chain_hash());
+}
+
 // Nothing is kept of a last step that is shorter than the others.
 TEST(ServedResume, GoesOnBeforeAShortenedLastStep) {
   const gravitas::harness::ScratchFolder folder;

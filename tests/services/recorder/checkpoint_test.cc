@@ -13,6 +13,7 @@
 
 #include "plugin_sdk/channel/digest.h"
 #include "services/recorder/identity.h"
+#include "services/run/resumption.h"
 #include "services/run/session.h"
 #include "tests/services/cli/program.h"
 
@@ -61,6 +62,17 @@ std::string refusal(std::span<const std::byte> bytes) {
   EXPECT_FALSE(parse_checkpoint(bytes, &problem).has_value());
   EXPECT_NE(problem, "");
   return problem;
+}
+
+// Weight is constant, a thrust that turns with its body is not.
+TEST(Checkpoint, KnowsWhetherForcesAreAsked) {
+  EXPECT_FALSE(sample().asks_forces());
+  const kernel::EnvironmentDescription thruster = description_of("thruster");
+  const Checkpoint asking = make_checkpoint(*start(thruster), identity_of(thruster), {});
+  EXPECT_TRUE(asking.asks_forces());
+  const kernel::EnvironmentDescription weight = description_of("two_spheres_motor");
+  EXPECT_FALSE(start(answering_at(sample(), weight, {}).begun)->asks_forces());
+  EXPECT_TRUE(start(answering_at(asking, weight, {}).begun)->asks_forces());
 }
 
 TEST(Checkpoint, ComesBackBitForBit) {
