@@ -102,7 +102,7 @@ bool Environment::lets_go_of_limits() {
 // closes or a drive slips. Where they take much, the mechanism has passed a place where its rows depend on each other, as a
 // parallelogram that lies flat, and a stage fell on it; or the step is long for the integrator. Energy is lost or gained then.
 void Environment::note_what_joints_take() {
-  constexpr double kMuch = 0.05;  // of the velocities
+  constexpr double kMuch = 0.1;  // of the velocities
   constexpr double kOfHeld = 1e-3, kOfLoad = 1e-6;
   const DiscrepancyAnswer& joints = data_.discrepancies;
   const double h = data_.time_step[0];

@@ -131,6 +131,9 @@ class ConeProblem {
   // True if all rows that push anything hold always, in the problem that was solved last.
   bool holds_all() const { return other_.empty(); }
 
+  // Of the rows that hold always, as a share of its diagonal, in the problem that was solved last in steps > 0.
+  double least_pivot() const { return factor_.least_pivot(); }
+
   // True if the problem that was solved last had too many rows for steps of Newton's.
   bool is_large() const { return other_.size() > kDenseRows; }
 

@@ -209,6 +209,10 @@ class IslandSolver {
   // Are reactions of joints in S* already?
   bool has_reactions() const { return !joints_.empty() && joints_.front().discrepancy.has_forces_applied(); }
 
+  // Next to a place where rows depend on each other the pose may end on another branch than the one that the bodies are on, along
+  // which next to none of their velocities are allowed. Would it take much of them? They stand then: the next step ends elsewhere.
+  bool leads_elsewhere(const BodyMotion& trial) const;
+
   // ---- places from which no motion leads, though velocities are allowed there
 
   // Does the pose change take a body back by most of its way? In regular places it is of the size of the method's error.

@@ -49,6 +49,11 @@ void IslandSolver::solve_velocity() {
     find_velocity(trial);
     summary_.contradiction = std::max(summary_.contradiction, drives_contradict_);
   }
+  if (taken_back == 0.0 && leads_elsewhere(trial)) {
+    velocity_ = trial;
+    for (ConeRow& row : cone_.rows) row.multiplier = 0.0;
+    keep_impulses();
+  }
   std::size_t cone = 0;
   for (EndContact& contact : contacts_)
     if (contact.is_closed) contact.slides = cone_.contacts[cone++].slides;
@@ -93,6 +98,29 @@ double IslandSolver::stop_what_is_locked(BodyMotion* trial) {
       if (law.is_unbounded_drive() && (stalls(joint.body1) || stalls(joint.body2)))
         law.lower_target = law.upper_target = 0.0;
   return share;
+}
+
+bool IslandSolver::leads_elsewhere(const BodyMotion& trial) const {
+  constexpr double kMuch = 0.05;             // of the velocities
+  constexpr double kNearlyDependent = 1e-3;  // of a diagonal: within some 0.03 rad
+  const auto holds_always = [](const JointLaw& law) { return !law.is_active() || law.is_rigid(); };
+  if (!has_reactions() || !contacts_.empty() || !cone_.holds_all() || !(cone_.least_pivot() < kNearlyDependent))
+    return false;
+  if (!std::ranges::all_of(joints_,
+                           [&](const EndJoint& j) { return std::ranges::all_of(j.velocity_laws, holds_always); }))
+    return false;
+  double taken = 0.0, all = 0.0;
+  for (const std::uint32_t i : pushed_) {
+    if (!(bodies_[i].inverse_mass > 0.0)) continue;
+    const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
+    const auto energy = [&](const Vector3& linear, const Vector3& angular) {
+      const Vector3 turning = end_[i].pose.orientation.conjugate() * angular;
+      return linear.squaredNorm() / bodies_[i].inverse_mass + turning.cwiseAbs2().dot(moments);
+    };
+    taken += energy(velocity_[i].linear - trial[i].linear, velocity_[i].angular - trial[i].angular);
+    all += energy(trial[i].linear, trial[i].angular);
+  }
+  return taken > kMuch * kMuch * all;
 }
 
 template <class Use>
