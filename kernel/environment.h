@@ -252,6 +252,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   void leave_empty(std::span<const ColumnId> reply);
   void find_impacts(const Trusted<Pairs>& pairs);
   Encounter encounter(std::size_t impact) const;
+  // At which a pair parts that a contact has pushed in the inner step before, m/s; at which its spins move its parts.
+  double bounce_speed(std::span<const std::uint32_t> pair) const;
+  double turning_speed(std::span<const std::uint32_t> pair) const;
   Trusted<Contacts> find_contacts(const Trusted<Pairs>& pairs);
   void look_up_contacts(const Trusted<Contacts>& contacts);
   void constrain(const Trusted<TrialState>& trial);

@@ -13,6 +13,17 @@ constexpr double kMostUnseen = 1e4;
 // Of the slip with the arms that the trial ends with: what is slower in one of the ways a contact may have moved, sticks.
 constexpr double kSticks = 0.1;
 
+// Of the gap at which detectors and solvers take a pair for closed: surely apart.
+constexpr double kApart = 20.0;
+
+// How long a pair that bounced off is to fly until it is surely apart; 0 where it need not, or may meet elsewhere before.
+double leaving_time(const Encounter& encounter, double length, double near) {
+  const double speed = std::min(encounter.start_speed, encounter.bounce_speed);
+  if (!(speed > 0.0 && encounter.turning_speed * length > encounter.harmless_depth)) return 0.0;
+  const double time = 2.0 * (std::fabs(encounter.gap) + kApart * near) / speed;
+  return time < length && encounter.turning_speed * time <= encounter.harmless_depth ? time : 0.0;
+}
+
 // When a pair meets that the straight motion lets meet at a time: later, if it is drawn together.
 double accelerated_time(const Encounter& encounter, double acceleration, double time) {
   if (!(acceleration < 0.0)) return time;
@@ -30,10 +41,14 @@ NextStop stop_before(const Encounter& encounter, double length, double target_ga
   const double near = std::max(encounter.slop, target_gap);
   const bool comes_back = encounter.start_speed > 0.0 && encounter.end_speed < 0.0;
   const double top = comes_back ? encounter.start_speed / -acceleration : 0.0;
+  if (encounter.fraction <= 0.0 && (!comes_back || 2.0 * top > shortest_flight))
+    if (const double leaves = leaving_time(encounter, length, near); leaves > 0.0) return {leaves};
   if (comes_back && top >= time) {
     const bool rests =
         2.0 * top <= shortest_flight || 0.5 * encounter.start_speed * top <= std::max(target_gap, encounter.left_gap);
-    return {rests ? length : std::min(length, top)};
+    if (rests) return {length};
+    // what turns may come back before
+    return {std::min(length, top), encounter.fraction > 0.0};
   }
   if (encounter.fraction <= 0.0) {
     const double closing = -encounter.start_speed;

@@ -17,6 +17,9 @@ struct Encounter {
   double slop = 0.0;         // gap at which a solver may take the pair for closed, m
   bool is_touching = false;  // since the step before: what closes it is the solver's
   double left_gap = 0.0;     // that the solver left a touching pair with, m: lower flights are its roundings
+  // Of a pair that starts closed: how fast it bounced off, how fast turning may bring other parts of it together, and how
+  // deep these may come unseen, m. Without such parts 0.
+  double bounce_speed = 0.0, turning_speed = 0.0, harmless_depth = 0.0;
 };
 
 struct NextStop {
@@ -27,16 +30,17 @@ struct NextStop {
 
 // The longest inner step, up to `length` (that of the trial), that an encounter allows.
 //
-// A pair that starts closed and parts, to come back within the trial, is followed to the top of its flight, and so is one
-// that the straight motion lets meet before; flights shorter than `shortest_flight`, or lower than the target gap or what
-// the solver left open, are none: the pair rests. One that starts so near that the collision slot calls it met, but no
-// nearer than target_gap, flies on until it is. One that comes from afar is met where the trial, taken for the straight
-// motion between its ends, deviates from it by less than half the target (by |a| t (length - t) / 2 at the time t). Until
-// then trials are shortened to twice the time of the meeting, and steps end before it, each squaring the distance. The
-// step that meets is short, as friction acts from its start to its end: where the way is straight, one that ends before,
-// where no solver sees it closed yet, comes first. It ends a little after the meeting, two target gaps deep, so that the
-// contact is closed; a pair that comes so near without touching goes on so far, too, and deeper each time while no
-// contact is found.
+// A pair that starts closed and bounced off, and of which other parts may meet within the trial, leaves each other first: what
+// is apart has a time of impact. Another that starts closed and parts, to come back within the trial, is followed to the top
+// of its flight; so is one that the straight motion lets meet before, if a trial of that length meets no more (what turns
+// may come back sooner). Flights shorter than `shortest_flight`, or lower than the target gap or what the solver left open,
+// are none: the pair rests. One that starts so near that the collision slot calls it met, but no nearer than target_gap,
+// flies on until it is. One that comes from afar is met where the trial, taken for the straight motion between its ends,
+// deviates from it by less than half the target (by |a| t (length - t) / 2 at the time t). Until then trials are shortened
+// to twice the time of the meeting, and steps end before it, each squaring the distance. The step that meets is short, as
+// friction acts from its start to its end: where the way is straight, one that ends before, where no solver sees it closed
+// yet, comes first. It ends a little after the meeting, two target gaps deep, so that the contact is closed; a pair that
+// comes so near without touching goes on so far, too, and deeper each time while no contact is found.
 NextStop stop_before(const Encounter& encounter, double length, double target_gap, double shortest_flight);
 
 // A body in a trial: where it starts and ends, and how fast it starts.

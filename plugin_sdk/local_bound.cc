@@ -7,9 +7,11 @@
 namespace gravitas {
 
 void measure(const Vector3& half_extents, LocalBound* bound) {
-  constexpr double kThinnest = 1e-3;
-  bound->least_half_extent = std::max(half_extents.minCoeff(), kThinnest * half_extents.maxCoeff());
+  constexpr double kThinnest = 1e-3, kFlat = 1e-9;
+  const double least = half_extents.minCoeff();
+  bound->least_half_extent = std::max(least, kThinnest * half_extents.maxCoeff());
   bound->reach = half_extents.norm();
+  bound->half_thickness = least > kFlat * bound->reach ? least : bound->least_half_extent;
 }
 
 double contact_margin(std::span<const LocalBound> bounds) {

@@ -19,6 +19,7 @@ struct LocalBound {
   // Of the shape itself, by whatever it is bounded, m; 0 where it is unbounded: its least half extent (of what is thin, a
   // thousandth of its largest), and half of its box's diagonal (a sphere's radius).
   double least_half_extent = 0.0, reach = 0.0;
+  double half_thickness = 0.0;  // m: the least half extent as it is; of what is flat the one above
 };
 
 // Sets what is told of a shape itself, from the half extents of its box.

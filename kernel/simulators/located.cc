@@ -78,6 +78,13 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
       if (starts_with(pair, &touching)) {
         met.left_gap = met.gap - 0.5 * (met.start_speed + met.end_speed) * met.fraction * left;
         met.fraction = met.gap = 0.0, met.is_touching = true;
+        met.bounce_speed = inner_ > 0 ? bounce_speed(pair) : 0.0;
+      } else {
+        met.bounce_speed = met.start_speed;
+      }
+      if (met.fraction <= 0.0) {
+        met.turning_speed = turning_speed(pair);
+        met.harmless_depth = harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]);
       }
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;
@@ -86,6 +93,22 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
     left = next.length;
     begin_inner_step(begin, left);
   }
+}
+
+double Environment::bounce_speed(std::span<const std::uint32_t> pair) const {
+  double fastest = 0.0;
+  for (std::size_t i = 0; i < data_.contact_key.size(); ++i) {
+    if (!std::ranges::equal(data_.contact_body.span().subspan(2 * i, 2), pair)) continue;
+    if (vector_at(data_.contact_impulse.span(), i).isZero(0.0)) continue;
+    const auto velocity = [&](std::uint32_t body) {
+      const Vector3 arm = vector_at(data_.contact_point.span(), i) - vector_at(front().position.span(), body);
+      return Vector3(vector_at(front().linear_velocity.span(), body) +
+                     vector_at(front().angular_velocity.span(), body).cross(arm));
+    };
+    const Vector3 parting = velocity(pair[1]) - velocity(pair[0]);
+    fastest = std::max(fastest, vector_at(data_.contact_normal.span(), i).dot(parting));
+  }
+  return fastest;
 }
 
 Encounter Environment::encounter(std::size_t impact) const {

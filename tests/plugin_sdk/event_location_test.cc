@@ -150,7 +150,26 @@ TEST(NextStop, TellsWhetherItMeets) {
 
 // The straight motion to the end of the trial goes down at once, the bent one does not.
 TEST(NextStop, FollowsAFlightToItsTopThoughTheStraightMotionMeetsBefore) {
-  EXPECT_NEAR(stop_before({1e-5, 2e-10, 0.01, -0.03}, 0.004, 1e-10, 1e-9).length, 0.001, 1e-15);
+  const NextStop top = stop_before({1e-5, 2e-10, 0.01, -0.03}, 0.004, 1e-10, 1e-9);
+  EXPECT_NEAR(top.length, 0.001, 1e-15);
+  // unless it comes back by turning: the motion to the top is looked at
+  EXPECT_TRUE(top.is_trial);
+  EXPECT_FALSE(stop_before({0.0, 0.0, 0.01, -0.03}, 0.004, 1e-10, 1e-9).is_trial);
+}
+
+// Bounced off at 10 m/s, with a spin that moves other parts by 50 m/s: 5 mm before the trial ends, of which 1 mm is harmless.
+TEST(NextStop, LeavesFirstWhereOtherPartsMayMeet) {
+  Encounter bounced{0.0, 0.0, 10.0, 10.0, 0.0, true};
+  bounced.bounce_speed = 10.0, bounced.turning_speed = 50.0, bounced.harmless_depth = 1e-3;
+  const auto left = [&] { return stop_before(bounced, 1e-4, kTargetGap, kShortestFlight).length; };
+  // apart, beyond all doubt, and turned by nothing
+  EXPECT_GT(10.0 * left(), 20.0 * kTargetGap);
+  EXPECT_LT(50.0 * left(), 1e-6);
+  bounced.turning_speed = 5.0;
+  EXPECT_EQ(left(), 1e-4);
+  // what only rolls away did not bounce, and is the solver's
+  bounced.turning_speed = 50.0, bounced.bounce_speed = 1e-15;
+  EXPECT_EQ(left(), 1e-4);
 }
 
 // 1e-10 m up, down at 2e-5 m/s: the straight motion to 0.5 mm below, after 10 ms, meets the floor a thousand times sooner.

@@ -33,6 +33,13 @@ TEST(LocalBound, TheMarginIsAHundredthOfTheSmallest) {
   EXPECT_DOUBLE_EQ(contact_margin(std::array{ball, unbounded}), 0.005);
 }
 
+TEST(LocalBound, ThicknessIsToldAsItIs) {
+  EXPECT_EQ(box(Vector3(3, 1e-4, 1)).half_thickness, 1e-4);
+  EXPECT_EQ(box(Vector3(3, 1e-4, 1)).least_half_extent, 3e-3);
+  for (const double flat : {0.0, 1e-12}) EXPECT_EQ(box(Vector3(3, flat, 1)).half_thickness, 3e-3);
+  EXPECT_EQ(LocalBound{}.half_thickness, 0.0);
+}
+
 TEST(LocalBound, WithoutOneABodyIsEverywhere) {
   const Bounds bounds = bounds_of(LocalBound{}, Pose{});
   EXPECT_TRUE(std::isinf(bounds.lower.x()) && std::isinf(bounds.upper.z()));
