@@ -200,7 +200,9 @@ class ReactionSolver {
   //
   // Next to the place itself such a state may lie on another branch than the one that the bodies are on, whose velocities are others:
   // where much of them were taken away, it is looked for a little ahead of the state, where branches are apart.
-  void agree_with_joints(bool is_beside = false);
+  // Where rows contradict each other alone, velocities that joints do not allow are answered as they are asked.
+  enum class Elsewhere : std::uint8_t { kIsAhead, kIsAsAsked, kGoesOn };
+  void agree_with_joints(Elsewhere elsewhere);
   bool leads_elsewhere(const std::vector<Twist>& change) const;
   void go_ahead(double turn_off);
   void move(const std::vector<Twist>& change);
@@ -230,7 +232,7 @@ class ReactionSolver {
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;
   // of the Jacobian: are states made to agree with the joints? joints where the bodies are; and by body for one number
-  bool agrees_ = false;
+  bool agrees_ = false, contradicts_ = false;
   std::vector<JointState> states_;
   std::vector<JacobianBlock> own_;
   std::vector<Change> moving_;

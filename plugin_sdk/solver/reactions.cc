@@ -53,37 +53,40 @@ double ReactionSolver::solve(const stage::SolverReactionsRequest& request) {
 }
 
 double ReactionSolver::solve_held() {
-  agrees_ = false;
+  agrees_ = contradicts_ = false;
   load_springs();
   make_rows();
   factorise(0.0);
-  if (factor_.least_pivot() < kNearlyDependent && is_amplifying()) agree_with_joints();
+  const bool is_amplified = factor_.least_pivot() < kNearlyDependent && is_amplifying();
+  if (is_amplified) agree_with_joints(Elsewhere::kIsAhead);
   double missed = find_multipliers();
   // Dependent rows contradict each other by what the state is off the joints. Left out in some states that an integrator tries and
   // made to agree in others, they would have it lose its order.
-  if (missed > 0.0 && !agrees_) {
-    agree_with_joints();
+  if (contradicts_ && !agrees_) {
+    agree_with_joints(Elsewhere::kIsAsAsked);
     missed = find_multipliers();
   }
-  if (!agrees_) share_out();
+  if (!is_amplified || !agrees_) share_out();
   return missed;
 }
 
 double ReactionSolver::find_multipliers() {
+  constexpr double kOfError = 1e-3;  // of the state, rad: what is missed by less is rounding
   accelerate();
   std::vector<double>& side = multipliers_;
   side.resize(rows_.size());
+  double largest = 0.0, most = 0.0;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const Row& row = rows_[i];
     const double along = row.direction.along(bodies_[row.body1].acceleration, bodies_[row.body2].acceleration);
     side[i] = -(row.gamma + along) / row.scale;
+    largest = std::max(largest, row.scale), most = std::max(most, std::fabs(side[i]));
   }
-  double largest = 0.0;  // what is missed is scaled
-  for (const Row& row : rows_) largest = std::max(largest, row.scale);
-  const double missed = largest * factor_.make_consistent(&side);
+  const double missed = factor_.make_consistent(&side);
+  contradicts_ = missed > kOfError * largest_turn() * most;
   factor_.solve(&side);
   for (std::size_t i = 0; i < rows_.size(); ++i) multipliers_[i] /= rows_[i].scale;
-  return missed;
+  return missed == 0.0 ? 0.0 : largest * missed;  // it was scaled
 }
 
 // Rows that depend on each other bear as equal springs would, moments by way of the longer radius of gyration.
@@ -410,7 +413,7 @@ bool ReactionSolver::is_amplifying() const {
   return largest > kMuch;
 }
 
-void ReactionSolver::agree_with_joints(bool is_beside) {
+void ReactionSolver::agree_with_joints(Elsewhere elsewhere) {
   constexpr int kRounds = 12;
   constexpr double kQuick = 1e-3;  // rounds that leave less of the error do with the factors they have
   const std::vector<Body> asked = bodies_;
@@ -448,11 +451,13 @@ void ReactionSolver::agree_with_joints(bool is_beside) {
   const double least = std::max({kSingular, kMargin * turn * turn, turn > kRounding ? kStuck * turn : 0.0});
   if (has_moved_ || factor_.least_pivot() < least) factorise(least);
   const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
-  if (!is_beside && leads_elsewhere(change)) {
+  if (elsewhere != Elsewhere::kGoesOn && leads_elsewhere(change)) {
     bodies_ = asked;
     has_moved_ = asked_elsewhere;
+    make_rows();
+    if (elsewhere == Elsewhere::kIsAsAsked) return factorise(0.0);
     go_ahead(far);
-    return agree_with_joints(true);
+    return agree_with_joints(Elsewhere::kGoesOn);
   }
   for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
     bodies_[i].velocity.linear += change[i].linear;
@@ -479,7 +484,6 @@ bool ReactionSolver::leads_elsewhere(const std::vector<Twist>& change) const {
 
 void ReactionSolver::go_ahead(double turn_off) {
   constexpr double kLeast = 1e-3, kOfError = 20.0;  // rad; of what the state is off by
-  make_rows();
   double fastest = 0.0;
   for (const Row& row : rows_)
     fastest = std::max(fastest, (bodies_[row.body2].velocity.angular - bodies_[row.body1].velocity.angular).norm());

@@ -9,7 +9,8 @@
 // to see whether the forces depend on velocity (none where the wrench is constant).
 // Under constant forces and no torque one drift is exact and order 2 is taken. Without torque nothing but rounding is between the result and the truth, at any step: position, attitude, energy and
 // angular momentum. With forces that depend on position and attitude alone the method is symplectic and symmetric: the
-// energy of long runs wanders within O(h^order) and does not drift. Stability: an oscillator is stable up to h w = 2
+// energy of long runs wanders within O(h^order) and does not drift. Not so with joints, which are put right at the end of the
+// whole step; order 6 is 5 there where bodies turn about hinges and ball joints. Stability: an oscillator is stable up to h w = 2
 // (order 2), 2.72 (order 4), 2.53 (order 6).
 // Where a force does depend on velocity a kick is one classical Runge-Kutta step in the velocities alone, which costs
 // four derivatives and is of order 4: so is the whole then at most, and not symplectic.
@@ -44,7 +45,7 @@ class SymplecticSplitting final : public IntegratorPlugin {
     return {.name = "SymplecticSplitting",
             .version = "1.0",
             .slot = Slot::kIntegrator,
-            .meaning = "Exact free motion and kicks in turn, symplectic, order 2, 4 or 6.",
+            .meaning = "Exact free motion and kicks in turn, symplectic for bodies without joints, order 2, 4 or 6.",
             .capabilities = {"order=4"},
             .properties = {Property::integer("Order").at_least(2).at_most(6).defaults_to({4}).means(
                 "Order of the composition: 2, 4 or 6.")},
