@@ -25,12 +25,14 @@ StepOutcome Environment::step() {
     if (!is_idle_ || !wake_orders_.empty()) find_sleepers();
     for (StageSlot* slot : slots_) slot->begin_step(step_count_ + 1);
     times_finer_ = 1;
-    for (make_inner_steps(); must_restart_; make_inner_steps()) {
+    for (;;) {
+      if (has_new_forces_) ask_forces();  // also those of a step that was broken off
+      make_inner_steps();
+      if (!must_restart_) break;
       return_to_start();
       if (!std::exchange(has_newcomer_, false)) continue;
       times_finer_ = 1;
       find_sleepers();
-      if (has_new_forces_) ask_forces();
     }
     finish_step();
   } catch (...) {

@@ -22,7 +22,12 @@ void Environment::ask_forces() {
   data_.derivative_time[0] = time();
   do {
     has_new_forces_ = false;
-    ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
+    try {
+      ask_forces(front().position, front().orientation, front().linear_velocity, front().angular_velocity);
+    } catch (...) {
+      has_new_forces_ = true;
+      throw;
+    }
   } while (has_new_forces_);
   count_jacobian_blocks();
 }

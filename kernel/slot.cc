@@ -8,6 +8,7 @@
 #include "plugin_sdk/checks.h"
 
 namespace gravitas::kernel {
+
 StageSlot::StageSlot(Slot which, SlotDescription description) : which_(which), description_(std::move(description)) {}
 
 void StageSlot::find_hosts(std::span<StageSlot* const> slots, std::uint32_t threads, const HostStarter& starter) {

@@ -41,6 +41,7 @@ std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const
     const AxisMode mode = axis_mode(discrepancy.modes, axis);
     const bool is_limited = mode == AxisMode::kLimited && discrepancy.lower[axis] < discrepancy.upper[axis];
     if ((!is_limited && mode != AxisMode::kUnilateral) || discrepancy.compliance[axis] > 0.0) continue;
+    if (discrepancy.maximum_force[axis] < kUnlimited) continue;  // gives way, as to all that takes no time
     const bool is_radial = discrepancy.is_radial() && axis == 0;
     const double length = error.norm();
     const Vector3 along = is_radial && length > 0.0 ? Vector3(error / length) : Vector3(axes.col(axis));

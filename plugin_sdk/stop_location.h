@@ -10,7 +10,7 @@
 
 namespace gravitas {
 
-// A stop of a joint in a state: one side of an axis that limits its error rigidly and leaves it room.
+// A stop of a joint in a state: one side of an axis that limits its error rigidly, without a bound on its force, and leaves it room.
 struct StopGap {
   double gap = kUnlimited;  // of the error to it, m or rad; below 0 beyond it
   double rate = 0.0;        // of the gap, m/s or rad/s

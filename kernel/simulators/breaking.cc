@@ -53,7 +53,8 @@ void Environment::update_joints() {
     while (row < columns.size() && d.constraint[row] == joint) ++row;
     const JointBody one = body(description.body1), two = body(description.body2);
     const JointRows rows{columns, data_.discrepancy_impulse.span(), first, row, reactions};
-    const double h = data_.time_step[0];
+    // an impact at a stop of `Smooth` has an inner step of its own
+    const double h = knows_reactions() ? length_of_step(step_count_ + 1) : data_.time_step[0];
     const auto share = [](double of, double most) { return most > 0.0 ? of / most : 0.0; };
     const double force = description.breaking_force, torque = description.breaking_torque;
     const double threshold = description.breaking_threshold;

@@ -78,13 +78,12 @@ NextStop Environment::first_impact(const Trusted<TrialState>& trial, double begi
       if (starts_with(pair, &touching)) {
         met.left_gap = met.gap - 0.5 * (met.start_speed + met.end_speed) * met.fraction * left;
         met.fraction = met.gap = 0.0, met.is_touching = true;
-        met.bounce_speed = inner_ > 0 ? bounce_speed(pair) : 0.0;
-      } else {
-        met.bounce_speed = met.start_speed;
       }
       if (met.fraction <= 0.0) {
         met.turning_speed = turning_speed(pair);
         met.harmless_depth = harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]);
+        if (met.turning_speed * left > met.harmless_depth)
+          met.bounce_speed = !met.is_touching ? met.start_speed : inner_ > 0 ? bounce_speed(pair) : 0.0;
       }
       const NextStop stop = stop_before(met, left, data_.target_gap[0], shortest_flight);
       if (stop.length < next.length) next = stop;

@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "kernel/environment.h"
+#include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
 namespace gravitas::kernel {
@@ -116,9 +117,8 @@ void Environment::note_what_joints_take() {
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
     if (!is_awake(i) || !(model_.inverse_mass[i] > 0.0)) continue;
     const auto energy = [&](const Vector3& velocity, const Vector3& spin) {
-      const Vector3 turning = quaternion_at(data_.trial_orientation.span(), i).conjugate() * spin;
-      return velocity.squaredNorm() / model_.inverse_mass[i] +
-             turning.cwiseAbs2().dot(vector_at(model_.inertia.span(), i));
+      return kinetic_energy(1.0 / model_.inverse_mass[i], vector_at(model_.inertia.span(), i),
+                            quaternion_at(data_.trial_orientation.span(), i), {velocity, spin});
     };
     const Vector3 velocity = vector_at(data_.trial_linear_velocity.span(), i);
     const Vector3 spin = vector_at(data_.trial_angular_velocity.span(), i);
@@ -135,8 +135,7 @@ void Environment::note_what_joints_take() {
 std::string Environment::why_joints_took(double share, std::uint32_t step) {
   return "in step " + std::to_string(step) + " the joints took or gave " + std::to_string(std::lround(100.0 * share)) +
          " % of the velocities at its end: a mechanism was where the rows of its joints depend on each other, or "
-         "TimeStep is too "
-         "long for the integrator; energy may be lost or gained";
+         "TimeStep is too long for the integrator; energy may be lost or gained";
 }
 
 // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.

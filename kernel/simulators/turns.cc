@@ -45,6 +45,7 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
   bool may_turn_far = false;
   for (std::uint32_t i = 0; i < model_.body_count; ++i)
     may_turn_far = may_turn_far || 2.0 * model_.bound[i].reach * spin(i).norm() * length > least;
+  if (!may_turn_far) return length;
   // in which what touches turns by half of what is harmless
   double shortest = kShortestTurn * length_of_step(step_count_ + 1);
   for (std::size_t i = 0; i < front().touching.size(); i += 2) {
@@ -52,7 +53,7 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
     shortest =
         std::min(shortest, 0.5 * harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]) / turning_speed(pair));
   }
-  if (!may_turn_far || length <= shortest) return length;
+  if (length <= shortest) return length;
 
   const auto harmless = [&](std::span<const std::uint32_t> pair) {
     return harmless_depth(model_.bound[pair[0]], model_.bound[pair[1]]);
@@ -113,7 +114,7 @@ double Environment::shorten_turns(Trusted<TrialState>* trial, double begin, doub
       try_step(kFinest * length);
       if (overlaps()) return try_step(length);
       try_step(shortest);
-      if (may_be_behind()) return shortest;
+      if (overlaps() || may_be_behind()) return shortest;
     }
     end = try_step(std::max(shortest, 0.5 * end));
   }

@@ -16,9 +16,9 @@ void ConeProblem::order_held(const SolverBodies& bodies) {
   const auto end = [&](std::uint32_t body) { return bodies[body].is_pushed() ? body : kNone; };
   const auto ends_of = [&](std::uint32_t r) { return RowEnds(end(rows[r].body1), end(rows[r].body2)); };
   const bool is_new = elimination_.arrange(ends_of, &held_);
-  if (!is_new && held_of_body_.size() == bodies.count() + 1) return;
+  if (!is_new && held_of_body_.size() == bodies.count() + 1 && first_held_.size() == held_.size()) return;
+  first_held_.clear();  // shorter than held_ until all is there
   clear_lists(bodies.count() + 1, &held_of_body_);
-  first_held_.resize(held_.size());
   for (std::uint32_t i = 0; i < held_.size(); ++i) {
     std::size_t first = i;
     const RowEnds& ends = elimination_.ends(i);
@@ -28,7 +28,7 @@ void ConeProblem::order_held(const SolverBodies& bodies) {
       if (!list.empty()) first = std::min<std::size_t>(first, list.front());
       list.push_back(i);
     }
-    first_held_[i] = first;
+    first_held_.push_back(first);
   }
 }
 

@@ -32,7 +32,7 @@ class EliminationOrder {
     ends_.clear();
     for (const Row& row : *rows) ends_.push_back(ends_of(row));
     const bool is_new = ends_ != known_;
-    if (is_new) order_ = elimination_order(ends_), known_ = ends_;
+    if (is_new) order_ = elimination_order(ends_), known_.swap(ends_);
     if (order_.empty()) return is_new;
     std::vector<Row> arranged;
     for (const std::uint32_t place : order_) arranged.push_back((*rows)[place]);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/island_solver.h"
 #include "plugin_sdk/solver/joint_bounce.h"
@@ -101,26 +102,34 @@ double IslandSolver::stop_what_is_locked(BodyMotion* trial) {
 }
 
 bool IslandSolver::leads_elsewhere(const BodyMotion& trial) const {
-  constexpr double kMuch = 0.05;             // of the velocities
   constexpr double kNearlyDependent = 1e-3;  // of a diagonal: within some 0.03 rad
-  const auto holds_always = [](const JointLaw& law) { return !law.is_active() || law.is_rigid(); };
+  // what asks for a velocity takes by right
+  const auto holds_always = [](const JointLaw& law) {
+    return !law.is_active() || (law.is_rigid() && !law.may_do_work());
+  };
   if (!has_reactions() || !contacts_.empty() || !cone_.holds_all() || !(cone_.least_pivot() < kNearlyDependent))
     return false;
   if (!std::ranges::all_of(joints_,
                            [&](const EndJoint& j) { return std::ranges::all_of(j.velocity_laws, holds_always); }))
     return false;
+  // where a step begins nothing has gone astray: what bodies are thrown with, joints take
+  const auto has_moved = [&](std::uint32_t i) {
+    const SolverBody& body = bodies_[i];
+    return body.trial.position != body.start.position ||
+           body.trial.orientation.coeffs() != body.start.orientation.coeffs();
+  };
+  if (std::ranges::none_of(pushed_, has_moved)) return false;
   double taken = 0.0, all = 0.0;
   for (const std::uint32_t i : pushed_) {
     if (!(bodies_[i].inverse_mass > 0.0)) continue;
-    const Vector3 moments = moments_of(vector_at(request_.inverse_inertia(), rows_[i]));
-    const auto energy = [&](const Vector3& linear, const Vector3& angular) {
-      const Vector3 turning = end_[i].pose.orientation.conjugate() * angular;
-      return linear.squaredNorm() / bodies_[i].inverse_mass + turning.cwiseAbs2().dot(moments);
+    const auto energy = [&](const Twist& of) {
+      return kinetic_energy(1.0 / bodies_[i].inverse_mass, moments_of(vector_at(request_.inverse_inertia(), rows_[i])),
+                            end_[i].pose.orientation, of);
     };
-    taken += energy(velocity_[i].linear - trial[i].linear, velocity_[i].angular - trial[i].angular);
-    all += energy(trial[i].linear, trial[i].angular);
+    taken += energy({velocity_[i].linear - trial[i].linear, velocity_[i].angular - trial[i].angular});
+    all += energy(trial[i]);
   }
-  return taken > kMuch * kMuch * all;
+  return taken > kMuchOfVelocities * kMuchOfVelocities * all;
 }
 
 template <class Use>

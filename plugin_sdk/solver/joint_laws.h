@@ -120,6 +120,10 @@ struct JointAxisState {
 // A rate that reactions take for none, m/s or rad/s, of speeds whose difference it is (ConstraintDirection::size_along()).
 inline double still_rate(double size) { return 1e-8 * size + 1e-10; }
 
+// Share of the velocities that joints have to take from bodies at most, where these have followed them: taken more, a mechanism
+// has come to another branch than its own.
+inline constexpr double kMuchOfVelocities = 0.05;
+
 // A side of an axis, as errors that grow away from it see it: its gap is sign (error - limit).
 struct JointStop {
   double sign = 1.0;  // -1: the upper

@@ -203,8 +203,9 @@ class ReactionSolver {
   // Where rows contradict each other alone, velocities that joints do not allow are answered as they are asked.
   enum class Elsewhere : std::uint8_t { kIsAhead, kIsAsAsked, kGoesOn };
   void agree_with_joints(Elsewhere elsewhere);
-  bool leads_elsewhere(const std::vector<Twist>& change) const;
-  void go_ahead(double turn_off);
+  // Are they of a mechanism that a change takes much of its velocities from? By body.
+  std::vector<std::uint8_t> led_elsewhere(const std::vector<Twist>& change) const;
+  void go_ahead(double turn_off, const std::vector<std::uint8_t>& which);
   void move(const std::vector<Twist>& change);
   std::vector<double> errors(double Row::*of) const;
 

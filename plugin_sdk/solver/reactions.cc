@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/rotation.h"
 #include "plugin_sdk/solver/end_of_step_rows.h"
+#include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/joint_laws.h"
 #include "plugin_sdk/solver/reaction_solver.h"
 #include "plugin_sdk/solver/request_check.h"
@@ -451,13 +453,16 @@ void ReactionSolver::agree_with_joints(Elsewhere elsewhere) {
   const double least = std::max({kSingular, kMargin * turn * turn, turn > kRounding ? kStuck * turn : 0.0});
   if (has_moved_ || factor_.least_pivot() < least) factorise(least);
   const std::vector<Twist> change = taken_out(errors(&Row::velocity_error));
-  if (elsewhere != Elsewhere::kGoesOn && leads_elsewhere(change)) {
-    bodies_ = asked;
-    has_moved_ = asked_elsewhere;
-    make_rows();
-    if (elsewhere == Elsewhere::kIsAsAsked) return factorise(0.0);
-    go_ahead(far);
-    return agree_with_joints(Elsewhere::kGoesOn);
+  if (elsewhere != Elsewhere::kGoesOn) {
+    const std::vector<std::uint8_t> which = led_elsewhere(change);
+    if (std::ranges::find(which, 1) != which.end()) {
+      bodies_ = asked;
+      has_moved_ = asked_elsewhere;
+      make_rows();
+      if (elsewhere == Elsewhere::kIsAsAsked) return factorise(0.0);
+      go_ahead(far, which);
+      return agree_with_joints(Elsewhere::kGoesOn);
+    }
   }
   for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
     bodies_[i].velocity.linear += change[i].linear;
@@ -467,30 +472,39 @@ void ReactionSolver::agree_with_joints(Elsewhere elsewhere) {
   make_rows();
 }
 
-bool ReactionSolver::leads_elsewhere(const std::vector<Twist>& change) const {
-  constexpr double kMuch = 0.05;  // of the velocities
-  double taken = 0.0, all = 0.0;
-  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+std::vector<std::uint8_t> ReactionSolver::led_elsewhere(const std::vector<Twist>& change) const {
+  BodyUnion mechanisms(bodies_.size());
+  for (const Row& row : rows_)
+    if (bodies_[row.body1].is_pushed() && bodies_[row.body2].is_pushed()) mechanisms.join(row.body1, row.body2);
+  std::vector<double> taken(bodies_.size(), 0.0), all(bodies_.size(), 0.0);
+  for (std::uint32_t i = 0; i + 1 < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
     if (!(body.inverse_mass > 0.0)) continue;
     const auto energy = [&](const Twist& of) {
-      const Vector3 turning = body.pose.orientation.conjugate() * of.angular;
-      return of.linear.squaredNorm() / body.inverse_mass + turning.cwiseAbs2().dot(vector_at(request_->inertia(), i));
+      return kinetic_energy(1.0 / body.inverse_mass, vector_at(request_->inertia(), i), body.pose.orientation, of);
     };
-    taken += energy(change[i]), all += energy(body.velocity);
+    taken[mechanisms.root(i)] += energy(change[i]), all[mechanisms.root(i)] += energy(body.velocity);
   }
-  return taken > kMuch * kMuch * all;
+  std::vector<std::uint8_t> are(bodies_.size(), 0);
+  for (std::uint32_t i = 0; i + 1 < bodies_.size(); ++i)
+    are[i] = taken[mechanisms.root(i)] > kMuchOfVelocities * kMuchOfVelocities * all[mechanisms.root(i)] ? 1 : 0;
+  return are;
 }
 
-void ReactionSolver::go_ahead(double turn_off) {
+void ReactionSolver::go_ahead(double turn_off, const std::vector<std::uint8_t>& which) {
   constexpr double kLeast = 1e-3, kOfError = 20.0;  // rad; of what the state is off by
   double fastest = 0.0;
-  for (const Row& row : rows_)
-    fastest = std::max(fastest, (bodies_[row.body2].velocity.angular - bodies_[row.body1].velocity.angular).norm());
-  if (!(fastest > 0.0)) return;
+  for (const Row& row : rows_) {
+    if (which[row.body1] == 0 && which[row.body2] == 0) continue;
+    const Twist &one = bodies_[row.body1].velocity, &two = bodies_[row.body2].velocity;
+    // rods turn where bodies do not
+    fastest = std::max({fastest, (two.angular - one.angular).norm(), (two.linear - one.linear).norm() / reach_of(row)});
+  }
+  if (!(fastest * request_->time_step() > kRounding)) return;  // they rest
   const double time = std::max(kLeast, kOfError * turn_off) / fastest;
-  std::vector<Twist> way;
-  for (const Body& body : bodies_) way.push_back({time * body.velocity.linear, time * body.velocity.angular});
+  std::vector<Twist> way(bodies_.size());
+  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i)
+    if (which[i] != 0) way[i] = {time * bodies_[i].velocity.linear, time * bodies_[i].velocity.angular};
   move(way);
 }
 

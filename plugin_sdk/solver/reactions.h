@@ -40,11 +40,13 @@
 // Dependent rows are left out by the factorisation (profile_ldlt.h); rows that contradict each other are met as well as
 // can be (least squares), and `residual` says by how much they are missed.
 //
-// Where rows are nearly dependent, so that bodies would have to move ten times as far as a row might be off, and where dependent ones
-// contradict each other, the answer is that for the nearest state, along M^-1 J^T, that agrees with the joints in pose and velocity. States that an integrator
-// tries are off by its error e, and at a distance x from a singular configuration J and gamma in them are off by e/x^2: the
-// motion would turn away on the hyperbola x y = e instead of going through. There a row counts as dependent within a pivot
-// of 1e-10 of its diagonal, elsewhere of 1e-12; what is left are roundings over x^3.
+// Where rows are nearly dependent, so that bodies would have to move ten times as far as a row might be off, and where dependent
+// ones contradict each other by what the state is off the joints, the answer is that for the nearest state, along M^-1 J^T, that
+// agrees with the joints in pose and velocity. States that an integrator tries are off by its error e, and at a distance x from
+// a singular configuration J and gamma in them are off by e/x^2: the motion would turn away on the hyperbola x y = e instead of
+// going through. There a row counts as dependent within a pivot of 1e-10 of its diagonal, elsewhere of 1e-12; what is left are
+// roundings over x^3. Nearer than e the state that agrees may lie on the other branch, which takes the velocities: it is then
+// looked for a little ahead.
 //
 // Where no state near by agrees (steps towards it do not leave a thousandth of the error: links in a row that just reach their
 // end are locked, and what they are off by, e, is the square of how far they are from being in a row), the question is answered

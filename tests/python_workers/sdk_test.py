@@ -110,6 +110,10 @@ class Columns(unittest.TestCase):
         for given in ([-1], [2.0**64]):
             with self.assertRaisesRegex(ValueError, "not a whole number of 64 bits"):
                 key.taken(given)
+        for given in ([2**64], [None], [1j], ["5"]):
+            for column in (flags, wrench):
+                with self.assertRaisesRegex(ValueError, f"column {column.name} has values of type .*, not real numbers"):
+                    column.taken(given)
         rows = numpy.arange(18.0).reshape(3, 6)
         for given in (rows, rows.reshape(-1), rows.reshape(3, 2, 3), rows.tolist()):
             self.assertEqual(wrench.taken(given).reshape(-1).tolist(), rows.reshape(-1).tolist())

@@ -61,18 +61,19 @@ TEST(RedundantLoops, GoOnThroughTheFlatPose) {
     return "Constraint { Type = \"Revolute\" Id = \"at" + x + "\" " + bodies +
            " CustomProperties { BindAxisPoint1 = {" + x + ", 0, 0} BindAxisPoint2 = {" + x + ", 0, 1} } }\n";
   };
-  const std::string scene =
-      "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = 0.01 Duration = 3 } }\nEnvironment { Space { Bodies "
-      "{ " +
-      body("L", 0.01, 0.15, 0.15 * turn, turn) + body("R", 0.01, 0.95, 0.15 * turn, turn) +
-      body("C", 0.05, 0.7, 0.3 * turn, 0.0) + "} } Constraints { " + hinge("Body2 = \"L\"", "0") +
-      hinge("Body1 = \"L\" Body2 = \"C\"", "0.3") + hinge("Body1 = \"C\" Body2 = \"R\"", "1.1") +
-      hinge("Body2 = \"R\"", "0.8") + "} }\n";
+  const auto scene = [&](const std::string& bodies, const std::string& joints) {
+    return "Simulator { Type = \"Smooth\" CustomProperties { TimeStep = 0.01 Duration = 3 } }\nEnvironment { Space { "
+           "Bodies { " +
+           body("L", 0.01, 0.15, 0.15 * turn, turn) + body("R", 0.01, 0.95, 0.15 * turn, turn) +
+           body("C", 0.05, 0.7, 0.3 * turn, 0.0) + bodies + "} } Constraints { " + hinge("Body2 = \"L\"", "0") +
+           hinge("Body1 = \"L\" Body2 = \"C\"", "0.3") + hinge("Body1 = \"C\" Body2 = \"R\"", "1.1") +
+           hinge("Body2 = \"R\"", "0.8") + joints + "} }\n";
+  };
   for (const std::string solver : {"Direct", "Newton"})
     for (const std::string integrator : {"RK4", "RKMK4", "SymplecticSplitting", "DormandPrince54"})
       for (const double time_step : {0.005, 0.01, 1.0 / 60.0, 0.02}) {
         if (integrator == "SymplecticSplitting" && time_step > 0.01) continue;  // known weakness
-        SceneRun run(scene,
+        SceneRun run(scene("", ""),
                      {set("Solver", solver), set("Integrator", integrator), set("Simulator.TimeStep", time_step)});
         const double energy = run.energy();
         run.to_end();
@@ -81,6 +82,11 @@ TEST(RedundantLoops, GoOnThroughTheFlatPose) {
             << solver << ' ' << integrator << ' ' << time_step;
         EXPECT_LE(run.report().max_joint_error(), 1e-12) << solver << ' ' << integrator << ' ' << time_step;
       }
+  // whatever else turns there
+  SceneRun beside(scene(body("Wheel", 1e4, 20.0, 0.0, 5.0), hinge("Body2 = \"Wheel\"", "20")),
+                  {set("Integrator", std::string("RK4"))});
+  beside.to_end();
+  EXPECT_NEAR(beside.body("L").twist.angular.z(), turn, 1e-3 * turn);
 }
 
 }  // namespace

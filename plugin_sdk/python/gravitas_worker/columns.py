@@ -57,8 +57,10 @@ class Column:
     def taken(self, value):
         """A plugin's value as numbers of the column. Raises ValueError where that would make others of them, or other rows."""
         given = numpy.asarray(value)
+        if given.dtype.kind not in "biuf":
+            raise ValueError(f"column {self.name} has values of type {given.dtype}, not real numbers")
         with numpy.errstate(all="ignore"):
-            numbers = given.astype(self.dtype)
+            numbers = given.astype(self.dtype, copy=False)
         if self.dtype.kind == "u":
             whole = (given >= 0) & (numbers == given)
             if given.dtype.kind == "f":
