@@ -135,7 +135,6 @@ void Environment::finish_step() {
   chain_hash_ = gravitas::chain_hash(chain_hash_, state_hash_);
   // what takes memory may fail: only now the state is S_{n+1}
   ++step_count_;
-  wakes_all_ = false;
   wake_orders_.clear();
   lap_ns_ = lap_ns();
   profile_[static_cast<std::size_t>(Stage::kCommit)].add(lap_between(start, lap_ns_));

@@ -74,6 +74,9 @@ struct SlotDescription {
   std::vector<PluginChoice> plugins;  // one; for force and constraint a list; empty: nothing needs the slot
   Defences defences = {};
 
+  // True if the hosting of one of its plugins is the slot's: what answers by gRPC whatever that is takes no neighbours along.
+  bool is_hosted_as(const PluginChoice& plugin) const { return !plugin.is_elsewhere() || plugins.size() == 1; }
+
   // Whoever takes over from a worker that was started by hand has a deadline again.
   void end_attachment();
   double call_deadline() const { return attached ? kAttachedDeadline : deadline; }

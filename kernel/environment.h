@@ -403,7 +403,6 @@ class Environment : private DerivativeSource, private SlotObserver {
 
   Activity activity_;
   std::uint32_t sleepers_ = 0;               // in this step
-  bool wakes_all_ = false;                   // with the next step
   bool is_idle_ = false;                     // nothing moved in the last step, and nothing has come up since
   std::vector<std::uint32_t> wake_orders_;   // with the next step
   std::vector<std::uint32_t> pushed_;        // asleep, under another force than before

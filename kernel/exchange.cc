@@ -128,8 +128,7 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   has_new_forces_ |= slot.which() == Slot::kForce;
   count_jacobian_blocks();
   if (now.name == before.declaration.name) return;
-  wakes_all_ = true;
-  // for who goes on from S_n elsewhere
+  // all wake with this step, also for who goes on from S_n elsewhere
   wake_orders_.clear();
   for (std::uint32_t i = 0; i < model_.body_count; ++i)
     if (is_asleep(i)) wake_orders_.push_back(i);

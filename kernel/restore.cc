@@ -159,7 +159,7 @@ std::string Environment::restore(const SavedState& saved) {
     return problem;
   }
   std::swap(front_, back_);
-  wakes_all_ = is_idle_ = false;
+  is_idle_ = false;
   wake_orders_ = saved.wake_orders;
   step_count_ = saved.step;
   is_anew_ = saved.is_anew;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "plugin_sdk/math/hermite.h"
 #include "plugin_sdk/math/rotation.h"
@@ -39,25 +40,23 @@ std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const
   }
   for (int axis = 0; axis < 3; ++axis) {
     const AxisMode mode = axis_mode(discrepancy.modes, axis);
-    const bool is_limited = mode == AxisMode::kLimited && discrepancy.lower[axis] < discrepancy.upper[axis];
-    if ((!is_limited && mode != AxisMode::kUnilateral) || discrepancy.compliance[axis] > 0.0) continue;
+    if (mode != AxisMode::kLimited && mode != AxisMode::kUnilateral) continue;
     if (discrepancy.maximum_force[axis] < kUnlimited) continue;  // gives way, as to all that takes no time
-    const bool is_radial = discrepancy.is_radial() && axis == 0;
     const double length = error.norm();
-    const Vector3 along = is_radial && length > 0.0 ? Vector3(error / length) : Vector3(axes.col(axis));
-    const double value = is_radial ? length : along.dot(error);
+    const bool is_radial = discrepancy.is_radial() && axis == 0 && length > 0.0;
+    const Vector3 along = is_radial ? Vector3(error / length) : Vector3(axes.col(axis));
+    const JointAxisState state = joint_axis_state(discrepancy, axis, along, error);
     const JacobianRow row = jacobian_row(discrepancy, along, body1.centre, body2.centre);
     const Twist &one = body1.velocity, &two = body2.velocity;
-    const double rate =
-        row.velocity(one.linear, one.angular, two.linear, two.angular) - along.dot(discrepancy.velocity);
+    const double rate = row.velocity(one.linear, one.angular, two.linear, two.angular) - state.desired_velocity;
     const double speeds = std::fabs(row.linear1.dot(one.linear)) + std::fabs(row.angular1.dot(one.angular)) +
                           std::fabs(row.linear2.dot(two.linear)) + std::fabs(row.angular2.dot(two.angular));
-    const double still = still_rate(speeds);
-    const auto place = 2 * static_cast<std::size_t>(axis);
-    const double lower = is_limited ? discrepancy.lower[axis] : 0.0;
-    if (lower > -kUnlimited) stops[place] = {value - lower, rate, slop, reach, still};
-    if (is_limited && discrepancy.upper[axis] < kUnlimited)
-      stops[place + 1] = {discrepancy.upper[axis] - value, -rate, slop, reach, still};
+    for (const double sign : {1.0, -1.0}) {
+      const std::optional<JointStop> stop = stop_of(state, sign);
+      if (!stop) continue;
+      stops[2 * static_cast<std::size_t>(axis) + (sign < 0.0 ? 1 : 0)] = {sign * (state.error_at_start - stop->limit),
+                                                                          sign * rate, slop, reach, still_rate(speeds)};
+    }
   }
   return stops;
 }

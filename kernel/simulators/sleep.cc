@@ -28,7 +28,7 @@ void Environment::find_sleepers() {
   sleepers_ = 0;
   if (!can_sleep()) return;
   for (std::uint32_t i = 0; i < model_.body_count; ++i) {
-    const bool is_asleep = front().rested[i] == kAsleep && !wakes_all_;
+    const bool is_asleep = front().rested[i] == kAsleep;
     let_sleep(i, is_asleep);
     sleepers_ += is_asleep ? 1 : 0;
   }

@@ -91,9 +91,8 @@ void ServedRun::keep_checkpoint(const JournalReading& known) {
 std::optional<ServedRun::Saved> ServedRun::save_checkpoint() {
   return between_steps([this]() -> std::optional<Saved> {
     if (!recorder_->keeps()) return {};
-    // whom to wake may have been ordered since
-    if (recorder_->saved_step() != environment_->step_count() || !environment_->wake_orders().empty())
-      recorder_->save(*environment_);
+    // also over one of this step: who answers, and whom to wake, may have changed since
+    recorder_->save(*environment_);
     checkpoint_ = recorder_->path();
     resume_command_ = command_to_resume();
     return Saved{recorder_->saved_step().value(), resume_command_};

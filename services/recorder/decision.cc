@@ -13,6 +13,9 @@
 namespace gravitas {
 namespace {
 
+// That may be rolled back.
+bool is_swap(const recorder::v1::Decision& decision) { return decision.why() == "swap"; }
+
 std::optional<kernel::Hosting> find_hosting(const std::string& name) {
   for (const auto hosting : {kernel::Hosting::kDirect, kernel::Hosting::kSharedMemory, kernel::Hosting::kGrpc})
     if (name == kernel::hosting_name(hosting)) return hosting;
@@ -35,8 +38,6 @@ recorder::v1::Decision message_of(const kernel::Decision& decision) {
   message.set_hosting(kernel::hosting_name(decision.host->hosting));
   return message;
 }
-
-bool is_swap(const recorder::v1::Decision& decision) { return decision.why() == "swap"; }
 
 void settle(recorder::v1::Decision* decision) {
   decision->clear_before();
@@ -95,8 +96,7 @@ void put_in_place(std::span<const recorder::v1::Decision> decisions, const Catal
     plugin = order.plugin;
     // none follows the one that took over
     if (fallback && !is_same_plugin(*fallback, plugin)) plugin.fallback = fallback;
-    // what answers by gRPC whatever the slot's hosting takes no neighbours along
-    if (!plugin.is_elsewhere() || slot.plugins.size() == 1) slot.hosting = *order.hosting;
+    if (slot.is_hosted_as(plugin)) slot.hosting = *order.hosting;
   }
 }
 

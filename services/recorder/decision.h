@@ -13,9 +13,6 @@ namespace gravitas {
 
 recorder::v1::Decision message_of(const kernel::Decision& decision);
 
-// That may be rolled back.
-bool is_swap(const recorder::v1::Decision& decision);
-
 // Makes of it one that is not.
 void settle(recorder::v1::Decision* decision);
 

@@ -168,7 +168,9 @@ class Run final : private kernel::CommitListener {
       } catch (const BadInput& problem) {
         result_.fault += fmt::format("; no checkpoint: {}", problem.what());
       }
-      if (keeps && recorder_->saved_step() != environment_->step_count()) recorder_->save(*environment_);
+      // in the step that pauses a run others may have taken over
+      const bool is_kept = recorder_ && recorder_->saved_step() == environment_->step_count();
+      if (keeps && (!is_kept || result_.outcome == RunOutcome::kPaused)) recorder_->save(*environment_);
     });
     // after a failure the one before
     if (!keeps || !recorder_->saved_step()) return;
@@ -271,7 +273,7 @@ class Run final : private kernel::CommitListener {
     // one of a step that was not made is in the checkpoint already
     const auto is_restored = [&](const kernel::SwapOrder& one) {
       return std::ranges::any_of(resumed.checkpoint.decisions(), [&](const recorder::v1::Decision& decision) {
-        return is_swap(decision) && decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
+        return decision.step() == one.step && decision.slot() == slot_name(one.slot) &&
                decision.plugin() == one.plugin.declaration.name;
       });
     };

@@ -218,6 +218,33 @@ TEST(ResumedSwap, OfAStepThatWasNotMadeIsMadeOnce) {
   EXPECT_EQ(resumed.report.swaps(0).outcome(), "committed");
 }
 
+// Nor is what a fallback took over in such a step, whether the checkpoint before is of the same state or not: it was told as a swap,
+// from what had failed or from itself.
+TEST(ResumedSwap, IsNoneOfAFallbackInAStepThatWasNotMade) {
+  const CurrentFolder here;
+  const ScratchFolder folder;
+  const std::string scene = folder.write(
+      "scene.gravitas", harness::read_file(harness::shipped_scene("two_spheres_motor")) +
+                            "Plugins { Plugin { Slot = \"integrator\" Fallback = \"SemiImplicitEuler\" } }\n");
+  RunOptions options = options_of(scene, Hosting::kSharedMemory, 80);
+  RunOptions swapped = options;
+  swapped.swaps = {"integrator=SemiImplicitEuler@step=50"};
+  const RunResult whole = run_quietly(swapped);
+  for (const std::uint32_t every : {1000U, 49U}) {
+    RunOptions part = options;
+    part.checkpoint = folder.path("checkpoint");
+    part.checkpoint_every = every;
+    part.faults = {"integrator:kill@step=50,times=100"};
+    const RunResult paused = run_quietly(part);
+    ASSERT_EQ(paused.outcome, RunOutcome::kPaused) << every;
+    ASSERT_EQ(paused.report.steps(), 49U) << every;
+    options.resume = part.checkpoint;
+    const RunResult resumed = run_quietly(options);
+    EXPECT_EQ(resumed.report.chain_hash(), whole.report.chain_hash()) << every;
+    EXPECT_EQ(resumed.report.swaps_size(), 0) << every;
+  }
+}
+
 // An instance of BasicVerlet or a solver's memory goes on, though the swap is made again.
 TEST(ResumedSwap, KeepsTheStateOfThePluginThatCameIn) {
   const ScratchFolder folder;
