@@ -32,6 +32,7 @@
 #include "kernel/step_data.h"
 #include "kernel/swap.h"
 #include "kernel/validate.h"
+#include "plugin_sdk/derivative_question.h"
 #include "plugin_sdk/duration_histogram.h"
 #include "plugin_sdk/event_location.h"
 #include "plugin_sdk/extrapolation.h"
@@ -227,6 +228,9 @@ class Environment : private DerivativeSource, private SlotObserver {
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
+  // joint_impulses.cc
+  void find_joint_impulses();
+  bool find_wanted_moves();
   void find_start_velocities();
   void join_start_velocities();
   void add_start_impulses();
@@ -237,6 +241,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void meet_stops(double begin, double length);
   double next_stop(const Trusted<TrialState>& trial, double begin, double length, double* crossing);
   void find_stops(bool of_trial, std::vector<StopGap>* stops) const;
+  // Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
   std::uint64_t most_reaction_blocks() const;
 
   // stages.cc: a stage each.
@@ -310,7 +315,10 @@ class Environment : private DerivativeSource, private SlotObserver {
   // True for a group of forces whose wrenches never change.
   bool is_constant(std::size_t group) const;
   void count_jacobian_blocks();
-  bool wants_jacobian() const { return data_.derivative_with_jacobian[0] != 0 && data_.jacobian_blocks[0] != 0; }
+  bool is_asked(DerivativeQuestion question) const {
+    return data_.derivative_question[0] == static_cast<std::uint32_t>(question);
+  }
+  bool wants_jacobian() const { return is_asked(DerivativeQuestion::kWithJacobian) && data_.jacobian_blocks[0] != 0; }
   void ask_jacobians();
   void ask_jacobians(Stage stage, StageSlot* slot, StageCall call, std::uint64_t most);
 
@@ -422,6 +430,8 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool is_anew_ = true;         // no step yet, or none since an edit
   double start_overlap_ = 0.0;  // m, where such a step begins
   bool start_wrench_known_ = false;
+  // Where the joints of the last derivative are: nowhere, in data_.discrepancies, in data_.held_joints.
+  enum class LastJoints { kNone, kFresh, kHeld } last_joints_ = LastJoints::kNone;
   bool attempt_counts_ = true;
   std::vector<std::size_t> next_in_group_;  // scratch of merge_discrepancies()
 

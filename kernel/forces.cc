@@ -84,6 +84,7 @@ void Environment::ask_jacobians() {
 
 void Environment::begin_attempt(bool counts) {
   attempt_counts_ = counts;
+  last_joints_ = LastJoints::kNone;
   validator_.begin_integration();
   if (!counts) return;
   start_wrench_known_ = false;
@@ -97,6 +98,9 @@ void Environment::evaluate() {
                 data_.derivative_linear_velocity, data_.derivative_angular_velocity);
   // the end of a step may be the time of a jump
   data_.derivative_time[0] = std::clamp(data_.derivative_time[0], asked_from_, asked_until_);
+  told_wrench().resize(6 * model_.body_count);
+  if (is_asked(DerivativeQuestion::kPlaceImpulses) || is_asked(DerivativeQuestion::kVelocityImpulses))
+    return find_joint_impulses();
   if (!wrench_is_constant_) {
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);
@@ -104,7 +108,7 @@ void Environment::evaluate() {
     if (wants_jacobian()) ask_jacobians();
     if (sleepers_ > 0 && attempt_counts_) look_for_pushes();
   }
-  if (knows_reactions()) ask_reactions();
+  if (knows_reactions()) is_asked(DerivativeQuestion::kForces) ? told_wrench().assign(data_.wrench) : ask_reactions();
   // a plugin may have taken over that gives none
   if (data_.jacobian_blocks[0] == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   validator_.note_wrench(told_wrench());

@@ -31,7 +31,7 @@ Environment::Environment(EnvironmentDescription description, const HostStarter& 
       integrator_(Slot::kIntegrator, description_.integrator),
       trial_columns_(ids(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
                          data_.derivative_linear_velocity, data_.derivative_angular_velocity,
-                         data_.derivative_with_jacobian)),
+                         data_.derivative_question)),
       answer_columns_(ids(told_wrench(), data_.jacobian_body, data_.jacobian)) {
   for (const DiscrepancyAnswer& answer : data_.discrepancy_answers) discrepancy_reply_.push_back(answer.ids());
   const bool has_inner_steps = description_.simulator >= Simulator::kBisection || description_.substeps > 1 ||

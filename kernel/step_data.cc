@@ -91,7 +91,7 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
   derivative_time = Column<double>(arena, 1, 0);
   derivative_position = bodies_if(has_forces, 3), derivative_orientation = bodies_if(has_forces, 4);
   derivative_linear_velocity = bodies_if(has_forces, 3), derivative_angular_velocity = bodies_if(has_forces, 3);
-  derivative_with_jacobian = Column<std::uint32_t>(arena, 1, 0), jacobian_blocks = Column<std::uint32_t>(arena, 1, 0);
+  derivative_question = Column<std::uint32_t>(arena, 1, 0), jacobian_blocks = Column<std::uint32_t>(arena, 1, 0);
   block_body = Column<std::uint32_t>(arena, 0, 0), jacobian_body = Column<std::uint32_t>(arena, 0, 0);
   block = Column<double>(arena, 0, 0), jacobian = Column<double>(arena, 0, 0);
   for (const ForceGroup& group : model.force_groups) {
@@ -106,6 +106,8 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
 
   kinematic_acceleration = bodies_if(is_smooth, 6), reaction = bodies_if(is_smooth, 6);
   wrench_with_reactions = bodies_if(is_smooth, 6);
+  held_position = bodies_if(is_smooth, 3), held_orientation = bodies_if(is_smooth, 4);
+  no_velocity = bodies_if(is_smooth, 3);
   reaction_residual = Column<double>(arena, 1, 0);
 
   trial_time = Column<double>(arena, 1, 0);
@@ -137,10 +139,11 @@ StepData::StepData(Arena* arena, const Model& model, const EnvironmentDescriptio
     group_intact.emplace_back(arena, joints, 0);
     discrepancy_answers.emplace_back(arena, 8 * joints);
   }
-  discrepancies = DiscrepancyAnswer(arena, rows);
+  discrepancies = DiscrepancyAnswer(arena, rows), held_joints = DiscrepancyAnswer(arena, is_smooth ? rows : 0);
   discrepancy_body = Column<std::uint32_t>(arena, 0, 2 * rows);
   const auto axis_numbers = [&] { return Column<double>(arena, 0, 3 * rows); };
   discrepancy_force = axis_numbers(), held_force = axis_numbers();
+  wanted_along = axis_numbers(), none_along = axis_numbers();
   discrepancy_warm_impulse = axis_numbers(), discrepancy_warm_correction = axis_numbers();
 
   solved_linear_velocity = bodies_if(has_reactions, 3), solved_angular_velocity = bodies_if(has_reactions, 3);

@@ -49,7 +49,7 @@ struct StepData {
   // Trial state of a derivative request, and its time. Written by the carrier of Stage::kIntegrate.
   Column<double> derivative_time, derivative_position, derivative_orientation, derivative_linear_velocity,
       derivative_angular_velocity;
-  Column<std::uint32_t> derivative_with_jacobian;
+  Column<std::uint32_t> derivative_question;
   // Stage::kForce: answers per group; sum per body (6); impulses per body (6), asked once.
   std::vector<ForceAnswer> force_answers;
   Column<double> wrench, impulse;
@@ -64,6 +64,9 @@ struct StepData {
   // Stage::kSolve inside kIntegrate; held_force: the last discrepancy_force of the integration that counts.
   Column<double> kinematic_acceleration, reaction, discrepancy_force, held_force, reaction_residual,
       wrench_with_reactions;
+  // joint_impulses.cc: joints and poses of the last derivative, what they shall do, and what is none.
+  DiscrepancyAnswer held_joints;
+  Column<double> held_position, held_orientation, no_velocity, wanted_along, none_along;
 
   // Stage::kIntegrate: S*, and its time.
   Column<double> trial_time, trial_position, trial_orientation, trial_linear_velocity, trial_angular_velocity,

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "plugin_sdk/answer_checks.h"
+#include "plugin_sdk/derivative_question.h"
 
 namespace gravitas::kernel {
 namespace {
@@ -83,6 +84,8 @@ void Validator::derivative_request(const StepData& data) const {
                                        &data.derivative_linear_velocity, &data.derivative_angular_velocity})
     if (first_not_finite(column->span()) != kNoRow)
       bad_numbers("it asked for a derivative in a state that is not finite");
+  if (data.derivative_question[0] > static_cast<std::uint32_t>(DerivativeQuestion::kVelocityImpulses))
+    bad_numbers("it asked a question that there is not");
 }
 
 Trusted<Pairs> Validator::pairs(const Untrusted<StageCall>& answer, const StepData& data) const {

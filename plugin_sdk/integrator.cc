@@ -40,15 +40,35 @@ Derivatives::Derivatives(const stage::IntegratorIntegrateRequest& request, Host&
 
 std::span<const double> Derivatives::wrenches_at_start() {
   if (request_.wrench_is_constant() != 0) return request_.wrench();
-  return ask(request_.time(),
-             {request_.position(), request_.orientation(), request_.linear_velocity(), request_.angular_velocity()},
-             nullptr);
+  return ask(DerivativeQuestion::kWrenches, request_.time(),
+             {request_.position(), request_.orientation(), request_.linear_velocity(), request_.angular_velocity()});
 }
 
 std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial) {
   if (request_.wrench_is_constant() != 0) return request_.wrench();
   require_finite(trial);
-  return ask(time, columns_of(trial), nullptr);
+  return ask(DerivativeQuestion::kWrenches, time, columns_of(trial));
+}
+
+std::span<const double> Derivatives::forces(double time, const TrialColumns& trial) {
+  if (request_.wrench_is_constant() != 0) return request_.wrench();
+  require_finite(trial);
+  return ask(DerivativeQuestion::kForces, time, columns_of(trial));
+}
+
+std::span<const double> Derivatives::place_impulses(double time, const TrialColumns& trial) {
+  return ask_impulses(DerivativeQuestion::kPlaceImpulses, time, trial);
+}
+
+std::span<const double> Derivatives::velocity_impulses(double time, const TrialColumns& trial) {
+  return ask_impulses(DerivativeQuestion::kVelocityImpulses, time, trial);
+}
+
+// Wrenches that are constant are those of bodies without joints.
+std::span<const double> Derivatives::ask_impulses(DerivativeQuestion question, double time, const TrialColumns& trial) {
+  if (request_.wrench_is_constant() != 0) return {};
+  require_finite(trial);
+  return ask(question, time, columns_of(trial));
 }
 
 std::span<const double> Derivatives::wrenches(double time, const TrialColumns& trial, WrenchJacobian* jacobian) {
@@ -58,18 +78,19 @@ std::span<const double> Derivatives::wrenches(double time, const TrialColumns& t
     return wrenches(time, trial);
   }
   require_finite(trial);
-  const std::span<const double> answer = ask(time, columns_of(trial), jacobian);
+  const std::span<const double> answer = ask(DerivativeQuestion::kWithJacobian, time, columns_of(trial), jacobian);
   jacobian->is_known_ = jacobian->size() > 0;
   return answer;
 }
 
-std::span<const double> Derivatives::ask(double time, const std::array<std::span<const double>, 4>& state,
+std::span<const double> Derivatives::ask(DerivativeQuestion question, double time,
+                                         const std::array<std::span<const double>, 4>& state,
                                          WrenchJacobian* jacobian) {
   answer_.resize(6 * size());
-  const std::uint32_t with_jacobian = jacobian != nullptr ? 1 : 0;
-  const std::array<gravitas_column, 6> question = {column_of({&time, 1}), column_of(state[0]),
-                                                   column_of(state[1]),   column_of(state[2]),
-                                                   column_of(state[3]),   gravitas_column{&with_jacobian, 1}};
+  const auto wanted = static_cast<std::uint32_t>(question);
+  const std::array<gravitas_column, 6> asked = {column_of({&time, 1}), column_of(state[0]),
+                                                column_of(state[1]),   column_of(state[2]),
+                                                column_of(state[3]),   gravitas_column{&wanted, 1}};
   std::array<gravitas_reply_column, 3> answer = {{{answer_.data(), answer_.size(), 0}, {}, {}}};
   if (jacobian != nullptr) {
     const std::size_t blocks = request_.jacobian_blocks();
@@ -77,7 +98,10 @@ std::span<const double> Derivatives::ask(double time, const std::array<std::span
     answer[1] = {jacobian->bodies_.data(), jacobian->bodies_.size(), 0};
     answer[2] = {jacobian->numbers_.data(), jacobian->numbers_.size(), 0};
   }
-  host_.derivative(question.data(), answer.data());
+  host_.derivative(asked.data(), answer.data());
+  const bool are_impulses =
+      question == DerivativeQuestion::kPlaceImpulses || question == DerivativeQuestion::kVelocityImpulses;
+  if (are_impulses && answer[0].count == 0) return {};
   if (answer[0].count != answer_.size()) throw std::runtime_error("the derivative has the wrong size");
   require_finite(answer_, 6, "wrench");
   if (jacobian == nullptr) return answer_;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "plugin_sdk/body.h"
+#include "plugin_sdk/derivative_question.h"
 #include "plugin_sdk/dynamics.h"
 #include "plugin_sdk/math/free_rotor.h"
 #include "plugin_sdk/math/transcendental.h"
@@ -48,6 +49,18 @@ class Derivatives {
   // The same, and how they change with the states of the bodies.
   std::span<const double> wrenches(double time, const TrialColumns& trial, WrenchJacobian* jacobian);
 
+  // Those of the forces alone: without what joints do, which simulator Smooth adds.
+  std::span<const double> forces(double time, const TrialColumns& trial);
+
+  // For methods that keep to the joints within a step: how joints have to push in the state that wrenches() was last asked for, along
+  // J^T there, six numbers a body.
+  //   place_impulses     W, kg m, with J M^-1 W = -(joints' errors in the trial state): what W/s is added to the momenta there moves
+  //                      the bodies in a time s to where joints want them, to first order in s
+  //   velocity_impulses  W, N s, with J M^-1 W = -(J v of the trial state - what joints want)
+  // Empty where joints hold by other than locks alone (limits, drives, friction, springs), or there are none. Throws as wrenches().
+  std::span<const double> place_impulses(double time, const TrialColumns& trial);
+  std::span<const double> velocity_impulses(double time, const TrialColumns& trial);
+
   // Acceleration of one body in a state, under its part of `wrenches`.
   Acceleration acceleration(std::size_t body, const BodyState& state, std::span<const double> wrenches) const;
 
@@ -75,8 +88,9 @@ class Derivatives {
   bool has_gyroscopic_term(std::size_t body) const;
   void require_finite(std::span<const double> column, std::size_t components, const char* what) const;
   void require_finite(const TrialColumns& trial) const;
-  std::span<const double> ask(double time, const std::array<std::span<const double>, 4>& state,
-                              WrenchJacobian* jacobian);
+  std::span<const double> ask(DerivativeQuestion question, double time,
+                              const std::array<std::span<const double>, 4>& state, WrenchJacobian* jacobian = nullptr);
+  std::span<const double> ask_impulses(DerivativeQuestion question, double time, const TrialColumns& trial);
 
   const stage::IntegratorIntegrateRequest& request_;
   Host& host_;

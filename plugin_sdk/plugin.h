@@ -138,7 +138,8 @@ class Host {
     });
   }
 
-  // Wrenches of all bodies (six numbers each) in a trial state, and the blocks of their Jacobian. The columns are those of
+  // Wrenches of all bodies (six numbers each) in a trial state, and the blocks of their Jacobian, or what else a
+  // DerivativeQuestion asks. The columns are those of
   // Integrator.Derivative. Throws std::runtime_error when they cannot be had: let it pass.
   void derivative(const gravitas_column* request, gravitas_reply_column* reply) const {
     if (host_->derivative == nullptr || host_->derivative(host_->context, request, reply) != GRAVITAS_OK)

@@ -43,6 +43,8 @@ void Environment::ask_reactions() {
   const auto asked = request(data_.block_body, data_.block);
   ask(Stage::kSolve, &solver_, {stage::Method::kSolverReactions, 0, asked, reply}, nullptr,
       [&](const auto& answer) { return validator_.reactions(answer); });
+  last_joints_ = LastJoints::kFresh;  // joint_impulses.cc
+  data_.held_position.assign(data_.derivative_position), data_.held_orientation.assign(data_.derivative_orientation);
   if (attempt_counts_) data_.held_force.assign(data_.discrepancy_force);
   std::ranges::transform(data_.wrench.span(), data_.reaction.span(), data_.wrench_with_reactions.data(), std::plus());
   if (!wants_jacobian()) return;
@@ -138,7 +140,6 @@ std::string Environment::why_joints_took(double share, std::uint32_t step) {
          "TimeStep is too long for the integrator; energy may be lost or gained";
 }
 
-// Joints connect all movable bodies, at most. 0: the solver cannot say how reactions change.
 std::uint64_t Environment::most_reaction_blocks() const {
   if (!has_capability(solver_.description().plugins[0].declaration, "reaction_jacobians")) return 0;
   const auto movable = static_cast<std::uint64_t>(

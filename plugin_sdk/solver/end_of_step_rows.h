@@ -58,6 +58,8 @@ struct EndContact {
   double softness = 0.0;             // ConeRow's
   double whole_target = 0.0;         // of which SharedRestitution takes a share
   bool shares = false;               // it does
+
+  bool is_of_pair(const EndContact& other) const { return body1 == other.body1 && body2 == other.body2; }
 };
 
 // True for modes that hold an error, of an axis or of any of a discrepancy's.

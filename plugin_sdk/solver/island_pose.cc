@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "plugin_sdk/math/rotation.h"
@@ -354,13 +355,30 @@ void IslandSolver::keep_corrections() {
   for (const EndContact& contact : contacts_) answer_.contact_correction[contact.row] = cone_.rows[next++].multiplier;
 }
 
+double IslandSolver::gap_of(const EndContact& contact) const {
+  return contact.gap + contact.gap_row.along(displacement_[contact.body1], displacement_[contact.body2]);
+}
+
+// A face that comes down about an edge meets with all its corners at once, but those nearer to the edge are within their slop
+// before. Of a pair that arrives, what comes in the time that the slop takes comes with it: one by one they bounce otherwise.
+void IslandSolver::close_together(std::span<EndContact> of_pair, double time) {
+  for (EndContact& contact : of_pair)
+    contact.is_closed = contact.is_closed || gap_of(contact) <= contact.slop + time * contact.law.arrival;
+}
+
 bool IslandSolver::find_closed() {
   bool any = false;
-  for (EndContact& contact : contacts_) {
-    const double gap = contact.gap + contact.gap_row.along(displacement_[contact.body1], displacement_[contact.body2]);
-    // what is pushed is closed, however far the steps have come
-    if (contact.is_closed || (gap > contact.slop && !(answer_.contact_correction[contact.row] > 0.0))) continue;
-    contact.is_closed = any = true;
+  for (std::size_t first = 0, end = 0; first < contacts_.size(); first = end) {
+    double time = 0.0;
+    for (; end < contacts_.size() && contacts_[end].is_of_pair(contacts_[first]); ++end) {
+      EndContact& contact = contacts_[end];
+      // what is pushed is closed, however far the steps have come
+      const bool closes = gap_of(contact) <= contact.slop || answer_.contact_correction[contact.row] > 0.0;
+      if (contact.is_closed || !closes) continue;
+      contact.is_closed = any = true;
+      if (contact.law.arrival > 0.0) time = std::max(time, 2.0 * contact.slop / contact.law.arrival);
+    }
+    if (time > 0.0) close_together(std::span(contacts_).subspan(first, end - first), time);
   }
   for (EndJoint& joint : joints_) {
     for (std::size_t k = 0; k < 3; ++k) {

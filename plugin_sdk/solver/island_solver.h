@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -166,6 +167,8 @@ class IslandSolver {
   void keep_corrections();
 
   // Contacts and limits that the end of the step closes, beside those that were.
+  double gap_of(const EndContact& contact) const;
+  void close_together(std::span<EndContact> of_pair, double time);
   bool find_closed();
 
   JointLaw velocity_law_of(const EndJoint& joint, std::size_t k) const;

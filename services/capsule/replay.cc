@@ -16,6 +16,7 @@
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/checks.h"
 #include "plugin_sdk/column_comparison.h"
+#include "plugin_sdk/derivative_question.h"
 #include "plugin_sdk/solver.h"
 #include "services/capsule/answer_verdict.h"
 #include "services/capsule/capsule.h"
@@ -74,7 +75,14 @@ bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRe
   const double time = asked.time();
   return same("time", {&time, 1}) && same("position", asked.position()) && same("orientation", asked.orientation()) &&
          same("linear_velocity", asked.linear_velocity()) && same("angular_velocity", asked.angular_velocity()) &&
-         recorded.u32("with_jacobian")[0] == asked.with_jacobian();
+         recorded.u32("question")[0] == asked.question();
+}
+
+// Impulses of joints are no wrenches.
+void add_told(const v1::CapsuleDerivative& one, WrenchRange* told) {
+  const std::uint32_t question = columns_of(one.trial(), derivative_info().request).u32("question")[0];
+  if (question <= static_cast<std::uint32_t>(DerivativeQuestion::kForces))
+    told->add(columns_of(one.answer(), derivative_info().reply).f64("wrench"));
 }
 
 // Why a run would not go on with this; empty: it would.
@@ -113,7 +121,7 @@ Answer Asked::ask(const v1::CapsuleCall& call, bool is_poison) {
     if (!is_same(columns_of(recorded.trial(), derivative.request), trial, comparison_))
       throw OtherDerivative(fmt::format("derivative {} is asked at another state", asked));
     const MessageColumns all = columns_of(recorded.answer(), derivative.reply);
-    told.add(all.f64("wrench"));
+    add_told(recorded, &told);
     return {all.f64("wrench"), all.u32("jacobian_body"), all.f64("jacobian")};
   };
   const MessageColumns request = columns_of(call.request(), method.request);
@@ -132,8 +140,7 @@ Answer recorded_answer(const v1::CapsuleCall& call, bool with_physics) {
                 .fault = call.fault(),
                 .columns = has_answer ? columns_of(call.reply(), method.reply) : MessageColumns(method.reply)};
   WrenchRange told;
-  for (const v1::CapsuleDerivative& one : call.derivatives())
-    told.add(columns_of(one.answer(), derivative_info().reply).f64("wrench"));
+  for (const v1::CapsuleDerivative& one : call.derivatives()) add_told(one, &told);
   answer.fault = failure_of(call, columns_of(call.request(), method.request), answer, told, with_physics);
   return answer;
 }

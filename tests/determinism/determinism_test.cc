@@ -29,7 +29,7 @@ const std::string kHashes = in_source("/tests/determinism/hashes.json");
 // whose hashes are committed
 constexpr const char* kScenes[] = {
     "two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack", "thruster", "pile", "callbacks",
-    "suspension",        "stops",  "taut"};
+    "suspension",        "stops",  "taut",          "hinged"};
 constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
                            Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 

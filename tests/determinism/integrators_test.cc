@@ -38,6 +38,11 @@ TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHostingWithJointsInItsDerivatives
   expect_same_bits("suspension.gravitas", GetParam(), 12);
 }
 
+// Impulses of joints, which that integrator asks for, and steps that joints take part in.
+TEST_P(EveryIntegrator, GivesTheSameBitsOnEveryHostingWithLocksInItsDerivatives) {
+  expect_same_bits("hinged.gravitas", GetParam(), 12);
+}
+
 INSTANTIATE_TEST_SUITE_P(Integrators, EveryIntegrator,
                          ::testing::Values("Euler", "SemiImplicitEuler", "Verlet", "BasicVerlet", "RK4", "RKMK4",
                                            "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54",

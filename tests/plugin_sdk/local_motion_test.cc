@@ -136,7 +136,7 @@ class Mechanism {
     asked.angular_velocity.assign(question.angular_velocity().begin(), question.angular_velocity().end());
     time = question.time();
     for (const double number : wrenches_in(asked)) reply.wrench().push(number);
-    if (question.with_jacobian() == 0) return GRAVITAS_OK;
+    if (question.question() != static_cast<std::uint32_t>(DerivativeQuestion::kWithJacobian)) return GRAVITAS_OK;
     for (const auto& [body, by] : {std::pair{0U, 0U}, {0U, 1U}, {1U, 0U}, {1U, 1U}, {2U, 2U}}) {
       reply.jacobian_body().push(body), reply.jacobian_body().push(by);
       const JacobianBlock block = slope(asked, body, by);

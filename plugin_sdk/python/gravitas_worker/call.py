@@ -93,7 +93,7 @@ class Call(Host):
         if self._derivative is None:
             raise RuntimeError("a derivative is asked for by integrators only")
         asked = {"time": time, "position": position, "orientation": orientation, "linear_velocity": linear_velocity,
-                 "angular_velocity": angular_velocity, "with_jacobian": 0}
+                 "angular_velocity": angular_velocity, "question": 0}
         asked = self.checked(self._derivative.request, asked, "the state of a derivative")
         self._send(Sent.QUESTION, None, {}, self._derivative.request.serialize(asked))
         answer = self.incoming.get()

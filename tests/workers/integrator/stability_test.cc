@@ -57,6 +57,8 @@ double growth(const StabilityMethod& method, double frequency, double ratio, int
     const BodyState& s = problem.bodies[0].state;
     const double energy = (s.twist.linear.squaredNorm() + k * s.pose.position.squaredNorm()) / (k * start * start);
     if (!(energy < 1e12)) return HUGE_VAL;
+    if (i < 2 && !problem.plugin.refusal(stage::Method::kIntegratorIntegrate, problem.request()).empty())
+      return HUGE_VAL;
     problem.step();
   }
   const BodyState& s = problem.bodies[0].state;

@@ -9,20 +9,29 @@
 // to see whether the forces depend on velocity (none where the wrench is constant).
 // Under constant forces and no torque one drift is exact and order 2 is taken. Without torque nothing but rounding is between the result and the truth, at any step: position, attitude, energy and
 // angular momentum. With forces that depend on position and attitude alone the method is symplectic and symmetric: the
-// energy of long runs wanders within O(h^order) and does not drift. Not so with joints, which are put right at the end of the
-// whole step; order 6 is 5 there where bodies turn about hinges and ball joints. Stability: an oscillator is stable up to h w = 2
+// energy of long runs wanders within O(h^order) and does not drift. Stability: an oscillator is stable up to h w = 2
 // (order 2), 2.72 (order 4), 2.53 (order 6).
-// Where a force does depend on velocity a kick is one classical Runge-Kutta step in the velocities alone, which costs
-// four derivatives and is of order 4: so is the whole then at most, and not symplectic.
+// With joints that hold by locks alone each pair of kicks and the drift between them are a step of RATTLE, with the free rotor as
+// its drift: impulses along the joints' directions before it bring the bodies to where joints want them after it,
+//   v' = v + M^-1 (s f/2 + J^T(q) lambda),   (q1, v1) = drift(s)(q, v'),   g(q1) = 0
+//   v1 += M^-1 (s f(q1)/2 + J^T(q1) mu),   J(q1) v1 = what joints want
+// That is symmetric and symplectic, and so is each composition of it, which has its order. lambda is found by chords with the
+// directions before the drift, from what joints bear there: four to eight questions a drift.
+// Where a force does depend on velocity, or joints have limits with room, drives, friction or springs, or lambda is not found
+// (bodies that turn by more than about half a radian in a drift, poses where rows depend on each other), a kick is one Runge-Kutta
+// step in the velocities alone, of order 4 (classical), with order 6 of that (Butcher's), and the whole is not symplectic.
 // Damping c is part of the drift: s becomes (1 - e^(-c s))/c and velocities shrink by e^(-c s), exact again since a
 // free rotor whose momentum decays is one in slowed time. So is then the acceleration f_0/m of the start, and kicks are of what
 // forces differ from it by: a damped body falls exactly. Where c h > 1 and the composition has steps back, it drifts along that
 // motion undamped in what deviates from it, velocities of which, and those of turning, are slowed in two halves around the step
 // instead (order 2 in c h; known failure: a steady torque turns it too slowly, then).
-// Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.4, V.3, VII.5.
+// Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.4, V.3, VII.1, VII.5. Butcher, J. Austral. Math. Soc. 4
+// (1964) 179: seven stages of order 6.
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <utility>
 
 #include "plugin_sdk/integrator.h"
 #include "plugin_sdk/math/free_rotor.h"
@@ -39,13 +48,31 @@ constexpr std::array<double, 9> kOrder6 = {0.39216144400731413928,  0.3325991367
                                            0.08221359629355080023,  0.79854399093482996340, 0.08221359629355080023,
                                            -0.70624617255763935981, 0.33259913678935943860, 0.39216144400731413928};
 
+struct RungeKutta {
+  std::size_t stages;
+  std::array<std::array<double, 7>, 7> a;  // of a stage: shares of the rates before it
+  std::array<double, 7> b;
+};
+constexpr RungeKutta kClassical = {
+    4, {{{}, {0.5}, {0.0, 0.5}, {0.0, 0.0, 1.0}}}, {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0}};
+constexpr RungeKutta kButcher6 = {
+    7,
+    {{{},
+      {1.0 / 3.0},
+      {0.0, 2.0 / 3.0},
+      {1.0 / 12.0, 1.0 / 3.0, -1.0 / 12.0},
+      {25.0 / 48.0, -55.0 / 24.0, 35.0 / 48.0, 15.0 / 8.0},
+      {3.0 / 20.0, -11.0 / 24.0, -1.0 / 8.0, 1.0 / 2.0, 1.0 / 10.0},
+      {-261.0 / 260.0, 33.0 / 13.0, 43.0 / 156.0, -118.0 / 39.0, 32.0 / 195.0, 80.0 / 39.0}}},
+    {13.0 / 200.0, 0.0, 11.0 / 40.0, 11.0 / 40.0, 4.0 / 25.0, 4.0 / 25.0, 13.0 / 200.0}};
+
 class SymplecticSplitting final : public IntegratorPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "SymplecticSplitting",
             .version = "1.0",
             .slot = Slot::kIntegrator,
-            .meaning = "Exact free motion and kicks in turn, symplectic for bodies without joints, order 2, 4 or 6.",
+            .meaning = "Exact free motion and kicks in turn, symplectic, with joints that hold by locks alone, too; order 2, 4 or 6.",
             .capabilities = {"order=4"},
             .properties = {Property::integer("Order").at_least(2).at_most(6).defaults_to({4}).means(
                 "Order of the composition: 2, 4 or 6.")},
@@ -75,7 +102,10 @@ class SymplecticSplitting final : public IntegratorPlugin {
     const std::span<const double> weights = needs_no_composition() ? std::span<const double>(kStrang) : weights_;
     const std::span<const double> start = derivatives.wrenches_at_start();
     start_wrench_.assign(start.begin(), start.end());
-    depends_on_velocity_ = request.wrench_is_constant() == 0 && size() > 0 && probe_velocity(&derivatives);
+    const bool has_locks = !find_what_acts(&derivatives);
+    if (has_locks && keep_to_joints(weights, &derivatives))
+      return for_each_body(request, reply, [&](std::size_t i, const BodyState&) { return trial_.at(i); });
+    if (has_locks) begin(request, derivatives);
 
     find_steady();
     slow_halves(0.0);
@@ -138,16 +168,96 @@ class SymplecticSplitting final : public IntegratorPlugin {
     }
   }
 
-  // Asks at the start with other velocities, other for each body and axis, since a damper feels their difference.
-  bool probe_velocity(Derivatives* derivatives) {
+  // Sets depends_on_velocity_, of all that acts. False where joints are what feels velocities, and forces do not.
+  bool find_what_acts(Derivatives* derivatives) {
+    depends_on_velocity_ = false;
+    if (request_->wrench_is_constant() != 0 || size() == 0) return true;
+    const auto is_same = [](std::span<const double> a, std::span<const double> b) {
+      return std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
+    };
+    const std::span<const double> shifted = derivatives->forces(request_->time(), shifted_velocities());
+    if (is_same(shifted, start_wrench_)) return true;
+    depends_on_velocity_ = true;
+    forces_.assign(shifted.begin(), shifted.end());
+    const std::span<const double> forces = derivatives->forces(request_->time(), trial_);
+    return is_same(forces, start_wrench_) || !is_same(forces, forces_);
+  }
+
+  // Other for each body and axis, since a damper feels their difference.
+  TrialColumns shifted_velocities() const {
     TrialColumns shifted = trial_;
     for (std::vector<double>* column : {&shifted.linear_velocity, &shifted.angular_velocity})
       for (std::size_t k = 0; k < column->size(); ++k) {
         const double share = static_cast<double>(k) / static_cast<double>(column->size());
         (*column)[k] += (1.0 + share * share) * (1.0 + std::fabs((*column)[k]));
       }
-    const std::span<const double> answer = derivatives->wrenches(request_->time(), shifted);
-    return std::memcmp(answer.data(), start_wrench_.data(), answer.size_bytes()) != 0;
+    return shifted;
+  }
+
+  // The whole step along the joints; false: that cannot be done. forces_: without what joints do.
+  bool keep_to_joints(std::span<const double> weights, Derivatives* derivatives) {
+    const double h = request_->time_step();
+    for (std::size_t i = 0; i < size(); ++i)
+      if (is_movable(i) && slows_in_halves(i)) return false;
+    std::swap(start_wrench_, forces_);  // bodies drift steadily under forces alone
+    find_steady();
+    std::swap(start_wrench_, forces_);
+    std::span<const double> wrenches = start_wrench_;
+    double passed = 0.0, before = 0.0;
+    for (std::size_t stage = 0; stage < weights.size(); ++stage) {
+      const double next = stage + 1 == weights.size() ? 1.0 : passed + weights[stage];
+      kicks_.assign(size(), {});
+      for (std::size_t i = 0; i < size(); ++i)
+        if (is_movable(i)) kicks_[i] = scaled(rate(i, wrenches), 0.5 * (before + weights[stage]) * h);
+      if (!drift_to_joints(derivatives, passed * h, next * h, weights[stage] * h)) return false;
+      passed = next, before = weights[stage];
+      wrenches = derivatives->wrenches(request_->time() + passed * h, trial_);
+    }
+    for (std::size_t i = 0; i < size(); ++i)
+      if (is_movable(i)) push(i, trial_.at(i), rate(i, wrenches), 0.5 * before * h);
+    const std::span<const double> impulses = derivatives->velocity_impulses(request_->time() + h, trial_);
+    if (impulses.empty()) return false;
+    for (std::size_t i = 0; i < size(); ++i)
+      if (is_movable(i)) push(i, trial_.at(i), change(i, impulses, trial_), 1.0);
+    return true;
+  }
+
+  // Drifts from trial_, with kicks_ and what they lack, to where joints want the bodies.
+  bool drift_to_joints(Derivatives* derivatives, double from, double to, double s) {
+    constexpr int kMost = 40;
+    constexpr double kNear = 1e-14, kFound = 1e-9;  // of the way
+    constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+    before_ = trial_;
+    drift_all(from, to, s);
+    double last = std::numeric_limits<double>::infinity();
+    for (int question = 0; question < kMost; ++question) {
+      const std::span<const double> impulses = derivatives->place_impulses(request_->time() + to, trial_);
+      if (impulses.empty()) return false;
+      // squares, by the masses, of what joints ask for, how far the bodies go, and their coordinates, which are rounded
+      double asked = 0.0, way = 0.0, place = 0.0;
+      for (std::size_t i = 0; i < size(); ++i) {
+        if (!is_movable(i)) continue;
+        const Twist moved = change(i, impulses, before_);
+        asked += energy(i, moved), way += s * s * (energy(i, before_.at(i).twist) + energy(i, kicks_[i]));
+        place += energy(i, {before_.at(i).pose.position, Vector3::Ones()});
+        kicks_[i].linear += moved.linear / s, kicks_[i].angular += moved.angular / s;
+      }
+      drift_all(from, to, s);
+      if (asked <= kNear * kNear * way) return true;
+      // what does not come nearer any more is rounding, or not found
+      if (asked >= 0.25 * last) return asked <= kFound * kFound * way + kRounding * kRounding * place;
+      last = asked;
+    }
+    return false;
+  }
+
+  // From before_ to trial_.
+  void drift_all(double from, double to, double s) {
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (is_movable(i)) push(i, before_.at(i), kicks_[i], 1.0);
+      drift(i, from, to, s);
+    }
+    carry_others(to);
   }
 
   // Bodies that are not movable at a time (s) after the start.
@@ -207,34 +317,47 @@ class SymplecticSplitting final : public IntegratorPlugin {
         if (is_movable(i)) push(i, trial_.at(i), rate(i, wrenches), s);
       return;
     }
-    // the classical Runge-Kutta method in the velocities
-    const TrialColumns start = trial_;
-    rates_.assign(size(), {});
-    constexpr std::array<double, 4> kShare = {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0}, kNext = {0.5, 0.5, 1.0, 0.0};
-    for (std::size_t stage = 0; stage < kShare.size(); ++stage) {
+    const RungeKutta& method = weights_.size() > kOrder4.size() ? kButcher6 : kClassical;
+    before_ = trial_;
+    for (std::size_t stage = 0; stage < method.stages; ++stage) {
       const std::span<const double> wrenches = ask();
+      rates_[stage].resize(size());
+      const bool is_last = stage + 1 == method.stages;
+      const std::array<double, 7>& shares = is_last ? method.b : method.a[stage + 1];
       for (std::size_t i = 0; i < size(); ++i) {
         if (!is_movable(i)) continue;
-        const Twist a = rate(i, wrenches);
-        rates_[i].linear += kShare[stage] * a.linear;
-        rates_[i].angular += kShare[stage] * a.angular;
-        push(i, start.at(i), a, kNext[stage] * s);
+        rates_[stage][i] = rate(i, wrenches);
+        Twist sum;
+        for (std::size_t k = 0; k <= stage; ++k)
+          sum.linear += shares[k] * rates_[k][i].linear, sum.angular += shares[k] * rates_[k][i].angular;
+        push(i, before_.at(i), sum, s);
       }
     }
-    for (std::size_t i = 0; i < size(); ++i)
-      if (is_movable(i)) push(i, start.at(i), rates_[i], s);
   }
 
   // Rates of the velocities without the gyroscopic term and the steady acceleration, which belong to the drift.
   Twist rate(std::size_t body, std::span<const double> wrenches) const {
-    const Vector3 inverse_moments = vector_at(request_->inverse_inertia(), body);
-    const Vector3 torque = vector_at(wrenches, 2 * body + 1);
-    Twist rate{request_->inverse_mass()[body] * vector_at(wrenches, 2 * body) - steady_[body], Vector3::Zero()};
-    if (torque.isZero(0.0)) return rate;
-    const Quaternion q = quaternion_at(trial_.orientation, body);
-    rate.angular = q * inverse_moments.cwiseProduct(q.conjugate() * torque);
+    Twist rate = change(body, wrenches, trial_);
+    rate.linear -= steady_[body];
     return rate;
   }
+  // M^-1 of a body's six numbers, at its attitude.
+  Twist change(std::size_t body, std::span<const double> impulses, const TrialColumns& at) const {
+    const Vector3 inverse_moments = vector_at(request_->inverse_inertia(), body);
+    const Vector3 turning = vector_at(impulses, 2 * body + 1);
+    Twist change{request_->inverse_mass()[body] * vector_at(impulses, 2 * body), Vector3::Zero()};
+    if (turning.isZero(0.0)) return change;
+    const Quaternion q = quaternion_at(at.orientation, body);
+    change.angular = q * inverse_moments.cwiseProduct(q.conjugate() * turning);
+    return change;
+  }
+  // v M v of a body, its attitude left aside.
+  double energy(std::size_t body, const Twist& twist) const {
+    const double inverse_mass = request_->inverse_mass()[body];
+    return (inverse_mass > 0.0 ? twist.linear.squaredNorm() / inverse_mass : 0.0) +
+           vector_at(request_->inertia(), body).maxCoeff() * twist.angular.squaredNorm();
+  }
+  static Twist scaled(const Twist& twist, double by) { return {by * twist.linear, by * twist.angular}; }
   void push(std::size_t body, const BodyState& from, const Twist& rate, double s) {
     trial_.set(body, {from.pose, {from.twist.linear + s * rate.linear, from.twist.angular + s * rate.angular}});
   }
@@ -242,10 +365,11 @@ class SymplecticSplitting final : public IntegratorPlugin {
   std::span<const double> weights_;
   const stage::IntegratorIntegrateRequest* request_ = nullptr;  // of the call in hand
   bool depends_on_velocity_ = false;
-  std::vector<double> room_, start_wrench_;  // scratch
-  std::vector<Twist> rates_;                 // scratch
-  std::vector<Vector3> steady_;              // scratch
-  TrialColumns trial_;                       // scratch: the state as it moves
+  std::vector<double> room_, start_wrench_, forces_;  // scratch
+  std::array<std::vector<Twist>, 7> rates_;           // scratch
+  std::vector<Twist> kicks_;                          // scratch
+  std::vector<Vector3> steady_;                       // scratch
+  TrialColumns trial_, before_;                       // scratch: the state as it moves, and before a kick or drift
 };
 
 }  // namespace

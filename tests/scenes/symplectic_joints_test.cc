@@ -1,0 +1,171 @@
+// SymplecticSplitting with joints (simulator Smooth): energy that does not drift, ways back, joints that a clock moves.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/math/rotation.h"
+#include "tests/scenes/scene_run.h"
+
+namespace gravitas {
+namespace {
+
+using harness::angle_between;
+using harness::literal;
+using harness::SceneRun;
+using harness::set;
+
+std::vector<std::string> of_order(int order, double time_step) {
+  return {"Integrator=SymplecticSplitting", "Integrator.Order=" + std::to_string(order),
+          set("Simulator.TimeStep", time_step)};
+}
+
+struct Start {
+  Pose pose;
+  Twist twist;
+};
+
+std::string body(const std::string& id, const std::string& moments, const Start& start) {
+  return "Body { Id = \"" + id + "\" Mass = 1 PrincipalMoments = " + moments + " Forces = {\"Down\"} " +
+         "KineticProperties { Position = " + literal(start.pose.position) +
+         " Orientation = " + literal(start.pose.orientation) + " LinearVelocity = " + literal(start.twist.linear) +
+         " AngularVelocity = " + literal(start.twist.angular) + " } }\n";
+}
+
+std::string scene(const std::string& bodies, const std::string& joints) {
+  return R"(
+Forces { Force { Type = "Gravity" Id = "Down" CustomProperties { Acceleration = {0, 0, -9.81} } } }
+Simulator { Type = "Smooth" CustomProperties { Duration = 1000 } }
+Environment { Space { Bodies { )" +
+         bodies + "} } Constraints { " + joints + " } ConstraintSolver = \"Direct\" }\n";
+}
+
+// A tilted top, its tip at the origin.
+std::string top() {
+  const Vector3 arm(0, 0.05, 0.0866), spin(0, 15, 25.98);
+  return scene(
+      body("Top", "{0.011, 0.012, 0.001}", {{arm, Quaternion::Identity()}, {spin.cross(arm), spin}}),
+      R"(Constraint { Type = "Spherical" Id = "Tip" Body2 = "Top" CustomProperties { BindPoint = {0, 0, 0} } })");
+}
+
+// Two rods in space, on a ball joint and a Hooke's joint.
+std::string rods(const Start& upper, const Start& lower) {
+  const Vector3 cross = upper.pose.position + upper.pose.orientation * Vector3(0.5, 0, 0);
+  return scene(
+      body("Upper", "{0.03, 0.08, 0.055}", upper) + body("Lower", "{0.03, 0.08, 0.055}", lower),
+      R"(Constraint { Type = "Spherical" Id = "Hook" Body2 = "Upper" CustomProperties { BindPoint = {0, 0, 0} } }
+Constraint { Type = "Universal" Id = "Cross" Body1 = "Upper" Body2 = "Lower" CustomProperties { BindPoint = )" +
+          literal(cross) + " Axis1 = " + literal(upper.pose.orientation * Vector3::UnitY()) +
+          " Axis2 = " + literal(lower.pose.orientation * Vector3::UnitZ()) + " } }");
+}
+std::string rods() {
+  return rods({{Vector3(0.5, 0, 0), Quaternion::Identity()}, {Vector3(0, 0.5, 0), Vector3(0, 0, 1)}},
+              {{Vector3(1.5, 0, 0), Quaternion::Identity()}, {Vector3(0, 1.0, 0), Vector3::Zero()}});
+}
+
+// The energy of a symplectic method wanders about that of the start and does not leave it: what it is off by in the last
+// quarter is what it was off by in the first. Steps of a ninth of a turn of the spin.
+TEST(SymplecticJoints, EnergyOfATopDoesNotDrift) {
+  for (const int order : {2, 4, 6}) {
+    SceneRun run(top(), of_order(order, 1.0 / 120.0));
+    const double energy = run.energy();
+    const auto largest_in = [&](int steps) {
+      double largest = 0.0;
+      for (int i = 0; i < steps; ++i) run.step(), largest = std::max(largest, std::abs(run.energy() - energy));
+      return largest;
+    };
+    const double first = largest_in(500);
+    run.steps(2000);
+    EXPECT_LT(largest_in(500), 1.1 * first) << order;
+    // and as small as its order has it
+    EXPECT_LT(first, (order == 2 ? 5e-3 : order == 4 ? 1e-5 : 2e-7) * energy) << order;
+    EXPECT_LT(run.report().max_joint_error(), 1e-15) << order;
+  }
+}
+
+// From its end with all velocities turned round a symmetric method runs back to its start, whatever its steps.
+TEST(SymplecticJoints, RunsBackToItsStart) {
+  for (const int order : {2, 4, 6}) {
+    SceneRun there(rods(), of_order(order, 0.01));
+    const auto start = std::pair(there.body("Upper"), there.body("Lower"));
+    there.steps(300);
+    const auto turned_round = [&](const std::string& id) {
+      const SceneRun::Motion now = there.body(id);
+      return Start{now.pose, {-now.twist.linear, -now.twist.angular}};
+    };
+    EXPECT_GT((there.body("Lower").pose.position - start.second.pose.position).norm(), 0.1);
+    SceneRun back(rods(turned_round("Upper"), turned_round("Lower")), of_order(order, 0.01));
+    back.steps(300);
+    for (const auto& [id, motion] : {std::pair("Upper", start.first), std::pair("Lower", start.second)}) {
+      const SceneRun::Motion now = back.body(id);
+      // roundings of 1e-14, grown by a motion whose neighbours part by e^t or so
+      EXPECT_LT((now.pose.position - motion.pose.position).norm(), 1e-10) << id << ' ' << order;
+      EXPECT_LT(angle_between(now.pose.orientation, motion.pose.orientation), 1e-10) << id << ' ' << order;
+      EXPECT_LT((now.twist.linear + motion.twist.linear).norm(), 1e-9) << id << ' ' << order;
+    }
+  }
+}
+
+// What no force acts on keeps its momenta: two bodies that turn about a ball joint between them.
+TEST(SymplecticJoints, KeepTheMomentaOfAPair) {
+  std::string text =
+      scene(body("One", "{1, 2, 2.5}",
+                 {{Vector3(-1, 0, 0), Quaternion::Identity()}, {Vector3(0, -2, 0.5), Vector3(1, 0.5, 2)}}) +
+                body("Two", "{0.5, 0.6, 0.7}",
+                     {{Vector3(1, 0, 0), Quaternion::Identity()}, {Vector3(0, 3, -1), Vector3(-1, 1, 3)}}),
+            R"(Constraint { Type = "Spherical" Id = "Joint" Body1 = "One" Body2 = "Two"
+                              CustomProperties { BindPoint = {0, 0, 0} } })");
+  for (std::size_t at = 0; (at = text.find("Forces = {\"Down\"}")) != std::string::npos;) text.erase(at, 17);
+  SceneRun run(text, of_order(4, 0.01));
+  run.step();  // joints jump to velocities that they allow
+  const Vector3 momentum = run.momentum(), angular = run.angular_momentum();
+  const double energy = run.energy();
+  run.steps(3000);
+  EXPECT_LT((run.momentum() - momentum).norm(), 1e-11);
+  EXPECT_LT((run.angular_momentum() - angular).norm(), 1e-10);
+  EXPECT_NEAR(run.energy(), energy, 1e-4 * energy);
+}
+
+// A rod hangs on a hook that goes to and fro: errors of half the step are 2^order times smaller.
+TEST(SymplecticJoints, FollowAHookAtTheirOrder) {
+  const std::string hook =
+      R"(Body { Id = "Hook" Kinematic = true Motion = {{0, {0, 0, 0}, {1, 0, 0, 0}}, {1, {0.4, 0.1, 0}, {1, 0, 0, 0}}, {2, {0, 0.3, 0.2}, {1, 0, 0, 0}}} }
+)";
+  const std::string text = scene(
+      hook + body("Rod", "{0.3, 0.3, 0.01}", {{Vector3(0, 0, -1), Quaternion::Identity()}, {}}),
+      R"(Constraint { Type = "Spherical" Id = "Joint" Body1 = "Hook" Body2 = "Rod" CustomProperties { BindPoint = {0, 0, 0} } })");
+  const auto end_of = [&](int order, int steps) {
+    // within one piece of the motion, whose ends are jumps of acceleration
+    SceneRun run(text, of_order(order, 0.9 / steps));
+    run.steps(static_cast<std::uint32_t>(steps));
+    return run.body("Rod").pose.position;
+  };
+  const Vector3 exact = end_of(6, 160);
+  for (const auto& [order, steps] : {std::pair(2, 80), std::pair(4, 20), std::pair(6, 10)}) {
+    const double coarse = (end_of(order, steps) - exact).norm(), fine = (end_of(order, 2 * steps) - exact).norm();
+    EXPECT_NEAR(std::log2(coarse / fine), order, 0.2) << order << ": " << coarse << ", " << fine;
+  }
+}
+
+// Limits and dampers are no locks: kicks take over, at the method's order, and the energy that a damper takes is its own.
+TEST(SymplecticJoints, OfOtherKindsKeepTheirOrder) {
+  const auto end_of = [&](int order, int steps) {
+    SceneRun run(
+        scene(
+            body("Bob", "{0.1, 0.1, 0.1}", {{Vector3(1, 0, 0), Quaternion::Identity()}, {}}),
+            R"(Constraint { Type = "Revolute" Id = "Hinge" Body2 = "Bob" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = {0, 1, 0} Damping = 0.7 } })"),
+        of_order(order, 1.5 / steps));
+    run.steps(static_cast<std::uint32_t>(steps));
+    return run.body("Bob").pose.position;
+  };
+  const Vector3 exact = end_of(6, 480);
+  for (const auto& [order, steps] : {std::pair(2, 150), std::pair(4, 60), std::pair(6, 24)}) {
+    const double coarse = (end_of(order, steps) - exact).norm(), fine = (end_of(order, 2 * steps) - exact).norm();
+    EXPECT_NEAR(std::log2(coarse / fine), order, 0.2) << order << ": " << coarse << ", " << fine;
+  }
+}
+
+}  // namespace
+}  // namespace gravitas
