@@ -42,16 +42,14 @@ void subtract(double share, const double* a, double* b, std::size_t count) {
 
 void ProfileLdlt::start(const std::vector<std::size_t>& first) {
   first_ = first;
-  begin_.resize(first.size() + 1);
-  begin_[0] = 0;
+  begin_.assign(first.size() + 1, 0);
   for (std::size_t i = 0; i < first.size(); ++i) begin_[i + 1] = begin_[i] + (i - first[i] + 1);
   constexpr std::size_t kMostEntries = std::size_t{2} << 27;
   if (begin_.back() > kMostEntries)
     throw Refusal(std::to_string(first.size()) + " rows of joints depend on each other so that their factors take " +
                   std::to_string((begin_.back() * sizeof(double)) >> 30) + " GB; at most 2 GB are taken");
-  values_.resize(begin_.back());
-  std::fill(values_.begin(), values_.end(), 0.0);
-  pivot_.resize(first.size());
+  values_.assign(begin_.back(), 0.0);
+  pivot_.assign(first.size(), 0.0);
   dropped_.clear();
   null_.clear(), part_.clear();
 }
@@ -80,7 +78,6 @@ void ProfileLdlt::factorise(double least) {
       pivot_[i] = pivot;
       if (pivot < least_pivot_ * diagonal) least_pivot_ = pivot / diagonal, weakest_ = i;
     } else {
-      pivot_[i] = 0.0;
       dropped_.push_back(i);
     }
   }
