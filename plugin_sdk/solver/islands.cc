@@ -4,7 +4,14 @@
 #include <numeric>
 #include <span>
 
+#include "plugin_sdk/body.h"
+
 namespace gravitas {
+
+bool is_pushed(const stage::SolverReactionsRequest& request, std::size_t body) {
+  if ((request.flags()[body] & kMovable) == 0 || (request.flags()[body] & kKinematic) != 0) return false;
+  return request.inverse_mass()[body] > 0.0 || !vector_at(request.inverse_inertia(), body).isZero(0.0);
+}
 
 void BodyUnion::reset(std::size_t count) {
   parent_.resize(count);
@@ -22,23 +29,36 @@ void BodyUnion::join(std::uint32_t body1, std::uint32_t body2) {
 }
 
 std::span<const Island> IslandFinder::find(const stage::SolverSolveRequest& request, const SolverBodies& bodies) {
-  const std::size_t count = bodies.count();
-  joined_.reset(count + 1);
-  is_held_.assign(count + 1, 0);
+  is_pushed_.resize(bodies.count());
+  for (std::uint32_t i = 0; i < bodies.count(); ++i) is_pushed_[i] = bodies[i].is_pushed() ? 1 : 0;
+  return find(request.discrepancy_body(), request.contact_body());
+}
+
+std::span<const Island> IslandFinder::find(const stage::SolverReactionsRequest& request) {
+  is_pushed_.resize(request.flags().size());
+  for (std::size_t i = 0; i < is_pushed_.size(); ++i) is_pushed_[i] = is_pushed(request, i) ? 1 : 0;
+  return find(request.discrepancy_body(), {});
+}
+
+std::span<const Island> IslandFinder::find(std::span<const std::uint32_t> joints,
+                                           std::span<const std::uint32_t> contacts) {
+  const std::size_t count = is_pushed_.size();
+  joined_.reset(count);
+  is_held_.assign(count, 0);
+  const auto pushes = [&](std::uint32_t body) { return body != kNone && is_pushed_[body] != 0; };
   const auto connect = [&](std::span<const std::uint32_t> pairs) {
     for (std::size_t i = 0; i < pairs.size(); i += 2) {
-      const std::uint32_t one = bodies.row(pairs[i]), two = bodies.row(pairs[i + 1]);
-      const bool first = bodies[one].is_pushed(), second = bodies[two].is_pushed();
-      if (first) is_held_[one] = 1;
-      if (second) is_held_[two] = 1;
-      if (first && second) joined_.join(one, two);
+      const std::uint32_t one = pairs[i], two = pairs[i + 1];
+      if (pushes(one)) is_held_[one] = 1;
+      if (pushes(two)) is_held_[two] = 1;
+      if (pushes(one) && pushes(two)) joined_.join(one, two);
     }
   };
-  connect(request.discrepancy_body());
-  connect(request.contact_body());
+  connect(joints);
+  connect(contacts);
 
   std::uint32_t found = 0;
-  island_of_.assign(count + 1, 0);
+  island_of_.assign(count, 0);
   for (std::uint32_t i = 0; i < count; ++i) {
     if (is_held_[i] == 0) continue;
     const std::uint32_t root = joined_.root(i);
@@ -52,14 +72,14 @@ std::span<const Island> IslandFinder::find(const stage::SolverSolveRequest& requ
   }
   const auto distribute = [&](std::span<const std::uint32_t> pairs, std::vector<std::uint32_t> Island::*rows) {
     for (std::size_t i = 0; i < pairs.size(); i += 2) {
-      const std::uint32_t one = bodies.row(pairs[i]), two = bodies.row(pairs[i + 1]);
-      if (!bodies[one].is_pushed() && !bodies[two].is_pushed()) continue;
-      const std::uint32_t root = joined_.root(bodies[one].is_pushed() ? one : two);
+      const std::uint32_t one = pairs[i], two = pairs[i + 1];
+      if (!pushes(one) && !pushes(two)) continue;
+      const std::uint32_t root = joined_.root(pushes(one) ? one : two);
       (islands_[island_of_[root]].*rows).push_back(static_cast<std::uint32_t>(i / 2));
     }
   };
-  distribute(request.discrepancy_body(), &Island::discrepancies);
-  distribute(request.contact_body(), &Island::contacts);
+  distribute(joints, &Island::discrepancies);
+  distribute(contacts, &Island::contacts);
   return {islands_.data(), found};
 }
 

@@ -12,6 +12,9 @@
 
 namespace gravitas {
 
+// Can anything push a body? Not one that is immovable or kinematic, whatever its columns say.
+bool is_pushed(const stage::SolverReactionsRequest& request, std::size_t body);
+
 // Sets of numbered bodies, by the smallest number in each: the same whatever the order of join().
 class BodyUnion {
  public:
@@ -37,8 +40,13 @@ class IslandFinder {
   // In the order of their first bodies; bodies without joint or contact are in none, nor are rows that push no body.
   // The same islands in whatever order rows come. Valid until the next find().
   std::span<const Island> find(const stage::SolverSolveRequest& request, const SolverBodies& bodies);
+  // By joints alone.
+  std::span<const Island> find(const stage::SolverReactionsRequest& request);
 
  private:
+  std::span<const Island> find(std::span<const std::uint32_t> joints, std::span<const std::uint32_t> contacts);
+
+  std::vector<std::uint8_t> is_pushed_;
   BodyUnion joined_{0};
   std::vector<std::uint8_t> is_held_;
   std::vector<std::uint32_t> island_of_;

@@ -44,14 +44,16 @@ ReactionSolver::Holding ReactionSolver::held_always(const Discrepancy& d, int ax
 
 void ReactionSolver::find_holdings() {
   may_let_go_ = false;
-  for (Joint& joint : joints_)
-    for (int axis = 0; axis < 3; ++axis)
+  bool has_others = false;
+  for (Joint& joint : joints_) {
+    for (int axis = 0; axis < 3; ++axis) {
       if (holds_always(joint.discrepancy, axis))
         joint.holdings[static_cast<std::size_t>(axis)] = held_always(joint.discrepancy, axis);
-  if (std::ranges::none_of(joints_, [](const Joint& joint) {
-        return may_hold(joint.discrepancy, 0) || may_hold(joint.discrepancy, 1) || may_hold(joint.discrepancy, 2);
-      }))
-    return;
+      else
+        has_others = has_others || may_hold(joint.discrepancy, axis);
+    }
+  }
+  if (!has_others) return;
   go_to_start();
   for (Joint& joint : joints_) {
     if (joint.discrepancy.is_twist()) turn_to_limit(&joint);
@@ -118,11 +120,13 @@ double ReactionSolver::strayed(const Row& row) const {
   double turn = 0.0, coordinates = 0.0;
   for (const std::uint32_t i : {row.body1, row.body2}) {
     const Body& body = bodies_[i];
-    const Quaternion since = shorter_arc(body.pose.orientation * body.start.orientation.conjugate());
-    double turned = log_rotation(since).norm(), turning = body.start_velocity.angular.norm();
+    const Pose start = start_of(body);
+    const Twist start_velocity = start_velocity_of(body);
+    const Quaternion since = shorter_arc(body.pose.orientation * start.orientation.conjugate());
+    double turned = log_rotation(since).norm(), turning = start_velocity.angular.norm();
     if (row.reach > 0.0) {
-      turned += (body.pose.position - body.start.position).norm() / row.reach;
-      turning += body.start_velocity.linear.norm() / row.reach;
+      turned += (body.pose.position - start.position).norm() / row.reach;
+      turning += start_velocity.linear.norm() / row.reach;
     }
     turn = std::max({turn, turned, request_->time_step() * turning});
     coordinates = std::max(coordinates, body.pose.position.cwiseAbs().maxCoeff());

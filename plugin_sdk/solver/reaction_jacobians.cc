@@ -30,50 +30,35 @@ void ReactionSolver::for_rows_of(const Joint& joint, Use&& use) const {
     use(r, rows_[r].place - joint.place);
 }
 
-void ReactionSolver::differentiate(const stage::SolverReactionJacobiansReply& reply) {
-  const auto count = static_cast<std::uint32_t>(bodies_.size() - 1);
-  BodyUnion parts(count);
-  std::vector<std::vector<std::size_t>> joints_of(count + 1);
-  const auto join = [&](std::uint32_t one, std::uint32_t two) {
-    if (bodies_[one].is_pushed() && bodies_[two].is_pushed()) parts.join(one, two);
-  };
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    join(joints_[j].body1, joints_[j].body2);
-    joints_of[joints_[j].body1].push_back(j), joints_of[joints_[j].body2].push_back(j);
-  }
-  for (std::size_t i = 0; i + 1 < request_->block_body().size(); i += 2)
-    join(request_->block_body()[i], request_->block_body()[i + 1]);
-  std::vector<std::vector<std::uint32_t>> part(count);
-  std::vector<bool> is_jointed(count, false);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    if (!bodies_[i].is_pushed()) continue;
-    part[parts.root(i)].push_back(i);
-    if (!joints_of[i].empty()) is_jointed[parts.root(i)] = true;
-  }
+void ReactionSolver::start_differentiating() {
   accelerate_with_reactions();
+  // places count from one of the mechanism's own: far from the origin differences of small numbers are rounding
+  const Vector3 origin = bodies_.front().pose.position;
+  for (Body& body : bodies_) body.pose.position -= origin, body.asked.position -= origin;
+  joints_of_.resize(std::max(joints_of_.size(), bodies_.size()));
+  for (std::vector<std::size_t>& list : joints_of_) list.clear();
+  size_ = longest_;
+  for (const Spring& spring : springs_) size_ = std::max(size_, spring.row.reach);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Discrepancy& d = joints_[j].discrepancy;
+    if (!d.is_angular()) d.point1 -= origin, d.point2 -= origin;
+    joints_of_[joints_[j].body1].push_back(j), joints_of_[joints_[j].body2].push_back(j);
+  }
   has_moved_ = true;  // bodies, from where they were asked
   states_.clear();
   for (const Joint& joint : joints_) states_.push_back(state_of(joint));
-  bool is_empty = true;
-  for (std::uint32_t by = 0; by < count; ++by) {
-    if (!bodies_[by].is_pushed() || !is_jointed[parts.root(by)]) continue;
-    const std::vector<std::uint32_t>& felt = part[parts.root(by)];
-    std::vector<JacobianBlock> blocks = forced_blocks(by);
-    for (int number = 0; number < 12; ++number) {
-      differentiate(by, number, joints_of[by], blocks);
-      for (const std::uint32_t i : felt) blocks[i].col(number) << pushes_[i].force, pushes_[i].torque;
-    }
-    for (const std::uint32_t i : felt) {
-      if (!blocks[i].allFinite()) throw Refusal("the Jacobian of a reaction is not finite: masses or forces overflow");
-      reply.reaction_body().push(i, by);
-      for (Eigen::Index k = 0; k < blocks[i].size(); ++k) reply.reaction_block().push(blocks[i].data()[k]);
-      is_empty = false;
-    }
+  all_joints_.resize(joints_.size());
+  std::iota(all_joints_.begin(), all_joints_.end(), std::size_t{0});
+}
+
+void ReactionSolver::differentiate(std::uint32_t by, std::span<const std::uint32_t> forced,
+                                   std::vector<JacobianBlock>* blocks) {
+  add_forced(forced);
+  for (int number = 0; number < 12; ++number) {
+    differentiate_by(place_of(by), number);
+    for (std::size_t i = 0; i < mechanism_->bodies.size(); ++i)
+      (*blocks)[mechanism_->bodies[i]].col(number) << pushes_[i].force, pushes_[i].torque;
   }
-  // no block at all would be no answer
-  if (!is_empty || count == 0) return;
-  reply.reaction_body().push(0, 0);
-  for (std::size_t k = 0; k < kBlockNumbers; ++k) reply.reaction_block().push(0.0);
 }
 
 void ReactionSolver::accelerate_with_reactions() {
@@ -81,13 +66,14 @@ void ReactionSolver::accelerate_with_reactions() {
   for (std::size_t i = 0; i < rows_.size(); ++i)
     add_force(rows_[i].direction, multipliers_[i], &held[rows_[i].body1], &held[rows_[i].body2]);
   own_.assign(bodies_.size(), JacobianBlock::Zero());
-  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
     Body& body = bodies_[i];
     if (!body.is_pushed()) continue;
-    const Vector3 torque = vector_at(request_->wrench(), 2 * i + 1) + sprung_[i].torque + held[i].torque;
-    own_[i] = acceleration_jacobian(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), i),
-                                    vector_at(request_->inverse_inertia(), i), torque);
-    own_[i].rightCols<6>().diagonal().array() -= request_->drag()[i];
+    const std::size_t row = body.row;
+    const Vector3 torque = vector_at(request_->wrench(), 2 * row + 1) + sprung_[i].torque + held[i].torque;
+    own_[i] = acceleration_jacobian(body.pose.orientation, body.velocity.angular, vector_at(request_->inertia(), row),
+                                    vector_at(request_->inverse_inertia(), row), torque);
+    own_[i].rightCols<6>().diagonal().array() -= request_->drag()[row];
     accelerate(body, held[i], &body.acceleration);
   }
 }
@@ -97,16 +83,15 @@ void ReactionSolver::accelerate(const Body& body, const Wrench& wrench, Twist* a
   acceleration->angular += body.inverse_inertia * wrench.torque;
 }
 
-std::vector<JacobianBlock> ReactionSolver::forced_blocks(std::uint32_t by) const {
-  std::vector<JacobianBlock> blocks(bodies_.size(), JacobianBlock::Zero());
-  for (std::size_t i = 0; i < request_->block_body().size() / 2; ++i) {
-    const std::uint32_t body = request_->block_body()[2 * i];
-    if (request_->block_body()[2 * i + 1] != by || !bodies_[body].is_pushed()) continue;
+void ReactionSolver::add_forced(std::span<const std::uint32_t> blocks) {
+  forced_.assign(bodies_.size(), JacobianBlock::Zero());
+  for (const std::size_t i : blocks) {
+    const std::uint32_t row = request_->block_body()[2 * i], body = place_of(row);
+    if (body == kNone) continue;
     const Eigen::Map<const JacobianBlock> block(&request_->block()[kBlockNumbers * i]);
-    blocks[body] += accelerated_block(bodies_[body].pose.orientation, bodies_[body].inverse_mass,
-                                      vector_at(request_->inverse_inertia(), body), block);
+    forced_[body] += accelerated_block(bodies_[body].pose.orientation, bodies_[body].inverse_mass,
+                                       vector_at(request_->inverse_inertia(), row), block);
   }
-  return blocks;
 }
 
 ReactionSolver::JointState ReactionSolver::state_of(const Joint& joint) {
@@ -154,7 +139,7 @@ void ReactionSolver::agree(double step) {
 }
 
 void ReactionSolver::move_along(double step, bool pose_alone) {
-  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const auto& [way, rate] = moving_[i];
     Body& body = bodies_[i];
     if (!way.linear.isZero(0.0) || !way.angular.isZero(0.0))
@@ -189,28 +174,28 @@ void ReactionSolver::add_slopes(double step, const std::vector<std::size_t>& joi
   bodies_ = still;
 }
 
-void ReactionSolver::differentiate(std::uint32_t by, int number, const std::vector<std::size_t>& joints,
-                                   const std::vector<JacobianBlock>& forced) {
+void ReactionSolver::move_number(std::uint32_t by, int number) {
   constexpr double kBy = 1e-7;
-  pushes_.assign(bodies_.size(), {}), changes_.assign(bodies_.size(), {}), moving_.assign(bodies_.size(), {});
-  side_.assign(rows_.size(), 0.0);
   const Body& body = bodies_[by];
   Twist& moved = number < 6 ? moving_[by].way : moving_[by].rate;
   (number % 6 < 3 ? moved.linear : moved.angular) = Vector3::Unit(number % 3);
   double step = kBy;
-  if (number < 3) step *= (longest_ > 0.0 ? longest_ : 1.0) + 1e-2 * body.pose.position.norm();
+  if (number < 3) step *= (size_ > 0.0 ? size_ : 1.0) + 1e-2 * body.pose.position.norm();
   if (number >= 6) step *= std::max(1.0, (number < 9 ? body.velocity.linear : body.velocity.angular).norm());
-  add_slopes(step, joints, true, !agrees_);
-  if (agrees_) {
-    agree(step);
-    std::vector<std::size_t> all(joints_.size());
-    std::iota(all.begin(), all.end(), 0);
-    add_slopes(step, all, false, true);
-  }
-  for (std::size_t i = 0; i + 1 < bodies_.size(); ++i) {
+  add_slopes(step, joints_of_[by], true, !agrees_);
+  if (!agrees_) return;
+  agree(step);
+  add_slopes(step, all_joints_, false, true);
+}
+
+void ReactionSolver::differentiate_by(std::uint32_t by, int number) {
+  pushes_.assign(bodies_.size(), {}), changes_.assign(bodies_.size(), {}), moving_.assign(bodies_.size(), {});
+  side_.assign(rows_.size(), 0.0);
+  if (by != kNone) move_number(by, number);
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
     Eigen::Matrix<double, 12, 1> state;
     state << moving_[i].way.linear, moving_[i].way.angular, moving_[i].rate.linear, moving_[i].rate.angular;
-    const Eigen::Matrix<double, 6, 1> change = forced[i].col(number) + own_[i] * state;
+    const Eigen::Matrix<double, 6, 1> change = forced_[i].col(number) + own_[i] * state;
     changes_[i] = {change.head<3>(), change.tail<3>()};
     accelerate(bodies_[i], pushes_[i], &changes_[i]);
   }

@@ -1,16 +1,18 @@
-// What answers the second question (reactions.h): the rows of the joints in a state, their factors and multipliers.
+// What answers the second question (reactions.h) for one mechanism: the rows of its joints in a state, their factors and
+// multipliers. It knows of no other, so that none shows in what is decided here.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "plugin_sdk/discrepancy.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/solver/bodies.h"
-#include "plugin_sdk/solver/elimination_order.h"
 #include "plugin_sdk/solver/equal_springs.h"
+#include "plugin_sdk/solver/islands.h"
 #include "plugin_sdk/solver/profile_ldlt.h"
 #include "plugin_sdk/wrench_jacobian.h"
 
@@ -21,20 +23,28 @@ bool holds_always(const Discrepancy& discrepancy, int axis);
 
 class ReactionSolver {
  public:
-  // Multipliers by row. Returns what the rows are missed by. The request must live until write() or differentiate().
+  // Before solve(), and where other bodies meet. `places`: of each body of the request among those of its mechanism. Must live
+  // as long as questions are asked, but for the request.
+  void set_mechanism(const stage::SolverReactionsRequest& request, const Island& mechanism,
+                     std::span<const std::uint32_t> places);
+  // Returns what the rows are missed by. The request must live until the last differentiate().
   double solve(const stage::SolverReactionsRequest& request);
-  void write(double residual, const stage::SolverReactionsReply& reply) const;
-  // Once for each solve().
-  void differentiate(const stage::SolverReactionJacobiansReply& reply);
+  // Into places of the whole request, which are zero.
+  void write(std::vector<Wrench>* reactions, std::vector<double>* forces) const;
+
+  // Once for each solve(), before differentiate().
+  void start_differentiating();
+  // How the reactions change with the state of a body, one of the mechanism's or not: columns of blocks, by the row of the body
+  // that feels them. `forced` are blocks of the request, those by that body.
+  void differentiate(std::uint32_t by, std::span<const std::uint32_t> forced, std::vector<JacobianBlock>* blocks);
 
  private:
   struct Body {
+    std::uint32_t row = kNone;  // of the request; none: the world
     double inverse_mass = 0.0;
     Matrix3 inverse_inertia = Matrix3::Zero();
     Pose asked, pose;  // as the question has it, and where the joints agree
     Twist velocity, acceleration;
-    Pose start;  // S_n
-    Twist start_velocity;
 
     bool is_pushed() const { return inverse_mass > 0.0 || !inverse_inertia.isZero(0.0); }
     Vector3 velocity_at(const Vector3& arm) const { return velocity.linear + velocity.angular.cross(arm); }
@@ -58,11 +68,11 @@ class ReactionSolver {
   };
 
   struct Joint {
-    std::size_t place;  // of its first axis among the multipliers
-    std::uint32_t body1, body2;
+    std::size_t place = 0;  // of its first axis among the multipliers
+    std::uint32_t body1 = 0, body2 = 0;
     Discrepancy discrepancy;
-    bool is_only_point;         // joint_laws.h
-    std::size_t first_row = 0;  // of those that hold
+    bool is_only_point = false;  // joint_laws.h
+    std::size_t first_row = 0;   // of those that hold
     std::array<Holding, 3> holdings = {};
   };
 
@@ -114,13 +124,14 @@ class ReactionSolver {
   static constexpr double kMargin = 100.0, kMostMargin = 1e9;
 
   void load_bodies();
-  // As S_n has them.
+  // In S_n.
+  Pose start_of(const Body& body) const;
+  Twist start_velocity_of(const Body& body) const;
   void go_to_start();
-  bool is_free(std::size_t body) const;
-
   // What forces, springs, the gyroscopic term and drag make of the bodies.
   void accelerate();
-  std::uint32_t row_of(std::uint32_t body) const;
+  // Of one of the mechanism's own, by its row in the request; kNone for others.
+  std::uint32_t place_of(std::uint32_t row) const;
   void load_joints();
   // Which axes hold, in S_n (reaction_holdings.cc).
   void find_holdings();
@@ -151,13 +162,14 @@ class ReactionSolver {
   // Adds what the reactions make of the accelerations, and finds how those change with each body's own state (own_).
   void accelerate_with_reactions();
   static void accelerate(const Body& body, const Wrench& wrench, Twist* acceleration);
-  // By body: how forces make its acceleration change with the state of another.
-  std::vector<JacobianBlock> forced_blocks(std::uint32_t by) const;
+  // Leaves of forced_ how forces make accelerations change.
+  void add_forced(std::span<const std::uint32_t> blocks);
   JointState state_of(const Joint& joint);
 
-  // How reactions (pushes_) change with a number of a body's state.
-  void differentiate(std::uint32_t by, int number, const std::vector<std::size_t>& joints,
-                     const std::vector<JacobianBlock>& forced);
+  // How reactions (pushes_) change with a number of a body's state; kNone: with what forces alone do.
+  void differentiate_by(std::uint32_t by, int number);
+  // What moves the rows and springs of all bodies as that number does: moving_, and of pushes_ and side_ what these do.
+  void move_number(std::uint32_t by, int number);
   // Of joints as bodies move by a step along moving_: what springs push (pushes_), what rows do and ask (side_).
   void add_slopes(double step, const std::vector<std::size_t>& joints, bool of_springs, bool of_rows);
   void move_along(double step, bool pose_alone = false);
@@ -218,24 +230,28 @@ class ReactionSolver {
   void factorise(double least);
 
   const stage::SolverReactionsRequest* request_ = nullptr;
-  std::vector<Body> bodies_;  // the world last
-  std::vector<Joint> joints_;
-  double longest_ = 0.0;     // reach of a row
-  bool has_moved_ = false;   // bodies, from where they were asked
-  bool may_let_go_ = false;  // an axis that holds
-  Discrepancy carried_;      // of at_pose()
+  const Island* mechanism_ = nullptr;
+  std::span<const std::uint32_t> places_;
+  std::vector<Body> bodies_;   // its own, and then what holds it
+  std::vector<Joint> joints_;  // in an order of elimination
+  double longest_ = 0.0;       // reach of a row
+  bool has_moved_ = false;     // bodies, from where they were asked
+  bool may_let_go_ = false;    // an axis that holds
+  Discrepancy carried_;        // of at_pose()
   std::vector<Row> rows_;
   std::vector<Spring> springs_;
   std::vector<Wrench> sprung_;  // of the springs, by body
-  EliminationOrder elimination_;
   ProfileLdlt factor_;
   EqualSprings shares_;
   std::vector<std::size_t> first_of_body_, first_;  // row; scratch of factorise()
   std::vector<double> multipliers_;
+  double size_ = 0.0;  // reach of rows and springs
   // of the Jacobian: are states made to agree with the joints? joints where the bodies are; and by body for one number
   bool agrees_ = false, contradicts_ = false;
   std::vector<JointState> states_;
-  std::vector<JacobianBlock> own_;
+  std::vector<std::size_t> all_joints_;
+  std::vector<std::vector<std::size_t>> joints_of_;  // by body
+  std::vector<JacobianBlock> own_, forced_;
   std::vector<Change> moving_;
   std::vector<Wrench> pushes_;
   std::vector<Twist> changes_;

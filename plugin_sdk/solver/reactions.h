@@ -37,6 +37,9 @@
 // step's end a limit that bore something is closed like a lock, and a drive that did all it can is left alone, unless it went
 // beyond its velocity.
 //
+// Each mechanism, the bodies that joints connect (islands.h), is solved by itself (reaction_solver.h), and what is decided for it
+// goes by it alone: it moves beside others as it does without them, bit for bit. `residual` is that of the worst.
+//
 // Dependent rows are left out by the factorisation (profile_ldlt.h); rows that contradict each other are met as well as
 // can be (least squares), and `residual` says by how much they are missed.
 //
@@ -62,12 +65,12 @@ namespace gravitas {
 void solve_reactions(const stage::SolverReactionsRequest& request, const stage::SolverReactionsReply& reply);
 
 // How the reactions change with the states of bodies. With the forces' Jacobian dF, multipliers as they are, and rows and
-// springs in states that differ by 1e-7 (m, rad, m/s, rad/s) from that of each body in turn,
+// springs in states that differ by 1e-7 (of the mechanism's reach, rad, m/s, rad/s) from that of each body in turn,
 //
 //   dR = d(J^T) lambda + dS + J^T dlambda,   J M^-1 J^T dlambda = -(dgamma + dJ a + J M^-1 (dF + dS + d(J^T) lambda)),
 //
 // S what springs do and a the accelerations with the reactions: one factorisation, and for each of the twelve numbers of a
-// body the rows of its own joints and one substitution. Where the answer is that of the nearest state that agrees with the
+// body the rows of its own joints and one substitution, in each mechanism that it or a force carries them to. Where the answer is that of the nearest state that agrees with the
 // joints, states are moved along what these allow.
 void differentiate_reactions(const stage::SolverReactionsRequest& request,
                              const stage::SolverReactionJacobiansReply& reply);

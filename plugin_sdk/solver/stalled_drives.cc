@@ -1,5 +1,7 @@
 #include "plugin_sdk/solver/stalled_drives.h"
 
+#include <algorithm>
+
 namespace gravitas {
 namespace {
 
@@ -11,14 +13,23 @@ bool StalledDrives::is_of(const Row& row, const Row& pair) {
   return (row.body1 == pair.body1 && row.body2 == pair.body2) || (row.body1 == pair.body2 && row.body2 == pair.body1);
 }
 
-StalledDrives::Numbers StalledDrives::numbers_of(const Row& row, const Row& pair) {
+StalledDrives::Numbers StalledDrives::numbers_of(const Row& row, const Row& pair, double arm) {
   const ConstraintDirection& d = *row.direction;
   Numbers numbers;
   if (row.body1 == pair.body1)
-    numbers << d.linear, d.angular1, d.angular2;
+    numbers << d.linear, d.angular1 / arm, d.angular2 / arm;
   else
-    numbers << -d.linear, d.angular2, d.angular1;
+    numbers << -d.linear, d.angular2 / arm, d.angular1 / arm;
   return numbers;
+}
+
+double StalledDrives::longest_arm(const Row& pair) const {
+  double longest = 0.0;
+  for (const Row& row : rows_) {
+    if (!is_of(row, pair) || row.direction->linear.isZero(0.0)) continue;
+    longest = std::max({longest, row.direction->angular1.norm(), row.direction->angular2.norm()});
+  }
+  return longest > 0.0 ? longest : 1.0;
 }
 
 void StalledDrives::stall_rows() {
@@ -33,17 +44,18 @@ void StalledDrives::stall_rows() {
   for (const Row& limit : rows_) {
     if (limit.kind != Kind::kLimit) continue;
     held.clear();
+    const double arm = longest_arm(limit);
     for (const Row& row : rows_) {
       if (row.kind != Kind::kHeld || !is_of(row, limit)) continue;
-      const Numbers numbers = left_of(numbers_of(row, limit));
+      const Numbers numbers = left_of(numbers_of(row, limit, arm));
       if (!numbers.isZero(0.0)) held.push_back(numbers.normalized());
     }
-    const Numbers axis = left_of(numbers_of(limit, limit));
+    const Numbers axis = left_of(numbers_of(limit, limit, arm));
     if (axis.isZero(0.0)) continue;
     for (const Row& drive : rows_) {
       JointLaw& law = *drive.law;
       if (drive.kind != Kind::kDrive || !is_of(drive, limit)) continue;
-      const Numbers numbers = left_of(numbers_of(drive, limit));
+      const Numbers numbers = left_of(numbers_of(drive, limit, arm));
       const double share = axis.dot(numbers) / axis.squaredNorm();
       if (numbers.isZero(0.0) || (numbers - share * axis).norm() > kAgrees * numbers.norm()) continue;
       limit.law->set_bounce(0.0);

@@ -6,7 +6,8 @@
 // bounce there.
 //
 // A drive has reached a limit of the same two bodies if its row is a multiple of the limit's and what else holds between
-// them (driving points about the axis of a hinge with limits: J_d = s J_l + sum c_k J_k, with J_k v = 0), to 1e-3. A
+// them (driving points about the axis of a hinge with limits: J_d = s J_l + sum c_k J_k, with J_k v = 0), to 1e-3, where turns
+// count by way of the longest arm of those rows. A
 // drive that is held up in any other way yields (end_of_step.h), which has to be found; what is told here is exact.
 #pragma once
 
@@ -53,8 +54,10 @@ class StalledDrives {
     return law.is_equality() ? Kind::kHeld : Kind::kLimit;
   }
   static bool is_of(const Row& row, const Row& pair);
-  // As a row of the pair of bodies in its order.
-  static Numbers numbers_of(const Row& row, const Row& pair);
+  // As a row of the pair of bodies in its order, turns times an arm.
+  static Numbers numbers_of(const Row& row, const Row& pair, double arm);
+  // Of the pair's rows, m; 1 if none has any.
+  double longest_arm(const Row& pair) const;
   void stall_rows();
 
   std::vector<Row> rows_;

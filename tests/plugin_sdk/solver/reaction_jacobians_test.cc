@@ -265,6 +265,83 @@ TEST(ReactionJacobians, AreOfThoseWhomJointsAndForcesConnect) {
   EXPECT_EQ(none.blocks(), 1U);
 }
 
+// Both, with the bodies of `second` after those of `first`.
+Mechanism side_by_side(const Mechanism& first, const Mechanism& second) {
+  Mechanism both = first;
+  const auto behind = static_cast<std::uint32_t>(first.poses.size());
+  both.poses.insert(both.poses.end(), second.poses.begin(), second.poses.end());
+  both.twists.insert(both.twists.end(), second.twists.begin(), second.twists.end());
+  both.masses.insert(both.masses.end(), second.masses.begin(), second.masses.end());
+  both.wrenches.insert(both.wrenches.end(), second.wrenches.begin(), second.wrenches.end());
+  for (Joint joint : second.joints) {
+    if (joint.one != kNone) joint.one += behind;
+    joint.two += behind;
+    both.joints.push_back(joint);
+  }
+  return both;
+}
+
+// Two rods of `length` in a row from `place`, which turn as one.
+Mechanism two_rods(double length, const Vector3& place) {
+  const auto rod_of = [length](const Pose& one, const Pose& two, const std::function<void(const Discrepancy&)>& emit) {
+    Discrepancy d;
+    d.point1 = one.position, d.point2 = two.position;
+    d.modes = pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree) | kRadialDiscrepancy;
+    d.lower.x() = d.upper.x() = length;
+    emit(d);
+  };
+  Mechanism rods;
+  for (const Vector3& at : {Vector3(0.6, 0.8, 0.0), Vector3(1.4, 1.4, 0.0)}) {
+    rods.poses.push_back({place + length * at, Quaternion::Identity()});
+    rods.twists.push_back({length * Vector3(-at.y(), at.x(), 0.0), Vector3::Zero()});
+    rods.masses.push_back(1.0);
+    rods.wrenches.push_back({Vector3(1, -9.81, 2), Vector3::Zero()});
+  }
+  rods.joints.push_back({kNone, 0, Pose{place, Quaternion::Identity()}, Pose{}, rod_of});
+  rods.joints.push_back({0, 1, Pose{}, Pose{}, rod_of});
+  return rods;
+}
+
+TEST(ReactionJacobians, OfEachMechanismAreThoseItHasAlone) {
+  Draw draw(11);
+  Mechanism chain = links(5);
+  chain.join(kNone, 0, {Vector3::Zero(), draw.rotation()}, ball);
+  chain.join(0, 1, {Vector3(1, 0, 0), draw.rotation()}, hinge);
+  chain.join(1, 2, {Vector3(2, 0, 0), draw.rotation()}, bushing);
+  const Eigen::MatrixXd alone = chain.problem().differentiate();
+  for (const double length : {1e-3, 1.0, 1e3}) {
+    const Mechanism rods = two_rods(length, Vector3(3, 0, 0));
+    ReactionProblem after = side_by_side(chain, rods).problem(), before = side_by_side(rods, chain).problem();
+    for (std::size_t i = 0; i < chain.poses.size(); ++i) before.drag[rods.poses.size() + i] = after.drag[i];
+    const Eigen::MatrixXd first = after.differentiate(), last = before.differentiate();
+    EXPECT_EQ(first.topLeftCorner(alone.rows(), alone.cols()), alone) << length;
+    EXPECT_EQ(last.bottomRightCorner(alone.rows(), alone.cols()), alone) << length;
+    EXPECT_EQ(after.blocks(), 9U + 4U);
+  }
+}
+
+// A force on one mechanism by the state of another, and one on a body without joints by theirs.
+TEST(ReactionJacobians, KnowForcesBetweenMechanisms) {
+  Draw draw(12);
+  Mechanism chain = links(6);
+  chain.join(kNone, 0, {Vector3::Zero(), draw.rotation()}, ball);
+  chain.join(0, 1, {Vector3(1, 0, 0), draw.rotation()}, hinge);
+  Mechanism both = side_by_side(chain, two_rods(1.0, Vector3(5, 0, 0)));
+  both.slope = JacobianBlock::NullaryExpr([&](Eigen::Index, Eigen::Index) { return draw.uniform(-30.0, 30.0); });
+  for (const auto& [body, by] : std::vector<std::pair<std::uint32_t, std::uint32_t>>{{1, 4}, {3, 0}, {2, 1}, {4, 2}}) {
+    both.body = body, both.by = by;
+    expect_slopes(both, std::to_string(body) + " by " + std::to_string(by));
+  }
+}
+
+// Differences of places are by 1e-7 of the mechanism's size, however far it is from the origin: a curvature adds as much.
+TEST(ReactionJacobians, OfSmallMechanismsFarAwayAreThoseAtTheOrigin) {
+  const Eigen::MatrixXd here = two_rods(1e-3, Vector3::Zero()).problem().differentiate();
+  const Eigen::MatrixXd there = two_rods(1e-3, Vector3(64, -32, 16)).problem().differentiate();
+  EXPECT_GT(here.cwiseAbs().maxCoeff(), 1.0);
+  EXPECT_LT((there - here).cwiseAbs().maxCoeff(), 1e-6 * here.cwiseAbs().maxCoeff());
+}
+
 TEST(ReactionJacobians, RefuseBlocksOfNobody) {
   Mechanism made = links(4);
   made.join(0, 1, {Vector3(1, 0, 0), Quaternion::Identity()}, ball);

@@ -190,6 +190,19 @@ TEST(Reactions, OfContradictingJointsAreACompromiseAndSaySo) {
   }
 }
 
+// What contradicts itself in one mechanism says nothing of another, and the worst is told.
+TEST(Reactions, TellTheWorstResidual) {
+  Problem problem;
+  for (const double pull : {1.0, 3.0, 2.0}) {
+    const auto body = problem.add_body(1.0, bob_at(), {0, 0, 0}, {0, 0, 0});
+    Discrepancy one = pin(bob_at()), two = pin(bob_at());
+    one.acceleration.x() = pull, two.acceleration.x() = -pull;
+    problem.add_joint(kNone, body, one), problem.add_joint(kNone, body, two);
+  }
+  problem.solve();
+  EXPECT_NEAR(problem.residual(), 3.0 * std::sqrt(2.0), 1e-12);
+}
+
 TEST(Reactions, AreNoneOfALockWithABound) {
   Discrepancy bounded = pin(bob_at());
   bounded.maximum_force = Vector3::Constant(1e6);
