@@ -17,9 +17,10 @@ struct LocalBound {
   Quaternion orientation = Quaternion::Identity();  // box to body
   Vector3 half_extents = Vector3::Zero();           // m; a sphere's radius in x
   // Of the shape itself, by whatever it is bounded, m; 0 where it is unbounded: its least half extent (of what is thin, a
-  // thousandth of its largest), and half of its box's diagonal (a sphere's radius).
+  // thousandth of its largest; of a mesh that nothing pushes 0), and half of its box's diagonal (a sphere's radius).
   double least_half_extent = 0.0, reach = 0.0;
-  double half_thickness = 0.0;  // m: the least half extent as it is; of what is flat the one above
+  // m: the least half extent as it is; of what is flat the one above, of an open mesh that nothing pushes 0.
+  double half_thickness = 0.0;
 };
 
 // Sets what is told of a shape itself, from the half extents of its box.

@@ -32,6 +32,17 @@ class ContactCandidates {
   // the deeper contact.
   void add(const ContactPoint& contact);
 
+  // Drops the contacts whose feature is_dropped(feature) names.
+  template <typename IsDropped>
+  void drop(const IsDropped& is_dropped) {
+    int kept = 0;
+    for (int i = 0; i < count_; ++i) {
+      const ContactPoint contact = contacts_[static_cast<std::size_t>(i)];
+      if (!is_dropped(contact.feature)) contacts_[static_cast<std::size_t>(kept++)] = contact;
+    }
+    count_ = kept;
+  }
+
   void clear() { count_ = 0; }
   int count() const { return count_; }
   double deepest() const;

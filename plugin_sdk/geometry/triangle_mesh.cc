@@ -16,6 +16,9 @@ namespace {
 // Of the longest edge, squared: a triangle with less area, doubled, has no direction.
 constexpr double kNoArea = 1e-13;
 constexpr std::uint32_t kDeepest = 60;
+// Of the largest coordinate: heights over a plane that are none, and of the distance from where its normal is known.
+constexpr double kFlatHeight = 1e-14;
+constexpr double kFlatSlope = 1e-12;
 
 bool precedes(const Vector3& a, const Vector3& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
@@ -72,6 +75,7 @@ std::optional<TriangleMesh> TriangleMesh::make(std::span<const Vector3> vertices
   }
   if (mesh.triangles_.empty()) return refuse("no triangle has an area");
   mesh.join();
+  mesh.find_flat_faces();
   mesh.options_ = options;
   mesh.build_tree();
   return mesh;
@@ -128,6 +132,38 @@ void TriangleMesh::join() {
     std::swap(triangles_[t][1], triangles_[t][2]);
     std::swap(neighbours_[t][0], neighbours_[t][2]);
     normals_[t] = -normals_[t];
+  }
+}
+
+void TriangleMesh::find_flat_faces() {
+  double largest = 0.0;
+  for (const Vector3& vertex : vertices_) largest = std::max(largest, vertex.cwiseAbs().maxCoeff());
+  flat_faces_.assign(triangles_.size(), kNone);
+  std::vector<std::uint32_t> open;
+  for (std::uint32_t seed = 0; seed < triangles_.size(); ++seed) {
+    if (flat_faces_[seed] != kNone) continue;
+    const std::array<Vector3, 3> x = corners(seed);
+    const Vector3& up = normals_[seed];
+    const double least = (x[1] - x[0]).cross(x[2] - x[0]).norm();
+    // the normal of a small triangle, or of a sliver, is known as its vertices are
+    const double size = std::max({(x[1] - x[0]).norm(), (x[2] - x[1]).norm(), (x[0] - x[2]).norm()});
+    const double slope = kFlatSlope + 4e-16 * largest * size / least;
+    const auto is_flush = [&](const Vector3& p) {
+      return std::fabs(up.dot(p - x[0])) <= kFlatHeight * largest + slope * (p - x[0]).norm();
+    };
+    flat_faces_[seed] = seed;
+    open.assign(1, seed);
+    while (!open.empty()) {
+      const std::uint32_t from = open.back();
+      open.pop_back();
+      for (const std::uint32_t next : neighbours_[from]) {
+        if (next == kNone || flat_faces_[next] != kNone || !(up.dot(normals_[next]) > 0.0)) continue;
+        const std::array<Vector3, 3> y = corners(next);
+        if (!std::all_of(y.begin(), y.end(), is_flush)) continue;
+        flat_faces_[next] = seed;
+        open.push_back(next);
+      }
+    }
   }
 }
 

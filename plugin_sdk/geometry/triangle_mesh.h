@@ -62,6 +62,9 @@ class TriangleMesh {
   std::uint32_t neighbour(std::uint32_t triangle, int edge) const {
     return neighbours_[triangle][static_cast<std::size_t>(edge)];
   }
+  // The flat face that a triangle is part of, by the lowest of its triangles: those that are joined over edges and lie in the
+  // plane of that one, to rounding.
+  std::uint32_t flat_face(std::uint32_t triangle) const { return flat_faces_[triangle]; }
   // The triangles round a vertex, ascending.
   std::span<const std::uint32_t> ring(std::uint32_t vertex) const {
     return std::span(rings_).subspan(ring_begin_[vertex], ring_begin_[vertex + 1] - ring_begin_[vertex]);
@@ -105,12 +108,14 @@ class TriangleMesh {
  private:
   TriangleMesh() = default;
   void join();
+  void find_flat_faces();
   void build_tree();
 
   std::vector<Vector3> vertices_;
   std::vector<Triangle> triangles_;
   std::vector<Vector3> normals_;
   std::vector<std::array<std::uint32_t, 3>> neighbours_;
+  std::vector<std::uint32_t> flat_faces_;
   std::vector<std::uint32_t> ring_begin_;
   std::vector<std::uint32_t> rings_;
   std::vector<Node> nodes_;

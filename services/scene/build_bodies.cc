@@ -297,6 +297,13 @@ class BodyBuilder {
     if (solid_ == nullptr) return;
     const std::string& type = body_.bounding_volume_type();
     description->bound = local_bound(*solid_, type, description->geometry);
+    // a mesh on which bodies stand has no thickness by which contacts could be measured, as a half-space has none; what has
+    // come into an open one is pushed out to the side of its centre
+    const bool is_mesh = solid_->shape && solid_->shape->kind == SceneShape::Kind::kTriangleMesh;
+    if (is_mesh && !is_movable_) {
+      description->bound.least_half_extent = 0.0;
+      if (!solid_->shape->mesh->is_closed()) description->bound.half_thickness = 0.0;
+    }
     if (!solid_->is_unbounded() || type.empty() || type == "None") return;
     diagnostics_.warning(
         place(Body::kBoundingVolumeTypeFieldNumber),

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "plugin_sdk/geometry/simplex.h"
+#include "plugin_sdk/math/pose.h"
 #include "tests/plugin_sdk/geometry/random_shapes.h"
 
 namespace gravitas {
@@ -198,6 +199,42 @@ TEST(TriangleMesh, TellsTheWayOutUpToItsSurface) {
     }
   }
   EXPECT_LE((mesh.nearest({0.25, 0.25, 0.0}).outward + Vector3::UnitZ()).norm(), 1e-15);
+}
+
+// A cube has six, whichever way it is turned, and is divided; what is bent by 1e-6 is two.
+TEST(TriangleMesh, FlatFacesAreNamedByTheirLowestTriangle) {
+  test::RandomShapes random(8);
+  for (int i = 0; i < 20; ++i) {
+    const Pose pose{random.vector(-1, 1), random.rotation()};
+    std::vector<Vector3> vertices;
+    Triangles triangles;
+    constexpr std::uint32_t n = 6;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double side : {-1.0, 1.0}) {
+        const auto first = static_cast<std::uint32_t>(vertices.size());
+        for (std::uint32_t u = 0; u <= n; ++u)
+          for (std::uint32_t v = 0; v <= n; ++v) {
+            Vector3 x;
+            x[axis] = side, x[(axis + 1) % 3] = 2.0 * u / n - 1.0, x[(axis + 2) % 3] = 2.0 * v / n - 1.0;
+            vertices.push_back(i == 0 ? x : transform_point(pose, x));
+          }
+        for (std::uint32_t u = 0; u < n; ++u)
+          for (std::uint32_t v = 0; v < n; ++v) {
+            const std::uint32_t a = first + u * (n + 1) + v, b = a + n + 1;
+            triangles.push_back(side > 0.0 ? TriangleMesh::Triangle{a, b, b + 1} : TriangleMesh::Triangle{a, b + 1, b});
+            triangles.push_back(side > 0.0 ? TriangleMesh::Triangle{a, b + 1, a + 1}
+                                           : TriangleMesh::Triangle{a, a + 1, b + 1});
+          }
+      }
+    }
+    const TriangleMesh mesh = made(vertices, triangles);
+    for (std::uint32_t t = 0; t < mesh.triangles().size(); ++t)
+      EXPECT_EQ(mesh.flat_face(t), t / (2 * n * n) * (2 * n * n)) << i << ' ' << t;
+  }
+  for (const double bend : {0.0, 1e-6}) {
+    const TriangleMesh mesh = made({{0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {1, bend, 1}}, {{0, 2, 1}, {1, 2, 3}});
+    EXPECT_EQ(mesh.flat_face(1), bend == 0.0 ? 0U : 1U);
+  }
 }
 
 }  // namespace

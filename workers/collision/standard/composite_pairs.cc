@@ -8,6 +8,7 @@
 #include "plugin_sdk/geometry/contour_contacts.h"
 #include "plugin_sdk/geometry/simplex.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
+#include "workers/collision/standard/flat_faces.h"
 #include "workers/collision/standard/narrow_phase.h"
 #include "workers/collision/standard/pair_functions.h"
 
@@ -19,6 +20,8 @@ constexpr double kLevel = 1e-7;
 constexpr double kPatchPreference = 0.01;
 // A neighbour whose normal is nearer to a contact's than the triangle's own, by this in the cosines, has the contact.
 constexpr double kFacesMore = 0.5;
+// Cosine of an angle that is none: a contact's normal is that of the face.
+constexpr double kOnFace = 1.0 - 1e-12;
 
 // ---- normals of a mesh
 
@@ -118,16 +121,6 @@ bool choose_normal(const PlacedPair& pair, const TriangleSide& a, const Triangle
 
 // ---- mesh against convex, half-space and mesh
 
-Box3 box_of(const SupportMap& map, const Matrix3& R, const Vector3& p) {
-  Box3 box;
-  for (int i = 0; i < 3; ++i) {
-    const Vector3 axis = R.row(i).transpose();
-    box.upper[i] = p[i] + axis.dot(map.support(axis)) + map.rounding();
-    box.lower[i] = p[i] + axis.dot(map.support(-axis)) - map.rounding();
-  }
-  return box;
-}
-
 class Collector {
  public:
   Collector(const Pose& frame, std::uint64_t key, double merge, bool is_reversed, ContactList* out)
@@ -140,17 +133,41 @@ class Collector {
 
   // A contact in the frame, its normal from the mesh to the other.
   void add(std::uint64_t part, const ContactPoint& contact) const {
-    ContactPoint moved = contact;
-    moved.point = p_ + R_ * contact.point;
-    moved.normal = R_ * contact.normal;
-    if (is_reversed_) moved.normal = -moved.normal;
-    out_->collect(key_of_part(key_, part), moved, merge_);
+    out_->collect(key_of_part(key_, part), moved(contact), merge_);
   }
   void add(std::uint64_t part, const Manifold& manifold) const {
     for (int i = 0; i < manifold.count; ++i) add(part, manifold.contacts[static_cast<std::size_t>(i)]);
   }
+  // What lies on a flat face: features keep their names from triangle to triangle.
+  void add_on_face(std::uint32_t face, const ContactPoint& contact) const {
+    out_->collect_on_face(key_of_part(key_, kFace | face), moved(contact), merge_);
+  }
+  void add_on_face(std::uint32_t face, const Manifold& manifold) const {
+    for (int i = 0; i < manifold.count; ++i) add_on_face(face, manifold.contacts[static_cast<std::size_t>(i)]);
+  }
+  // Of a triangle.
+  void add(const TriangleMesh& mesh, std::uint32_t t, const Manifold& manifold) const {
+    for (int i = 0; i < manifold.count; ++i) {
+      const ContactPoint& contact = manifold.contacts[static_cast<std::size_t>(i)];
+      if (is_of_face(contact.feature)) {
+        add_on_face(mesh.flat_face(t), contact);
+      } else {
+        add(t, contact);
+      }
+    }
+  }
 
  private:
+  static constexpr std::uint64_t kFace = std::uint64_t{1} << 32;  // beside all numbers of triangles
+
+  ContactPoint moved(const ContactPoint& contact) const {
+    ContactPoint moved = contact;
+    moved.point = p_ + R_ * contact.point;
+    moved.normal = R_ * contact.normal;
+    if (is_reversed_) moved.normal = -moved.normal;
+    return moved;
+  }
+
   Matrix3 R_;
   Vector3 p_;
   std::uint64_t key_;
@@ -208,20 +225,29 @@ void for_each_at_ball(const TriangleMesh& mesh, const Vector3& centre, double ra
   }
 }
 
-void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const Pose& X_MC, const Flush& flush,
-                         double margin, const Collector& out) {
-  const Matrix3 R = X_MC.orientation.toRotationMatrix();
-  const Vector3 centre = X_MC.position + R * map.centre();
+void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const Flush& flush, double margin,
+                         const Collector& out) {
+  const SupportMap& map = over.map;
+  const Matrix3& R = over.R;
+  const Pose& X_MC = over.X_MC;
+  const Vector3 centre = over.centre();
+  const bool is_ball = map.rounding() == map.radius();
+  FlatFaces faces(mesh, over, margin);
   // In a concave edge, and deep in small triangles, the shortest way out of each leads into another, and none claims the
   // contact: then all do that are about as shallow as any, along their faces.
   constexpr double kOfShallowest = 2.0;
   double shallowest = std::numeric_limits<double>::infinity();  // along the face of a triangle that claims nothing
   bool is_claimed = false, by_faces = false;
   const auto collide_triangle = [&](std::uint32_t t, const std::optional<Separation>& known) {
+    const FlatFaces::Plane* const plane = by_faces ? nullptr : faces.holding(t);
+    if (plane != nullptr && plane->is_covered) return;
     const TriangleMap triangle(mesh.corners(t), mesh.normal(t));
     const PlacedPair pair{triangle, map, R, X_MC.position};
-    const Separation least = known ? *known : find_separation(pair, margin);
-    if (!(least.depth >= -margin)) return;
+    Separation least;
+    if (plane == nullptr) {
+      least = known ? *known : find_separation(pair, margin);
+      if (!(least.depth >= -margin)) return;
+    }
     const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
     const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
     const Vector3 up = side.normal();
@@ -232,24 +258,74 @@ void collide_mesh_convex(const TriangleMesh& mesh, const SupportMap& map, const 
     if (by_faces) {
       if (is_before && pair.depth_along(up) <= kOfShallowest * shallowest)
         contacts_along(pair, up, margin, &least, &manifold);
-    } else if (choose_normal(pair, side, nullptr, least, &normal, &is_least)) {
-      contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold);
+    } else if (plane != nullptr || choose_normal(pair, side, nullptr, least, &normal, &is_least)) {
+      if (plane != nullptr) normal = plane->up;
+      const FeatureTest is_inside = [&side](std::uint32_t feature) {
+        return is_inside_flat_face(side.mesh, side.triangle, side.side < 0.0, feature);
+      };
+      const bool is_flat = normal.dot(up) > kOnFace;
+      contacts_along(pair, normal, margin, is_least ? &least : nullptr, &manifold, is_flat ? is_inside : nullptr);
       flush.lay(pair, margin, &manifold);
     }
     is_claimed = is_claimed || manifold.count > 0;
     if (manifold.count == 0 && is_before)
       shallowest = std::min(shallowest, std::max(1e-6 * map.radius(), pair.depth_along(up)));
-    out.add(t, manifold);
+    out.add(mesh, t, manifold);
+  };
+  // whether the way out of a triangle with the lowest point of the body is that along its face, if others of it have their say
+  const auto touches_along_face = [&](std::uint32_t t) {
+    const TriangleMap triangle(mesh.corners(t), mesh.normal(t));
+    const PlacedPair pair{triangle, map, R, X_MC.position};
+    const Separation least = find_separation(pair, margin);
+    if (!(least.depth >= -margin)) return false;
+    const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
+    const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
+    Vector3 normal;
+    bool is_least = false;
+    return leads_out_inside_flat_face(mesh, t, least.normal) ||
+           (choose_normal(pair, side, nullptr, least, &normal, &is_least) && normal.dot(side.normal()) > kOnFace);
   };
   const auto collide_triangles = [&] {
-    if (map.rounding() == map.radius()) {
+    if (is_ball) {
       for_each_at_ball(mesh, centre, map.radius(), margin, collide_triangle);
     } else {
-      mesh.for_each_in(box_of(map, R, X_MC.position).widened(margin),
-                       [&](std::uint32_t t) { collide_triangle(t, std::nullopt); });
+      mesh.for_each_in(over.box().widened(margin), [&](std::uint32_t t) { collide_triangle(t, std::nullopt); });
     }
   };
-  collide_triangles();
+  struct Near {
+    std::uint32_t triangle;
+    std::optional<Separation> known;
+  };
+  if (is_ball) {
+    // planes over which the centre lies first, as far as there is room: most balls are near few triangles
+    std::array<Near, 16> near;
+    std::size_t count = 0;
+    const auto collide_near = [&] {
+      for (std::size_t i = 0; i < count; ++i) collide_triangle(near[i].triangle, near[i].known);
+      count = 0;
+    };
+    for_each_at_ball(mesh, centre, map.radius(), margin, [&](std::uint32_t t, const std::optional<Separation>& known) {
+      const double facing = known ? known->normal.dot(mesh.normal(t)) : 0.0;
+      if ((mesh.is_closed() ? facing : std::fabs(facing)) > kOnFace) faces.take(t, known->normal);
+      if (count == near.size()) collide_near();
+      near[count++] = {t, known};
+    });
+    collide_near();
+  } else {
+    const Matrix3 R_FM = flush.X_FM.orientation.toRotationMatrix();
+    mesh.for_each_in(over.box().widened(margin), [&](std::uint32_t t) {
+      Manifold manifold;
+      if (faces.holding(t) != nullptr || !faces.find(t, flush.rests.of_a, R_FM, &manifold)) return;
+      if (manifold.count > 0) {
+        faces.take(true);
+        is_claimed = true;
+        out.add_on_face(mesh.flat_face(t), manifold);
+      } else if (touches_along_face(t)) {
+        faces.take(false);
+      }
+    });
+    collide_triangles();
+  }
   if (!is_claimed && std::isfinite(shallowest)) {
     by_faces = true;
     collide_triangles();
@@ -396,8 +472,8 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
     } else {
       SupportMapBuffer buffer;
       const PairRests of_mesh_first = is_reversed ? PairRests{rests.of_b, rests.of_a, rests.origin} : rests;
-      collide_mesh_convex(*mesh.mesh, support_map_of(other, &buffer), X_MO,
-                          {of_mesh_first, X_WM, flush_length(mesh, other)}, margin, collector);
+      const OverMesh over{other, support_map_of(other, &buffer), X_MO, X_MO.orientation.toRotationMatrix()};
+      collide_mesh_convex(*mesh.mesh, over, {of_mesh_first, X_WM, flush_length(mesh, other)}, margin, collector);
     }
   } else {
     Manifold manifold;

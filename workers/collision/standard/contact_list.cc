@@ -33,6 +33,13 @@ void ContactList::collect(std::uint64_t key, const ContactPoint& contact, double
   collected_.push_back({key_of_part(key, contact.feature), 0, contact});
 }
 
+void ContactList::collect_on_face(std::uint64_t key, const ContactPoint& contact, double merge_distance) {
+  constexpr int kBits = 15;
+  merge_distance_ = std::max(merge_distance_, merge_distance);
+  const std::uint64_t name = key_of_part(key, 0) >> (32 + kBits) << kBits | (contact.feature & ((1U << kBits) - 1U));
+  collected_.push_back({name << 32, 0, contact});
+}
+
 void ContactList::begin_at_rim() {
   Vector3 middle = Vector3::Zero();
   double deepest = -std::numeric_limits<double>::infinity();

@@ -21,6 +21,9 @@ class ContactList {
   // A contact of one part of a mesh or compound with another; `key` names the parts, contact.feature the features on
   // them. Points nearer than `merge_distance` (m) with one normal are one contact.
   void collect(std::uint64_t key, const ContactPoint& contact, double merge_distance);
+  // The same of two parts that touch with a face of the first. The order is that of the features on the second (15 bits), as
+  // it is of two convex shapes: solvers take contacts in order.
+  void collect_on_face(std::uint64_t key, const ContactPoint& contact, double merge_distance);
   // Answers what was collected: at most four contacts for every normal (normals within half a degree are one), features
   // folded to 32 bits and made unique, ascending; moved by `origin`, normals turned round if `is_swapped`.
   void finish(const Vector3& origin, bool is_swapped);

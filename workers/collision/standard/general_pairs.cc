@@ -26,7 +26,8 @@ const SupportMap& support_map_of(const Shape& shape, SupportMapBuffer* buffer) {
   return shape.map != nullptr ? *shape.map : buffer->emplace(kind_of(shape.type), shape.size);
 }
 
-void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out) {
+void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out,
+                    const FeatureTest& is_dropped) {
   constexpr double kFlat = 0.2, kFlatRounded = 0.03;
   const double tie = std::max(1e-9 * pair.thinnest(), 1e-13 * pair.reach());
   ContactCandidates candidates(margin, tie, std::max(1e-6 * pair.thinnest(), tie));
@@ -38,6 +39,7 @@ void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, con
   if (candidates.count() == 0 && least != nullptr)
     candidates.add(
         {0.5 * (least->point_a + least->point_b), n, least->depth, (a.code & 0x7FFFU) << 15 | (b.code & 0x7FFFU)});
+  if (is_dropped && a.is_face()) candidates.drop(is_dropped);
   candidates.reduce_to(out);
 }
 

@@ -15,6 +15,8 @@
 //   capsule, cone,           distance or expanding polytope (plugin_sdk/geometry/penetration.h), the features that
 //   polyhedron - any convex  touch laid over each other: up to 4; against a half-space the feature turned towards it
 //   mesh - anything          triangle by triangle, through its tree (composite_pairs.h)
+//   flat face of a mesh,     as with a thick box (flat_faces.h)
+//   what lies over it
 //   compound - anything      child by child
 // For a gap between boxes and cylinders whose closest features own no separating axis, the normal
 // is that of the closest points (plugin_sdk/geometry/penetration.h).

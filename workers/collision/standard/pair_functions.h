@@ -2,6 +2,9 @@
 // type with the lower value first.
 #pragma once
 
+#include <cstdint>
+#include <functional>
+
 #include "plugin_sdk/geometry/manifold.h"
 #include "plugin_sdk/geometry/penetration.h"
 #include "plugin_sdk/geometry/support_map_buffer.h"
@@ -46,8 +49,11 @@ void collide_halfspace_general(const Shape& a, const Shape& b, const Placement& 
 
 // The contacts of two convex shapes along the unit vector n, from a to b, of features that lie within an angle of sine 0.2
 // (of rounded cores 0.03) of its planes, as in collide_support_maps(): of a face askew all corners, or bodies would rock
-// from one to the next. Those of features that touch there in a point only if `least` is given. All in a's frame.
-void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out);
+// from one to the next. Those of features that touch there in a point only if `least` is given. All in a's frame. Where a
+// touches with a face, none whose feature `is_dropped` names.
+using FeatureTest = std::function<bool(std::uint32_t feature)>;
+void contacts_along(const PlacedPair& pair, const Vector3& n, double margin, const Separation* least, Manifold* out,
+                    const FeatureTest& is_dropped = nullptr);
 
 // The kind of a primitive that is bounded, and the map of a convex shape: its own, or one made in the buffer.
 SceneShape::Kind kind_of(ShapeType type);
