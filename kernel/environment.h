@@ -230,7 +230,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   void ask_reactions();
   // joint_impulses.cc
   void find_joint_impulses();
-  bool find_wanted_moves();
+  bool find_wanted_moves(const DiscrepancyAnswer& joints);
   void find_start_velocities();
   void join_start_velocities();
   void add_start_impulses();

@@ -64,7 +64,7 @@ struct StepData {
   // Stage::kSolve inside kIntegrate; held_force: the last discrepancy_force of the integration that counts.
   Column<double> kinematic_acceleration, reaction, discrepancy_force, held_force, reaction_residual,
       wrench_with_reactions;
-  // joint_impulses.cc: joints and poses of the last derivative, what they shall do, and what is none.
+  // joint_impulses.cc: joints (once others are asked) and poses of the last derivative, what they shall do, and what is none.
   DiscrepancyAnswer held_joints;
   Column<double> held_position, held_orientation, no_velocity, wanted_along, none_along;
 

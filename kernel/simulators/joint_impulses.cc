@@ -11,13 +11,18 @@
 namespace gravitas::kernel {
 
 void Environment::find_joint_impulses() {
-  if (last_joints_ == LastJoints::kFresh) {
+  const auto last = [&]() -> const DiscrepancyAnswer& {
+    return last_joints_ == LastJoints::kHeld ? data_.held_joints : data_.discrepancies;
+  };
+  if (!knows_reactions() || last_joints_ == LastJoints::kNone || !are_locks(last().columns()))
+    return told_wrench().resize(0);
+  // that question asks the joints anew
+  if (last_joints_ == LastJoints::kFresh && is_asked(DerivativeQuestion::kPlaceImpulses)) {
     std::swap(data_.discrepancies, data_.held_joints);
     last_joints_ = LastJoints::kHeld;
   }
-  const DiscrepancyAnswer& joints = data_.held_joints;
-  const bool can = knows_reactions() && last_joints_ == LastJoints::kHeld && are_locks(joints.columns());
-  if (!can || !find_wanted_moves()) return told_wrench().resize(0);
+  const DiscrepancyAnswer& joints = last();
+  if (!find_wanted_moves(joints)) return told_wrench().resize(0);
   data_.none_along.resize(3 * joints.mode.size()), std::ranges::fill(data_.none_along.span(), 0.0);
   data_.discrepancy_force.resize(3 * joints.mode.size());
   data_.block_body.resize(0), data_.block.resize(0);
@@ -33,18 +38,16 @@ void Environment::find_joint_impulses() {
       [&](const auto& answer) { return validator_.reactions(answer); });
 }
 
-// What the bodies are to be moved by, or their velocities changed by, along the axes of held_joints. False: that is unknown.
-bool Environment::find_wanted_moves() {
-  const DiscrepancyColumns held = data_.held_joints.columns();
-  data_.wanted_along.resize(3 * held.size());
+// What the bodies are to be moved by, or their velocities changed by, along the axes of joints. False: that is unknown.
+bool Environment::find_wanted_moves(const DiscrepancyAnswer& joints) {
+  data_.wanted_along.resize(3 * joints.mode.size());
   if (is_asked(DerivativeQuestion::kPlaceImpulses)) {
     ask_discrepancies(data_.derivative_time, data_.derivative_position, data_.derivative_orientation,
                       data_.derivative_linear_velocity, data_.derivative_angular_velocity);
-    if (!find_lock_errors(data_.held_joints.columns(), data_.discrepancies.columns(), data_.wanted_along.span()))
-      return false;
+    if (!find_lock_errors(joints.columns(), data_.discrepancies.columns(), data_.wanted_along.span())) return false;
   } else {
     find_lock_velocity_errors(
-        held, data_.discrepancy_body.span(),
+        joints.columns(), data_.discrepancy_body.span(),
         {data_.held_position.span(), data_.derivative_linear_velocity.span(), data_.derivative_angular_velocity.span()},
         data_.wanted_along.span());
   }

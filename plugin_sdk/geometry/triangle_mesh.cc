@@ -19,6 +19,7 @@ constexpr std::uint32_t kDeepest = 60;
 // Of the largest coordinate: heights over a plane that are none, and of the distance from where its normal is known.
 constexpr double kFlatHeight = 1e-14;
 constexpr double kFlatSlope = 1e-12;
+constexpr double kMostSlope = 1e-7;  // however little the normal of a sliver is known
 
 bool precedes(const Vector3& a, const Vector3& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
@@ -147,7 +148,7 @@ void TriangleMesh::find_flat_faces() {
     const double least = (x[1] - x[0]).cross(x[2] - x[0]).norm();
     // the normal of a small triangle, or of a sliver, is known as its vertices are
     const double size = std::max({(x[1] - x[0]).norm(), (x[2] - x[1]).norm(), (x[0] - x[2]).norm()});
-    const double slope = kFlatSlope + 4e-16 * largest * size / least;
+    const double slope = std::min(kMostSlope, kFlatSlope + 4e-16 * largest * size / least);
     const auto is_flush = [&](const Vector3& p) {
       return std::fabs(up.dot(p - x[0])) <= kFlatHeight * largest + slope * (p - x[0]).norm();
     };

@@ -360,10 +360,14 @@ double IslandSolver::gap_of(const EndContact& contact) const {
 }
 
 // A face that comes down about an edge meets with all its corners at once, but those nearer to the edge are within their slop
-// before. Of a pair that arrives, what comes in the time that the slop takes comes with it: one by one they bounce otherwise.
+// before. Of a pair that arrives, what comes in the time that the slop takes comes with it, if it is nearly there: one by one
+// they bounce otherwise.
 void IslandSolver::close_together(std::span<EndContact> of_pair, double time) {
-  for (EndContact& contact : of_pair)
-    contact.is_closed = contact.is_closed || gap_of(contact) <= contact.slop + time * contact.law.arrival;
+  constexpr double kNearly = 100.0;  // slops
+  for (EndContact& contact : of_pair) {
+    const double way = std::min(time * contact.law.arrival, kNearly * contact.slop);
+    contact.is_closed = contact.is_closed || gap_of(contact) <= contact.slop + way;
+  }
 }
 
 bool IslandSolver::find_closed() {

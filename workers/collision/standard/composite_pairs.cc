@@ -238,6 +238,10 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
   constexpr double kOfShallowest = 2.0;
   double shallowest = std::numeric_limits<double>::infinity();  // along the face of a triangle that claims nothing
   bool is_claimed = false, by_faces = false;
+  const auto side_of = [&](std::uint32_t t, const TriangleMap& triangle) {
+    const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
+    return TriangleSide{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
+  };
   const auto collide_triangle = [&](std::uint32_t t, const std::optional<Separation>& known) {
     const FlatFaces::Plane* const plane = by_faces ? nullptr : faces.holding(t);
     if (plane != nullptr && plane->is_covered) return;
@@ -248,8 +252,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
       least = known ? *known : find_separation(pair, margin);
       if (!(least.depth >= -margin)) return;
     }
-    const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
-    const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
+    const TriangleSide side = side_of(t, triangle);
     const Vector3 up = side.normal();
     const bool is_before = up.dot(centre - triangle.centre()) > 0.0;
     Vector3 normal;
@@ -278,8 +281,7 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
     const PlacedPair pair{triangle, map, R, X_MC.position};
     const Separation least = find_separation(pair, margin);
     if (!(least.depth >= -margin)) return false;
-    const bool is_behind = !mesh.is_closed() && mesh.normal(t).dot(centre - triangle.centre()) < 0.0;
-    const TriangleSide side{mesh, t, is_behind ? -1.0 : 1.0, Matrix3::Identity()};
+    const TriangleSide side = side_of(t, triangle);
     Vector3 normal;
     bool is_least = false;
     return leads_out_inside_flat_face(mesh, t, least.normal) ||
@@ -306,7 +308,8 @@ void collide_mesh_convex(const TriangleMesh& mesh, const OverMesh& over, const F
     };
     for_each_at_ball(mesh, centre, map.radius(), margin, [&](std::uint32_t t, const std::optional<Separation>& known) {
       const double facing = known ? known->normal.dot(mesh.normal(t)) : 0.0;
-      if ((mesh.is_closed() ? facing : std::fabs(facing)) > kOnFace) faces.take(t, known->normal);
+      if ((mesh.is_closed() ? facing : std::fabs(facing)) > kOnFace)
+        faces.take(t, facing < 0.0 ? Vector3(-mesh.normal(t)) : mesh.normal(t));
       if (count == near.size()) collide_near();
       near[count++] = {t, known};
     });

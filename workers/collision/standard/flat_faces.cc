@@ -21,12 +21,14 @@ constexpr std::size_t kMostPoints = 2 * gravitas::Contour::kCapacity;
 
 // The turn that brings the axis nearest to `up` there by the shortest way: none if that is an axis, so that a face along the
 // mesh's axes is a side of a box along them.
-Quaternion turn_to(const Vector3& up, Vector3* axis) {
+Quaternion turn_to(const Vector3& up) {
+  // the first of those that are as near but for rounding: all triangles of a face have one box
+  const double least = up.cwiseAbs().maxCoeff() - 1e-6;
   Eigen::Index nearest = 0;
-  up.cwiseAbs().maxCoeff(&nearest);
-  *axis = (up[nearest] < 0.0 ? -1.0 : 1.0) * Vector3::Unit(nearest);
-  const Vector3 cross = axis->cross(up);
-  return Quaternion(1.0 + axis->dot(up), cross.x(), cross.y(), cross.z()).normalized();
+  while (std::fabs(up[nearest]) < least) ++nearest;
+  const Vector3 axis = (up[nearest] < 0.0 ? -1.0 : 1.0) * Vector3::Unit(nearest);
+  const Vector3 cross = axis.cross(up);
+  return Quaternion(1.0 + axis.dot(up), cross.x(), cross.y(), cross.z()).normalized();
 }
 
 // Of p, over the triangle along its unit normal.
@@ -161,12 +163,15 @@ bool FlatFaces::find(std::uint32_t t, std::span<const Rest> rests, const Matrix3
   Shape box;
   box.type = ShapeType::kBox;
   box.size = Vector3::Constant(half);
-  Vector3 axis;
-  const Quaternion turn = turn_to(up, &axis);
   const Vector3& p = over_.X_MC.position;
-  collide(box, {p - (height(p) + half) * up, turn}, over_.shape, over_.X_MC, margin_, out);
-  for (int i = 0; i < out->count; ++i)
-    points[static_cast<std::size_t>(i)] = out->contacts[static_cast<std::size_t>(i)].point;
+  collide(box, {p - (height(p) + half) * up, turn_to(up)}, over_.shape, over_.X_MC, margin_, out);
+  // exact pairs have names of 8 bits (features.h): which side of the box stands for the face is none of the contact's
+  const bool is_exact = over_.shape.type == ShapeType::kBox || over_.shape.type == ShapeType::kCylinder;
+  for (int i = 0; i < out->count; ++i) {
+    ContactPoint& contact = out->contacts[static_cast<std::size_t>(i)];
+    if (is_exact) contact.feature &= 0xFFU;
+    points[static_cast<std::size_t>(i)] = contact.point;
+  }
   const bool is_along = out->count > 0 && out->contacts[0].normal.dot(up) >= 1.0 - kStraight;
   if (!is_along || !are_over(found_, {points.data(), static_cast<std::size_t>(out->count)})) out->count = 0;
   return true;

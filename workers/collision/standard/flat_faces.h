@@ -2,7 +2,8 @@
 // side is the face.
 //
 // A triangle alone knows neither which of its edges are edges of the face nor how the whole of a body lies to it. So a
-// convex shape whose centre is before the face, and of which all that comes within the margin lies over it, is held
+// convex shape whose centre is before the face (of an open mesh: or behind it by less than half of the shape's least half
+// extent), and of which all that comes within the margin lies over it, is held
 // against a box that is wider and thicker than it. Elsewhere triangles tell their contacts one by one (composite_pairs.h),
 // without those of edges and corners inside the face.
 #pragma once
@@ -47,8 +48,8 @@ class FlatFaces {
   };
 
   // Whether a point of the shape that is the lowest over the plane of triangle t, seen from the side of the shape's centre,
-  // lies over t; then the contacts if all of the shape does that comes within the margin, else none. In the mesh's frame, the normal
-  // from the mesh to the shape. `rests`: of the mesh, in a frame turned by `R_FM` against its own: what they may lay flush
+  // lies over t; then the contacts if all of the shape does that comes within the margin, else none. In the mesh's frame,
+  // the normal from the mesh to the shape. `rests`: of the mesh, in a frame turned by `R_FM` against its own: what they may lay flush
   // with something else is left to the triangles.
   bool find(std::uint32_t t, std::span<const Rest> rests, const Matrix3& R_FM, Manifold* out);
   // The triangles of the plane of the last one that was found touch along its normal.

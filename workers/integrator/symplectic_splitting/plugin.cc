@@ -31,7 +31,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <utility>
 
 #include "plugin_sdk/integrator.h"
 #include "plugin_sdk/math/free_rotor.h"
@@ -72,7 +71,9 @@ class SymplecticSplitting final : public IntegratorPlugin {
     return {.name = "SymplecticSplitting",
             .version = "1.0",
             .slot = Slot::kIntegrator,
-            .meaning = "Exact free motion and kicks in turn, symplectic, with joints that hold by locks alone, too; order 2, 4 or 6.",
+            .meaning =
+                "Exact free motion and kicks in turn, symplectic, with joints that hold by locks alone, too; order 2, "
+                "4 or 6.",
             .capabilities = {"order=4"},
             .properties = {Property::integer("Order").at_least(2).at_most(6).defaults_to({4}).means(
                 "Order of the composition: 2, 4 or 6.")},
@@ -102,12 +103,12 @@ class SymplecticSplitting final : public IntegratorPlugin {
     const std::span<const double> weights = needs_no_composition() ? std::span<const double>(kStrang) : weights_;
     const std::span<const double> start = derivatives.wrenches_at_start();
     start_wrench_.assign(start.begin(), start.end());
-    const bool has_locks = !find_what_acts(&derivatives);
-    if (has_locks && keep_to_joints(weights, &derivatives))
+    const bool has_joints = !find_what_acts(&derivatives);
+    if (has_joints && keep_to_joints(weights, &derivatives))
       return for_each_body(request, reply, [&](std::size_t i, const BodyState&) { return trial_.at(i); });
-    if (has_locks) begin(request, derivatives);
+    if (has_joints) begin(request, derivatives);
 
-    find_steady();
+    find_steady(start_wrench_);
     slow_halves(0.0);
     double passed = 0.0, before = 0.0;
     for (std::size_t stage = 0; stage < weights.size(); ++stage) {
@@ -133,11 +134,11 @@ class SymplecticSplitting final : public IntegratorPlugin {
   bool is_movable(std::size_t body) const { return (request_->flags()[body] & kMovable) != 0; }
 
   // The accelerations of the start that damped bodies drift with.
-  void find_steady() {
+  void find_steady(std::span<const double> wrenches) {
     steady_.assign(size(), Vector3::Zero());
     for (std::size_t i = 0; i < size(); ++i)
       if (is_movable(i) && request_->damping()[i] != 0.0)
-        steady_[i] = request_->inverse_mass()[i] * vector_at(start_wrench_, 2 * i);
+        steady_[i] = request_->inverse_mass()[i] * vector_at(wrenches, 2 * i);
   }
   // Of a damped body under that alone, after the start.
   DampedMotion steady_motion(std::size_t body, double elapsed) const {
@@ -175,17 +176,19 @@ class SymplecticSplitting final : public IntegratorPlugin {
     const auto is_same = [](std::span<const double> a, std::span<const double> b) {
       return std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
     };
-    const std::span<const double> shifted = derivatives->forces(request_->time(), shifted_velocities());
-    if (is_same(shifted, start_wrench_)) return true;
+    // what joints bear changes with velocities, too, though it be nothing at the start
+    const TrialColumns& shifted = shifted_velocities();
+    if (is_same(derivatives->wrenches(request_->time(), shifted), start_wrench_)) return true;
     depends_on_velocity_ = true;
-    forces_.assign(shifted.begin(), shifted.end());
     const std::span<const double> forces = derivatives->forces(request_->time(), trial_);
-    return is_same(forces, start_wrench_) || !is_same(forces, forces_);
+    forces_.assign(forces.begin(), forces.end());
+    return !is_same(derivatives->forces(request_->time(), shifted), forces_);
   }
 
   // Other for each body and axis, since a damper feels their difference.
-  TrialColumns shifted_velocities() const {
-    TrialColumns shifted = trial_;
+  const TrialColumns& shifted_velocities() {
+    TrialColumns& shifted = before_;
+    shifted = trial_;
     for (std::vector<double>* column : {&shifted.linear_velocity, &shifted.angular_velocity})
       for (std::size_t k = 0; k < column->size(); ++k) {
         const double share = static_cast<double>(k) / static_cast<double>(column->size());
@@ -199,9 +202,7 @@ class SymplecticSplitting final : public IntegratorPlugin {
     const double h = request_->time_step();
     for (std::size_t i = 0; i < size(); ++i)
       if (is_movable(i) && slows_in_halves(i)) return false;
-    std::swap(start_wrench_, forces_);  // bodies drift steadily under forces alone
-    find_steady();
-    std::swap(start_wrench_, forces_);
+    find_steady(forces_);  // bodies drift steadily under forces alone
     std::span<const double> wrenches = start_wrench_;
     double passed = 0.0, before = 0.0;
     for (std::size_t stage = 0; stage < weights.size(); ++stage) {
@@ -219,6 +220,8 @@ class SymplecticSplitting final : public IntegratorPlugin {
     if (impulses.empty()) return false;
     for (std::size_t i = 0; i < size(); ++i)
       if (is_movable(i)) push(i, trial_.at(i), change(i, impulses, trial_), 1.0);
+    // what joints bear counts as the last question has it: where the step ends
+    derivatives->wrenches(request_->time() + h, trial_);
     return true;
   }
 
