@@ -437,6 +437,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_, validation_;
   std::uint64_t check_begin_ns_ = 0;  // of the last answer
   std::uint64_t lap_ns_ = 0;          // the last look at the clock that ended something
+  std::uint64_t nested_ns_ = 0;       // of an integration so far: others answered
   DurationHistogram step_profile_;
 };
 

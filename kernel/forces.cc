@@ -83,7 +83,7 @@ void Environment::ask_jacobians() {
 }
 
 void Environment::begin_attempt(bool counts) {
-  attempt_counts_ = counts;
+  attempt_counts_ = counts, nested_ns_ = 0;
   validator_.begin_integration();
   if (!counts) return;
   start_wrench_known_ = false;
@@ -91,6 +91,7 @@ void Environment::begin_attempt(bool counts) {
 }
 
 void Environment::evaluate() {
+  const std::uint64_t begin = lap_ns();
   validator_.derivative_request(data_);
   data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   follow_motion(data_.derivative_time[0], data_.derivative_position, data_.derivative_orientation,
@@ -108,6 +109,7 @@ void Environment::evaluate() {
   // a plugin may have taken over that gives none
   if (data_.jacobian_blocks[0] == 0) data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   validator_.note_wrench(told_wrench());
+  nested_ns_ += lap_between(begin, lap_ns());
   if (start_wrench_known_ || !attempt_counts_ || !has_reactions()) return;
   std::ranges::copy(data_.wrench.span(), data_.start_wrench.data());
   start_wrench_known_ = true;
