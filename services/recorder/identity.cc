@@ -9,6 +9,7 @@
 
 #include "plugin_sdk/channel/digest.h"
 #include "plugin_sdk/slots.h"
+#include "services/recorder/library_digest.h"
 
 namespace gravitas {
 namespace {
@@ -102,6 +103,14 @@ recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& d) {
   for (const Slot slot : kSlots)
     add_part(fmt::format("the plugin of slot {} or its settings", slot_name(slot)), digest_plugins(d.slot(slot)),
              &identity);
+  for (const Slot slot : kSlots)
+    for (const kernel::PluginChoice& plugin : d.slot(slot).plugins) {
+      if (plugin.library.empty()) continue;
+      recorder::v1::Library* library = identity.add_libraries();
+      library->set_plugin(plugin.declaration.name);
+      library->set_path(plugin.library);
+      library->set_digest(library_digest(plugin.library));
+    }
   return identity;
 }
 

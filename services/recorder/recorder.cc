@@ -79,16 +79,21 @@ std::string Recorder::warning() const {
       journal_of(path_));
 }
 
-void Recorder::save(const kernel::Environment& environment) {
+void Recorder::save(const kernel::Environment& environment, bool goes_on) {
   journal_->flush();
   if (ends_in_a_shortened_step(environment)) return;
-  save_to(path_, environment);
+  write(path_, environment, goes_on);
   saved_step_ = environment.step_count();
 }
 
 void Recorder::save_to(const std::string& path, const kernel::Environment& environment) const {
+  write(path, environment, false);
+}
+
+void Recorder::write(const std::string& path, const kernel::Environment& environment, bool goes_on) const {
   recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
   checkpoint.set_listener_decided(listener_decided_);
+  checkpoint.set_goes_on_in_journal(goes_on);
   for (const edit::v1::Edit& edit : edits_) *checkpoint.add_edits() = edit;
   try {
     replace_file(path, serialize_checkpoint(checkpoint));
