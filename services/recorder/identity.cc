@@ -9,7 +9,6 @@
 
 #include "plugin_sdk/channel/digest.h"
 #include "plugin_sdk/slots.h"
-#include "services/recorder/library_digest.h"
 
 namespace gravitas {
 namespace {
@@ -109,7 +108,6 @@ recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& d) {
       recorder::v1::Library* library = identity.add_libraries();
       library->set_plugin(plugin.declaration.name);
       library->set_path(plugin.library);
-      library->set_digest(library_digest(plugin.library));
     }
   return identity;
 }

@@ -10,6 +10,7 @@
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/identity.h"
+#include "services/recorder/library_digest.h"
 
 namespace gravitas {
 namespace {
@@ -25,7 +26,11 @@ bool ends_in_a_shortened_step(const kernel::Environment& environment) {
 std::string journal_of(const std::string& checkpoint) { return checkpoint + ".journal"; }
 
 Recorder::Recorder(recorder::v1::Identity identity, std::function<recorder::v1::Tally()> tally)
-    : identity_(std::move(identity)), tally_(std::move(tally)) {}
+    : identity_(std::move(identity)), tally_(std::move(tally)) {
+  // here, as a run that keeps nothing need not read them
+  for (recorder::v1::Library& library : *identity_.mutable_libraries())
+    library.set_digest(library_digest(library.path()));
+}
 
 void Recorder::expect(const std::string& journal, std::vector<JournalEntry> commits) {
   expected_journal_ = journal;

@@ -28,8 +28,9 @@ using harness::CurrentFolder;
 using harness::run_quietly;
 using harness::ScratchFolder;
 using kernel::Hosting;
+using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
+using ::testing::Not;
 
 struct Case {
   const char* scene;
@@ -522,7 +523,8 @@ TEST_F(LostJournal, ThatIsMissingIsRefusedUnlessOneAsksForIt) {
   const RunResult result = run_quietly(go_on(true));
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   EXPECT_NE(result.report.chain_hash(), chain_);
-  EXPECT_THAT(result.report.warnings(), ::testing::Contains(HasSubstr("it is missing, and the run went on after the checkpoint; left aside")));
+  EXPECT_THAT(result.report.warnings(),
+              ::testing::Contains(HasSubstr("it is missing, and the run went on after the checkpoint; left aside")));
 }
 
 TEST_F(LostJournal, ThatIsDamagedInItsMiddleIsRefusedUnlessOneAsksForIt) {
@@ -545,7 +547,7 @@ TEST_F(LostJournal, AtTheEndOfARunIsNoLoss) {
   std::filesystem::remove(journal_);
   const RunResult result = run_quietly(go_on());
   EXPECT_EQ(result.report.chain_hash(), chain_);
-  EXPECT_THAT(result.report.warnings(), ::testing::Not(::testing::Contains(HasSubstr("journal"))));
+  EXPECT_THAT(result.report.warnings(), Not(Contains(HasSubstr("journal"))));
 }
 
 // Its name and version are those of before.
@@ -562,13 +564,13 @@ TEST(ResumedRun, ALibraryThatWasBuiltAnewIsTold) {
   options.resume = options.checkpoint;
   options.checkpoint.clear();
   options.steps = 60;
-  EXPECT_THAT(run_quietly(options).report.warnings(), IsEmpty());
+  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
   // what stands behind an ELF file's sections changes nothing but the file
   std::ofstream(library, std::ios::app) << "another build";
   const RunResult result = run_quietly(options);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
-  EXPECT_THAT(result.report.warnings(), ::testing::ElementsAre(HasSubstr("plugin Verlet: '" + library +
-                                                                         "' was built anew since the checkpoint")));
+  EXPECT_THAT(result.report.warnings(),
+              Contains(HasSubstr("plugin Verlet: '" + library + "' was built anew since the checkpoint")));
 }
 
 // The same of one that was swapped in.
@@ -583,10 +585,9 @@ TEST(ResumedRun, ALibraryThatWasSwappedInAndBuiltAnewIsTold) {
   options.resume = options.checkpoint;
   options.checkpoint.clear();
   options.steps = 60;
-  EXPECT_THAT(run_quietly(options).report.warnings(), IsEmpty());
+  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
   std::ofstream(library, std::ios::app) << "another build";
-  EXPECT_THAT(run_quietly(options).report.warnings(),
-              ::testing::ElementsAre(HasSubstr("was built anew since the checkpoint")));
+  EXPECT_THAT(run_quietly(options).report.warnings(), Contains(HasSubstr("was built anew since the checkpoint")));
 }
 
 }  // namespace
