@@ -228,7 +228,6 @@ class Environment : private DerivativeSource, private SlotObserver {
   // smooth.cc: derivatives that agree with the joints.
   bool knows_reactions() const { return description_.simulator == Simulator::kSmooth && model_.constraint_count > 0; }
   void ask_reactions();
-  // joint_impulses.cc
   void find_joint_impulses();
   bool find_wanted_moves(const DiscrepancyAnswer& joints);
   void find_start_velocities();
@@ -300,6 +299,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   const Column<double>& told_wrench() const { return knows_reactions() ? data_.wrench_with_reactions : data_.wrench; }
   void begin_attempt(bool counts) override;
   void evaluate() override;
+  void find_wrenches();
   // Of S_n, until all are answered by the same plugins.
   void ask_forces();
   // At the time in data_.derivative_time.
@@ -315,9 +315,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   // True for a group of forces whose wrenches never change.
   bool is_constant(std::size_t group) const;
   void count_jacobian_blocks();
-  bool is_asked(DerivativeQuestion question) const {
-    return data_.derivative_question[0] == static_cast<std::uint32_t>(question);
-  }
+  bool is_asked(DerivativeQuestion q) const { return data_.derivative_question[0] == static_cast<std::uint32_t>(q); }
   bool wants_jacobian() const { return is_asked(DerivativeQuestion::kWithJacobian) && data_.jacobian_blocks[0] != 0; }
   void ask_jacobians();
   void ask_jacobians(Stage stage, StageSlot* slot, StageCall call, std::uint64_t most);
@@ -430,8 +428,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   bool is_anew_ = true;         // no step yet, or none since an edit
   double start_overlap_ = 0.0;  // m, where such a step begins
   bool start_wrench_known_ = false;
-  // Where the joints of the last derivative are: nowhere, in data_.discrepancies, in data_.held_joints.
-  enum class LastJoints { kNone, kFresh, kHeld } last_joints_ = LastJoints::kNone;
+  enum class LastJoints { kNone, kFresh, kHeld } last_joints_ = LastJoints::kNone;  // in discrepancies, held_joints
   bool attempt_counts_ = true;
   std::vector<std::size_t> next_in_group_;  // scratch of merge_discrepancies()
 
@@ -447,6 +444,7 @@ class Environment : private DerivativeSource, private SlotObserver {
   std::array<DurationHistogram, static_cast<std::size_t>(Stage::kCount)> profile_, transport_, validation_;
   std::uint64_t check_begin_ns_ = 0;  // of the last answer
   std::uint64_t lap_ns_ = 0;          // the last look at the clock that ended something
+  std::uint64_t nested_ns_ = 0;       // of an integration so far: others answered
   DurationHistogram step_profile_;
 };
 

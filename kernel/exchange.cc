@@ -119,7 +119,7 @@ void Environment::inject(FaultInjection fault) {
   slot.inject(std::move(fault));
 }
 
-// What only the plugin before understands is dropped; another build or instance of it goes on with it.
+// What only the plugin before understands is dropped; another build or instance of it goes on with it, and so does a space.
 void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, const PluginChoice& before) {
   const PluginDeclaration& now = slot.description().plugins[target].declaration;
   for (const ConstraintGroup& group : model_.constraint_groups)
@@ -127,7 +127,7 @@ void Environment::on_plugin_change(const StageSlot& slot, std::uint32_t target, 
   must_restart_ = has_newcomer_ = true;
   has_new_forces_ |= slot.which() == Slot::kForce;
   count_jacobian_blocks();
-  if (now.name == before.declaration.name) return;
+  if (now.name == before.declaration.name || slot.which() == Slot::kSpace) return;
   // all wake with this step, also for who goes on from S_n elsewhere
   wake_orders_.clear();
   for (std::uint32_t i = 0; i < model_.body_count; ++i)

@@ -83,8 +83,7 @@ void Environment::ask_jacobians() {
 }
 
 void Environment::begin_attempt(bool counts) {
-  attempt_counts_ = counts;
-  last_joints_ = LastJoints::kNone;
+  attempt_counts_ = counts, nested_ns_ = 0, last_joints_ = LastJoints::kNone;
   validator_.begin_integration();
   if (!counts) return;
   start_wrench_known_ = false;
@@ -92,6 +91,7 @@ void Environment::begin_attempt(bool counts) {
 }
 
 void Environment::evaluate() {
+  const std::uint64_t begin = lap_ns();
   validator_.derivative_request(data_);
   data_.jacobian_body.resize(0), data_.jacobian.resize(0);
   follow_motion(data_.derivative_time[0], data_.derivative_position, data_.derivative_orientation,
@@ -99,8 +99,13 @@ void Environment::evaluate() {
   // the end of a step may be the time of a jump
   data_.derivative_time[0] = std::clamp(data_.derivative_time[0], asked_from_, asked_until_);
   told_wrench().resize(6 * model_.body_count);
-  if (is_asked(DerivativeQuestion::kPlaceImpulses) || is_asked(DerivativeQuestion::kVelocityImpulses))
-    return find_joint_impulses();
+  const bool wants_impulses =
+      data_.derivative_question[0] >= static_cast<std::uint32_t>(DerivativeQuestion::kPlaceImpulses);
+  wants_impulses ? find_joint_impulses() : find_wrenches();
+  nested_ns_ += lap_between(begin, lap_ns());
+}
+
+void Environment::find_wrenches() {
   if (!wrench_is_constant_) {
     ask_forces(data_.derivative_position, data_.derivative_orientation, data_.derivative_linear_velocity,
                data_.derivative_angular_velocity);

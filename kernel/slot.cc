@@ -199,7 +199,8 @@ void StageSlot::recover(StageFault fault, const StageCall& call, Attempts* attem
   log_->back().recovered_by = recovery.how;
   if (poison) observer_->on_poison(call, plugin, fault);
   if (!recovery.plugins_changed) return;
-  if (recovery.how == "rollback") close_all_probations(&host, SwapState::kRolledBack, fault.text());
+  if (recovery.how == "rollback")
+    close_all_probations(&host, SwapState::kRolledBack, "in step " + std::to_string(step_) + ": " + fault.text());
   let_all_adopt(host, recovery.how);
 }
 

@@ -138,6 +138,7 @@ class StageSlot {
   struct Checker {
     std::unique_ptr<Carrier> process;
     bool is_lacking = false;  // it could not be started, which takes its time
+    std::uint32_t asked = 0;  // calls
   };
   struct Rerun {
     std::uint32_t every = 0;

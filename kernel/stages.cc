@@ -10,17 +10,18 @@
 namespace gravitas::kernel {
 void Environment::book_call(Stage stage, StageSlot* slot, std::uint64_t start, const CallTimes& times) {
   const std::uint64_t end = lap_ns();
-  // what failed before it is no measure of how long a call takes
+  // what failed before it is no measure of how long a call takes, nor what others took in derivatives
   const std::uint64_t total = lap_between(times.begin != 0 ? times.begin : start, end);
+  const std::uint64_t own = total - (stage == Stage::kIntegrate ? std::min(total, std::exchange(nested_ns_, 0)) : 0);
   check_begin_ns_ = end - times.check;
   profile_[static_cast<std::size_t>(stage)].add(lap_between(start, end));
   if (slot->description().hosting == Hosting::kDirect &&
-      static_cast<double>(total) > 1e9 * slot->description().deadline) {
+      static_cast<double>(own) > 1e9 * slot->description().deadline) {
     std::uint64_t& longest = overrun_ns_[static_cast<std::size_t>(stage)];
-    longest = std::max(longest, total);
+    longest = std::max(longest, own);
   }
   if (times.compute > 0) transport_[static_cast<std::size_t>(stage)].add(total - std::min(total, times.compute));
-  slot->note_duration(total);
+  slot->note_duration(own);
 }
 
 void Environment::book_check(Stage stage) {

@@ -32,7 +32,7 @@ enum class SwapState : std::uint32_t { kPreparing, kShadow, kProbation, kCommitt
 struct SwapRecord {
   Slot slot;
   std::uint32_t step;    // first step that the new host makes
-  std::string from, to;  // plugins, with the hosting where that changes
+  std::string from, to;  // plugins, with library and hosting where these change
   bool only_compared = false;
   // Of a comparison: the step from which on `from` answers; 0: since it began. What was counted beside others before is a
   // record of its own.

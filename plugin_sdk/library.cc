@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "plugin_sdk/channel/digest.h"
+#include "plugin_sdk/exit_guard.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/printable.h"
 
@@ -199,6 +200,7 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     return known->second;
   }
   const std::uint32_t control = floating_point_control();
+  const ExitGuard guard(path.c_str());
   // the descriptor stays open: debuggers and sanitizers read symbols through this name, which for a debugger must not be one of its
   // own files (`self`), where it may wait for ever
   void* handle = load("/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(copy), path, problem);
@@ -206,6 +208,7 @@ PluginLibrary load_plugin_library(const std::string& path, std::string* problem)
     close(copy);
     return {};
   }
+  ExitGuard::listen_first();
   PluginLibrary library = checked(handle, control, path, problem);
   if (library.table != nullptr && content != 0) loaded.emplace(content, library);
   return library;
@@ -218,6 +221,7 @@ std::string error_text(const gravitas_error& error) {
 std::string create_instance(const PluginLibrary& library, std::span<const double> settings, void** instance) {
   const std::uint32_t control = floating_point_control();
   gravitas_error error{};
+  const ExitGuard guard(library.declaration.name.c_str());
   const std::int32_t status = library.table->create(settings.data(), settings.size(), instance, &error);
   const bool is_changed = restore_floating_point_control(control);
   if (status != GRAVITAS_OK) return error.text[0] == '\0' ? "it failed without a reason" : error_text(error);
@@ -226,7 +230,15 @@ std::string create_instance(const PluginLibrary& library, std::span<const double
   return "its constructor changed the floating-point environment";
 }
 
+std::int32_t call_instance(const PluginLibrary& library, void* instance, std::uint32_t method,
+                           const gravitas_column* request, gravitas_reply_column* reply, const gravitas_host* host,
+                           gravitas_error* error) {
+  const ExitGuard guard(library.declaration.name.c_str());
+  return library.table->call(instance, method, request, reply, host, error);
+}
+
 void destroy_instance(const PluginLibrary& library, void* instance) {
+  const ExitGuard guard(library.declaration.name.c_str());
   const std::uint32_t control = floating_point_control();
   library.table->destroy(instance);
   restore_floating_point_control(control);

@@ -1,6 +1,7 @@
 // Loading a plugin library.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -31,6 +32,10 @@ PluginLibrary look_into_plugin_library(const std::string& path, std::string* pro
 // failed, or its constructor changed the floating-point environment (which is restored), on which all later calls in this
 // thread would depend.
 std::string create_instance(const PluginLibrary& library, std::span<const double> settings, void** instance);
+// Asks it, in this process: a program that guards its end (exit_guard.h) is told who is asked.
+std::int32_t call_instance(const PluginLibrary& library, void* instance, std::uint32_t method,
+                           const gravitas_column* request, gravitas_reply_column* reply, const gravitas_host* host,
+                           gravitas_error* error);
 // Leaves the floating-point environment as it is, whatever the destructor does.
 void destroy_instance(const PluginLibrary& library, void* instance);
 

@@ -86,8 +86,8 @@ CallResult DirectCarrier::call(const StageCall& call, Arena* arena, DerivativeSo
   CallResult result;
   const std::uint64_t generation = arena->generation();
   arena->hold();
-  result.status = libraries_[call.target].table->call(instances_[call.target], static_cast<std::uint32_t>(call.method),
-                                                      request.data(), reply.data(), &host, &error);
+  result.status = call_instance(libraries_[call.target], instances_[call.target],
+                                static_cast<std::uint32_t>(call.method), request.data(), reply.data(), &host, &error);
   for (std::size_t i = 0; i < call.reply.size() && arena->generation() != generation; ++i)
     std::memcpy(arena->data(call.reply[i]), reply[i].data,
                 std::min(reply[i].count, reply[i].capacity) * stage::element_size(call.info().reply[i].type));

@@ -183,6 +183,10 @@ bool Catalog::is_of_folder(const InstalledPlugin* plugin) const {
                      [&](const InstalledPlugin& one) { return &one == plugin; });
 }
 
+bool Catalog::knows_library(const std::string& library) const {
+  return std::ranges::find(plugins_, library, &InstalledPlugin::library) != plugins_.end();
+}
+
 const InstalledPlugin* Catalog::find(const std::string& name) const {
   for (auto plugin = plugins_.rbegin(); plugin != plugins_.rend(); ++plugin)
     if (plugin->declaration.name == name) return &*plugin;

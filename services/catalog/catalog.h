@@ -53,6 +53,7 @@ class Catalog {
   std::vector<const InstalledPlugin*> installed_as(Slot slot, const std::string& name) const;
   // Whether it is one of the folder, and was not added.
   bool is_of_folder(const InstalledPlugin* plugin) const;
+  bool knows_library(const std::string& library) const;
   // The plugin of that name in any slot, or null.
   const InstalledPlugin* find(const std::string& name) const;
 

@@ -116,6 +116,7 @@ void CarrierSubject::start() {
   if (carrier_) return;
   const kernel::SlotDescription slot = examinee_.slot(hosting_, patience_.deadline);
   carrier_ = kernel::start_host(slot, threads_, {});
+  calls_ = 0;
   if (hosting_ == kernel::Hosting::kDirect) return;
   const std::lock_guard lock(mutex_);
   pidfd_ = static_cast<int>(syscall(SYS_pidfd_open, carrier_->process_id(), 0));
@@ -196,6 +197,7 @@ Answer CarrierSubject::call(stage::Method method, const MessageColumns& request,
   const auto index = static_cast<std::size_t>(method);
   const stage::MethodInfo& info = stage::method_info(method);
   start();
+  ++calls_;
   put(request_columns_[index], request, info.request);
   const kernel::StageCall stage_call{method, 0, request_columns_[index], reply_columns_[index]};
   Answer answer{.status = GRAVITAS_OK, .text = {}, .fault = {}, .columns = MessageColumns(info.reply)};

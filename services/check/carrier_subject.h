@@ -54,6 +54,8 @@ class CarrierSubject final : public conformance::Subject {
   // How often there was no answer, and why the last time.
   std::uint32_t faults() const { return faults_; }
   const std::string& last_fault() const { return last_fault_; }
+  // Of the process at work, how often it was asked.
+  std::uint64_t calls() const { return carrier_ ? calls_ : 0; }
   // The last question was not answered, as its time was up.
   bool was_late() const { return was_late_; }
   // The last call in words; empty before the first.
@@ -80,6 +82,7 @@ class CarrierSubject final : public conformance::Subject {
   std::array<std::vector<kernel::ColumnId>, stage::kMethodCount> request_columns_, reply_columns_;
   std::unique_ptr<kernel::Carrier> carrier_;
   int pidfd_ = -1;
+  std::uint64_t calls_ = 0;
 
   std::uint32_t faults_ = 0;
   std::string last_fault_;

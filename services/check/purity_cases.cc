@@ -1,8 +1,9 @@
-// C2: the same request gets the same bytes: twice, after others, in a fresh process, on another carrier, hosted direct, with
-// other numbers of threads.
+// C2: the same request gets the same bytes: hundreds of times, twice, after others, in a fresh process, on another carrier,
+// hosted direct, with other numbers of threads.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <numeric>
 
 #include "services/check/answer_text.h"
@@ -52,6 +53,28 @@ std::vector<std::size_t> backward(Examination& examination) {
 
 std::string judge_answered(Examination& examination) {
   examination.answers();
+  return {};
+}
+
+// Else what depends on how often a process was asked shows in whatever case comes by then, and not in that case alone.
+std::string judge_many(Examination& examination) {
+  constexpr std::uint32_t kCalls = 500;
+  const auto budget = std::chrono::milliseconds(examination.options.quick ? 200 : 5000);
+  const std::unique_ptr<CarrierSubject> subject = examination.fresh(examination.usual_hosting());
+  const Question& question = *examination.one_of_each_method().front();
+  const Answer first = subject->ask(question);
+  // that it is answered at all is another case's
+  if (!first.ok()) return {};
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::uint32_t call = 2; call <= kCalls && std::chrono::steady_clock::now() - begin < budget; ++call) {
+    const Answer came = subject->ask(question);
+    const std::string differs = difference(question.method, first, came);
+    if (differs.empty()) continue;
+    examination.blamed_call = call_text(question.method, question.request);
+    if (subject->was_late()) ++examination.late_answers;
+    return fmt::format("{}'{}' in call {} of one process: {}", subject->was_late() ? "too slow to be judged: " : "",
+                       question.name, call, differs);
+  }
   return {};
 }
 
@@ -106,6 +129,7 @@ std::string judge_threads(Examination& examination) {
 std::vector<CheckCase> purity_cases() {
   return {
       {Level::kPurity, "purity/answered", "Ordinary questions are answered.", judge_answered},
+      {Level::kPurity, "purity/many-calls", "How often it was asked does not matter.", judge_many},
       {Level::kPurity, "purity/twice", "The same question gets the same bytes.", judge_twice},
       {Level::kPurity, "purity/after-others", "What was asked before does not matter.", judge_after_others},
       {Level::kPurity, "purity/fresh-process", "Which process answers does not matter.", judge_fresh},

@@ -63,7 +63,7 @@ void add_check(CLI::App* app, Action* action) {
   CLI::App* command = app->add_subcommand("check", "Judge a plugin by the contract that every plugin keeps");
   command->footer(
       "Levels: C0 handshake, C1 wire, C2 purity, C3 state, C4 limits, C5 numbers. Exit code 0: it conforms, 4: it does "
-      "not, 2: it is no plugin.\n"
+      "not, or that is not decided, 2: it is no plugin.\n"
       "Example: gravitas check build/release/lib/gravitas/hello.so --quick\n"
       "         gravitas check 'python3 my_worker.py'");
   command

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin_sdk/exit_guard.h"
 #include "plugin_sdk/floating_point.h"
 #include "plugin_sdk/near_miss.h"
 #include "services/cli/commands.h"
@@ -84,6 +85,7 @@ std::string option_without_value(const std::vector<std::string>& words) {
 
 int main(int argc, char** argv) {
   using namespace gravitas;
+  const ExitGuard guard(nullptr);
   for (const std::string& missing : {missing_cpu_features(), too_small_stack(argv)}) {
     if (missing.empty()) continue;
     std::cerr << "gravitas: " << missing << '\n';

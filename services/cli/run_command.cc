@@ -160,6 +160,7 @@ void add_run(CLI::App* app, Action* action) {
   command->add_option("--resume", options.resume,
                       "Go on from this checkpoint; --steps and --duration count from t = 0. Files of output hold what "
                       "follows it");
+  add_despite_journal(command, &options);
   add_list(command, "--swap", &options.swaps,
            "Exchange a plugin while the simulation runs: SLOT=PLUGIN@step=N[,hosting=MODE], before step N (from 1, so "
            "at (N - 1) TimeStep); repeatable");

@@ -59,6 +59,15 @@ void add_list(CLI::App* command, const char* name, std::vector<std::string>* val
   command->add_option(name, *values, text)->take_all()->allow_extra_args(false);
 }
 
+void add_despite_journal(CLI::App* command, RunOptions* options) {
+  command
+      ->add_flag(
+          "--despite-journal", options->despite_journal,
+          "Go on from a checkpoint whose journal is missing or damaged, with what can be read of it: edits, swaps "
+          "and steps that it alone knew are lost")
+      ->needs(command->get_option("--resume"));
+}
+
 void add_comparisons(CLI::App* command, std::vector<std::string>* values) {
   add_list(command, "--compare", values,
            "Ask a second plugin the same in every step and report how the answers differ: SLOT=PLUGIN; repeatable");

@@ -30,6 +30,9 @@ class SceneOptions {
 // An option that may be repeated, with one value each time.
 void add_list(CLI::App* command, const char* name, std::vector<std::string>* values, const char* text);
 
+// --despite-journal, after --resume.
+void add_despite_journal(CLI::App* command, RunOptions* options);
+
 // --compare.
 void add_comparisons(CLI::App* command, std::vector<std::string>* values);
 

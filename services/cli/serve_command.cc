@@ -130,6 +130,7 @@ void add_serve(CLI::App* app, Action* action) {
                       "Go on from this checkpoint and the journal beside it, of a server or a run; --steps and "
                       "--duration count from t = 0, and a reset begins the scene; a library that was swapped in by "
                       "its path must be installed, or named by the scene");
+  add_despite_journal(command, &line->options.run);
   add_comparisons(command, &line->options.run.comparisons);
   command->add_option("--socket", line->socket,
                       "Listen at this path instead of a private folder in $XDG_RUNTIME_DIR or /tmp");

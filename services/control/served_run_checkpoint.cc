@@ -18,7 +18,7 @@ namespace gravitas::control {
 // With the steps, edits and swaps that the journal beside the checkpoint knows, made again.
 Resumption ServedRun::last_known(const RunOptions& options, const kernel::EnvironmentDescription& description,
                                  std::vector<std::string>* warnings) {
-  Resumption found = read_resumption(options.resume, description, warnings);
+  Resumption found = read_resumption(options, description, warnings);
   std::uint32_t last = found.journal.last_step;
   for (const edit::v1::Edit& one : found.journal.edits) last = std::max(last, one.step());
   // the checkpoint has those for a step that was not made
@@ -48,7 +48,8 @@ Resumption ServedRun::last_known(const RunOptions& options, const kernel::Enviro
                     "--resume` pauses there",
                     options.resume, found.checkpoint.step() + 1, last, result.fault));
   std::vector<std::string> known;  // was told above
-  Resumption caught_up = read_resumption(again.checkpoint, description, &known);
+  again.resume = again.checkpoint;
+  Resumption caught_up = read_resumption(again, description, &known);
   caught_up.journal = std::move(found.journal);
   return caught_up;
 }
@@ -92,7 +93,7 @@ std::optional<ServedRun::Saved> ServedRun::save_checkpoint() {
   return between_steps([this]() -> std::optional<Saved> {
     if (!recorder_->keeps()) return {};
     // also over one of this step: who answers, and whom to wake, may have changed since
-    recorder_->save(*environment_);
+    recorder_->save_last(*environment_);
     checkpoint_ = recorder_->path();
     resume_command_ = command_to_resume();
     return Saved{recorder_->saved_step().value(), resume_command_};
@@ -133,6 +134,15 @@ std::string ServedRun::command_to_resume() {
   if (recorder_->has_listened()) return {};
   RunOptions options = options_;
   for (std::string& scene : options.scenes) scene = std::filesystem::absolute(scene);
+  // libraries that took over, which a checkpoint alone lets nobody load
+  const auto name_library = [&](const recorder::v1::Decision& one) {
+    if (one.library().empty() || catalog_.knows_library(one.library())) return;
+    options.swaps.push_back(fmt::format("{}={}@step={}", one.slot(), one.library(), one.step()));
+  };
+  for (const recorder::v1::Decision& one : recorder_->decisions()) {
+    if (one.has_before()) name_library(one.before());
+    name_library(one);
+  }
   // what was ordered for later, and what is compared still
   options.comparisons.clear();
   for (const Order& one : pending_orders()) {

@@ -100,8 +100,9 @@ std::string status_page(const api::Status& status) {
   heading("faults", status.fault_count());
   for (int i = std::max(0, status.faults_size() - kMostListed); i < status.faults_size(); ++i) {
     const report::v1::FaultRecord& fault = status.faults(i);
-    text += fmt::format("  step {}, {} {}: {}; {}, {}\n", fault.step(), fault.slot(), fault.plugin(), fault.kind(),
-                        fault.recovered_by(), duration_text(fault.recovery_us()));
+    text += fmt::format("  step {}, {} {}: {}{}; {}, {}\n", fault.step(), fault.slot(), fault.plugin(), fault.kind(),
+                        fault.text().empty() ? "" : " (" + fault.text() + ")", fault.recovered_by(),
+                        duration_text(fault.recovery_us()));
   }
   if (status.warning_count() > 0)
     text += fmt::format("warnings: {}, the last: {}\n", status.warning_count(), status.last_warning());

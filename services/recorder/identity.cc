@@ -102,6 +102,13 @@ recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& d) {
   for (const Slot slot : kSlots)
     add_part(fmt::format("the plugin of slot {} or its settings", slot_name(slot)), digest_plugins(d.slot(slot)),
              &identity);
+  for (const Slot slot : kSlots)
+    for (const kernel::PluginChoice& plugin : d.slot(slot).plugins) {
+      if (plugin.library.empty()) continue;
+      recorder::v1::Library* library = identity.add_libraries();
+      library->set_plugin(plugin.declaration.name);
+      library->set_path(plugin.library);
+    }
   return identity;
 }
 

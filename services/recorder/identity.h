@@ -10,6 +10,7 @@
 
 namespace gravitas {
 
+// Libraries are named, without their digests, which a recorder takes.
 recorder::v1::Identity identity_of(const kernel::EnvironmentDescription& description);
 
 // The parts in which a record differs from the scene, with both time steps if these do; empty if it is the same.

@@ -61,6 +61,44 @@ JournalHeader header_of(const Hash& run) {
   return header;
 }
 
+// Size of the record with which `bytes` begin, by what it says itself; 0: no whole one can be there.
+std::size_t size_of_record(std::span<const std::byte> bytes) {
+  RecordHead head;
+  if (bytes.size() < sizeof head) return 0;
+  std::memcpy(&head, bytes.data(), sizeof head);
+  const std::size_t whole = sizeof head + std::size_t{head.size} + kCheckSize;
+  const bool is_possible = head.zero == RecordHead{}.zero && head.size <= kLargestPayload && bytes.size() >= whole;
+  return is_possible ? whole : 0;
+}
+
+std::uint64_t check_of(std::span<const std::byte> record, std::uint64_t before) {
+  return XXH3_64bits_withSeed(record.data(), record.size() - kCheckSize, before);
+}
+
+std::uint64_t check_at(std::span<const std::byte> bytes, std::size_t place) {
+  std::uint64_t check = 0;
+  std::memcpy(&check, &bytes[place], kCheckSize);
+  return check;
+}
+
+bool begins_with_record(std::span<const std::byte> bytes, std::uint64_t before) {
+  const std::size_t whole = size_of_record(bytes);
+  return whole > 0 && check_at(bytes, whole - kCheckSize) == check_of(bytes.first(whole), before);
+}
+
+// Whether a whole record follows the bad one with which `bytes` begin. The check that seeds its own stands before it, or
+// is to be worked out where that is the bad one.
+bool has_whole_record_behind(std::span<const std::byte> bytes, std::uint64_t before) {
+  if (const std::size_t bad = size_of_record(bytes); bad > 0)
+    if (begins_with_record(bytes.subspan(bad), check_of(bytes.first(bad), before))) return true;
+  for (std::size_t place = kCheckSize; place < bytes.size(); ++place) {
+    const auto kind = std::to_integer<std::uint8_t>(bytes[place]);
+    if (kind < kCommit || kind > kEdit) continue;
+    if (begins_with_record(bytes.subspan(place), check_at(bytes, place - kCheckSize))) return true;
+  }
+  return false;
+}
+
 // False if the content is impossible.
 bool take_record(std::uint8_t kind, std::span<const std::byte> payload, std::uint32_t after, JournalReading* reading) {
   if (kind == kDecision) {
@@ -112,20 +150,18 @@ JournalReading read_journal(std::span<const std::byte> bytes, const Hash& run, s
   reading.check = header.check;
   for (;;) {
     const std::span<const std::byte> rest = bytes.subspan(reading.end);
-    RecordHead head;
-    if (rest.size() < sizeof head) break;
-    std::memcpy(&head, rest.data(), sizeof head);
-    const std::size_t whole = sizeof head + std::size_t{head.size} + kCheckSize;
-    if (head.zero != RecordHead{}.zero || head.size > kLargestPayload || rest.size() < whole) break;
-    std::uint64_t check = 0;
-    std::memcpy(&check, &rest[whole - kCheckSize], kCheckSize);
-    if (check != XXH3_64bits_withSeed(rest.data(), whole - kCheckSize, reading.check)) break;
-    if (!take_record(head.kind, rest.subspan(sizeof head, head.size), after, &reading)) break;
+    if (!begins_with_record(rest, reading.check)) break;
+    const std::size_t whole = size_of_record(rest);
+    const auto payload = rest.first(whole - kCheckSize).subspan(sizeof(RecordHead));
+    if (!take_record(std::to_integer<std::uint8_t>(rest[0]), payload, after, &reading)) break;
     reading.end += whole;
-    reading.check = check;
+    reading.check = check_at(rest, whole - kCheckSize);
   }
-  if (reading.end < bytes.size())
-    reading.note = fmt::format("its last {} bytes are no whole record", bytes.size() - reading.end);
+  if (reading.end == bytes.size()) return reading;
+  reading.is_damaged = has_whole_record_behind(bytes.subspan(reading.end), reading.check);
+  reading.note = reading.is_damaged
+                     ? fmt::format("the record at byte {} is damaged, and whole ones stand behind it", reading.end)
+                     : fmt::format("its last {} bytes are no whole record", bytes.size() - reading.end);
   return reading;
 }
 

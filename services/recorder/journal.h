@@ -9,8 +9,9 @@
 //
 // A check is XXH3-64 of the record, seeded with the check before it, so that records can neither be changed nor
 // exchanged. `run` is the digest of the scene's identity and the build. A record that is not whole (a crash tears the
-// last one) ends the journal. Decisions and edits change what the next commit is made of, and are written before it;
-// commits may be buffered, since the journal only vouches for them.
+// last one) ends the journal; where whole ones stand behind it the file is damaged, which no crash does. Decisions and
+// edits change what the next commit is made of, and are written before it; commits may be buffered, since the journal
+// only vouches for them.
 #pragma once
 
 #include <chrono>
@@ -39,6 +40,7 @@ struct JournalReading {
   std::uint64_t check = 0;                        // of that record
   std::uint32_t last_step = 0;                    // of all commits
   std::string note;                               // what was left aside and why; empty: nothing
+  bool is_damaged = false;                        // what was left aside is more than a torn end
 };
 
 // The same changes before the same step, wherever bodies were.

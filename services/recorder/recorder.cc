@@ -10,6 +10,7 @@
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/identity.h"
+#include "services/recorder/library_digest.h"
 
 namespace gravitas {
 namespace {
@@ -25,7 +26,11 @@ bool ends_in_a_shortened_step(const kernel::Environment& environment) {
 std::string journal_of(const std::string& checkpoint) { return checkpoint + ".journal"; }
 
 Recorder::Recorder(recorder::v1::Identity identity, std::function<recorder::v1::Tally()> tally)
-    : identity_(std::move(identity)), tally_(std::move(tally)) {}
+    : identity_(std::move(identity)), tally_(std::move(tally)) {
+  // here, as a run that keeps nothing need not read them
+  for (recorder::v1::Library& library : *identity_.mutable_libraries())
+    library.set_digest(library_digest(library.path()));
+}
 
 void Recorder::expect(const std::string& journal, std::vector<JournalEntry> commits) {
   expected_journal_ = journal;
@@ -79,16 +84,21 @@ std::string Recorder::warning() const {
       journal_of(path_));
 }
 
-void Recorder::save(const kernel::Environment& environment) {
+void Recorder::save(const kernel::Environment& environment, bool goes_on) {
   journal_->flush();
   if (ends_in_a_shortened_step(environment)) return;
-  save_to(path_, environment);
+  write(path_, environment, goes_on);
   saved_step_ = environment.step_count();
 }
 
 void Recorder::save_to(const std::string& path, const kernel::Environment& environment) const {
+  write(path, environment, false);
+}
+
+void Recorder::write(const std::string& path, const kernel::Environment& environment, bool goes_on) const {
   recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
   checkpoint.set_listener_decided(listener_decided_);
+  checkpoint.set_goes_on_in_journal(goes_on);
   for (const edit::v1::Edit& edit : edits_) *checkpoint.add_edits() = edit;
   try {
     replace_file(path, serialize_checkpoint(checkpoint));

@@ -63,7 +63,9 @@ class Recorder final : public kernel::CommitListener {
     return keeps() && every_ != 0 && environment.step_count() % every_ == 0 && saved_step_ != environment.step_count();
   }
   // Brings file and journal to the committed state. Throws std::system_error.
-  void save(const kernel::Environment& environment);
+  void save(const kernel::Environment& environment) { save(environment, true); }
+  // The same where the run ends: nothing follows in the journal.
+  void save_last(const kernel::Environment& environment) { save(environment, false); }
 
   // Writes the committed state to a file of its own.
   void save_to(const std::string& path, const kernel::Environment& environment) const;
@@ -77,6 +79,8 @@ class Recorder final : public kernel::CommitListener {
 
  private:
   void check(const JournalEntry& commit);
+  void save(const kernel::Environment& environment, bool goes_on);
+  void write(const std::string& path, const kernel::Environment& environment, bool goes_on) const;
 
   recorder::v1::Identity identity_;
   std::function<recorder::v1::Tally()> tally_;

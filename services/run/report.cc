@@ -137,6 +137,7 @@ void write_comparison(const Comparison& from, const kernel::Environment& environ
 }
 
 std::string comparison_text(const report::v1::Comparison& comparison, const std::string& from, const std::string& to) {
+  if (comparison.calls() == 0) return "no answer was compared";
   return fmt::format("{} of {} answers differ; {} {:.3g} us, {} {:.3g} us a call", comparison.differing_calls(),
                      comparison.calls(), from, comparison.from_us(), to, comparison.to_us());
 }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
@@ -10,6 +12,7 @@
 #include "services/recorder/decision.h"
 #include "services/recorder/durable_file.h"
 #include "services/recorder/identity.h"
+#include "services/recorder/library_digest.h"
 #include "services/recorder/recorder.h"
 #include "services/run/session.h"
 
@@ -26,24 +29,57 @@ std::vector<std::byte> read_or_refuse(const std::string& path) {
   }
 }
 
-JournalReading read_journal_beside(const std::string& path, const Hash& run, std::uint32_t step,
-                                   std::vector<std::string>* warnings) {
+JournalReading read_journal_beside(const std::string& path, const Hash& run, const recorder::v1::Checkpoint& checkpoint,
+                                   bool despite_loss, std::vector<std::string>* warnings) {
   const std::string journal = journal_of(path);
-  if (!fs::exists(journal)) return {};
   JournalReading reading;
   try {
-    reading = read_journal(read_whole_file(journal), run, step);
+    if (fs::exists(journal)) {
+      reading = read_journal(read_whole_file(journal), run, checkpoint.step());
+    } else if (checkpoint.goes_on_in_journal()) {
+      reading.note = "it is missing, and the run went on after the checkpoint";
+    }
   } catch (const std::runtime_error& problem) {
     reading.note = problem.what();
   }
-  if (!reading.note.empty()) warnings->push_back(fmt::format("journal '{}': {}; left aside", journal, reading.note));
+  if (reading.note.empty()) return reading;
+  // without a whole header nothing of it can be had
+  const bool is_lost = reading.is_damaged || (reading.end == 0 && checkpoint.goes_on_in_journal());
+  if (is_lost && !despite_loss) {
+    const std::uint32_t last = std::max(reading.last_step, checkpoint.step());
+    throw BadInput(
+        fmt::format("checkpoint '{}': journal '{}': {}; what edits, swaps and steps it knew after step {} is lost. To "
+                    "go on all the "
+                    "same, perhaps along another trajectory: --despite-journal",
+                    path, journal, reading.note, last));
+  }
+  warnings->push_back(fmt::format("journal '{}': {}; left aside", journal, reading.note));
   return reading;
+}
+
+// A library that was built anew has its name still, and may have its version.
+void warn_of_other_builds(const Resumption& resumed, std::vector<std::string>* warnings) {
+  const auto look_at = [&](const std::string& plugin, const std::string& library, std::uint64_t digest) {
+    const std::uint64_t now = library_digest(library);
+    if (digest == 0 || now == digest) return;
+    const std::string line =
+        fmt::format("plugin {}: '{}' {} since the checkpoint was made, so the run may not go on as it was", plugin,
+                    library, now == 0 ? "cannot be read any more" : "was built anew");
+    if (std::ranges::find(*warnings, line) == warnings->end()) warnings->push_back(line);
+  };
+  for (const recorder::v1::Library& one : resumed.checkpoint.identity().libraries())
+    look_at(one.plugin(), one.path(), one.digest());
+  for (const recorder::v1::Decision& one : resumed.checkpoint.decisions())
+    look_at(one.plugin(), one.library(), one.digest());
+  for (const recorder::v1::Decision& one : resumed.journal.decisions)
+    look_at(one.plugin(), one.library(), one.digest());
 }
 
 }  // namespace
 
-Resumption read_resumption(const std::string& path, const kernel::EnvironmentDescription& description,
+Resumption read_resumption(const RunOptions& options, const kernel::EnvironmentDescription& description,
                            std::vector<std::string>* warnings) {
+  const std::string& path = options.resume;
   const auto refuse = [&](const std::string& why) { throw BadInput(fmt::format("checkpoint '{}': {}", path, why)); };
   const std::vector<std::byte> bytes = read_or_refuse(path);
   std::string problem;
@@ -57,13 +93,16 @@ Resumption read_resumption(const std::string& path, const kernel::EnvironmentDes
         fmt::format("it is the state after step {}, beyond the end of this run at step {}; --steps and --duration "
                     "count from t = 0",
                     checkpoint->step(), description.steps));
-  JournalReading journal = read_journal_beside(checkpoint_target(path), digest_of(scene), checkpoint->step(), warnings);
+  JournalReading journal =
+      read_journal_beside(checkpoint_target(path), digest_of(scene), *checkpoint, options.despite_journal, warnings);
   // the checkpoint has those before a step that was not made
   for (const edit::v1::Edit& made : checkpoint->edits()) {
     const auto known = std::ranges::find_if(journal.edits, [&](const auto& one) { return is_same_edit(made, one); });
     if (known != journal.edits.end()) journal.edits.erase(known);
   }
-  return {std::move(*checkpoint), std::move(journal)};
+  Resumption resumed{std::move(*checkpoint), std::move(journal)};
+  warn_of_other_builds(resumed, warnings);
+  return resumed;
 }
 
 Answering answering_at(const recorder::v1::Checkpoint& checkpoint, const kernel::EnvironmentDescription& description,

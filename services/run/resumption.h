@@ -18,9 +18,10 @@ struct Resumption {
   JournalReading journal;  // of what came after the checkpoint
 };
 
-// Throws BadInput if the file cannot be read, is no checkpoint, is one of another build or scene, or lies beyond the
-// end of the run. A journal that is missing is none; one that cannot be used in full is a warning.
-Resumption read_resumption(const std::string& path, const kernel::EnvironmentDescription& description,
+// What options.resume names. Throws BadInput if the file cannot be read, is no checkpoint, is one of another build or scene,
+// or lies beyond the end of the run. A torn end of the journal is a warning. One that is damaged, or missing though the run
+// went on, loses edits, swaps and steps: BadInput, or with options.despite_journal a warning.
+Resumption read_resumption(const RunOptions& options, const kernel::EnvironmentDescription& description,
                            std::vector<std::string>* warnings);
 
 // Who answers where a run goes on, and who begins, so that swaps that were made are made again (recorder/decision.h).

@@ -73,7 +73,7 @@ class Run final : private kernel::CommitListener {
   // Starts the environment and brings it to the state where the run begins.
   void prepare() {
     std::optional<Resumption> resumed;
-    if (!options_.resume.empty()) resumed = read_resumption(options_.resume, description_, &warnings_);
+    if (!options_.resume.empty()) resumed = read_resumption(options_, description_, &warnings_);
     if (!options_.checkpoint.empty()) checkpoint_path_ = checkpoint_target(options_.checkpoint);
     read_edits(resumed ? &*resumed : nullptr);
     read_orders();
@@ -168,9 +168,8 @@ class Run final : private kernel::CommitListener {
       } catch (const BadInput& problem) {
         result_.fault += fmt::format("; no checkpoint: {}", problem.what());
       }
-      // in the step that pauses a run others may have taken over
-      const bool is_kept = recorder_ && recorder_->saved_step() == environment_->step_count();
-      if (keeps && (!is_kept || result_.outcome == RunOutcome::kPaused)) recorder_->save(*environment_);
+      // also over one of this step: in the step that pauses a run others may have taken over
+      if (keeps) recorder_->save_last(*environment_);
     });
     // after a failure the one before
     if (!keeps || !recorder_->saved_step()) return;

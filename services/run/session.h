@@ -45,6 +45,7 @@ struct RunOptions {
   std::string checkpoint;              // file that is kept up to date; none if empty
   std::uint32_t checkpoint_every = 0;  // steps, counted from t = 0; 0: at the start and the end alone
   std::string resume;                  // checkpoint to go on from
+  bool despite_journal = false;        // though its journal is missing or damaged
   std::uint32_t threads = 1;
   std::vector<std::string> faults, swaps, comparisons, reruns, edits;  // as on the command line
   kernel::HostStarter starter = kernel::start_host;

@@ -54,7 +54,21 @@ std::string exchanges(const report::v1::Report& report) {
     return !fault.ordered().empty() &&
            (fault.ordered() + ",").find(fmt::format("@step={},", fault.step())) == std::string::npos;
   };
+  // in a step that was given up
+  const auto is_open = [&](const report::v1::FaultRecord& fault) {
+    return report.outcome() == "interrupted" && fault.step() > report.steps();
+  };
+  // what a plugin says itself, and not what was done to its worker
+  const auto words = [&](const report::v1::FaultRecord& fault) {
+    const std::string order = is_late(fault) ? fault.ordered() : fault.ordered().empty() ? fault.text() : "";
+    return order.empty() ? order : " (" + order + ")";
+  };
   for (const report::v1::FaultRecord& fault : report.faults()) {
+    if (is_open(fault)) {
+      text += fmt::format("  interrupted: step {}, {} {}: {}{}; nobody had answered instead\n", fault.step(),
+                          fault.slot(), fault.plugin(), fault.kind(), words(fault));
+      continue;
+    }
     // nor what came before another in a step that ended the run
     if (std::ranges::any_of(report.faults(), [&](const report::v1::FaultRecord& other) {
           return is_lost(other) && other.step() == fault.step() && other.slot() == fault.slot();
@@ -62,8 +76,7 @@ std::string exchanges(const report::v1::Report& report) {
       continue;
     if (++survived <= static_cast<int>(kMostNamed))
       text += fmt::format("  survived: step {}, {} {}: {}{}; {} took over in {:.3g} ms\n", fault.step(), fault.slot(),
-                          fault.plugin(), fault.kind(), is_late(fault) ? " (" + fault.ordered() + ")" : "",
-                          fault.recovered_by(), 1e-3 * fault.recovery_us());
+                          fault.plugin(), fault.kind(), words(fault), fault.recovered_by(), 1e-3 * fault.recovery_us());
   }
   if (survived > static_cast<int>(kMostNamed))
     text += fmt::format("  survived: {} more faults\n", survived - static_cast<int>(kMostNamed));
@@ -78,18 +91,20 @@ std::string exchanges(const report::v1::Report& report) {
   for (int i = 0; i < edits; ++i) text += fmt::format("  {}\n", edit_line(report.edits(i)));
   if (report.edits_size() > edits) text += fmt::format("  {} more edits\n", report.edits_size() - edits);
   for (const report::v1::SwapRecord& one : report.comparisons())
-    text += fmt::format("  compared{}: {} {} with {}: {}\n",
+    text += fmt::format("  compared{}: {} {} with {}: {}{}\n",
                         one.step() > 1 ? fmt::format(" from step {} on", one.step()) : "", one.slot(), one.from(),
-                        one.to(), comparison_text(one.shadow(), one.from(), one.to()));
+                        one.to(), comparison_text(one.shadow(), one.from(), one.to()),
+                        one.reason().empty() ? "" : "; it ended: " + one.reason());
   return text;
 }
 
 }  // namespace
 
 std::string summarize(const report::v1::Report& report, const std::vector<EventLog::Meeting>& meetings) {
-  std::string text = fmt::format("{}: {:.6g} s in {} steps, {} bodies, {:.3f} s of wall time ({:.1f} us a step)\n",
-                                 report.scene(), report.simulated_seconds(), report.steps(), report.bodies(),
-                                 report.wall_seconds(), report.microseconds_per_step().median());
+  std::string text =
+      fmt::format("{}: {:.6g} s in {} steps, {} bodies, {:.3f} s of wall time (median {:.1f} us a step)\n",
+                  report.scene(), report.simulated_seconds(), report.steps(), report.bodies(), report.wall_seconds(),
+                  report.microseconds_per_step().median());
   const std::string happened = story(report, meetings);
   if (!happened.empty()) text += "  " + happened + "\n";
   const auto energy = [](double number) {

@@ -185,5 +185,23 @@ TEST(CheckOfOneCase, ThatIsNamedIsJudgedAlone) {
   EXPECT_EQ(report.badge(), "no finding in what was asked for: C2");
 }
 
+// What depends on how often a process was asked is blamed on that, and not on the case in which it showed.
+TEST(Check, ManyCallsAreACaseOfTheirOwn) {
+  for (const char* name : {"counts_calls", "force_tires"}) {
+    const auto report = check_library(kFaulty + "/" + name + ".so", {.quick = true, .level = {}, .only_case = {}});
+    ASSERT_GT(report.findings_size(), 0) << name;
+    EXPECT_EQ(report.findings(0).case_(), "purity/many-calls") << report.DebugString();
+    const auto again = check_library(kFaulty + "/" + name + ".so", {.level = {}, .only_case = "purity/many-calls"});
+    EXPECT_EQ(again.findings_size(), 1) << name;
+  }
+  const auto numbers = check_library(kFaulty + "/force_tires.so", {.level = "C5", .only_case = {}});
+  ASSERT_GT(numbers.findings_size(), 0);
+  EXPECT_THAT(numbers.findings(0).text(), ::testing::HasSubstr("calls in one process: alone this case passes"));
+  // and that is so
+  const auto alone =
+      check_library(kFaulty + "/force_tires.so", {.level = {}, .only_case = numbers.findings(0).case_()});
+  EXPECT_TRUE(alone.conforms()) << alone.DebugString();
+}
+
 }  // namespace
 }  // namespace gravitas::check

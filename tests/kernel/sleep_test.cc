@@ -510,5 +510,27 @@ TEST(Sleep, StopsNoMotion) {
   for (const std::uint32_t body : {1U, 2U, 3U}) EXPECT_FALSE(world.is_asleep(body)) << body;
 }
 
+// All spaces give the same pairs, so who rests is not disturbed by another one; other plugins answer otherwise.
+TEST(Sleep, AnotherSpaceWakesNobodyAndAnotherSolverAll) {
+  const auto other = [](Slot slot, const std::string& library) {
+    WorldBuilder builder;
+    builder.plugin(slot, plugin_path(library));
+    return builder.description().slot(slot).plugins[0];
+  };
+  Environment quiet(boxes_and_ball().description()), world(boxes_and_ball().description());
+  run(&quiet, 200);
+  world.order_swap({Slot::kSpace, other(Slot::kSpace, "space_kd_tree"), std::nullopt, kAsleepBy + 1});
+  run(&world, kAsleepBy + 1);
+  EXPECT_EQ(world.swaps()[0].to, "KDTree");
+  for (const std::uint32_t body : {1U, 2U, 3U}) EXPECT_TRUE(world.is_asleep(body));
+  run(&world, 200 - kAsleepBy - 1);
+  EXPECT_EQ(world.chain_hash(), quiet.chain_hash());
+
+  Environment woken(boxes_and_ball().description());
+  woken.order_swap({Slot::kIntegrator, other(Slot::kIntegrator, "integrator_verlet"), std::nullopt, kAsleepBy + 1});
+  run(&woken, kAsleepBy + 1);
+  for (const std::uint32_t body : {1U, 2U, 3U}) EXPECT_FALSE(woken.is_asleep(body));
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -257,5 +257,16 @@ TEST_P(Supervised, WorkersKilledBetweenStepsAreReplaced) {
   EXPECT_EQ(world.faults().size(), 3 * std::size(kSlots));
 }
 
+// A force that takes its time while an integrator asks for derivatives is slow itself, and nobody else.
+TEST_P(Supervised, WhoIsSlowInADerivativeIsNamed) {
+  Environment world(builder().description());
+  world.inject({Slot::kForce, "slow,seconds=0.1", 15});
+  run_to_end(&world);
+  EXPECT_EQ(world.chain_hash(), quiet_chain());
+  const std::vector<std::string> warnings = world.warnings();
+  EXPECT_THAT(warnings, ::testing::Contains(HasSubstr("worker of slot force: it was slow")));
+  for (const std::string& one : warnings) EXPECT_THAT(one, ::testing::Not(HasSubstr("slot integrator: it was slow")));
+}
+
 }  // namespace
 }  // namespace gravitas

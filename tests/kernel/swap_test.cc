@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <utility>
@@ -27,8 +28,10 @@ using kernel::StepOutcome;
 using kernel::SwapOrder;
 using kernel::SwapRecord;
 using kernel::SwapState;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 constexpr std::uint32_t kSwapSteps = 40;
 
@@ -148,6 +151,7 @@ TEST_P(Swapped, APluginThatFailsOnProbationIsRolledBack) {
   ASSERT_EQ(world.swaps().size(), 1U);
   EXPECT_EQ(world.swaps()[0].state, SwapState::kRolledBack);
   EXPECT_EQ(world.swaps()[0].step, 2U);
+  EXPECT_THAT(world.swaps()[0].reason, StartsWith("in step 4: "));
   ASSERT_EQ(world.faults().size(), 1U);
   EXPECT_EQ(world.faults()[0].step, 4U);
   EXPECT_EQ(world.faults()[0].recovered_by, "rollback");
@@ -320,6 +324,36 @@ TEST(Rerun, AWrongAnswerThatLooksRightIsOutvoted) {
   ASSERT_EQ(world.faults().size(), 1U);
   EXPECT_EQ(world.faults()[0].fault.kind, kernel::FaultKind::kDisagreement);
   EXPECT_EQ(world.faults()[0].step, 9U);
+}
+
+// What counts calls counts as many of them where it is asked again; another call there tells.
+TEST(Rerun, APluginThatCountsItsCallsIsFound) {
+  WorldBuilder builder(Hosting::kSharedMemory);
+  builder.steps(160, 0.01).sphere(0.5, 1.0, Vector3::Zero());
+  builder.plugin(Slot::kIntegrator, faulty_plugin_path("counts_calls"));
+  Environment world(builder.description());
+  world.set_rerun_every(Slot::kIntegrator, 1);
+  run_to_end(&world);
+  EXPECT_THAT(world.warnings(), Contains(HasSubstr("another process answered the same request otherwise")));
+  // its own answer is otherwise for the first time, and two others agree that it was not
+  ASSERT_FALSE(world.faults().empty());
+  EXPECT_EQ(world.faults()[0].fault.kind, kernel::FaultKind::kDisagreement);
+  EXPECT_EQ(world.faults()[0].step, 150U);
+}
+
+// Two libraries of one name are told apart by their files.
+TEST(Swap, RecordsNameTheLibrariesOfTwoBuilds) {
+  Environment world(busy_world(Hosting::kDirect).steps(kSwapSteps, 1.0 / 120.0).description());
+  const std::string copy = testing::TempDir() + "another_build.so";
+  std::filesystem::copy_file(plugin_path("solver_sequential"), copy, std::filesystem::copy_options::overwrite_existing);
+  kernel::PluginChoice other_build = plugin_of(Slot::kSolver);
+  other_build.library = copy;
+  world.order_swap({Slot::kSolver, other_build, std::nullopt, 5});
+  run_to_end(&world);
+  std::filesystem::remove(copy);
+  EXPECT_EQ(world.chain_hash(), chain_without_swaps());
+  EXPECT_EQ(world.swaps()[0].from, "Sequential (" + plugin_path("solver_sequential") + ")");
+  EXPECT_EQ(world.swaps()[0].to, "Sequential (" + copy + ")");
 }
 
 }  // namespace

@@ -226,6 +226,8 @@ class Midpoint(Integrator):
             raise Refusal("no file pl\udcfcgin")  # as os.fsdecode() gives names that are no UTF-8
         if request.time == 5.0:
             sys.exit(6)
+        if request.time == 9.0:
+            reply.orientaton = request.orientation
         if request.time == 4.0:
             host._last_mark -= 1.0  # as if the last mark had been a second ago
             host.mark_progress()
@@ -417,6 +419,13 @@ class Talk(unittest.TestCase):
         sys.stderr = stderr
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
         self.assertRegex(outcome.text, r"SystemExit: 6 \(.*sdk_test\.py:\d+\)")
+        # a column that no reply has
+        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")
+        outcome = self.reply(stream.send(self.request(time=9.0))).outcome
+        sys.stderr.close()
+        sys.stderr = stderr
+        self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
+        self.assertRegex(outcome.text, r"AttributeError: the reply has no column 'orientaton'; allowed: position, ")
         stream.send(self.request(time=3.0))
         stream.send(self.answer([1.0] * 12))
         outcome = self.reply(stream.send(self.answer([1.0] * 12))).outcome

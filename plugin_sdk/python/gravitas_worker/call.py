@@ -57,10 +57,25 @@ class Sent(enum.Enum):
 
 
 class Columns:
-    """A request's columns, or a reply's, as attributes."""
+    """A request's columns, as attributes."""
 
     def __init__(self, columns):
         self.__dict__.update(columns)
+
+
+class Reply:
+    """Its columns, as attributes: no others, so that one that is misspelt is not lost in silence."""
+
+    __slots__ = ("_layout", "__dict__")
+
+    def __init__(self, layout):
+        object.__setattr__(self, "_layout", layout)
+
+    def __setattr__(self, name, value):
+        names = [column.name for column in self._layout.columns]
+        if name not in names:
+            raise AttributeError(f"the reply has no column {name!r}; allowed: {', '.join(names)}")
+        super().__setattr__(name, value)
 
 
 class Call(Host):
@@ -202,7 +217,7 @@ class Session:
         problem = check_rows(layout, message.columns, call.rows)
         if problem:
             raise Refusal(problem)
-        reply = Columns({})
+        reply = Reply(call.method.reply)
         with numpy.errstate(all="ignore"):
             answer(Columns(message.columns), reply, call)
         return call.checked(call.method.reply, vars(reply), "the plugin's answer")

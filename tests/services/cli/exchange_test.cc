@@ -253,5 +253,53 @@ TEST(Exchange, WhatCannotBeIsRefusedWithWhatIsAllowed) {
   EXPECT_THAT(refusal({"--attach", "solver=10.0.0.1:1"}), HasSubstr("a worker of this machine"));
 }
 
+// Nothing was compared with who failed or was refused, and silence would read like agreement.
+TEST(Exchange, AComparisonThatEndsIsToldWithItsReason) {
+  const Outcome failed =
+      run_sample({"--compare", "integrator=" + in_build("/lib/gravitas-faulty/integrator_throws.so")});
+  ASSERT_EQ(failed.program.exit_code, 0) << failed.program.err;
+  EXPECT_EQ(failed.report.chain_hash(), quiet_chain());
+  EXPECT_THAT(failed.program.out, HasSubstr("compared: integrator Euler with Faulty: "));
+  EXPECT_THAT(failed.program.out, HasSubstr("; it ended: in shadow: it failed: "));
+}
+
+// Ordered faults are known; what a plugin says itself is not.
+TEST(Exchange, TheSummaryHasTheWordsOfAPluginThatFailed) {
+  const ScratchFolder folder;
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Failures = 100 Library = \"" +
+                                           in_build("/lib/gravitas-faulty/integrator_throws.so") + "\" } }");
+  const ProgramResult result =
+      run_program({"run", kSample, plugins, "--set", "Integrator=Faulty", "--steps", "5"}, folder);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("survived: step 3, integrator Faulty: failure (it failed: "));
+}
+
+// Hosted direct a plugin that ends its process ends this program: never with the exit code of work that is done.
+TEST(Exchange, APluginThatCallsExitEndsNoRunAsDone) {
+  const ScratchFolder folder;
+  for (const std::string name : {"integrator_calls_exit", "integrator_exits_in_a_thread"}) {
+    const std::string library = in_build("/lib/gravitas-faulty/") + name + ".so";
+    const std::string plugins =
+        folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Library = \"" + library + "\" } }");
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"run", kSample, plugins, "--set", "Integrator=Faulty", "--hosting", "direct"},
+          {"run", kSample, "--swap", "integrator=" + library + "@step=20,hosting=direct"},
+          {"run", kSample, "--compare", "integrator=" + library + ",hosting=direct"},
+          {"serve", kSample, plugins, "--set", "Integrator=Faulty", "--headless", "--hosting", "direct"},
+          {"capture", kSample, plugins, "--set", "Integrator=Faulty", "--hosting", "direct", "--slot", "integrator",
+           "--out", folder.path("capsule")}}) {
+      const ProgramResult result = run_program(words, folder);
+      EXPECT_EQ(result.exit_code, 1) << words[0] << result.err;
+      EXPECT_THAT(result.err, HasSubstr("gravitas: plugin Faulty called exit()")) << words[0] << name;
+    }
+    // a worker is replaced
+    const ProgramResult worker = run_program(
+        {"run", kSample, plugins, "--set", "Integrator=Faulty", "--steps", "3", "--hosting", "shm"}, folder);
+    EXPECT_EQ(worker.exit_code, 0) << worker.err;
+    EXPECT_THAT(worker.out, HasSubstr("survived: step 3, integrator Faulty: death"));
+  }
+}
+
 }  // namespace
 }  // namespace gravitas

@@ -4,8 +4,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "tests/paths.h"
 #include "tests/run_quietly.h"
@@ -217,6 +219,32 @@ TEST(ServedResume, DoesNotGoOnFromWhatIsNoCheckpointOfItsScene) {
   { Served same(options); }
   options.run.overrides.clear();
   EXPECT_THROW(ServedRun{options}, BadInput);
+}
+
+// A library that took over by its path is named in the command that goes on, which may load no other.
+TEST(ServedResume, TheCommandThatGoesOnNamesTheLibraryThatTookOver) {
+  const gravitas::harness::ScratchFolder folder;
+  ServeOptions options = sample("direct");
+  options.run.checkpoint = folder.path("served.ck");
+  const std::string library = folder.path("mine.so");
+  std::filesystem::copy_file(in_build("/lib/gravitas/integrator_verlet.so"), library);
+  std::string command, end;
+  {
+    Served served(options);
+    served.client.step(10);
+    EXPECT_EQ(served.swap("integrator=" + library).outcome(), "committed");
+    command = served.run.save_checkpoint().value().go_on_by;
+    end = served.to_the_end().chain_hash();
+  }
+  EXPECT_THAT(command, HasSubstr(" --swap integrator=" + library + "@step=11 "));
+  // as a shell reads it, without words that have blanks
+  std::vector<std::string> words;
+  std::istringstream rest(command.substr(command.find(' ') + 1));
+  for (std::string word; rest >> word;) words.push_back(word);
+  words.insert(words.end(), {"--json", "--hosting", "direct"});
+  const gravitas::harness::ProgramResult result = gravitas::harness::run_program(words, folder);
+  EXPECT_EQ(result.exit_code, 0) << command << result.err;
+  EXPECT_EQ(gravitas::harness::read_report(result.out).chain_hash(), end);
 }
 
 }  // namespace

@@ -164,5 +164,24 @@ TEST(Journal, WhatCannotBeWrittenIsSaid) {
   EXPECT_THROW(JournalWriter(folder.path("none/j"), kRun, {}), std::system_error);
 }
 
+// A tear leaves nothing whole behind it; damage does, wherever in a record it is.
+TEST(Journal, ABadRecordBeforeWholeOnesIsDamage) {
+  const ScratchFolder folder;
+  const std::string path = folder.path("j");
+  write_steps(path, {}, 1, 4);
+  std::vector<std::byte> bytes = read_whole_file(path);
+  for (std::size_t place = kJournalHeader; place < bytes.size(); ++place) {
+    bytes[place] ^= std::byte{1};
+    const std::size_t record = (place - kJournalHeader) / kRecord;
+    EXPECT_EQ(read_journal(bytes, kRun, 0).is_damaged, record < 3) << place;
+    bytes[place] ^= std::byte{1};
+  }
+  for (std::size_t size = 0; size <= bytes.size(); ++size)
+    EXPECT_FALSE(read_journal(std::span(bytes).first(size), kRun, 0).is_damaged) << size;
+  // blocks of a file that were never written
+  bytes.resize(bytes.size() + 4096);
+  EXPECT_FALSE(read_journal(bytes, kRun, 0).is_damaged);
+}
+
 }  // namespace
 }  // namespace gravitas

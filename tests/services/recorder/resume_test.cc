@@ -28,8 +28,9 @@ using harness::CurrentFolder;
 using harness::run_quietly;
 using harness::ScratchFolder;
 using kernel::Hosting;
+using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
+using ::testing::Not;
 
 struct Case {
   const char* scene;
@@ -469,6 +470,124 @@ TEST(Recorder, ARunWithoutCheckpointsWritesNoFile) {
   const ScratchFolder folder;
   const RunResult result = run_quietly(options_of("bounce", Hosting::kDirect, 10));
   EXPECT_EQ(result.checkpoint, "");
+}
+
+// A checkpoint of the middle of a run, an edit after it, and the journal that alone knows of that.
+class LostJournal : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    RunOptions options = options_of("bounce", Hosting::kDirect, 120);
+    options.checkpoint = path_;
+    options.checkpoint_every = 50;
+    options.edits = {"set Body.RubberBall.LinearVelocity={1,0,0}@step=70"};
+    std::vector<std::byte> middle;
+    const RunResult result = run(
+        options, [] { return false; },
+        [&](const Progress& now) {
+          if (now.step == 60) middle = read_whole_file(path_);
+        });
+    ASSERT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+    chain_ = result.report.chain_hash();
+    last_ = read_whole_file(path_);
+    replace_file(path_, middle);
+  }
+
+  RunOptions go_on(bool despite_journal = false) const {
+    RunOptions options = options_of("bounce", Hosting::kDirect, 120);
+    options.resume = path_;
+    options.despite_journal = despite_journal;
+    return options;
+  }
+  void expect_refusal(const std::string& why) const {
+    try {
+      run_quietly(go_on());
+      ADD_FAILURE() << "it was not refused";
+    } catch (const BadInput& problem) {
+      EXPECT_THAT(problem.what(), HasSubstr(why));
+      EXPECT_THAT(problem.what(), HasSubstr("edits, swaps and steps"));
+      EXPECT_THAT(problem.what(), HasSubstr("--despite-journal"));
+    }
+  }
+
+  const ScratchFolder folder_;
+  const std::string path_ = folder_.path("checkpoint"), journal_ = journal_of(path_);
+  std::string chain_;
+  std::vector<std::byte> last_;  // of the run's end
+};
+
+TEST_F(LostJournal, KnowsTheEdit) { EXPECT_EQ(run_quietly(go_on()).report.chain_hash(), chain_); }
+
+TEST_F(LostJournal, ThatIsMissingIsRefusedUnlessOneAsksForIt) {
+  std::filesystem::remove(journal_);
+  expect_refusal("it is missing");
+  const RunResult result = run_quietly(go_on(true));
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  EXPECT_NE(result.report.chain_hash(), chain_);
+  EXPECT_THAT(result.report.warnings(),
+              ::testing::Contains(HasSubstr("it is missing, and the run went on after the checkpoint; left aside")));
+}
+
+TEST_F(LostJournal, ThatIsDamagedInItsMiddleIsRefusedUnlessOneAsksForIt) {
+  std::vector<std::byte> bytes = read_whole_file(journal_);
+  bytes[bytes.size() / 2] ^= std::byte{16};
+  replace_file(journal_, bytes);
+  expect_refusal("is damaged, and whole ones stand behind it");
+  EXPECT_EQ(run_quietly(go_on(true)).outcome, RunOutcome::kCompleted);
+}
+
+TEST_F(LostJournal, ThatIsOfAnotherRunIsRefusedUnlessOneAsksForIt) {
+  std::ofstream(journal_) << "something else, long enough to be a header of a journal that it is not";
+  expect_refusal("not a journal that this build reads");
+  EXPECT_EQ(run_quietly(go_on(true)).outcome, RunOutcome::kCompleted);
+}
+
+// Nothing came after the checkpoint of a run's end.
+TEST_F(LostJournal, AtTheEndOfARunIsNoLoss) {
+  replace_file(path_, last_);
+  std::filesystem::remove(journal_);
+  const RunResult result = run_quietly(go_on());
+  EXPECT_EQ(result.report.chain_hash(), chain_);
+  EXPECT_THAT(result.report.warnings(), Not(Contains(HasSubstr("journal"))));
+}
+
+// Its name and version are those of before.
+TEST(ResumedRun, ALibraryThatWasBuiltAnewIsTold) {
+  const ScratchFolder folder;
+  const std::string library = folder.path("mine.so");
+  std::filesystem::copy_file(in_build("/lib/gravitas/integrator_verlet.so"), library);
+  const std::string plugins =
+      folder.write("plugins.gravitas", "Plugins { Plugin { Slot = \"integrator\" Library = \"" + library + "\" } }");
+  RunOptions options = options_of("bounce", Hosting::kSharedMemory, 40, {"Integrator=Verlet"});
+  options.scenes.push_back(plugins);
+  options.checkpoint = folder.path("kept");
+  ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
+  options.resume = options.checkpoint;
+  options.checkpoint.clear();
+  options.steps = 60;
+  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
+  // what stands behind an ELF file's sections changes nothing but the file
+  std::ofstream(library, std::ios::app) << "another build";
+  const RunResult result = run_quietly(options);
+  EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
+  EXPECT_THAT(result.report.warnings(),
+              Contains(HasSubstr("plugin Verlet: '" + library + "' was built anew since the checkpoint")));
+}
+
+// The same of one that was swapped in.
+TEST(ResumedRun, ALibraryThatWasSwappedInAndBuiltAnewIsTold) {
+  const ScratchFolder folder;
+  const std::string library = folder.path("mine.so");
+  std::filesystem::copy_file(in_build("/lib/gravitas/integrator_verlet.so"), library);
+  RunOptions options = options_of("bounce", Hosting::kSharedMemory, 40);
+  options.swaps = {"integrator=" + library + "@step=20"};
+  options.checkpoint = folder.path("kept");
+  ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
+  options.resume = options.checkpoint;
+  options.checkpoint.clear();
+  options.steps = 60;
+  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
+  std::ofstream(library, std::ios::app) << "another build";
+  EXPECT_THAT(run_quietly(options).report.warnings(), Contains(HasSubstr("was built anew since the checkpoint")));
 }
 
 }  // namespace
