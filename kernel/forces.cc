@@ -99,9 +99,8 @@ void Environment::evaluate() {
   // the end of a step may be the time of a jump
   data_.derivative_time[0] = std::clamp(data_.derivative_time[0], asked_from_, asked_until_);
   told_wrench().resize(6 * model_.body_count);
-  const bool wants_impulses =
-      data_.derivative_question[0] >= static_cast<std::uint32_t>(DerivativeQuestion::kPlaceImpulses);
-  wants_impulses ? find_joint_impulses() : find_wrenches();
+  const bool wants_wrenches = data_.derivative_question[0] < kFirstOfImpulses;
+  wants_wrenches ? find_wrenches() : find_joint_impulses();
   nested_ns_ += lap_between(begin, lap_ns());
 }
 

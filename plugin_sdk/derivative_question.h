@@ -13,4 +13,7 @@ enum class DerivativeQuestion : std::uint32_t {
   kVelocityImpulses = 4,  // Derivatives::velocity_impulses()
 };
 
+// From this question on impulses of joints are asked for instead of wrenches.
+inline constexpr auto kFirstOfImpulses = static_cast<std::uint32_t>(DerivativeQuestion::kPlaceImpulses);
+
 }  // namespace gravitas

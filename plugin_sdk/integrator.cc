@@ -99,9 +99,7 @@ std::span<const double> Derivatives::ask(DerivativeQuestion question, double tim
     answer[2] = {jacobian->numbers_.data(), jacobian->numbers_.size(), 0};
   }
   host_.derivative(asked.data(), answer.data());
-  const bool are_impulses =
-      question == DerivativeQuestion::kPlaceImpulses || question == DerivativeQuestion::kVelocityImpulses;
-  if (are_impulses && answer[0].count == 0) return {};
+  if (wanted >= kFirstOfImpulses && answer[0].count == 0) return {};
   if (answer[0].count != answer_.size()) throw std::runtime_error("the derivative has the wrong size");
   require_finite(answer_, 6, "wrench");
   if (jacobian == nullptr) return answer_;

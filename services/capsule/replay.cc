@@ -81,8 +81,7 @@ bool is_same(const MessageColumns& recorded, const stage::IntegratorDerivativeRe
 // Impulses of joints are no wrenches.
 void add_told(const v1::CapsuleDerivative& one, WrenchRange* told) {
   const std::uint32_t question = columns_of(one.trial(), derivative_info().request).u32("question")[0];
-  if (question <= static_cast<std::uint32_t>(DerivativeQuestion::kForces))
-    told->add(columns_of(one.answer(), derivative_info().reply).f64("wrench"));
+  if (question < kFirstOfImpulses) told->add(columns_of(one.answer(), derivative_info().reply).f64("wrench"));
 }
 
 // Why a run would not go on with this; empty: it would.
