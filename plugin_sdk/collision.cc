@@ -9,7 +9,7 @@
 namespace gravitas::collision {
 namespace {
 
-constexpr double kMostTurning = 1e4;  // rad
+constexpr double kMostTurning = 1e8;  // rad: rounded to 1e-8 rad, the angles say where a metre is to 1e-8 m
 constexpr double kFarthest = 1e100;   // m: squares of lengths stay finite
 
 void require_finite(const char* row, const char* what, std::span<const double> column, std::size_t components) {
@@ -51,6 +51,12 @@ std::span<const double> ShapeColumns::parameters(std::size_t shape) const {
   return shape_parameter.subspan(begin[shape], begin[shape + 1] - begin[shape]);
 }
 
+Motion motion_of(const stage::CollisionTimesOfImpactRequest& request, std::uint32_t body) {
+  const bool is_ball = request.shape_type()[request.body_shape()[body]] == type_id("Sphere");
+  const bool turns = !is_ball || !vector_at(request.geometry_position(), body).isZero(0.0);
+  return {vector_at(request.displacement(), body), turns ? vector_at(request.rotation(), body) : Vector3::Zero()};
+}
+
 void check_request(const stage::CollisionManifoldsRequest& request) {
   check_pairs(request);
   if (!(request.margin() >= 0.0)) throw Refusal("the margin is negative, or no number");
@@ -68,9 +74,10 @@ void check_request(const stage::CollisionTimesOfImpactRequest& request) {
       if (!(std::fabs(lengths[i]) <= kFarthest))
         throw Refusal("body " + std::to_string(i / 3) + " is, or goes, farther than 1e100 m");
   require_finite("body ", "rotation", request.rotation(), 3);
-  for (std::size_t body = 0; body < request.body_shape().size(); ++body)
-    if (!(vector_at(request.rotation(), body).squaredNorm() <= kMostTurning * kMostTurning))
-      throw Refusal("body " + std::to_string(body) + " turns by more than 1e4 rad in the interval");
+  for (const std::uint32_t body : request.pair())
+    if (!(motion_of(request, body).rotation.squaredNorm() <= kMostTurning * kMostTurning))
+      throw Refusal("body " + std::to_string(body) +
+                    " turns by more than 1e8 rad in the interval; allowed: a shorter TimeStep");
 }
 
 void check_request(const stage::CollisionRaysRequest& request) {

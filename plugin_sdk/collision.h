@@ -53,9 +53,8 @@ BodyColumns bodies_of(const Request& request) {
 }
 // A shape cast is a time of impact without rotation: the body that is cast has the displacement of the cast, the others
 // rest. A sweep that turns on its way is asked the same way.
-inline Motion motion_of(const stage::CollisionTimesOfImpactRequest& request, std::uint32_t body) {
-  return {vector_at(request.displacement(), body), vector_at(request.rotation(), body)};
-}
+// A ball about its centre does not turn: it is the same in all attitudes.
+Motion motion_of(const stage::CollisionTimesOfImpactRequest& request, std::uint32_t body);
 
 inline Ray ray_of(const stage::CollisionRaysRequest& request, std::uint32_t ray) {
   return {vector_at(request.origin(), ray), vector_at(request.direction(), ray), request.length()[ray]};
@@ -65,8 +64,8 @@ inline Ray ray_of(const stage::CollisionRaysRequest& request, std::uint32_t ray)
 enum DebugKind : std::uint32_t { kOutlines = 1U << 0, kTrees = 1U << 1 };
 
 // The pairs (or candidates) name bodies with shapes, the margin (or target) is one, and every number of a body is
-// finite; of rays, that they exist and have unit directions; of motions, that they turn
-// by no more than 1e4 rad and stay within 1e100 m; the extent of debug geometry is finite and not negative.
+// finite; of rays, that they exist and have unit directions; of motions, that what is in a pair turns
+// by no more than 1e8 rad and all stay within 1e100 m; the extent of debug geometry is finite and not negative.
 void check_request(const stage::CollisionManifoldsRequest& request);
 void check_request(const stage::CollisionTimesOfImpactRequest& request);
 void check_request(const stage::CollisionRaysRequest& request);

@@ -69,6 +69,7 @@ class TurningCore {
   // Of the farthest point from the centre, and of what moves when the body turns.
   double reach() const { return reach_; }
   double travel() const { return rate_ * off_axis_; }
+  double rate() const { return rate_; }
 
  private:
   const MovingSolid& solid_;
@@ -80,6 +81,13 @@ class TurningCore {
   Vector3 axis_ = Vector3::UnitY();
   double reach_ = 0.0, off_axis_ = 0.0, up_ = 0.0, down_ = 0.0;
 };
+
+// How far a bound of third order is followed for solids that turn at these rates. Beyond kFarthestLook it says nothing, and
+// chords that begin there are short by the square of the angle.
+double look_ahead(double rates, double rest) {
+  constexpr double kFarthestLook = 3.0;  // rad
+  return rates * rest > kFarthestLook ? kFarthestLook / rates : rest;
+}
 
 // How far a bound f, positive at 0, surely stays positive: `rest` if all the way.
 template <typename Bound>
@@ -191,7 +199,8 @@ class ConvexApproach {
   }
 
   // The same of one that turns along with w.
-  double step_along(const Vector3& normal, const Vector3& w, double half_target, double rest) const {
+  double step_along(const Vector3& normal, const Vector3& w, double half_target, double span) const {
+    const double rest = look_ahead(a_.rate() + b_.rate(), span);
     const Drift drift(normal, centres_, velocity_, w, rest);
     const TurningCore::Swing of_a = a_.swing(normal, w), of_b = b_.swing(-normal, w);
     const auto bound = [&](double s) {
@@ -236,13 +245,14 @@ class HalfspaceApproach {
   }
   double step(double half_target, double rest) const {
     const Vector3& spin = ground_.motion.rotation;
-    const Drift drift(up_, centres_, velocity_, spin, rest);
+    const double ahead = look_ahead(norm_of(spin) + b_.rate(), rest);
+    const Drift drift(up_, centres_, velocity_, spin, ahead);
     const TurningCore::Swing swing = b_.swing(-up_, spin);
     const double nearer = plane_ + b_.map().rounding() + half_target;
     const auto bound = [&](double s) { return drift(s) - b_.support(swing, s) - nearer; };
     const double at_zero = bound(0.0);
     if (!(at_zero > 0.0)) return 0.0;
-    double step = safe_step(bound, at_zero, rest);
+    double step = safe_step(bound, at_zero, ahead);
     const double swept = up_.dot(centres_) - b_.swept_support(-up_) - nearer;
     if (step < rest && swept > 0.0 && spin.isZero(0.0)) {
       const double closing = -up_.dot(velocity_);

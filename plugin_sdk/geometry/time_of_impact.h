@@ -13,8 +13,8 @@
 // through the centre). The greatest over all x is the support of the solid in a direction that moves with s (B. Mirtich,
 // "Timewarp rigid body simulation" (2000), bounds the first derivative alone: steps of first order, where these are of
 // third). Curvature that leads away from the plane counts as none: then the bound of the gap is concave in s, each chord
-// under it is a bound, too, and regula falsi climbs it from the safe side. A last bound, for solids that spin fast, holds
-// for all angles at once: the support of what the solid sweeps in a whole turn.
+// under it is a bound, too, and regula falsi climbs it from the safe side; it is followed for half a turn at most. A last
+// bound, for solids that spin fast, holds for all angles at once: the support of what the solid sweeps in a whole turn.
 //
 // Steps repeat until the gap is at most the target (an impact), a bound reaches the end of the interval (none), or
 // kMostSteps are spent: then the answer is an impact at the time that was reached, its depth showing that the gap is
@@ -60,7 +60,7 @@ inline constexpr int kMostSteps = 20000;
 // and was always more than half of it. Nothing if the gap stays above half of it: an impact is never missed.
 //
 // A target below 1e-10 of the radii of the maps counts as that. Two half-spaces never meet. Preconditions: poses finite
-// and unit, rotations at most 1e4 rad.
+// and unit, rotations at most 1e8 rad (where angles are rounded to 1e-8 rad).
 std::optional<Impact> first_impact(const MovingSolid& a, const MovingSolid& b, double target_gap,
                                    const TimeSpan& span = {});
 

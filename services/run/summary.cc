@@ -110,7 +110,7 @@ std::string summarize(const report::v1::Report& report, const std::vector<EventL
   const auto energy = [](double number) {
     return std::isfinite(number) ? fmt::format("{:.6g}", number) : std::string("not finite");
   };
-  text += fmt::format("  energy {} -> {} J, penetration <= {:.2g} m, joint error <= {:.2g} m\n",
+  text += fmt::format("  energy {} -> {} J, contacts up to {:.2g} m deep, joint error <= {:.2g} m\n",
                       energy(report.energy().initial()), energy(report.energy().final()), report.max_penetration(),
                       report.max_joint_error());
   text += exchanges(report);

@@ -45,8 +45,9 @@ void build_steps(const SimulatorProperties& properties, BuildContext* context) {
   const double ratio = duration / time_step, whole = std::round(ratio);
   // a quotient of two rounded numbers is off by a rounding or two of its own size
   const double tolerance = std::max(kStepTolerance, 4.0 * std::numeric_limits<double>::epsilon() * ratio);
-  const bool is_whole = std::fabs(ratio - whole) <= tolerance;
-  const double steps = is_whole ? whole : std::ceil(ratio);
+  // what is far shorter than a step is a step of its own
+  const bool is_whole = duration == 0.0 || (whole > 0.0 && std::fabs(ratio - whole) <= tolerance);
+  const double steps = is_whole ? whole : std::max(std::ceil(ratio), 1.0);
   if (!(steps <= static_cast<double>(std::numeric_limits<std::uint32_t>::max()))) {
     context->diagnostics->error(place_of(properties, SimulatorProperties::kTimeStepFieldNumber),
                                 "Duration " + number_text(duration) + " s in steps of " + number_text(time_step) +

@@ -1,6 +1,7 @@
 #include "services/scene/build_bodies.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -145,7 +146,8 @@ class BodyBuilder {
                                "(kg/m^2)");
     MassProperties properties = mass_properties(*solid_->shape, body_.has_mass() ? kUnspecifiedDensity : density);
     if (body_.has_mass()) properties = scaled_to_mass(properties, body_.mass());
-    return checked(properties, principal_axes(properties), Body::kMassDensityFieldNumber);
+    const int field = body_.has_mass() ? Body::kMassFieldNumber : Body::kMassDensityFieldNumber;
+    return checked(properties, principal_axes(properties), field);
   }
 
   // Mass and PrincipalMoments as written.
@@ -168,6 +170,13 @@ class BodyBuilder {
   std::optional<Inertia> checked(const MassProperties& properties, const PrincipalAxes& axes, int field) {
     std::string why;
     if (!validate(properties, &why)) return refuse(field, "has a mass that no solid can have: " + why);
+    const bool is_light = !std::isfinite(1.0 / properties.mass);
+    if (is_light || !std::isfinite(1.0 / axes.moments.minCoeff()))
+      return refuse(is_light && body_.has_mass() ? Body::kMassFieldNumber : field,
+                    "has " +
+                        (is_light ? "a mass of " + number_text(properties.mass) + " kg"
+                                  : "a moment of " + number_text(axes.moments.minCoeff()) + " kg m^2") +
+                        ", whose inverse overflows; allowed: from 1e-307 on");
     return Inertia{properties.mass, axes.moments, {properties.centre_of_mass, axes.orientation}};
   }
 

@@ -42,6 +42,17 @@ std::uint32_t find_plugin(const kernel::SlotDescription& slot, const std::string
   return static_cast<std::uint32_t>(found - slot.plugins.begin());
 }
 
+// "body 3 turns": `Body "Id" turns`, of collision, whose rows of bodies are those of the scene.
+std::string name_body(const kernel::EnvironmentDescription& description, const kernel::StageFault& fault) {
+  const std::string kind = std::string(kItRefused) + "body ";
+  const std::string& text = fault.text();
+  std::uint32_t row = 0;
+  if (fault.slot != Slot::kCollision || !text.starts_with(kind)) return text;
+  const auto [end, error] = std::from_chars(text.data() + kind.size(), text.data() + text.size(), row);
+  if (error != std::errc() || row >= description.bodies.size()) return text;
+  return std::string(kItRefused) + "Body \"" + description.bodies[row].id + "\"" + end;
+}
+
 // Rows count what the plugin serves, in the order of the scene.
 std::optional<RefusedRow> find_row(const kernel::EnvironmentDescription& description, const kernel::StageFault& fault) {
   std::string_view text = fault.text();
@@ -140,7 +151,7 @@ std::optional<SceneError> find_settings(const v1::Scene& scene, const kernel::En
 
 std::string refusal_text(const kernel::EnvironmentDescription& description, const kernel::StageFault& fault) {
   const std::optional<RefusedRow> row = find_row(description, fault);
-  return row ? std::string(kItRefused) + who(*row) + row->reason : fault.text();
+  return row ? std::string(kItRefused) + who(*row) + row->reason : name_body(description, fault);
 }
 
 std::optional<SceneError> find_refused(const v1::Scene& scene, const kernel::EnvironmentDescription& description,

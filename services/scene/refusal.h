@@ -12,7 +12,7 @@
 namespace gravitas::scene {
 
 // The fault's text; "joint 3: …" and "application 3: …" of a refusal are `Constraint "Id": …` and
-// `Force "Id" on Body "Id": …` in it.
+// `Force "Id" on Body "Id": …` in it, and "body 3 …" of collision is `Body "Id" …`.
 std::string refusal_text(const kernel::EnvironmentDescription& description, const kernel::StageFault& fault);
 
 // The same without "it refused", at a place of the scene: that of the last written property that the text names; else that

@@ -46,6 +46,30 @@ TEST_P(FreeSpin, KeepsEnergyAndMomentum) {
   }
 }
 
+// ---- after an impact
+
+// A ball that slides through its impact leaves with u' = u - mu (1 + e) v and w = 5/2 mu (1 + e) v / r: by 1e4 and 1e8 rad in the step.
+TEST(SpinOfAnImpact, OfABallIsAnyNumberOfTurnsAStep) {
+  for (const double radius : {3e-3, 1e-7}) {
+    SceneRun run("Geometries { Geometry { Type = \"Sphere\" Id = \"S\" CustomProperties { Radius = " + literal(radius) +
+                 " } }\nGeometry { Type = \"Box\" Id = \"P\" CustomProperties { HalfExtents = {9, 0.001, 9} } } }\n"
+                 "Materials { Material { Id = \"M\" RestitutionCoefficient = 1 StaticFrictionCoefficient = 0.1 } }\n"
+                 "Simulator { Type = \"Continuous\" CustomProperties { TimeStep = 0.1 Duration = 0.3 } }\n"
+                 "Environment { Space { Bodies {\n"
+                 "Body { Id = \"Plate\" GeometryId = \"P\" Material = \"M\" Immovable = true }\n"
+                 "Body { Id = \"Ball\" GeometryId = \"S\" Material = \"M\" Mass = 1 KineticProperties { "
+                 "Position = {0, 1, 0} LinearVelocity = {3000, -2300, 0} } } } } }\n");
+    run.to_end();
+    const double impulse = 0.1 * 2.0 * 2300.0, met = (1.0 - 0.001 - radius) / 2300.0, after = 0.3 - met;
+    const Vector3 velocity(3000.0 - impulse, 2300.0, 0.0);
+    const auto ball = run.body("Ball");
+    EXPECT_LE((ball.twist.linear - velocity).norm(), 1e-9 * velocity.norm()) << radius;
+    EXPECT_LE((ball.twist.angular * radius + Vector3(0, 0, 2.5 * impulse)).norm(), 1e-9 * impulse) << radius;
+    const Vector3 place = Vector3(3000.0 * met, 0.001 + radius, 0.0) + after * velocity;
+    EXPECT_LE((ball.pose.position - place).norm(), 1e-8 * place.norm()) << radius;
+  }
+}
+
 // ---- on joints
 
 class SpinOnJoints : public ::testing::TestWithParam<const char*> {

@@ -190,6 +190,29 @@ TEST(TimeOfImpact, ACubeAt1000MetresPerSecondDoesNotPassAThinWall) {
   }
 }
 
+// A bar of 2 cm square over a thin plate, from flat to where its edge is at the height h: sin(phi + pi/4) = h/(a sqrt 2). Where it
+// leaves by a/2 a radian its edges stay above: a (1.2 + phi/2 - cos phi - sin phi) is least at sin phi - cos phi = -1/2, 0.088 a.
+TEST(TimeOfImpact, OfABarThatSpinsManyTimes) {
+  const double a = 0.01, high = 1.2;
+  const Body plate(box(1, 5e-4, 1), at(0, -5e-4, 0), by(0, 0, 0));
+  const double angle = std::asin(high / std::sqrt(2.0)) - 0.25 * M_PI;
+  for (const double turn : {1.0, 30.0, 1e3, 1e5, 1e7}) {
+    const Pose start = at(0, high * a, 0);
+    for (const SceneShape& bar : {box(a, a, 0.1), box(a, a, 0.001)}) {
+      const std::optional<Impact> found = impact_of(plate, Body(bar, start, by(0, 0, 0, {0, 0, turn})));
+      ASSERT_TRUE(found) << turn;
+      // gaps of half the target to all of it, at the edge's speed there
+      const double speed = a * std::sqrt(2.0) * std::cos(angle + 0.25 * M_PI);
+      EXPECT_NEAR(turn * found->fraction, angle - 0.75 * kTarget / speed, 0.3 * kTarget / speed) << turn;
+      EXPECT_LE(-found->depth, kTarget) << turn;
+      EXPECT_FALSE(impact_of(plate, Body(bar, start, by(0, 0.5 * a * turn, 0, {0, 0, turn})))) << turn;
+      EXPECT_FALSE(
+          impact_of(Body(ground(), at(0, 0, 0), by(0, 0, 0)), Body(bar, start, by(0, 0.5 * a * turn, 0, {0, 0, turn}))))
+          << turn;
+    }
+  }
+}
+
 // ---- what starts in touch, and what does not move
 
 TEST(TimeOfImpact, IsZeroForWhatOverlapsOrTouches) {

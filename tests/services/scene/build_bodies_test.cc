@@ -131,6 +131,14 @@ TEST(BuildBodies, RefuseMassesThatNoSolidHas) {
   EXPECT_THAT(body_errors_of("Mass = 1 PrincipalMoments = {1, 1, 3}"),
               ElementsAre(testing::StartsWith("scene:2:29: error: Body \"Ball\" has a mass that no solid can have: ")));
   EXPECT_THAT(body_errors_of("GeometryId = \"Brick\" MassDensity = 1e308"), testing::SizeIs(1));
+  // velocities come of inverses
+  EXPECT_THAT(body_errors_of("GeometryId = \"Brick\" Mass = 5e-309"),
+              ElementsAre("scene:2:29: error: Body \"Ball\" has a mass of 5e-309 kg, whose inverse overflows; allowed: "
+                          "from 1e-307 on"));
+  EXPECT_THAT(body_errors_of("Mass = 1 PrincipalMoments = {1e-309, 1e-309, 1e-309}"),
+              ElementsAre("scene:2:29: error: Body \"Ball\" has a moment of 1e-309 kg m^2, whose inverse overflows; "
+                          "allowed: from 1e-307 on"));
+  EXPECT_THAT(body_errors_of("Mass = 1e-307 PrincipalMoments = {1e-307, 1e-307, 1e-307}"), ElementsAre());
   EXPECT_THAT(body_errors_of("Mass = 1 PrincipalMoments = {1, 0, 1}"),
               ElementsAre("scene:2:33: error: an element of PrincipalMoments is 0; allowed: a list "
                           "of 3 numbers, each "

@@ -84,6 +84,15 @@ TEST(Refusal, OfAForceNamesItsBody) {
             "scene:2:57: error: Force \"Down\" on Body \"B\" (scene:6:3): Acceleration is none");
 }
 
+TEST(Refusal, OfABodyOnItsWayNamesIt) {
+  World world;
+  const auto text = [&](Slot slot, const std::string& reason) { return world.text(refusal(slot, "Standard", reason)); };
+  EXPECT_EQ(text(Slot::kCollision, "body 1 turns too far"), "it refused: Body \"B\" turns too far");
+  EXPECT_EQ(text(Slot::kCollision, "body 2 turns too far"), "it refused: body 2 turns too far");
+  EXPECT_EQ(text(Slot::kCollision, "body one"), "it refused: body one");
+  EXPECT_EQ(text(Slot::kIntegrator, "body 1 turns too far"), "it refused: body 1 turns too far");
+}
+
 TEST(Refusal, OfSettingsIsWhereTheyStand) {
   const auto settings = [](const std::string& text) {
     return fault(kernel::FaultKind::kHandshake, Slot::kSolver, "Sequential", text);

@@ -398,8 +398,9 @@ ContactPoint way_out_of_mesh(const TriangleMesh& outer, const TriangleMesh& inne
   return least;
 }
 
-void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose& X_AB, const Flush& flush,
-                       double margin, const Collector& out) {
+void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X_AB, const Flush& flush, double margin,
+                       const Collector& out) {
+  const TriangleMesh &a = *shape_a.mesh, &b = *shape_b.mesh;
   const Matrix3 R = X_AB.orientation.toRotationMatrix();
   const Vector3 centre_a = a.box().centre(), centre_b = X_AB.position + R * b.box().centre();
   // the box of a in b
@@ -433,11 +434,24 @@ void collide_mesh_mesh(const TriangleMesh& a, const TriangleMesh& b, const Pose&
     });
   });
   if (any) return;
-  // triangles tell nothing: one mesh leaves the other by the lesser way
+  // triangles tell nothing: convex meshes part as the solids that they are
+  const auto part_as_hulls = [&] {
+    Manifold manifold;
+    if (shape_a.hull != nullptr && shape_b.hull != nullptr)
+      collide_support_maps({*shape_a.hull, *shape_b.hull, R, X_AB.position}, 0.0, &manifold);
+    out.add(TriangleMesh::kNone, manifold);
+    return manifold.count > 0;
+  };
+  if (cross && part_as_hulls()) return;
+  // else one mesh leaves the other by the lesser way
   ContactPoint least = way_out_of_mesh(a, b, X_AB, {}, 1.0, cross);
   const ContactPoint other = way_out_of_mesh(b, a, relative(X_AB, {}), X_AB, -1.0, cross);
   if (other.depth < least.depth) least = other;
-  if (std::isfinite(least.depth)) out.add(TriangleMesh::kNone, least);
+  if (std::isfinite(least.depth)) {
+    out.add(TriangleMesh::kNone, least);
+  } else {
+    part_as_hulls();
+  }
 }
 
 // ---- parts
@@ -462,7 +476,7 @@ void collide_parts(const Shape& a, const Pose& X_WA, const Shape& b, const Pose&
       collide_parts(a, X_WA, child.shape, compose(X_WB, child.pose), key_of_part(key, 2 * i + 1), rests, margin, out);
     }
   } else if (a.mesh != nullptr && b.mesh != nullptr) {
-    collide_mesh_mesh(*a.mesh, *b.mesh, relative(X_WA, X_WB), {rests, X_WA, flush_length(a, b)}, margin,
+    collide_mesh_mesh(a, b, relative(X_WA, X_WB), {rests, X_WA, flush_length(a, b)}, margin,
                       Collector(X_WA, key, merge_distance(a, b), false, out));
   } else if (a.mesh != nullptr || b.mesh != nullptr) {
     const bool is_reversed = a.mesh == nullptr;

@@ -9,6 +9,8 @@
 //   fall away, or it points far more along the normal of one of them, that one has the contact
 //   a triangle of a closed mesh pushes outward only, one of an open mesh to the side on which the other shape's centre is
 //   a shape whose centre is inside a closed mesh is pushed to the nearest place of its surface
+//   closed meshes that cross, none of whose triangles tells a normal, part as hulls if both are convex, else over the
+//   place nearest to a vertex of one that is inside the other
 //
 // Known limits. Near an edge of a closed mesh two faces may each report the depth below their own plane, also where the
 // way out over the other is shorter. A shape that has passed through an open mesh with its centre stays on the far side.

@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/collision.h"
+#include "plugin_sdk/geometry/convex_polyhedron.h"
 #include "plugin_sdk/geometry/scene_shape.h"
+#include "plugin_sdk/geometry/support_map.h"
 #include "workers/collision/standard/detector_table.h"
 
 namespace gravitas::collision {
@@ -72,6 +78,24 @@ bool read_primitive(std::uint64_t type, std::span<const double> numbers, std::si
   return true;
 }
 
+// A closed mesh as a polyhedron, if it is convex. Every vertex is held against every face: nothing of large ones.
+std::shared_ptr<const ConvexPolyhedron> convex_polyhedron_of(const TriangleMesh& mesh) {
+  constexpr std::size_t kMostTriangles = 2000;
+  if (!mesh.is_closed() || mesh.triangles().size() > kMostTriangles) return nullptr;
+  const double level = 1e-6 * mesh.box().half_extents().maxCoeff();
+  std::vector<std::vector<std::uint32_t>> faces;
+  for (std::uint32_t t = 0; t < mesh.triangles().size(); ++t) {
+    const TriangleMesh::Triangle& corners = mesh.triangles()[t];
+    faces.emplace_back(corners.begin(), corners.end());
+    for (int k = 0; k < 3; ++k)
+      for (const Vector3& corner : mesh.corners(mesh.neighbour(t, k)))
+        if (mesh.normal(t).dot(corner - mesh.vertices()[corners[0]]) > level) return nullptr;
+  }
+  std::string why;
+  std::optional<ConvexPolyhedron> made = make_convex_polyhedron(mesh.vertices(), faces, &why);
+  return made ? std::make_shared<const ConvexPolyhedron>(std::move(*made)) : nullptr;
+}
+
 StoredShape registered_shape(const RegisteredShape& kind, ShapeType type, std::span<const double> parameters) {
   StoredShape stored;
   stored.map = kind.read(PropertyCursor(parameters));
@@ -104,6 +128,13 @@ StoredShape store_shape(std::shared_ptr<const SceneShape> scene_shape) {
     double radius = 0.0;
     for (const Vector3& v : scene.mesh->vertices()) radius = std::max(radius, v.squaredNorm());
     shape.size = Vector3(std::sqrt(radius), scene.mesh->box().half_extents().maxCoeff(), 0.0);
+    stored.hull = convex_polyhedron_of(*scene.mesh);
+    if (stored.hull != nullptr) {
+      SceneShape hull;
+      hull.kind = SceneShape::Kind::kConvexPolyhedron, hull.polyhedron = stored.hull;
+      stored.map = make_support_map(hull);
+      shape.hull = stored.map.get();
+    }
   } else if (scene.kind == SceneShape::Kind::kCompound) {
     stored.compound = std::make_unique<CompoundShape>();
     shape.size = Vector3(0.0, std::numeric_limits<double>::infinity(), 0.0);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plugin_sdk/collision.h"
+#include "plugin_sdk/geometry/convex_polyhedron.h"
 #include "plugin_sdk/plugin.h"
 #include "plugin_sdk/shape_cache.h"
 #include "workers/collision/standard/composite_pairs.h"
@@ -23,6 +24,7 @@ struct StoredShape {
   Shape shape;
   std::shared_ptr<const SceneShape> scene_shape;
   std::unique_ptr<SupportMap> map;
+  std::shared_ptr<const ConvexPolyhedron> hull;
   std::unique_ptr<CompoundShape> compound;
   std::deque<StoredShape> children;
 };

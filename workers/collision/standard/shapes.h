@@ -52,6 +52,7 @@ struct Shape {
   // What it was made of; null for primitives and registered types.
   const SceneShape* scene = nullptr;
   const TriangleMesh* mesh = nullptr;
+  const SupportMap* hull = nullptr;  // of a closed mesh that is convex, the same solid
   const CompoundShape* compound = nullptr;
 
   bool is_composite() const { return mesh != nullptr || compound != nullptr; }

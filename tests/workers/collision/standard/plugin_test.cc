@@ -64,6 +64,31 @@ TEST_F(StandardCollision, RefusesNumbersThatAreNotFinite) {
   }
 }
 
+// Two unit balls 1 m apart, of which one comes by 4 m.
+TEST_F(StandardCollision, BallsAboutTheirCentresMayTurnByAnyAngle) {
+  constexpr stage::Method kTimes = stage::Method::kCollisionTimesOfImpact;
+  const MessageColumns still = two_balls();
+  MessageColumns request = PluginUnderTest::request_of(kTimes);
+  for (const char* column : {"shape_hash", "shape_type"}) request.u64(column) = still.u64(column);
+  for (const char* column : {"shape_parameter_begin", "body_shape", "pair"}) request.u32(column) = still.u32(column);
+  for (const char* column : {"shape_parameter", "geometry_position", "geometry_orientation", "orientation"})
+    request.f64(column) = still.f64(column);
+  request.f64("target_gap") = {1e-6};
+  request.f64("position") = {0, 0, 0, 3, 0, 0};
+  request.f64("displacement") = {4, 0, 0, 0, 0, 0};
+  for (const double turn : {0.0, 1e3, 1e9, 1e300}) {
+    request.f64("rotation") = {0, turn, 0, 0, 0, turn};
+    EXPECT_NEAR(plugin_.ask(kTimes, request).f64("fraction").at(0), 0.25, 2.5e-7) << turn;
+  }
+  // off its centre it goes round
+  request.f64("geometry_position") = {0, 0, 0, 0, 0, 0.1};
+  EXPECT_EQ(plugin_.refusal(kTimes, request),
+            "body 1 turns by more than 1e8 rad in the interval; allowed: a shorter TimeStep");
+  // what meets nothing may do as it likes
+  request.u32("pair") = {};
+  EXPECT_TRUE(plugin_.ask(kTimes, request).f64("fraction").empty());
+}
+
 TEST_F(StandardCollision, RefusesAContactThatOverflows) {
   MessageColumns request = two_balls();
   request.f64("linear_velocity") = {-1.5e308, 0, 0, 1.5e308, 0, 0};
