@@ -13,8 +13,8 @@ namespace {
 // A candidate in shadow gets this many times the longest call of the slot so far, and this at least, so that one that
 // hangs holds up the run no longer than that, once.
 constexpr std::uint64_t kShadowFactor = 10, kShadowNs = 100'000'000;
-constexpr std::uint32_t kTwiceEvery =
-    16;  // calls: or what plugins keep of them were the same where they are asked again
+// Calls. What a plugin keeps of earlier ones would else be the same where it is asked again.
+constexpr std::uint32_t kTwiceEvery = 16;
 
 double microseconds(std::uint64_t since) { return 1e-3 * static_cast<double>(channel::now_ns() - since); }
 

@@ -94,8 +94,8 @@ Answer LibrarySubject::ask(stage::Method method, const MessageColumns& request, 
     }
     const std::uint32_t control = floating_point_control();
     gravitas_error error{};
-    answer.status = library_.table->call(instance_, static_cast<std::uint32_t>(method), columns.data(), rooms.data(),
-                                         &host, &error);
+    answer.status = call_instance(library_, instance_, static_cast<std::uint32_t>(method), columns.data(), rooms.data(),
+                                  &host, &error);
     answer.text = error_text(error);
     if (restore_floating_point_control(control)) {
       answer.fault = "it changed the floating-point environment";

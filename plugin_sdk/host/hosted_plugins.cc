@@ -61,8 +61,8 @@ CallEnd HostedPlugins::call(std::uint32_t target, stage::Method method, const gr
   const std::uint32_t control = floating_point_control();
   gravitas_error error{};
   const std::uint64_t start = channel::now_ns();
-  end.status = libraries_[target].table->call(instances_[target], static_cast<std::uint32_t>(method), request, reply,
-                                              &host, &error);
+  end.status = call_instance(libraries_[target], instances_[target], static_cast<std::uint32_t>(method), request, reply,
+                             &host, &error);
   end.compute_ns = channel::now_ns() - start;
   if (fault != nullptr && end.status != GRAVITAS_NEEDS_CAPACITY) {
     end.status = fault->after_plugin(stage::method_info(method), request, reply, end.status, end.compute_ns, &error);

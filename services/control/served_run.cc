@@ -213,7 +213,11 @@ void ServedRun::make_step() {
     }
     figures_->follow(environment_.get());
     const bool is_last = environment_->step_count() >= environment_->total_steps();
-    if (recorder_->is_due(*environment_) || ((is_last || wakes) && recorder_->keeps())) recorder_->save(*environment_);
+    if (is_last && recorder_->keeps()) {
+      recorder_->save_last(*environment_);
+    } else if (recorder_->is_due(*environment_) || (wakes && recorder_->keeps())) {
+      recorder_->save(*environment_);
+    }
   } catch (const StepInterrupted&) {
     return;
   } catch (const std::exception& problem) {

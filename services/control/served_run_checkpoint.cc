@@ -110,7 +110,7 @@ void ServedRun::keep_faulted_state() {
         keeps ? recorder_->path() : std::filesystem::absolute(paused_checkpoint(options_)).string();
     // also where one of this step is kept: an edit may have come since, which its journal did not take
     if (keeps) {
-      recorder_->save(*environment_);
+      recorder_->save_last(*environment_);
     } else {
       recorder_->save_to(path, *environment_);
       remove_other_journal(options_, path);

@@ -9,7 +9,6 @@
 #include "plugin_sdk/channel/address.h"
 #include "plugin_sdk/property_value.h"
 #include "plugin_sdk/slots.h"
-#include "services/recorder/library_digest.h"
 
 namespace gravitas {
 namespace {
@@ -37,7 +36,6 @@ recorder::v1::Decision message_of(const kernel::Decision& decision) {
   message.set_address(decision.plugin->address);
   message.mutable_settings()->Add(decision.plugin->settings.begin(), decision.plugin->settings.end());
   message.set_hosting(kernel::hosting_name(decision.host->hosting));
-  message.set_digest(library_digest(decision.plugin->library));
   return message;
 }
 

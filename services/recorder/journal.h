@@ -9,8 +9,8 @@
 //
 // A check is XXH3-64 of the record, seeded with the check before it, so that records can neither be changed nor
 // exchanged. `run` is the digest of the scene's identity and the build. A record that is not whole (a crash tears the
-// last one) ends the journal; where whole ones stand behind it the file is damaged, which no crash does. Decisions and
-// edits change what the next commit is made of, and are written before it; commits may be buffered, since the journal
+// last one) ends the journal; where whole ones stand behind it the file is damaged, which no crash of the program does (a
+// power failure may). Decisions and edits change what the next commit is made of, and are written before it; commits may be buffered, since the journal
 // only vouches for them.
 #pragma once
 
@@ -66,6 +66,8 @@ class JournalWriter {
   // One that the journal knows and that is made again is not written again.
   void append(const edit::v1::Edit& edit);
   void flush();
+  // It holds more than the steps up to this one: of a run that came further before.
+  bool goes_beyond(std::uint32_t step) const { return last_step_ > step || !known_edits_.empty(); }
   // As the last flush found: somebody removed the file, or put another into its place.
   bool is_lost() const { return is_lost_; }
 

@@ -55,7 +55,8 @@ void Recorder::on_commit(const kernel::Environment& environment) {
 }
 
 void Recorder::on_decision(const kernel::Environment&, const kernel::Decision& decision) {
-  const recorder::v1::Decision message = message_of(decision);
+  recorder::v1::Decision message = message_of(decision);
+  if (journal_) message.set_digest(library_digest(message.library()));
   put_in_force(message, &decisions_);
   if (journal_) journal_->append(message);
 }
@@ -99,6 +100,9 @@ void Recorder::write(const std::string& path, const kernel::Environment& environ
   recorder::v1::Checkpoint checkpoint = make_checkpoint(environment, identity_, tally_(), decisions_);
   checkpoint.set_listener_decided(listener_decided_);
   checkpoint.set_goes_on_in_journal(goes_on);
+  // of decisions that no journal took
+  for (recorder::v1::Decision& one : *checkpoint.mutable_decisions())
+    if (one.digest() == 0) one.set_digest(library_digest(one.library()));
   for (const edit::v1::Edit& edit : edits_) *checkpoint.add_edits() = edit;
   try {
     replace_file(path, serialize_checkpoint(checkpoint));

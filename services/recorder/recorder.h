@@ -64,8 +64,10 @@ class Recorder final : public kernel::CommitListener {
   }
   // Brings file and journal to the committed state. Throws std::system_error.
   void save(const kernel::Environment& environment) { save(environment, true); }
-  // The same where the run ends: nothing follows in the journal.
-  void save_last(const kernel::Environment& environment) { save(environment, false); }
+  // The same where the run ends: nothing is added to the journal.
+  void save_last(const kernel::Environment& environment) {
+    save(environment, journal_->goes_beyond(environment.step_count()));
+  }
 
   // Writes the committed state to a file of its own.
   void save_to(const std::string& path, const kernel::Environment& environment) const;

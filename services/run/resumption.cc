@@ -44,13 +44,12 @@ JournalReading read_journal_beside(const std::string& path, const Hash& run, con
   }
   if (reading.note.empty()) return reading;
   // without a whole header nothing of it can be had
-  const bool is_lost = reading.is_damaged || (reading.end == 0 && checkpoint.goes_on_in_journal());
+  const bool is_lost = checkpoint.goes_on_in_journal() && (reading.is_damaged || reading.end == 0);
   if (is_lost && !despite_loss) {
     const std::uint32_t last = std::max(reading.last_step, checkpoint.step());
     throw BadInput(
         fmt::format("checkpoint '{}': journal '{}': {}; what edits, swaps and steps it knew after step {} is lost. To "
-                    "go on all the "
-                    "same, perhaps along another trajectory: --despite-journal",
+                    "go on all the same, perhaps along another trajectory: --despite-journal",
                     path, journal, reading.note, last));
   }
   warnings->push_back(fmt::format("journal '{}': {}; left aside", journal, reading.note));
@@ -67,8 +66,11 @@ void warn_of_other_builds(const Resumption& resumed, std::vector<std::string>* w
                     library, now == 0 ? "cannot be read any more" : "was built anew");
     if (std::ranges::find(*warnings, line) == warnings->end()) warnings->push_back(line);
   };
+  // of a path that was swapped in again the decision tells the build
+  const auto& decisions = resumed.checkpoint.decisions();
   for (const recorder::v1::Library& one : resumed.checkpoint.identity().libraries())
-    look_at(one.plugin(), one.path(), one.digest());
+    if (std::ranges::find(decisions, one.path(), &recorder::v1::Decision::library) == decisions.end())
+      look_at(one.plugin(), one.path(), one.digest());
   for (const recorder::v1::Decision& one : resumed.checkpoint.decisions())
     look_at(one.plugin(), one.library(), one.digest());
   for (const recorder::v1::Decision& one : resumed.journal.decisions)

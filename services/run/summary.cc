@@ -56,7 +56,7 @@ std::string exchanges(const report::v1::Report& report) {
   };
   // in a step that was given up
   const auto is_open = [&](const report::v1::FaultRecord& fault) {
-    return report.outcome() == "interrupted" && fault.step() > report.steps();
+    return report.outcome() == "interrupted" && fault.step() > report.steps() && fault.recovery_us() == 0.0;
   };
   // what a plugin says itself, and not what was done to its worker
   const auto words = [&](const report::v1::FaultRecord& fault) {

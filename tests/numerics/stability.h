@@ -27,6 +27,8 @@ double amplification_in_theory(const MotionMethod& method, const SpringCell& cel
 double stability_limit(const MotionMethod& method, double zeta);
 
 // As the engine does it: one world of masses on springs.
+// kOverflows where the theory has more: stages of such a step are no numbers, and it is refused.
+inline constexpr double kOverflows = 1e200;
 std::vector<double> amplifications(const MotionMethod& method, const std::vector<SpringCell>& cells);
 // Along the stiffest mode of the lattice, the cell's stiffness and damping being those of this mode.
 double lattice_amplification(const MotionMethod& method, const SpringCell& cell);

@@ -191,7 +191,7 @@ TEST(TimeOfImpact, ACubeAt1000MetresPerSecondDoesNotPassAThinWall) {
 }
 
 // A bar of 2 cm square over a thin plate, from flat to where its edge is at the height h: sin(phi + pi/4) = h/(a sqrt 2). Where it
-// leaves by a/2 a radian its edges stay above: a (1.2 + phi/2 - cos phi - sin phi) is least at sin phi - cos phi = -1/2, 0.088 a.
+// leaves by a/2 a radian its edges stay above: a (1.2 + phi/2 - cos phi - sin phi) is least at sin phi - cos phi = -1/2, 0.089 a.
 TEST(TimeOfImpact, OfABarThatSpinsManyTimes) {
   const double a = 0.01, high = 1.2;
   const Body plate(box(1, 5e-4, 1), at(0, -5e-4, 0), by(0, 0, 0));

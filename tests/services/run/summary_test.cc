@@ -31,13 +31,16 @@ TEST(Summary, AFaultInAStepThatWasInterruptedIsNotSurvived) {
   report.set_outcome("interrupted");
   report.set_steps(150);
   add_fault(100, &report);
-  add_fault(151, &report);
+  add_fault(151, &report)->set_recovery_us(0.0);
   const std::string text = summarize(report, {});
   EXPECT_THAT(text,
               HasSubstr("survived: step 100, solver Mine: deadline (it gave no answer within its deadline of 2000 "
                         "ms); standby took over in 1.5 ms\n"));
   EXPECT_THAT(text, HasSubstr("interrupted: step 151, solver Mine: deadline"));
   EXPECT_THAT(text, Not(HasSubstr("survived: step 151")));
+  // another had answered, before the run was interrupted
+  report.mutable_faults(1)->set_recovery_us(1500.0);
+  EXPECT_THAT(summarize(report, {}), HasSubstr("survived: step 151"));
 }
 
 TEST(Summary, AnOrderedFaultIsNamedByItsOrder) {

@@ -407,8 +407,9 @@ void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X
   const Vector3 half = R.cwiseAbs().transpose() * a.box().half_extents();
   const Vector3 middle = R.transpose() * (centre_a - X_AB.position);
   const Box3 box{middle - half, middle + half};
-  bool any = false, cross = false;
-  b.for_each_in(box.widened(margin + 1e-12 * half.maxCoeff()), [&](std::uint32_t tb) {
+  bool any = false, near = false, cross = false;
+  const double reach = margin + 1e-12 * half.maxCoeff();  // or rounding
+  b.for_each_in(box.widened(reach), [&](std::uint32_t tb) {
     std::array<Vector3, 3> corners = b.corners(tb);
     Box3 own;
     for (Vector3& corner : corners) own.extend(corner = X_AB.position + R * corner);
@@ -416,7 +417,8 @@ void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X
     a.for_each_in(own.widened(margin), [&](std::uint32_t ta) {
       const TriangleMap triangle_a(a.corners(ta), a.normal(ta));
       const PlacedPair pair{triangle_a, triangle_b, Matrix3::Identity(), Vector3::Zero()};
-      const Separation least = find_separation(pair, margin);
+      const Separation least = find_separation(pair, reach);
+      near = near || least.depth >= -reach;
       if (!(least.depth >= -margin)) return;
       cross = cross || least.depth > 0.0;
       const bool a_behind = !a.is_closed() && a.normal(ta).dot(centre_b - triangle_a.centre()) < 0.0;
@@ -449,7 +451,8 @@ void collide_mesh_mesh(const Shape& shape_a, const Shape& shape_b, const Pose& X
   if (other.depth < least.depth) least = other;
   if (std::isfinite(least.depth)) {
     out.add(TriangleMesh::kNone, least);
-  } else {
+  } else if (near && !cross) {
+    // surfaces that lie in each other
     part_as_hulls();
   }
 }

@@ -153,7 +153,6 @@ TEST(Mesh, ConvexMeshesInEachOtherPartAsHulls) {
   const std::vector<Vector3> corners = {{a, a, a}, {-a, -a, a}, {-a, a, -a}, {a, -a, -a}};
   const Shape& mesh = shapes.mesh(corners, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}});
   const Shape &hull = shapes.hull(corners), &cube = shapes.box_mesh({a, a, a}), &box = shapes.box_hull({a, a, a});
-  int counts = 0;
   for (const Vector3& offset : {Vector3(0, 0, 0), Vector3(0.03, 0.01, 0.02), Vector3(0.1, 0.05, 0.02),
                                 Vector3(0.2, 0.01, 0.02), Vector3(0.03, 0, 0)}) {
     for (const auto& [of_mesh, of_hull] : {std::pair(&mesh, &hull), std::pair(&cube, &box)}) {
@@ -164,12 +163,15 @@ TEST(Mesh, ConvexMeshesInEachOtherPartAsHulls) {
       for (std::size_t i = 0; i < known.size(); ++i) known_deepest = std::max(known_deepest, known[i].depth);
       for (std::size_t i = 0; i < found.size(); ++i) deepest = std::max(deepest, found[i].depth);
       SCOPED_TRACE(testing::Message() << offset.transpose());
+      ASSERT_EQ(found.size(), known.size());
       ASSERT_GT(found.size(), 0U);
       EXPECT_NEAR(deepest, known_deepest, 1e-12);
-      counts += found.size() == known.size() ? 1 : 0;
+      // of those that lie in the same place all ways out are as long
+      if (!offset.isZero(0.0)) {
+        EXPECT_GT(found[0].normal.dot(known[0].normal), 1.0 - 1e-9);
+      }
     }
   }
-  EXPECT_EQ(counts, 10);
 }
 
 TEST(Mesh, StandsOnItsVerticesOnAPlane) {
