@@ -12,8 +12,8 @@ namespace {
 constexpr int kFailure = 1;
 
 std::atomic<pid_t> guarded{0};           // the program; a child that a plugin forks is none
-std::atomic<int> open_guards{0};         // of all threads
-std::atomic<const char*> last{nullptr};  // who began last and is not done; null: the program
+std::atomic<int> open_guards{0};         // of the program itself
+std::atomic<const char*> last{nullptr};  // who began last; null once any thread is done
 
 void say(const std::string& text) {
   // NOLINTNEXTLINE(bugprone-unused-return-value): there is nobody left to tell
@@ -26,9 +26,10 @@ thread_local const ExitGuard* ExitGuard::innermost = nullptr;
 
 ExitGuard::ExitGuard(const char* plugin) : plugin_(plugin), outer_(innermost) {
   innermost = this;
-  open_guards.fetch_add(1, std::memory_order_relaxed);
   last.store(plugin, std::memory_order_relaxed);
-  if (plugin != nullptr || guarded != 0) return;
+  if (plugin != nullptr) return;
+  ++open_guards;
+  if (guarded != 0) return;
   guarded = getpid();
   listen_first();
 }
@@ -36,7 +37,7 @@ ExitGuard::ExitGuard(const char* plugin) : plugin_(plugin), outer_(innermost) {
 ExitGuard::~ExitGuard() {
   innermost = outer_;
   last.store(outer_ == nullptr ? nullptr : outer_->plugin_, std::memory_order_relaxed);
-  open_guards.fetch_sub(1, std::memory_order_relaxed);
+  if (plugin_ == nullptr) --open_guards;
 }
 
 void ExitGuard::listen_first() {

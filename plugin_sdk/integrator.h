@@ -52,12 +52,13 @@ class Derivatives {
   // Those of the forces alone: without what joints do, which simulator Smooth adds.
   std::span<const double> forces(double time, const TrialColumns& trial);
 
-  // For methods that keep to the joints within a step: how joints have to push in the state that wrenches() was last asked for, along
-  // J^T there, six numbers a body.
-  //   place_impulses     W, kg m, with J M^-1 W = -(joints' errors in the trial state): what W/s is added to the momenta there moves
-  //                      the bodies in a time s to where joints want them, to first order in s
+  // For methods that keep to the joints within a step: how joints have to push in the state that wrenches() was last asked
+  // for, along J^T there, six numbers a body.
+  //   place_impulses     W, kg m, with J M^-1 W = -(joints' errors in the trial state): W/s, added to the momenta there,
+  //                      moves the bodies in a time s to where joints want them, to first order in s
   //   velocity_impulses  W, N s, with J M^-1 W = -(J v of the trial state - what joints want)
-  // Empty where joints hold by other than locks alone (limits, drives, friction, springs), or there are none. Throws as wrenches().
+  // Empty where joints hold by other than locks alone (limits, drives, friction, springs), or there are none. Throws as
+  // wrenches().
   std::span<const double> place_impulses(double time, const TrialColumns& trial);
   std::span<const double> velocity_impulses(double time, const TrialColumns& trial);
 

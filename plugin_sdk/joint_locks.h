@@ -1,4 +1,5 @@
-// Joints that hold by locks alone, as integrators need them that keep to the joints while they go (Derivatives::place_impulses).
+// Joints that hold by locks alone, as integrators need them that keep to the joints while they go
+// (Derivatives::place_impulses).
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
-// What an integrator asks of the joints that keeps to them while it goes (plugin_sdk/integrator.h, place_impulses): how they have
-// to push where the last derivative was asked for, so that the bodies come to where joints want them.
+// What an integrator asks of the joints that keeps to them while it goes (plugin_sdk/integrator.h, place_impulses): how they
+// have to push where the last derivative was asked for, so that the bodies come to where joints want them.
 //
-// Both answers are reactions of bodies at rest in the poses of that derivative, J M^-1 W = -e, where e are errors of place, or of
-// velocity, instead of accelerations.
+// Both answers are reactions of bodies at rest in the poses of that derivative, J M^-1 W = -e, where e are errors of place,
+// or of velocity, instead of accelerations.
 #include <algorithm>
 
 #include "kernel/environment.h"

@@ -334,7 +334,7 @@ void TriangleMap::contour(const Vector3& n, double sine, Contour* out) const {
   const double towards = n.dot(normal_);
   if (std::fabs(towards) >= std::sqrt(1.0 - sine * sine)) {
     out->normal = towards < 0.0 ? Vector3(-normal_) : normal_;
-    out->code = towards < 0.0 ? 8 : 7;
+    out->code = towards < 0.0 ? kBack : kFront;
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t i = towards < 0.0 ? 2 - k : k;
       out->add(corners_[i], 1 + i);

@@ -68,6 +68,9 @@ std::unique_ptr<SupportMap> make_support_map(const SceneShape& shape);
 // A flat triangle, as a solid of no thickness.
 class TriangleMap final : public SupportMap {
  public:
+  // Codes of its face in contours, seen from its normal's side and from the other.
+  static constexpr std::uint32_t kFront = 7, kBack = 8;
+
   // `normal`: unit, that of the corners' order.
   TriangleMap(const std::array<Vector3, 3>& corners, const Vector3& normal);
   Vector3 support(const Vector3& d) const override;

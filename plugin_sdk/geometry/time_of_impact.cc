@@ -153,10 +153,11 @@ class ConvexApproach {
   }
 
   double step(double half_target, double rest) const {
-    double step = step_of(normal_, half_target, rest);
-    if (step >= rest) return rest;
+    const double ahead = look_ahead(a_.rate() + b_.rate(), rest);
+    double step = step_of(normal_, half_target, ahead, rest);
+    if (step >= ahead) return step;
     const auto try_plane = [&](const Vector3& normal, const Vector3& turn) {
-      if (step < rest) step = std::max(step, step_along(normal, turn, half_target, rest));
+      if (step < ahead) step = std::max(step, step_along(normal, turn, half_target, ahead));
     };
     // rounding tilts the plane of points that lie close; those of the features it belongs to are exact
     Contour on_a, on_b;
@@ -183,12 +184,13 @@ class ConvexApproach {
   // Of features that meet a plane.
   static constexpr double kFlush = 1e-6;
 
-  // How far a plane surely parts them that stays as it is, or turns along with either solid.
-  double step_of(const Vector3& normal, double half_target, double rest) const {
-    double step = step_along(normal, Vector3::Zero(), half_target, rest);
+  // How far a plane surely parts them that stays as it is, or turns along with either solid: within `ahead`, or of what is
+  // out of reach however it turns, within `rest`.
+  double step_of(const Vector3& normal, double half_target, double ahead, double rest) const {
+    double step = step_along(normal, Vector3::Zero(), half_target, ahead);
     for (const TurningCore* core : {&a_, &b_})
-      if (step > 0.0 && step < rest && !core->spin().isZero(0.0))
-        step = std::max(step, step_along(normal, core->spin(), half_target, rest));
+      if (step > 0.0 && step < ahead && !core->spin().isZero(0.0))
+        step = std::max(step, step_along(normal, core->spin(), half_target, ahead));
     const double swept =
         normal.dot(centres_) - a_.swept_support(normal) - b_.swept_support(-normal) - rounding_ - half_target;
     if (step < rest && swept > 0.0) {
@@ -199,15 +201,14 @@ class ConvexApproach {
   }
 
   // The same of one that turns along with w.
-  double step_along(const Vector3& normal, const Vector3& w, double half_target, double span) const {
-    const double rest = look_ahead(a_.rate() + b_.rate(), span);
-    const Drift drift(normal, centres_, velocity_, w, rest);
+  double step_along(const Vector3& normal, const Vector3& w, double half_target, double ahead) const {
+    const Drift drift(normal, centres_, velocity_, w, ahead);
     const TurningCore::Swing of_a = a_.swing(normal, w), of_b = b_.swing(-normal, w);
     const auto bound = [&](double s) {
       return drift(s) - a_.support(of_a, s) - b_.support(of_b, s) - rounding_ - half_target;
     };
     const double at_zero = bound(0.0);
-    return at_zero > 0.0 ? safe_step(bound, at_zero, rest) : 0.0;
+    return at_zero > 0.0 ? safe_step(bound, at_zero, ahead) : 0.0;
   }
 
   TurningCore a_, b_;

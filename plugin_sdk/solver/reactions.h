@@ -3,8 +3,8 @@
 //   J M^-1 J^T lambda = -(gamma + J a),   reaction = J^T lambda
 //
 // a is what forces, the gyroscopic term and drag make of each body (of a kinematic one what it is given), gamma what
-// the velocities alone do to the second derivative of each row's error, less its desired acceleration. Points of a discrepancy are carried by their
-// bodies, its axes by body 1, a radial axis by its points; with w the relative velocity of the points seen from body 1,
+// the velocities alone do to the second derivative of each row's error, less its desired acceleration. Points of a
+// discrepancy are carried by their bodies, its axes by body 1, a radial axis by its points; with w the relative velocity of the points seen from body 1,
 //
 //   along an axis      gamma = a.(w2 x (w2 x r2) - w1 x (w1 x r1) - 2 w1 x w),   r2 the arm to body 2's point, r1 to where
 //                      that is once the held axes are at their targets, w along the other axes
@@ -70,8 +70,8 @@ void solve_reactions(const stage::SolverReactionsRequest& request, const stage::
 //   dR = d(J^T) lambda + dS + J^T dlambda,   J M^-1 J^T dlambda = -(dgamma + dJ a + J M^-1 (dF + dS + d(J^T) lambda)),
 //
 // S what springs do and a the accelerations with the reactions: one factorisation, and for each of the twelve numbers of a
-// body the rows of its own joints and one substitution, in each mechanism that it or a force carries them to. Where the answer is that of the nearest state that agrees with the
-// joints, states are moved along what these allow.
+// body the rows of its own joints and one substitution, in each mechanism that it or a force carries them to. Where the
+// answer is that of the nearest state that agrees with the joints, states are moved along what these allow.
 void differentiate_reactions(const stage::SolverReactionsRequest& request,
                              const stage::SolverReactionJacobiansReply& reply);
 

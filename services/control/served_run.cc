@@ -48,8 +48,10 @@ ServedRun::ServedRun(const ServeOptions& options)
       timer_(loop_) {
   for (const std::string& path : options.run.scenes) scene_name_ += (scene_name_.empty() ? "" : " ") + path;
   require_separate_files(options_, first_scene_, {});
+  // whom only these name, the command that goes on must name, too
+  Catalog named = catalog_;
   for (const std::string& text : options_.comparisons)
-    comparisons_.push_back(resolve_swap(parse_compare("--compare", text), first_description_, &catalog_));
+    comparisons_.push_back(resolve_swap(parse_compare("--compare", text), first_description_, &named));
   if (options_.resume.empty()) {
     begin_environment(nullptr);
   } else {

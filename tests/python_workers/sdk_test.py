@@ -1,6 +1,7 @@
 """The Python SDK: its columns against protobuf and the golden messages, declared properties, and a worker that is
 asked over a socket."""
 
+import contextlib
 import os
 import pathlib
 import queue
@@ -53,6 +54,13 @@ def random_message(kind, draw):
         else:
             setattr(message, field.name, one())
     return message
+
+
+@contextlib.contextmanager
+def no_stacks():
+    """What a plugin's failure writes goes nowhere."""
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stderr(nowhere):
+        yield
 
 
 class Columns(unittest.TestCase):
@@ -324,10 +332,8 @@ class Talk(unittest.TestCase):
         self.ready()
 
     def test_a_plugin_that_cannot_be_made_says_why(self):
-        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")
-        _, answer = self.hello(plugins=[control_pb2.PluginSettings(plugin="Midpoint", numbers=[0.25])])
-        sys.stderr.close()
-        sys.stderr = stderr
+        with no_stacks():
+            _, answer = self.hello(plugins=[control_pb2.PluginSettings(plugin="Midpoint", numbers=[0.25])])
         self.assertTrue(answer.HasField("refusal"), answer)
         self.assertRegex(answer.refusal.text, r"Midpoint: it cannot be made: SystemExit: no quarters \(.*sdk_test\.py:\d+\)")
 
@@ -403,27 +409,22 @@ class Talk(unittest.TestCase):
         stream.send(self.answer([1.0] * 12))
         self.assertEqual(self.reply(stream.send(self.answer([1.0] * 12))).outcome.status, call_pb2.Outcome.STATUS_OK)
 
+    def failure(self, stream, time):
+        with no_stacks():
+            return self.reply(stream.send(self.request(time=time))).outcome
+
     def test_failures_of_the_plugin_are_told(self):
         _, stream = self.ready()
-        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")  # its stack
-        outcome = self.reply(stream.send(self.request(time=2.0))).outcome
-        sys.stderr.close()
-        sys.stderr = stderr
+        outcome = self.failure(stream, time=2.0)
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
         # with the line that raised
         self.assertRegex(outcome.text, r"ValueError: broken at two \(.*sdk_test\.py:\d+\)")
         # an exit would end the plugin's thread alone
-        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")
-        outcome = self.reply(stream.send(self.request(time=5.0))).outcome
-        sys.stderr.close()
-        sys.stderr = stderr
+        outcome = self.failure(stream, time=5.0)
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
         self.assertRegex(outcome.text, r"SystemExit: 6 \(.*sdk_test\.py:\d+\)")
         # a column that no reply has
-        stderr, sys.stderr = sys.stderr, open(os.devnull, "w")
-        outcome = self.reply(stream.send(self.request(time=9.0))).outcome
-        sys.stderr.close()
-        sys.stderr = stderr
+        outcome = self.failure(stream, time=9.0)
         self.assertEqual(outcome.status, call_pb2.Outcome.STATUS_FAILED)
         self.assertRegex(outcome.text, r"AttributeError: the reply has no column 'orientaton'; allowed: position, ")
         stream.send(self.request(time=3.0))

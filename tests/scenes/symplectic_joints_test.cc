@@ -24,12 +24,7 @@ std::vector<std::string> of_order(int order, double time_step) {
           set("Simulator.TimeStep", time_step)};
 }
 
-struct Start {
-  Pose pose;
-  Twist twist;
-};
-
-std::string body(const std::string& id, const std::string& moments, const Start& start) {
+std::string body(const std::string& id, const std::string& moments, const SceneRun::Motion& start) {
   return "Body { Id = \"" + id + "\" Mass = 1 PrincipalMoments = " + moments + " Forces = {\"Down\"} " +
          "KineticProperties { Position = " + literal(start.pose.position) +
          " Orientation = " + literal(start.pose.orientation) + " LinearVelocity = " + literal(start.twist.linear) +
@@ -53,7 +48,7 @@ std::string top() {
 }
 
 // Two rods in space, on a ball joint and a Hooke's joint.
-std::string rods(const Start& upper, const Start& lower) {
+std::string rods(const SceneRun::Motion& upper, const SceneRun::Motion& lower) {
   const Vector3 cross = upper.pose.position + upper.pose.orientation * Vector3(0.5, 0, 0);
   return scene(
       body("Upper", "{0.03, 0.08, 0.055}", upper) + body("Lower", "{0.03, 0.08, 0.055}", lower),
@@ -95,7 +90,7 @@ TEST(SymplecticJoints, RunsBackToItsStart) {
     there.steps(300);
     const auto turned_round = [&](const std::string& id) {
       const SceneRun::Motion now = there.body(id);
-      return Start{now.pose, {-now.twist.linear, -now.twist.angular}};
+      return SceneRun::Motion{now.pose, {-now.twist.linear, -now.twist.angular}};
     };
     EXPECT_GT((there.body("Lower").pose.position - start.second.pose.position).norm(), 0.1);
     SceneRun back(rods(turned_round("Upper"), turned_round("Lower")), of_order(order, 0.01));

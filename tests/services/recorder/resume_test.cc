@@ -472,7 +472,18 @@ TEST(Recorder, ARunWithoutCheckpointsWritesNoFile) {
   EXPECT_EQ(result.checkpoint, "");
 }
 
-// Its name and version are those of before.
+// Goes on from options.checkpoint, which a run to its steps leaves, with another build of a library; name and version are those of
+// before.
+RunResult with_another_build(const std::string& library, RunOptions options) {
+  EXPECT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
+  options.resume = std::exchange(options.checkpoint, "");
+  options.steps = 60;
+  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
+  // what stands behind an ELF file's sections changes nothing but the file
+  std::ofstream(library, std::ios::app) << "another build";
+  return run_quietly(options);
+}
+
 TEST(ResumedRun, ALibraryThatWasBuiltAnewIsTold) {
   const ScratchFolder folder;
   const std::string library = folder.path("mine.so");
@@ -482,14 +493,7 @@ TEST(ResumedRun, ALibraryThatWasBuiltAnewIsTold) {
   RunOptions options = options_of("bounce", Hosting::kSharedMemory, 40, {"Integrator=Verlet"});
   options.scenes.push_back(plugins);
   options.checkpoint = folder.path("kept");
-  ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
-  options.resume = options.checkpoint;
-  options.checkpoint.clear();
-  options.steps = 60;
-  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
-  // what stands behind an ELF file's sections changes nothing but the file
-  std::ofstream(library, std::ios::app) << "another build";
-  const RunResult result = run_quietly(options);
+  const RunResult result = with_another_build(library, options);
   EXPECT_EQ(result.outcome, RunOutcome::kCompleted) << result.fault;
   EXPECT_THAT(result.report.warnings(),
               Contains(HasSubstr("plugin Verlet: '" + library + "' was built anew since the checkpoint")));
@@ -503,13 +507,8 @@ TEST(ResumedRun, ALibraryThatWasSwappedInAndBuiltAnewIsTold) {
   RunOptions options = options_of("bounce", Hosting::kSharedMemory, 40);
   options.swaps = {"integrator=" + library + "@step=20"};
   options.checkpoint = folder.path("kept");
-  ASSERT_EQ(run_quietly(options).outcome, RunOutcome::kCompleted);
-  options.resume = options.checkpoint;
-  options.checkpoint.clear();
-  options.steps = 60;
-  EXPECT_THAT(run_quietly(options).report.warnings(), Not(Contains(HasSubstr("built anew"))));
-  std::ofstream(library, std::ios::app) << "another build";
-  EXPECT_THAT(run_quietly(options).report.warnings(), Contains(HasSubstr("was built anew since the checkpoint")));
+  EXPECT_THAT(with_another_build(library, options).report.warnings(),
+              Contains(HasSubstr("was built anew since the checkpoint")));
 }
 
 }  // namespace

@@ -195,7 +195,7 @@ bool leads_out_inside_flat_face(const TriangleMesh& mesh, std::uint32_t t, const
 
 bool is_of_face(std::uint32_t feature) {
   const std::uint32_t code = feature >> 15;
-  return code == 7 || code == 8;
+  return code == TriangleMap::kFront || code == TriangleMap::kBack;
 }
 
 bool is_inside_flat_face(const TriangleMesh& mesh, std::uint32_t t, bool is_turned, std::uint32_t feature) {

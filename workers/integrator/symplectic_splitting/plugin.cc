@@ -7,19 +7,20 @@
 // Order 2: s = 1. Order 4: Suzuki's g = (p, p, 1 - 4p, p, p), p = 1/(4 - 4^(1/3)). Order 6: the nine of Kahan and Li,
 // Math. Comp. 66 (1997) 1089, s9odr6a. All inner times lie within the step. Derivatives a step: 2, 6, 10, and one more
 // to see whether the forces depend on velocity (none where the wrench is constant).
-// Under constant forces and no torque one drift is exact and order 2 is taken. Without torque nothing but rounding is between the result and the truth, at any step: position, attitude, energy and
-// angular momentum. With forces that depend on position and attitude alone the method is symplectic and symmetric: the
+// Under constant forces and no torque one drift is exact and order 2 is taken. Without torque nothing but rounding is
+// between the result and the truth, at any step: position, attitude, energy and angular momentum. With forces that depend on position and attitude alone the method is symplectic and symmetric: the
 // energy of long runs wanders within O(h^order) and does not drift. Stability: an oscillator is stable up to h w = 2
 // (order 2), 2.72 (order 4), 2.53 (order 6).
-// With joints that hold by locks alone each pair of kicks and the drift between them are a step of RATTLE, with the free rotor as
-// its drift: impulses along the joints' directions before it bring the bodies to where joints want them after it,
+// With joints that hold by locks alone each pair of kicks and the drift between them are a step of RATTLE, with the free
+// rotor as its drift: impulses along the joints' directions before it bring the bodies to where joints want them after it,
 //   v' = v + M^-1 (s f/2 + J^T(q) lambda),   (q1, v1) = drift(s)(q, v'),   g(q1) = 0
 //   v1 += M^-1 (s f(q1)/2 + J^T(q1) mu),   J(q1) v1 = what joints want
 // That is symmetric and symplectic, and so is each composition of it, which has its order. lambda is found by chords with the
 // directions before the drift, from what joints bear there: four to eight questions a drift.
-// Where a force does depend on velocity, or joints have limits with room, drives, friction or springs, or lambda is not found
-// (bodies that turn by more than about half a radian in a drift, poses where rows depend on each other), a kick is one Runge-Kutta
-// step in the velocities alone, of order 4 (classical), with order 6 of that (Butcher's), and the whole is not symplectic.
+// Where a force does depend on velocity, or joints have limits with room, drives, friction or springs, or lambda is not
+// found (bodies that turn by more than about half a radian in a drift, poses where rows depend on each other), a kick is one
+// Runge-Kutta step in the velocities alone, of order 4 (classical), with order 6 of that (Butcher's), and the whole is not
+// symplectic.
 // Damping c is part of the drift: s becomes (1 - e^(-c s))/c and velocities shrink by e^(-c s), exact again since a
 // free rotor whose momentum decays is one in slowed time. So is then the acceleration f_0/m of the start, and kicks are of what
 // forces differ from it by: a damped body falls exactly. Where c h > 1 and the composition has steps back, it drifts along that
@@ -103,10 +104,10 @@ class SymplecticSplitting final : public IntegratorPlugin {
     const std::span<const double> weights = needs_no_composition() ? std::span<const double>(kStrang) : weights_;
     const std::span<const double> start = derivatives.wrenches_at_start();
     start_wrench_.assign(start.begin(), start.end());
-    const bool has_joints = !find_what_acts(&derivatives);
-    if (has_joints && keep_to_joints(weights, &derivatives))
+    const bool joints_alone_feel_velocity = find_what_feels_velocity(&derivatives);
+    if (joints_alone_feel_velocity && keep_to_joints(weights, &derivatives))
       return for_each_body(request, reply, [&](std::size_t i, const BodyState&) { return trial_.at(i); });
-    if (has_joints) begin(request, derivatives);
+    if (joints_alone_feel_velocity) begin(request, derivatives);
 
     find_steady(start_wrench_);
     slow_halves(0.0);
@@ -169,20 +170,20 @@ class SymplecticSplitting final : public IntegratorPlugin {
     }
   }
 
-  // Sets depends_on_velocity_, of all that acts. False where joints are what feels velocities, and forces do not.
-  bool find_what_acts(Derivatives* derivatives) {
+  // Sets depends_on_velocity_, of all that acts. True where what joints do depends on velocities, and forces do not.
+  bool find_what_feels_velocity(Derivatives* derivatives) {
     depends_on_velocity_ = false;
-    if (request_->wrench_is_constant() != 0 || size() == 0) return true;
+    if (request_->wrench_is_constant() != 0 || size() == 0) return false;
     const auto is_same = [](std::span<const double> a, std::span<const double> b) {
       return std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
     };
     // what joints bear changes with velocities, too, though it be nothing at the start
     const TrialColumns& shifted = shifted_velocities();
-    if (is_same(derivatives->wrenches(request_->time(), shifted), start_wrench_)) return true;
+    if (is_same(derivatives->wrenches(request_->time(), shifted), start_wrench_)) return false;
     depends_on_velocity_ = true;
     const std::span<const double> forces = derivatives->forces(request_->time(), trial_);
     forces_.assign(forces.begin(), forces.end());
-    return !is_same(derivatives->forces(request_->time(), shifted), forces_);
+    return is_same(derivatives->forces(request_->time(), shifted), forces_);
   }
 
   // Other for each body and axis, since a damper feels their difference.
