@@ -16,6 +16,7 @@ void add_run(CLI::App* app, Action* action);
 void add_plan(CLI::App* app, Action* action);
 void add_plugins(CLI::App* app, Action* action);
 void add_describe(CLI::App* app, Action* action);
+void add_new(CLI::App* app, Action* action);
 void add_check(CLI::App* app, Action* action);
 void add_capture(CLI::App* app, Action* action);
 void add_replay(CLI::App* app, Action* action);

@@ -102,6 +102,7 @@ int main(int argc, char** argv) {
   cli::add_plan(&app, &action);
   cli::add_plugins(&app, &action);
   cli::add_describe(&app, &action);
+  cli::add_new(&app, &action);
   cli::add_check(&app, &action);
   cli::add_capture(&app, &action);
   cli::add_replay(&app, &action);

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::string_view kStageFrames = "schemas/stage_frames.h";
 constexpr std::string_view kWorkerHost = "plugin_sdk/host/";
+constexpr std::string_view kTemplates = "services/scaffold/templates/";
 
 bool starts_with_room(std::string_view include) {
   return include.find('/') != std::string_view::npos &&
@@ -29,6 +30,14 @@ std::string plugin_folder(std::string_view path) {
   const std::size_t slot_end = path.find('/', path.find('/') + 1);
   const std::size_t name_end = slot_end == std::string_view::npos ? slot_end : path.find('/', slot_end + 1);
   return std::string(path.substr(0, name_end == std::string_view::npos ? path.rfind('/') + 1 : name_end + 1));
+}
+
+// True for a header that will stand beside the file in the project that it is a template of.
+bool is_of_project(const SourceTree& tree, const std::string& path, const std::string& include) {
+  if (!path.starts_with(kTemplates) || include.find('/') != std::string::npos) return false;
+  const std::string own = path.substr(0, path.rfind('/') + 1), shared = std::string(kTemplates) + "every_kind/";
+  return std::ranges::any_of(
+      tree.files, [&](const std::string& file) { return file == own + include || file == shared + include; });
 }
 
 // why a file of `path` must not include `include`, a header of ours; empty when it may
@@ -56,6 +65,12 @@ std::string objection(const std::string& path, std::string_view include) {
              "folder only";
     }
   }
+  if (path.starts_with(kTemplates)) {
+    const bool sdk = to == "plugin_sdk" && !include.starts_with(kWorkerHost);
+    return sdk || include == kStageFrames
+               ? ""
+               : "a new project may include plugin_sdk (without host/) and schemas/stage_frames.h only";
+  }
   if (from == "services" && !only({"schemas", "plugin_sdk", "kernel", "services"})) {
     return "services may include schemas, plugin_sdk and kernel only";
   }
@@ -81,7 +96,7 @@ std::vector<Finding> find_wrong_includes(const SourceTree& tree) {
         reason = "includes are spelt from the root, without ../";
       } else if (ours) {
         reason = objection(path, include);
-      } else if (match[1] == "\"") {
+      } else if (match[1] == "\"" && !is_of_project(tree, path, include)) {
         reason = "quotes are for headers of ours, spelt from the root";
       }
       if (!reason.empty()) {

@@ -3,6 +3,8 @@
 //   schemas <- plugin_sdk <- workers (each its own folder only; not the worker host)
 //   schemas, plugin_sdk (not the worker host) <- kernel <- services
 //   tests may include everything; nothing includes tests or deploy
+//   services/scaffold/templates/ are files of projects of their own: plugin_sdk (not the worker host), and by their names
+//   the headers that stand beside them there
 //
 // Generated headers are spelt "schemas/stage_frames.h" and "gravitas/<area>/v1/...".
 #pragma once

@@ -30,6 +30,10 @@ TEST(IncludeArrows, AllowedOnesPass) {
       {"workers/force/x/a.cc", "#include \"plugin_sdk/b.h\"\n#include \"schemas/stage_frames.h\"\n"},
       {"workers/force/x/part/a.cc", "#include \"workers/force/x/a.h\"\n"},
       {"services/a.cc", "#include \"kernel/a.h\"\n#include \"plugin_sdk/b.h\"\n"},
+      {"services/scaffold/templates/force/plugin.cc",
+       "#include \"a.h\"\n#include \"b.h\"\n#include \"plugin_sdk/b.h\"\n"},
+      {"services/scaffold/templates/force/a.h", ""},
+      {"services/scaffold/templates/every_kind/b.h", ""},
       {"tests/kernel/a_test.cc", "#include \"kernel/a.h\"\n#include \"workers/force/x/a.h\"\n"},
   });
   EXPECT_EQ(report(find_wrong_includes(sample.tree())), "");
@@ -52,24 +56,28 @@ TEST_P(WrongArrows, IsFoundOnItsLine) {
   EXPECT_TRUE(found.starts_with(GetParam().path + ":1: ")) << "found: '" << found << "'";
 }
 
-INSTANTIATE_TEST_SUITE_P(Every, WrongArrows,
-                         testing::Values(WrongArrow{"schemas/a.cc", "#include \"plugin_sdk/b.h\""},
-                                         WrongArrow{"plugin_sdk/a.h", "#include \"kernel/a.h\""},
-                                         WrongArrow{"plugin_sdk/a.h", "#include <services/a.h>"},
-                                         WrongArrow{"plugin_sdk/a.h", "#include \"workers/hello/a.h\""},
-                                         WrongArrow{"kernel/a.cc", "#include \"workers/force/x/a.h\""},
-                                         WrongArrow{"kernel/a.cc", "#  include \"services/a.h\""},
-                                         WrongArrow{"kernel/a.cc", "#include \"tests/a.h\""},
-                                         WrongArrow{"kernel/a.cc", "#include \"plugin_sdk/host/host.h\""},
-                                         WrongArrow{"workers/force/x/a.cc", "#include \"kernel/a.h\""},
-                                         WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/y/a.h\""},
-                                         WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/xy/a.h\""},
-                                         WrongArrow{"workers/force/x/a.cc", "#include \"plugin_sdk/host/host.h\""},
-                                         WrongArrow{"workers/force/x/a.cc", "#include \"gravitas/stage/v1/f.pb.h\""},
-                                         WrongArrow{"workers/force/x/a.cc", "#include \"a.h\""},
-                                         WrongArrow{"services/a.cc", "#include \"workers/hello/a.h\""},
-                                         WrongArrow{"services/a.cc", "#include \"../kernel/a.h\""},
-                                         WrongArrow{"tests/kernel/a_test.cc", "#include \"../../kernel/a.h\""}));
+INSTANTIATE_TEST_SUITE_P(
+    Every, WrongArrows,
+    testing::Values(WrongArrow{"schemas/a.cc", "#include \"plugin_sdk/b.h\""},
+                    WrongArrow{"plugin_sdk/a.h", "#include \"kernel/a.h\""},
+                    WrongArrow{"plugin_sdk/a.h", "#include <services/a.h>"},
+                    WrongArrow{"plugin_sdk/a.h", "#include \"workers/hello/a.h\""},
+                    WrongArrow{"kernel/a.cc", "#include \"workers/force/x/a.h\""},
+                    WrongArrow{"kernel/a.cc", "#  include \"services/a.h\""},
+                    WrongArrow{"kernel/a.cc", "#include \"tests/a.h\""},
+                    WrongArrow{"kernel/a.cc", "#include \"plugin_sdk/host/host.h\""},
+                    WrongArrow{"workers/force/x/a.cc", "#include \"kernel/a.h\""},
+                    WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/y/a.h\""},
+                    WrongArrow{"workers/force/x/a.cc", "#include \"workers/force/xy/a.h\""},
+                    WrongArrow{"workers/force/x/a.cc", "#include \"plugin_sdk/host/host.h\""},
+                    WrongArrow{"workers/force/x/a.cc", "#include \"gravitas/stage/v1/f.pb.h\""},
+                    WrongArrow{"workers/force/x/a.cc", "#include \"a.h\""},
+                    WrongArrow{"services/a.cc", "#include \"workers/hello/a.h\""},
+                    WrongArrow{"services/a.cc", "#include \"../kernel/a.h\""},
+                    WrongArrow{"services/scaffold/templates/force/a.cc", "#include \"b.h\""},
+                    WrongArrow{"services/scaffold/templates/force/a.cc", "#include \"kernel/a.h\""},
+                    WrongArrow{"services/scaffold/templates/force/a.cc", "#include \"services/a.h\""},
+                    WrongArrow{"tests/kernel/a_test.cc", "#include \"../../kernel/a.h\""}));
 
 }  // namespace
 }  // namespace gravitas::structure

@@ -113,7 +113,7 @@ TEST(Describe, WhatIsNotInstalledIsAnErrorThatListsWhatIs) {
 TEST(Help, OfEverySubcommandHasAnExample) {
   const ScratchFolder folder;
   EXPECT_EQ(run_program({"--help"}, folder).exit_code, 0);
-  for (const char* command : {"run", "plan", "plugins", "describe", "check"}) {
+  for (const char* command : {"run", "plan", "plugins", "describe", "new", "check"}) {
     const ProgramResult result = run_program({command, "--help"}, folder);
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out, HasSubstr(std::string("Example: gravitas ") + command));

@@ -1,0 +1,220 @@
+// `gravitas new`: what it writes is built, tested and used by the very commands that its README names, and what it refuses leaves
+// nothing behind.
+#include "services/scaffold/new_project.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/shell_word.h"
+#include "tests/paths.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas::scaffold {
+namespace {
+
+using harness::ProgramResult;
+using harness::read_file;
+using harness::run_program;
+using harness::ScratchFolder;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// Of a shell script: how it ended, and both of its outputs.
+struct ScriptResult {
+  int exit_code = -1;
+  std::string words;
+};
+ScriptResult run_script(const std::string& folder, const std::string& script) {
+  const std::string command =
+      "cd " + shell_word(folder) + " && exec bash -eo pipefail -c " + shell_word(script) + " 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return {};
+  ScriptResult result;
+  for (int c = std::fgetc(pipe); c != EOF; c = std::fgetc(pipe)) result.words += static_cast<char>(c);
+  const int status = pclose(pipe);
+  result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return result;
+}
+
+// The commands of a README, block by block.
+std::vector<std::string> commands_of(const std::string& readme) {
+  std::vector<std::string> blocks;
+  bool is_inside = false;
+  std::istringstream lines(readme);
+  for (std::string line; std::getline(lines, line);) {
+    if (line == "```sh") blocks.emplace_back();
+    if (is_inside && line != "```") blocks.back() += line + '\n';
+    is_inside = line == "```sh" || (is_inside && line != "```");
+  }
+  return blocks;
+}
+
+bool has(const std::string& block, const char* word) { return block.find(word) != std::string::npos; }
+
+// Those which come to an end by themselves, and need neither a debugger nor another terminal.
+std::string plain_commands(const std::string& readme) {
+  std::string script;
+  for (const std::string& block : commands_of(readme))
+    if (!has(block, "gdb ") && !has(block, "serve ") && !has(block, "ctl ") && !has(block, "unix:")) script += block;
+  return script;
+}
+
+// A server beside which the commands to it are given.
+std::string live_commands(const std::string& readme) {
+  const std::vector<std::string> blocks = commands_of(readme);
+  const auto block_with = [&](const char* word) {
+    return *std::ranges::find_if(blocks, [&](const std::string& block) { return has(block, word); });
+  };
+  std::string serve = block_with("gravitas serve ");
+  serve.pop_back();
+  return blocks[0] + "export XDG_RUNTIME_DIR=$PWD/build\n" + serve + " &\ntrap \"kill $!\" EXIT\n" +
+         "until gravitas ctl status >/dev/null 2>&1; do kill -0 $!; done\n" + block_with("gravitas ctl ");
+}
+
+// A compiler is asked again only where something changed.
+const char* const kWithCache =
+    "if command -v ccache >/dev/null; then\n"
+    "  export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=true\n"
+    "fi\n";
+
+struct Scaffold {
+  const char* kind;
+  const char* name;
+  const char* file;
+};
+void PrintTo(const Scaffold& one, std::ostream* out) { *out << one.kind; }
+std::string kind_of(const testing::TestParamInfo<Scaffold>& one) { return one.param.kind; }
+
+class NewProject : public testing::TestWithParam<Scaffold> {};
+
+TEST_P(NewProject, IsBuiltTestedAndUsedAsItsReadmeSays) {
+  const ScratchFolder folder;
+  const ProgramResult written = run_program({"new", GetParam().kind, GetParam().name}, folder);
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  EXPECT_EQ(written.err, "");
+  EXPECT_THAT(written.out, HasSubstr(std::string("\nnext:\n  cd ") + GetParam().file + "\n  cmake -B build -G Ninja"));
+  const std::string project = folder.path(GetParam().file);
+  const std::string readme = read_file(project + "/README.md");
+  const ScriptResult ended = run_script(project, kWithCache + plain_commands(readme));
+  EXPECT_EQ(ended.exit_code, 0) << ended.words;
+  EXPECT_THAT(ended.words, HasSubstr("100% tests passed, 0 tests failed out of 3"));
+  EXPECT_THAT(ended.words, Not(HasSubstr("warning: ")));
+  const ScriptResult live = run_script(project, live_commands(readme));
+  EXPECT_EQ(live.exit_code, 0) << live.words;
+  // nothing of the template's own is left, of names or of what stands between two @
+  const ScriptResult left = run_script(project, "grep -rnE 'MyName|my_name|@[A-Z_]+@' --exclude-dir=build . || true");
+  EXPECT_EQ(left.words, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, NewProject,
+                         testing::Values(Scaffold{"space", "XSweep", "x_sweep"},
+                                         Scaffold{"collision", "BallsOnly", "balls_only"},
+                                         Scaffold{"constraint", "In_Plane", "in_plane"},
+                                         Scaffold{"force", "MyWind", "my_wind"}, Scaffold{"solver", "PGS", "pgs"},
+                                         Scaffold{"integrator", "String", "string"}),
+                         kind_of);
+
+TEST(NewPythonProject, IsTestedAndUsedAsItsReadmeSays) {
+  const ScratchFolder folder;
+  const ProgramResult written =
+      run_program({"new", "force", "MyWind", "--language", "python", "--out", "a wind"}, folder);
+  ASSERT_EQ(written.exit_code, 0) << written.err;
+  EXPECT_THAT(written.out, HasSubstr("\nnext:\n  cd 'a wind'\n  /usr/bin/python3 -B my_wind_test.py\n"));
+  const std::string project = folder.path("a wind");
+  const ScriptResult ended = run_script(project, plain_commands(read_file(project + "/README.md")));
+  EXPECT_EQ(ended.exit_code, 0) << ended.words;
+  EXPECT_THAT(ended.words, HasSubstr("Ran 3 tests"));
+  const ScriptResult left = run_script(project, "grep -rnE 'MyName|my_name|@[A-Z_]+@' . || true");
+  EXPECT_EQ(left.words, "");
+}
+
+// A checkout that is none, or that is not built, is named with what is required.
+TEST(NewProjectBuild, SaysWhatIsMissing) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run_program({"new", "force", "MyWind"}, folder).exit_code, 0);
+  const std::string project = folder.path("my_wind");
+  const ScriptResult no_tree = run_script(project, "cmake -B build -G Ninja -DGRAVITAS=/nowhere");
+  EXPECT_NE(no_tree.exit_code, 0);
+  EXPECT_THAT(no_tree.words, HasSubstr("GRAVITAS is '/nowhere'"));
+  const ScriptResult no_build = run_script(project, "cmake -B other -G Ninja -DGRAVITAS_BUILD=/nowhere");
+  EXPECT_NE(no_build.exit_code, 0);
+  EXPECT_THAT(no_build.words, HasSubstr("Gravitas is not built in '/nowhere'"));
+}
+
+TEST(NewProjectRefusal, NamesWhatIsAllowedAndLeavesNothing) {
+  struct Trial {
+    std::vector<std::string> words;
+    const char* expected;
+  };
+  const ScratchFolder folder;
+  folder.write("file", "");
+  std::filesystem::create_directory(folder.path("full"));
+  folder.write("full/file", "kept");
+  const std::string long_name(65, 'n');
+  for (const Trial& trial : {
+           Trial{{"new", "forces", "MyWind"}, "KIND \"forces\": there is no such slot; did you mean \"force\"?"},
+           Trial{{"new", "force", "My-Wind"}, "NAME \"My-Wind\"; allowed: letters, digits and '_', a letter first"},
+           Trial{{"new", "force", "2Winds"}, "NAME \"2Winds\"; allowed"},
+           Trial{{"new", "force", "My/Wind"}, "NAME \"My/Wind\"; allowed"},
+           Trial{{"new", "force", long_name}, "64 at most"},
+           Trial{{"new", "force", "Newton"},
+                 "NAME \"Newton\" is taken: the installed plugin Newton (slot solver) has it"},
+           Trial{{"new", "space", "Sphere"}, "serves a type of that name"},
+           Trial{{"new", "force", "MyWind", "--out", "full"}, "folder 'full' is not empty"},
+           Trial{{"new", "force", "MyWind", "--out", "file"}, "folder 'file' cannot be made"},
+           Trial{{"new", "force", "MyWind", "--out", "no/where"}, "folder 'no/where' cannot be made"},
+           Trial{{"new", "force", "MyWind", "--out", ""}, "--out"},
+           Trial{{"new", "solver", "MyWind", "--language", "python"},
+                 "no template of slot solver in Python; allowed: c++"},
+           Trial{{"new", "force", "MyWind", "--language", "rust"}, "--language"},
+           Trial{{"new", "force"}, "NAME is required"},
+       }) {
+    const ProgramResult result = run_program(trial.words, folder);
+    EXPECT_EQ(result.exit_code, 2) << trial.expected;
+    EXPECT_THAT(result.err, HasSubstr(trial.expected));
+    EXPECT_EQ(result.out, "");
+  }
+  std::vector<std::string> there;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path("")))
+    there.push_back(entry.path().filename().string());
+  EXPECT_THAT(there, testing::UnorderedElementsAre("file", "full", "file", "stdout", "stderr"));
+  EXPECT_EQ(read_file(folder.path("full/file")), "kept");
+}
+
+// Its folder can be made, and its files have names that are too long for the system.
+TEST(NewProjectRefusal, WhatCannotBeWrittenIsTakenBackWhole) {
+  const ScratchFolder folder;
+  std::string place = folder.path("deep");
+  // a file of the project is the first that is beyond Linux's 4095 characters
+  constexpr std::size_t kParent = 4090;
+  while (place.size() + 202 < kParent) place += '/' + std::string(200, 'd');
+  place += '/' + std::string(kParent - place.size() - 1, 'e');
+  std::filesystem::create_directories(place);
+  const ProgramResult result = run_program({"new", "force", "MyWind", "--out", place + "/p"}, folder);
+  EXPECT_EQ(result.exit_code, 1) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("File name too long"));
+  EXPECT_TRUE(std::filesystem::is_empty(place));
+}
+
+TEST(FileStyle, IsThatOfTheTreesFolders) {
+  EXPECT_EQ(file_style("MyWind"), "my_wind");
+  EXPECT_EQ(file_style("GjkOnly"), "gjk_only");
+  EXPECT_EQ(file_style("KDTree"), "kd_tree");
+  EXPECT_EQ(file_style("DynamicBVH"), "dynamic_bvh");
+  EXPECT_EQ(file_style("DormandPrince54"), "dormand_prince54");
+  EXPECT_EQ(file_style("SPH2Solver"), "sph2_solver");
+  EXPECT_EQ(file_style("already_so"), "already_so");
+  EXPECT_EQ(file_style("Half_Way"), "half_way");
+}
+
+}  // namespace
+}  // namespace gravitas::scaffold
