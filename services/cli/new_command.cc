@@ -54,7 +54,7 @@ void add_new(CLI::App* app, Action* action) {
       ->required();
   command->add_option("--out", options->folder,
                       "Folder to write, which is empty or not there; if absent NAME as files are named: my_wind");
-  command->add_option("--language", options->language, "c++, or python for a force")
+  command->add_option("--language", options->language, "c++, or python but for a solver")
       ->check(CLI::IsMember({"c++", "python"}))
       ->default_val("c++");
   command->callback([=] { *action = [=] { return write_new_project(*options); }; });

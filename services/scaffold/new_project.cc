@@ -47,6 +47,10 @@ void demand_name(const std::string& name, const Catalog& installed) {
   if (name.empty() || !is_word || !(is_lower(name[0]) || is_upper(name[0])) || name.size() > kLongestName)
     throw BadInput(fmt::format(
         "gravitas new: NAME \"{}\"; allowed: letters, digits and '_', a letter first, {} at most", name, kLongestName));
+  // bases and files of projects have such names
+  if (std::ranges::find(kKinds, file_style(name), &Kind::slot) != std::end(kKinds) ||
+      file_style(name) == "known_result")
+    throw BadInput(fmt::format("gravitas new: NAME \"{}\" is one that every project has; allowed: another", name));
   for (const InstalledPlugin& plugin : installed.plugins()) {
     const bool is_type = find_type(plugin.declaration, name) != nullptr;
     if (!is_type && plugin.declaration.name != name) continue;
@@ -153,29 +157,37 @@ Project write_project(const ProjectOptions& options, const Catalog& installed) {
   const fs::path build = fs::path(installed_worker()).parent_path().parent_path();
   const fs::path tree = templates_above(build), templates = tree / "services/scaffold/templates";
   // stands between quotes in CMake, a shell and Python
-  if (tree.string().find_first_of("\"\\$`;\n") != std::string::npos)
+  if (build.string().find_first_of("\"\\$`;\n") != std::string::npos)
     throw BadInput(
-        fmt::format("gravitas new: this program lies in '{}'; allowed: a path without \" \\ $ ` ;", tree.string()));
+        fmt::format("gravitas new: this program lies in '{}'; allowed: a path without \" \\ $ ` ;", build.string()));
   const bool is_python = options.language == "python";
-  const fs::path own = templates / ((is_python ? "python_" : "") + options.kind);
+  const std::string prefix = is_python ? "python_" : "";
+  const fs::path own = templates / (prefix + kind.slot), shared = templates / (prefix + "every_kind");
   if (!fs::exists(own))
     throw BadInput(fmt::format(
-        "gravitas new: --language python: there is no template of slot {} in Python; allowed: c++", options.kind));
+        "gravitas new: --language python: there is no template of slot {} in Python; allowed: c++", kind.slot));
 
   const std::string file = file_style(options.name);
-  Words words = {{"MyName", options.name},
-                 {"my_name", file},
-                 {"@SLOT@", kind.slot},
-                 {"@METHOD@", kind.method},
-                 {"@PEER@", kind.peer},
-                 {"@GRAVITAS@", tree.string()},
-                 {"@GRAVITAS_BUILD@", build.string()}};
-  const bool has_peer = kind.peer[0] != '\0';
-  const fs::path shared = templates / "every_kind";
-  words["@COMPARE@"] = filled(text_of(shared / (has_peer ? "compare_peer.md" : "compare_builds.md")), words);
+  Words words = {
+      {"MyName", options.name},
+      {"my_name", file},
+      {"@SLOT@", kind.slot},
+      {"@METHOD@", kind.method},
+      {"@PEER@", kind.peer},
+      {"@PLUGIN@", is_python ? "Command = \"/usr/bin/python3 -B plugin.py\"" : "Library = \"build/" + file + ".so\""},
+      {"@TEST@", file + "_test." + (is_python ? "py" : "cc")},
+      {"@GRAVITAS@", tree.string()},
+      {"@BUILD@", build.lexically_relative(tree).string()},
+      {"@GRAVITAS_BUILD@", build.string()}};
   Texts texts;
-  if (!is_python) add_templates(shared, words, &texts);
+  if (!is_python) {
+    const char* const compare = kind.peer[0] != '\0' ? "compare_peer.md" : "compare_builds.md";
+    words["@COMPARE@"] = filled(text_of(shared / compare), words);
+  }
+  add_templates(shared, words, &texts);
   add_templates(own, words, &texts);
+  // the scene is the same in all languages
+  texts[file + ".gravitas"] = filled(text_of(templates / kind.slot / "my_name.gravitas"), words);
 
   Project project{options.folder.empty() ? fs::path(file) : fs::path(options.folder), {}};
   write_all(project.folder, texts);

@@ -2,7 +2,7 @@
 //
 //   templates/every_kind/   what projects in C++ share: CMakeLists.txt, README.md, known_result.h
 //   templates/<slot>/       the plugin of that slot, a small one that works: plugin.cc, my_name.h, its test and its scene
-//   templates/python_<slot>/   the same in Python, whole
+//   templates/python_every_kind/, templates/python_<slot>/   the same in Python; the scene is that of <slot>
 //
 // A template is a file as it is: MyName in it becomes the plugin's name, my_name that of its files, and words between two @
 // what the slot and this installation make of them. They are read from the tree that the program was built in, whose SDK the
