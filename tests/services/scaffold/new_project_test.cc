@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <ostream>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -76,8 +77,17 @@ std::string live_commands(const std::string& readme) {
   };
   std::string serve = block_with("gravitas serve ");
   serve.pop_back();
-  return blocks[0] + "export XDG_RUNTIME_DIR=$PWD/build\n" + serve + " &\ntrap \"kill $!\" EXIT\n" +
+  return blocks[0] + "export XDG_RUNTIME_DIR=$PWD/build\n" + serve + " &\ntrap \"kill $!; wait\" EXIT\n" +
          "until gravitas ctl status >/dev/null 2>&1; do kill -0 $!; done\n" + block_with("gravitas ctl ");
+}
+
+// What runs end with: all the same, wherever the plugin was, and whatever was done to its worker.
+std::set<std::string> chain_hashes(const std::string& words) {
+  const std::string before = "chain hash ";
+  std::set<std::string> hashes;
+  for (std::size_t at = words.find(before); at != std::string::npos; at = words.find(before, at + 1))
+    hashes.insert(words.substr(at + before.size(), 32));
+  return hashes;
 }
 
 // A compiler is asked again only where something changed.
@@ -108,6 +118,7 @@ TEST_P(NewProject, IsBuiltTestedAndUsedAsItsReadmeSays) {
   EXPECT_EQ(ended.exit_code, 0) << ended.words;
   EXPECT_THAT(ended.words, HasSubstr("100% tests passed, 0 tests failed out of 3"));
   EXPECT_THAT(ended.words, Not(HasSubstr("warning: ")));
+  EXPECT_THAT(chain_hashes(ended.words), testing::SizeIs(1)) << ended.words;
   const ScriptResult live = run_script(project, live_commands(readme));
   EXPECT_EQ(live.exit_code, 0) << live.words;
   // nothing of the template's own is left, of names or of what stands between two @
@@ -141,6 +152,7 @@ TEST_P(NewPythonProject, IsTestedAndUsedAsItsReadmeSays) {
   const ScriptResult ended = run_script(project, script);
   EXPECT_EQ(ended.exit_code, 0) << ended.words;
   EXPECT_THAT(ended.words, testing::ContainsRegex("Ran [34] tests"));
+  EXPECT_THAT(chain_hashes(ended.words), testing::SizeIs(1)) << ended.words;
   const ScriptResult left = run_script(project, "grep -rnIE 'MyName|my_name|@[A-Z_]+@' . || true");
   EXPECT_EQ(left.words, "");
 }

@@ -1,6 +1,8 @@
 // What the collision is known to find: contacts by themselves, and what comes of them in my_name.gravitas.
 #include "my_name.h"
 
+#include <vector>
+
 #include "known_result.h"
 
 using namespace known_result;

@@ -1,6 +1,9 @@
 // What the joint is known to do: its rows by themselves, and the motion that my_name.gravitas comes to.
 #include "my_name.h"
 
+#include <cstddef>
+#include <vector>
+
 #include "known_result.h"
 #include "plugin_sdk/math/rotation.h"
 

@@ -20,10 +20,11 @@ struct Sample {
   Vector3 angular_velocity;          // rad/s, world
 };
 
-// The samples of a body in the file of `gravitas run --trajectory`: a header, then
+// The samples of a body, none where there is no file, in that of `gravitas run --trajectory`: a header, then
 // time,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,wx,wy,wz.
 inline std::vector<Sample> samples_of(const std::string& body, const char* file) {
   std::vector<Sample> samples;
+  if (file == nullptr) return samples;
   std::ifstream lines(file);
   for (std::string line; std::getline(lines, line);) {
     std::istringstream words(line);

@@ -1,7 +1,8 @@
 // What the force is known to do: the plain code by itself, and the motion that my_name.gravitas comes to.
 #include "my_name.h"
 
-#include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "known_result.h"
 

@@ -3,6 +3,7 @@
 // A plugin is a class derived from the base of its slot. It declares itself once (name, types, properties), receives a
 // request as columns, and fills the columns of the reply. The answer depends on the request and the settings alone: the
 // same request gives the same bytes, so keep nothing between calls but caches that can be made again.
+#include <cstddef>
 #include <cstdint>
 
 #include "my_name.h"

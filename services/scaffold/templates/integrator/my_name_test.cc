@@ -2,6 +2,8 @@
 #include "my_name.h"
 
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "known_result.h"
 

@@ -1,8 +1,12 @@
 // What the space is known to find: the sweep by itself, and what comes of the pairs in my_name.gravitas.
 #include "my_name.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "known_result.h"
 
