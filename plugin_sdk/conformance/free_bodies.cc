@@ -1,5 +1,7 @@
 #include "plugin_sdk/conformance/free_bodies.h"
 
+#include "plugin_sdk/derivative_question.h"
+
 namespace gravitas::conformance {
 
 MessageColumns FreeBodies::request() const {
@@ -29,14 +31,21 @@ MessageColumns FreeBodies::request() const {
 }
 
 DerivativeFunction FreeBodies::answers() const {
-  if (derivative) return derivative;
+  // no joint holds them: nothing is to be said of impulses
+  if (derivative) {
+    return [of_wrenches = derivative](const stage::IntegratorDerivativeRequest& question) {
+      return question.question() < kFirstOfImpulses ? of_wrenches(question) : DerivativeAnswer({});
+    };
+  }
   // a method may ask although the wrench is constant
   std::vector<double> wrenches;
   for (const FreeBody& body : bodies) {
     append(&wrenches, body.wrench.force);
     append(&wrenches, body.wrench.torque);
   }
-  return [wrenches](const stage::IntegratorDerivativeRequest&) { return wrenches; };
+  return [wrenches](const stage::IntegratorDerivativeRequest& question) {
+    return question.question() < kFirstOfImpulses ? wrenches : std::vector<double>();
+  };
 }
 
 MessageColumns FreeBodies::ask(Inquiry* inquiry) const {

@@ -141,7 +141,7 @@ Environment {
 )";
   const Vector3 end(0.6434869411116291, -1.2078867456907545, 0);
   for (const auto& [integrator, time_step, tolerance] :
-       {std::tuple{"Radau", 0.01, 1e-8}, std::tuple{"ImplicitMidpoint", 0.002, 1e-5},
+       {std::tuple{"Radau", 0.01, 1e-8}, std::tuple{"ImplicitMidpoint", 0.001, 4e-6},
         std::tuple{"ImplicitMidpoint", 0.0005, 1e-6}, std::tuple{"DormandPrince54", 0.01, 1e-8}}) {
     SceneRun run(scene, {set("Integrator", std::string(integrator)), set("Simulator.TimeStep", time_step)});
     run.to_end();

@@ -14,7 +14,17 @@
 //   x' = x + h v_bar          h v_bar = D v + (h - D)/c a          v' = e^(-c h) v + D a
 //
 // (angular momentum likewise): exact under constant forces and of a free rotor, which turns in slowed time.
-// Sources: Simo, Wong, Int. J. Numer. Meth. Eng. 31 (1991) 19; Austin, Krishnaprasad, Wang, J. Comput. Phys. 107 (1993).
+// With joints that hold by locks alone, that step is made with forces alone, between two impulses along the joints' directions
+// where it begins and ends, as in RATTLE:
+//
+//   v0 += M^-1 J^T(q0) lambda,   (q1, v1) = step(q0, v0) with g(q1) = 0,   v1 += M^-1 J^T(q1) mu with J(q1) v1 as joints want
+//
+// which is symmetric as well, keeps the momenta of what only joints hold together, and is the midpoint rule of the reduced
+// motion where joints and forces are linear. lambda is found by chords. Where joints have limits with room, drives, friction
+// or springs, or forces are so stiff that lambda or the step is not found so (h^2 k/m above about 1), the forces of the
+// equations above are those with what joints do, which keeps neither.
+// Sources: Simo, Wong, Int. J. Numer. Meth. Eng. 31 (1991) 19; Austin, Krishnaprasad, Wang, J. Comput. Phys. 107 (1993);
+// Hairer, Lubich, Wanner, Geometric Numerical Integration, VII.1.
 // The equations in (v_bar, W) are solved to rounding: by iteration where that contracts, else by Newton's method with
 // the matrix from the wrenches' Jacobian where it can be had (wrench_jacobian.h), else by differences (six derivatives per
 // body of the largest group that feels each other, interaction_groups.h). Stability: none is lost at any h k; but
@@ -23,6 +33,8 @@
 // jump, h |w| in the tens and unequal moments) the step is refused.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "plugin_sdk/interaction_groups.h"
 #include "plugin_sdk/math/dense_lu.h"
@@ -77,7 +89,10 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     request_ = &request, derivatives_ = &derivatives, host_ = &host;
     h_ = request.time_step();
     begin();
-    if (!bodies_.empty()) solve();
+    if (!bodies_.empty() && find_step()) {
+      for_each_body(request, reply, [&](std::size_t i, const BodyState&) { return trial_.at(i); });
+      return;
+    }
     std::size_t next = 0;
     for_each_body(request, reply, [&](std::size_t, const BodyState&) { return end_of(next++); });
   }
@@ -116,27 +131,36 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   void begin() {
     bodies_.clear();
     groups_.clear();
+    keeps_to_joints_ = false;
     trial_.resize(derivatives_->size());
     for (std::size_t i = 0; i < derivatives_->size(); ++i) {
-      BodyState s = derivatives_->start(i);
-      if ((request_->flags()[i] & kMovable) == 0) {
-        trial_.set(i, (request_->flags()[i] & kKinematic) != 0 ? detail::keep_moving(s, 0.5 * h_) : s);
-        continue;
-      }
+      if ((request_->flags()[i] & kMovable) == 0) continue;
+      const BodyState s = derivatives_->start(i);
       const double damping = request_->damping()[i];
-      const Twist undamped = s.twist;
-      if (damping != 0.0) {
-        const double share = damped_time(damping, h_) / h_;
-        s.twist = {share * s.twist.linear, share * s.twist.angular};
-      }
-      const Vector3 moments = vector_at(request_->inertia(), i);
-      bodies_.push_back({i, s, moments.cwiseProduct(s.pose.orientation.conjugate() * s.twist.angular), moments,
+      bodies_.push_back({i, s, Vector3::Zero(), vector_at(request_->inertia(), i),
                          vector_at(request_->inverse_inertia(), i), request_->inverse_mass()[i],
-                         damping != 0.0 ? damped_distance(damping, h_) / h_ : 0.5 * h_, damping, undamped,
+                         damping != 0.0 ? damped_distance(damping, h_) / h_ : 0.5 * h_, damping, s.twist,
                          Vector3::Zero()});
+      start_with(s.twist, &bodies_.back());
     }
+    carry_others(0.5 * h_);
     unknown_.resize(static_cast<Eigen::Index>(6 * bodies_.size()));
     for (std::size_t b = 0; b < bodies_.size(); ++b) start_from(b);
+  }
+  void start_with(const Twist& twist, Body* body) const {
+    const double share = body->damping != 0.0 ? damped_time(body->damping, h_) / h_ : 1.0;
+    body->undamped = twist;
+    body->start.twist = {share * twist.linear, share * twist.angular};
+    body->momentum = body->moments.cwiseProduct(body->start.pose.orientation.conjugate() * body->start.twist.angular);
+  }
+  // Bodies that are not movable, at a time (s) after the start.
+  void carry_others(double elapsed) {
+    for (std::size_t i = 0; i < derivatives_->size(); ++i) {
+      const std::uint32_t flags = request_->flags()[i];
+      if ((flags & kMovable) != 0) continue;
+      const BodyState s = derivatives_->start(i);
+      trial_.set(i, (flags & kKinematic) != 0 ? detail::keep_moving(s, elapsed) : s);
+    }
   }
   void start_from(std::size_t b) {
     const BodyState& start = bodies_[b].start;
@@ -162,7 +186,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
       const Body& body = bodies_[b];
       trial_.set(body.row, middle_of(body, at(guess, b)));
     }
-    const std::span<const double> wrenches = derivatives_->wrenches(request_->time() + 0.5 * h_, trial_);
+    const double middle = request_->time() + 0.5 * h_;
+    const std::span<const double> wrenches =
+        keeps_to_joints_ ? derivatives_->forces(middle, trial_) : derivatives_->wrenches(middle, trial_);
     Eigen::VectorXd left(guess.size());
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       Body& body = bodies_[b];
@@ -214,18 +240,109 @@ class ImplicitMidpoint final : public IntegratorPlugin {
     return largest;
   }
 
-  void solve() {
+  // True: the end of the step is in trial_; false: it is end_of() the unknown.
+  bool find_step() {
+    Eigen::VectorXd first = residual(unknown_);
+    if (!derivatives_->place_impulses(request_->time() + 0.5 * h_, trial_).empty()) {
+      if (keep_to_joints()) return true;
+      begin();
+      first = residual(unknown_);
+    }
+    if (!iterate(std::move(first))) newton();
+    return false;
+  }
+
+  // From the unknown, whose residual is known; false where that does not contract.
+  bool iterate(Eigen::VectorXd change) {
     double last = HUGE_VAL;
     for (int i = 0; i < kMostIterations; ++i) {
-      const Eigen::VectorXd change = residual(unknown_);
+      if (i > 0) change = residual(unknown_);
       if (!change.allFinite()) break;
+      if (keeps_to_joints_) turn_with_spins(&change);
       unknown_ -= change;
       const double size = size_of(change);
-      if (size <= kConverged || (size <= kStagnant && size >= last)) return;
+      if (size <= kConverged || (size <= kStagnant && size >= last)) return true;
       if (i > 1 && size > kContraction * last && size > kStagnant) break;
       last = size;
     }
-    newton();
+    return false;
+  }
+
+  // A residual as the changes of Newton's method where forces stay what they are: spins alone do not contract by themselves.
+  void turn_with_spins(Eigen::VectorXd* change) {
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      const Body& body = bodies_[b];
+      const Matrix6 own = own_change(body, at(unknown_, b));
+      at(*change, b).tail<3>() = own.bottomRightCorner<3, 3>().inverse() * at(*change, b).tail<3>();
+    }
+  }
+
+  // The whole step between impulses of joints, to trial_; false: that cannot be done.
+  bool keep_to_joints() {
+    keeps_to_joints_ = true;
+    const double end = request_->time() + h_;
+    derivatives_->wrenches_at_start();  // directions of the joints are those of the start
+    std::vector<Twist> kicks(bodies_.size());
+    if (!find_start(end, &kicks)) return false;
+    derivatives_->wrenches(end, trial_);
+    const std::span<const double> impulses = derivatives_->velocity_impulses(end, trial_);
+    if (impulses.empty()) return false;
+    for (const Body& body : bodies_) {
+      BodyState state = trial_.at(body.row);
+      const Twist change = change_of(body, impulses, state.pose.orientation);
+      state.twist = {state.twist.linear + change.linear, state.twist.angular + change.angular};
+      trial_.set(body.row, state);
+    }
+    // what joints bear counts as the last question has it: where the step ends
+    derivatives_->wrenches(end, trial_);
+    return true;
+  }
+
+  // The velocities at the start that bring the bodies to where joints want them.
+  bool find_start(double end, std::vector<Twist>* kicks) {
+    constexpr int kMost = 40;
+    constexpr double kNear = 1e-14, kFound = 1e-9;  // of the way
+    constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
+    double last = HUGE_VAL;
+    for (int question = 0; question < kMost; ++question) {
+      carry_others(0.5 * h_);
+      if (!iterate(residual(unknown_))) return false;
+      for (std::size_t b = 0; b < bodies_.size(); ++b) trial_.set(bodies_[b].row, end_of(b));
+      carry_others(h_);
+      if (last == 0.0) return true;
+      const std::span<const double> impulses = derivatives_->place_impulses(end, trial_);
+      if (impulses.empty()) return false;
+      // squares, by the masses, of what joints ask for, how far the bodies go, and their coordinates, which are rounded
+      double asked = 0.0, way = 0.0, place = 0.0;
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        Body& body = bodies_[b];
+        const Twist moved = change_of(body, impulses, body.start.pose.orientation);
+        asked += energy(body, moved), way += h_ * h_ * energy(body, body.start.twist);
+        place += energy(body, {body.start.pose.position, Vector3::Ones()});
+        Twist& kick = (*kicks)[b];
+        kick.linear += moved.linear / h_, kick.angular += moved.angular / h_;
+        const Twist start = derivatives_->start(body.row).twist;
+        start_with({start.linear + kick.linear, start.angular + kick.angular}, &body);
+      }
+      // what does not come nearer any more is rounding, or not found
+      const bool is_near = asked <= kNear * kNear * way;
+      if (!is_near && asked >= 0.25 * last && !(asked <= kFound * kFound * way + kRounding * kRounding * place))
+        return false;
+      last = is_near || asked >= 0.25 * last ? 0.0 : asked;
+    }
+    return false;
+  }
+
+  // M^-1 of a body's six numbers at an attitude.
+  static Twist change_of(const Body& body, std::span<const double> impulses, const Quaternion& q) {
+    const Vector3 turning = vector_at(impulses, 2 * body.row + 1);
+    return {body.inverse_mass * vector_at(impulses, 2 * body.row),
+            q * body.inverse_moments.cwiseProduct(q.conjugate() * turning)};
+  }
+  // v M v, the attitude left aside.
+  static double energy(const Body& body, const Twist& twist) {
+    return (body.inverse_mass > 0.0 ? twist.linear.squaredNorm() / body.inverse_mass : 0.0) +
+           body.moments.maxCoeff() * twist.angular.squaredNorm();
   }
 
   void newton() {
@@ -452,6 +569,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   Derivatives* derivatives_ = nullptr;
   Host* host_ = nullptr;
   double h_ = 0.0;
+  bool keeps_to_joints_ = false;
   std::vector<Group> groups_;
   std::vector<Body> bodies_;  // scratch, as all that follows
   Eigen::VectorXd unknown_;   // v_bar (m/s, world) and W (rad/s, body) of each
