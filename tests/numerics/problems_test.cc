@@ -16,6 +16,7 @@ using harness::MotionProblem;
 using harness::MotionResult;
 
 const MotionMethod kRk4{"RK4", "integrator_rk4", {}};
+const MotionMethod kMidpoint{"ImplicitMidpoint", "integrator_implicit_midpoint", {}};
 const MotionMethod kSecond{"SymplecticSplitting 2", "integrator_symplectic_splitting", {2}};
 const MotionMethod kFourth{"SymplecticSplitting 4", "integrator_symplectic_splitting", {4}};
 const MotionMethod kSixth{"SymplecticSplitting 6", "integrator_symplectic_splitting", {6}};
@@ -113,6 +114,7 @@ TEST(Problems, FourBarPassesItsSingularities) {
   expect_run(harness::four_bar(10.0), dormand_prince(1e-8), 50, {.error = 1e-5, .joint_error = 1e-12});
   expect_run(harness::four_bar(10.0), rosenbrock(1e-3), 400, {.error = 1e-3, .joint_error = 1e-12});
   expect_run(harness::four_bar(10.0), radau(1e-2), 400, {.error = 1e-4, .joint_error = 1e-12});
+  expect_run(harness::four_bar(20.0), kMidpoint, 8000, {.error = 1e-2, .joint_error = 1e-12});
   if (harness::runs_long_problems())
     expect_run(harness::four_bar(20.0), kRk4, 25600, {.error = 1e-8, .joint_error = 1e-12});
 }

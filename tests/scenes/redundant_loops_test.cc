@@ -70,7 +70,7 @@ TEST(RedundantLoops, GoOnThroughTheFlatPose) {
            hinge("Body2 = \"R\"", "0.8") + joints + "} }\n";
   };
   for (const std::string solver : {"Direct", "Newton"})
-    for (const std::string integrator : {"RK4", "RKMK4", "SymplecticSplitting", "DormandPrince54"})
+    for (const std::string integrator : {"RK4", "RKMK4", "SymplecticSplitting", "ImplicitMidpoint", "DormandPrince54"})
       for (const double time_step : {0.005, 0.01, 1.0 / 60.0, 0.02}) {
         if (integrator == "SymplecticSplitting" && time_step > 0.01) continue;  // known weakness
         SceneRun run(scene("", ""),

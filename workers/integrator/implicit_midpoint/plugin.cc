@@ -301,7 +301,8 @@ class ImplicitMidpoint final : public IntegratorPlugin {
   // The velocities at the start that bring the bodies to where joints want them.
   bool find_start(double end, std::vector<Twist>* kicks) {
     constexpr int kMost = 40;
-    constexpr double kNear = 1e-14, kFound = 1e-9;  // of the way
+    constexpr double kNear = 1e-14,
+                     kFound = 1e-6;  // of the way; in a pose where rows depend on each other some is left
     constexpr double kRounding = 64.0 * std::numeric_limits<double>::epsilon();
     double last = HUGE_VAL;
     for (int question = 0; question < kMost; ++question) {
