@@ -233,6 +233,15 @@ Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3&
   return d;
 }
 
+Discrepancy limited_way_row(const Vector3& axis, const Vector3& point1, const Vector3& point2,
+                            const JointLimits& limits) {
+  Discrepancy d = row_along(axis, point1, point2, AxisMode::kLimited);
+  d.lower.x() = limits.lower;
+  d.upper.x() = limits.upper;
+  d.restitution = limits.restitution;
+  return d;
+}
+
 Discrepancy meshing_row(const Vector3& axis, const Vector3& point, double ahead, double error, double period,
                         const JointBodies& bodies) {
   constexpr double kClearly = 1e-4;  // of a period

@@ -118,6 +118,9 @@ Discrepancy held_point(const Pose& frame1, const Vector3& point2, HeldAxes held,
 
 // One row along a unit axis through two points, x and the others free; the error is axis.(x2 - x1).
 Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3& point2, AxisMode mode);
+// The same with limits of that error.
+Discrepancy limited_way_row(const Vector3& axis, const Vector3& point1, const Vector3& point2,
+                            const JointLimits& limits);
 
 // One row along a unit axis through a point, for what meshes: its error is known but for whole periods (m), as those of teeth
 // and turns of a thread. Of error + k period that is taken which the step made, by the bodies' velocities at its end: all of

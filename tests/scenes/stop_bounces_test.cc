@@ -47,6 +47,17 @@ class StopBounces : public ::testing::TestWithParam<StopCase> {
            " PrincipalMoments = {0.1, 0.1, 0.1} KineticProperties { Position = " + literal(at) +
            " LinearVelocity = " + literal(velocity) + " AngularVelocity = " + literal(spin) + " } " + more + " }\n";
   }
+  // Guides of body A along x, with stops at -0.1 and 0.05.
+  static std::vector<std::string> guides(double restitution) {
+    const std::string e = " Restitution = " + literal(restitution);
+    return {joint("Slider", "BindPoint = {0, 0, 0} Axis = {1, 0, 0} LowerLimit = -0.1 UpperLimit = 0.05" + e,
+                  "Body2 = \"A\""),
+            joint("Axle",
+                  "BindPoint = {0, 0, 0} SteeringAxis = {1, 0, 0} RollingAxis = {0, 1, 0} SuspensionLowerLimit = -0.1 "
+                  "SuspensionUpperLimit = 0.05" +
+                      e,
+                  "Body2 = \"A\"")};
+  }
   static std::string joint(const std::string& type, const std::string& properties, const std::string& bodies) {
     return "Constraint { Id = \"" + type + "\" Type = \"" + type + "\" " + bodies + " CustomProperties { " +
            properties + " } }\n";
@@ -61,33 +72,28 @@ INSTANTIATE_TEST_SUITE_P(Each, StopBounces, ::testing::ValuesIn(kStopCases), [](
 // Each bounce is told once, with the speed and the impulse of it; what rests on its stop is not told again.
 TEST_P(StopBounces, AreTold) {
   constexpr double kMass = 2.0, kSpeed = 0.9;
-  for (const double e : {1.0, 0.7, 0.25, 0.0}) {
-    SceneRun run = scene(body("A", kMass, {0, 0, 0}, {kSpeed, 0, 0}),
-                         joint("Slider",
-                               "BindPoint = {0, 0, 0} Axis = {1, 0, 0} LowerLimit = -0.1 UpperLimit = 0.05 "
-                               "Restitution = " +
-                                   literal(e),
-                               "Body2 = \"A\""),
-                         0.005, 1.0);
-    double direction = 1.0, speed = kSpeed;
-    std::size_t bounces = 0;
-    while (!run.is_done()) {
-      run.step();
-      const double now = run.body("A").twist.linear.x();
-      if (now * direction > 0.0 && e > 0.0) continue;
-      if (e == 0.0 && (now != 0.0 || bounces == 1)) continue;
-      direction = -direction;
-      ASSERT_EQ(run.count_events(EventKind::kLimitStart), ++bounces) << e << " at " << run.time();
-      const Event& told = run.events().back();
-      EXPECT_EQ(told.constraint, 0U);
-      EXPECT_EQ(told.step, run.step_count());
-      EXPECT_NEAR(told.relative_speed, speed, 1e-9);
-      EXPECT_NEAR(told.impulse, kMass * speed * (1.0 + e), 1e-9);
-      speed *= e;
+  for (const double e : {1.0, 0.7, 0.25, 0.0})
+    for (const std::string& guide : guides(e)) {
+      SceneRun run = scene(body("A", kMass, {0, 0, 0}, {kSpeed, 0, 0}), guide, 0.005, 1.0);
+      double direction = 1.0, speed = kSpeed;
+      std::size_t bounces = 0;
+      while (!run.is_done()) {
+        run.step();
+        const double now = run.body("A").twist.linear.x();
+        if (now * direction > 0.0 && e > 0.0) continue;
+        if (e == 0.0 && (now != 0.0 || bounces == 1)) continue;
+        direction = -direction;
+        ASSERT_EQ(run.count_events(EventKind::kLimitStart), ++bounces) << e << " at " << run.time();
+        const Event& told = run.events().back();
+        EXPECT_EQ(told.constraint, 0U);
+        EXPECT_EQ(told.step, run.step_count());
+        EXPECT_NEAR(told.relative_speed, speed, 1e-9);
+        EXPECT_NEAR(told.impulse, kMass * speed * (1.0 + e), 1e-9);
+        speed *= e;
+      }
+      EXPECT_GE(bounces, 1U);
+      EXPECT_EQ(run.count_events(EventKind::kLimitStart), bounces) << e << guide;
     }
-    EXPECT_GE(bounces, 1U);
-    EXPECT_EQ(run.count_events(EventKind::kLimitStart), bounces) << e;
-  }
 }
 
 // A bar that falls on the stop of its hinge, and one that comes to it without a load: each meets it once and rests there.
@@ -129,27 +135,22 @@ TEST_P(StopBounces, ARopeThatGetsTautIsToldOnce) {
 }
 
 // Between two stops without loads a speed is e^n of the first after n of them, exactly, and of e = 1 what it was.
-TEST_P(StopBounces, OfASliderAreAPowerOfTheFirst) {
-  for (const double e : {1.0, 0.7, 0.25}) {
-    SceneRun run = scene(body("A", 2.0, {0, 0, 0}, {0.9, 0, 0}),
-                         joint("Slider",
-                               "BindPoint = {0, 0, 0} Axis = {1, 0, 0} LowerLimit = -0.1 UpperLimit = 0.05 "
-                               "Restitution = " +
-                                   literal(e),
-                               "Body2 = \"A\""),
-                         1.0 / 60.0, 2.0);
-    double expected = 0.9;
-    int met = 0;
-    while (!run.is_done()) {
-      run.step();
-      const double speed = run.body("A").twist.linear.x();
-      if (speed * expected < 0.0) ++met, expected *= -e;
-      EXPECT_NEAR(speed, expected, 1e-13) << e << ' ' << met;
-      EXPECT_LE(run.body("A").pose.position.x(), 0.05 + 1e-12);
-      EXPECT_GE(run.body("A").pose.position.x(), -0.1 - 1e-12);
+TEST_P(StopBounces, OfGuidesAreAPowerOfTheFirst) {
+  for (const double e : {1.0, 0.7, 0.25})
+    for (const std::string& guide : guides(e)) {
+      SceneRun run = scene(body("A", 2.0, {0, 0, 0}, {0.9, 0, 0}), guide, 1.0 / 60.0, 2.0);
+      double expected = 0.9;
+      int met = 0;
+      while (!run.is_done()) {
+        run.step();
+        const double speed = run.body("A").twist.linear.x();
+        if (speed * expected < 0.0) ++met, expected *= -e;
+        EXPECT_NEAR(speed, expected, 1e-13) << e << ' ' << met << guide;
+        EXPECT_LE(run.body("A").pose.position.x(), 0.05 + 1e-12);
+        EXPECT_GE(run.body("A").pose.position.x(), -0.1 - 1e-12);
+      }
+      EXPECT_GE(met, e == 1.0 ? 11 : e == 0.7 ? 3 : 1) << guide;
     }
-    EXPECT_GE(met, e == 1.0 ? 11 : e == 0.7 ? 3 : 1);
-  }
 }
 
 // So is the spin of what turns between stops, whatever joint has them.
@@ -168,6 +169,10 @@ TEST_P(StopBounces, OfTurnsAreAPowerOfTheFirst) {
                 "BindPoint = {0, 0, 0} Axis1 = {0, 0, 1} Axis2 = {1, 0, 0} LowerLimit1 = -0.7 UpperLimit1 = 0.5", -0.7},
         Turning{"Universal",
                 "BindPoint = {0, 0, 0} Axis1 = {1, 0, 0} Axis2 = {0, 0, 1} LowerLimit2 = -0.7 UpperLimit2 = 0.5", -0.7},
+        Turning{"Axle",
+                "BindPoint = {0, 0, 0} SteeringAxis = {0, 0, 1} RollingAxis = {1, 0, 0} SteeringLowerLimit = -0.7 "
+                "SteeringUpperLimit = 0.5",
+                -0.7},
         Turning{"ConstantVelocity", "BindPoint = {0, 0, 0} Axis1 = {1, 0, 0} Axis2 = {1, 0, 0} MaximumAngle = 0.5",
                 -0.5}}) {
     SceneRun run = scene(body("A", 2.0, {0, 0, 0}, {0, 0, 0}, {0, 0, 3.0}),

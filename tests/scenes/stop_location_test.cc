@@ -59,24 +59,32 @@ TEST(StopsOfSmooth, AreMetWhenTheyAre) {
   }
 }
 
-// On a spring between two stops: between them it is a part of the sine, which the stops turn over.
+// On a spring between two stops, of a guide's own as of a suspension: between them it is a part of the sine, which the stops turn over.
 TEST(StopsOfSmooth, LeaveMotionItsOrder) {
   constexpr double kSpring = 50.0, kMass = 2.0, kStop = 0.06, kSpeed = 0.5;
   const double rate = std::sqrt(kSpring / kMass), amplitude = kSpeed / rate;
   const double half = 2.0 * std::asin(kStop / amplitude) / rate;  // from stop to stop
-  const auto error = [&](double h) {
-    SceneRun run(scene("Force { Type = \"Spring\" Id = \"Coil\" CustomProperties { Stiffness = 50 } }",
-                       ball({0, 0, 0}, {kSpeed, 0, 0}, "\"Coil\""), slider(-kStop, kStop, 1.0), h, 4.0));
-    run.to_end();
-    EXPECT_GT(run.count_events(EventKind::kLimitStart), 10U);
-    const double phase = std::fmod(4.0 + 0.5 * half, 2.0 * half) - 0.5 * half;
-    const double right = amplitude * std::sin(rate * (phase <= 0.5 * half ? phase : half - phase));
-    return std::fabs(run.body("A").pose.position.x() - right);
-  };
-  const double coarse = error(0.02), fine = error(0.01), finest = error(0.005);
-  EXPECT_LT(coarse, 2e-5);
-  EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.4);
-  EXPECT_NEAR(std::log2(fine / finest), 4.0, 0.4);
+  const std::string coil = "Force { Type = \"Spring\" Id = \"Coil\" CustomProperties { Stiffness = 50 } }";
+  const std::string suspension =
+      "Constraint { Type = \"Axle\" Id = \"Rail\" Body2 = \"A\" CustomProperties { BindPoint = {0, 0, 0} SteeringAxis "
+      "= "
+      "{1, 0, 0} RollingAxis = {0, 1, 0} SuspensionStiffness = 50 Restitution = 1 SuspensionLowerLimit = " +
+      literal(-kStop) + " SuspensionUpperLimit = " + literal(kStop) + " } }";
+  for (const bool is_sprung : {false, true}) {
+    const auto error = [&](double h) {
+      SceneRun run(scene(is_sprung ? "" : coil, ball({0, 0, 0}, {kSpeed, 0, 0}, is_sprung ? "" : "\"Coil\""),
+                         is_sprung ? suspension : slider(-kStop, kStop, 1.0), h, 4.0));
+      run.to_end();
+      EXPECT_GT(run.count_events(EventKind::kLimitStart), 10U);
+      const double phase = std::fmod(4.0 + 0.5 * half, 2.0 * half) - 0.5 * half;
+      const double right = amplitude * std::sin(rate * (phase <= 0.5 * half ? phase : half - phase));
+      return std::fabs(run.body("A").pose.position.x() - right);
+    };
+    const double coarse = error(0.02), fine = error(0.01), finest = error(0.005);
+    EXPECT_LT(coarse, 2e-5);
+    EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.4) << is_sprung;
+    EXPECT_NEAR(std::log2(fine / finest), 4.0, 0.4) << is_sprung;
+  }
 }
 
 // e = 1/2 on a load: it comes to rest after sqrt(2 h/g) (1 + e)/(1 - e), and rests.

@@ -283,6 +283,7 @@ TEST(Coordinates, AWheelTellsSteeringSuspensionAndRolling) {
                                                           {"RollingAxis", numbers_of(rolling)},
                                                           {"SuspensionStiffness", {1e4}}};
       if (is_limited) given["SteeringLowerLimit"] = {-0.6}, given["SteeringUpperLimit"] = {0.6};
+      if (is_limited) given.erase("SuspensionStiffness"), given["SuspensionUpperLimit"] = {0.1};
       JointUnderTest wheel("constraint_axle", given);
       const double angle = 0.4, turned = 0.3;
       const Quaternion steered = exp_rotation(angle * kJointAxis);

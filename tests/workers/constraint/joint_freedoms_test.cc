@@ -10,25 +10,10 @@
 
 #include "plugin_sdk/conformance/draw.h"
 #include "plugin_sdk/math/rotation.h"
-#include "tests/workers/constraint/joint_problem.h"
+#include "tests/workers/constraint/joint_pair.h"
 
 namespace gravitas::test {
 namespace {
-
-// Rounding of transforms of points within ten metres, some of them in a row.
-constexpr double kFreedomRounding = 2e-14;
-const double kNoValue = std::nan("");
-const Vector3 kPoint(0.3, -0.2, 0.5);
-const Vector3 kAxis = Vector3(1.0, 2.0, -0.5).normalized();
-const Vector3 kAcross = kAxis.cross(Vector3::UnitZ()).normalized();
-const Vector3 kBent = (kAxis + 0.8 * kAcross).normalized();
-
-std::vector<double> numbers(const std::vector<Vector3>& vectors, const std::vector<double>& rest = {}) {
-  std::vector<double> all;
-  for (const Vector3& v : vectors) all.insert(all.end(), {v.x(), v.y(), v.z()});
-  all.insert(all.end(), rest.begin(), rest.end());
-  return all;
-}
 
 // A motion of body 2 against body 1 about or along world axes of the start, applied in order: what is later is fixed in
 // body 1 if `in_body1`, else moves with body 2.
@@ -189,33 +174,6 @@ TEST_P(JointFreedoms, RowsAreTheRatesOfTheErrors) {
 }
 
 // ---- each by itself
-
-class JointPair : public testing::Test {
- protected:
-  JointPair() {
-    for (JointedBody& body : bodies_) body.pose = random_.pose(3.0);
-  }
-  JointProblem joint(PluginUnderTest* plugin, const char* type, const std::vector<double>& properties) {
-    JointProblem made(plugin, type);
-    made.bodies = bodies_;
-    made.bind(properties);
-    return made;
-  }
-  std::string refused(PluginUnderTest* plugin, const char* type, const std::vector<double>& properties) {
-    JointProblem made(plugin, type);
-    made.bodies = bodies_;
-    return plugin->refusal(stage::Method::kConstraintBind, made.bind_request(properties));
-  }
-  // Turns body 2 of a joint about its point.
-  static void turn(JointProblem* joint, const Vector3& rotation) {
-    const Quaternion q = exp_rotation(rotation);
-    Pose& pose = joint->bodies[1].pose;
-    pose = {kPoint + q * (pose.position - kPoint), normalized(q * pose.orientation)};
-  }
-
-  conformance::Draw random_{11};
-  std::vector<JointedBody> bodies_ = std::vector<JointedBody>(2);
-};
 
 TEST_F(JointPair, ARevolutesAngleIsThatOfBody2AboutItsAxis) {
   PluginUnderTest plugin("constraint_revolute");

@@ -43,6 +43,11 @@ const JointOfStops kJointsOfStops[] = {
      {17, 18, 19, 20},
      2},
     {"constraint_constant_velocity", "ConstantVelocity", {0, 0, 0, 1, 0, 0, 1, 0, 0, kNothing, kNothing, 0.5}, {11}, 1},
+    {"constraint_axle",
+     "Axle",
+     {0, 0, 0, 0, 1, 0, 1, 0, 0, 2000, 50, -0.5, 0.5, kNothing, kNothing, 0, kNothing, kNothing, -0.1, 0.2},
+     {11, 12, 18, 19},
+     2},
     {"constraint_winch", "Winch", {0, 0, 1, 0.5, 0.5, -1, 0, 0, 0, 0, 0.1, kNothing, kNothing, 0}, {}, 1, 11}};
 
 class RestitutionOfStops : public testing::TestWithParam<JointOfStops> {

@@ -1,12 +1,15 @@
 // Constraint `Axle`: a wheel (body 2) on a vehicle (body 1). It rolls about an axis of its own, steers about one of the
 // vehicle, and may be sprung along the latter.
 //
-//        | s  steering axis, fixed in body 1; the spring acts along it
+//        | s  steering axis, fixed in body 1; the wheel travels along it, on a spring and between stops
 //      --o--- r  rolling axis, fixed in body 2; the angle between s and r stays that of the start
 //
 // Freedoms. The wheel's centre: three rows, or with a suspension the two across s (held where the wheel is) and a soft one
 // along s, which takes no freedom. The angle between s and r changes at the rate w.n, n = s x r/|s x r|: one row about n.
 // Four rows of rank 4, left are the turns about s and r; with a suspension rank 3 and a spring.
+//
+// Suspension. The way of the wheel along s, 0 at the start. Limits are one row more, active at a limit (rank 4 there): where
+// they bear, the spring bears what it does at that way, and they the rest of the load. They alone make a free guide.
 //
 // Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
 // start, however the wheel rolls. Limits are one row, active at a limit, on asin(sin(g) sin(angle)), where s and r make an angle
@@ -20,6 +23,7 @@
 //
 // Rolling. What the wheel has rolled is the angle about r by which it sees s turned back: its rate is p, steering is none of it.
 #include <cmath>
+#include <string>
 
 #include "plugin_sdk/joint_coordinates.h"
 #include "plugin_sdk/joint_rows.h"
@@ -36,7 +40,7 @@ class Axle final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Axle",
-        .version = "1.3",
+        .version = "1.4",
         .slot = Slot::kConstraint,
         .meaning = "Wheel that rolls, steers and is sprung.",
         .capabilities = {"coordinates"},
@@ -52,8 +56,11 @@ class Axle final : public ConstraintPlugin {
                   .means("Axis fixed in body 2 about which the wheel rolls; not parallel to the other."),
               Property::number("SuspensionStiffness", "N/m")
                   .above(0.0)
-                  .means("Spring along the steering axis; rigid if absent."),
-              Property::number("SuspensionDamping", "N*s/m").at_least(0.0).means("Its damping; none if absent."),
+                  .means("Spring along the steering axis. If absent the wheel is free between SuspensionLowerLimit and "
+                         "SuspensionUpperLimit, and rigid without those."),
+              Property::number("SuspensionDamping", "N*s/m")
+                  .at_least(0.0)
+                  .means("Damper along the steering axis; none if absent."),
               Property::number("SteeringLowerLimit", "rad")
                   .at_least(-kMostSteering)
                   .at_most(0.0)
@@ -78,11 +85,18 @@ class Axle final : public ConstraintPlugin {
                          "absent."),
               Property::number("MaximumTorque", "N*m")
                   .at_least(0.0)
-                  .means("Largest torque of the drive; unlimited if absent.")},
+                  .means("Largest torque of the drive; unlimited if absent."),
+              Property::number("SuspensionLowerLimit", "m")
+                  .at_most(0.0)
+                  .means("Smallest way of the wheel along SteeringAxis, relative to body 1, 0 at the start; none if "
+                         "absent."),
+              Property::number("SuspensionUpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
+              restitution_property()},
              {{"steering", "rad",
                "Steering angle, right-handed about SteeringAxis, 0 at the start, above -pi up to pi."},
               {"suspension", "m",
-               "Way of the wheel along SteeringAxis relative to body 1, 0 at the start; of a wheel that is sprung."},
+               "Way of the wheel along SteeringAxis relative to body 1, 0 at the start; of a wheel that has a "
+               "suspension."},
               {"rolling", "rad",
                "Angle by which the wheel has rolled, right-handed about RollingAxis, 0 at the start, above -pi up to "
                "pi."}}}}};
@@ -90,33 +104,41 @@ class Axle final : public ConstraintPlugin {
   explicit Axle(PropertyCursor) {}
 
   void bind(const stage::ConstraintBindRequest& request, const stage::ConstraintBindReply& reply, Host&) override {
-    bind_each(request, reply,
-              [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
-                demand_type(type, "Axle");
-                const Vector3 point = properties.vector();
-                const Vector3 steering = unit_axis(properties.vector(), "Axle: SteeringAxis");
-                const Vector3 rolling = unit_axis(properties.vector(), "Axle: RollingAxis");
-                const JointSpring suspension = JointSpring::of(&properties);
-                if (steering.cross(rolling).norm() < 1e-6)
-                  throw Refusal("Axle: RollingAxis is parallel to SteeringAxis");
-                if (suspension.stiffness == 0.0 && suspension.damping > 0.0)
-                  throw Refusal("Axle: SuspensionDamping is given without SuspensionStiffness");
-                const JointLimits limits = properties.at_end() ? JointLimits{} : steering_limits(&properties);
-                const JointSpring spring = JointSpring::of(&properties);
-                write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
-                const Pose wheel = frame_along(point, rolling);
-                write_frame(bodies.pose2, wheel, &out);
-                out.number(swing_between(steering, rolling).angle);
-                write_spring(suspension, &out);
-                out.number(limits.lower);
-                out.number(limits.upper);
-                write_spring(spring, &out);
-                out.number(properties.at_end() ? 0.0 : properties.number());
-                // where the wheel sees the steering axis
-                const Vector3 seen = wheel.orientation.conjugate() * steering;
-                out.number(math::atan2(seen.z(), seen.y()));
-                write_drive(&properties, "Axle", &out);
-              });
+    bind_each(
+        request, reply, [](std::uint64_t type, PropertyCursor properties, const JointBodies& bodies, BoundWriter& out) {
+          demand_type(type, "Axle");
+          const Vector3 point = properties.vector();
+          const Vector3 steering = unit_axis(properties.vector(), "Axle: SteeringAxis");
+          const Vector3 rolling = unit_axis(properties.vector(), "Axle: RollingAxis");
+          const JointSpring suspension = JointSpring::of(&properties);
+          if (steering.cross(rolling).norm() < 1e-6) throw Refusal("Axle: RollingAxis is parallel to SteeringAxis");
+          JointLimits limits = read_limits_of(&properties, "Steering");
+          const JointSpring spring = JointSpring::of(&properties);
+          const double rest = properties.at_end() ? 0.0 : properties.number();
+          BoundWriter drive;
+          write_drive(&properties, "Axle", &drive);
+          JointLimits travel = read_limits_of(&properties, "Suspension");
+          if (suspension.stiffness == 0.0 && suspension.damping > 0.0 && travel.is_none())
+            throw Refusal(
+                "Axle: SuspensionDamping is given without SuspensionStiffness, SuspensionLowerLimit or "
+                "SuspensionUpperLimit");
+          limits.restitution = travel.restitution =
+              read_restitution(&properties, "Axle", !limits.is_none() || !travel.is_none(),
+                               "SteeringLowerLimit, SteeringUpperLimit, SuspensionLowerLimit or SuspensionUpperLimit");
+          write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
+          const Pose wheel = frame_along(point, rolling);
+          write_frame(bodies.pose2, wheel, &out);
+          out.number(swing_between(steering, rolling).angle);
+          write_spring(suspension, &out);
+          write_limits(travel, &out);
+          write_limits(limits, &out);
+          write_spring(spring, &out);
+          out.number(rest);
+          // where the wheel sees the steering axis
+          const Vector3 seen = wheel.orientation.conjugate() * steering;
+          out.number(math::atan2(seen.z(), seen.y()));
+          for (const double number : drive.numbers()) out.number(number);
+        });
   }
 
   void discrepancies(const stage::ConstraintDiscrepanciesRequest& request,
@@ -125,15 +147,16 @@ class Axle final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       const double angle = bound.number();
       const JointSpring suspension = read_spring(&bound);
+      const JointLimits travel = read_limits(&bound);
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
-      const bool is_sprung = !suspension.is_none();
-      emit(held_point(one, two.position, {!is_sprung, true, true}));
+      const bool is_rigid = suspension.is_none() && travel.is_none();
+      emit(held_point(one, two.position, {is_rigid, true, true}));
       emit(swing_row(steering, rolling, angle));
-      if (is_sprung) emit(sprung(row_along(steering, one.position, two.position, AxisMode::kFree), suspension));
+      if (!suspension.is_none())
+        emit(sprung(row_along(steering, one.position, two.position, AxisMode::kFree), suspension));
+      if (!travel.is_none()) emit(limited_way_row(steering, one.position, two.position, travel));
       const Vector3 across = -(one.orientation * Vector3::UnitZ());
-      JointLimits limits;
-      limits.lower = bound.number();
-      limits.upper = bound.number();
+      const JointLimits limits = read_limits(&bound);
       if (!limits.is_none()) {
         Discrepancy limit = swing_row(across, rolling, kQuarterTurn, AxisMode::kLimited);
         const double sine = math::sin(angle);
@@ -142,6 +165,7 @@ class Axle final : public ConstraintPlugin {
         };
         limit.lower.x() = counted(limits.lower);
         limit.upper.x() = counted(limits.upper);
+        limit.restitution = limits.restitution;
         emit(limit);
       }
       const JointSpring held = read_spring(&bound);
@@ -161,21 +185,25 @@ class Axle final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       bound.number();
       const JointSpring suspension = read_spring(&bound);
-      // limits, spring and its angle
-      for (int i = 0; i < 5; ++i) bound.number();
+      const JointLimits travel = read_limits(&bound);
+      read_limits(&bound);
+      // the steering's spring and its angle
+      for (int i = 0; i < 3; ++i) bound.number();
       const math::SinCos start = math::sincos(bound.number());
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
       const Vector3 turning = bodies.spin2 - bodies.spin1;
       emit(0, azimuth_of(steering, one.orientation * Vector3::UnitY(), rolling, turning));
-      if (!suspension.is_none()) emit(1, way_along(steering, one.position, two.position, bodies));
+      if (!suspension.is_none() || !travel.is_none()) emit(1, way_along(steering, one.position, two.position, bodies));
       emit(2, reversed(azimuth_of(rolling, two.orientation * Vector3(0.0, start.cos, start.sin), steering, -turning)));
     });
   }
 
  private:
-  static JointLimits steering_limits(PropertyCursor* properties) {
+  // The next two properties; a request that was recorded before the joint had them may end here.
+  static JointLimits read_limits_of(PropertyCursor* properties, const std::string& what) {
+    if (properties->at_end()) return {};
     const double lower = properties->number(), upper = properties->number();
-    return JointLimits::of(lower, upper, "Axle: SteeringLowerLimit", "Axle: SteeringUpperLimit");
+    return JointLimits::of(lower, upper, "Axle: " + what + "LowerLimit", "Axle: " + what + "UpperLimit");
   }
 };
 

@@ -83,13 +83,8 @@ class Slider final : public ConstraintPlugin {
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
       const JointDrive drive = read_drive(&bound);
-      if (!limits.is_none() && !drive.is_course_alone()) {
-        Discrepancy limit = row_along(axis, one.position, two.position, AxisMode::kLimited);
-        limit.lower.x() = limits.lower;
-        limit.upper.x() = limits.upper;
-        limit.restitution = limits.restitution;
-        emit(limit);
-      }
+      if (!limits.is_none() && !drive.is_course_alone())
+        emit(limited_way_row(axis, one.position, two.position, limits));
       if (!drive.motion.is_none()) {
         const CourseState course = drive.motion.at(bodies.time).within(limits);
         emit(followed_way(axis, one.position, two.position, bodies, course, drive.force));

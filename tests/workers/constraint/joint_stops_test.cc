@@ -1,0 +1,60 @@
+// Suspensions of axles: the rows of their stops, and what they refuse.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "plugin_sdk/discrepancy.h"
+#include "plugin_sdk/math/rotation.h"
+#include "tests/workers/constraint/joint_pair.h"
+
+namespace gravitas::test {
+namespace {
+
+// With limits alone it is a guide along the steering axis, whose way they see and no turn of the wheel.
+TEST_F(JointPair, ASuspensionWithLimitsIsAGuideBetweenThem) {
+  PluginUnderTest plugin("constraint_axle");
+  const double no = kNoValue;
+  for (const double stiffness : {no, 2000.0}) {
+    JointProblem wheel =
+        joint(&plugin, "Axle",
+              numbers({kPoint, kAxis, kAcross}, {stiffness, no, no, no, no, no, 0.0, no, no, -0.04, 0.09, 0.5}));
+    wheel.bodies[1].pose.position += 0.07 * kAxis;
+    turn(&wheel, 0.4 * kAxis);
+    const std::vector<Discrepancy> all = wheel.describe();
+    ASSERT_EQ(all.size(), std::isnan(stiffness) ? 3U : 4U);
+    EXPECT_EQ(rank(wheel.jacobian({all[0], all[1]})), 3);
+    for (const Discrepancy& d : all) EXPECT_NEAR(joint_error(d, d.point2 - d.point1), 0.0, kFreedomRounding);
+    const Discrepancy& limit = all.back();
+    EXPECT_EQ(limit.modes, pack_modes(AxisMode::kLimited, AxisMode::kFree, AxisMode::kFree));
+    EXPECT_EQ(Vector3(limit.lower.x(), limit.upper.x(), limit.restitution), Vector3(-0.04, 0.09, 0.5));
+    const Vector3 axis = to_rotation_matrix(limit.axes).col(0);
+    EXPECT_NEAR(axis.dot(limit.point2 - limit.point1), 0.07, kFreedomRounding);
+    EXPECT_EQ(rank(wheel.jacobian({all[0], all[1], limit})), 4);
+    EXPECT_NEAR((axis - kAxis).norm(), 0.0, kFreedomRounding);
+  }
+}
+
+TEST_F(JointPair, StopsThatCannotBeAreRefusedWithTheField) {
+  struct Trial {
+    const char *plugin, *type;
+    std::vector<double> properties;
+    const char* field;
+  };
+  const double no = kNoValue;
+  const auto wheel = [](const std::vector<double>& rest) { return numbers({kPoint, kAxis, kAcross}, rest); };
+  const std::vector<Trial> trials = {
+      {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, 0.02, 0.1}), "SuspensionLowerLimit"},
+      {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, no, -0.1}), "SuspensionUpperLimit"},
+  };
+  for (const Trial& trial : trials) {
+    PluginUnderTest plugin(trial.plugin);
+    const std::string why = refused(&plugin, trial.type, trial.properties);
+    EXPECT_NE(why.find(std::string(trial.type) + ": " + trial.field), std::string::npos)
+        << trial.type << ", " << trial.field << ": \"" << why << '"';
+  }
+}
+
+}  // namespace
+}  // namespace gravitas::test
