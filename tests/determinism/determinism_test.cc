@@ -28,8 +28,8 @@ using kernel::Hosting;
 const std::string kHashes = in_source("/tests/determinism/hashes.json");
 // whose hashes are committed
 constexpr const char* kScenes[] = {
-    "two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack", "thruster", "pile", "callbacks",
-    "suspension",        "stops",  "taut",          "hinged"};
+    "two_spheres_motor", "bounce", "sliding_boxes", "double_pendulum", "stack",     "thruster", "pile", "callbacks",
+    "suspension",        "stops",  "taut",          "hinged",          "bump_stops"};
 constexpr Slot kSlots[] = {Slot::kSpace, Slot::kCollision, Slot::kConstraint,
                            Slot::kForce, Slot::kSolver,    Slot::kIntegrator};
 

@@ -87,6 +87,30 @@ TEST(StopsOfSmooth, LeaveMotionItsOrder) {
   }
 }
 
+// A preloaded spring presses the wheel on one stop, from which it is thrown again and again: x + d = A cos(rate t) in between.
+TEST(StopsOfSmooth, LeaveAPreloadedSuspensionItsOrder) {
+  constexpr double kSpring = 50.0, kMass = 2.0, kPreload = 4.0, kStop = 0.06, kSpeed = 0.5;
+  const double rate = std::sqrt(kSpring / kMass), rest = kPreload / kSpring;
+  const double amplitude = std::hypot(rest, kSpeed / rate), top = std::acos(rest / amplitude) / rate;
+  const double period = 2.0 * std::acos((rest - kStop) / amplitude) / rate;  // from stop to stop
+  const auto error = [&](double h) {
+    SceneRun run(
+        scene("", ball({0, 0, 0}, {kSpeed, 0, 0}, ""),
+              "Constraint { Type = \"Axle\" Id = \"Rail\" Body2 = \"A\" CustomProperties { BindPoint = {0, 0, 0} "
+              "SteeringAxis = {1, 0, 0} RollingAxis = {0, 1, 0} SuspensionStiffness = 50 SuspensionPreload = 4 "
+              "SuspensionLowerLimit = -0.06 Restitution = 1 } }",
+              h, 4.0));
+    run.to_end();
+    EXPECT_EQ(run.count_events(EventKind::kLimitStart), static_cast<std::uint32_t>((4.0 - top) / period + 0.5));
+    const double since = std::fmod(4.0 - top + 0.5 * period, period) - 0.5 * period;
+    return std::fabs(run.body("A").pose.position.x() - (amplitude * std::cos(rate * since) - rest));
+  };
+  const double coarse = error(0.02), fine = error(0.01), finest = error(0.005);
+  EXPECT_LT(coarse, 2e-5);
+  EXPECT_NEAR(std::log2(coarse / fine), 4.0, 0.4);
+  EXPECT_NEAR(std::log2(fine / finest), 4.0, 0.4);
+}
+
 // e = 1/2 on a load: it comes to rest after sqrt(2 h/g) (1 + e)/(1 - e), and rests.
 TEST(StopsOfSmooth, BringToRestWhatBouncesLessAndLess) {
   for (const double h : {1.0 / 60.0, 1e-3}) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/scenes/scene_run.h"
+#include "tests/scenes/watched_run.h"
 
 namespace gravitas {
 namespace {
@@ -15,6 +16,7 @@ namespace {
 using harness::literal;
 using harness::SceneRun;
 using harness::set;
+using harness::WatchedRun;
 
 constexpr double kCarMass = 100.0, kCarSpring = 2e4;    // kg, N/m
 constexpr double kCarSag = kCarMass * kG / kCarSpring;  // m
@@ -36,20 +38,24 @@ constexpr SuspensionCase kSuspensionCases[] = {{"Sequential", "Basic", "SemiImpl
 class QuarterCar : public ::testing::TestWithParam<SuspensionCase> {
  protected:
   static bool is_smooth() { return std::string(GetParam().simulator) == "Smooth"; }
-  static SceneRun run(const std::string& suspension, double duration, double speed = 0.0) {
+  static std::string scene(const std::string& suspension, double duration, double speed = 0.0) {
     const SuspensionCase& with = GetParam();
-    return SceneRun(
-        "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
-        "Simulator { Type = \"" +
-            std::string(with.simulator) + "\" CustomProperties { TimeStep = " + literal(with.time_step) +
-            " Duration = " + literal(duration) +
-            " } }\nEnvironment { Space { Bodies { Body { Id = \"Car\" Mass = 100 PrincipalMoments = {9, 9, 9} Forces = "
-            "{\"G\"} KineticProperties { LinearVelocity = {0, " +
-            literal(speed) +
-            ", 0} } } } }\nConstraints { Constraint { Type = \"Axle\" Id = \"Axle\" Body1 = \"Car\" CustomProperties { "
-            "BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = {0, 0, 1} " +
-            suspension + " } } } }\n",
-        {set("Solver", std::string(with.solver)), set("Integrator", std::string(with.integrator))});
+    return "Forces { Force { Type = \"Gravity\" Id = \"G\" CustomProperties { Acceleration = {0, -9.81, 0} } } }\n"
+           "Simulator { Type = \"" +
+           std::string(with.simulator) + "\" CustomProperties { TimeStep = " + literal(with.time_step) +
+           " Duration = " + literal(duration) +
+           " } }\nEnvironment { Space { Bodies { Body { Id = \"Car\" Mass = 100 PrincipalMoments = {9, 9, 9} Forces = "
+           "{\"G\"} KineticProperties { LinearVelocity = {0, " +
+           literal(speed) +
+           ", 0} } } } }\nConstraints { Constraint { Type = \"Axle\" Id = \"Axle\" Body1 = \"Car\" CustomProperties { "
+           "BindPoint = {0, 0, 0} SteeringAxis = {0, 1, 0} RollingAxis = {0, 0, 1} " +
+           suspension + " } } } }\n";
+  }
+  static std::vector<std::string> overrides() {
+    return {set("Solver", std::string(GetParam().solver)), set("Integrator", std::string(GetParam().integrator))};
+  }
+  static SceneRun run(const std::string& suspension, double duration, double speed = 0.0) {
+    return SceneRun(scene(suspension, duration, speed), overrides());
   }
   static Event first_stop(const SceneRun& run) {
     for (const Event& event : run.events())
@@ -93,7 +99,7 @@ TEST_P(QuarterCar, MeetsItsBumpStopAtTheSpeedThatEnergyGives) {
   }
 }
 
-// Nearer than the sag the stop bears m g - k x, and the car stands.
+// Nearer than the sag the stop holds the car.
 TEST_P(QuarterCar, StandsOnItsStop) {
   for (const std::string& spring : {"SuspensionStiffness = 2e4 SuspensionDamping = 2e3 ", ""}) {
     SceneRun standing = run(spring + "SuspensionUpperLimit = 0.02", 0.5);
@@ -102,6 +108,75 @@ TEST_P(QuarterCar, StandsOnItsStop) {
     EXPECT_NEAR(standing.body("Car").twist.linear.y(), 0.0, 1e-9) << spring;
     EXPECT_EQ(standing.count_events(EventKind::kLimitStart), 1U) << spring;
   }
+}
+
+// What each row of the joint pushed with in the last step, N.
+class RowForces : public kernel::CommitListener {
+ public:
+  explicit RowForces(SceneRun* run) { run->environment().set_commit_listener(this); }
+  double of(AxisMode mode) const { return mode == AxisMode::kLimited ? limited_ : locked_; }
+
+ private:
+  void on_inner_step(const kernel::Environment&, const kernel::InnerStep& inner) override {
+    limited_ = locked_ = 0.0;
+    const DiscrepancyColumns rows = inner.data.discrepancies.columns();
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      if (rows.at(row).is_angular()) continue;
+      double force = inner.data.discrepancy_impulse[3 * row] / inner.data.time_step[0];
+      // beside it, what acted in the derivatives of Smooth
+      if (3 * row < inner.data.held_force.size()) force += inner.data.held_force[3 * row];
+      (axis_mode(rows.at(row).modes, 0) == AxisMode::kLimited ? limited_ : locked_) += force;
+    }
+  }
+  void on_commit(const kernel::Environment&) override {}
+
+  double limited_ = 0.0, locked_ = 0.0;
+};
+
+// There the spring bears k x + P, and the stop the rest of the weight.
+TEST_P(QuarterCar, ItsStopBearsWhatTheSpringDoesNot) {
+  for (const double preload : {0.0, 300.0}) {
+    SceneRun standing =
+        run("SuspensionStiffness = 2e4 SuspensionDamping = 2e3 SuspensionUpperLimit = 0.02 "
+            "SuspensionPreload = " +
+                literal(preload),
+            0.5);
+    const RowForces forces(&standing);
+    standing.to_end();
+    // pushed down on the wheel, which is body 2
+    EXPECT_NEAR(forces.of(AxisMode::kLocked), -(kCarSpring * 0.02 + preload), 1e-5) << preload;
+    EXPECT_NEAR(forces.of(AxisMode::kLimited), -(kCarMass * kG - kCarSpring * 0.02 - preload), 1e-5) << preload;
+  }
+}
+
+// Preloaded with its weight it stands where it starts, and its axle tells that weight from the first step on.
+TEST_P(QuarterCar, StandsWhereItStartsOnItsPreload) {
+  for (const std::string& stops : {"", "SuspensionLowerLimit = -0.05 SuspensionUpperLimit = 0.05 Restitution = 0.5 "}) {
+    WatchedRun standing(
+        scene("SuspensionStiffness = 2e4 SuspensionDamping = 500 SuspensionPreload = 981 " + stops, 0.2), overrides());
+    while (!standing.run.is_done()) {
+      standing.run.step();
+      EXPECT_NEAR(standing.run.body("Car").pose.position.y(), 0.0, 1e-12) << stops;
+      const auto reactions = standing.reactions();
+      if (std::string(GetParam().solver) == "Sequential" && is_smooth()) continue;
+      ASSERT_EQ(reactions.size(), 1U);
+      const auto& force = reactions[0].force();
+      EXPECT_NEAR(std::fabs(force.at(1)), kCarMass * kG, 1e-7) << stops << standing.run.time();
+    }
+  }
+}
+
+// With less it sinks until k x = m g - P; it swings at sqrt(k/m) about there.
+TEST_P(QuarterCar, SinksByWhatItsPreloadLeaves) {
+  SceneRun settling = run("SuspensionStiffness = 2e4 SuspensionDamping = 2.8e3 SuspensionPreload = 600", 2.0);
+  settling.to_end();
+  EXPECT_NEAR(settling.body("Car").pose.position.y(), -(kCarMass * kG - 600.0) / kCarSpring, 1e-9);
+  if (!is_smooth()) return;
+  constexpr double kSpeed = 0.2;
+  SceneRun swinging = run("SuspensionStiffness = 2e4 SuspensionPreload = 981", 2.0, kSpeed);
+  const double rate = std::sqrt(kCarSpring / kCarMass);
+  swinging.to_end();
+  EXPECT_NEAR(swinging.body("Car").pose.position.y(), kSpeed / rate * std::sin(2.0 * rate), 1e-6);
 }
 
 // Without a spring it falls freely from stop to stop: up against the lower one, back at its speed, and down on the upper one.

@@ -1,4 +1,4 @@
-// Suspensions of axles: the rows of their stops, and what they refuse.
+// Suspensions of axles: the rows of their stops and preloads, and what they refuse.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ TEST_F(JointPair, ASuspensionWithLimitsIsAGuideBetweenThem) {
   for (const double stiffness : {no, 2000.0}) {
     JointProblem wheel =
         joint(&plugin, "Axle",
-              numbers({kPoint, kAxis, kAcross}, {stiffness, no, no, no, no, no, 0.0, no, no, -0.04, 0.09, 0.5}));
+              numbers({kPoint, kAxis, kAcross}, {stiffness, no, no, no, no, no, 0.0, no, no, -0.04, 0.09, 0.0, 0.5}));
     wheel.bodies[1].pose.position += 0.07 * kAxis;
     turn(&wheel, 0.4 * kAxis);
     const std::vector<Discrepancy> all = wheel.describe();
@@ -36,6 +36,21 @@ TEST_F(JointPair, ASuspensionWithLimitsIsAGuideBetweenThem) {
   }
 }
 
+// At the start it bears its preload, along the steering axis on body 1.
+TEST_F(JointPair, ASuspensionBearsItsPreloadAtTheStart) {
+  PluginUnderTest plugin("constraint_axle");
+  const double no = kNoValue;
+  JointProblem wheel =
+      joint(&plugin, "Axle",
+            numbers({kPoint, kAxis, kAcross}, {2000.0, 50.0, no, no, no, no, 0.0, no, no, no, no, 600.0, 0.0}));
+  for (const double way : {0.0, 0.1, -0.3}) {
+    wheel.bodies[1].pose.position = bodies_[1].pose.position + way * kAxis;
+    const Discrepancy spring = wheel.describe().at(2);
+    const Vector3 axis = to_rotation_matrix(spring.axes).col(0);
+    EXPECT_NEAR(axis.dot(spring.point2 - spring.point1) / spring.compliance.x(), 600.0 + 2000.0 * way, 1e-9) << way;
+  }
+}
+
 TEST_F(JointPair, StopsThatCannotBeAreRefusedWithTheField) {
   struct Trial {
     const char *plugin, *type;
@@ -47,6 +62,8 @@ TEST_F(JointPair, StopsThatCannotBeAreRefusedWithTheField) {
   const std::vector<Trial> trials = {
       {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, 0.02, 0.1}), "SuspensionLowerLimit"},
       {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, no, -0.1}), "SuspensionUpperLimit"},
+      {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, -0.1, 0.1, 50}), "SuspensionPreload"},
+      {"constraint_axle", "Axle", wheel({2e3, no, no, no, no, no, 0.0, no, no, no, no, -50}), "SuspensionPreload"},
   };
   for (const Trial& trial : trials) {
     PluginUnderTest plugin(trial.plugin);

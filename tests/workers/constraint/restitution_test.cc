@@ -45,7 +45,7 @@ const JointOfStops kJointsOfStops[] = {
     {"constraint_constant_velocity", "ConstantVelocity", {0, 0, 0, 1, 0, 0, 1, 0, 0, kNothing, kNothing, 0.5}, {11}, 1},
     {"constraint_axle",
      "Axle",
-     {0, 0, 0, 0, 1, 0, 1, 0, 0, 2000, 50, -0.5, 0.5, kNothing, kNothing, 0, kNothing, kNothing, -0.1, 0.2},
+     {0, 0, 0, 0, 1, 0, 1, 0, 0, 2000, 50, -0.5, 0.5, kNothing, kNothing, 0, kNothing, kNothing, -0.1, 0.2, 0},
      {11, 12, 18, 19},
      2},
     {"constraint_winch", "Winch", {0, 0, 1, 0.5, 0.5, -1, 0, 0, 0, 0, 0.1, kNothing, kNothing, 0}, {}, 1, 11}};

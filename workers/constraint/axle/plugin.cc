@@ -8,7 +8,8 @@
 // along s, which takes no freedom. The angle between s and r changes at the rate w.n, n = s x r/|s x r|: one row about n.
 // Four rows of rank 4, left are the turns about s and r; with a suspension rank 3 and a spring.
 //
-// Suspension. The way of the wheel along s, 0 at the start. Limits are one row more, active at a limit (rank 4 there): where
+// Suspension. The way of the wheel along s, 0 at the start. The spring is at rest at -preload/k, so that it bears the preload at
+// the start: -(k way + preload) - c way' on the wheel along s, and the opposite on the vehicle. Limits are one row more, active at a limit (rank 4 there): where
 // they bear, the spring bears what it does at that way, and they the rest of the load. They alone make a free guide.
 //
 // Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
@@ -91,6 +92,12 @@ class Axle final : public ConstraintPlugin {
                   .means("Smallest way of the wheel along SteeringAxis, relative to body 1, 0 at the start; none if "
                          "absent."),
               Property::number("SuspensionUpperLimit", "m").at_least(0.0).means("Largest way; none if absent."),
+              Property::number("SuspensionPreload", "N")
+                  .at_least(0.0)
+                  .defaults_to({0.0})
+                  .means(
+                      "Force with which the spring pushes body 1 along SteeringAxis, and the wheel against it, at the "
+                      "start: it is at rest at a way of -SuspensionPreload/SuspensionStiffness."),
               restitution_property()},
              {{"steering", "rad",
                "Steering angle, right-handed about SteeringAxis, 0 at the start, above -pi up to pi."},
@@ -122,6 +129,10 @@ class Axle final : public ConstraintPlugin {
             throw Refusal(
                 "Axle: SuspensionDamping is given without SuspensionStiffness, SuspensionLowerLimit or "
                 "SuspensionUpperLimit");
+          const double preload = properties.at_end() ? 0.0 : properties.number();
+          if (!(preload >= 0.0)) throw Refusal("Axle: SuspensionPreload is negative");
+          if (preload > 0.0 && suspension.stiffness == 0.0)
+            throw Refusal("Axle: SuspensionPreload is given without SuspensionStiffness");
           limits.restitution = travel.restitution =
               read_restitution(&properties, "Axle", !limits.is_none() || !travel.is_none(),
                                "SteeringLowerLimit, SteeringUpperLimit, SuspensionLowerLimit or SuspensionUpperLimit");
@@ -130,6 +141,7 @@ class Axle final : public ConstraintPlugin {
           write_frame(bodies.pose2, wheel, &out);
           out.number(swing_between(steering, rolling).angle);
           write_spring(suspension, &out);
+          out.number(preload > 0.0 ? -preload / suspension.stiffness : 0.0);
           write_limits(travel, &out);
           write_limits(limits, &out);
           write_spring(spring, &out);
@@ -147,13 +159,15 @@ class Axle final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       const double angle = bound.number();
       const JointSpring suspension = read_spring(&bound);
+      const double rest_way = bound.number();
       const JointLimits travel = read_limits(&bound);
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
       const bool is_rigid = suspension.is_none() && travel.is_none();
       emit(held_point(one, two.position, {is_rigid, true, true}));
       emit(swing_row(steering, rolling, angle));
       if (!suspension.is_none())
-        emit(sprung(row_along(steering, one.position, two.position, AxisMode::kFree), suspension));
+        emit(
+            sprung(row_along(steering, one.position + rest_way * steering, two.position, AxisMode::kFree), suspension));
       if (!travel.is_none()) emit(limited_way_row(steering, one.position, two.position, travel));
       const Vector3 across = -(one.orientation * Vector3::UnitZ());
       const JointLimits limits = read_limits(&bound);
@@ -185,6 +199,7 @@ class Axle final : public ConstraintPlugin {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       bound.number();
       const JointSpring suspension = read_spring(&bound);
+      bound.number();  // where that is at rest
       const JointLimits travel = read_limits(&bound);
       read_limits(&bound);
       // the steering's spring and its angle
