@@ -43,7 +43,7 @@ namespace gravitas {
 struct CourseState {
   double value = 0.0, rate = 0.0, change = 0.0;
 
-  // As far as limits let it go: where they stop it, it is at rest.
+  // As far as limits let it go: where they stop it, it is at rest, those that give way too.
   CourseState within(const JointLimits& limits) const;
 };
 

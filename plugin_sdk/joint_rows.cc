@@ -72,6 +72,15 @@ JointLimits JointLimits::of_turn(double lower, double upper, std::string_view lo
   return limits;
 }
 
+void JointLimits::limit(double scale, Discrepancy* d) const {
+  d->lower.x() = lower > -kUnlimited ? scale * lower : -kUnlimited;
+  d->upper.x() = upper < kUnlimited ? scale * upper : kUnlimited;
+  d->restitution = restitution;
+  if (spring.is_none()) return;
+  d->compliance.x() = 1.0 / spring.stiffness;
+  d->damping.x() = spring.damping;
+}
+
 double JointLimits::turn(double angle, double way) const {
   constexpr double kOfWay = 0.5, kMostPast = 1.0;  // rad
   if (is_none()) return angle;
@@ -135,6 +144,32 @@ double read_restitution(PropertyCursor* properties, std::string_view type, bool 
   if (restitution > 0.0 && !has_stops)
     throw Refusal(std::string(type) + ": Restitution is given without " + std::string(stops));
   return restitution;
+}
+
+Property limit_stiffness_property(std::string_view unit, std::string_view whose) {
+  return Property::number(std::string(whose) + "LimitStiffness", std::string(unit))
+      .above(0.0)
+      .means("Spring that pushes back what is beyond a limit; absent: limits stop dead.");
+}
+
+Property limit_damping_property(std::string_view unit, std::string_view whose) {
+  return Property::number(std::string(whose) + "LimitDamping", std::string(unit))
+      .at_least(0.0)
+      .means("Its damper, which never pulls; none if absent.");
+}
+
+JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type, double restitution, bool has_stops,
+                              std::string_view stops, std::string_view whose) {
+  const JointSpring spring = JointSpring::of(properties);
+  const std::string joint = std::string(type) + ": ", limit = std::string(whose) + "Limit";
+  if (spring.stiffness > 0.0 && !has_stops)
+    throw Refusal(joint + limit + "Stiffness is given without " + std::string(stops));
+  if (spring.damping > 0.0 && spring.stiffness == 0.0)
+    throw Refusal(joint + limit + "Damping is given without " + limit + "Stiffness");
+  if (restitution > 0.0 && spring.stiffness > 0.0)
+    throw Refusal(joint + "Restitution is given without limits that stop dead: " + limit +
+                  "Stiffness lets them give way");
+  return spring.stiffness > 0.0 ? spring : JointSpring{};
 }
 
 JointSpring JointSpring::of(PropertyCursor* properties) {
@@ -236,9 +271,7 @@ Discrepancy row_along(const Vector3& axis, const Vector3& point1, const Vector3&
 Discrepancy limited_way_row(const Vector3& axis, const Vector3& point1, const Vector3& point2,
                             const JointLimits& limits) {
   Discrepancy d = row_along(axis, point1, point2, AxisMode::kLimited);
-  d.lower.x() = limits.lower;
-  d.upper.x() = limits.upper;
-  d.restitution = limits.restitution;
+  limits.limit(1.0, &d);
   return d;
 }
 
@@ -341,10 +374,7 @@ Discrepancy limited_twist_row(const Quaternion& frame1, const Quaternion& frame2
   const double twist = limits.limited_turn(twist_between(frame1, frame2), twisted_way(frame1, frame2, bodies));
   const Twisting twisting = {first_axis(frame1), first_axis(frame2), twist};
   Discrepancy d = row_of(twisting, AxisMode::kLimited);
-  const double scale = twisting.cosine();
-  d.lower.x() = limits.lower > -kUnlimited ? scale * limits.lower : -kUnlimited;
-  d.upper.x() = limits.upper < kUnlimited ? scale * limits.upper : kUnlimited;
-  d.restitution = limits.restitution;
+  limits.limit(twisting.cosine(), &d);
   return d;
 }
 

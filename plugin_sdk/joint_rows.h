@@ -32,15 +32,31 @@ struct StepTurn {
   }
 };
 
+// A spring and a damper on an axis, which yields as they let it (compliance, joint_laws.h): of torque or force -(k e + c e'),
+// with a damper alone -c e'. As scenes give them: NaN or 0 where there is none.
+struct JointSpring {
+  double stiffness = 0.0, damping = 0.0;
+
+  // The next two properties, refused if negative; a request that was recorded before a joint had them may end here.
+  static JointSpring of(PropertyCursor* properties);
+  bool is_none() const { return stiffness == 0.0 && damping == 0.0; }
+  // As one of the axes (0 ... 2) of a discrepancy, whose error is counted from where the spring is at rest.
+  void yield_on(int axis, Discrepancy* d) const;
+};
+
 // Refuses, with the field named, limits that cross, and limits without the 0 of the start between them. NaN: absent.
 struct JointLimits {
   double lower = -kUnlimited, upper = kUnlimited;
   double restitution = 0.0;  // of both stops
+  JointSpring spring;        // that holds what is beyond them; none: they stop dead
 
   static JointLimits of(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
   // Of an angle that is known within one turn: two that span a whole one are refused, too.
   static JointLimits of_turn(double lower, double upper, std::string_view lower_field, std::string_view upper_field);
   bool is_none() const { return lower == -kUnlimited && upper == kUnlimited; }
+  bool has_both() const { return lower > -kUnlimited && upper < kUnlimited; }
+  // As the first axis of a discrepancy, whose error is `scale` times what they limit.
+  void limit(double scale, Discrepancy* d) const;
   // The turn that is meant by an angle, among angle + k 2 pi; `way`: what the step turned by to get there. Without limits the
   // one within pi. With two the nearest to their middle, with one the nearest to half a turn on its free side; but where the step
   // began within the limits in another, that: what a step turns beyond a limit is beyond it, however little is between the two.
@@ -73,17 +89,15 @@ JointLimits read_limits(PropertyCursor* bound);
 Property restitution_property();
 double read_restitution(PropertyCursor* properties, std::string_view type, bool has_stops, std::string_view stops);
 
-// A spring and a damper on an axis, which yields as they let it (compliance, joint_laws.h): of torque or force -(k e + c e'),
-// with a damper alone -c e'. As scenes give them: NaN or 0 where there is none.
-struct JointSpring {
-  double stiffness = 0.0, damping = 0.0;
+// `LimitStiffness` and `LimitDamping`, or these behind the name of `whose` limits, the next two properties: limits that give way. A
+// request that was recorded before a joint had them may end before. Beyond a limit by e they push with k e + c e', and never
+// pull. Refused are both without stops, the damper without the spring, and a Restitution beside them: what gives way throws back
+// what its damper leaves.
+Property limit_stiffness_property(std::string_view unit, std::string_view whose = {});
+Property limit_damping_property(std::string_view unit, std::string_view whose = {});
+JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type, double restitution, bool has_stops,
+                              std::string_view stops, std::string_view whose = {});
 
-  // The next two properties, refused if negative; a request that was recorded before a joint had them may end here.
-  static JointSpring of(PropertyCursor* properties);
-  bool is_none() const { return stiffness == 0.0 && damping == 0.0; }
-  // As one of the axes (0 ... 2) of a discrepancy, whose error is counted from where the spring is at rest.
-  void yield_on(int axis, Discrepancy* d) const;
-};
 void write_spring(const JointSpring& spring, BoundWriter* out);
 JointSpring read_spring(PropertyCursor* bound);
 // A row (its first axis) that the spring holds, as far as it does.

@@ -149,6 +149,17 @@ TEST_P(QuarterCar, ItsStopBearsWhatTheSpringDoesNot) {
   }
 }
 
+// On rubber the stop gives way by what it bears over its stiffness.
+TEST_P(QuarterCar, PressesItsRubberStopIn) {
+  SceneRun standing =
+      run("SuspensionStiffness = 2e4 SuspensionDamping = 2e3 SuspensionUpperLimit = 0.02 "
+          "SuspensionLimitStiffness = 1e5 SuspensionLimitDamping = 1e3",
+          2.0);
+  standing.to_end();
+  // k x + k' (x - 0.02) = m g
+  EXPECT_NEAR(standing.body("Car").pose.position.y(), -(kCarMass * kG + 1e5 * 0.02) / (kCarSpring + 1e5), 1e-9);
+}
+
 // Preloaded with its weight it stands where it starts, and its axle tells that weight from the first step on.
 TEST_P(QuarterCar, StandsWhereItStartsOnItsPreload) {
   for (const std::string& stops : {"", "SuspensionLowerLimit = -0.05 SuspensionUpperLimit = 0.05 Restitution = 0.5 "}) {

@@ -1,4 +1,4 @@
-// Suspensions of axles: the rows of their stops and preloads, and what they refuse.
+// Suspensions of axles, and limits that give way: the rows of their stops and preloads, and what they refuse.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,6 +51,36 @@ TEST_F(JointPair, ASuspensionBearsItsPreloadAtTheStart) {
   }
 }
 
+// Limits that give way are no error and take no freedom.
+TEST_F(JointPair, LimitsThatGiveWayAreSpringsBeyondThem) {
+  struct Soft {
+    const char *plugin, *type;
+    std::vector<double> properties;
+    double turn, way;
+    std::size_t row;
+  };
+  const double no = kNoValue;
+  for (const Soft& soft :
+       {Soft{"constraint_slider", "Slider",
+             numbers({kPoint, kAxis}, {-0.1, 0.2, no, no, no, no, 0.0, 0.0, 0.0, 500.0, 7.0}), 0.0, 0.5, 4},
+        Soft{"constraint_revolute", "Revolute",
+             numbers({kPoint, kPoint + kAxis}, {-0.1, 0.2, no, no, 0.0, no, no, 0.0, 0.0, 500.0, 7.0}), 0.5, 0.0, 3},
+        Soft{"constraint_axle", "Axle",
+             numbers({kPoint, kAxis, kAcross}, {no, no, no, no, no, no, 0.0, no, no, -0.1, 0.2, 0.0, 0.0, 500.0, 7.0}),
+             0.0, 0.5, 2}}) {
+    PluginUnderTest plugin(soft.plugin);
+    JointProblem pair = joint(&plugin, soft.type, soft.properties);
+    turn(&pair, soft.turn * kAxis);
+    pair.bodies[1].pose.position += soft.way * kAxis;
+    const Discrepancy limit = pair.describe().at(soft.row);
+    EXPECT_EQ(axis_mode(limit.modes, 0), AxisMode::kLimited) << soft.type;
+    EXPECT_EQ(limit.compliance.x(), 1.0 / 500.0) << soft.type;
+    EXPECT_EQ(limit.damping.x(), 7.0) << soft.type;
+    EXPECT_NEAR(to_rotation_matrix(limit.axes).col(0).dot(limit.point2 - limit.point1), 0.5, kFreedomRounding);
+    EXPECT_EQ(joint_error(limit, limit.point2 - limit.point1), 0.0) << soft.type;
+  }
+}
+
 TEST_F(JointPair, StopsThatCannotBeAreRefusedWithTheField) {
   struct Trial {
     const char *plugin, *type;
@@ -64,6 +94,18 @@ TEST_F(JointPair, StopsThatCannotBeAreRefusedWithTheField) {
       {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, no, -0.1}), "SuspensionUpperLimit"},
       {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, -0.1, 0.1, 50}), "SuspensionPreload"},
       {"constraint_axle", "Axle", wheel({2e3, no, no, no, no, no, 0.0, no, no, no, no, -50}), "SuspensionPreload"},
+      {"constraint_axle", "Axle", wheel({no, no, -1, 1, no, no, 0.0, no, no, no, no, 0, 0.5, 500, no}),
+       "SuspensionLimitStiffness"},
+      {"constraint_axle", "Axle", wheel({no, no, no, no, no, no, 0.0, no, no, -0.1, no, 0, 0.5, 500, no}),
+       "Restitution"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {no, no, no, no, no, no, 0, 0, 0, 500, no}),
+       "LimitStiffness"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {-1, no, no, no, no, no, 0, 0, 0, no, 3}),
+       "LimitDamping"},
+      {"constraint_slider", "Slider", numbers({kPoint, kAxis}, {-1, no, no, no, no, no, 0, 0.5, 0, 500, 3}),
+       "Restitution"},
+      {"constraint_revolute", "Revolute", numbers({kPoint, kPoint + kAxis}, {-1, no, no, no, 0, no, no, 0, 0, 500, no}),
+       "LimitStiffness"},
   };
   for (const Trial& trial : trials) {
     PluginUnderTest plugin(trial.plugin);

@@ -10,7 +10,8 @@
 //
 // Suspension. The way of the wheel along s, 0 at the start. The spring is at rest at -preload/k, so that it bears the preload at
 // the start: -(k way + preload) - c way' on the wheel along s, and the opposite on the vehicle. Limits are one row more, active at a limit (rank 4 there): where
-// they bear, the spring bears what it does at that way, and they the rest of the load. They alone make a free guide.
+// they bear, the spring bears what it does at that way, and they the rest of the load. They alone make a free guide. Limits that
+// give way are a spring and a damper more on what is beyond them, which push and never pull, and take no freedom.
 //
 // Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
 // start, however the wheel rolls. Limits are one row, active at a limit, on asin(sin(g) sin(angle)), where s and r make an angle
@@ -98,7 +99,8 @@ class Axle final : public ConstraintPlugin {
                   .means(
                       "Force with which the spring pushes body 1 along SteeringAxis, and the wheel against it, at the "
                       "start: it is at rest at a way of -SuspensionPreload/SuspensionStiffness."),
-              restitution_property()},
+              restitution_property(), limit_stiffness_property("N/m", "Suspension"),
+              limit_damping_property("N*s/m", "Suspension")},
              {{"steering", "rad",
                "Steering angle, right-handed about SteeringAxis, 0 at the start, above -pi up to pi."},
               {"suspension", "m",
@@ -136,6 +138,9 @@ class Axle final : public ConstraintPlugin {
           limits.restitution = travel.restitution =
               read_restitution(&properties, "Axle", !limits.is_none() || !travel.is_none(),
                                "SteeringLowerLimit, SteeringUpperLimit, SuspensionLowerLimit or SuspensionUpperLimit");
+          travel.spring =
+              read_limit_spring(&properties, "Axle", limits.is_none() ? travel.restitution : 0.0, !travel.is_none(),
+                                "SuspensionLowerLimit or SuspensionUpperLimit", "Suspension");
           write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
           const Pose wheel = frame_along(point, rolling);
           write_frame(bodies.pose2, wheel, &out);
@@ -143,6 +148,7 @@ class Axle final : public ConstraintPlugin {
           write_spring(suspension, &out);
           out.number(preload > 0.0 ? -preload / suspension.stiffness : 0.0);
           write_limits(travel, &out);
+          write_spring(travel.spring, &out);
           write_limits(limits, &out);
           write_spring(spring, &out);
           out.number(rest);
@@ -160,7 +166,8 @@ class Axle final : public ConstraintPlugin {
       const double angle = bound.number();
       const JointSpring suspension = read_spring(&bound);
       const double rest_way = bound.number();
-      const JointLimits travel = read_limits(&bound);
+      JointLimits travel = read_limits(&bound);
+      travel.spring = read_spring(&bound);
       const Vector3 steering = one.orientation * Vector3::UnitX(), rolling = two.orientation * Vector3::UnitX();
       const bool is_rigid = suspension.is_none() && travel.is_none();
       emit(held_point(one, two.position, {is_rigid, true, true}));
@@ -200,7 +207,8 @@ class Axle final : public ConstraintPlugin {
       bound.number();
       const JointSpring suspension = read_spring(&bound);
       bound.number();  // where that is at rest
-      const JointLimits travel = read_limits(&bound);
+      JointLimits travel = read_limits(&bound);
+      travel.spring = read_spring(&bound);
       read_limits(&bound);
       // the steering's spring and its angle
       for (int i = 0; i < 3; ++i) bound.number();

@@ -9,6 +9,7 @@
 // to the rows: with a point far out, ways and turns could not be told apart.
 // With limits one row more about a, active only at a limit: rank 6 there. The angle is that of body 2 relative to body 1,
 // right-handed about point 1 -> point 2, zero at the start, known within one turn: two limits may span less than that.
+// Two that give way are a spring and a damper on what is beyond them, which push and never pull, and take no freedom.
 // A spring and a damper about a, torque -k (angle - RestAngle) - c angle', take no freedom. Beyond half a turn from RestAngle
 // (from the middle of the limits, where there are some) the angle, and so the spring, goes on from the other side.
 // A drive to a speed with a largest torque is one row on the velocity about a (rank 6), as in an `AngularMotor`; at a limit that it
@@ -28,7 +29,7 @@ class Revolute final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Revolute",
-        .version = "1.5",
+        .version = "1.6",
         .slot = Slot::kConstraint,
         .meaning = "Hinge.",
         .capabilities = {"coordinates"},
@@ -58,7 +59,8 @@ class Revolute final : public ConstraintPlugin {
                         .means("Largest torque of the drive; unlimited if absent."),
                     restitution_property(),
                     motion_property("rad", "Angle, counted as by the limits but through any number of turns,",
-                                    "MaximumTorque")},
+                                    "MaximumTorque"),
+                    limit_stiffness_property("N*m/rad"), limit_damping_property("N*m*s/rad")},
                    {{"angle", "rad",
                      "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start; the "
                      "turn that limits are compared with, without them above -pi up to pi."}}}}};
@@ -80,7 +82,11 @@ class Revolute final : public ConstraintPlugin {
           JointDrive drive = JointDrive::of(&properties);
           limits.restitution = read_restitution(&properties, "Revolute", !limits.is_none(), "LowerLimit or UpperLimit");
           drive.follow(&properties, "Revolute", "AngularSpeed", "MaximumTorque");
+          // what is far beyond a single one cannot be told from what comes to it from behind
+          limits.spring = read_limit_spring(&properties, "Revolute", limits.restitution, limits.has_both(),
+                                            "LowerLimit and UpperLimit");
           write_limits(limits, &out);
+          write_spring(limits.spring, &out);
           write_spring(spring, &out);
           out.number(rest);
           write_drive(drive, &out);
@@ -92,7 +98,8 @@ class Revolute final : public ConstraintPlugin {
     describe_each(request, reply, [](std::uint64_t, PropertyCursor bound, const JointBodies& bodies, auto&& emit) {
       const Pose one = read_frame(&bound, bodies.pose1), two = read_frame(&bound, bodies.pose2);
       hold_hinge(one, two, emit);
-      const JointLimits limits = read_limits(&bound);
+      JointLimits limits = read_limits(&bound);
+      limits.spring = read_spring(&bound);
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
       const JointDrive drive = read_drive(&bound);

@@ -6,8 +6,8 @@
 // Freedoms. The origin's two rows take the translations across the axis, the angles the turns about z, y and x: five rows
 // of rank 5, none redundant, one freedom left. The rows are taken where body 2 is, so that a long way along the axis is no
 // lever.
-// The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit) and a
-// drive to a speed with a largest force (one row on the velocity, rank 6). A spring and a damper along it, force
+// The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit; those that give
+// way are a spring and a damper on what is beyond them, which push and never pull, and take no freedom) and a drive to a speed with a largest force (one row on the velocity, rank 6). A spring and a damper along it, force
 // -k (way - RestPosition) - c way', take no freedom. A drive along a course over time (plugin_sdk/joint_motion.h) is one row, too: of
 // the way, or with a largest force of the velocity.
 #include "plugin_sdk/joint_coordinates.h"
@@ -22,7 +22,7 @@ class Slider final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Slider",
-        .version = "1.4",
+        .version = "1.5",
         .slot = Slot::kConstraint,
         .meaning = "Straight guide.",
         .capabilities = {"coordinates"},
@@ -44,7 +44,8 @@ class Slider final : public ConstraintPlugin {
               Property::number("Damping", "N*s/m").at_least(0.0).means("Damper along the axis; none if absent."),
               Property::number("RestPosition", "m").defaults_to({0.0}).means("Way at which the spring pushes nothing."),
               restitution_property(),
-              motion_property("m", "Way of body 2 along the axis from the start", "MaximumForce")},
+              motion_property("m", "Way of body 2 along the axis from the start", "MaximumForce"),
+              limit_stiffness_property("N/m"), limit_damping_property("N*s/m")},
              {{"displacement", "m", "Way of body 2 along the axis, relative to body 1, 0 at the start."}}}}};
   }
   explicit Slider(PropertyCursor) {}
@@ -62,9 +63,12 @@ class Slider final : public ConstraintPlugin {
           const double rest = properties.at_end() ? 0.0 : properties.number();
           limits.restitution = read_restitution(&properties, "Slider", !limits.is_none(), "LowerLimit or UpperLimit");
           drive.follow(&properties, "Slider", "Speed", "MaximumForce");
+          limits.spring = read_limit_spring(&properties, "Slider", limits.restitution, !limits.is_none(),
+                                            "LowerLimit or UpperLimit");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           write_limits(limits, &out);
+          write_spring(limits.spring, &out);
           write_spring(spring, &out);
           out.number(rest);
           write_drive(drive, &out);
@@ -79,7 +83,8 @@ class Slider final : public ConstraintPlugin {
       hold_orientation(one, two, emit);
 
       const Vector3 axis = one.orientation * Vector3::UnitX();
-      const JointLimits limits = read_limits(&bound);
+      JointLimits limits = read_limits(&bound);
+      limits.spring = read_spring(&bound);
       const JointSpring spring = read_spring(&bound);
       const double rest = bound.number();
       const JointDrive drive = read_drive(&bound);
