@@ -41,21 +41,25 @@ std::array<StopGap, kStopsOfRow> stop_gaps(const Discrepancy& discrepancy, const
   for (int axis = 0; axis < 3; ++axis) {
     const AxisMode mode = axis_mode(discrepancy.modes, axis);
     if (mode != AxisMode::kLimited && mode != AxisMode::kUnilateral) continue;
-    if (discrepancy.maximum_force[axis] < kUnlimited) continue;  // gives way, as to all that takes no time
+    const bool gives_way = discrepancy.compliance[axis] > 0.0;
+    if (gives_way && discrepancy.damping[axis] == 0.0) continue;  // pushes with nothing at first
+    // gives way as to all that takes no time
+    if (!gives_way && discrepancy.maximum_force[axis] < kUnlimited) continue;
     const double length = error.norm();
     const bool is_radial = discrepancy.is_radial() && axis == 0 && length > 0.0;
     const Vector3 along = is_radial ? Vector3(error / length) : Vector3(axes.col(axis));
-    const JointAxisState state = joint_axis_state(discrepancy, axis, along, error);
+    JointAxisState state = joint_axis_state(discrepancy, axis, along, error);
+    state.mode = mode;  // that it acts in the derivatives makes no axis free here
     const JacobianRow row = jacobian_row(discrepancy, along, body1.centre, body2.centre);
     const Twist &one = body1.velocity, &two = body2.velocity;
     const double rate = row.velocity(one.linear, one.angular, two.linear, two.angular) - state.desired_velocity;
     const double speeds = std::fabs(row.linear1.dot(one.linear)) + std::fabs(row.angular1.dot(one.angular)) +
                           std::fabs(row.linear2.dot(two.linear)) + std::fabs(row.angular2.dot(two.angular));
     for (const double sign : {1.0, -1.0}) {
-      const std::optional<JointStop> stop = stop_of(state, sign);
+      const std::optional<JointStop> stop = gives_way ? soft_stop_of(state, sign) : stop_of(state, sign);
       if (!stop) continue;
-      stops[2 * static_cast<std::size_t>(axis) + (sign < 0.0 ? 1 : 0)] = {sign * (state.error_at_start - stop->limit),
-                                                                          sign * rate, slop, reach, still_rate(speeds)};
+      stops[2 * static_cast<std::size_t>(axis) + (sign < 0.0 ? 1 : 0)] = {
+          sign * (state.error_at_start - stop->limit), sign * rate, slop, reach, still_rate(speeds), gives_way};
     }
   }
   return stops;

@@ -10,17 +10,19 @@
 
 namespace gravitas {
 
-// A stop of a joint in a state: one side of an axis that limits its error rigidly, without a bound on its force, and leaves it room.
+// A stop of a joint in a state: one side of an axis that limits its error and leaves it room, rigidly without a bound on its force,
+// or by a spring with a damper, whose force jumps where it is met.
 struct StopGap {
   double gap = kUnlimited;  // of the error to it, m or rad; below 0 beyond it
   double rate = 0.0;        // of the gap, m/s or rad/s
   double slop = 0.0;        // gap that is none
   double reach = 1.0;       // m that a rad counts as: arms and coordinates; 1 of turns
   double still = 0.0;       // rate that is none
+  bool gives_way = false;
 
   bool exists() const { return gap < kUnlimited; }
   // Bears nothing from here on: it is away, or goes away.
-  bool is_open() const { return exists() && (gap > slop || rate > still); }
+  bool is_open() const { return exists() && (gap > slop || (rate > still && !gives_way)); }
   // May have closed in a time that ends here, as far as this state alone tells.
   bool may_have_closed(double time) const;
 };

@@ -62,12 +62,20 @@ JointLaw soft_law(const JointAxisState& a, double h) {
   return law;
 }
 
+std::optional<JointStop> side_of(const JointAxisState& a, double sign) {
+  if (!is_limit(a.mode) || is_held(a)) return std::nullopt;
+  if (sign > 0.0) return has_lower_side(a) ? std::optional(JointStop{1.0, lower_of(a)}) : std::nullopt;
+  return has_upper_side(a) ? std::optional(JointStop{-1.0, a.upper}) : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<JointStop> stop_of(const JointAxisState& a, double sign) {
-  if (!is_limit(a.mode) || is_held(a) || is_soft(a)) return std::nullopt;
-  if (sign > 0.0) return has_lower_side(a) ? std::optional(JointStop{1.0, lower_of(a)}) : std::nullopt;
-  return has_upper_side(a) ? std::optional(JointStop{-1.0, a.upper}) : std::nullopt;
+  return is_soft(a) ? std::nullopt : side_of(a, sign);
+}
+
+std::optional<JointStop> soft_stop_of(const JointAxisState& a, double sign) {
+  return is_soft(a) ? side_of(a, sign) : std::nullopt;
 }
 
 bool acts_as_force(const Discrepancy& discrepancy, int axis) {

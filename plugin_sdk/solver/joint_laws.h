@@ -129,8 +129,9 @@ struct JointStop {
   double sign = 1.0;  // -1: the upper
   double limit = 0.0;
 };
-// The stop that the axis has on a side, rigid and with room beside it; none for others.
+// The stop that the axis has on a side, with room beside it: rigid, or one that gives way; none for others.
 std::optional<JointStop> stop_of(const JointAxisState& axis, double sign);
+std::optional<JointStop> soft_stop_of(const JointAxisState& axis, double sign);
 
 // True for an axis whose law is a force of the state: with compliance, or driven or friction with damping.
 bool acts_as_force(const Discrepancy& discrepancy, int axis);

@@ -33,13 +33,31 @@ std::pair<std::uint32_t, std::uint32_t> bodies_of(const kernel::StepData& data, 
   return {data.contact_body[2 * contact], data.contact_body[2 * contact + 1]};
 }
 
-JointBody joint_body(const kernel::StepData& data, std::uint32_t body) {
+Pose pose_of(const kernel::State& state, std::uint32_t body) {
+  return {vector_at(state.position.span(), body), quaternion_at(state.orientation.span(), body)};
+}
+
+JointBody joint_body(const kernel::InnerStep& inner, std::uint32_t body) {
+  const kernel::StepData& data = inner.data;
   JointBody one;
   if (body == kNone) return one;
+  one.start = pose_of(inner.before, body), one.next = pose_of(inner.after, body);
   one.trial = {vector_at(data.trial_position.span(), body), quaternion_at(data.trial_orientation.span(), body)};
   one.inverse_mass = data.inverse_mass[body];
   one.inverse_moments = vector_at(data.inverse_inertia.span(), body);
   return one;
+}
+
+// The side on which an axis of a limit that gives way was passed in the step: 1 the lower, -1 the upper, 0 none.
+double passed_side(const Discrepancy& limit, int axis, const JointBody& body1, const JointBody& body2) {
+  const auto error = [&](const Pose& one, const Pose& two) {
+    const Vector3 all = error_in_axes_at(limit, body1.trial, body2.trial, one, two);
+    return limit.is_radial() && axis == 0 ? all.norm() : (limit.axes * Vector3::Unit(axis)).dot(all);
+  };
+  const double before = error(body1.start, body2.start), after = error(body1.next, body2.next);
+  const bool has_two = axis_mode(limit.modes, axis) == AxisMode::kLimited;
+  const double lower = has_two ? limit.lower[axis] : 0.0, upper = has_two ? limit.upper[axis] : kUnlimited;
+  return before >= lower && after < lower ? 1.0 : before <= upper && after > upper ? -1.0 : 0.0;
 }
 
 }  // namespace
@@ -148,7 +166,8 @@ void EventSource::find_ongoing(const kernel::Environment& environment, const ker
 
 // A limit is met by a side that pushes now and did not in the step before, if it closed where the step began, by more than
 // rounding, and its impulse changes that rate. So what rests on a limit, or is pressed on it, does not meet it. The rate is along
-// the row where the step ends: what swings on a taut rope seems to close, with next to no impulse.
+// the row where the step ends: what swings on a taut rope seems to close, with next to no impulse. One that gives way pushes with
+// next to nothing at first: it is met where it is passed.
 void EventSource::find_limits(const kernel::Environment& environment, const kernel::InnerStep& inner) {
   constexpr double kRounding = 1e-9, kNothing = 1e-12;  // of the speeds; m or rad in the step
   constexpr double kOfStop = 1e-3;                      // of the rate
@@ -162,7 +181,8 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
         continue;
       const std::size_t at = 3 * row + static_cast<std::size_t>(axis);
       const double impulse = data.discrepancy_impulse[at], before = data.discrepancy_warm_impulse[at];
-      if (impulse == 0.0 || impulse * before > 0.0) continue;
+      const bool is_soft = limit.compliance[axis] > 0.0;
+      if (!is_soft && (impulse == 0.0 || impulse * before > 0.0)) continue;
       const std::uint32_t a = data.discrepancy_body[2 * row], b = data.discrepancy_body[2 * row + 1];
       const auto of = [](std::uint32_t body, std::span<const double> column) {
         return body == kNone ? Vector3(Vector3::Zero()) : Vector3(vector_at(column, body));
@@ -176,10 +196,12 @@ void EventSource::find_limits(const kernel::Environment& environment, const kern
                              jacobian.angular2.dot(of(b, inner.before.angular_velocity.span()))};
       double rate = 0.0, largest = 0.0;
       for (const double way : ways) rate += way, largest = std::max(largest, std::fabs(way));
-      const double closing = impulse > 0.0 ? -rate : rate;
+      const JointBody one = joint_body(inner, a), two = joint_body(inner, b);
+      const double side = is_soft ? passed_side(limit, axis, one, two) : impulse;
+      if (side == 0.0) continue;
+      const double closing = side > 0.0 ? -rate : rate;
       if (!(closing > kRounding * largest && closing * environment.time_step() > kNothing)) continue;
-      const double change = held_back(limit, impulse * along, joint_body(data, a), joint_body(data, b), 1.0);
-      if (!(change > kOfStop * closing)) continue;
+      if (!is_soft && !(held_back(limit, impulse * along, one, two, 1.0) > kOfStop * closing)) continue;
       const std::uint32_t joint = data.discrepancies.constraint[row];
       events_.push_back(
           {EventKind::kLimitStart, environment.step_count() + 1, inner.end, a, b, joint, closing, std::fabs(impulse)});

@@ -63,6 +63,23 @@ TEST(StopGaps, AreOfRigidStopsWithRoomAlone) {
   EXPECT_FALSE(stop_gaps(d, {}, {})[1].exists());
 }
 
+// A damper pushes from where it is met on, however little the spring does.
+TEST(StopGaps, AreOfDampedStopsThatGiveWay) {
+  Discrepancy d = limited({0, 0, 0}, {0.15, 0, 0}, -0.2, 0.2);
+  d.compliance.x() = 1e-4, d.damping.x() = 3.0;
+  for (const std::uint32_t applied : {0U, kForcesApplied}) {
+    d.modes |= applied;
+    EXPECT_NEAR(stop_gaps(d, {}, {})[1].gap, 0.05, 1e-15);
+  }
+  EXPECT_TRUE(stop_gaps(d, {}, {})[1].is_open());
+  d.point2.x() = 0.25;
+  StopBody leaves;
+  leaves.centre = d.point2, leaves.velocity.linear = {-3, 0, 0}, leaves.is_pushed = true;
+  const StopGap pressed = stop_gaps(d, {}, leaves)[1];
+  EXPECT_NEAR(pressed.gap, -0.05, 1e-15);
+  EXPECT_FALSE(pressed.is_open());  // pushes on while it leaves
+}
+
 TEST(StopGaps, GoAlongWithWhatTheJointMoves) {
   Discrepancy guided = limited({0, 0, 0}, {0.1, 0, 0}, -0.2, 0.2);
   guided.velocity = {2, 0, 0};
