@@ -201,6 +201,11 @@ Discrepancy sprung(Discrepancy row, const JointSpring& spring) {
   return row;
 }
 
+Discrepancy sprung_about(const Vector3& axis, double rate, double angle, const JointSpring& spring) {
+  const double share = 1.0 / (rate * rate);
+  return sprung(row_about(axis, rate * angle, AxisMode::kFree), {share * spring.stiffness, share * spring.damping});
+}
+
 void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out, std::string_view which) {
   if (properties->at_end()) return;
   const double speed = properties->number(), torque = properties->number();

@@ -103,6 +103,10 @@ JointSpring read_spring(PropertyCursor* bound);
 // A row (its first axis) that the spring holds, as far as it does.
 Discrepancy sprung(Discrepancy row, const JointSpring& spring);
 
+// The row of a spring against an angle, about a unit axis about which the bodies turn by `rate` times that angle: a torque of
+// -(k angle + c angle') times its gradient. Exact to first order in the step's turn.
+Discrepancy sprung_about(const Vector3& axis, double rate, double angle, const JointSpring& spring);
+
 // A drive about an axis, from the next two properties, AngularSpeed and MaximumTorque, or `which` behind either; a request that was
 // recorded before a joint had them may end before. Bound are its speed and torque, and nothing where there is none. Refuses a torque
 // without a speed.

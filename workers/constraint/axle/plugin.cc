@@ -15,9 +15,9 @@
 //
 // Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
 // start, however the wheel rolls. Limits are one row, active at a limit, on asin(sin(g) sin(angle)), where s and r make an angle
-// g; a spring and a damper, torque -k e - c e' with that e of angle - SteeringAngle, take no freedom. With a stiff spring
-// SteeringAngle is the angle that the wheel is steered to. They can tell less than a quarter turn either way: from behind, a
-// limit is met half a turn on.
+// g. They can tell less than a quarter turn either way: from behind, a limit is met half a turn on. A spring and a damper take no
+// freedom: of e = angle - SteeringAngle, within half a turn, a torque -(k e + c e') about the gradient of e, as the drive's. With
+// a stiff spring SteeringAngle is the angle that the wheel is steered to.
 //
 // Drive. The wheel turns at w2 - w1 = p r + q s, where p is what it rolls at. So d = (r - (r.s) s)/sin^2 g has d.(w2 - w1) = p
 // and d.s = 0: a torque T d does the work T p, and steers nothing, as a motor in the hub of a wheel that may steer does. It is one
@@ -25,6 +25,7 @@
 //
 // Rolling. What the wheel has rolled is the angle about r by which it sees s turned back: its rate is p, steering is none of it.
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "plugin_sdk/joint_coordinates.h"
@@ -191,12 +192,15 @@ class Axle final : public ConstraintPlugin {
       }
       const JointSpring held = read_spring(&bound);
       const double rest = bound.number();
-      if (!held.is_none()) emit(sprung(swing_row(exp_rotation(rest * steering) * across, rolling, kQuarterTurn), held));
+      const Vector3 normal = swing_between(steering, rolling).axis;
+      const double sine_now = steering.cross(rolling).norm();
+      const Vector3 at_rest = exp_rotation(rest * steering) * (one.orientation * Vector3::UnitY());
+      const std::optional<Coordinate> off = azimuth_of(steering, at_rest, rolling, bodies.spin2 - bodies.spin1);
+      if (!held.is_none() && off) emit(sprung_about(rolling.cross(normal), sine_now, off->value, held));
       if (bound.at_end()) return;
       bound.number();  // of the coordinates alone
       if (bound.at_end()) return;
-      const Vector3 normal = swing_between(steering, rolling).axis;
-      drive_about(normal.cross(steering), steering.cross(rolling).norm(), &bound, emit);
+      drive_about(normal.cross(steering), sine_now, &bound, emit);
     });
   }
 

@@ -10,8 +10,8 @@
 // a right angle behind an angle z, in the body of the bar, counted from a right angle: asin(sin(g) sin(angle - z)), exact for
 // turns of any size, and right within a right angle of z. So z is the middle of limits that are no more than that apart, else
 // the nearer limit (which limits nothing from further away), and half of the way back to it where a step went far beyond.
-// A spring and a damper about either bar take no freedom. Their angle is that by which one bar has turned about the other
-// since the start, asin(sin(g) sin(angle)) where the bars make an angle g: within a right angle, beyond which they pull on.
+// A spring and a damper about either bar take no freedom. Their angle is that of the coordinates, within half a turn of the
+// start; their torque acts about the gradient of it, as a drive's does.
 // Drives. Body 2 turns on body 1 at p a1 + q a2, with p and q what it turns about the bars. So d1 = (a1 - (a1.a2) a2)/sin^2 g has
 // d1.w = p and no part along a2: a torque T d1 does the work T p, as a motor or friction between body 1 and the cross does, and d2
 // alike between the cross and body 2. Each is one row on the velocity about its d, made unit; with a speed of 0 it is the friction
@@ -131,20 +131,21 @@ class Universal final : public ConstraintPlugin {
       const Vector3 axis1 = one.orientation * Vector3::UnitX(), axis2 = two.orientation * Vector3::UnitX();
       const double between = bound.number();
       emit(swing_row(axis1, axis2, between));
-      const JointSpring spring1 = read_spring(&bound), spring2 = read_spring(&bound);
-      // of a direction of either body, across each other at the start
-      const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
-      if (!spring1.is_none()) emit(sprung(swing_row(across1, axis2, kQuarterTurn), spring1));
-      if (!spring2.is_none()) emit(sprung(swing_row(axis1, across2, kQuarterTurn), spring2));
+      const Vector3 normal = swing_between(axis1, axis2).axis;
+      const std::array<Vector3, 2> turned_about = {axis2.cross(normal), normal.cross(axis1)};
+      const double sine = axis1.cross(axis2).norm();
+      const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1);
+      for (std::size_t bar = 0; bar < 2; ++bar) {
+        const JointSpring spring = read_spring(&bound);
+        const std::optional<Coordinate> angle = bars[bar].angle();
+        if (!spring.is_none() && angle) emit(sprung_about(turned_about[bar], sine, angle->value, spring));
+      }
       if (bound.at_end()) return;
       PropertyCursor drive1(bound.table(2)), drive2(bound.table(2));
-      const Vector3 normal = swing_between(axis1, axis2).axis;
-      const double sine = axis1.cross(axis2).norm();
-      drive_about(axis2.cross(normal), sine, &drive1, emit);
-      drive_about(normal.cross(axis1), sine, &drive2, emit);
+      drive_about(turned_about[0], sine, &drive1, emit);
+      drive_about(turned_about[1], sine, &drive2, emit);
       if (bound.at_end()) return;
-      const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1),
-                               start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
+      const std::array<Bar, 2> start = bars_of(one, two, bodies.start_spin2 - bodies.start_spin1);
       for (std::size_t bar = 0; bar < 2; ++bar) {
         const JointLimits limits = read_limits(&bound);
         if (!limits.is_none()) emit(limited_row(bars[bar], start[bar].angle(), limits, between, bodies.elapsed));
