@@ -218,6 +218,8 @@ class IslandSolver {
 
   // ---- places from which no motion leads, though velocities are allowed there
 
+  // From S_n to S*.
+  bool has_moved(std::uint32_t body) const;
   // Does the pose change take a body back by most of its way? In regular places it is of the size of the method's error.
   bool is_taken_back(std::uint32_t body) const;
   // Takes from v* what the pose change took back; returns the share of that which it was, 1/s, 0 where nothing was.

@@ -64,8 +64,15 @@ void IslandSolver::solve_velocity() {
       answer_.joint_impulse[3 * joint.row + k] += taken_back * answer_.joint_correction[3 * joint.row + k];
 }
 
+bool IslandSolver::has_moved(std::uint32_t body) const {
+  const SolverBody& of = bodies_[body];
+  return of.trial.position != of.start.position || of.trial.orientation.coeffs() != of.start.orientation.coeffs();
+}
+
 bool IslandSolver::is_taken_back(std::uint32_t body) const {
   constexpr double kMost = 0.1;
+  // of no way all is rounding
+  if (!has_moved(body)) return false;
   const SolverBody& of = bodies_[body];
   const Twist& back = displacement_[body];
   const double turn = log_rotation(shorter_arc(of.trial.orientation * of.start.orientation.conjugate())).norm();
@@ -113,12 +120,7 @@ bool IslandSolver::leads_elsewhere(const BodyMotion& trial) const {
                            [&](const EndJoint& j) { return std::ranges::all_of(j.velocity_laws, holds_always); }))
     return false;
   // where a step begins nothing has gone astray: what bodies are thrown with, joints take
-  const auto has_moved = [&](std::uint32_t i) {
-    const SolverBody& body = bodies_[i];
-    return body.trial.position != body.start.position ||
-           body.trial.orientation.coeffs() != body.start.orientation.coeffs();
-  };
-  if (std::ranges::none_of(pushed_, has_moved)) return false;
+  if (std::ranges::none_of(pushed_, [&](std::uint32_t i) { return has_moved(i); })) return false;
   double taken = 0.0, all = 0.0;
   for (const std::uint32_t i : pushed_) {
     if (!(bodies_[i].inverse_mass > 0.0)) continue;

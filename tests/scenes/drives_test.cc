@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "plugin_sdk/math/rotation.h"
 #include "tests/scenes/scene_run.h"
 
 namespace gravitas {
@@ -373,6 +374,29 @@ TEST_P(DrivenCar, BrakesAsItsTyresLetIt) {
   rolling.steps(400);
   EXPECT_NEAR(rolling.body("Car").twist.linear.x(), kSpeed - 4.0 * 50.0 / kRadius / kRolling * 2.0, 1e-2);
   EXPECT_NEAR(rolling.body("W0").twist.angular.z(), -rolling.body("Car").twist.linear.x() / kRadius, 1e-2);
+}
+
+// What turns at its drive's speed from the start goes on turning in the first step, too, whatever its axis.
+TEST(Drive, GoesOnFromTheStart) {
+  for (int i = 1; i <= 100; ++i) {
+    const Vector3 axis = Vector3(std::sin(i), std::cos(2.3 * i), std::sin(1.7 * i + 1.0)).normalized();
+    const Vector3 arm(std::cos(1.1 * i), std::sin(0.7 * i), std::cos(0.3 * i));
+    const double speed = 0.2 + std::fabs(std::sin(3.1 * i));
+    const Vector3 spin = speed * axis;
+    for (const std::string solver : {"Newton", "Direct"}) {
+      SceneRun run(driven_disc("Type = \"Revolute\" CustomProperties { BindAxisPoint1 = {0, 0, 0} BindAxisPoint2 = " +
+                                   literal(axis) + " AngularSpeed = " + literal(speed) + " }",
+                               "",
+                               "Forces = {\"Down\"} KineticProperties { Position = " + literal(arm) +
+                                   " Orientation = " + literal(exp_rotation(Vector3(0.3 * i, 0.1 * i, -0.7))) +
+                                   " LinearVelocity = " + literal(Vector3(spin.cross(arm))) +
+                                   " AngularVelocity = " + literal(spin) + " }"),
+                   {"Simulator=Smooth", "Integrator=RK4", "Solver=" + solver});
+      run.steps(2);
+      const Vector3 expected = exp_rotation(0.02 * spin) * arm;
+      EXPECT_LT((run.body("Disc").pose.position - expected).norm(), 1e-9) << i << ' ' << solver;
+    }
+  }
 }
 
 }  // namespace
