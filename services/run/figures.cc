@@ -15,6 +15,8 @@ namespace {
 
 // Joints that are open by more than this share of what they hold together hold it no more.
 constexpr double kTorn = 0.01;
+// Overlaps at the start, as a share of the smaller radius of gyration, that are worth a word.
+constexpr double kOverlap = 0.02;
 // Ways of a step, of what the scene measures: nobody means that.
 constexpr double kRunaway = 1e6;
 
@@ -145,12 +147,36 @@ void Figures::measure(kernel::Environment* environment) {
   joined_size_ = joined.size(), scene_size_ = all.size();
 }
 
+// What contacts of the first inner step say of the poses that it begins with: less what closes within it.
+void Figures::find_overlaps(const kernel::StepData& data) {
+  const auto size = [&](std::uint32_t body) {
+    const kernel::BodyDescription& of = description_.bodies[body];
+    return of.mass > 0.0 ? std::sqrt(of.inertia.maxCoeff() / of.mass) : HUGE_VAL;
+  };
+  std::uint32_t last_one = kNone, last_two = kNone;
+  std::size_t pairs = 0;
+  for (std::size_t i = 0; i < data.contact_depth.size(); ++i) {
+    const std::uint32_t one = data.contact_body[2 * i], two = data.contact_body[2 * i + 1];
+    const double closing =
+        -vector_at(data.contact_normal.span(), i).dot(vector_at(data.contact_relative_velocity.span(), i));
+    const double depth = data.contact_depth[i] - std::max(0.0, closing) * data.time_step[0];
+    if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
+    if (one != last_one || two != last_two) ++pairs;
+    last_one = one, last_two = two;
+    if (depth > overlap_.depth) overlap_ = {description_.bodies[one].id, description_.bodies[two].id, depth, 0};
+  }
+  overlap_.others = pairs > 0 ? pairs - 1 : 0;
+}
+
 void Figures::look_at(const kernel::InnerStep& inner) {
+  if (is_at_start_ && inner.number == 0) find_overlaps(inner.data);
+  is_at_start_ = false;
   contradicts_ = contradicts_ || tells_contradiction(static_cast<StopReason>(inner.data.stop_reason[0]));
 }
 
 void Figures::follow(kernel::Environment* environment) {
   last_ = totals(environment);
+  is_at_start_ = environment->step_count() == 0;
   if (!initial_) {
     reference_energy_ = (initial_ = last_)->energy();
     measure(environment);
@@ -190,6 +216,13 @@ void Figures::write(report::v1::Report* report) const {
   report->set_max_joint_error(joint_error_);
   if (!std::isfinite(initial.energy()) || !std::isfinite(last_.energy()))
     report->add_warnings("energies are not finite: speeds are so large that their squares overflow");
+  if (overlap_.depth > 0.0)
+    report->add_warnings(fmt::format(
+        "at the start bodies \"{}\" and \"{}\" overlap by {:.3g} m{}: contacts push them apart in the first steps",
+        overlap_.one, overlap_.two, overlap_.depth,
+        overlap_.others == 0
+            ? ""
+            : fmt::format(", and {} more {}", overlap_.others, overlap_.others == 1 ? "pair" : "pairs")));
   if (opening_step_)
     report->add_warnings(fmt::format(
         "joints came open by up to {:.3g} m, by more than {:.0f} % of what they hold together ({:.3g} m) from step {} "

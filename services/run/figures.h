@@ -22,7 +22,8 @@ class Figures {
   // The scene was edited: energy is compared with that of now.
   void begin_again(kernel::Environment* environment);
 
-  // Energy, momenta, penetration, joint error, drives; warnings where joints came open, and why, and where a body runs away.
+  // Energy, momenta, penetration, joint error, drives; warnings where joints came open, and why, where a body runs away, and where
+  // bodies overlap at the start.
   void write(report::v1::Report* report) const;
 
   // The extremes so far, into a checkpoint and out of it. To resume: follow() the initial state, resume(), and follow()
@@ -58,7 +59,15 @@ class Figures {
     bool is_given;       // no step has been made with that speed
   };
 
+  // Of two bodies at the start.
+  struct Overlap {
+    std::string one, two;
+    double depth = 0.0;      // m, of the deepest
+    std::size_t others = 0;  // pairs
+  };
+
   Totals totals(kernel::Environment* environment) const;
+  void find_overlaps(const kernel::StepData& data);
   void find_drives();
   void measure(kernel::Environment* environment);
   double drive_speed(const Drive& drive, const kernel::StateView& state) const;
@@ -75,6 +84,8 @@ class Figures {
   std::optional<Runaway> runaway_;               // the first
   std::optional<std::uint64_t> opening_step_;    // the first in which joints came open by kTorn of it
   std::optional<std::uint64_t> edited_step_;     // the one after the last edit
+  bool is_at_start_ = false;                     // no step has been made
+  Overlap overlap_;
 };
 
 }  // namespace gravitas

@@ -203,7 +203,21 @@ Environment { Space { Bodies {
   Body { Id = "B" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {0.45, 0, 0} } } } } })",
                                                  3);
     EXPECT_NEAR(report.max_penetration(), 0.15, 1e-12) << simulator;
+    ASSERT_EQ(report.warnings_size(), 1) << simulator;
+    EXPECT_THAT(report.warnings(0), HasSubstr("at the start bodies \"A\" and \"B\" overlap by 0.15 m:")) << simulator;
   }
+}
+
+// What flies into another within the first step was apart.
+TEST(Figures, WhatMeetsInTheFirstStepDoesNotOverlapAtTheStart) {
+  const report::v1::Report report = figures_of(R"(
+Geometries { Geometry { Type = "Sphere" Id = "Ball" CustomProperties { Radius = 0.3 } } }
+Environment { Space { Bodies {
+  Body { Id = "A" GeometryId = "Ball" Mass = 1 KineticProperties { LinearVelocity = {20, 0, 0} } }
+  Body { Id = "B" GeometryId = "Ball" Mass = 1 KineticProperties { Position = {0.65, 0, 0} LinearVelocity = {2, 0, 0} } } } } })",
+                                               3);
+  EXPECT_EQ(report.warnings_size(), 0);
+  EXPECT_LT(report.energy().final(), 0.7 * report.energy().initial());  // they have met
 }
 
 // It is named, though rows of bodies changed since.
