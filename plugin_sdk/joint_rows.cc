@@ -146,10 +146,11 @@ double read_restitution(PropertyCursor* properties, std::string_view type, bool 
   return restitution;
 }
 
-Property limit_stiffness_property(std::string_view unit, std::string_view whose) {
+Property limit_stiffness_property(std::string_view unit, std::string_view whose, std::string_view needs) {
   return Property::number(std::string(whose) + "LimitStiffness", std::string(unit))
       .above(0.0)
-      .means("Spring that pushes back what is beyond a limit; absent: limits stop dead.");
+      .means("Spring that pushes back what is beyond a limit; absent: limits stop dead." +
+             (needs.empty() ? std::string() : " Needs " + std::string(needs) + "."));
 }
 
 Property limit_damping_property(std::string_view unit, std::string_view whose) {
@@ -158,15 +159,18 @@ Property limit_damping_property(std::string_view unit, std::string_view whose) {
       .means("Its damper, which never pulls; none if absent.");
 }
 
-JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type, double restitution, bool has_stops,
-                              std::string_view stops, std::string_view whose) {
+JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type, const JointLimits& limits,
+                              bool has_stops, std::string_view stops, std::string_view whose) {
   const JointSpring spring = JointSpring::of(properties);
   const std::string joint = std::string(type) + ": ", limit = std::string(whose) + "Limit";
   if (spring.stiffness > 0.0 && !has_stops)
     throw Refusal(joint + limit + "Stiffness is given without " + std::string(stops));
   if (spring.damping > 0.0 && spring.stiffness == 0.0)
     throw Refusal(joint + limit + "Damping is given without " + limit + "Stiffness");
-  if (restitution > 0.0 && spring.stiffness > 0.0)
+  if (spring.stiffness > 0.0 && limits.lower == limits.upper)
+    throw Refusal(joint + limit +
+                  "Stiffness is given with limits that leave no room; allowed: a spring in their place");
+  if (limits.restitution > 0.0 && spring.stiffness > 0.0)
     throw Refusal(joint + "Restitution is given without limits that stop dead: " + limit +
                   "Stiffness lets them give way");
   return spring.stiffness > 0.0 ? spring : JointSpring{};
@@ -201,9 +205,16 @@ Discrepancy sprung(Discrepancy row, const JointSpring& spring) {
   return row;
 }
 
-Discrepancy sprung_about(const Vector3& axis, double rate, double angle, const JointSpring& spring) {
-  const double share = 1.0 / (rate * rate);
-  return sprung(row_about(axis, rate * angle, AxisMode::kFree), {share * spring.stiffness, share * spring.damping});
+JointSpring on_swing(const JointSpring& spring, double sine, double swing) {
+  constexpr double kSquare = 1e-9, kMost = 1.4;  // rad, where the swing hardly changes any more
+  constexpr double kSmall = 1e-4;                // below it a quotient is its limit
+  if (!(sine < 1.0 - kSquare)) return spring;
+  const double angle = math::asin(std::min(math::sin(std::fabs(swing)) / sine, math::sin(kMost)));
+  const double told = math::asin(sine * math::sin(angle));
+  // d angle/d swing
+  const double slope = math::cos(told) / (sine * math::cos(angle));
+  const double stiffness = told > kSmall ? angle * slope / told : slope * slope;
+  return {stiffness * spring.stiffness, slope * slope * spring.damping};
 }
 
 void write_drive(PropertyCursor* properties, std::string_view type, BoundWriter* out, std::string_view which) {

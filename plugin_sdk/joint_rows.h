@@ -83,7 +83,7 @@ StepTurn twisted_way(const Quaternion& frame1, const Quaternion& frame2, const J
 void write_limits(const JointLimits& limits, BoundWriter* out);
 JointLimits read_limits(PropertyCursor* bound);
 
-// `Restitution` of a joint's stops, the last property of its type; a request that was recorded before it had that may end before.
+// `Restitution` of a joint's stops, the next property; a request that was recorded before it had that may end before.
 // Refuses what is outside 0 ... 1, and more than 0 where the joint has no stop, or one that gives way; `stops` says what would
 // make one.
 Property restitution_property();
@@ -91,21 +91,22 @@ double read_restitution(PropertyCursor* properties, std::string_view type, bool 
 
 // `LimitStiffness` and `LimitDamping`, or these behind the name of `whose` limits, the next two properties: limits that give way. A
 // request that was recorded before a joint had them may end before. Beyond a limit by e they push with k e + c e', and never
-// pull. Refused are both without stops, the damper without the spring, and a Restitution beside them: what gives way throws back
-// what its damper leaves.
-Property limit_stiffness_property(std::string_view unit, std::string_view whose = {});
+// pull. Refused are both without stops, or with stops that leave no room; the damper without the spring; and a Restitution beside
+// them: what gives way throws back what its damper leaves.
+Property limit_stiffness_property(std::string_view unit, std::string_view whose = {}, std::string_view needs = {});
 Property limit_damping_property(std::string_view unit, std::string_view whose = {});
-JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type, double restitution, bool has_stops,
-                              std::string_view stops, std::string_view whose = {});
+JointSpring read_limit_spring(PropertyCursor* properties, std::string_view type, const JointLimits& limits,
+                              bool has_stops, std::string_view stops, std::string_view whose = {});
 
 void write_spring(const JointSpring& spring, BoundWriter* out);
 JointSpring read_spring(PropertyCursor* bound);
 // A row (its first axis) that the spring holds, as far as it does.
 Discrepancy sprung(Discrepancy row, const JointSpring& spring);
 
-// The row of a spring against an angle, about a unit axis about which the bodies turn by `rate` times that angle: a torque of
-// -(k angle + c angle') times its gradient. Exact to first order in the step's turn.
-Discrepancy sprung_about(const Vector3& axis, double rate, double angle, const JointSpring& spring);
+// A spring against the angle by which a direction has turned about an axis, from across it: as one on the swing of the direction
+// from there, asin(sine sin(angle)), where direction and axis keep an angle of that sine. The torque is that of the angle at the
+// state; within a right angle of it, beyond which it pulls on.
+JointSpring on_swing(const JointSpring& spring, double sine, double swing);
 
 // A drive about an axis, from the next two properties, AngularSpeed and MaximumTorque, or `which` behind either; a request that was
 // recorded before a joint had them may end before. Bound are its speed and torque, and nothing where there is none. Refuses a torque

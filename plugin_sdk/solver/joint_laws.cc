@@ -51,13 +51,16 @@ JointLaw soft_law(const JointAxisState& a, double h) {
     set_equality(law, a.desired_velocity - (a.error_at_start - rest_error(a)) / softness);
     return law;
   }
+  // from inside nothing slows the way to the limit
   if (has_lower_side(a) && std::min(a.error_at_start, a.error_at_trial) < lower_of(a)) {
+    const double off = a.error_at_start - lower_of(a);
     law.has_lower = true;
-    law.lower_target = a.desired_velocity - (a.error_at_start - lower_of(a)) / softness;
+    law.lower_target = a.desired_velocity - off / (off > 0.0 ? h : softness);
   }
   if (has_upper_side(a) && std::max(a.error_at_start, a.error_at_trial) > a.upper) {
+    const double off = a.error_at_start - a.upper;
     law.has_upper = true;
-    law.upper_target = a.desired_velocity - (a.error_at_start - a.upper) / softness;
+    law.upper_target = a.desired_velocity - off / (off < 0.0 ? h : softness);
   }
   return law;
 }

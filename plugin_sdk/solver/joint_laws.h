@@ -36,7 +36,8 @@
 // spring and damper
 //   lambda/h = -(e_{n+1}/c + d (J v - v_d)),  e_{n+1} = e_n + h (J v - v_d),
 // at the end of the step (implicit Euler, order one, stable for every stiffness), e being e_n less
-// the limit. A soft limit pushes only while its error is outside it at S_n or S*.
+// the limit. A soft limit pushes only while its error is outside it at S_n or S*; where it is inside at S_n, the damper holds against
+// the way beyond it alone: J v = v_d - e/h comes to the limit.
 //
 // In the derivative (reactions.h) the same axes are forces of the state, e being its error less the limit:
 //   with compliance    f = -(e/c + d (J v - v_d)); of a limit while e is outside it, and never a pull back to it

@@ -147,19 +147,27 @@ void Figures::measure(kernel::Environment* environment) {
   joined_size_ = joined.size(), scene_size_ = all.size();
 }
 
-// What contacts of the first inner step say of the poses that it begins with: less what closes within it.
-void Figures::find_overlaps(const kernel::StepData& data) {
+// What contacts of the first inner step say of the poses that it begins with: where their points were in them.
+void Figures::find_overlaps(const kernel::InnerStep& inner) {
+  const kernel::StepData& data = inner.data;
   const auto size = [&](std::uint32_t body) {
     const kernel::BodyDescription& of = description_.bodies[body];
     return of.mass > 0.0 ? std::sqrt(of.inertia.maxCoeff() / of.mass) : HUGE_VAL;
+  };
+  const auto before = [&](std::uint32_t body, const Vector3& point) {
+    const Vector3 from = vector_at(data.trial_position.span(), body),
+                  to = vector_at(inner.before.position.span(), body);
+    const Quaternion turn = quaternion_at(inner.before.orientation.span(), body) *
+                            quaternion_at(data.trial_orientation.span(), body).conjugate();
+    return Vector3(to + turn * (point - from));
   };
   std::uint32_t last_one = kNone, last_two = kNone;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < data.contact_depth.size(); ++i) {
     const std::uint32_t one = data.contact_body[2 * i], two = data.contact_body[2 * i + 1];
-    const double closing =
-        -vector_at(data.contact_normal.span(), i).dot(vector_at(data.contact_relative_velocity.span(), i));
-    const double depth = data.contact_depth[i] - std::max(0.0, closing) * data.time_step[0];
+    const Vector3 normal = vector_at(data.contact_normal.span(), i), point = vector_at(data.contact_point.span(), i);
+    const Vector3 half = 0.5 * data.contact_depth[i] * normal;
+    const double depth = normal.dot(before(one, point + half) - before(two, point - half));
     if (!(depth > kOverlap * std::min(size(one), size(two)))) continue;
     if (one != last_one || two != last_two) ++pairs;
     last_one = one, last_two = two;
@@ -169,7 +177,7 @@ void Figures::find_overlaps(const kernel::StepData& data) {
 }
 
 void Figures::look_at(const kernel::InnerStep& inner) {
-  if (is_at_start_ && inner.number == 0) find_overlaps(inner.data);
+  if (is_at_start_ && inner.number == 0) find_overlaps(inner);
   is_at_start_ = false;
   contradicts_ = contradicts_ || tells_contradiction(static_cast<StopReason>(inner.data.stop_reason[0]));
 }

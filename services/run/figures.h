@@ -67,7 +67,7 @@ class Figures {
   };
 
   Totals totals(kernel::Environment* environment) const;
-  void find_overlaps(const kernel::StepData& data);
+  void find_overlaps(const kernel::InnerStep& inner);
   void find_drives();
   void measure(kernel::Environment* environment);
   double drive_speed(const Drive& drive, const kernel::StateView& state) const;

@@ -220,6 +220,21 @@ Environment { Space { Bodies {
   EXPECT_LT(report.energy().final(), 0.7 * report.energy().initial());  // they have met
 }
 
+// A rod that turns its end to the floor in the first step began above it.
+TEST(Figures, WhatTurnsDownInTheFirstStepDoesNotOverlapAtTheStart) {
+  for (const char* simulator : {"Basic", "Substepping"}) {
+    const report::v1::Report report = figures_of(std::string("Simulator { Type = \"") + simulator + R"(" }
+Geometries { Geometry { Type = "Box" Id = "Rod" CustomProperties { HalfExtents = {1, 0.05, 0.05} } }
+  Geometry { Type = "Halfspace" Id = "Plane" } }
+Environment { Space { Bodies {
+  Body { Id = "Floor" GeometryId = "Plane" }
+  Body { Id = "Rod" GeometryId = "Rod" Mass = 1 KineticProperties { Position = {0, 0.1, 0} AngularVelocity = {0, 0, 20} } } } } })",
+                                                 1);
+    EXPECT_EQ(report.warnings_size(), 0) << simulator << ": " << report.warnings(0);
+    EXPECT_LT(report.energy().final(), 0.95 * report.energy().initial());  // it has met it
+  }
+}
+
 // It is named, though rows of bodies changed since.
 TEST(Figures, ABodyThatRanAwayIsNamedAfterAnEdit) {
   const harness::ScratchFolder folder;

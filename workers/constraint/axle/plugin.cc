@@ -9,15 +9,15 @@
 // Four rows of rank 4, left are the turns about s and r; with a suspension rank 3 and a spring.
 //
 // Suspension. The way of the wheel along s, 0 at the start. The spring is at rest at -preload/k, so that it bears the preload at
-// the start: -(k way + preload) - c way' on the wheel along s, and the opposite on the vehicle. Limits are one row more, active at a limit (rank 4 there): where
-// they bear, the spring bears what it does at that way, and they the rest of the load. They alone make a free guide. Limits that
+// the start: -(k way + preload) - c way' on the wheel along s, and the opposite on the vehicle. Limits are one row more, active
+// at a limit (rank 4 there): where they bear, the spring bears what it does at that way, and they the rest of the load. They alone make a free guide. Limits that
 // give way are a spring and a damper more on what is beyond them, which push and never pull, and take no freedom.
 //
 // Steering. The angle about s from u, across s and the rolling axis of the start, to r: right-handed about s, zero at the
 // start, however the wheel rolls. Limits are one row, active at a limit, on asin(sin(g) sin(angle)), where s and r make an angle
 // g. They can tell less than a quarter turn either way: from behind, a limit is met half a turn on. A spring and a damper take no
-// freedom: of e = angle - SteeringAngle, within half a turn, a torque -(k e + c e') about the gradient of e, as the drive's. With
-// a stiff spring SteeringAngle is the angle that the wheel is steered to.
+// freedom: of e = angle - SteeringAngle, within a right angle, a torque -(k e + c e') (on_swing()). With a stiff spring
+// SteeringAngle is the angle that the wheel is steered to.
 //
 // Drive. The wheel turns at w2 - w1 = p r + q s, where p is what it rolls at. So d = (r - (r.s) s)/sin^2 g has d.(w2 - w1) = p
 // and d.s = 0: a torque T d does the work T p, and steers nothing, as a motor in the hub of a wheel that may steer does. It is one
@@ -25,7 +25,6 @@
 //
 // Rolling. What the wheel has rolled is the angle about r by which it sees s turned back: its rate is p, steering is none of it.
 #include <cmath>
-#include <optional>
 #include <string>
 
 #include "plugin_sdk/joint_coordinates.h"
@@ -139,9 +138,11 @@ class Axle final : public ConstraintPlugin {
           limits.restitution = travel.restitution =
               read_restitution(&properties, "Axle", !limits.is_none() || !travel.is_none(),
                                "SteeringLowerLimit, SteeringUpperLimit, SuspensionLowerLimit or SuspensionUpperLimit");
-          travel.spring =
-              read_limit_spring(&properties, "Axle", limits.is_none() ? travel.restitution : 0.0, !travel.is_none(),
-                                "SuspensionLowerLimit or SuspensionUpperLimit", "Suspension");
+          // a Restitution may be of the steering's stops alone
+          JointLimits giving_way = travel;
+          if (!limits.is_none()) giving_way.restitution = 0.0;
+          travel.spring = read_limit_spring(&properties, "Axle", giving_way, !travel.is_none(),
+                                            "SuspensionLowerLimit or SuspensionUpperLimit", "Suspension");
           write_frame(bodies.pose1, cross_frame(point, steering, rolling), &out);
           const Pose wheel = frame_along(point, rolling);
           write_frame(bodies.pose2, wheel, &out);
@@ -192,15 +193,16 @@ class Axle final : public ConstraintPlugin {
       }
       const JointSpring held = read_spring(&bound);
       const double rest = bound.number();
-      const Vector3 normal = swing_between(steering, rolling).axis;
-      const double sine_now = steering.cross(rolling).norm();
-      const Vector3 at_rest = exp_rotation(rest * steering) * (one.orientation * Vector3::UnitY());
-      const std::optional<Coordinate> off = azimuth_of(steering, at_rest, rolling, bodies.spin2 - bodies.spin1);
-      if (!held.is_none() && off) emit(sprung_about(rolling.cross(normal), sine_now, off->value, held));
+      if (!held.is_none()) {
+        const Vector3 at_rest = exp_rotation(rest * steering) * across;
+        const double swing = swing_between(at_rest, rolling).angle - kQuarterTurn;
+        emit(sprung(swing_row(at_rest, rolling, kQuarterTurn), on_swing(held, math::sin(angle), swing)));
+      }
       if (bound.at_end()) return;
       bound.number();  // of the coordinates alone
       if (bound.at_end()) return;
-      drive_about(normal.cross(steering), sine_now, &bound, emit);
+      const Vector3 normal = swing_between(steering, rolling).axis;
+      drive_about(normal.cross(steering), steering.cross(rolling).norm(), &bound, emit);
     });
   }
 

@@ -60,7 +60,8 @@ class Revolute final : public ConstraintPlugin {
                     restitution_property(),
                     motion_property("rad", "Angle, counted as by the limits but through any number of turns,",
                                     "MaximumTorque"),
-                    limit_stiffness_property("N*m/rad"), limit_damping_property("N*m*s/rad")},
+                    limit_stiffness_property("N*m/rad", {}, "LowerLimit and UpperLimit"),
+                    limit_damping_property("N*m*s/rad")},
                    {{"angle", "rad",
                      "Angle of body 2 relative to body 1, right-handed about point 1 -> point 2, 0 at the start; the "
                      "turn that limits are compared with, without them above -pi up to pi."}}}}};
@@ -83,8 +84,8 @@ class Revolute final : public ConstraintPlugin {
           limits.restitution = read_restitution(&properties, "Revolute", !limits.is_none(), "LowerLimit or UpperLimit");
           drive.follow(&properties, "Revolute", "AngularSpeed", "MaximumTorque");
           // what is far beyond a single one cannot be told from what comes to it from behind
-          limits.spring = read_limit_spring(&properties, "Revolute", limits.restitution, limits.has_both(),
-                                            "LowerLimit and UpperLimit");
+          limits.spring =
+              read_limit_spring(&properties, "Revolute", limits, limits.has_both(), "LowerLimit and UpperLimit");
           write_limits(limits, &out);
           write_spring(limits.spring, &out);
           write_spring(spring, &out);

@@ -7,7 +7,8 @@
 // of rank 5, none redundant, one freedom left. The rows are taken where body 2 is, so that a long way along the axis is no
 // lever.
 // The way along the axis, body 2 relative to body 1, 0 at the start, may have limits (one row, rank 6 at a limit; those that give
-// way are a spring and a damper on what is beyond them, which push and never pull, and take no freedom) and a drive to a speed with a largest force (one row on the velocity, rank 6). A spring and a damper along it, force
+// way are a spring and a damper on what is beyond them, which push and never pull, and take no freedom) and a drive to a speed
+// with a largest force (one row on the velocity, rank 6). A spring and a damper along it, force
 // -k (way - RestPosition) - c way', take no freedom. A drive along a course over time (plugin_sdk/joint_motion.h) is one row, too: of
 // the way, or with a largest force of the velocity.
 #include "plugin_sdk/joint_coordinates.h"
@@ -63,8 +64,8 @@ class Slider final : public ConstraintPlugin {
           const double rest = properties.at_end() ? 0.0 : properties.number();
           limits.restitution = read_restitution(&properties, "Slider", !limits.is_none(), "LowerLimit or UpperLimit");
           drive.follow(&properties, "Slider", "Speed", "MaximumForce");
-          limits.spring = read_limit_spring(&properties, "Slider", limits.restitution, !limits.is_none(),
-                                            "LowerLimit or UpperLimit");
+          limits.spring =
+              read_limit_spring(&properties, "Slider", limits, !limits.is_none(), "LowerLimit or UpperLimit");
           write_frame(bodies.pose1, frame, &out);
           write_frame(bodies.pose2, frame, &out);
           write_limits(limits, &out);

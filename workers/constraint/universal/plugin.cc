@@ -10,8 +10,8 @@
 // a right angle behind an angle z, in the body of the bar, counted from a right angle: asin(sin(g) sin(angle - z)), exact for
 // turns of any size, and right within a right angle of z. So z is the middle of limits that are no more than that apart, else
 // the nearer limit (which limits nothing from further away), and half of the way back to it where a step went far beyond.
-// A spring and a damper about either bar take no freedom. Their angle is that of the coordinates, within half a turn of the
-// start; their torque acts about the gradient of it, as a drive's does.
+// A spring and a damper about either bar take no freedom. Their angle is that of the coordinates, within a right angle of the
+// start, as the swing of a bar from across the other tells it (on_swing()): beyond, they pull on.
 // Drives. Body 2 turns on body 1 at p a1 + q a2, with p and q what it turns about the bars. So d1 = (a1 - (a1.a2) a2)/sin^2 g has
 // d1.w = p and no part along a2: a torque T d1 does the work T p, as a motor or friction between body 1 and the cross does, and d2
 // alike between the cross and body 2. Each is one row on the velocity about its d, made unit; with a speed of 0 it is the friction
@@ -53,7 +53,7 @@ class Universal final : public ConstraintPlugin {
   static PluginDeclaration declaration() {
     return {
         .name = "Universal",
-        .version = "1.4",
+        .version = "1.5",
         .slot = Slot::kConstraint,
         .meaning = "Hooke's joint.",
         .capabilities = {"coordinates"},
@@ -135,11 +135,17 @@ class Universal final : public ConstraintPlugin {
       const std::array<Vector3, 2> turned_about = {axis2.cross(normal), normal.cross(axis1)};
       const double sine = axis1.cross(axis2).norm();
       const std::array<Bar, 2> bars = bars_of(one, two, bodies.spin2 - bodies.spin1);
-      for (std::size_t bar = 0; bar < 2; ++bar) {
-        const JointSpring spring = read_spring(&bound);
-        const std::optional<Coordinate> angle = bars[bar].angle();
-        if (!spring.is_none() && angle) emit(sprung_about(turned_about[bar], sine, angle->value, spring));
-      }
+      // of a direction of either body, across each other at the start
+      const Vector3 across1 = one.orientation * Vector3::UnitZ(), across2 = two.orientation * Vector3::UnitZ();
+      const double held = math::sin(between);
+      const auto spring_against = [&](const Vector3& first, const Vector3& second, const JointSpring& spring) {
+        if (spring.is_none()) return;
+        const double swing = swing_between(first, second).angle - kQuarterTurn;
+        emit(sprung(swing_row(first, second, kQuarterTurn), on_swing(spring, held, swing)));
+      };
+      const JointSpring spring1 = read_spring(&bound), spring2 = read_spring(&bound);
+      spring_against(across1, axis2, spring1);
+      spring_against(axis1, across2, spring2);
       if (bound.at_end()) return;
       PropertyCursor drive1(bound.table(2)), drive2(bound.table(2));
       drive_about(turned_about[0], sine, &drive1, emit);

@@ -73,7 +73,7 @@ class ImplicitMidpoint final : public IntegratorPlugin {
  public:
   static PluginDeclaration declaration() {
     return {.name = "ImplicitMidpoint",
-            .version = "1.0",
+            .version = "1.1",
             .slot = Slot::kIntegrator,
             .meaning =
                 "Implicit midpoint rule on the rotation group, order 2, keeps momentum, and the energy of what no "
@@ -321,7 +321,9 @@ class ImplicitMidpoint final : public IntegratorPlugin {
         asked += energy(body, moved), way += h_ * h_ * energy(body, body.start.twist);
         place += energy(body, {body.start.pose.position, Vector3::Ones()});
         Twist& kick = (*kicks)[b];
-        kick.linear += moved.linear / h_, kick.angular += moved.angular / h_;
+        // what damping leaves of the way
+        const double time = damped_time(body.damping, h_);
+        kick.linear += moved.linear / time, kick.angular += moved.angular / time;
         const Twist start = derivatives_->start(body.row).twist;
         start_with({start.linear + kick.linear, start.angular + kick.angular}, &body);
       }
