@@ -22,6 +22,7 @@ void add_capture(CLI::App* app, Action* action);
 void add_replay(CLI::App* app, Action* action);
 void add_bisect(CLI::App* app, Action* action);
 void add_campaign(CLI::App* app, Action* action);
+void add_study(CLI::App* app, Action* action);
 void add_serve(CLI::App* app, Action* action);
 void add_ctl(CLI::App* app, Action* action);
 

@@ -108,6 +108,7 @@ int main(int argc, char** argv) {
   cli::add_replay(&app, &action);
   cli::add_bisect(&app, &action);
   cli::add_campaign(&app, &action);
+  cli::add_study(&app, &action);
   cli::add_serve(&app, &action);
   cli::add_ctl(&app, &action);
   cli::refuse_empty_values(&app);
