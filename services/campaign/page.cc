@@ -7,22 +7,10 @@
 #include <cmath>
 #include <vector>
 
+#include "services/recorder/svg.h"
+
 namespace gravitas::campaign {
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '<') {
-      out += "&lt;";
-    } else if (c == '&') {
-      out += "&amp;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
 
 std::string cell(std::uint64_t count, const char* colour) {
   return count == 0 ? "<td>0</td>" : fmt::format("<td style=\"background:{}\">{}</td>", colour, count);
@@ -80,7 +68,7 @@ std::string page(const v1::Table& table, const Tally& tally) {
       "<th>paused, resumable</th><th>needs re-run</th><th>not caught</th><th>forbidden</th></tr>\n";
   for (const v1::Row& row : table.rows())
     html +=
-        fmt::format("<tr><td>{}</td><td>{}</td>{}{}{}{}{}{}{}</tr>\n", escaped(row.group()), row.injected(),
+        fmt::format("<tr><td>{}</td><td>{}</td>{}{}{}{}{}{}{}</tr>\n", in_markup(row.group()), row.injected(),
                     cell(row.masked(), "#e6f4ea"), cell(row.recovered(), "#b7e1c0"), cell(row.fallback(), "#fff2b3"),
                     cell(row.paused(), "#ffe0a3"), cell(row.needs_rerun(), "#d9e2f3"),
                     cell(row.not_caught(), "#f6cf9b"), cell(row.forbidden(), "#f28b82"));
@@ -95,7 +83,7 @@ std::string page(const v1::Table& table, const Tally& tally) {
     html += histogram(tally.standby(), tally.cold_start());
   }
   if (!table.failures().empty()) html += "<h2>To see each again</h2>\n<pre>";
-  for (const std::string& failure : table.failures()) html += escaped(failure) + "\n";
+  for (const std::string& failure : table.failures()) html += in_markup(failure) + "\n";
   if (!table.failures().empty()) html += "</pre>\n";
   return html + "</body></html>\n";
 }

@@ -10,23 +10,31 @@ namespace {
 
 // Beyond these an error is useless, or rounding's.
 constexpr double kUseless = 0.05, kRounding = 1e-12;
+constexpr std::size_t kFewestSlopes = 3;
 
 bool is_good(const v1::Rung& rung) { return rung.failed().empty(); }
 
-// The slope of error against step over the middle half of the rungs that show it.
+// The median of the slopes between neighbouring rungs: those at either end, before the leading term stands alone and where
+// rounding begins, have no say.
 void find_order(double uncertainty, v1::Ladder* ladder) {
-  std::vector<const v1::Rung*> shown;
+  std::vector<double> slopes;
+  const v1::Rung* before = nullptr;
   const double least = std::max(kRounding, 10.0 * uncertainty);
   for (const v1::Rung& rung : ladder->rungs()) {
-    if (!is_good(rung) || rung.error() > kUseless) continue;
-    // the finer ones are rounding's
-    if (rung.error() < least) break;
-    shown.push_back(&rung);
+    if (!is_good(rung) || rung.error() > kUseless) {
+      before = nullptr;
+      continue;
+    }
+    // exact methods, and what comes after
+    if (rung.error() < least || (before != nullptr && rung.error() > 0.8 * before->error())) break;
+    if (before != nullptr)
+      slopes.push_back(std::log(before->error() / rung.error()) / std::log(before->setting() / rung.setting()));
+    before = &rung;
   }
-  const std::size_t quarter = shown.size() / 4;
-  if (shown.size() < 2 * quarter + 3) return;
-  const v1::Rung &first = *shown[quarter], &last = *shown[shown.size() - quarter - 1];
-  ladder->set_observed_order(std::log(first.error() / last.error()) / std::log(first.setting() / last.setting()));
+  if (slopes.size() < kFewestSlopes) return;
+  std::ranges::sort(slopes);
+  const std::size_t middle = slopes.size() / 2;
+  ladder->set_observed_order(slopes.size() % 2 == 1 ? slopes[middle] : 0.5 * (slopes[middle - 1] + slopes[middle]));
 }
 
 void find_achieved(double uncertainty, v1::Ladder* ladder) {

@@ -19,8 +19,8 @@ constexpr const char* kStepAccuracy = "Simulator.Accuracy";
 const std::vector<Method>& method_table() {
   constexpr unsigned kFree = kMotion | kStiff;
   static const std::vector<Method> all = {
-      {"Basic", "SemiImplicitEuler", "Sequential", {}, "", 0, kMotion | kStiff | kContacts},
-      {"Basic", "SemiImplicitEuler", "Newton", {}, "", 0, kMotion | kContacts},
+      {"Basic", "SemiImplicitEuler", "Sequential", {}, "", 1, kMotion | kStiff | kContacts},
+      {"Basic", "SemiImplicitEuler", "Newton", {}, "", 1, kMotion | kContacts},
       {"Smooth", "SemiImplicitEuler", "Direct", {}, "", 1, kFree},
       {"Smooth", "Verlet", "Direct", {}, "", 2, kFree},
       {"Smooth", "ImplicitMidpoint", "Direct", {}, "", 2, kFree},
@@ -65,6 +65,7 @@ std::optional<Method> installed_method(const std::string& word, const Catalog& i
   const InstalledPlugin* integrator = installed.find_plugin(Slot::kIntegrator, parts[1]);
   if (integrator == nullptr || installed.find_plugin(Slot::kSolver, parts[2]) == nullptr) return std::nullopt;
   Method method{parts[0], parts[1], parts[2]};
+  method.tasks = kMotion | kStiff | kContacts;
   if (std::ranges::find(integrator->declaration.properties, "Accuracy", &Property::name) !=
       integrator->declaration.properties.end())
     method.accuracy = kInnerAccuracy;
@@ -81,12 +82,17 @@ std::string Method::name() const {
 std::span<const Method> offered_methods() { return method_table(); }
 
 std::vector<Method> named_methods(const std::vector<std::string>& words, const Catalog& installed) {
-  std::vector<bool> is_wanted(method_table().size());
+  // by their whole name they are asked for whatever they are offered for
+  constexpr unsigned kAnything = kMotion | kStiff | kContacts;
+  std::vector<unsigned> wanted(method_table().size(), 0);
   std::vector<Method> others;
   for (const std::string& word : words) {
     bool is_known = false;
-    for (std::size_t i = 0; i < is_wanted.size(); ++i)
-      if (is_named_by(method_table()[i], word)) is_wanted[i] = is_known = true;
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+      if (const Method& method = method_table()[i]; is_named_by(method, word)) {
+        wanted[i] |= word == method.name() ? kAnything : method.tasks;
+        is_known = true;
+      }
     if (is_known) continue;
     if (std::optional<Method> other = installed_method(word, installed)) {
       others.push_back(std::move(*other));
@@ -100,14 +106,17 @@ std::vector<Method> named_methods(const std::vector<std::string>& words, const C
     const std::string nearest = nearest_name(word, near);
     std::string all;
     for (const std::string& name : names) all += "\n  " + name;
-    throw BadInput(fmt::format(
-        "--methods {}: no method is called so{}; allowed: one of the following, a part of its name, or "
-        "SIMULATOR/INTEGRATOR/SOLVER of plugins that are installed{}",
-        word, nearest.empty() ? "" : fmt::format("; did you mean {}?", nearest), all));
+    throw BadInput(
+        fmt::format("--methods {}: no method is called so{}; allowed: one of the following, a part of its name, or "
+                    "SIMULATOR/INTEGRATOR/SOLVER of plugins that are installed{}",
+                    word, nearest.empty() ? "" : fmt::format("; did you mean {}?", nearest), all));
   }
   std::vector<Method> methods;
-  for (std::size_t i = 0; i < is_wanted.size(); ++i)
-    if (is_wanted[i]) methods.push_back(method_table()[i]);
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (wanted[i] != 0) {
+      methods.push_back(method_table()[i]);
+      methods.back().tasks = wanted[i];
+    }
   methods.insert(methods.end(), others.begin(), others.end());
   return methods;
 }

@@ -23,8 +23,8 @@ struct Method {
   std::vector<std::string> settings = {};
   // What becomes finer: the time step (empty), or an accuracy by its path, "Integrator.Accuracy".
   std::string accuracy = {};
-  double order = 0.0;   // by theory, of the error on smooth problems that is observed; 0: none that is gated
-  unsigned tasks = 0;   // on which it is offered unasked
+  double order = 0.0;      // by theory, of the error on smooth problems that is observed; 0: none that is gated
+  unsigned tasks = 0;      // on which it is offered unasked
   std::string label = {};  // instead of the integrator in the name
 
   // "Smooth/RK4/Direct"; of what both a step and an accuracy can make finer "…/Accuracy" at the end.
@@ -38,7 +38,7 @@ struct Method {
 std::span<const Method> offered_methods();
 
 // Those that `words` name, in the order of the table: whole names, or parts of them in order ("RK4", "Smooth/RK4",
-// "Continuous"). SIMULATOR/INTEGRATOR/SOLVER of installed plugins that the table lacks is added; an integrator with an
+// "Continuous"); of the latter on the tasks alone that they are offered for. SIMULATOR/INTEGRATOR/SOLVER of installed plugins that the table lacks is added; an integrator with an
 // Accuracy then climbs by it. Throws BadInput for a word that names nothing, with the nearest and the list.
 std::vector<Method> named_methods(const std::vector<std::string>& words, const Catalog& installed);
 

@@ -37,7 +37,8 @@ struct Problem {
   double uncertainty;  // of the reference, a share of its size
   std::vector<Known> known;
   std::vector<Bound> bounds;
-  bool shows_orders = true;  // smooth enough for methods to show the order of their theory
+  // Integrators whose ladders are to show the order of their theory: the others' are not yet there, or go beyond it.
+  std::vector<std::string> orders = {};
 };
 
 // All that are shipped.

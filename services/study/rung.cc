@@ -11,6 +11,7 @@
 
 #include "plugin_sdk/body.h"
 #include "plugin_sdk/dynamics.h"
+#include "plugin_sdk/slots.h"
 #include "services/capsule/forwarding_host.h"
 #include "services/run/session.h"
 #include "services/scene/overrides.h"
@@ -46,8 +47,8 @@ struct Meter {
     if (SteadyClock::now() < next_look) return;
     const double left = limits.cpu_seconds - (process_seconds() - begin);
     if (left <= 0.0) throw TooMuchWork();
-    next_look = SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(
-                                         std::chrono::duration<double>(std::min(left, 1e6)));
+    next_look = SteadyClock::now() +
+                std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(std::min(left, 1e6)));
   }
 };
 
@@ -113,9 +114,9 @@ Energy energy_in(kernel::Environment* environment) {
   Energy energy{0.0, environment->potential_energy()};
   for (std::uint32_t i = 0; i < model.body_count; ++i)
     if ((model.flags[i] & kMovable) != 0)
-      energy.kinetic += kinetic_energy(model.mass[i], vector_at(model.inertia.span(), i),
-                                       quaternion_at(state.orientation, i),
-                                       {vector_at(state.linear_velocity, i), vector_at(state.angular_velocity, i)});
+      energy.kinetic +=
+          kinetic_energy(model.mass[i], vector_at(model.inertia.span(), i), quaternion_at(state.orientation, i),
+                         {vector_at(state.linear_velocity, i), vector_at(state.angular_velocity, i)});
   return energy;
 }
 
@@ -126,7 +127,10 @@ class TimedRun {
  public:
   TimedRun(kernel::EnvironmentDescription description, const Setting& setting, const MeasureMaker& measure,
            const RunLimits& limits)
-      : meter_{limits}, setting_(setting), measure_(measure(description)), environment_(start(description, metered(&meter_))) {}
+      : meter_{limits},
+        setting_(setting),
+        measure_(measure(description)),
+        environment_(start(description, metered(&meter_))) {}
 
   // CPU of its steps alone, s.
   double go(v1::Rung* rung) {
@@ -191,9 +195,9 @@ Subject::Subject(const std::string& path, Catalog* installed) : path_(path), ins
   scene::read_files(paths, &document_, &problems);
   demand(problems);
   if (!(duration() > 0.0)) throw BadInput(path + ": Duration 0; allowed: a scene that goes on for some time");
-  // what the planner leaves out nothing can need
   const Method plain{"Basic", "SemiImplicitEuler", "Sequential"};
-  has_contacts_ = start(describe(plain, 1, {}))->why_left_out(Slot::kCollision).empty();
+  const std::vector<kernel::LeftOut> left_out = start(describe(plain, 1, {}))->plan().left_out;
+  has_contacts_ = std::ranges::find(left_out, slot_name(Slot::kCollision), &kernel::LeftOut::what) == left_out.end();
 }
 
 double Subject::duration() const { return document_.scene().simulator().custom_properties().duration(); }
@@ -233,6 +237,7 @@ v1::Rung make_rung(const Subject& subject, const Method& method, const Setting& 
     if (rung.failed().empty() && !(rung.error() < 1.0)) rung.set_failed("off by more than its size");
   } catch (const TooMuchWork&) {
     rung.set_failed(fmt::format("more than {:g} s of CPU", limits.cpu_seconds));
+    rung.set_too_long(true);
     seconds = {process_seconds() - begin};
   } catch (const StudyInterrupted&) {
     throw;

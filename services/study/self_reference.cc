@@ -24,9 +24,7 @@ std::vector<Candidate> candidates(bool has_contacts) {
   std::vector<Candidate> all;
   if (!has_contacts)
     for (const auto& [integrator, accuracy] : {std::pair{"DormandPrince853", 1e-12}, std::pair{"Radau", 1e-11}})
-      all.push_back({{"Smooth", integrator, solver, {}, "Integrator.Accuracy"},
-                     {1, 1},
-                     {accuracy, 10.0 * accuracy}});
+      all.push_back({{"Smooth", integrator, solver, {}, "Integrator.Accuracy"}, {1, 1}, {accuracy, 10.0 * accuracy}});
   all.push_back({{"Continuous", "Verlet", solver, {}, "Simulator.Accuracy"}, {4, 4}, {1e-10, 1e-9}});
   all.push_back({{"Continuous", "Verlet", solver}, {1024, 512}, {}});
   all.push_back({{"Basic", "SemiImplicitEuler", solver}, {1024, 512}, {}});
@@ -74,9 +72,10 @@ SelfReference find_self_reference(const Subject& subject, std::uint32_t steps, s
     }
     return {samples, fmt::format("itself by {}", name), std::max(coarse.error(), 1e-15)};
   }
-  throw BadInput(fmt::format("{}: no fine run comes to its end that others could be measured against; a shorter "
-                             "Duration, or a longer --run-seconds, may help:{}",
-                             subject.path(), why));
+  throw BadInput(
+      fmt::format("{}: no fine run comes to its end that others could be measured against; a shorter "
+                  "Duration, or a longer --run-seconds, may help:{}",
+                  subject.path(), why));
 }
 
 }  // namespace gravitas::study

@@ -17,6 +17,7 @@
 #include "services/study/problem.h"
 #include "services/study/rung.h"
 #include "services/study/self_reference.h"
+#include "services/study/spring_stability.h"
 
 namespace gravitas::study {
 namespace {
@@ -40,7 +41,7 @@ struct Climb {
   Subject subject;
   std::vector<Method> methods;
   std::uint32_t steps = 1, look_every = 1;  // of the coarsest rung
-  MeasureMaker measure;  // empty: the scene's own reference is still to be found
+  MeasureMaker measure;                     // empty: the scene's own reference is still to be found
 };
 
 bool suits(const Method& method, bool has_contacts) { return method.bears_contacts() || !has_contacts; }
@@ -77,6 +78,10 @@ class StudyRun {
         if (!climb->measure) find_reference(climb.get(), result);
         for (const Method& method : climb->methods) climb_ladder(*climb, method, result);
       }
+      if (options_.problems.empty() && options_.methods.empty() && options_.scenes.empty()) {
+        report_({done_, ladders_, "springs", "the map of stability"});
+        for (v1::Limit& limit : map_stability(limits_.interrupted)) *study.add_limits() = std::move(limit);
+      }
     } catch (const StudyInterrupted&) {
       study.set_is_interrupted(true);
     }
@@ -87,8 +92,7 @@ class StudyRun {
   std::vector<Method> methods_for(bool has_contacts, unsigned tasks) const {
     std::vector<Method> methods;
     for (const Method& method : options_.methods.empty() ? offered_methods() : std::span<const Method>(wanted_))
-      if (suits(method, has_contacts) && (!options_.methods.empty() || (method.tasks & tasks) != 0))
-        methods.push_back(method);
+      if (suits(method, has_contacts) && (method.tasks & tasks) != 0) methods.push_back(method);
     return methods;
   }
 
@@ -147,10 +151,11 @@ class StudyRun {
       if (too_long.empty()) {
         rung = make_rung(climb.subject, method, setting, climb.measure, limits_);
         // a single step of a finer one may take hours
-        if (rung.cpu_median() > limits_.cpu_seconds) too_long = "not run: a coarser one took too long";
+        if (rung.too_long()) too_long = "not run: a coarser one took too long";
       } else {
         rung.set_setting(setting.accuracy ? *setting.accuracy : climb.subject.duration() / setting.steps);
         rung.set_failed(too_long);
+        rung.set_too_long(true);
       }
       *ladder->add_rungs() = std::move(rung);
     }
@@ -163,7 +168,8 @@ class StudyRun {
     if (method.climbs_accuracy()) {
       const double factor = options_.is_short ? 10.0 : std::sqrt(10.0);
       for (double accuracy = kCoarsest; accuracy > kFinest; accuracy /= factor)
-        all.push_back({climb.steps, climb.look_every, accuracy});
+        if (options_.rungs == 0 || all.size() < options_.rungs)
+          all.push_back({climb.steps, climb.look_every, accuracy});
     } else {
       const std::uint32_t rungs = options_.rungs > 0 ? options_.rungs : kRungs;
       for (std::uint32_t i = 0; i < rungs; ++i) all.push_back({climb.steps << i, climb.look_every << i});

@@ -22,10 +22,8 @@ struct Options {
   std::vector<std::string> scenes;    // of the user's own, each measured against itself (self_reference.h)
   // Less work: accuracies by 10 instead of sqrt(10), shorter runs.
   bool is_short = false;
-  double run_seconds = 0.0;     // CPU that one run may take, s; 0: kLongRun, or kShortRun
-  std::uint32_t rungs = 0;      // of steps; 0: kRungs
-  bool maps_stability = true;   // measures Study.limits, too
-  std::string gate;             // file of demands (gate.h); the built-in ones if empty
+  double run_seconds = 0.0;  // CPU that one run may take, s; 0: kLongRun, or kShortRun
+  std::uint32_t rungs = 0;   // of a ladder, at most; 0: kRungs of steps, accuracies down to 1e-13
 };
 
 inline constexpr double kLongRun = 4.0, kShortRun = 0.25;  // s
@@ -36,6 +34,7 @@ struct Progress {
   std::string problem, method;
 };
 
+// The map of stability is measured where nothing is left out: neither problems nor methods are named, nor scenes given.
 // What was measured until `interrupted` says so; then with is_interrupted. Throws BadInput for names that are none, scenes
 // that cannot be read, and a method that suits no problem.
 v1::Study run(const Options& options, const std::function<bool()>& interrupted,

@@ -1,11 +1,157 @@
 #include "services/study/tables.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
 
 #include "services/recorder/csv.h"
 #include "services/study/analysis.h"
 
 namespace gravitas::study {
+namespace {
+
+constexpr const char* kNone = "–";
+constexpr std::array<double, 4> kFactors = {1.0, 2.0, 4.0, 16.0};
+
+double best_error(const v1::Ladder& ladder) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const v1::Rung& rung : ladder.rungs())
+    if (rung.failed().empty()) best = std::min(best, rung.error());
+  return best;
+}
+
+std::string best_text(const v1::Ladder& ladder) {
+  const double best = best_error(ladder);
+  return std::isinf(best) ? "none" : fmt::format("{:.1e}", best);
+}
+
+// Milliseconds per simulated second to each of kWantedErrors.
+std::vector<std::string> times_to(const v1::Ladder& ladder) {
+  std::vector<std::string> all;
+  for (const double wanted : kWantedErrors) {
+    const auto found = std::ranges::find(ladder.reached(), wanted, &v1::Reached::error);
+    all.push_back(found == ladder.reached().end() ? kNone : fmt::format("{:.3g}", 1e3 * found->cost()));
+  }
+  return all;
+}
+
+std::string order_text(const v1::Ladder& ladder) {
+  return ladder.has_observed_order() ? fmt::format("{:.2f}", ladder.observed_order()) : kNone;
+}
+
+std::string achieved_text(const v1::Ladder& ladder) {
+  return ladder.has_achieved_to_requested() ? fmt::format("{:.2g}", ladder.achieved_to_requested()) : kNone;
+}
+
+bool fails(const v1::Rung& rung) { return !rung.failed().empty() && !rung.too_long(); }
+
+auto failed_rungs(const v1::Ladder& ladder) { return std::ranges::count_if(ladder.rungs(), fails); }
+auto long_rungs(const v1::Ladder& ladder) { return std::ranges::count_if(ladder.rungs(), &v1::Rung::too_long); }
+
+std::string problem_section(const v1::Problem& problem) {
+  std::string text = fmt::format(
+      "\n## {0}\n\n{1}; {2:g} s. Error against: {3}, good to {4:.1g}.\n\n![error against work]({0}.svg)\n\n"
+      "| method | 1e-3 | 1e-6 | 1e-9 | best error | order, theory | observed | achieved / requested | rungs | failed | "
+      "too long |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+      problem.name(), problem.family(), problem.duration(), problem.reference(), problem.uncertainty());
+  for (const v1::Ladder& ladder : problem.ladders())
+    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", ladder.method(),
+                        fmt::join(times_to(ladder), " | "), best_text(ladder),
+                        ladder.order() > 0.0 ? fmt::format("{:g}", ladder.order()) : kNone, order_text(ladder),
+                        achieved_text(ladder), ladder.rungs_size(), failed_rungs(ladder), long_rungs(ladder));
+  return text;
+}
+
+// What each ladder's failures were, once a reason.
+std::string failure_section(const v1::Study& study) {
+  std::string text;
+  for (const v1::Problem& problem : study.problems())
+    for (const v1::Ladder& ladder : problem.ladders()) {
+      std::vector<std::string> reasons;
+      for (const v1::Rung& rung : ladder.rungs())
+        if (fails(rung) && std::ranges::find(reasons, rung.failed()) == reasons.end()) reasons.push_back(rung.failed());
+      if (!reasons.empty())
+        text += fmt::format("- {}, {}: {}\n", problem.name(), ladder.method(), fmt::join(reasons, "; "));
+    }
+  return text.empty() ? text : "\n## What failed\n\n" + text;
+}
+
+std::string profile_section(const v1::Study& study) {
+  std::string text;
+  for (const bool has_contacts : {false, true})
+    for (const double error : kWantedErrors) {
+      std::size_t problems = 0;
+      const std::vector<Profile> all = profiles(study, has_contacts, error, &problems);
+      if (problems < 2) continue;
+      text += fmt::format(
+          "\n{} problems {} contacts, to {:g}:\n\n| method | fastest | within 2 | within 4 | within 16 | at all |\n"
+          "| --- | --- | --- | --- | --- | --- |\n",
+          problems, has_contacts ? "with" : "without", error);
+      for (const Profile& profile : all) {
+        text += "| " + profile.method;
+        for (const double factor : kFactors)
+          text += fmt::format(" | {:.0f} %", 100.0 * share_within(profile, factor, problems));
+        const double infinite = std::numeric_limits<double>::infinity();
+        text += fmt::format(" | {:.0f} % |\n", 100.0 * share_within(profile, infinite, problems));
+      }
+    }
+  if (text.empty()) return text;
+  return "\n## Over all problems\n\nShare of the problems on which a method costs at most so many times the CPU of the "
+         "cheapest one (profiles of Dolan\nand More); problems that no method solves so well are left out.\n\n"
+         "![profiles](profile.svg)\n" +
+         text;
+}
+
+std::string limit_text(const v1::Limit& limit) {
+  return limit.has_theory() ? fmt::format("{:.4g}", limit.theory()) : "none";
+}
+
+std::string stability_section(const v1::Study& study) {
+  if (study.limits().empty()) return {};
+  std::vector<double> zetas;
+  for (const v1::Limit& limit : study.limits())
+    if (std::ranges::find(zetas, limit.zeta()) == zetas.end()) zetas.push_back(limit.zeta());
+  std::string text =
+      "\n## Where integrators are stable\n\nA spring k with damper c on 1 kg, step h: k h^2 at which the theory's "
+      "growth "
+      "first exceeds 1, for zeta = c / (2 sqrt(k));\n0: at once. Beside it how many cells the engine, measured, agrees "
+      "on; "
+      "all stand in `stability.csv`. Adaptive\nintegrators: of one whole step, which their error control would "
+      "shorten.\n\n"
+      "| integrator |";
+  for (const double zeta : zetas) text += zeta == 0.0 ? " undamped |" : fmt::format(" zeta {:g} |", zeta);
+  text += " cells that agree |\n| --- | --- |";
+  for (std::size_t i = 0; i < zetas.size(); ++i) text += " --- |";
+  text += "\n";
+  for (int i = 0; i < study.limits_size();) {
+    const std::string& name = study.limits(i).integrator();
+    text += "| " + name;
+    std::size_t cells = 0, agreeing = 0;
+    for (; i < study.limits_size() && study.limits(i).integrator() == name; ++i) {
+      text += " | " + limit_text(study.limits(i));
+      cells += static_cast<std::size_t>(study.limits(i).cells_size());
+      agreeing += study.limits(i).agreeing();
+    }
+    text += fmt::format(" | {} of {} |\n", agreeing, cells);
+  }
+  return text;
+}
+
+std::string gate_text(const v1::Study& study) {
+  if (study.demands() == 0) return "the gate demands nothing of what was run\n";
+  if (study.failures().empty()) return fmt::format("the gate is passed: {} demands\n", study.demands());
+  std::string text = fmt::format("the gate failed: {} of {} demands\n", study.failures_size(), study.demands());
+  for (const std::string& failure : study.failures()) text += "  " + failure + "\n";
+  return text;
+}
+
+}  // namespace
 
 std::string csv(const v1::Study& study) {
   std::string text =
@@ -13,14 +159,68 @@ std::string csv(const v1::Study& study) {
       "simulated_s,steps,derivatives,iterations,evaluations,failed,build,processor\n";
   for (const v1::Problem& problem : study.problems())
     for (const v1::Ladder& ladder : problem.ladders())
-      for (const v1::Rung& rung : ladder.rungs())
-        text += fmt::format("{},{},{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.4g},{:.4g},{},{:.17g},{},{},{},{},{},{},{}\n",
+      for (const v1::Rung& rung : ladder.rungs()) {
+        text += fmt::format("{},{},{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.4g},{:.4g},{},{:.17g},",
                             csv_quoted(problem.name()), problem.family(), ladder.method(), ladder.climbs(),
                             rung.setting(), rung.error(), rung.energy_drift(), rung.joint_error(), rung.penetration(),
-                            rung.cpu_min(), rung.cpu_median(), rung.runs(), problem.duration(), rung.steps(),
-                            rung.derivatives(), rung.iterations(), evaluations(rung), csv_quoted(rung.failed()),
-                            csv_quoted(study.build()), csv_quoted(study.processor()));
+                            rung.cpu_min(), rung.cpu_median(), rung.runs(), problem.duration());
+        text += fmt::format("{},{},{},{:.0f},{},{},{}\n", rung.steps(), rung.derivatives(), rung.iterations(),
+                            evaluations(rung), csv_quoted(rung.failed()), csv_quoted(study.build()),
+                            csv_quoted(study.processor()));
+      }
   return text;
+}
+
+std::string stability_csv(const v1::Study& study) {
+  std::string text = "integrator,zeta,stiffness_kh2,measured,theory\n";
+  for (const v1::Limit& limit : study.limits())
+    for (const v1::Cell& cell : limit.cells())
+      text += fmt::format("{},{:g},{:.6g},{:.9g},{:.9g}\n", limit.integrator(), limit.zeta(), cell.stiffness(),
+                          cell.measured(), cell.theory());
+  return text;
+}
+
+std::string page(const v1::Study& study) {
+  std::string text = fmt::format(
+      "# Error against run time\n\nWritten by `gravitas study`{}; build {}, {}.\n\n"
+      "Each method climbs a ladder of settings, from useless to rounding: a time step that halves, or an accuracy. "
+      "Errors "
+      "are\ndimensionless: the largest of distances as shares of the problem's size, and of angles in rad. Columns "
+      "1e-3, "
+      "1e-6, 1e-9:\nCPU of the cheapest rung that is at least as good, in ms per simulated second; {} : none is. "
+      "Order: the "
+      "median slope of\nerror against step. Achieved / requested: geometric mean over the rungs of an accuracy. "
+      "Hosting "
+      "direct, one thread. Every\nrun stands in `study.csv`, what failed included. Diagrams: curves lead from the "
+      "coarsest "
+      "setting to the finest; hollow\nmarks failed; in the grey band the reference itself is no better; dashed: slopes "
+      "of the "
+      "orders 1, 2, 4.\n\n",
+      study.is_interrupted() ? ", which was interrupted" : "", study.build(), study.processor(), kNone);
+  text += "Gate: " + gate_text(study);
+  for (const v1::Problem& problem : study.problems()) text += problem_section(problem);
+  return text + profile_section(study) + stability_section(study) + failure_section(study);
+}
+
+std::string summary(const v1::Study& study) {
+  std::string text = "ms of CPU per simulated second to an error; - : no rung reaches it\n";
+  for (const v1::Problem& problem : study.problems()) {
+    text +=
+        fmt::format("\n{} ({}), against {}, good to {:.1g}\n  {:<40} {:>8} {:>8} {:>8} {:>9} {:>6} {:>6} {:>6} {:>8}\n",
+                    problem.name(), problem.family(), problem.reference(), problem.uncertainty(), "method", "1e-3",
+                    "1e-6", "1e-9", "best", "order", "rungs", "failed", "too long");
+    for (const v1::Ladder& ladder : problem.ladders()) {
+      std::vector<std::string> cells = times_to(ladder);
+      cells.push_back(best_text(ladder));
+      cells.push_back(order_text(ladder));
+      for (std::string& cell : cells)
+        if (cell == kNone) cell = "-";
+      text +=
+          fmt::format("  {:<40} {:>8} {:>8} {:>8} {:>9} {:>6} {:>6} {:>6} {:>8}\n", ladder.method(), cells[0], cells[1],
+                      cells[2], cells[3], cells[4], ladder.rungs_size(), failed_rungs(ladder), long_rungs(ladder));
+    }
+  }
+  return text + "\n" + gate_text(study);
 }
 
 }  // namespace gravitas::study

@@ -12,6 +12,9 @@ namespace gravitas::study {
 // processor. 17 significant digits of errors, which are the same on every machine; times with 4.
 std::string csv(const v1::Study& study);
 
+// A line a cell of the map of stability: growth in a step, measured on the engine and by theory.
+std::string stability_csv(const v1::Study& study);
+
 // STUDY.md: how to read it, a table a problem, profiles, limits of stability, what the gate says.
 std::string page(const v1::Study& study);
 

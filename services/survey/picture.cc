@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "plugin_sdk/math/types.h"
+#include "services/recorder/svg.h"
 #include "services/survey/instrumentation.h"
 #include "services/survey/numbers.h"
 
@@ -64,23 +65,7 @@ class View {
   Point2 middle_;
 };
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
-std::string line_text(const Point2& from, const Point2& to) {
-  return fmt::format("<line x1=\"{:.2f}\" y1=\"{:.2f}\" x2=\"{:.2f}\" y2=\"{:.2f}\"/>\n", from.x, from.y, to.x, to.y);
-}
+std::string line_text(const Point2& from, const Point2& to) { return svg_line(from.x, from.y, to.x, to.y); }
 
 std::array<Vector3, 8> corners_of(const v1::Box& box) {
   const Numbers& q = box.orientation();
@@ -176,7 +161,7 @@ class Groups {
     const Point2 at = view_.at(vector_of(label.position()));
     groups_[label.kind()] +=
         fmt::format("<text x=\"{:.2f}\" y=\"{:.2f}\" stroke=\"none\" fill=\"{}\">{}</text>\n", at.x + 5.0, at.y - 4.0,
-                    kColours[static_cast<std::size_t>(label.kind())], escaped(label.text()));
+                    kColours[static_cast<std::size_t>(label.kind())], in_markup(label.text()));
   }
 
   View view_;
@@ -186,12 +171,9 @@ class Groups {
 }  // namespace
 
 std::string picture(const v1::Frame& frame, const std::string& title) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} {1:.0f}\" "
-      "font-family=\"sans-serif\" font-size=\"11\" stroke-width=\"1\">\n"
-      "<rect width=\"{0:.0f}\" height=\"{1:.0f}\" fill=\"white\"/>\n"
-      "<text x=\"14\" y=\"24\" font-size=\"14\">{2}, t = {3:.6g} s, step {4}</text>\n{5}</svg>\n",
-      kWidth, kHeight, escaped(title), frame.time(), frame.step(), Groups(frame).text());
+  return svg_page(kWidth, kHeight,
+                  fmt::format("<text x=\"14\" y=\"24\" font-size=\"14\">{}, t = {:.6g} s, step {}</text>\n{}",
+                              in_markup(title), frame.time(), frame.step(), Groups(frame).text()));
 }
 
 }  // namespace gravitas::survey

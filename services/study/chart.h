@@ -1,0 +1,45 @@
+// Charts of curves as parts of an SVG: axes with ticks, curves with marks, what failed hollow at an edge, a legend.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace gravitas::study {
+
+struct Axis {
+  std::string title;
+  double low, high;  // where it is logarithmic above 0
+  bool is_log = true;
+};
+
+struct Mark {
+  double x, y;
+  std::string label = {};  // beside the mark, where there is room
+};
+
+struct Curve {
+  std::string name;
+  std::vector<Mark> marks;
+  std::vector<double> failed = {};  // y of hollow marks at the right edge
+  std::string note = {};            // after the name, in the legend
+  bool has_steps = false;           // goes on at its height to the next mark, without marks
+};
+
+struct Chart {
+  std::string title;
+  Axis x, y;
+  std::vector<Curve> curves;
+  std::optional<double> band = {};                              // grey up to this x: nothing is known there
+  std::vector<double> slopes = {};                              // guides: y as x^(-1/slope)
+  double top = 0.0, left = 0.0, width = 440.0, height = 440.0;  // points, titles of axes outside
+};
+
+// Curves have the same colours and marks as their names in the legend, by their order.
+std::string draw(const Chart& chart);
+std::string legend(const std::vector<Curve>& curves, double left, double top);
+
+// An axis over whole decades that holds all of `values` that are finite and > 0; at least one decade.
+Axis decades(const std::string& title, const std::vector<double>& values);
+
+}  // namespace gravitas::study

@@ -1,0 +1,231 @@
+// What ladders tell, what the gate makes of them, and the program around it.
+#include "services/study/gate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include "services/run/session.h"
+#include "services/study/analysis.h"
+#include "services/study/diagram.h"
+#include "tests/services/cli/program.h"
+
+namespace gravitas::study {
+namespace {
+
+using harness::ProgramResult;
+using harness::read_file;
+using harness::run_program;
+using harness::ScratchFolder;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Steps of 0.1 that halve, errors of an order, a cost that doubles.
+v1::Ladder ladder_of(const std::string& method, double order, double cost, int rungs = 8) {
+  v1::Ladder ladder;
+  ladder.set_method(method);
+  ladder.set_climbs("TimeStep");
+  ladder.set_order(2.0);
+  for (int i = 0; i < rungs; ++i) {
+    v1::Rung* rung = ladder.add_rungs();
+    rung->set_setting(0.1 * std::pow(2.0, -i));
+    rung->set_error(std::pow(rung->setting(), order));
+    rung->set_cpu_median(cost * std::pow(2.0, i));
+    rung->set_runs(1);
+    rung->set_steps(10U << static_cast<unsigned>(i));
+  }
+  judge(1.0, 1e-15, &ladder);
+  return ladder;
+}
+
+v1::Study study_with(std::initializer_list<v1::Ladder> ladders, const std::string& name = "top") {
+  v1::Study study;
+  v1::Problem* problem = study.add_problems();
+  problem->set_name(name);
+  problem->set_duration(1.0);
+  problem->set_uncertainty(1e-15);
+  for (const v1::Ladder& ladder : ladders) *problem->add_ladders() = ladder;
+  return study;
+}
+
+TEST(StudyAnalysis, FindsTheOrderBetweenTheUselessAndRounding) {
+  EXPECT_NEAR(ladder_of("A", 2.0, 1.0).observed_order(), 2.0, 1e-12);
+  v1::Ladder ladder = ladder_of("A", 4.0, 1.0, 12);
+  ladder.mutable_rungs(0)->set_error(0.9);
+  ladder.mutable_rungs(1)->set_failed("off by more than its size");
+  for (int i = 8; i < 12; ++i) ladder.mutable_rungs(i)->set_error(2e-11);
+  judge(1.0, 1e-15, &ladder);
+  EXPECT_NEAR(ladder.observed_order(), 4.0, 1e-12);
+  EXPECT_FALSE(ladder_of("A", 2.0, 1.0, 3).has_observed_order());
+  // exact at every step: what there is is rounding
+  v1::Ladder exact = ladder_of("A", -0.5, 1.0);
+  for (v1::Rung& rung : *exact.mutable_rungs()) rung.set_error(1e-9 / std::sqrt(rung.setting()));
+  judge(1.0, 1e-15, &exact);
+  EXPECT_FALSE(exact.has_observed_order());
+}
+
+TEST(StudyAnalysis, CheapestRungThatIsGoodEnoughCounts) {
+  v1::Ladder ladder = ladder_of("A", 2.0, 1.0);
+  ASSERT_EQ(ladder.reached_size(), 2);
+  EXPECT_EQ(ladder.reached(0).error(), 1e-3);
+  EXPECT_DOUBLE_EQ(ladder.reached(0).setting(), 0.025);
+  EXPECT_DOUBLE_EQ(ladder.reached(0).cost(), 4.0);
+  ladder.mutable_rungs(2)->set_failed("it fell over");
+  judge(2.0, 1e-15, &ladder);
+  EXPECT_DOUBLE_EQ(ladder.reached(0).setting(), 0.0125);
+  EXPECT_DOUBLE_EQ(ladder.reached(0).cost(), 4.0);
+}
+
+TEST(StudyAnalysis, ProfilesCompareWithTheCheapest) {
+  v1::Study study = study_with({ladder_of("A", 2.0, 1.0), ladder_of("B", 2.0, 3.0)});
+  *study.add_problems() =
+      study_with({ladder_of("A", 2.0, 10.0), ladder_of("B", 2.0, 1.0), ladder_of("C", 0.1, 1.0)}).problems(0);
+  std::size_t problems = 0;
+  const std::vector<Profile> all = profiles(study, false, 1e-3, &problems);
+  EXPECT_EQ(problems, 2U);
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_THAT(all[0].ratios, ElementsAre(1.0, 10.0));
+  EXPECT_THAT(all[1].ratios, ElementsAre(1.0, 3.0));
+  EXPECT_THAT(all[2].ratios, IsEmpty());
+  EXPECT_DOUBLE_EQ(share_within(all[1], 2.0, problems), 0.5);
+  EXPECT_DOUBLE_EQ(share_within(all[1], 4.0, problems), 1.0);
+  EXPECT_EQ(profiles(study, true, 1e-3, &problems).size(), 0U);
+}
+
+std::vector<std::string> failures_of(v1::Study study, const Demand& demand) {
+  apply_gate({demand}, &study);
+  EXPECT_EQ(study.demands(), 1U);
+  return {study.failures().begin(), study.failures().end()};
+}
+
+TEST(StudyGate, FailsWhereOrderErrorOrWorkIsMissed) {
+  using What = Demand::What;
+  const v1::Study study = study_with({ladder_of("A", 1.7, 1.0)});
+  EXPECT_THAT(failures_of(study, {What::kOrder, "top", "A", 1.8, 2.2}),
+              ElementsAre("top, A: its observed order is 1.70; 1.8 to 2.2 is wanted"));
+  EXPECT_THAT(failures_of(study, {What::kOrder, "top", "A", 1.6, 2.0}), IsEmpty());
+  EXPECT_THAT(failures_of(study, {What::kError, "top", "A", 0.0, 1e-6}),
+              ElementsAre(HasSubstr("its best error is 5.2")));
+  EXPECT_THAT(failures_of(study, {What::kError, "top", "A", 0.0, 1e-5}), IsEmpty());
+  EXPECT_THAT(failures_of(study, {What::kEvaluations, "top", "A", 1e-3, 79.0}),
+              ElementsAre("top, A: an error of 0.001 takes 80 evaluations; at most 79 are wanted"));
+  EXPECT_THAT(failures_of(study, {What::kEvaluations, "top", "A", 1e-3, 80.0}), IsEmpty());
+  EXPECT_THAT(failures_of(study, {What::kEvaluations, "top", "A", 1e-9, 80.0}),
+              ElementsAre(HasSubstr("does not reach")));
+
+  // what was not run is not judged; a ladder that shows nothing is, unless it ran out of time
+  v1::Study other = study;
+  apply_gate({{What::kOrder, "top", "B", 1.8, 2.2}, {What::kOrder, "spin", "A", 1.8, 2.2}}, &other);
+  EXPECT_EQ(other.demands(), 0U);
+  const v1::Study few = study_with({ladder_of("A", 2.0, 1.0, 3)});
+  EXPECT_THAT(failures_of(few, {What::kOrder, "top", "A", 1.8, 2.2}), ElementsAre(HasSubstr("shows no order")));
+  v1::Study slow = few;
+  slow.mutable_problems(0)->mutable_ladders(0)->mutable_rungs(2)->set_too_long(true);
+  EXPECT_THAT(failures_of(slow, {What::kOrder, "top", "A", 1.8, 2.2}), IsEmpty());
+}
+
+TEST(StudyGate, FilesAreReadLineByLine) {
+  const ScratchFolder folder;
+  const std::string path = folder.write("gate", "# ours\nerror top A 1e-9\norder top A 1.8 2.2 # of the theory\n\n");
+  const std::vector<Demand> demands = read_demands(path);
+  ASSERT_EQ(demands.size(), 2U);
+  EXPECT_EQ(demands[0].high, 1e-9);
+  EXPECT_EQ(demands[1].low, 1.8);
+  EXPECT_EQ(demands[1].high, 2.2);
+  const auto refusal = [&](const std::string& text) {
+    try {
+      read_demands(folder.write("gate", text));
+    } catch (const BadInput& refused) {
+      return std::string(refused.what());
+    }
+    return std::string("not refused");
+  };
+  EXPECT_THAT(refusal("error top A 1\nerrors top A 1\n"),
+              AllOf(HasSubstr("gate:2: error: "), HasSubstr("did you mean \"error\"?")));
+  EXPECT_THAT(refusal("order top A 1\n"),
+              HasSubstr("gate:1: error: \"order top A 1\"; allowed: order PROBLEM METHOD and 2 numbers"));
+  EXPECT_THAT(refusal("error top A 1 2\n"), HasSubstr("and 1 number >= 0"));
+  EXPECT_THAT(refusal("# nothing\n"), HasSubstr("it demands nothing"));
+  EXPECT_GT(built_in_demands().size(), 30U);
+}
+
+// As many marks as rungs that were run in either panel, and what failed is hollow.
+TEST(StudyDiagram, ShowsEveryRun) {
+  v1::Ladder ladder = ladder_of("A", 2.0, 1.0);
+  ladder.mutable_rungs(0)->set_failed("it fell over");
+  const std::string drawing = diagram(study_with({ladder}).problems(0));
+  const auto count = [&](const std::string& part) {
+    std::size_t found = 0;
+    for (std::size_t at = drawing.find(part); at != std::string::npos; at = drawing.find(part, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<circle"), 2U * 8U + 1U);
+  EXPECT_EQ(count("fill=\"white\" stroke"), 2U);
+  EXPECT_THAT(drawing, AllOf(HasSubstr("A (1 failed)"), HasSubstr("CPU s per simulated s"), HasSubstr("0.05 s")));
+}
+
+// ---- the program
+
+TEST(StudyProgram, WritesWhatItMeasuredAndFailsByItsGate) {
+  const ScratchFolder folder;
+  const std::string out = folder.path("study");
+  const std::string gate = folder.write("gate", "error point_pendulum Smooth/RK4/Direct 1e-30\n");
+  std::vector<std::string> words = {
+      "study", "--problems", "point_pendulum,bounce", "--methods", "RK4,Continuous", "--rungs", "3", "--short",
+      "--out", out};
+  ProgramResult result = run_program(words, folder);
+  // three rungs show no order
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("point_pendulum, Smooth/RK4/Direct: its ladder shows no order"));
+  for (const char* file : {"study.csv", "STUDY.md", "point_pendulum.svg", "bounce.svg", "profile.svg"})
+    EXPECT_TRUE(std::filesystem::exists(out + "/" + file)) << file;
+  EXPECT_THAT(read_file(out + "/STUDY.md"), AllOf(HasSubstr("## bounce"), HasSubstr("Gate: the gate failed")));
+  EXPECT_THAT(read_file(out + "/study.csv"), HasSubstr("\npoint_pendulum,smooth,Smooth/RK4/Direct,TimeStep,0.25,"));
+
+  words.insert(words.end(), {"--json", "--gate", gate});
+  result = run_program(words, folder);
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("\"failures\": ["), HasSubstr("at most 1e-30 is wanted"), HasSubstr("\"demands\": 1")));
+
+  words.back() = folder.write("gate", "error point_pendulum Smooth/RK4/Direct 0.1\n");
+  EXPECT_EQ(run_program(words, folder).exit_code, 0);
+}
+
+TEST(StudyProgram, LeavesNothingBehindWhereItRefuses) {
+  const ScratchFolder folder;
+  const std::string out = folder.path("study");
+  const ProgramResult result = run_program({"study", "--methods", "RK5", "--out", out}, folder);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("did you mean RK4?"));
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_EQ(run_program({"study"}, folder).exit_code, 2);
+  EXPECT_THAT(run_program({"study", "--list"}, folder).out,
+              AllOf(HasSubstr("heavy_top"), HasSubstr("Smooth/Radau/Direct")));
+}
+
+TEST(StudyProgram, KeepsWhatItHasWhenInterrupted) {
+  const ScratchFolder folder;
+  const std::string out = folder.path("study");
+  const pid_t process = harness::start_program(
+      {"study", "--problems", "four_bar", "--methods", "Smooth/RK4/Direct", "--run-seconds", "100", "--out", out},
+      folder);
+  // it listens before it makes its files
+  for (int i = 0; i < 1000 && !std::filesystem::exists(out + "/study.csv"); ++i) usleep(10'000);
+  usleep(1'500'000);
+  kill(process, SIGINT);
+  const ProgramResult result = harness::finish_program(process, folder);
+  EXPECT_EQ(result.exit_code, 130) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("what was computed is kept"));
+  EXPECT_THAT(read_file(out + "/study.csv"), HasSubstr("\nfour_bar,smooth,Smooth/RK4/Direct,"));
+}
+
+}  // namespace
+}  // namespace gravitas::study
