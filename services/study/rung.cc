@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <stop_token>
 #include <utility>
 
@@ -226,6 +227,7 @@ kernel::EnvironmentDescription Subject::describe(const Method& method, std::uint
 v1::Rung make_rung(const Subject& subject, const Method& method, const Setting& setting, const MeasureMaker& measure,
                    const RunLimits& limits) {
   v1::Rung rung;
+  rung.set_error(std::numeric_limits<double>::quiet_NaN());
   rung.set_setting(setting.accuracy ? *setting.accuracy : subject.duration() / setting.steps);
   std::vector<double> seconds;
   const double begin = process_seconds();

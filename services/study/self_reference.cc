@@ -26,9 +26,9 @@ std::vector<Candidate> candidates(bool has_contacts) {
     for (const auto& [integrator, accuracy] : {std::pair{"DormandPrince853", 1e-12}, std::pair{"Radau", 1e-11}})
       all.push_back({{"Smooth", integrator, solver, {}, "Integrator.Accuracy"}, {1, 1}, {accuracy, 10.0 * accuracy}});
   all.push_back({{"Continuous", "Verlet", solver, {}, "Simulator.Accuracy"}, {4, 4}, {1e-10, 1e-9}});
-  all.push_back({{"Continuous", "Verlet", solver}, {1024, 512}, {}});
-  all.push_back({{"Basic", "SemiImplicitEuler", solver}, {1024, 512}, {}});
-  all.push_back({{"Basic", "SemiImplicitEuler", "Sequential"}, {64, 32}, {}});
+  all.push_back({{"Continuous", "Verlet", solver}, {512, 256}, {}});
+  all.push_back({{"Basic", "SemiImplicitEuler", solver}, {512, 256}, {}});
+  all.push_back({{"Basic", "SemiImplicitEuler", "Sequential"}, {32, 16}, {}});
   return all;
 }
 
@@ -37,7 +37,7 @@ std::vector<Candidate> candidates(bool has_contacts) {
 SelfReference find_self_reference(const Subject& subject, std::uint32_t steps, std::uint32_t look_every,
                                   const RunLimits& limits) {
   RunLimits patient = limits;
-  patient.cpu_seconds *= 8.0;
+  patient.cpu_seconds = std::max(8.0 * limits.cpu_seconds, kReferenceSeconds);
   patient.runs = 1;
   std::string why;
   for (const Candidate& one : candidates(subject.has_contacts())) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -75,7 +76,10 @@ class StudyRun {
         // what is measured before somebody interrupts is kept
         v1::Problem* result = study.add_problems();
         *result = climb->result;
-        if (!climb->measure) find_reference(climb.get(), result);
+        if (!climb->measure && !find_reference(climb.get(), result)) {
+          study.mutable_problems()->RemoveLast();
+          continue;
+        }
         for (const Method& method : climb->methods) climb_ladder(*climb, method, result);
       }
       if (options_.problems.empty() && options_.methods.empty() && options_.scenes.empty()) {
@@ -85,6 +89,10 @@ class StudyRun {
     } catch (const StudyInterrupted&) {
       study.set_is_interrupted(true);
     }
+    // the others' results are worth keeping
+    if (!without_reference_.empty() && study.problems().empty() && !study.is_interrupted())
+      throw BadInput(without_reference_.front());
+    for (const std::string& why : without_reference_) study.add_failures(why);
     return study;
   }
 
@@ -129,14 +137,22 @@ class StudyRun {
     climb->result.set_has_contacts(climb->subject.has_contacts());
   }
 
-  void find_reference(Climb* climb, v1::Problem* result) {
+  // False where there is none.
+  bool find_reference(Climb* climb, v1::Problem* result) {
     report_({done_, ladders_, result->name(), "its reference"});
-    const SelfReference reference = find_self_reference(climb->subject, climb->steps, climb->look_every, limits_);
+    SelfReference reference;
+    try {
+      reference = find_self_reference(climb->subject, climb->steps, climb->look_every, limits_);
+    } catch (const BadInput& refused) {
+      without_reference_.emplace_back(refused.what());
+      return false;
+    }
     climb->measure = [samples = reference.samples](const kernel::EnvironmentDescription&) {
       return std::make_unique<DistanceTo>(*samples);
     };
     result->set_reference(reference.text);
     result->set_uncertainty(reference.uncertainty);
+    return true;
   }
 
   void climb_ladder(const Climb& climb, const Method& method, v1::Problem* result) {
@@ -154,6 +170,7 @@ class StudyRun {
         if (rung.too_long()) too_long = "not run: a coarser one took too long";
       } else {
         rung.set_setting(setting.accuracy ? *setting.accuracy : climb.subject.duration() / setting.steps);
+        rung.set_error(std::numeric_limits<double>::quiet_NaN());
         rung.set_failed(too_long);
         rung.set_too_long(true);
       }
@@ -183,6 +200,7 @@ class StudyRun {
   RunLimits limits_;
   const std::function<void(const Progress&)>& report_;
   std::vector<std::unique_ptr<Climb>> climbs_;
+  std::vector<std::string> without_reference_;  // scenes, and why
   std::size_t done_ = 0, ladders_ = 0;
 };
 

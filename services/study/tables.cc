@@ -160,9 +160,11 @@ std::string csv(const v1::Study& study) {
   for (const v1::Problem& problem : study.problems())
     for (const v1::Ladder& ladder : problem.ladders())
       for (const v1::Rung& rung : ladder.rungs()) {
-        text += fmt::format("{},{},{},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.4g},{:.4g},{},{:.17g},",
+        // of a run that did not come to its end there is none
+        const std::string error = std::isfinite(rung.error()) ? fmt::format("{:.17g}", rung.error()) : "";
+        text += fmt::format("{},{},{},{},{:.17g},{},{:.17g},{:.17g},{:.17g},{:.4g},{:.4g},{},{:.17g},",
                             csv_quoted(problem.name()), problem.family(), ladder.method(), ladder.climbs(),
-                            rung.setting(), rung.error(), rung.energy_drift(), rung.joint_error(), rung.penetration(),
+                            rung.setting(), error, rung.energy_drift(), rung.joint_error(), rung.penetration(),
                             rung.cpu_min(), rung.cpu_median(), rung.runs(), problem.duration());
         text += fmt::format("{},{},{},{:.0f},{},{},{}\n", rung.steps(), rung.derivatives(), rung.iterations(),
                             evaluations(rung), csv_quoted(rung.failed()), csv_quoted(study.build()),
